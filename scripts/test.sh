@@ -191,7 +191,7 @@ phase "lints" cargo clippy --workspace --all-targets -- -D warnings
 phase "docs, warnings denied" docs
 phase "dependencies" dependencies
 phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
-phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu --lib
+phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu,figures --lib
 if $all; then
     phase "the program on Windows" cargo check --target "$windows" -p rattlemap
     phase "the program on macOS" cargo check --target "$macos" -p rattlemap

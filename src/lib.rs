@@ -62,7 +62,7 @@ pub mod validate;
 #[cfg(feature = "figures")]
 pub mod show;
 
-#[cfg(feature = "figures")]
+#[cfg(feature = "files")]
 pub mod store;
 
 pub mod job;

@@ -21,7 +21,7 @@ use rattlemap::model::GearPair;
 use rattlemap::record::Record;
 use rattlemap::store::error::OutputError;
 use rattlemap::store::folder::{Folder, FolderError};
-use rattlemap::store::map::{Made, Run};
+use rattlemap::store::map::{Provenance, Run};
 use rattlemap::store::merge::{MergeError, Parts};
 use rattlemap::store::record_file::{Identity, RECORDS, RecordFile, RecordFileError};
 use rattlemap::store::shard::{self, FinishedShard, Tally};
@@ -131,7 +131,7 @@ pub fn write_shards(ask: Ask, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Taken>), 
                 file.append(&batch)?;
                 tally.take(&plan, &batch);
             }
-            let made = Made { engine: "cpu", precision: "f64", device: "event-driven reference" };
+            let made = Provenance { engine: "cpu", precision: "f64", device: "event-driven reference" };
             let run = Run::new(made, &[], "none: the records are made up");
             shard::write(
                 &folder,

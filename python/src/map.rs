@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rattlemap::store::in_memory;
-use rattlemap::store::in_memory::Colors;
+use rattlemap::store::in_memory::{self, SharedColors};
 
 use crate::arrays::columns;
 use crate::engines::{Out, Task, request};
@@ -77,7 +76,7 @@ type Rgb = (u8, u8, u8);
 /// Returns the colours of the program's figures: by name, and in the order of items without a name.
 #[pyfunction]
 pub(crate) fn colors() -> (BTreeMap<&'static str, Rgb>, Vec<Rgb>) {
-    let Colors { named, in_a_row } = in_memory::colors();
+    let SharedColors { named, in_a_row } = in_memory::colors();
     let parts = |[red, green, blue]: [u8; 3]| (red, green, blue);
     (
         named.into_iter().map(|(name, color)| (name, parts(color))).collect(),

@@ -25,8 +25,8 @@ pub(crate) struct Orbit {
 #[pymethods]
 impl Orbit {
     /// The JSON object that `orbit --json` prints.
-    fn json(&self) -> Result<String, Problem> {
-        Ok(store::orbit::json(&*self.model, &self.orbit, None)?)
+    fn json(&self) -> String {
+        store::orbit::json(&*self.model, &self.orbit, None)
     }
 
     /// Number of forcing periods that the events span.

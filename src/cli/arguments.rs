@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use crate::cli::say;
 use crate::gpu::Precision;
 use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
-use crate::map::printable::is_printable;
+use crate::text::printable::is_printable;
 use crate::map::scene::{Along, Format};
 use crate::map::shard::Shard;
 use crate::model_file::DEFAULT as DEFAULT_MODEL;

@@ -11,35 +11,35 @@ use super::interrupt::Interrupt;
 use super::say::{self, Console};
 use super::stdout::print_json;
 use crate::findings::compare::{Comparison, Kind, Tally};
-use crate::job::compare::MapPair;
+use crate::job::compare::CompareJob;
 use crate::map::scene::Scene;
 use crate::store;
-use crate::store::compare::Compared;
+use crate::show::map_pair::MapPair;
 use crate::store::folder::Folder;
 
 /// Reads both maps, compares, writes.
 pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let clock = Instant::now();
     let interrupt = Interrupt::listen(arguments.quiet)?;
-    let pair = MapPair::open([&arguments.a, &arguments.b])?;
-    let out = arguments.out(pair.names());
-    pair.check_output(&out)?;
+    let job = CompareJob::open([&arguments.a, &arguments.b])?;
+    let out = arguments.out(job.names());
+    job.check_output(&out)?;
     let folder = Folder::open(&out, arguments.force)?;
     folder.refuse_links(store::compare::names())?;
     interrupt.wait_for(Some("the maps are read"));
-    let result = pair.compare(&Console::new(arguments.quiet, "", false), interrupt.raised())?;
+    let result = job.compare(&Console::new(arguments.quiet, "", false), interrupt.raised())?;
     let stopped = || interrupt.failure(format!("interrupted, and nothing was written to {}", out.display()));
     let Some(result) = result.filter(|_| interrupt.wait_for(None)) else { return Err(stopped()) };
     let cells = result.cells();
-    let compared = result.compared(&cells);
+    let pair = result.pair(&cells);
     let formats = FigureFormat::scene(&arguments.format);
-    let files = store::compare::write(&folder, &compared, &formats, clock.elapsed())?;
+    let files = store::compare::write(&folder, &pair, &formats, clock.elapsed())?;
     if !arguments.quiet {
         let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
-        say::notes(format_args!("{}\n{files}", summary(&compared, pair.scene())));
+        say::notes(format_args!("{}\n{files}", summary(&pair, job.scene())));
     }
     if arguments.json {
-        print_json(&store::compare::object(folder.path(), &files, &compared))?;
+        print_json(&store::compare::object(folder.path(), &files, &pair))?;
     }
     let (differing, count) = (result.comparison.differing(), result.comparison.kinds.len());
     match arguments.fail && differing > 0 {
@@ -56,15 +56,15 @@ impl Compare {
 }
 
 /// The differences of scenes, engines, classes and periods, then of cells that agree in both.
-fn summary(compared: &Compared<'_>, scene: &Scene) -> String {
-    let Compared { sides, comparison } = compared;
+fn summary(maps: &MapPair<'_>, scene: &Scene) -> String {
+    let MapPair { sides, comparison } = maps;
     let (differing, cells) = (comparison.differing(), comparison.kinds.len());
-    let differences = compared.scene_differences();
+    let differences = maps.scene_differences();
     let mut lines: Vec<String> = differences
         .iter()
         .map(|found| say::quoted(format_args!("{}: {} in A, {} in B", found.name, found.a, found.b)))
         .collect();
-    let [a, b] = sides.map(|side| say::quoted(format_args!("{} {}", side.made.engine, side.made.precision)));
+    let [a, b] = sides.map(|side| say::quoted(format_args!("{} {}", side.provenance.engine, side.provenance.precision)));
     if a != b {
         lines.push(format!("engine: {a} in A, {b} in B"));
     }
@@ -78,7 +78,7 @@ fn summary(compared: &Compared<'_>, scene: &Scene) -> String {
         ),
     });
     lines.extend(
-        compared.transitions().iter().map(|pair| format!("{} in A, {} in B: {}", pair.a, pair.b, pair.cells)),
+        maps.transitions().iter().map(|pair| format!("{} in A, {} in B: {}", pair.a, pair.b, pair.cells)),
     );
     lines.extend(other_differences(comparison, scene));
     lines.join("\n")

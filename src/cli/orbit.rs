@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let (shown, halt) = (orbit::EVENT_PERIODS, interrupt.raised());
     let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(stopped)?;
     print(&match arguments.json {
-        true => store::orbit::json(&*model, &orbit, instant)?,
+        true => store::orbit::json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),
     })?;
     let failed = orbit.class == Class::Failed;

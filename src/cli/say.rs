@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use crate::cli::progress::Progress;
 use crate::job::observer::Observer;
-use crate::map::printable;
+use crate::text::printable;
 
 /// Prints a line on stderr; line feeds in it are escaped. If stderr is closed or full, the line is dropped and the run
 /// continues.

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write, stdout};
 use serde::Serialize;
 
 use crate::cli::failure::Failure;
-use crate::map::printable;
+use crate::text::printable;
 use anyhow::{Context, anyhow};
 
 /// Prints lines to stdout. Characters that a terminal would interpret are escaped: see [`printable`].

@@ -1,16 +1,16 @@
 //! Basins of attraction: the attractor to which each start of a map leads.
 //!
-//! Contact-free motion is one attractor, even if a run has not reached it yet. Periodic starts are distinguished by their
-//! cycles, which Newton's method finds on the reference ([`catalogue`]); symmetry-conjugate orbits are different
-//! attractors. All chaotic starts share one attractor, because records do not distinguish chaotic attractors. Undecided and
-//! failed starts have none.
+//! Contact-free motion is one attractor, even if a run has not reached it yet. Periodic starts are distinguished by
+//! their cycles, which Newton's method finds on the reference ([`catalogue`]); symmetry-conjugate orbits are different
+//! attractors. All chaotic starts share one attractor, because records do not distinguish chaotic attractors. Undecided
+//! and failed starts have none.
 //!
-//! Attractors are numbered by decreasing share; equal shares are ordered by period, then by strobe state. The result depends
-//! only on the records, not on their order.
+//! Attractors are numbered by decreasing share; equal shares are ordered by period, then by strobe state. The result
+//! depends only on the records, not on their order.
 //!
-//! If one axis sweeps a parameter, each of its values has attractors of its own. An attractor continues at the next value as
-//! the nearest cycle of the same period within a relative distance of [`CONTINUATION`]. Otherwise it ends there, and the
-//! remaining cycles of the next value are new attractors.
+//! If one axis sweeps a parameter, each of its values has attractors of its own. An attractor continues at the next
+//! value as the nearest cycle of the same period within a relative distance of [`CONTINUATION`]. Otherwise it ends
+//! there, and the remaining cycles of the next value are new attractors.
 
 use rayon::prelude::*;
 
@@ -49,8 +49,8 @@ pub struct Attractor {
     pub symmetric: Option<bool>,
     /// Number of cells in the basin.
     pub cells: usize,
-    /// A cell of the basin. If a parameter is swept, strobe state, word, exponent, multiplier and symmetry are those at this
-    /// cell.
+    /// A cell of the basin. If a parameter is swept, strobe state, word, exponent, multiplier and symmetry are those at
+    /// this cell.
     pub cell: usize,
 }
 
@@ -105,8 +105,8 @@ impl Grouping {
     }
 }
 
-/// Labels the cells of a map of basins; returns none for other maps. `filled_from` has for every cell the cell from which it
-/// was filled, itself if it was integrated; empty if all were integrated.
+/// Labels the cells of a map of basins; returns none for other maps. `filled_from` has for every cell the cell from
+/// which it was filled, itself if it was integrated; empty if all were integrated.
 ///
 /// # Panics
 /// If the number of records is not that of the cells.
@@ -193,8 +193,8 @@ impl Basins {
         &self.list
     }
 
-    /// Returns the label of the attractor that another record of the cell `id` shows; none if the record is undecided or shows
-    /// none of the map's attractors.
+    /// Returns the label of the attractor that another record of the cell `id` shows; none if the record is undecided
+    /// or shows none of the map's attractors.
     pub fn label(&self, id: usize, record: &Record) -> Option<u16> {
         let group = &self.groups[self.grouping.group(id)];
         match classify(record) {

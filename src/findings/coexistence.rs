@@ -1,14 +1,14 @@
 //! Coexistence: the number of attractors that the starts of a cell reach.
 //!
 //! Two periodic runs have one attractor if the last strobe state of one is on the cycle of the other, within a relative
-//! distance of [`CYCLE_TOLERANCE`](crate::map::cycle::CYCLE_TOLERANCE), and if one period divides the other. Near a period
-//! doubling, rounding can turn a period into a multiple. Newton's method finds the cycle that an unsettled run approaches.
-//! Symmetry-conjugate orbits count as one attractor, because they always coexist after a symmetric cycle has split.
-//! Contact-free motion is one attractor, even if a run has not reached it yet. All chaotic runs share one attractor, because
-//! records do not distinguish chaotic attractors. Undecided and failed runs are ignored.
+//! distance of [`CYCLE_TOLERANCE`](crate::map::cycle::CYCLE_TOLERANCE), and if one period divides the other. Near a
+//! period doubling, rounding can turn a period into a multiple. Newton's method finds the cycle that an unsettled run
+//! approaches. Symmetry-conjugate orbits count as one attractor, because they always coexist after a symmetric cycle
+//! has split. Contact-free motion is one attractor, even if a run has not reached it yet. All chaotic runs share one
+//! attractor, because records do not distinguish chaotic attractors. Undecided and failed runs are ignored.
 //!
-//! The number is a lower bound, with one exception: a chaotic transient longer than the budget counts as chaos, in addition
-//! to the cycle that it reaches later.
+//! The number is a lower bound, with one exception: a chaotic transient longer than the budget counts as chaos, in
+//! addition to the cycle that it reaches later.
 
 use rayon::prelude::*;
 
@@ -35,7 +35,7 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     let count = |id: usize| {
         let runs = (id..records.count()).step_by(cells);
         let cell = plan.cell(id as u32);
-        let mut found = CellAttractors::new(plan.law(cell.law));
+        let mut found = CellAttractors { law: plan.law(cell.law), chaos: false, cycles: Vec::new() };
         flows.with(cell.flow, |flow| runs.for_each(|run| found.take(flow, &records.record(run))));
         found.count()
     };
@@ -50,10 +50,6 @@ struct CellAttractors {
 }
 
 impl CellAttractors {
-    fn new(law: Law) -> CellAttractors {
-        CellAttractors { law, chaos: false, cycles: Vec::new() }
-    }
-
     fn count(&self) -> u8 {
         (self.cycles.len() + usize::from(self.chaos)) as u8
     }

@@ -1,8 +1,8 @@
 //! Comparison of two maps of one grid, cell by cell. Pure.
 //!
-//! It shows hysteresis between maps with policies up and down, and differences between engines or versions. Cells differ by
-//! class or period; cells that agree in both can still differ by pattern. Symmetry, words and exponents of cycles of one
-//! period are counted separately.
+//! It shows hysteresis between maps with policies up and down, and differences between engines or versions. Cells
+//! differ by class or period; cells that agree in both can still differ by pattern. Symmetry, words and exponents of
+//! cycles of one period are counted separately.
 
 use crate::record::classify::classify;
 use crate::record::distance::apart;
@@ -84,8 +84,8 @@ pub struct Comparison {
     pub kinds: Vec<Option<Kind>>,
     /// Symmetry of cycles of one period.
     pub symmetric: Tally,
-    /// Words of cycles of one period. The words of an orbit and of its mirror image count as equal, because small changes of
-    /// the start decide between the two.
+    /// Words of cycles of one period. The words of an orbit and of its mirror image count as equal, because small
+    /// changes of the start decide between the two.
     pub words: Tally,
     /// Patterns of cycles of one period, compared like words.
     pub patterns: Tally,

@@ -13,11 +13,11 @@ const SINGLE_TOLERANCE: f64 = 1e-3;
 /// Relative tolerance for rounding errors of engines in double precision.
 const DOUBLE_TOLERANCE: f64 = 1e-6;
 
-/// Returns the names of the swept parameters along whose axis all integrated cells are equal within rounding errors. The
-/// tolerance depends on `precision`: `f64`, else single.
+/// Returns the names of the swept parameters along whose axis all integrated cells are equal within rounding errors.
+/// The tolerance depends on `precision`: `f64`, else single.
 ///
-/// Filled cells are ignored. The result is empty if cells start from their neighbours, because then more than the parameter
-/// changes along an axis, and for a list, which has no axes.
+/// Filled cells are ignored. The result is empty if cells start from their neighbours, because then more than the
+/// parameter changes along an axis, and for a list, which has no axes.
 ///
 /// # Panics
 /// If the number of records is not that of the runs.

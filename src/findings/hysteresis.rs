@@ -12,8 +12,8 @@ pub struct Hysteresis {
     pub differing: usize,
     /// First and last value of each range of neighbouring values at which class or period differ.
     pub ranges: Vec<[f64; 2]>,
-    /// Number of values at which only the patterns differ, for example if one direction leads to contact-free motion and the
-    /// other to rattling. The patterns of an orbit and of its mirror image count as equal.
+    /// Number of values at which only the patterns differ, for example if one direction leads to contact-free motion
+    /// and the other to rattling. The patterns of an orbit and of its mirror image count as equal.
     pub by_pattern: usize,
     /// First and last value of each range of neighbouring values at which only the patterns differ.
     pub pattern_ranges: Vec<[f64; 2]>,

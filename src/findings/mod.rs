@@ -1,5 +1,5 @@
-//! What the records of a map show together: attractors and their basins, coexistence, hysteresis, differences between
-//! two maps, and parameters without effect.
+//! Results that need all records of a map, or of several maps: attractors and their basins, coexistence, hysteresis,
+//! differences between two maps, and parameters without effect.
 
 pub mod attractors;
 pub mod coexistence;

@@ -233,7 +233,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_adapter_by_two_interfaces_is_taken_by_the_better() {
+    fn the_better_interface_to_an_adapter_comes_first() {
         let with = wgpu::AdapterInfo::new;
         let (dedicated, software) = (wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::Cpu);
         let in_order = [
@@ -247,7 +247,7 @@ mod tests {
         assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:?}");
     }
     #[test]
-    fn equal_cards_are_numbered_by_their_place_on_the_bus() {
+    fn equal_cards_are_ordered_by_pci_address() {
         let at = |pci: &str, device_type| wgpu::AdapterInfo {
             device_pci_bus_id: pci.to_owned(),
             ..wgpu::AdapterInfo::new(device_type, wgpu::Backend::Vulkan)

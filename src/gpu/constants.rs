@@ -304,7 +304,7 @@ mod tests {
 
     /// Underdamped, overdamped by the teeth, and overdamped by a support.
     #[test]
-    fn no_mode_turns_or_decays_by_more_than_a_step() {
+    fn the_fastest_mode_turns_by_at_most_a_radian_per_step() {
         let paper = GearPair::paper(0.5);
         for pair in [paper, GearPair { r: 450.0, k: 2.4, ..paper }, GearPair { r1: 70.0, ..paper }] {
             let constants = Constants::new(&pair.oscillator().unwrap(), None).unwrap();

@@ -248,7 +248,7 @@ mod tests {
     use rattlemap_dynamics::model::GearPair;
 
     #[test]
-    fn what_lies_together_is_sent_together() {
+    fn adjacent_slots_are_uploaded_together() {
         let far = WIDEST_GAP + 10;
         assert_eq!(stretches([3, 4, 9, 9 * far].into_iter()), [3..10, 9 * far..9 * far + 1]);
         assert_eq!(
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_device_is_an_error_that_says_so() {
+    fn a_lost_device_is_an_error() {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
         gpu.device.destroy();
         let pair = GearPair::paper(0.5);

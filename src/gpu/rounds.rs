@@ -250,7 +250,7 @@ mod tests {
     const ROUND: Duration = Duration::from_millis(100);
 
     #[test]
-    fn rounds_tend_to_their_length() {
+    fn rounds_approach_their_desired_duration() {
         // 0.3 ms per iteration. The duration of a round is known when the next one already runs.
         let (mut under_way, mut iterations) = (1000, 1000);
         for _ in 0..20 {

@@ -12,29 +12,29 @@ use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
 use crate::record::Record;
 use crate::show::cells::{Cells, Survey};
-use crate::store::compare::{Compared, MapSide};
+use crate::show::map_pair::{MapPair, MapSide};
 use crate::store::finished_map::{FinishedMap, StoredManifest};
-use crate::store::map::Made;
+use crate::store::map::Provenance;
 
 /// Two finished maps that can be compared.
-pub struct MapPair<'a> {
+pub struct CompareJob<'a> {
     dirs: [&'a Path; 2],
     names: [String; 2],
     maps: [FinishedMap; 2],
     scenes: [Scene; 2],
 }
 
-impl<'a> MapPair<'a> {
+impl<'a> CompareJob<'a> {
     /// Reads the manifests and scenes of two folders, and checks that they have classes and the same cells.
     ///
     /// # Errors
     /// [`JobError`] if a folder is not a finished map's, or the maps cannot be compared.
-    pub fn open(dirs: [&'a Path; 2]) -> Result<MapPair<'a>, JobError> {
+    pub fn open(dirs: [&'a Path; 2]) -> Result<CompareJob<'a>, JobError> {
         let maps = [FinishedMap::open(dirs[0])?, FinishedMap::open(dirs[1])?];
         let scenes = [finished::scene(&maps[0])?, finished::scene(&maps[1])?];
         require_classes(dirs, &scenes)?;
         require_same_cells(dirs, &scenes)?;
-        Ok(MapPair { dirs, names: dirs.map(folder_name), maps, scenes })
+        Ok(CompareJob { dirs, names: dirs.map(folder_name), maps, scenes })
     }
 
     /// Names of the two folders.
@@ -94,13 +94,13 @@ impl<'a> MapPair<'a> {
         });
         let comparison = compare::compare(a, b);
         let surveys = loaded.each_mut().map(|map| Survey::of_refinement(map.stored.refined.take()));
-        Ok(Some(MapComparison { pair: self, loaded, surveys, comparison }))
+        Ok(Some(MapComparison { job: self, loaded, surveys, comparison }))
     }
 }
 
 /// Two finished maps, and the cells in which they differ.
 pub struct MapComparison<'a> {
-    pair: &'a MapPair<'a>,
+    job: &'a CompareJob<'a>,
     loaded: [LoadedMap; 2],
     surveys: [Survey; 2],
     /// Differences by cell.
@@ -108,25 +108,25 @@ pub struct MapComparison<'a> {
 }
 
 impl MapComparison<'_> {
-    /// The cells of both maps, for [`MapComparison::compared`].
+    /// The cells of both maps, for [`MapComparison::pair`].
     pub fn cells(&self) -> [Cells<'_>; 2] {
-        [0, 1].map(|i| self.loaded[i].cells(&self.pair.scenes[i], &self.surveys[i]))
+        [0, 1].map(|i| self.loaded[i].cells(&self.job.scenes[i], &self.surveys[i]))
     }
 
     /// The comparison, for tables and figures.
-    pub fn compared<'a>(&'a self, cells: &'a [Cells<'a>; 2]) -> Compared<'a> {
+    pub fn pair<'a>(&'a self, cells: &'a [Cells<'a>; 2]) -> MapPair<'a> {
         let sides = [0, 1].map(|i| {
             let StoredManifest { engine, precision, device, crate_version, commit, .. } =
-                self.pair.maps[i].manifest();
+                self.job.maps[i].manifest();
             MapSide {
-                name: &self.pair.names[i],
+                name: &self.job.names[i],
                 cells: &cells[i],
-                made: Made { engine, precision, device },
+                provenance: Provenance { engine, precision, device },
                 crate_version,
                 commit,
             }
         });
-        Compared { sides, comparison: &self.comparison }
+        MapPair { sides, comparison: &self.comparison }
     }
 }
 

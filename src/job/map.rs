@@ -27,7 +27,7 @@ use crate::store::finished_map::FinishedMap;
 use crate::store::folder::Folder;
 use crate::store::in_memory;
 use crate::store::inventory::{self, Finding};
-use crate::store::map::{Made, Run};
+use crate::store::map::{Provenance, Run};
 use crate::store::record_file::{Identity, RECORDS};
 use crate::store::run_records::{RunRecords, Work};
 use crate::store::shard::{self, FinishedShard};
@@ -293,13 +293,14 @@ impl<'p> MapRun<'p> {
     /// Describes the run for manifests.
     pub fn description(&self) -> Run<'_> {
         let OpenMap { job, engine, opening, .. } = &self.open;
-        let made = Made { engine: engine.name(), precision: engine.precision(), device: &self.device };
+        let provenance =
+            Provenance { engine: engine.name(), precision: engine.precision(), device: &self.device };
         Run {
             opening: *opening,
             elapsed: self.elapsed,
             elapsed_before: self.records.as_ref().map_or(Duration::ZERO, RunRecords::elapsed_before),
             resumed_cells: self.resumed(),
-            ..Run::new(made, job.sets, &self.processor).on(engine)
+            ..Run::new(provenance, job.sets, &self.processor).on(engine)
         }
     }
 

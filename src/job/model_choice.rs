@@ -6,7 +6,7 @@ use rattlemap_dynamics::model::Model;
 
 use crate::job::error::JobError;
 use crate::job::scene_file;
-use crate::map::printable;
+use crate::text::printable;
 use crate::model_file::{BUILT_IN, FileModel};
 
 /// Parts of file names. Names of built-in models contain none of them.

@@ -16,7 +16,7 @@ use crate::show::cells::Survey;
 use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::inventory::Finding;
-use crate::store::map::{self, MANIFEST, Made, VALIDATION};
+use crate::store::map::{self, MANIFEST, Provenance, VALIDATION};
 use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
 
 /// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
@@ -155,8 +155,8 @@ impl ValidateJob {
     ) -> Result<Vec<&'static str>, JobError> {
         let cells = self.loaded.cells(&self.scene, &self.survey);
         let StoredManifest { engine, precision, device, .. } = self.map.manifest();
-        let made = Made { engine, precision, device };
-        Ok(map::write_validation(&self.folder, &cells, &made, lanes.device(), validation, elapsed)?)
+        let provenance = Provenance { engine, precision, device };
+        Ok(map::write_validation(&self.folder, &cells, &provenance, lanes.device(), validation, elapsed)?)
     }
 
     /// Checks that the map is valid, and that no file of the folder is damaged or missing but for the `written` ones.

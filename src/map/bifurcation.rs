@@ -100,8 +100,8 @@ pub fn column_count(cells: usize, start: Start) -> usize {
     if start == Start::Both { 2 * cells } else { cells }
 }
 
-/// Integrates every cell and calls `progress` with the number of finished columns. Returns none if `halt` was raised before
-/// the last column ended.
+/// Integrates every cell and calls `progress` with the number of finished columns. Returns none if `halt` was raised
+/// before the last column ended.
 ///
 /// Columns that start from one state are independent and run in parallel. Columns that follow the attractor run one
 /// after the other, the first of them from rest. With [`Start::Both`] there are two columns per cell, those followed
@@ -172,7 +172,8 @@ impl Run<'_> {
         Ok(columns)
     }
 
-    /// Computes one column, and a state on its attractor from which the next column can start; none after `halt` is raised.
+    /// Computes one column, and a state on its attractor from which the next column can start; none after `halt` is
+    /// raised.
     fn column(
         &self,
         value: f64,

@@ -1,8 +1,8 @@
 //! The catalogue of cycles of one oscillator, built from records.
 //!
-//! A record within [`SETTLED_TOLERANCE`] of a known cycle belongs to it. From any other record, Newton's method finds the
-//! cycle that the motion approaches; two cycles within the same tolerance are one. So the result does not depend on the
-//! order of the records.
+//! A record within [`SETTLED_TOLERANCE`] of a known cycle belongs to it. From any other record, Newton's method finds
+//! the cycle that the motion approaches; two cycles within the same tolerance are one. So the result does not depend on
+//! the order of the records.
 
 use rayon::prelude::*;
 
@@ -13,8 +13,8 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, NonImpacting, State};
 use rattlemap_dynamics::orbit::Class;
 
-/// Relative distance within which a state belongs to a cycle without further search. Settled lanes in single precision are
-/// closer to their cycle.
+/// Relative distance within which a state belongs to a cycle without further search. Settled lanes in single precision
+/// are closer to their cycle.
 const SETTLED_TOLERANCE: f64 = 1e-4;
 
 /// Relative distance within which a cycle counts as closed after fewer periods.
@@ -70,7 +70,8 @@ impl Catalogue {
         &self.cycles
     }
 
-    /// Identifies the motions of `count` records and adds new cycles to the catalogue. `record` returns a record by index.
+    /// Identifies the motions of `count` records and adds new cycles to the catalogue. `record` returns a record by
+    /// index.
     pub(crate) fn learn(
         &mut self,
         flow: &Flow,

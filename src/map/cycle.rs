@@ -10,8 +10,8 @@ use rattlemap_dynamics::stability::{StrobeMap, refine};
 /// approaches its cycle slowly.
 pub const CYCLE_TOLERANCE: f64 = 3e-2;
 
-/// Relative distance within which a cycle found by Newton's method is the one that a run approaches. It is twice as large
-/// because engines measure distances relative to the whole motion.
+/// Relative distance within which a cycle found by Newton's method is the one that a run approaches. It is twice as
+/// large because engines measure distances relative to the whole motion.
 const REFINEMENT_TOLERANCE: f64 = 2.0 * CYCLE_TOLERANCE;
 
 /// A periodic motion.
@@ -30,7 +30,8 @@ pub(crate) struct StrobeCycle {
 }
 
 impl StrobeCycle {
-    /// Returns the cycle that a run approaches, found by Newton's method; without success the motion from its last state.
+    /// Returns the cycle that a run approaches, found by Newton's method; without success the motion from its last
+    /// state.
     pub(crate) fn from(flow: &Flow, law: Law, strobe: State, period: u32) -> StrobeCycle {
         StrobeCycle::refined(flow, law, strobe, period)
             .unwrap_or_else(|| StrobeCycle::through(flow, law, strobe, period))
@@ -97,8 +98,8 @@ impl StrobeCycle {
         self.period.is_multiple_of(period) || period.is_multiple_of(self.period)
     }
 
-    /// Returns the units of displacements and velocities: the largest of the motion, but at least the scale of length and
-    /// the corresponding velocity.
+    /// Returns the units of displacements and velocities: the largest of the motion, but at least the scale of length
+    /// and the corresponding velocity.
     pub(crate) fn units(&self, flow: &Flow) -> [f64; 2] {
         let all = || self.points.iter().copied().chain(self.mirrored());
         let largest = |i: usize, j: usize| all().flat_map(|y| [y[i].abs(), y[j].abs()]).fold(0.0, f64::max);
@@ -130,10 +131,12 @@ mod tests {
         assert!(through(state).passes(&flow, &state, 1));
         for i in 0..4 {
             for value in [f64::NAN, f64::INFINITY] {
-                let mut lost = state;
-                lost[i] = value;
-                assert!(!through(state).passes(&flow, &lost, 1) && !through(lost).passes(&flow, &state, 1));
-                assert!(!through(lost).passes(&flow, &lost, 1), "{i}: {value}");
+                let mut broken = state;
+                broken[i] = value;
+                assert!(
+                    !through(state).passes(&flow, &broken, 1) && !through(broken).passes(&flow, &state, 1)
+                );
+                assert!(!through(broken).passes(&flow, &broken, 1), "{i}: {value}");
             }
         }
     }

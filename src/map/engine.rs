@@ -1,7 +1,8 @@
 //! Engines compute the cells of a plan.
 //!
 //! An [`Engine`] accepts cells at any time and returns one record for each, in any order. A record depends on its cell,
-//! its start and the plan only. It does not depend on other cells under way, on neighbours, or on the number of threads.
+//! its start and the plan only. It does not depend on other cells under way, on neighbours, or on the number of
+//! threads.
 
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 mod cards;
@@ -10,6 +11,7 @@ mod fake;
 mod flows;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod requested;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -19,13 +21,15 @@ use thiserror::Error;
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 pub use cards::Cards;
 pub use cpu::Cpu;
-pub use cpu::record as measured_record;
 pub use fake::Fake;
 pub(crate) use flows::Flows;
 #[cfg(feature = "gpu")]
 pub use gpu::Gpu;
 #[cfg(feature = "gpu")]
-pub(crate) use gpu::{drop_unrequested, lane_settings};
+pub(crate) use gpu::lane_settings;
+#[cfg(feature = "gpu")]
+pub(crate) use requested::drop_unrequested;
+pub use requested::measured_record;
 
 #[cfg(feature = "gpu")]
 use crate::gpu::AdapterId;
@@ -232,7 +236,8 @@ impl Engine<'_> {
         self.properties().room()
     }
 
-    /// Sets the flag that stops the engine: while it is raised, [`Engine::advance`] soon returns the cells that have ended.
+    /// Sets the flag that stops the engine: while it is raised, [`Engine::advance`] soon returns the cells that have
+    /// ended.
     pub fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
         let engine: &mut dyn Device = match self {
             Engine::Cpu(cpu) => cpu,

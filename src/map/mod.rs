@@ -1,9 +1,8 @@
 //! Maps: many motions, one for each cell of a parameter plane.
 //!
 //! A scene defines the map ([`scene`]); a plan numbers its cells ([`plan`]); a schedule orders them ([`schedule`]); an
-//! engine computes their records ([`engine`], [`sweep`]). A scene over one axis is a bifurcation diagram ([`bifurcation`]).
-
-pub use crate::text::{expression, printable};
+//! engine computes their records ([`engine`], [`sweep`]). A scene over one axis is a bifurcation diagram
+//! ([`bifurcation`]).
 
 pub mod random;
 pub(crate) mod statistics;

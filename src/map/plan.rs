@@ -29,8 +29,8 @@ use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Class};
 use start::Starts;
 
-/// Largest number of flows that engines store for all batches: less than 1 GB, unless the motion needs thousands of steps
-/// per forcing period.
+/// Largest number of flows that engines store for all batches: less than 1 GB, unless the motion needs thousands of
+/// steps per forcing period.
 const MOST_STORED_FLOWS: usize = 8_192;
 
 /// A run of a cell: indices of its flow and its law in the plan, and its start.
@@ -146,8 +146,8 @@ impl Plan {
         }
     }
 
-    /// Checks that the model has a motion in every cell. For a model like the gear pair, only overflow or a derived parameter
-    /// outside its range can prevent it.
+    /// Checks that the model has a motion in every cell. For a model like the gear pair, only overflow or a derived
+    /// parameter outside its range can prevent it.
     ///
     /// # Errors
     /// [`NoMotion`] for one of the cells without motion.
@@ -250,8 +250,8 @@ impl Plan {
         self.start_count() > 1 || self.is_basin() || self.policy().follows()
     }
 
-    /// Returns the state of the run `id` at phase 0. If cells follow their neighbours, it is the neighbour's last strobe state
-    /// from `records`, or rest if the neighbour failed or has no record yet.
+    /// Returns the state of the run `id` at phase 0. If cells follow their neighbours, it is the neighbour's last
+    /// strobe state from `records`, or rest if the neighbour failed or has no record yet.
     pub fn start(&self, id: u32, records: &(impl Records + ?Sized)) -> State {
         let of = |before: u32| {
             let before = before as usize;
@@ -268,7 +268,7 @@ impl Plan {
         let nth = id as usize / self.cell_count();
         match nth {
             0 => self.points.start(id as usize, self.starts.first()),
-            _ => self.starts.drawn(nth, &self.oscillator(self.flow_of(id))),
+            _ => self.starts.random(nth, &self.oscillator(self.flow_of(id))),
         }
     }
 
@@ -278,9 +278,9 @@ impl Plan {
     }
 
     /// Whether records can be results of this plan. Periods longer than the longest search show damaged records.
-    pub fn admits(&self, kept: &[(u32, Record)]) -> bool {
+    pub fn admits(&self, batch: &[(u32, Record)]) -> bool {
         let longest = self.budget.settings.max_period.max(1);
-        kept.iter().all(|(_, record)| record.period <= longest)
+        batch.iter().all(|(_, record)| record.period <= longest)
     }
 
     /// Returns the smallest resolution of the lanes' time grid.
@@ -303,8 +303,8 @@ impl Plan {
         self.points.indices(id as usize % self.cell_count())
     }
 
-    /// Returns flow, law and start of the run `id`. The start of a run that follows its neighbour is rest here; the actual
-    /// start depends on the neighbour's record ([`Plan::start`]).
+    /// Returns flow, law and start of the run `id`. The start of a run that follows its neighbour is rest here; the
+    /// actual start depends on the neighbour's record ([`Plan::start`]).
     pub fn cell(&self, id: u32) -> Cell {
         let law = self.laws.of(id as usize % self.cell_count());
         Cell { id, flow: self.flow_of(id), law, start: self.own_start(id) }

@@ -81,8 +81,8 @@ pub struct Scene {
 impl Scene {
     /// Reads a scene that names no other files.
     ///
-    /// Messages call the text `name`, usually the file's path as the user gave it. `sets` are `NAME=VALUE` arguments; each
-    /// overrides the text and earlier arguments.
+    /// Messages call the text `name`, usually the file's path as the user gave it. `sets` are `NAME=VALUE` arguments;
+    /// each overrides the text and earlier arguments.
     ///
     /// # Errors
     /// [`SceneError`] for the first error.
@@ -251,7 +251,8 @@ impl Scene {
         self.points.base()
     }
 
-    /// Returns the parameters and components of the start that axes or columns sweep. Derived parameters are not included.
+    /// Returns the parameters and components of the start that axes or columns sweep. Derived parameters are not
+    /// included.
     pub fn swept(&self) -> impl Iterator<Item = &Parameter> {
         self.points.swept()
     }

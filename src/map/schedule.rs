@@ -1,19 +1,19 @@
 //! The schedule: which cells are integrated, and in which order. Pure.
 //!
-//! Without `[refine]` every cell is integrated, in Morton order. With it the map is adaptive. The cells of a coarse grid
-//! come first. A block of cells is then halved if cells in it are known to differ, or if it touches a block whose corners
-//! differ, down to single cells. Cells differ in class and period, and in symmetry, word or pattern if the scene requests
-//! them; in a map of basins they differ in the attractor. The other cells are filled from the corners around them. An audit
-//! integrates a random sample of the filled cells. If significantly more of them are wrong than allowed, blocks filled with
-//! the most frequently wrong values are halved and the audit is repeated. Otherwise only the blocks with wrong cells are
-//! halved.
+//! Without `[refine]` every cell is integrated, in Morton order. With it the map is adaptive. The cells of a coarse
+//! grid come first. A block of cells is then halved if cells in it are known to differ, or if it touches a block whose
+//! corners differ, down to single cells. Cells differ in class and period, and in symmetry, word or pattern if the
+//! scene requests them; in a map of basins they differ in the attractor. The other cells are filled from the corners
+//! around them. An audit integrates a random sample of the filled cells. If significantly more of them are wrong than
+//! allowed, blocks filled with the most frequently wrong values are halved and the audit is repeated. Otherwise only
+//! the blocks with wrong cells are halved.
 //!
-//! If cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells starts from the last states of
-//! the preceding row. Several starts per cell are further runs over all cells, one start after the other, so that
+//! If cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells starts from the last states
+//! of the preceding row. Several starts per cell are further runs over all cells, one start after the other, so that
 //! simultaneous runs start alike.
 //!
-//! Requests depend on the records that have arrived, not on their order. So no cell waits for a slow cell unless it depends
-//! on it, and an interrupted run continues by replaying its records.
+//! Requests depend on the records that have arrived, not on their order. So no cell waits for a slow cell unless it
+//! depends on it, and an interrupted run continues by replaying its records.
 
 mod adaptive;
 mod audit;
@@ -77,11 +77,13 @@ pub struct Refined {
     pub integrated: usize,
     /// Number of filled cells.
     pub filled: usize,
-    /// Number of consecutive steps: the coarse grid, the halvings of the block that was halved most, and the samples of audits.
+    /// Number of consecutive steps: the coarse grid, the halvings of the block that was halved most, and the samples of
+    /// audits.
     pub rounds: usize,
     /// Allowed fraction of wrong filled cells.
     pub max_error: f64,
-    /// Audits in order. The last one found at most the allowed fraction of wrong cells, unless no more blocks could be halved.
+    /// Audits in order. The last one found at most the allowed fraction of wrong cells, unless no more blocks could be
+    /// halved.
     pub audits: Vec<Audit>,
     /// For a map of basins, the cell from which each cell was filled; itself if it was integrated. Otherwise empty.
     pub filled_from: Vec<u32>,
@@ -161,12 +163,14 @@ impl Schedule {
         }
     }
 
-    /// Whether the schedule reads records of other cells. Otherwise the slice of records may be empty in [`Schedule::take`].
+    /// Whether the schedule reads records of other cells. Otherwise the slice of records may be empty in
+    /// [`Schedule::take`].
     pub fn reads_records(&self) -> bool {
         !matches!(self.strategy, Strategy::Whole)
     }
 
-    /// Accepts the record of a requested cell. `records` are those of all runs, including this one, if the schedule reads them.
+    /// Accepts the record of a requested cell. `records` are those of all runs, including this one, if the schedule
+    /// reads them.
     pub fn take(&mut self, id: u32, records: &[Record]) {
         self.states[id as usize] = RunState::Done;
         self.done += 1;

@@ -1,13 +1,14 @@
 //! Shards: parts of a map for several machines. Pure.
 //!
 //! Cells are assigned in small blocks of the plan's order. Neighbouring cells stay together, because their lanes take
-//! similar work. The blocks of a shard are spread over the whole map, because regions differ in cost by a factor of 100.
-//! Blocks are dealt out in rounds, one block to each shard, and the order of the shards is shifted after each round.
-//! Without the shift a shard would get stripes of a map whose side is a multiple of the number of shards. With 64 shards
-//! of the main map, the largest share of work is 9 % above the mean. It is 20 % above without the shift, and five times
-//! the mean if each shard gets one range of the order.
+//! similar work. The blocks of a shard are spread over the whole map, because regions differ in cost by a factor of
+//! 100. Blocks are dealt out in rounds, one block to each shard, and the order of the shards is shifted after each
+//! round. Without the shift a shard would get stripes of a map whose side is a multiple of the number of shards. With
+//! 64 shards of the main map, the largest share of work is 9 % above the mean. It is 20 % above without the shift, and
+//! five times the mean if each shard gets one range of the order.
 //!
-//! All starts of a cell are in one shard. If cells follow their neighbours along the last axis, whole columns are assigned.
+//! All starts of a cell are in one shard. If cells follow their neighbours along the last axis, whole columns are
+//! assigned.
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -140,7 +141,8 @@ impl Shard {
         }
     }
 
-    /// Returns the runs of this shard in the order of the plan. It is not the order of work if cells follow their neighbours.
+    /// Returns the runs of this shard in the order of the plan. It is not the order of work if cells follow their
+    /// neighbours.
     pub fn runs(self, plan: &Plan) -> Vec<u32> {
         if plan.policy().follows() {
             let [width, rows] = plan.counts();
@@ -158,7 +160,8 @@ impl Shard {
         self.blocks(parts).map(|block| block.len()).sum::<usize>() * (plan.run_count() / parts)
     }
 
-    /// Returns the columns of this shard, for a map whose cells follow their neighbours: increasing indices on the first axis.
+    /// Returns the columns of this shard, for a map whose cells follow their neighbours: increasing indices on the
+    /// first axis.
     pub(crate) fn columns(self, plan: &Plan) -> Vec<u32> {
         self.blocks(plan.counts()[0]).flatten().map(|column| column as u32).collect()
     }

@@ -6,8 +6,8 @@ pub(crate) const TWO_SIDED_95: f64 = 1.959964;
 /// The 99.5 % point of the normal distribution: ends of a two-sided 99 % interval.
 pub(crate) const TWO_SIDED_99: f64 = 2.575829;
 
-/// Returns Wilson's score interval (J. Am. Stat. Assoc. 22, 1927) of the share `hits / sampled`. `z` is the point of the
-/// normal distribution, such as [`TWO_SIDED_95`]. The interval is valid for small counts, too.
+/// Returns Wilson's score interval (J. Am. Stat. Assoc. 22, 1927) of the share `hits / sampled`. `z` is the point of
+/// the normal distribution, such as [`TWO_SIDED_95`]. The interval is valid for small counts, too.
 pub(crate) fn score_interval(hits: usize, sampled: usize, z: f64) -> [f64; 2] {
     let n = sampled.max(1) as f64;
     let rate = hits as f64 / n;

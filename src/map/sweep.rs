@@ -99,8 +99,8 @@ pub async fn run(
     Ok(true)
 }
 
-/// Repeats the stored records of an interrupted run in their order. Returns false if the schedule does not wait for one of
-/// them.
+/// Repeats the stored records of an interrupted run in their order. Returns false if the schedule does not wait for one
+/// of them.
 pub fn replay(schedule: &mut Schedule, records: &mut [Record], stored: &[(u32, Record)]) -> bool {
     schedule.prepare(stored);
     stored.iter().all(|&(id, record)| {
@@ -126,15 +126,16 @@ struct Pace {
 }
 
 impl Pace {
-    /// Lowers the limit to half of `tried` cells. Returns false if that is none.
+    /// Halves the number of cells for good, after `tried` cells did not fit into the memory. Returns false for one cell.
     fn halve(&mut self, tried: usize) -> bool {
         self.most = tried / 2;
         self.cells = self.most;
         self.most > 0
     }
 
-    /// Adapts the number of cells to [`BATCH_SECONDS`], by a factor of at most 4, because costs differ between parts of a map.
-    /// `ended` of `under_way` cells ended within `elapsed`. The last cells of a map are ignored: they are too few to measure.
+    /// Adapts the number of cells to [`BATCH_SECONDS`], by a factor of at most 4, because costs differ between parts of
+    /// a map. `ended` of `under_way` cells ended within `elapsed`. The last cells of a map are ignored: they are too
+    /// few to measure.
     fn adapt(&mut self, under_way: usize, ended: usize, elapsed: Duration) {
         if 2 * under_way < self.cells || 4 * ended < under_way {
             return;

@@ -128,7 +128,8 @@ pub(crate) fn factor(entry: &Expression) -> String {
     }
 }
 
-/// Whether a text has no sum outside of parentheses. The sign of an exponent looks like a sum, which only adds parentheses.
+/// Whether a text has no sum outside of parentheses. The sign of an exponent looks like a sum, which only adds
+/// parentheses.
 fn is_product(text: &str) -> bool {
     let mut depth = 0;
     text.chars().all(|c| {

@@ -1,8 +1,8 @@
 //! Model files: names, parameters and matrices in TOML, read into a [`Model`]. Pure.
 //!
-//! A file defines `M x'' + C x' + K x = force cos(frequency t) + load` in one or two coordinates, a gap `z = g . x`, and one or two
-//! walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in f64.
-//! `docs/models.md` describes each key.
+//! A file defines `M x'' + C x' + K x = force cos(frequency t) + load` in one or two coordinates, a gap `z = g . x`,
+//! and one or two walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
+//! f64. `docs/models.md` describes each key.
 
 mod builtin;
 mod contact;

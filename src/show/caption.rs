@@ -1,55 +1,85 @@
-//! Which oscillator a figure shows, in words.
+//! Descriptions of parameters, starts and integration in figures and the report.
 
-use crate::map::scene::Scene;
-use crate::show::symbols::{equation, symbol};
+use crate::map::scene::{Scene, Start};
+use crate::show::symbols::{equation, number, symbol};
 use rattlemap_dynamics::model::{Model, Parameter};
 
-/// The values that tell an oscillator: of parameters without a default, the frequency, and what differs from the
-/// defaults; then that the others have theirs. What `is_swept` has no one value.
+/// Describes an oscillator: values of parameters without a default, the frequency, values that differ from the defaults, and
+/// whether all others have their defaults. Parameters for which `is_swept` is true are not mentioned.
 pub(crate) fn parameters(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool) -> String {
     parameters_and(model, is_swept, Vec::new())
 }
 
-/// The same, with what else is to be named.
 fn parameters_and(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool, derived: Vec<String>) -> String {
     let scales = model.frequency();
     let all = model.parameters().iter().enumerate().map(|(i, p)| (p, model.value(i), scales.contains(&i)));
     let fixed: Vec<(&Parameter, f64, bool)> = all.filter(|(parameter, ..)| !is_swept(parameter)).collect();
-    // Where each is named: chosen ones first, then the frequency, without which a time has no scale.
-    let place = |(parameter, value, scales): &(&Parameter, f64, bool)| match parameter.default {
+    let rank = |(parameter, value, scales): &(&Parameter, f64, bool)| match parameter.default {
         None => Some(0),
         Some(_) if *scales => Some(1),
         Some(default) if default != *value => Some(2),
         Some(_) => None,
     };
-    let of = |wanted| fixed.iter().filter(move |fixed| place(fixed) == Some(wanted));
-    let named: Vec<String> =
-        (0..3).flat_map(of).map(|(parameter, value, _)| equation(&parameter.name, *value)).collect();
-    let is_all = named.len() == fixed.len();
-    let named = [named, derived].concat();
-    let rest = match (named.is_empty(), is_all) {
+    let of_rank = |wanted| fixed.iter().filter(move |fixed| rank(fixed) == Some(wanted));
+    let listed: Vec<String> =
+        (0..3).flat_map(of_rank).map(|(parameter, value, _)| equation(&parameter.name, *value)).collect();
+    let is_all = listed.len() == fixed.len();
+    let listed = [listed, derived].concat();
+    let rest = match (listed.is_empty(), is_all) {
         (_, true) => "",
         (true, _) => "all other parameters at their defaults",
         (false, _) => "; all other parameters at their defaults",
     };
-    named.join(", ") + rest
+    listed.join(", ") + rest
 }
 
-/// The same of a scene, without what its axes sweep, and with what follows others.
-pub(crate) fn of_scene(scene: &Scene) -> String {
+/// Describes the oscillators of a scene by their fixed and derived parameters.
+pub fn of_scene(scene: &Scene) -> String {
     let is_fixed = |parameter: &Parameter| scene.fixed().any(|(name, _)| name == parameter.name);
     parameters_and(scene.base(), |parameter| !is_fixed(parameter), derived(scene).collect())
 }
 
-/// Every parameter of a scene that is fixed or follows others.
+/// Returns all fixed and derived parameters of a scene.
 pub(crate) fn all_fixed(scene: &Scene) -> String {
     let fixed = scene.fixed().map(|(name, value)| equation(name, value));
     fixed.chain(derived(scene)).collect::<Vec<_>>().join(", ")
 }
 
-/// Parameters that follow others, each with its expression as it was written.
+/// Returns the derived parameters of a scene with their expressions.
 fn derived(scene: &Scene) -> impl Iterator<Item = String> {
     scene.derived().map(|(parameter, expression)| format!("{} = {expression}", symbol(&parameter.name)))
+}
+
+/// Describes the start and the length of the integration of a map's cells.
+pub(crate) fn integration(scene: &Scene) -> String {
+    let last = scene.axes().last().map_or(String::new(), |axis| symbol(&axis.parameter().name));
+    let start = match scene.start() {
+        Start::Rest if scene.sweeps_start() => "from its own state, the other components 0".to_owned(),
+        Start::State(state) if scene.sweeps_start() => {
+            format!("from its own state, the other components of ({})", state.map(number).join(", "))
+        }
+        Start::Rest => "from rest".to_owned(),
+        Start::State(state) => format!("from ({})", state.map(number).join(", ")),
+        Start::Up => format!("from the attractor at the next lower {last}"),
+        Start::Down => format!("from the attractor at the next higher {last}"),
+        Start::Both => format!("from the attractors at the next {last} on either side"),
+    };
+    let more_starts = match scene.draw() {
+        Some(draw) => format!(", attractors counted with {} random states more", draw.count - 1),
+        None => String::new(),
+    };
+    let integration = scene.integration();
+    let (transient, observed) = (integration.transient_periods, integration.observed_periods);
+    let upper = if integration.early_stop { "at most " } else { "" };
+    let more = match integration.undecided_periods {
+        more if more > 0 && integration.early_stop => format!(", undecided cells up to {more} more"),
+        _ => String::new(),
+    };
+    let filled = match scene.refine() {
+        Some(_) => "; refined at borders, the rest filled and audited",
+        None => "",
+    };
+    format!("every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{filled}")
 }
 
 #[cfg(test)]
@@ -58,7 +88,7 @@ mod tests {
     use rattlemap_dynamics::model::GearPair;
 
     #[test]
-    fn what_follows_others_is_named_by_its_expression() {
+    fn derived_parameters_are_described_by_their_expressions() {
         let built = Scene::builder(GearPair { k: 500.0, ..GearPair::paper(0.5) });
         let scene = built.derived("k2", "2/3*k1").axis("k1", 1.0..=2.0, 2).axis("F", 1.0..=2.0, 2);
         let scene = scene.build().unwrap();
@@ -68,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_from_the_defaults_is_named() {
+    fn values_that_differ_from_the_defaults_are_described() {
         let pair = GearPair { k: 500.0, force: -50.0, ..GearPair::paper(0.5) };
         let rest = "; all other parameters at their defaults";
         assert_eq!(

@@ -1,9 +1,9 @@
-//! How far apart two colours are to all eyes.
+//! The difference of two colours as perceived by people with and without colour blindness.
 //!
-//! Differences are CIEDE2000 (Sharma, Wu, Dalal 2005). What people see who lack one kind of receptor is simulated after
-//! Machado, Oliveira and Fernandes 2009, at full severity, in linear light.
+//! Differences are CIEDE2000 (Sharma, Wu and Dalal 2005). Colour blindness is simulated by the matrices of Machado, Oliveira
+//! and Fernandes (2009) at full severity, in linear light.
 
-use crate::show::layers::Color;
+use crate::show::color::Color;
 
 type Triple = [f64; 3];
 type Matrix = [Triple; 3];
@@ -18,17 +18,18 @@ const DEUTERANOPE: Matrix = [
     [0.280_085, 0.672_501, 0.047_413],
     [-0.011_820, 0.042_940, 0.968_881],
 ];
-const ANY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-/// Linear sRGB to XYZ over the white of D65.
+const NORMAL_VISION: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// Conversion of linear sRGB to XYZ relative to the white D65.
 const XYZ: Matrix = [
     [0.412_456_4 / 0.950_47, 0.357_576_1 / 0.950_47, 0.180_437_5 / 0.950_47],
     [0.212_672_9, 0.715_152_2, 0.072_175_0],
     [0.019_333_9 / 1.088_83, 0.119_192_0 / 1.088_83, 0.950_304_1 / 1.088_83],
 ];
 
-/// The least difference of two colours, over the kinds of eyes.
+/// Returns the least difference of two colours over the three kinds of vision.
 pub(crate) fn least_difference(a: Color, b: Color) -> f64 {
-    let differences = [ANY, PROTANOPE, DEUTERANOPE].map(|eye| difference(lab(a, eye), lab(b, eye)));
+    let differences =
+        [NORMAL_VISION, PROTANOPE, DEUTERANOPE].map(|vision| difference(lab(a, vision), lab(b, vision)));
     differences.into_iter().fold(f64::INFINITY, f64::min)
 }
 
@@ -36,14 +37,14 @@ fn times(matrix: Matrix, v: Triple) -> Triple {
     matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// A colour in CIELAB, as an eye sees it.
-fn lab(color: Color, eye: Matrix) -> Triple {
+/// Returns a colour in CIELAB as perceived with the given kind of vision.
+fn lab(color: Color, vision: Matrix) -> Triple {
     let linear = color.map(|value| {
         let value = f64::from(value) / 255.0;
         if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
     });
-    let seen = times(eye, linear).map(|value| value.clamp(0.0, 1.0));
-    let [x, y, z] = times(XYZ, seen).map(|value| {
+    let perceived = times(vision, linear).map(|value| value.clamp(0.0, 1.0));
+    let [x, y, z] = times(XYZ, perceived).map(|value| {
         if value > 216.0 / 24389.0 { value.cbrt() } else { (24389.0 / 27.0 * value + 16.0) / 116.0 }
     });
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
@@ -85,7 +86,7 @@ fn difference([l1, a1, b1]: Triple, [l2, a2, b2]: Triple) -> f64 {
 
 /// Pairs 1, 4, 7, 16, 17, 21 and 25 of the authors' test data.
 #[test]
-fn differences_are_the_published_ones() {
+fn differences_equal_the_published_ones() {
     for (a, b, expected) in [
         ([50.0, 2.6772, -79.7751], [50.0, 0.0, -82.7485], 2.0425),
         ([50.0, -1.3802, -84.2814], [50.0, 0.0, -82.7485], 1.0),
@@ -103,13 +104,12 @@ fn differences_are_the_published_ones() {
     }
 }
 
-/// White is what all see alike; green and amber only some can tell apart.
 #[test]
-fn eyes_differ() {
+fn white_is_the_same_to_all_and_green_differs_from_amber_only_for_normal_vision() {
     let [green, amber] = [[0x20, 0xc0, 0x20], [0xd0, 0xa0, 0x00]];
-    assert!(difference(lab(green, ANY), lab(amber, ANY)) > 30.0);
-    for eye in [PROTANOPE, DEUTERANOPE] {
-        assert!(difference(lab([255; 3], eye), lab([255; 3], ANY)) < 0.1);
-        assert!(difference(lab(green, eye), lab(amber, eye)) < 5.0);
+    assert!(difference(lab(green, NORMAL_VISION), lab(amber, NORMAL_VISION)) > 30.0);
+    for vision in [PROTANOPE, DEUTERANOPE] {
+        assert!(difference(lab([255; 3], vision), lab([255; 3], NORMAL_VISION)) < 0.1);
+        assert!(difference(lab(green, vision), lab(amber, vision)) < 5.0);
     }
 }

@@ -1,45 +1,29 @@
-//! The names that outputs use: part of the contract with scripts.
+//! Names in output files. They are part of the contract with scripts.
 
 use crate::map::scene::Format;
-use crate::show::cells::Source;
 use rattlemap_dynamics::model::Side;
-use rattlemap_dynamics::orbit::{Class, EventKind, Status};
+use rattlemap_dynamics::orbit::{Class, EventKind};
 
-/// Every class name, in the order in which they are counted.
-pub(crate) const CLASSES: [&str; 4] = Class::NAMES;
-
-/// The name of a figure's file.
-pub(crate) fn figure(what: &str, format: Format) -> String {
+/// Returns the name of a figure's file.
+pub fn figure(what: &str, format: Format) -> String {
     format!("{what}.{}", format.name())
 }
 
-/// A figure's files, by format.
-pub(crate) fn figures(what: &str) -> [(Format, String); 3] {
+/// Returns the names of a figure's files in all formats.
+pub fn figures(what: &str) -> [(Format, String); 3] {
     Format::FIGURES.map(|format| (format, figure(what, format)))
 }
 
-pub(crate) fn class(class: Class) -> &'static str {
-    class.name()
-}
-
-/// The number that stands for a class in tables: its place in [`CLASSES`].
-pub(crate) fn class_code(class: Class) -> i8 {
-    class.index() as i8
-}
-
-/// Forcing periods per cycle, where the motion is periodic.
-pub(crate) fn period(class: Class) -> Option<u32> {
+/// Returns the forcing periods per cycle of a periodic motion.
+pub fn period(class: Class) -> Option<u32> {
     match class {
         Class::Periodic { period } => Some(period),
         _ => None,
     }
 }
 
-pub(crate) fn status(status: Status) -> &'static str {
-    status.name()
-}
-
-pub(crate) fn kind(kind: EventKind) -> &'static str {
+/// Returns the name of a kind of event.
+pub fn kind(kind: EventKind) -> &'static str {
     match kind {
         EventKind::Impact => "impact",
         EventKind::MeshStart => "mesh_start",
@@ -47,24 +31,31 @@ pub(crate) fn kind(kind: EventKind) -> &'static str {
     }
 }
 
-/// `1` right, `-1` left.
-pub(crate) fn side(side: Side) -> i8 {
+/// Returns 1 for the right wall, -1 for the left wall.
+pub fn side_code(side: Side) -> i8 {
     match side {
         Side::Right => 1,
         Side::Left => -1,
     }
 }
 
-pub(crate) fn source(source: Source) -> &'static str {
-    match source {
-        Source::Integrated => "integrated",
-        Source::Filled => "filled",
+/// Returns the name of a side in texts.
+pub fn side(side: Side) -> &'static str {
+    match side {
+        Side::Right => "right",
+        Side::Left => "left",
     }
 }
 
-/// A number in a table: the shortest decimal that reads back as the same; empty where there is none or it is not finite.
+/// Formats a number for a table: the shortest decimal that reads back as the same number. Absent and not finite numbers are
+/// empty.
 pub(crate) fn float(x: impl Into<Option<f64>>) -> String {
     x.into().filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:?}"))
+}
+
+/// Formats an optional value for a table. An absent value is empty.
+pub(crate) fn optional(value: Option<impl ToString>) -> String {
+    value.map_or(String::new(), |value| value.to_string())
 }
 
 #[cfg(test)]
@@ -72,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tables_have_finite_numbers_or_nothing() {
+    fn numbers_that_are_not_finite_are_empty_in_tables() {
         assert_eq!(
             [0.1 + 0.2, -0.0, f64::NAN, f64::INFINITY].map(float),
             ["0.30000000000000004", "-0.0", "", ""]

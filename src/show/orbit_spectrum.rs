@@ -1,57 +1,62 @@
-//! Of which frequencies is a motion made? Amplitudes of the gap and its velocity, by a discrete Fourier transform of samples
-//! on the exact flow.
+//! Spectra of the gap and its velocity, by a discrete Fourier transform of samples of the exact flow.
 //!
-//! A cycle is transformed over exactly one cycle: its lines are all there is, at multiples of the forcing frequency over
-//! the cycle's periods, and none leaks into another. Any other motion is seen through Hann windows that overlap by half,
-//! and their squares are averaged, without the mean (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70).
+//! A periodic motion is transformed over exactly one cycle. Its lines lie at multiples of the forcing frequency divided by the
+//! number of periods, without leakage. For any other motion the mean is subtracted, and squares are averaged over Hann windows
+//! that overlap by half (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70).
 
 use std::f64::consts::TAU;
 
-use rattlemap_dynamics::model::{Model, ModelError, Oscillator, State};
+use rattlemap_dynamics::model::{Model, ModelError, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, trace};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 
-use crate::store::orbit::samples_per_period;
-
-/// Forcing periods of one window, and windows.
+/// Forcing periods per window, and number of windows.
 const WINDOW: u32 = 128;
 const WINDOWS: u32 = 7;
 
-/// Samples that are transformed at most, of a cycle and of all windows.
-const MOST_OF_CYCLE: usize = 1 << 20;
-const MOST_OF_WINDOWS: usize = 1 << 19;
+/// Largest numbers of samples of a cycle and of all windows.
+const CYCLE_SAMPLES: usize = 1 << 20;
+const WINDOW_SAMPLES: usize = 1 << 19;
+
+/// Returns the samples per forcing period that figures need: 400, or 20 per oscillation of the teeth in meshing if that is more.
+pub fn samples_per_period(oscillator: &Oscillator) -> usize {
+    let stiffness =
+        Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)[0]).into_iter().fold(0.0, f64::max);
+    let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
+    (20.0 * ringing).clamp(400.0, 50_000.0) as usize
+}
 
 /// Amplitudes at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Line {
-    /// In multiples of the forcing frequency.
+pub struct Line {
+    /// Frequency in multiples of the forcing frequency.
     pub(crate) frequency: f64,
-    /// Of the gap and of its velocity; at frequency 0 the size of the mean.
+    /// Amplitudes of the gap and of its velocity; at frequency 0 the absolute value of the mean.
     pub(crate) amplitudes: [f64; 2],
 }
 
-/// A motion by frequencies.
+/// A spectrum.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Spectrum {
-    /// In order of frequency.
+pub struct Spectrum {
+    /// Lines in order of frequency.
     pub(crate) lines: Vec<Line>,
-    /// Forcing periods of the cycle; none where windows were laid over a motion that does not come round.
+    /// Forcing periods of the cycle; none if windows were used.
     pub(crate) cycle: Option<u32>,
 }
 
 impl Spectrum {
-    /// That of an orbit; none if the motion cannot be followed for as long.
+    /// Returns the spectrum of an orbit, or none if the motion cannot be followed for the required time.
     ///
     /// # Errors
     /// [`ModelError`] if the model is not valid.
-    pub(crate) fn of(model: &dyn Model, orbit: &Orbit) -> Result<Option<Spectrum>, ModelError> {
+    pub fn of(model: &dyn Model, orbit: &Orbit) -> Result<Option<Spectrum>, ModelError> {
         let oscillator = model.oscillator()?;
         let cycle = matches!(orbit.class, Class::Periodic { .. }).then_some(orbit.cycle_periods);
-        // Jumps of the velocity have high harmonics, which samples of a cycle fold back: they are dense.
+        // Velocity jumps have high harmonics, which cause aliasing, so a cycle needs dense samples.
         let (periods, dense, most) = match cycle {
-            Some(periods) => (periods, 8, MOST_OF_CYCLE),
-            None => (WINDOW * (WINDOWS + 1) / 2, 2, MOST_OF_WINDOWS),
+            Some(periods) => (periods, 8, CYCLE_SAMPLES),
+            None => (WINDOW * (WINDOWS + 1) / 2, 2, WINDOW_SAMPLES),
         };
         let wanted = samples_per_period(&oscillator);
         let largest = (most / periods as usize).next_power_of_two() / 2;
@@ -61,7 +66,7 @@ impl Spectrum {
         if samples.len() <= count {
             return Ok(None);
         }
-        // The last sample is the first of what follows.
+        // The last sample belongs to the next period.
         let values =
             |velocity| samples[..count].iter().map(move |sample| gap(&oscillator, &sample.state, velocity));
         let [z, w]: [Vec<f64>; 2] = [0, 1].map(|velocity| values(velocity).collect());
@@ -69,8 +74,8 @@ impl Spectrum {
         let frequencies =
             (0..=(wanted / 10).min(per_period / 4) * span as usize).map(|k| k as f64 / f64::from(span));
         let lines = match cycle {
-            // The gap has no jumps, and its derivative's series is that of the velocity: samples of the velocity itself
-            // would place a jump only to within their distance.
+            // The gap is continuous, and the derivative of its series is the series of the velocity. Samples of the velocity would
+            // locate jumps only to within their spacing.
             Some(_) => frequencies
                 .zip(amplitudes(&[&z], |_| 1.0))
                 .map(|(frequency, z)| Line { frequency, amplitudes: [z, z * frequency * oscillator.omega] })
@@ -83,28 +88,26 @@ impl Spectrum {
         Ok(Some(Spectrum { lines, cycle }))
     }
 
-    /// How it was made, in words.
+    /// Describes the method.
     pub(crate) fn method(&self) -> String {
         match self.cycle {
             Some(1) => "Fourier series over the cycle, one forcing period".to_owned(),
             Some(periods) => format!("Fourier series over the cycle, {periods} forcing periods"),
-            None => {
-                format!(
-                    "mean square over {WINDOWS} Hann windows of {WINDOW} forcing periods that overlap by half"
-                )
-            }
+            None => format!(
+                "mean square over {WINDOWS} Hann windows of {WINDOW} forcing periods that overlap by half"
+            ),
         }
     }
 }
 
-/// The gap, or with `velocity` 1 its velocity.
+/// Returns the gap of a state, or with `velocity` 1 its velocity.
 pub(crate) fn gap(oscillator: &Oscillator, state: &State, velocity: usize) -> f64 {
     let [g1, g2] = oscillator.gap;
     g1 * state[velocity] + g2 * state[2 + velocity]
 }
 
-/// Amplitudes as those of windows; at frequency 0 the size of the mean, by itself: under a window it would spread into
-/// the next line, half as high and then doubled.
+/// Returns the amplitudes of a signal over windows. The mean is treated separately, because a window would spread it into the
+/// first line.
 fn through_windows(signal: &[f64]) -> Vec<f64> {
     let mean = signal.iter().sum::<f64>() / signal.len() as f64;
     let swings: Vec<f64> = signal.iter().map(|value| value - mean).collect();
@@ -113,19 +116,19 @@ fn through_windows(signal: &[f64]) -> Vec<f64> {
     lines
 }
 
-/// Windows that overlap by half.
+/// Splits a signal into windows that overlap by half.
 fn windows(signal: &[f64]) -> Vec<&[f64]> {
     let half = signal.len() / (WINDOWS as usize + 1);
     (0..WINDOWS as usize).map(|nth| &signal[nth * half..(nth + 2) * half]).collect()
 }
 
-/// Over a share of a window.
+/// Returns the Hann window at a share of its length.
 fn hann(share: f64) -> f64 {
     0.5 - 0.5 * (TAU * share).cos()
 }
 
-/// Amplitudes from frequency 0 up to half the samples', in the root of the mean square over parts of equal length; a
-/// harmonic motion of amplitude 1 at one of the frequencies gives 1 there.
+/// Returns root mean square amplitudes over parts of equal length, from frequency 0 to half the sampling frequency. A harmonic
+/// motion of amplitude 1 at one of these frequencies gives 1.
 fn amplitudes(parts: &[&[f64]], window: impl Fn(f64) -> f64) -> Vec<f64> {
     let count = parts[0].len();
     let weights: Vec<f64> = (0..count).map(|i| window(i as f64 / count as f64)).collect();
@@ -139,9 +142,9 @@ fn amplitudes(parts: &[&[f64]], window: impl Fn(f64) -> f64) -> Vec<f64> {
         squares.iter_mut().zip(values).for_each(|(square, value)| *square += value.norm_sqr());
     }
     let scaled = squares.iter().enumerate().map(|(k, square)| {
-        // All but these two stand for their mirror images, too.
-        let twins = if k == 0 || 2 * k == count { 1.0 } else { 2.0 };
-        twins * (square / parts.len() as f64).sqrt() / whole
+        // All other lines also represent negative frequencies.
+        let signs = if k == 0 || 2 * k == count { 1.0 } else { 2.0 };
+        signs * (square / parts.len() as f64).sqrt() / whole
     });
     scaled.collect()
 }
@@ -158,7 +161,7 @@ mod tests {
         (orbit, spectrum)
     }
 
-    /// Gear 1 swings alone: F / |k1 - m1 omega^2 + i r1 omega|.
+    /// Gear 1 alone has the amplitude F / |k1 - m1 omega^2 + i r1 omega|.
     #[test]
     fn motion_without_contact_is_one_line() {
         let pair = GearPair { force: 5.0, omega: 3.0, ..GearPair::paper(0.5) };
@@ -175,16 +178,16 @@ mod tests {
         assert_eq!(spectrum.lines.len(), 41);
     }
 
-    /// The mean of a square is the sum of the squares of its parts.
+    /// Parseval's theorem.
     #[test]
-    fn no_power_is_lost() {
+    fn the_mean_square_is_the_sum_over_all_lines() {
         let signal: Vec<f64> = (0..96_u32).map(|i| f64::from(i * i * 7919 % 101) - 37.0).collect();
         let mean = signal.iter().map(|x| x * x).sum::<f64>() / signal.len() as f64;
         let lines = amplitudes(&[&signal], |_| 1.0);
         let ends = lines[0] * lines[0] + lines[48] * lines[48];
         let sum = ends + lines[1..48].iter().map(|a| 0.5 * a * a).sum::<f64>();
         assert!((sum / mean - 1.0).abs() < 1e-14, "{sum} {mean}");
-        // A mean square of noise under windows: their own mean square over the square of their mean is 3/2.
+        // A Hann window's mean square over its squared mean is 3/2.
         let noise: Vec<f64> =
             (0..1 << 16).map(|i: u64| ((i * i * 2_654_435_761) % 65_537) as f64 - 32_768.0).collect();
         let mean = noise.iter().map(|x| x * x).sum::<f64>() / noise.len() as f64;
@@ -198,13 +201,13 @@ mod tests {
             (0..4096).map(|i| 3.0 + 0.7 * (TAU * 10.0 * f64::from(i) / 1024.0).sin()).collect();
         let lines = through_windows(&signal);
         assert!((lines[0] - 3.0).abs() < 1e-12 && (lines[10] - 0.7).abs() < 1e-12, "{:?}", &lines[..12]);
-        // The line's own neighbours are half as high; those of the mean are none.
+        // The neighbours of the line have half its height, and the mean has no neighbours.
         assert!(lines[1..9].iter().chain(&lines[12..]).all(|a| *a < 1e-12), "{:?}", &lines[..14]);
     }
 
-    /// As samples of the velocity say, which place its jumps to within their distance.
+    /// Samples of the velocity locate its jumps only to within their spacing, which explains the tolerance.
     #[test]
-    fn velocities_are_derivatives() {
+    fn velocity_amplitudes_agree_with_samples_of_the_velocity() {
         let pair = GearPair::paper(0.0997);
         let (orbit, spectrum) = spectrum(&pair);
         assert!(!orbit.events.is_empty());
@@ -218,14 +221,13 @@ mod tests {
         }
     }
 
-    /// Chaos has power between the multiples.
     #[test]
-    fn chaos_is_seen_through_windows() {
+    fn chaos_has_power_between_multiples_of_the_forcing_frequency() {
         let (orbit, spectrum) = spectrum(&GearPair::paper(0.65));
         assert_eq!((orbit.class, spectrum.cycle), (Class::Chaotic, None));
         assert_eq!(spectrum.lines[1].frequency, 1.0 / 128.0);
         let [mean, next] = [0, 1].map(|k| spectrum.lines[k].amplitudes[0]);
-        assert!(next < 0.1 * mean, "no mean beside frequency 0: {mean} {next}");
+        assert!(next < 0.1 * mean, "the mean spread into the first line: {mean} {next}");
         assert!(spectrum.lines[64..128].iter().all(|line| line.amplitudes[0] > 1e-4));
     }
 }

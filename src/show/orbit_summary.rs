@@ -1,19 +1,19 @@
-//! `orbit` for the eye: what the motion is, then its events as a table.
+//! The text that `orbit` prints: properties of the motion, then a table of its events.
 
 use std::fmt::Write;
 
+use crate::show::instant::Instant;
 use crate::show::names;
-use crate::store::orbit::Instant;
-use rattlemap_dynamics::model::{Model, Side};
+use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
 
-/// Numbers as the paper prints them, one digit more.
+/// Number of decimals: one more than in the tables of the paper.
 const DECIMALS: usize = 5;
 
-/// A summary of the orbit of a model in lines of aligned text.
-pub(crate) fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
+/// Returns a summary of the orbit of a model in lines of aligned text.
+pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
     let mut text = String::new();
-    let instant = instant.map(|instant| ("state".to_owned(), at(model, instant)));
+    let instant = instant.map(|instant| ("state".to_owned(), state(model, instant)));
     for (label, value) in facts(model, orbit).into_iter().chain(instant) {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{label:<22}{value}");
@@ -28,71 +28,60 @@ pub(crate) fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>
     let _ = writeln!(text, "\nevents over {span} (T = {:.DECIMALS$})", orbit.forcing_period);
     text.push_str(&match orbit.strobe_meshing {
         Some(side) if orbit.events.is_empty() => {
-            format!("none: always in contact with the {} wall\n", side_name(side))
+            format!("none: always in contact with the {} wall\n", names::side(side))
         }
         _ => events(model, &orbit.events),
     });
     text
 }
 
-/// In all digits, since it was asked for by itself.
-fn at(model: &dyn Model, instant: Instant) -> String {
+/// Formats a requested state with all digits.
+fn state(model: &dyn Model, instant: Instant) -> String {
     let values = model.state_names().into_iter().zip(instant.state);
     let values: Vec<String> = values.map(|(name, value)| format!("{name}={value:?}")).collect();
     format!("{} at t = {:?}", values.join(" "), instant.time)
 }
 
+/// Returns labels and values of the lines before the events.
 fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
-    let mut facts = vec![
-        ("parameters", parameters(model)),
-        ("class", class(orbit)),
-        ("status", status(orbit.status).to_owned()),
-    ];
+    let mut facts = Vec::new();
+    let mut add = |label: &str, value: String| facts.push((label.to_owned(), value));
+    add("parameters", parameters(model));
+    add("class", class(orbit));
+    add("status", status(orbit.status).to_owned());
     if orbit.class == Class::Failed {
-        return labelled(facts);
+        return facts;
     }
-    let names = model.state_names();
-    facts.extend([
-        ("word, in time", or_dash(orbit.word.time_order())),
-        ("word, as printed", or_dash(orbit.word.paper_notation())),
-    ]);
+    add("word, in time", or_dash(orbit.word.time_order()));
+    add("word, as printed", or_dash(orbit.word.paper_notation()));
     let pattern = orbit.word.pattern();
     if pattern != orbit.word {
-        facts.push(("pattern", pattern.time_order()));
+        add("pattern", pattern.time_order());
     }
-    facts.push(("Lyapunov exponent", exponent(orbit)));
+    add("Lyapunov exponent", exponent(orbit));
     if let Some(multipliers) = &orbit.floquet {
         let listed: Vec<String> = multipliers.iter().copied().map(complex).collect();
-        facts.push(("Floquet multipliers", listed.join(", ")));
+        add("Floquet multipliers", listed.join(", "));
     }
     if let Some(symmetric) = orbit.symmetric {
-        facts.push((
-            "symmetric",
-            match (symmetric, has_mirror_images(model)) {
-                (true, _) => "yes",
-                (false, true) => "no, a symmetry-conjugate orbit coexists",
-                (false, false) => "no, as the model",
-            }
-            .to_owned(),
-        ));
+        let text = match (symmetric, has_mirror_images(model)) {
+            (true, _) => "yes",
+            (false, true) => "no, a symmetry-conjugate orbit coexists",
+            (false, false) => "no; the model itself is not symmetric",
+        };
+        add("symmetric", text.to_owned());
     }
-    facts.extend([
-        ("impacts per period", format!("{:.DECIMALS$}", orbit.impacts_per_period)),
-        ("fraction meshing", format!("{:.DECIMALS$}", orbit.mesh_fraction)),
-    ]);
-    let mut facts = labelled(facts);
+    add("impacts per period", format!("{:.DECIMALS$}", orbit.impacts_per_period));
+    add("fraction meshing", format!("{:.DECIMALS$}", orbit.mesh_fraction));
+    let names = model.state_names();
     let strobe = numbers(&orbit.strobe[..names.len()]).trim_start().to_owned();
-    facts.push((format!("strobe {}", names.join(" ")), strobe));
+    add(&format!("strobe {}", names.join(" ")), strobe);
     facts
 }
 
-/// Whether the mirror image of a motion, half a forcing period later, is one of the same model.
+/// Whether the mirror image of every motion, shifted by half a forcing period, is a motion of the same model.
 pub(crate) fn has_mirror_images(model: &dyn Model) -> bool {
     model.law().is_symmetric() && model.oscillator().is_ok_and(|oscillator| oscillator.mirror_symmetric())
-}
-
-fn labelled(facts: Vec<(&str, String)>) -> Vec<(String, String)> {
-    facts.into_iter().map(|(label, value)| (label.to_owned(), value)).collect()
 }
 
 fn parameters(model: &dyn Model) -> String {
@@ -103,24 +92,24 @@ fn parameters(model: &dyn Model) -> String {
 fn class(orbit: &Orbit) -> String {
     match orbit.class {
         Class::Periodic { period } => format!("periodic, period {period}"),
-        other => names::class(other).to_owned(),
+        other => other.name().to_owned(),
     }
 }
 
 fn status(status: Status) -> &'static str {
     match status {
         Status::Ok => "ok",
-        Status::Slow => "slow: convergence too slow to rest the class on recurrence alone",
+        Status::Slow => "slow: the motion converges slowly; the class rests on Newton's method",
         Status::NearGrazing => {
-            "near_grazing: an event close to grazing, so distrust exponent and multipliers"
+            "near_grazing: an event is close to grazing; exponent and multipliers are inaccurate"
         }
         Status::StrobeOnEvent => "strobe_on_event: an event lies on phase 0",
-        Status::CapEvents => "cap_events: more events in one period than the cap allows",
-        Status::CapRoot => "cap_root: more root iterations than the cap allows",
+        Status::CapEvents => "cap_events: one period has more events than the limit",
+        Status::CapRoot => "cap_root: locating an event needed more iterations than the limit",
         Status::TooStiff => "too_stiff: too stiff for this engine",
-        Status::NonFinite => "non_finite: the state left the range of finite numbers",
+        Status::NonFinite => "non_finite: the state became infinite or undefined",
         Status::BelowResolution => {
-            "below_resolution: points of the cycle closer together than can be told apart"
+            "below_resolution: points of the cycle are closer together than the numerical resolution"
         }
     }
 }
@@ -145,13 +134,9 @@ fn numbers(state: &[f64]) -> String {
     state.iter().map(|x| format!(" {x:>9.DECIMALS$}")).collect()
 }
 
-fn side_name(side: Side) -> &'static str {
-    if side == Side::Right { "right" } else { "left" }
-}
-
 fn events(model: &dyn Model, events: &[Event]) -> String {
     if events.is_empty() {
-        return "none: the walls are not reached\n".to_owned();
+        return "none: the motion does not reach a wall\n".to_owned();
     }
     let names = model.state_names();
     let (count, listed) = (names.len(), names.join(", "));
@@ -165,7 +150,7 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
         width = 10 * count
     );
     for event in events {
-        let side = side_name(event.side);
+        let side = names::side(event.side);
         let _ = writeln!(
             text,
             "{:<11}{side:<6} {:>10.DECIMALS$} {:>10.DECIMALS$}  {}  {}",

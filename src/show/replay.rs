@@ -3,12 +3,14 @@
 use crate::map::scene::{Scene, Start};
 use crate::model_file::{DEFAULT, FileModel};
 use crate::show::cells::Cells;
-use crate::store::map::MODEL;
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::Settings;
 
-/// What follows the `--set` of swept and derived parameters: others that differ from `orbit`'s own
-/// defaults, the start, and how long to integrate.
+/// Name of the copy of the model's file in the folder of a map whose model is not built in.
+pub const MODEL: &str = "model.toml";
+
+/// Returns the arguments that are the same for all cells: the model, values that differ from the defaults of `orbit`, the
+/// start and the length of the integration.
 pub(crate) fn arguments(scene: &Scene) -> String {
     let mut words = Vec::new();
     let base = scene.base();
@@ -34,7 +36,8 @@ pub(crate) fn arguments(scene: &Scene) -> String {
     words.concat()
 }
 
-/// How `orbit` finds a model that is not its own default: by name, or by the copy in the map's folder.
+/// Returns the argument of `--model`: the name of a built-in model or the file in the map's folder. The default model needs
+/// none.
 fn model(file: &FileModel) -> Option<&str> {
     match (file.is_built_in(), file.name()) {
         (true, DEFAULT) => None,
@@ -44,19 +47,19 @@ fn model(file: &FileModel) -> Option<&str> {
 }
 
 fn start(model: &dyn Model, state: State) -> String {
-    let shown = state[..model.state_names().len()].iter().map(|x| format!("{x:?}"));
-    format!(" --start {}", shown.collect::<Vec<_>>().join(","))
+    let values = state[..model.state_names().len()].iter().map(|x| format!("{x:?}"));
+    format!(" --start {}", values.collect::<Vec<_>>().join(","))
 }
 
-/// The whole command for the run `id`.
-pub(crate) fn command(cells: &Cells<'_>, id: usize) -> String {
+/// Returns the command that replays the run `id`.
+pub fn command(cells: &Cells<'_>, id: usize) -> String {
     let scene = cells.scene();
     let targets = scene.points().targets();
     let swept = targets.zip(scene.swept().map(|parameter| &*parameter.name).zip(cells.values(id)));
     let swept = swept.filter(|(target, _)| !target.is_start()).map(|(_, named)| named);
     let sets = swept.chain(cells.derived(id)).map(|(name, value)| format!(" --set {name}={value:?}"));
     let sets: String = sets.collect();
-    // A later argument wins over the scene's own.
+    // The last of several arguments counts, so the cell's own start comes last.
     let own = if cells.has_own_start(id) { start(scene.base(), cells.start(id)) } else { String::new() };
     format!("rattlemap orbit{sets}{}{own}", arguments(scene))
 }

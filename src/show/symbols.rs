@@ -1,37 +1,18 @@
-//! Parameters as the field writes them, in figures and in the report; in files their names stay as one types them.
+//! Mathematical symbols of parameters, for figures and the report. Files use the names that users type.
 
 use rattlemap_dynamics::model::Parameter;
 
+#[rustfmt::skip]
 const GREEK: [(&str, char); 25] = [
-    ("alpha", '\u{3b1}'),
-    ("beta", '\u{3b2}'),
-    ("gamma", '\u{3b3}'),
-    ("delta", '\u{3b4}'),
-    ("epsilon", '\u{3b5}'),
-    ("zeta", '\u{3b6}'),
-    ("eta", '\u{3b7}'),
-    ("theta", '\u{3b8}'),
-    ("iota", '\u{3b9}'),
-    ("kappa", '\u{3ba}'),
-    ("lambda", '\u{3bb}'),
-    ("mu", '\u{3bc}'),
-    ("nu", '\u{3bd}'),
-    ("xi", '\u{3be}'),
-    ("pi", '\u{3c0}'),
-    ("rho", '\u{3c1}'),
-    ("sigma", '\u{3c3}'),
-    ("tau", '\u{3c4}'),
-    ("upsilon", '\u{3c5}'),
-    ("phi", '\u{3c6}'),
-    ("chi", '\u{3c7}'),
-    ("psi", '\u{3c8}'),
-    ("omega", '\u{3c9}'),
-    ("Delta", '\u{394}'),
-    ("Omega", '\u{3a9}'),
+    ("alpha", '\u{3b1}'), ("beta", '\u{3b2}'), ("gamma", '\u{3b3}'), ("delta", '\u{3b4}'), ("epsilon", '\u{3b5}'),
+    ("zeta", '\u{3b6}'), ("eta", '\u{3b7}'), ("theta", '\u{3b8}'), ("iota", '\u{3b9}'), ("kappa", '\u{3ba}'),
+    ("lambda", '\u{3bb}'), ("mu", '\u{3bc}'), ("nu", '\u{3bd}'), ("xi", '\u{3be}'), ("pi", '\u{3c0}'),
+    ("rho", '\u{3c1}'), ("sigma", '\u{3c3}'), ("tau", '\u{3c4}'), ("upsilon", '\u{3c5}'), ("phi", '\u{3c6}'),
+    ("chi", '\u{3c7}'), ("psi", '\u{3c8}'), ("omega", '\u{3c9}'), ("Delta", '\u{394}'), ("Omega", '\u{3a9}'),
 ];
 
-/// The symbol of what is called `name`: `omega` by its letter, the digits of `x1` or `omega_0` below the line.
-pub(crate) fn symbol(name: &str) -> String {
+/// Returns the symbol of a name: `omega` becomes a Greek letter, the digits of `x1` or `omega_0` become subscripts.
+pub fn symbol(name: &str) -> String {
     let stem = name.trim_end_matches(|sign: char| sign.is_ascii_digit());
     let digits = &name[stem.len()..];
     let letters = if digits.is_empty() { stem } else { stem.trim_end_matches('_') };
@@ -43,21 +24,37 @@ pub(crate) fn symbol(name: &str) -> String {
     symbol
 }
 
-/// What stands beside a parameter's axis.
-pub(crate) fn axis_label(parameter: &Parameter) -> String {
+/// Returns the label of a parameter's axis.
+pub fn axis_label(parameter: &Parameter) -> String {
     let symbol = symbol(&parameter.name);
-    // Where nobody said what it means its name stands for that.
+    // A parameter without a description has its name as meaning.
     if parameter.meaning == parameter.name { symbol } else { format!("{}, {symbol}", parameter.meaning) }
 }
 
-/// A number with the typographic minus.
+/// Formats a number with the typographic minus.
 pub(crate) fn number(value: f64) -> String {
     value.to_string().replace('-', "\u{2212}")
 }
 
-/// A value by its symbol.
+/// Formats an equation of a parameter's symbol and its value.
 pub(crate) fn equation(name: &str, value: f64) -> String {
     format!("{} = {}", symbol(name), number(value))
+}
+
+/// Returns the superscript of a digit or minus.
+pub(crate) fn superscript(sign: char) -> char {
+    match sign {
+        '-' | '\u{2212}' => '\u{207b}',
+        '1' => '\u{b9}',
+        '2' => '\u{b2}',
+        '3' => '\u{b3}',
+        _ => sign.to_digit(10).and_then(|digit| char::from_u32(0x2070 + digit)).unwrap_or(sign),
+    }
+}
+
+/// Returns the digit or minus of a superscript.
+pub(crate) fn lowered(sign: char) -> Option<char> {
+    "\u{2212}0123456789".chars().find(|&plain| superscript(plain) == sign)
 }
 
 #[cfg(test)]
@@ -65,25 +62,14 @@ mod tests {
     use crate::show::symbols::symbol;
 
     #[test]
+    #[rustfmt::skip]
     fn names_become_symbols() {
-        let names =
-            ["omega", "lambda", "x1", "v2", "k12", "e", "F", "omega_0", "mesh_speed", "zeta2", "Omega", "7"];
-        assert_eq!(
-            names.map(symbol),
-            [
-                "\u{3c9}",
-                "\u{3bb}",
-                "x\u{2081}",
-                "v\u{2082}",
-                "k\u{2081}\u{2082}",
-                "e",
-                "F",
-                "\u{3c9}\u{2080}",
-                "mesh_speed",
-                "\u{3b6}\u{2082}",
-                "\u{3a9}",
-                "\u{2087}"
-            ]
-        );
+        for (name, expected) in [
+            ("omega", "\u{3c9}"), ("Omega", "\u{3a9}"), ("lambda", "\u{3bb}"), ("e", "e"), ("mesh_speed", "mesh_speed"),
+            ("x1", "x\u{2081}"), ("k12", "k\u{2081}\u{2082}"), ("omega_0", "\u{3c9}\u{2080}"), ("zeta2", "\u{3b6}\u{2082}"),
+            ("7", "\u{2087}"),
+        ] {
+            assert_eq!(symbol(name), expected);
+        }
     }
 }

@@ -1,16 +1,15 @@
 //! The folder of a bifurcation diagram: tables, figure and manifest.
 
-use std::fs::File;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use crate::map::bifurcation::{Column, fixed};
 use crate::map::scene::{self, Along, Format, Scene};
-use crate::show::drawing::axes::Scale;
+use crate::show::drawing::axis::Scale;
 use crate::show::figure;
-use crate::show::figure::bifurcation::Shown;
+use crate::show::figure::bifurcation::Panels;
 use crate::show::symbols::{axis_label, symbol};
-use crate::show::table::{bifurcation_columns_csv, bifurcation_csv, bifurcation_strobe_csv};
+use crate::show::table::bifurcation_tables;
 use crate::show::{caption, names};
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
@@ -50,22 +49,18 @@ pub fn write(
     let mut files = Vec::new();
     let (names, fixed) = (scene.base().state_names(), fixed(&scene.line()));
     if wanted.contains(&Format::Csv) {
-        folder.replace(CSV, |path| {
-            bifurcation_csv::write(File::create(path)?, &parameter.name, &names, columns)
-        })?;
-        folder.replace(COLUMNS_CSV, |path| {
-            bifurcation_columns_csv::write(File::create(path)?, &parameter.name, columns)
-        })?;
+        let axis = &parameter.name;
+        folder.replace(CSV, |out| bifurcation_tables::write_points(out, axis, &names, columns))?;
+        folder.replace(COLUMNS_CSV, |out| bifurcation_tables::write_columns(out, axis, columns))?;
         files.extend([CSV, COLUMNS_CSV]);
         if fixed.is_some() {
-            folder.replace(STROBE_CSV, |path| {
-                bifurcation_strobe_csv::write(path, &parameter.name, &names, columns)
-            })?;
+            folder
+                .replace(STROBE_CSV, |out| bifurcation_tables::write_strobes(out, axis, &names, columns))?;
             files.push(STROBE_CSV);
         }
     }
-    let shown = Shown::of(scene.base(), fixed);
-    for (_, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
+    let panels = Panels::of(scene.base(), fixed);
+    for (format, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
         let subtitle =
             format!("{}{}; {}", line(arguments.along), scene.start().in_words(), caption::of_scene(scene));
@@ -74,14 +69,9 @@ pub fn write(
             scene::Scale::Linear => Scale::Linear,
             scene::Scale::Values => Scale::Listed,
         };
-        folder.replace(name, |path| {
-            Ok(figure::bifurcation::write(
-                path,
-                [scene.title(), &subtitle],
-                (&label, scale),
-                &shown,
-                columns,
-            )?)
+        let texts = [scene.title(), &subtitle];
+        folder.replace(name, |out| {
+            figure::bifurcation::write(out, *format, texts, (&label, scale), &panels, columns)
         })?;
         files.push(name);
     }

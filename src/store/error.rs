@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::show::error::{FigureError, WriteError};
+use crate::show::error::WriteError;
 use rattlemap_dynamics::model::ModelError;
 
 /// Why a result cannot be written. The text is one line with the file and the reason.
@@ -28,9 +28,6 @@ pub enum OutputError {
     /// A result cannot be put into JSON.
     #[error("cannot put the result into JSON: {0}")]
     Json(#[from] serde_json::Error),
-    /// A figure cannot be drawn.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
     /// The model has no motion.
     #[error(transparent)]
     Model(#[from] ModelError),

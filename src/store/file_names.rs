@@ -8,7 +8,5 @@ pub const RECORDS: &str = "records.bin";
 pub(crate) const UNFINISHED: &str = "unfinished.json";
 /// Copy of the scene's list of cells, so that the folder does not depend on a file elsewhere.
 pub const LIST: &str = "list.csv";
-/// Copy of the scene's model, if the model is not a built-in one.
-pub const MODEL: &str = "model.toml";
 /// Result of `rattlemap validate`.
 pub const VALIDATION: &str = "validation.json";

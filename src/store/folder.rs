@@ -3,8 +3,8 @@
 
 mod lock;
 
-use std::fs::{self, OpenOptions};
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -158,15 +158,15 @@ impl Folder {
         &self.path
     }
 
-    /// Writes the file `name` whole or not at all: `write` gets a temporary name of the same
-    /// extension, which is renamed once it has succeeded.
+    /// Writes the file `name` completely or not at all: `write` writes to a temporary file, which is renamed after it has
+    /// succeeded.
     ///
     /// # Errors
-    /// [`OutputError::Write`]: whatever `write` or the file system says, with the file's path.
+    /// [`OutputError::Write`]: the error of `write` or of the file system, with the file's path.
     pub fn replace(
         &self,
         name: &str,
-        write: impl FnOnce(&Path) -> Result<(), WriteError>,
+        write: impl FnOnce(&mut BufWriter<File>) -> Result<(), WriteError>,
     ) -> Result<(), OutputError> {
         let target = self.path.join(name);
         let partial = partial(&target);
@@ -174,11 +174,16 @@ impl Folder {
         if let Err(reason) = links {
             return Err(OutputError::Write { path: target, reason: reason.into() });
         }
-        // On the disk before it has its name, or a power cut leaves an empty file of that name.
-        // Windows wants to see that whoever asks for it may write.
-        let synced = || OpenOptions::new().write(true).open(&partial)?.sync_all();
-        let whole = || Ok(synced().and_then(|()| fs::rename(&partial, &target))?);
-        let written = write(&partial).and_then(|()| whole());
+        let whole = || {
+            let mut out = BufWriter::new(File::create(&partial)?);
+            write(&mut out)?;
+            out.flush()?;
+            // Without this, a power cut after renaming could leave an empty file.
+            out.get_ref().sync_all()?;
+            drop(out);
+            Ok(fs::rename(&partial, &target)?)
+        };
+        let written: Result<(), WriteError> = whole();
         if written.is_err() {
             // Best effort: the error that matters is the one already at hand.
             let _ = fs::remove_file(&partial);
@@ -191,7 +196,10 @@ impl Folder {
     /// # Errors
     /// As [`Folder::replace`].
     pub fn write_json(&self, name: &str, object: &impl Serialize) -> Result<(), OutputError> {
-        self.replace(name, |path| Ok(fs::write(path, serde_json::to_string_pretty(object)? + "\n")?))
+        self.replace(name, |out| {
+            serde_json::to_writer_pretty(&mut *out, object)?;
+            Ok(writeln!(out)?)
+        })
     }
 
     /// Removes those of the files `names` that exist.
@@ -243,7 +251,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("a/b");
         let folder = Folder::open(&path, false).unwrap();
-        folder.replace("x.txt", |at| Ok(fs::write(at, "one")?)).unwrap();
+        folder.replace("x.txt", |out| Ok(out.write_all(b"one")?)).unwrap();
         drop(folder);
         assert_eq!(fs::read_dir(&path).unwrap().count(), 1, "the lock is gone");
         assert!(matches!(Folder::open(&path, false), Err(FolderError::NotEmpty { .. })));
@@ -350,7 +358,7 @@ mod tests {
                 Ok(folder) => {
                     let named = folder.refuse_links(["x.txt"]).unwrap_err().to_string();
                     assert!(named.contains(&format!("{name} is a symbolic link")), "{named}");
-                    folder.replace("x.txt", |at| Ok(fs::write(at, "one")?)).unwrap_err().to_string()
+                    folder.replace("x.txt", |out| Ok(out.write_all(b"one")?)).unwrap_err().to_string()
                 }
                 Err(error) => error.to_string(),
             };
@@ -369,7 +377,7 @@ mod tests {
         // The folder itself may be one.
         let link = root.path().join("link");
         std::os::unix::fs::symlink(&inside, &link).unwrap();
-        Folder::open(&link, false).unwrap().replace("x.txt", |at| Ok(fs::write(at, "one")?)).unwrap();
+        Folder::open(&link, false).unwrap().replace("x.txt", |out| Ok(out.write_all(b"one")?)).unwrap();
         assert_eq!(fs::read_to_string(inside.join("x.txt")).unwrap(), "one");
     }
 
@@ -377,9 +385,9 @@ mod tests {
     fn a_failed_write_keeps_the_old_file() {
         let root = tempfile::tempdir().unwrap();
         let folder = Folder::open(root.path(), false).unwrap();
-        folder.replace("x.txt", |at| Ok(fs::write(at, "one")?)).unwrap();
-        let failed = folder.replace("x.txt", |at| {
-            fs::write(at, "half")?;
+        folder.replace("x.txt", |out| Ok(out.write_all(b"one")?)).unwrap();
+        let failed = folder.replace("x.txt", |out| {
+            out.write_all(b"half")?;
             Err(io::Error::other("disk full").into())
         });
         assert!(failed.unwrap_err().to_string().contains("x.txt: disk full"));

@@ -6,10 +6,10 @@ use crate::map::bifurcation::Column;
 use crate::map::scene::Scene;
 use crate::show::cells::Cells;
 use crate::show::error::WriteError;
-pub use crate::show::layers::Colors;
+pub use crate::show::layers::SharedColors;
 use crate::show::table::cell_columns::{self, Values};
-use crate::show::table::words_csv::Rows;
-use crate::show::table::{attractors_csv, bifurcation_columns_csv, bifurcation_csv};
+use crate::show::table::words_csv::WordRows;
+use crate::show::table::{attractors_csv, bifurcation_tables};
 use crate::show::{layers, words};
 use crate::store::error::OutputError;
 use crate::store::manifest::bifurcation::{DiagramArguments, bifurcation};
@@ -33,8 +33,8 @@ pub struct Map {
 /// # Errors
 /// [`OutputError`] if a result cannot be formatted.
 pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
-    let spelled = words::read(cells);
-    let rows = Rows::new(&spelled);
+    let words = words::read(cells);
+    let rows = WordRows::new(&words);
     let attractors =
         cells.basins().map(|basins| text(|to| attractors_csv::write(to, cells, basins))).transpose()?;
     Ok(Map {
@@ -46,7 +46,7 @@ pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
 }
 
 /// Returns the colours of the program's figures.
-pub fn colors() -> Colors {
+pub fn colors() -> SharedColors {
     layers::shared_colors()
 }
 
@@ -78,11 +78,11 @@ pub fn diagram(
 ) -> Result<Diagram, OutputError> {
     let (axis, names) = (&*scene.axes()[0].parameter().name, scene.base().state_names());
     let manifest = bifurcation(scene, arguments, columns, [elapsed, Duration::ZERO], &[]);
-    let [kinds, directions] = bifurcation_csv::point_codes();
+    let [kinds, directions] = bifurcation_tables::point_codes();
     Ok(Diagram {
         manifest: manifest.to_string(),
-        columns: text(|to| bifurcation_columns_csv::write(to, axis, columns))?,
-        points: bifurcation_csv::points(axis, &names, columns),
+        columns: text(|to| bifurcation_tables::write_columns(to, axis, columns))?,
+        points: bifurcation_tables::points(axis, &names, columns),
         kinds,
         directions,
     })

@@ -1,7 +1,7 @@
 //! The list `files` of a manifest: name, size and hash of each file, and the comparison with the folder.
 
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -191,7 +191,7 @@ pub(crate) fn update(folder: &Folder, names: &[&str], timing: (&str, f64)) -> Re
 /// As [`Folder::replace`].
 pub fn write_manifest(folder: &Folder, manifest: &impl Serialize) -> Result<(), OutputError> {
     let text = sealed(serde_json::to_value(manifest)?)?;
-    folder.replace(MANIFEST, |path| Ok(fs::write(path, text)?))
+    folder.replace(MANIFEST, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
 /// Returns the text of a manifest with a seal: the hash of the text with an empty seal.

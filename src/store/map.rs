@@ -1,7 +1,7 @@
 //! The folder of a map: tables, figures, report and manifest.
 
 use std::fs::{self, File};
-use std::path::Path;
+use std::io::{BufWriter, Write};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
@@ -14,9 +14,9 @@ use crate::show::cells::Cells;
 use crate::show::error::WriteError;
 use crate::show::figure;
 use crate::show::layers::Layer;
-use crate::show::table::words_csv::Rows;
+use crate::show::table::words_csv::WordRows;
 use crate::show::table::{attractors_csv, cells_csv, cells_npy};
-use crate::show::words::{self, Spelled};
+use crate::show::words::{self, MapWords};
 use crate::show::{layers, names, report};
 use crate::store::error::OutputError;
 use crate::store::file_names::{RECORDS, UNFINISHED};
@@ -25,8 +25,10 @@ use crate::store::plain_file::PARTIAL;
 use crate::store::{inventory, manifest, unfinished, validation_json};
 use crate::validate::Validation;
 
-pub use crate::store::file_names::{LIST, MANIFEST, MODEL, VALIDATION};
-pub use crate::store::manifest::map::{Made, Run, ShardOrigin};
+pub use crate::show::provenance::Provenance;
+pub use crate::show::replay::MODEL;
+pub use crate::store::file_names::{LIST, MANIFEST, VALIDATION};
+pub use crate::store::manifest::map::{Run, ShardOrigin};
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
@@ -89,7 +91,7 @@ pub fn begin(folder: &Folder, scene: &Scene) -> Result<(), OutputError> {
 }
 
 fn write_list(folder: &Folder, list: &List) -> Result<(), OutputError> {
-    folder.replace(LIST, |path| Ok(fs::write(path, list.to_csv())?))
+    folder.replace(LIST, |out| Ok(out.write_all(list.to_csv().as_bytes())?))
 }
 
 /// Writes the files that the scene asks for, and the manifest last. Returns the names of the files.
@@ -117,7 +119,7 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<St
 pub fn write_validation(
     folder: &Folder,
     cells: &Cells<'_>,
-    made: &Made<'_>,
+    made: &Provenance<'_>,
     again: Option<&str>,
     validation: &Validation,
     elapsed: Duration,
@@ -169,11 +171,11 @@ fn write_files(
     validation: Option<&Value>,
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
-    let spelled = words::read(cells);
+    let words = words::read(cells);
     // In parallel, because both have parts that run on one core.
     let (tables, pictures) = rayon::join(
-        || write_tables(folder, cells, &spelled, wanted),
-        || write_pictures(folder, cells, &spelled, validation, wanted),
+        || write_tables(folder, cells, &words, wanted),
+        || write_pictures(folder, cells, &words, validation, wanted),
     );
     let mut files = tables?;
     files.extend(pictures?);
@@ -194,7 +196,7 @@ pub(crate) fn write_copies(
     }
     let own = scene.base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in());
     if let Some(model) = own.filter(|_| wanted(MODEL)) {
-        folder.replace(MODEL, |path| Ok(fs::write(path, &model.definition().text)?))?;
+        folder.replace(MODEL, |out| Ok(out.write_all(model.definition().text.as_bytes())?))?;
         files.push(MODEL.to_owned());
     }
     Ok(files)
@@ -203,11 +205,11 @@ pub(crate) fn write_copies(
 fn write_tables(
     folder: &Folder,
     cells: &Cells<'_>,
-    spelled: &Spelled,
+    words: &MapWords,
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
-    type Write<'w> = &'w (dyn Fn(&Path) -> Result<(), WriteError> + Sync);
-    let write_if = |is_asked: bool, name: &str, write: Write<'_>| {
+    type WriteTable<'w> = &'w (dyn Fn(&mut BufWriter<File>) -> Result<(), WriteError> + Sync);
+    let write_if = |is_asked: bool, name: &str, write: WriteTable<'_>| {
         if is_asked && wanted(name) {
             folder.replace(name, write).map(|()| Some(name.to_owned()))
         } else {
@@ -215,17 +217,17 @@ fn write_tables(
         }
     };
     let asks = |format| cells.scene().outputs().files.contains(&format);
-    let rows = Rows::new(spelled);
-    let has_words = spelled.words.is_some() || spelled.patterns.is_some();
+    let rows = WordRows::new(words);
+    let has_words = words.words.is_some() || words.patterns.is_some();
     let (csv, npy) = rayon::join(
-        || write_if(asks(Format::Csv), CSV, &|path| cells_csv::write(path, cells)),
-        || write_if(asks(Format::Npy), NPY, &|path| cells_npy::write(path, cells, &rows)),
+        || write_if(asks(Format::Csv), CSV, &|out| cells_csv::write(out, cells)),
+        || write_if(asks(Format::Npy), NPY, &|out| cells_npy::write(out, cells, &rows)),
     );
-    let words = write_if(asks(Format::Npy) && has_words, WORDS, &|path| rows.write(path));
+    let words = write_if(asks(Format::Npy) && has_words, WORDS, &|out| rows.write(out));
     let attractors = match cells.basins() {
-        Some(basins) => write_if(asks(Format::Csv), ATTRACTORS, &|path| {
-            attractors_csv::write(File::create(path)?, cells, basins)
-        })?,
+        Some(basins) => {
+            write_if(asks(Format::Csv), ATTRACTORS, &|out| attractors_csv::write(out, cells, basins))?
+        }
         None => None,
     };
     Ok([csv?, npy?, words?, attractors].into_iter().flatten().collect())
@@ -234,7 +236,7 @@ fn write_tables(
 fn write_pictures(
     folder: &Folder,
     cells: &Cells<'_>,
-    spelled: &Spelled,
+    words: &MapWords,
     validation: Option<&Value>,
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
@@ -242,26 +244,27 @@ fn write_pictures(
     let mut files = Vec::new();
     let wants_page = asks(Format::Html) && wanted(HTML);
     let formats: Vec<Format> = Format::FIGURES.into_iter().filter(|&format| asks(format)).collect();
-    let names = |layer| formats.iter().map(move |&format| names::figure(layer, format));
-    let wants_figures = LAYERS.iter().any(|layer| names(*layer).any(|name| wanted(&name)));
+    let names = |layer| formats.iter().map(move |&format| (format, names::figure(layer, format)));
+    let wants_figures = LAYERS.iter().any(|layer| names(*layer).any(|(_, name)| wanted(&name)));
     if !wants_page && !wants_figures {
         return Ok(files);
     }
-    let layers = layers::of(cells, spelled);
+    let layers = layers::of(cells, words);
     if wants_figures {
-        let named = layers.iter().flat_map(|layer| names(layer.name).map(move |name| (layer, name)));
-        let named: Vec<_> = named.filter(|(_, name)| wanted(name)).collect();
-        let draw = |(layer, name): &(&Layer, String)| {
-            folder.replace(name, |path| Ok(figure::map::write(path, cells, layer)?))
+        let figures =
+            layers.iter().flat_map(|layer| names(layer.name).map(move |(f, name)| (layer, f, name)));
+        let figures: Vec<_> = figures.filter(|(.., name)| wanted(name)).collect();
+        let draw = |(layer, format, name): &(&Layer, Format, String)| {
+            folder.replace(name, |out| figure::map::write(out, *format, cells, layer))
         };
-        match cells.counts().iter().product::<usize>() > SIDE_BY_SIDE {
-            true => named.iter().try_for_each(draw)?,
-            false => named.par_iter().try_for_each(draw)?,
+        match cells.count() > SIDE_BY_SIDE {
+            true => figures.iter().try_for_each(draw)?,
+            false => figures.par_iter().try_for_each(draw)?,
         }
-        files.extend(named.into_iter().map(|(_, name)| name));
+        files.extend(figures.into_iter().map(|(.., name)| name));
     }
     if wants_page {
-        folder.replace(HTML, |path| report::write(path, cells, &layers, spelled, validation))?;
+        folder.replace(HTML, |out| report::write(out, cells, &layers, words, validation))?;
         files.push(HTML.to_owned());
     }
     Ok(files)

@@ -6,7 +6,8 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::show::cells::Cells;
-use crate::store::manifest::map::{RefinementObject, Run, counts, made};
+use crate::show::refinement;
+use crate::store::manifest::map::{Run, counts, engine_and_cards};
 use crate::store::manifest::{joined, without_nulls};
 
 /// Describes a map whose files were written to a folder in `writing`. `folder` is the path that the user named; `seconds`
@@ -14,12 +15,12 @@ use crate::store::manifest::{joined, without_nulls};
 pub fn object(folder: &Path, files: &[String], cells: &Cells<'_>, run: &Run<'_>, writing: Duration) -> Value {
     joined([
         json!({ "folder": folder.to_string_lossy(), "files": files }),
-        made(run),
+        engine_and_cards(run),
         without_nulls(json!({ "shards": run.shards.map(|shards| shards.count) })),
-        json!({ "cells": cells.counts().iter().product::<usize>(), "runs": cells.runs() }),
+        json!({ "cells": cells.count(), "runs": cells.runs() }),
         counts(cells),
         json!({
-            "refinement": cells.refinement().map(RefinementObject::from),
+            "refinement": cells.refinement().map(refinement::object),
             "periods": cells.periods(),
             "without_effect": run.without_effect,
             "resumed": resumed(run),

@@ -37,11 +37,12 @@ use crate::map::scene::{Scene, Start};
 use crate::map::shard::Shard;
 use crate::record::{RecordStore, Records};
 use crate::show::cells::{Cells, Survey};
+use crate::show::provenance::Provenance;
 use crate::store::error::OutputError;
 use crate::store::finished_map::{FinishedMap, StoredManifest, UnfinishedRun};
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry, Finding};
-use crate::store::map::{self, Made, Run, ShardOrigin};
+use crate::store::map::{self, Run, ShardOrigin};
 use crate::store::record_file::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
 use crate::store::run_records::Work;
 use crate::store::{in_memory, map_json, unfinished};
@@ -421,7 +422,7 @@ impl MapRecords {
         Ok(MergedMap { files, classes, object, warnings: self.warnings, times: [self.reading, writing] })
     }
 
-    /// Calls `take` with the cells of the map and a description of its computation.
+    /// Calls `take` with the cells and the computation of the map.
     fn with_cells<T>(
         &self,
         take: impl FnOnce(&Cells<'_>, &Run<'_>) -> Result<T, OutputError>,
@@ -431,7 +432,7 @@ impl MapRecords {
         let survey = Survey::of(plan, records, None);
         let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey);
         let processor = parts.processors();
-        let made = Made { engine: &first.engine, precision: &first.precision, device: &first.device };
+        let made = Provenance { engine: &first.engine, precision: &first.precision, device: &first.device };
         // Adapters and cards are in the manifests of the parts.
         let run = Run {
             opening: parts.sum(StoredManifest::opening_seconds),

@@ -1,14 +1,17 @@
 //! The folder of an orbit: `orbit.json`, tables, figures and manifest.
 
-use std::fs;
+use std::io::Write;
+use std::sync::LazyLock;
 use std::time::{Duration, Instant as Clock};
 
 use serde_json::json;
 
 use crate::map::scene::Format;
-use crate::show::figure;
+use crate::show::figure::orbit::{OrbitFigure, OrbitPlot, spectrum};
+pub use crate::show::instant::Instant;
+use crate::show::names;
 use crate::show::orbit_json::to_json;
-use crate::show::orbit_spectrum::Spectrum;
+use crate::show::orbit_spectrum::{Spectrum, samples_per_period};
 use crate::show::parameters::Parameters;
 use crate::show::table::orbit_tables;
 pub use crate::show::table::orbit_tables::Moment;
@@ -16,17 +19,8 @@ use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::{self, Head, MANIFEST, joined};
-use rattlemap_dynamics::model::{Model, ModelError, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Model, ModelError, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
-
-/// Returns the number of samples per forcing period that figures need: 400, or 20 per oscillation of the relative motion
-/// in contact, if that is more.
-pub(crate) fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let stiffness =
-        Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)[0]).into_iter().fold(0.0, f64::max);
-    let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
-    (20.0 * ringing).clamp(400.0, 50_000.0) as usize
-}
 
 const JSON: &str = "orbit.json";
 const TRAJECTORY: &str = "trajectory.csv";
@@ -49,19 +43,19 @@ pub struct OrbitRequest {
     pub instant: Option<Instant>,
 }
 
-/// A state and its time since the start.
-#[derive(Clone, Copy, Debug)]
-pub struct Instant {
-    /// Since the start at phase 0.
-    pub time: f64,
-    /// Then.
-    pub state: State,
-}
+/// Files of the figures of the motion.
+static FIGURES: LazyLock<Vec<(OrbitFigure, Format, String)>> = LazyLock::new(|| {
+    let files =
+        |figure: OrbitFigure| names::figures(figure.name()).map(|(format, name)| (figure, format, name));
+    OrbitFigure::ALL.into_iter().flat_map(files).collect()
+});
+/// Files of the figure of the spectrum.
+static SPECTRUM_FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures(spectrum::NAME));
 
 /// Names of all files that an orbit may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    let figures = figure::orbit::NAMES.into_iter().chain(crate::show::figure::orbit::spectrum::NAMES);
-    [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures)
+    let figures = FIGURES.iter().map(|(.., name)| name).chain(SPECTRUM_FIGURES.iter().map(|(_, name)| name));
+    [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures.map(String::as_str))
 }
 
 /// Writes the orbit, its tables and figures unless it failed, and the manifest last. Returns the names of the files.
@@ -78,25 +72,26 @@ pub fn write(
     let clock = Clock::now();
     // The manifest does not list files of an earlier orbit.
     folder.remove(&names().collect::<Vec<_>>())?;
-    let json = to_json(model, orbit, request.instant)?;
-    folder.replace(JSON, |path| Ok(fs::write(path, json + "\n")?))?;
+    let json = to_json(model, orbit, request.instant);
+    folder.replace(JSON, |out| Ok(writeln!(out, "{json}")?))?;
     let mut files = vec![JSON];
     if orbit.class != Class::Failed {
         let samples = samples_per_period(&model.oscillator()?);
         let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
-        figure::orbit::write_each(model, orbit, &trace, formats, |name, save| {
+        let plot = OrbitPlot::new(model, orbit, &trace)?;
+        for (figure, format, name) in FIGURES.iter().filter(|(_, format, _)| formats.contains(format)) {
+            folder.replace(name, |out| figure.write(out, *format, &plot))?;
             files.push(name);
-            folder.replace(name, |path| Ok(save(path)?))
-        })?;
+        }
         write_trajectory(folder, model, orbit)?;
         files.push(TRAJECTORY);
         if let Some(spectrum) = Spectrum::of(model, orbit)? {
-            folder.replace(SPECTRUM, |path| orbit_tables::write_spectrum(path, &spectrum))?;
+            folder.replace(SPECTRUM, |out| orbit_tables::write_spectrum(out, &spectrum))?;
             files.push(SPECTRUM);
-            figure::orbit::spectrum::write_each(model, orbit, &spectrum, formats, |name, save| {
+            for (format, name) in SPECTRUM_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {
+                folder.replace(name, |out| spectrum::write(out, *format, model, orbit, &spectrum))?;
                 files.push(name);
-                folder.replace(name, |path| Ok(save(path)?))
-            })?;
+            }
         }
     }
     let listed = inventory::entries(folder, &files)?;
@@ -124,7 +119,7 @@ pub fn write(
 fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<(), OutputError> {
     let samples = TABLED.div_ceil(orbit.cycle_periods.max(1) as usize).max(LEAST_TABLED);
     let moments = moments(model, orbit, samples)?;
-    folder.replace(TRAJECTORY, |path| orbit_tables::write_trajectory(path, &model.state_names(), &moments))
+    folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, &model.state_names(), &moments))
 }
 
 /// Samples the motion over the periods of the orbit's events, and adds every event.
@@ -141,9 +136,6 @@ pub fn moments(
 }
 
 /// Returns the object that `orbit --json` prints.
-///
-/// # Errors
-/// [`OutputError`] if it cannot be put into JSON.
-pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> Result<String, OutputError> {
-    Ok(to_json(model, orbit, instant)?)
+pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
+    to_json(model, orbit, instant)
 }

@@ -11,11 +11,10 @@ use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::record::Record;
 use crate::record::classify::{classify, status};
-use crate::show::names;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry};
-use crate::store::manifest::map::{integration, made, run_and_scene, timings};
+use crate::store::manifest::map::{engine_and_cards, integration, run_and_scene, timings};
 use crate::store::manifest::{self, MANIFEST, joined};
 use crate::store::map::{self, Run};
 use crate::store::map_json::resumed;
@@ -52,12 +51,12 @@ impl Tally {
     }
 
     fn classes(&self) -> BTreeMap<&'static str, usize> {
-        names::CLASSES.into_iter().zip(self.classes).collect()
+        Class::NAMES.into_iter().zip(self.classes).collect()
     }
 
     fn statuses(&self) -> BTreeMap<&'static str, usize> {
         let count = |status: Status| self.statuses.get(&status.code()).copied().unwrap_or(0);
-        Status::ALL.iter().map(|&status| (names::status(status), count(status))).collect()
+        Status::ALL.iter().map(|&status| (status.name(), count(status))).collect()
     }
 }
 
@@ -126,7 +125,7 @@ pub fn object(folder: &Path, files: &[String], finished: &FinishedShard<'_>) -> 
     let FinishedShard { shard, run, .. } = *finished;
     joined([
         json!({ "folder": folder.to_string_lossy(), "files": files, "shard": shard }),
-        made(run),
+        engine_and_cards(run),
         counts(finished),
         json!({
             "resumed": resumed(run),

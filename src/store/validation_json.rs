@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::show::cells::Cells;
+use crate::show::provenance::Provenance;
 use crate::show::replay;
-use crate::store::manifest::map::Made;
 use crate::store::manifest::{Head, joined};
 use crate::validate::{
     ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult, Validation,
@@ -19,7 +19,7 @@ use crate::validate::{
 /// reproduced bit for bit.
 pub(crate) fn object(
     cells: &Cells<'_>,
-    made: &Made<'_>,
+    made: &Provenance<'_>,
     again_on: Option<&str>,
     validation: &Validation,
 ) -> Value {
@@ -42,7 +42,7 @@ pub(crate) fn object(
                 Judge::Independent => "dop853",
             },
             "seed": validation.seed,
-            "cells": cells.counts().iter().product::<usize>(),
+            "cells": cells.count(),
             "counted": validation.counted(),
             "runs": validation.runs,
             "integrated": validation.runs - validation.filled,

@@ -183,7 +183,8 @@ impl Fault {
     }
 }
 
-/// Returns the remedy for an unknown name: the most similar known one, if there is one, and `all`, the list of known names.
+/// Returns the remedy for an unknown name: the most similar known one, if there is one, and `all`, the list of known
+/// names.
 pub(crate) fn suggest(name: &str, known: &[&str], all: &str) -> String {
     let length = name.chars().count();
     // One typing error per three letters, but fewer errors than letters.

@@ -1,7 +1,7 @@
 //! Expressions in parameters, as in scenes and models: `0.5*k1`, `F0*omega^2`. Pure.
 //!
-//! Values are computed in f64, from left to right, with the functions of the crate `libm`, so that every machine computes the
-//! same bits.
+//! Values are computed in f64, from left to right, with the functions of the crate `libm`, so that every machine
+//! computes the same bits.
 
 mod grammar;
 

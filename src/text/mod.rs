@@ -1,6 +1,6 @@
-//! Texts that users write: TOML whose values know their places (`document`), tables with known fields (`section`), errors that
-//! name file, line, field, value and remedy ([`error`]), formulas ([`expression`]), text for terminals ([`printable`]), and
-//! text for shells ([`shell`]). Pure.
+//! Texts that users write: TOML whose values know their places (`document`), tables with known fields (`section`),
+//! errors that name file, line, field, value and remedy ([`error`]), formulas ([`expression`]), text for terminals
+//! ([`printable`]), and text for shells ([`shell`]). Pure.
 
 pub(crate) mod document;
 pub mod error;
@@ -8,7 +8,7 @@ pub mod expression;
 pub mod printable;
 pub(crate) mod section;
 pub mod shell;
-#[cfg(feature = "figures")]
+#[cfg(feature = "files")]
 pub(crate) mod size;
 
 /// Splits a table of test cases: one case per line, fields separated by `|`, with `\n` for a line break within a field.

@@ -1,12 +1,12 @@
 //! Makes text from outside safe for a terminal.
 //!
-//! Scenes, manifests, arguments, file names, environment variables and drivers may contain characters that move the cursor,
-//! colour or hide text, or reverse its direction. They are escaped before they reach a terminal.
+//! Scenes, manifests, arguments, file names, environment variables and drivers may contain characters that move the
+//! cursor, colour or hide text, or reverse its direction. They are escaped before they reach a terminal.
 
 use std::borrow::Cow;
 
-/// Whether a terminal shows a character as itself: it is no control character (C0, DEL, C1), no line or paragraph separator,
-/// and does not change the direction of text.
+/// Whether a terminal shows a character as itself: it is no control character (C0, DEL, C1), no line or paragraph
+/// separator, and does not change the direction of text.
 pub fn is_printable(c: char) -> bool {
     let turns =
         matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');

@@ -70,8 +70,8 @@ impl<'a> Section<'a> {
 
     /// Returns the given fields in the order of their names.
     pub(crate) fn fields(&self) -> impl Iterator<Item = (&'a str, Field<'a>)> {
-        let given = self.table.into_iter().flatten();
-        given.map(|(name, node)| (name.as_str(), Field { path: self.path_of(name), node }))
+        let fields = self.table.into_iter().flatten();
+        fields.map(|(name, node)| (name.as_str(), Field { path: self.path_of(name), node }))
     }
 
     /// Returns the given fields in the order of the text.

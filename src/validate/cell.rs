@@ -1,4 +1,4 @@
-//! One cell, and what the reference can be asked about it.
+//! One cell and its computations on the reference.
 
 use std::sync::atomic::AtomicBool;
 
@@ -21,8 +21,8 @@ use rattlemap_dynamics::orbit::{Budget, Class, Status, measure_until};
 use rattlemap_dynamics::reference::{Allowance, Trajectory};
 use rattlemap_dynamics::stability::{UNIT, multipliers};
 
-/// What a precision resolves of a motion or a parameter, relative to its size: some roundings, since errors gather
-/// over the steps of a period.
+/// Returns the smallest relative difference of a state or parameter that an engine of this precision resolves: several
+/// rounding units, because errors accumulate over the steps of a period.
 pub(super) fn resolution(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 1e-6,
@@ -30,15 +30,15 @@ pub(super) fn resolution(precision: Precision) -> f64 {
     }
 }
 
-/// No rounding moves the meshing speed by more than this share, however fast the motion is.
+/// Largest relative change of the meshing speed that is attributed to rounding.
 const MOST_OF_MESH_SPEED: f64 = 2e-3;
 
-/// Motions that show what the resolution makes of a cycle, and how much farther a lane may be off: it rounds at
-/// every step.
+/// Number of perturbed motions that measure the effect of rounding on a cycle.
 const TURNS: u64 = 6;
+/// Factor by which a lane may deviate farther than these: it rounds at every step, they once per period.
 pub(super) const FACTOR: f64 = 8.0;
 
-/// A cycle that is approached slowly is followed for so many times the budget: to be seen near it is not to reach it.
+/// Multiple of the budget for which a slow approach to a cycle is followed.
 const FOLLOWED: u32 = 8;
 
 /// A cell of a finished map.
@@ -53,12 +53,12 @@ pub(super) struct Cell<'a> {
     pub(super) precision: Precision,
     resolution: f64,
     seed: u64,
-    /// Once it is raised, answers are of no use.
+    /// Once set, computations stop and their results must not be used.
     pub(super) halt: &'a AtomicBool,
 }
 
-/// A cell that is the same within the engine's resolution.
-pub(super) struct Moved<'a> {
+/// A cell whose parameters and start are perturbed within the engine's resolution.
+pub(super) struct Perturbed<'a> {
     flow: Box<Flow>,
     law: Law,
     start: State,
@@ -88,14 +88,13 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// The same in a map of basins.
+    /// Adds the attractors of a map of basins.
     pub(super) fn in_basins(mut self, basins: Option<&'a Basins>, id: u32) -> Cell<'a> {
         self.bars.labels = basins.map(|basins| Labels { basins, id: id as usize, own: self.record.strobe });
         self
     }
 
-    /// The plan's budget, all of it: a cell stops before in no case, and one that is undecided takes what the plan
-    /// gives undecided cells.
+    /// Returns `times` the plan's budget without early stops.
     fn whole_budget(&self, times: u32) -> Budget {
         let mut budget = Budget { early_stop: false, ..self.budget };
         let observed = budget.settings.observed_periods;
@@ -104,23 +103,23 @@ impl<'a> Cell<'a> {
         budget
     }
 
-    /// Whether a record holds the numbers that it claims to hold.
+    /// Whether all numbers of a record are finite where they must be.
     pub(super) fn is_finite(&self, record: &Record) -> bool {
         not_finite(record, &self.budget).is_none()
     }
 
-    /// Forcing periods that the plan allows one run.
+    /// Returns the largest number of forcing periods of one run.
     pub(super) fn longest(&self) -> u32 {
         self.budget.longest()
     }
 
-    /// What the engine of the reference says of the cell, early stops and all.
+    /// Computes the cell with the reference as an engine does, with early stops.
     pub(super) fn again(&self, needs: &Needs) -> Record {
         let measured = measure_until(&self.flow, self.law, self.start, &self.budget, self.halt);
         measured.map_or(Record::default(), |measured| measured_record(&measured, needs))
     }
 
-    /// A budget of so many periods.
+    /// Builds a budget of this number of periods without early stops.
     fn budget_of(&self, periods: u32) -> Budget {
         let mut budget = Budget { early_stop: false, ..self.budget };
         let observed = budget.settings.observed_periods.min(periods / 2);
@@ -130,7 +129,7 @@ impl<'a> Cell<'a> {
         budget
     }
 
-    /// What the cell's start reaches within the whole budget.
+    /// Computes what the cell's start leads to within the whole budget.
     pub(super) fn truth(&self) -> Answer {
         self.reached(&self.flow, self.law, self.start)
     }
@@ -150,57 +149,57 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// What its start reaches by another law.
+    /// Computes the cell with another contact law.
     pub(super) fn obeying(&self, law: Law) -> Answer {
         self.reached(&self.flow, law, self.start)
     }
 
-    /// What another start of the same cell reaches.
+    /// Computes the cell from another start.
     pub(super) fn starting_at(&self, start: State) -> Answer {
         self.reached(&self.flow, self.law, start)
     }
 
-    /// What it reaches from where it is the same within the resolution; `shaken` where every period rounds.
-    pub(super) fn moved_truth(&self, k: u64, shaken: bool) -> Option<Answer> {
-        let mut moved = self.moved(k)?;
-        if shaken {
-            moved.start = moved.shaken(self.budget.settings.transient_periods)?;
+    /// Computes the `k`th perturbed cell. With `every_period` the state is perturbed after each transient period, too.
+    pub(super) fn perturbed_truth(&self, k: u64, every_period: bool) -> Option<Answer> {
+        let mut moved = self.perturbed(k)?;
+        if every_period {
+            moved.start = moved.state_after(self.budget.settings.transient_periods)?;
         }
         Some(self.reached(&moved.flow, moved.law, moved.start))
     }
 
-    /// The same after so many periods.
-    pub(super) fn moved_after(&self, k: u64, periods: u32) -> Option<Answer> {
-        let moved = self.moved(k)?;
+    /// Computes the `k`th perturbed cell over this number of periods.
+    pub(super) fn perturbed_after(&self, k: u64, periods: u32) -> Option<Answer> {
+        let moved = self.perturbed(k)?;
         Some(answer(&moved.flow, moved.law, moved.start, &self.budget_of(periods), self.halt))
     }
 
-    /// The same when it may take far longer than the plan allows.
-    pub(super) fn moved_at_leisure(&self, k: u64) -> Option<Answer> {
-        let moved = self.moved(k)?;
+    /// Computes the `k`th perturbed cell over a multiple of the plan's budget.
+    pub(super) fn perturbed_for_long(&self, k: u64) -> Option<Answer> {
+        let moved = self.perturbed(k)?;
         Some(answer(&moved.flow, moved.law, moved.start, &self.whole_budget(FOLLOWED), self.halt))
     }
 
-    /// Averages over the periods that a record of chaos averages, from a start that is the same within the resolution.
+    /// Computes averages of the `k`th perturbed cell over the periods that a chaotic record averages.
     pub(super) fn averages(&self, k: u64, periods: u32) -> Option<Record> {
-        let moved = self.moved(k)?;
+        let moved = self.perturbed(k)?;
         let mut budget = self.budget_of(periods);
         let from = self.budget.exponent_from().min(periods / 2);
         (budget.settings.transient_periods, budget.settings.observed_periods) = (from, periods - from);
         Some(answer(&moved.flow, moved.law, moved.start, &budget, self.halt).record)
     }
 
-    /// Where the reference is after so many periods, and where it is from starts that are the same within the
-    /// resolution if every period rounds.
+    /// Returns the reference's state after this number of periods, and the states of `count` perturbed cells whose state
+    /// is also perturbed after each period.
     pub(super) fn states(&self, count: u64, periods: u32) -> Option<(State, Vec<State>)> {
         let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start)
             .allowing(Allowance::UNLIMITED.until(self.halt));
         (0..periods).try_for_each(|_| trajectory.advance_period(&mut ())).ok()?;
-        let moved = (0..count).filter_map(|k| self.moved(k)?.shaken(periods));
+        let moved = (0..count).filter_map(|k| self.perturbed(k)?.state_after(periods));
         Some((trajectory.state(), moved.collect()))
     }
 
-    /// Whether a cycle through a state closes before so many periods, by no more than the resolution makes of it.
+    /// Whether a cycle of `period` periods closes earlier within the effect of rounding.
     pub(super) fn closes_earlier(&self, state: State, period: u32) -> bool {
         let mut trajectory =
             Trajectory::<0>::new(&self.flow, self.law, state).allowing(Allowance::UNLIMITED.until(self.halt));
@@ -213,23 +212,23 @@ impl<'a> Cell<'a> {
                 earlier = earlier.min(self.apart(&trajectory.state(), &state));
             }
         }
-        let ends = self.turned::<0>(state, period, []).map(|end| end.state());
+        let ends = self.perturbed_motions::<0>(state, period, []).map(|end| end.state());
         let spread = ends.map(|end| self.apart(&end, &state)).fold(self.resolution, farther);
         spread.is_finite() && earlier <= FACTOR * spread
     }
 
-    /// Logarithms of the largest multiplier of so many periods from a state, if every period rounds.
+    /// Returns logarithms of the largest multiplier over `period` periods, for motions perturbed after each period.
     pub(super) fn multipliers_from(&self, state: State, period: u32) -> Vec<f64> {
         let log_radius = |end: Trajectory<'_, 4>| {
             let columns = end.tangents().map(Vector4::from);
             let [re, im] = *multipliers(&Matrix4::from_columns(&columns))?.first()?;
             Some(re.hypot(im).ln() + end.log_scale())
         };
-        self.turned(state, period, UNIT).filter_map(log_radius).collect()
+        self.perturbed_motions(state, period, UNIT).filter_map(log_radius).collect()
     }
 
-    /// Where a few motions are after so many periods from a state, if every period rounds.
-    fn turned<const N: usize>(
+    /// Follows a few motions from a state, each perturbed after each period.
+    fn perturbed_motions<const N: usize>(
         &self,
         state: State,
         periods: u32,
@@ -248,7 +247,7 @@ impl<'a> Cell<'a> {
         })
     }
 
-    /// The distance of two states relative to the size of the motion, but not less than the scale of length.
+    /// Returns the distance of two states relative to the size of the motion, which is at least the scale of length.
     pub(super) fn apart(&self, a: &State, b: &State) -> f64 {
         let [position, velocity] = self.units(a);
         let by = |i: usize| distance::apart(a[i], b[i]) / [position, velocity][i % 2];
@@ -260,17 +259,18 @@ impl<'a> Cell<'a> {
         [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
     }
 
-    /// The `k`th cell, at random, that is the same within the resolution: every parameter and the start are moved.
-    fn moved(&self, k: u64) -> Option<Moved<'_>> {
+    /// Builds the `k`th perturbed cell: every parameter and the start move at random within the resolution.
+    fn perturbed(&self, k: u64) -> Option<Perturbed<'_>> {
         let mut random = Random::new(self.seed ^ k);
         let mut model = self.model.clone();
         let units = self.units(&self.record.strobe);
         for index in 0..self.model.parameters().len() {
             let value = self.model.value(index);
-            // At the end of its range a parameter stays where it is.
+            // A parameter at the end of its range keeps its value.
             let _ = model.set_at(index, value * (1.0 + self.resolution * (2.0 * random.unit() - 1.0)));
         }
-        // Leaving speeds carry the rounding of the whole motion's velocity, at both walls alike: what is symmetric stays so.
+        // Leaving speeds have the rounding errors of the motion's velocity. Both walls get the same change, so that a
+        // symmetric law stays symmetric.
         let draw = 2.0 * Random::new(!(self.seed ^ k)).unit() - 1.0;
         let mut law = model.law();
         for speed in &mut law.mesh_speed {
@@ -283,13 +283,13 @@ impl<'a> Cell<'a> {
             *x += self.resolution * units[i % 2] * (2.0 * random.unit() - 1.0);
         }
         let flow = Box::new(Flow::new(&model.oscillator().ok()?));
-        Some(Moved { flow, law, start, resolution: self.resolution, random, halt: self.halt })
+        Some(Perturbed { flow, law, start, resolution: self.resolution, random, halt: self.halt })
     }
 }
 
-impl Moved<'_> {
-    /// Where it is after so many periods if the state is moved within the resolution at each.
-    fn shaken(&mut self, periods: u32) -> Option<State> {
+impl Perturbed<'_> {
+    /// Returns the state after this number of periods, perturbed within the resolution after each.
+    fn state_after(&mut self, periods: u32) -> Option<State> {
         let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start)
             .allowing(Allowance::UNLIMITED.until(self.halt));
         for _ in 0..periods {
@@ -300,7 +300,7 @@ impl Moved<'_> {
     }
 }
 
-/// By what a period rounds.
+/// Draws the relative changes of a state by rounding over one period.
 fn shares(random: &mut Random, resolution: f64) -> [f64; 4] {
     std::array::from_fn(|_| resolution * (2.0 * random.unit() - 1.0))
 }

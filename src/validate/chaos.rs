@@ -1,9 +1,9 @@
-//! Averages over chaos, compared as distributions over the class.
+//! Averages of chaotic motion, compared as distributions over the class.
 //!
-//! What one chaotic cell averages within its budget scatters by itself. So every chaotic cell of the uniform sample
-//! is averaged twice more on the reference, over as many periods and from starts that are the same within the
-//! engine's resolution. The record's differences from the first of these are distributed as those of the second are,
-//! if the engine is right: the two samples are compared by the statistic of Kolmogorov and Smirnov.
+//! The averages of one chaotic cell within its budget scatter. Therefore the reference computes each chaotic cell of the
+//! uniform sample twice more, over as many periods and from starts within the engine's resolution. If the engine is
+//! right, the differences of the record from the first result have the distribution of the differences of the second
+//! from the first. The two samples are compared by the Kolmogorov-Smirnov statistic.
 
 use super::cell::Cell;
 use super::compare::Field;
@@ -11,44 +11,45 @@ use crate::record::classify::classify;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::Class;
 
-/// Fewer cells than this tell nothing.
+/// Smallest number of cells for a test.
 const FEWEST: usize = 8;
 
-/// Probability that an average of a right map is found wrong.
+/// Probability that the test rejects a right map.
 const CHANCE: f64 = 1e-4;
 
-/// Averages that are compared: the exponent, the logarithm of its error, impacts, meshing.
+/// Number of compared averages: exponent, logarithm of its error, impacts, meshing.
 const COUNT: usize = 4;
 
-/// One average over all chaotic cells.
+/// Test of one average over all chaotic cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChaosTest {
-    /// What is compared.
+    /// Name of the average.
     pub name: &'static str,
-    /// Chaotic cells.
+    /// Number of chaotic cells.
     pub cells: usize,
-    /// The largest distance of the two distributions.
+    /// Largest distance of the two distribution functions.
     pub distance: f64,
-    /// The distance that chance exceeds once in 10,000 times; none where there are too few cells to tell.
+    /// Distance that chance exceeds once in 10,000 tests; none if there are too few cells.
     pub bar: Option<f64>,
-    /// Mean differences from the reference: the map's, and the reference's own.
+    /// Mean differences from the reference: of the map, and of the reference's second result.
     pub means: [f64; 2],
 }
 
 impl ChaosTest {
-    /// Whether the map's averages are not those of the reference.
+    /// Whether the map's averages differ from the reference's.
     pub fn fails(&self) -> bool {
         self.bar.is_some_and(|bar| self.distance > bar)
     }
 }
 
-/// Differences of one cell from the reference: the record's, and the reference's own. None of those that a side lacks.
+/// Differences of one cell from the reference: of the record, and of the reference's second result. None for an average
+/// that one side lacks.
 pub(super) type Differences = [Option<[f64; 2]>; COUNT];
 
-/// What one chaotic cell adds; none if it is not chaotic on all sides.
+/// Computes the differences of one cell; none unless all three results are chaotic.
 pub(super) fn differences(cell: &Cell<'_>) -> Option<Differences> {
     let record = cell.record;
-    // Starts of their own: those of `explain` begin at zero.
+    // Large indices, because `explain` uses those from zero.
     let [first, second] = [1 << 16, 1 << 17].map(|k| cell.averages(k, record.periods_run));
     let (first, second) = (first?, second?);
     if [record, &first, &second].iter().any(|side| classify(side) != Class::Chaotic) {
@@ -73,7 +74,7 @@ pub(super) fn differences(cell: &Cell<'_>) -> Option<Differences> {
     ])
 }
 
-/// Every average, over all chaotic cells.
+/// Tests each average over all chaotic cells.
 pub(super) fn tests(all: &[Differences]) -> Vec<ChaosTest> {
     let names = ["lyapunov", "lyapunov_error", "impacts_per_period", "mesh_fraction"];
     names
@@ -95,8 +96,7 @@ pub(super) fn tests(all: &[Differences]) -> Vec<ChaosTest> {
         .collect()
 }
 
-/// The largest distance of the distribution functions of two samples of one size. What is not a number lies at the
-/// far end.
+/// Returns the largest distance of the distribution functions of two samples of equal size. NaN counts as largest.
 fn distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
     let count = a.len().max(1) as f64;
     a.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! Where two records of one cell differ.
+//! Comparison of two records of one cell.
 
 use serde::Serialize;
 
@@ -12,22 +12,22 @@ use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Budget, Class, Status};
 use rattlemap_dynamics::word::Word;
 
-/// What is compared.
+/// A compared field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Field {
-    /// Periodic, chaotic, undecided or failed.
+    /// The class: periodic, chaotic, undecided or failed.
     Class,
-    /// The period, where both are periodic.
+    /// The period, if both are periodic.
     Period,
-    /// The word, up to mirror image, where the period agrees.
+    /// The word up to mirror image, if the periods agree.
     Word,
-    /// Its pattern, likewise.
+    /// The pattern up to mirror image, if the periods agree.
     Pattern,
-    /// Whether the cycle is its own mirror image, where the period agrees.
+    /// Whether the cycle is its own mirror image, if the periods agree.
     Symmetric,
-    /// The exponent: by the largest multiplier of cycles, within wide bars otherwise.
+    /// The exponent: through the largest multiplier for cycles, with wide tolerances otherwise.
     Exponent,
-    /// The attractor that the start leads to, in a map of basins, where both are periodic.
+    /// The attractor of the start in a map of basins, if both are periodic.
     Attractor,
     /// Impacts per forcing period.
     Impacts,
@@ -35,16 +35,16 @@ pub enum Field {
     Mesh,
     /// How the integration ended.
     Status,
-    /// Forcing periods integrated: no more than the plan allows.
+    /// Number of integrated forcing periods, which the plan limits.
     Periods,
-    /// Every number that the record claims to hold: it is finite.
+    /// Whether all numbers of the record are finite.
     Finite,
-    /// The whole record: the same lane on the same device gives it again, to the bit.
+    /// Whether the same engine reproduces the record to the bit.
     Again,
 }
 
 impl Field {
-    /// Every field, in the order in which they are told.
+    /// All fields, in the order in which they are reported.
     pub const ALL: [Field; 13] = [
         Field::Class,
         Field::Period,
@@ -61,7 +61,7 @@ impl Field {
         Field::Again,
     ];
 
-    /// Its name in files, that of the record's field where there is one.
+    /// Returns the name in files, which is the record's field name if there is one.
     pub fn name(self) -> &'static str {
         match self {
             Field::Class => "class",
@@ -81,7 +81,7 @@ impl Field {
     }
 }
 
-/// A value of one side.
+/// A value in a difference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
@@ -95,21 +95,21 @@ pub enum Value {
     Flag(bool),
 }
 
-/// One field in which a record and its judge differ.
+/// A field in which a record and its judge differ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// Which.
+    /// The field.
     pub field: Field,
-    /// What the record says.
+    /// Value in the record.
     pub record: Value,
-    /// What the judge says.
+    /// Value of the judge.
     pub judge: Value,
 }
 
-/// A field that was compared, and what differs in it if anything does.
+/// A compared field with its difference, if there is one.
 pub(super) type Compared = (Field, Option<Difference>);
 
-/// What a computation says of a cell.
+/// Result of a computation of a cell.
 #[derive(Clone, Debug)]
 pub(super) struct Answer {
     pub(super) record: Record,
@@ -117,16 +117,16 @@ pub(super) struct Answer {
     pattern: Either,
 }
 
-/// A word or a pattern, and its mirror image.
+/// A word or pattern with its mirror image.
 #[derive(Clone, Debug)]
 struct Either {
     own: Option<Spelling>,
-    /// Of a long word no record tells it.
+    /// None for a long word of which only a hash is known.
     mirrored: Option<Spelling>,
 }
 
 impl Either {
-    /// `word` is what the record spells, if it is known.
+    /// Builds the pair from the record's text and, if known, the word.
     fn new(own: Option<Spelling>, word: Option<&Word>) -> Either {
         let mirrored = match (word, &own) {
             (Some(word), _) | (None, Some(Spelling::Whole(word))) => Some(Spelling::new(&word.mirrored())),
@@ -135,7 +135,7 @@ impl Either {
         Either { own, mirrored }
     }
 
-    /// Whether a spelling is that of the word or of its mirror image.
+    /// Whether a text is the word's or its mirror image's.
     fn is(&self, ours: &Spelling) -> bool {
         let length = |spelling: &Spelling| match spelling {
             Spelling::Whole(word) => word.len() as u32,
@@ -148,7 +148,7 @@ impl Either {
         }
     }
 
-    /// What differs, where both sides have it.
+    /// Compares with another text; none if one side has none.
     fn compare(&self, field: Field, ours: Option<&Spelling>) -> Option<Compared> {
         let (ours, theirs) = (ours?, self.own.as_ref()?);
         let shown = || (Value::Text(ours.text()), Value::Text(theirs.text()));
@@ -162,24 +162,24 @@ impl Answer {
         Answer { record, word: Either::new(record.spelling(), word), pattern }
     }
 
-    /// Whether another has the same word, and the same pattern, up to mirror image.
+    /// Whether another result has the same word, and whether it has the same pattern, up to mirror image.
     pub(super) fn is_spelled_as(&self, other: &Answer) -> [bool; 2] {
         let is = |own: &Either, other: &Either| own.own.as_ref().is_none_or(|own| other.is(own));
         [is(&self.word, &other.word), is(&self.pattern, &other.pattern)]
     }
 }
 
-/// How far numbers may differ and still count as the same.
+/// Tolerances of the comparison of numbers.
 ///
-/// Lanes read a cycle where they have come near it, not on it, and carry tangents in their own precision. Of cycles
-/// over the plane 99 % are within 3e-4 (f32) and 4e-6 (f64) of the reference's multiplier, all but those whose
-/// multiplier is close to 1 or which had not settled within 6e-3 and 3e-3; their meshing within 2e-6 and 3e-8.
+/// Lanes evaluate a cycle near it, not on it, and compute tangents in their own precision. Over the plane, multipliers of
+/// 99 % of the cycles agree with the reference within 3e-4 (f32) and 4e-6 (f64). All agree within 6e-3 and 3e-3, except
+/// where the multiplier is close to 1 or the motion has not settled. Fractions of meshing agree within 2e-6 and 3e-8.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bars<'a> {
-    /// Natural logarithm of the largest multiplier, per forcing period and at least per five: every period of a
-    /// cycle adds its own error.
+    /// Tolerance of the natural logarithm of the largest multiplier, per forcing period. Cycles of fewer than five
+    /// periods get five times this value.
     multiplier: f64,
-    /// Multipliers below this are rounding of the monodromy matrix: as good as zero.
+    /// Smallest multiplier that the monodromy matrix resolves; smaller ones count as zero.
     no_multiplier: f64,
     mesh: f64,
     forcing_period: f64,
@@ -187,7 +187,7 @@ pub(super) struct Bars<'a> {
     pub(super) labels: Option<Labels<'a>>,
 }
 
-/// The attractors of a map of basins, as one cell of it knows them.
+/// The attractors of a map of basins, seen from one of its cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Labels<'a> {
     pub(super) basins: &'a Basins,
@@ -197,7 +197,8 @@ pub(super) struct Labels<'a> {
 }
 
 impl Labels<'_> {
-    /// What the map says of its own record; of another the attractor that it shows, if that is one of the map's.
+    /// Returns the attractor of a record: the map's label for the map's own record, else the known attractor that the
+    /// record's state belongs to.
     fn of(&self, record: &Record) -> Option<u16> {
         match record.strobe == self.own {
             true => Some(self.basins.labels()[self.id]).filter(|&label| label != NONE),
@@ -206,17 +207,17 @@ impl Labels<'_> {
     }
 }
 
-/// Growth or decay, as a logarithm, that takes rounding to the size of the motion or back: what has had less of it by
-/// the end of its budget cannot be told from neutral.
-const TELLING: f64 = 40.0;
+/// Logarithm of the growth or decay that takes a rounding error to the size of the motion. A motion with less over its
+/// budget cannot be distinguished from a neutral one.
+const DECISIVE_GROWTH: f64 = 40.0;
 
-/// Impacts are counted: nothing but the division rounds.
+/// Tolerance of impacts per period of a cycle. Impacts are counted, so only the division rounds.
 const IMPACTS_BAR: f64 = 1e-9;
 
-/// Averages of one chaotic cell may differ by so many standard errors of both. This finds what is out of all
-/// proportion; what is systematic is found over the class ([`super::chaos`]).
+/// Tolerance of averages of one chaotic cell, in standard errors of both sides. It finds gross errors only; the test over
+/// the class ([`super::chaos`]) finds systematic ones.
 const ERRORS: f64 = 8.0;
-/// Beside that: an exponent per forcing period, and shares of impacts and of time.
+/// Additional tolerances of chaotic averages: exponent per forcing period, relative impacts, fraction of time.
 const CHAOS_BARS: [f64; 3] = [0.1, 0.5, 0.25];
 
 impl Bars<'_> {
@@ -228,7 +229,7 @@ impl Bars<'_> {
         Bars { multiplier, no_multiplier, mesh, forcing_period, budget: *budget, labels: None }
     }
 
-    /// Compares a record with what its judge says, field by field as far as both have them.
+    /// Compares a record with its judge's, for all fields that both have.
     pub(super) fn compare(&self, record: &Record, answer: &Answer) -> Vec<Compared> {
         let judge = &answer.record;
         let [ours, theirs] = [record, judge].map(classify);
@@ -263,7 +264,7 @@ impl Bars<'_> {
         list
     }
 
-    /// Whether two cycles are the same attractor, in a map of basins.
+    /// Compares the attractors of two cycles in a map of basins.
     fn compare_labels(&self, record: &Record, judge: &Record) -> Option<Compared> {
         let labels = self.labels?;
         let [ours, theirs] = [record, judge].map(|record| labels.of(record));
@@ -271,27 +272,28 @@ impl Bars<'_> {
         Some(compared(Field::Attractor, ours == theirs, || (shown(ours), shown(theirs))))
     }
 
-    /// Whether two ends of motion of one class are the same. Lanes call an approach slow where they stand farther than
-    /// 1e-4 from the cycle, the reference farther than 1e-8: of motion that settles slowly both may be said.
+    /// Whether two statuses of one class agree. Lanes report `slow` at distances above 1e-4 from the cycle, the reference
+    /// above 1e-8, so `ok` and `slow` agree for motion that settles slowly.
     fn is_same_status(&self, class: Class, statuses: [Status; 2], judge: &Record) -> bool {
         match class {
-            // That it is at no cycle is its class.
+            // For these classes the status adds nothing.
             Class::Chaotic | Class::Undecided => true,
             _ => {
                 let graded = [Status::Ok, Status::Slow];
                 let is_grade = statuses.iter().all(|status| graded.contains(status));
-                statuses[0] == statuses[1] || is_grade && !self.is_told(judge)
+                statuses[0] == statuses[1] || is_grade && !self.is_decisive(judge)
             }
         }
     }
 
-    /// Whether the motion of a record settles or separates, within the budget, by enough to be told from neutral.
-    pub(super) fn is_told(&self, judge: &Record) -> bool {
+    /// Whether motion settles or separates enough within the budget to be distinguished from neutral motion.
+    pub(super) fn is_decisive(&self, judge: &Record) -> bool {
         let has = judge.valid & valid::LYAPUNOV != 0;
-        has && judge.lyapunov.abs() * self.forcing_period * f64::from(self.budget.periods()) >= TELLING
+        has && judge.lyapunov.abs() * self.forcing_period * f64::from(self.budget.periods())
+            >= DECISIVE_GROWTH
     }
 
-    /// That every number of a record is finite.
+    /// Checks that every number of a record is finite.
     pub(super) fn finite(&self, record: &Record) -> Compared {
         let found = not_finite(record, &self.budget);
         let shown = || {
@@ -301,7 +303,7 @@ impl Bars<'_> {
         compared(Field::Finite, found.is_none(), shown)
     }
 
-    /// Whether a record says the same in every field.
+    /// Whether a record agrees in all fields.
     pub(super) fn agree(&self, record: &Record, answer: &Answer) -> bool {
         self.compare(record, answer).iter().all(|(_, differs)| differs.is_none())
     }
@@ -328,20 +330,20 @@ impl Bars<'_> {
         self.push_averages(list, record, judge, [IMPACTS_BAR, self.mesh]);
     }
 
-    /// Whether two logarithms of the largest multiplier of a cycle are the same.
+    /// Whether two logarithms of the largest multiplier of a cycle agree.
     pub(super) fn is_same_multiplier(&self, ours: f64, theirs: f64, period: f64) -> bool {
         let is_none = [ours, theirs].iter().all(|log| *log <= self.none());
         is_none || is_within(apart(ours, theirs), self.multiplier * period.max(5.0))
     }
 
-    /// The logarithm of a multiplier that is as good as zero.
+    /// Returns the logarithm of the smallest multiplier that is resolved.
     pub(super) fn none(&self) -> f64 {
         self.no_multiplier.ln()
     }
 
     fn compare_averages(&self, record: &Record, judge: &Record, list: &mut Vec<Compared>) {
         let exponents = [record, judge].map(|side| side.lyapunov);
-        // Only the judge's error counts: what a record says of itself widens no bar.
+        // Only the judge's error counts, so that a record cannot widen its own tolerance.
         let own = if judge.lyapunov_error.is_finite() { judge.lyapunov_error } else { 0.0 };
         let bar = ERRORS * std::f64::consts::SQRT_2 * own + CHAOS_BARS[0] / self.forcing_period;
         let is_same = is_within(apart(exponents[0], exponents[1]), bar);
@@ -362,7 +364,7 @@ impl Bars<'_> {
         }
     }
 
-    /// Notes a number that both sides have.
+    /// Adds the comparison of a number if both sides have it.
     fn push(
         &self,
         list: &mut Vec<Compared>,
@@ -377,9 +379,10 @@ impl Bars<'_> {
     }
 }
 
-pub(super) fn compared(field: Field, same: bool, shown: impl FnOnce() -> (Value, Value)) -> Compared {
+/// Builds the comparison of a field. `values` returns the record's value and the judge's.
+pub(super) fn compared(field: Field, same: bool, values: impl FnOnce() -> (Value, Value)) -> Compared {
     let differs = (!same).then(|| {
-        let (record, judge) = shown();
+        let (record, judge) = values();
         Difference { field, record, judge }
     });
     (field, differs)

@@ -1,46 +1,47 @@
-//! Why a record differs from what its cell's start reaches.
+//! Explanations of mismatches.
 
 use super::Kind;
-use super::beside::{meets_strobe, on_its_cycle};
 use super::cell::Cell;
 use super::compare::Answer;
+use super::near_cycle::{meets_strobe, on_its_cycle};
 use crate::record::classify::{classify, status};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::{Class, Status};
 
-/// Cells, at random, that are the same within the resolution.
-const MOVED: u64 = 12;
+/// Number of perturbed cells.
+const PERTURBED: u64 = 12;
 
-/// As many more in a map of basins: where these are mixed on every scale, an attractor may take one start in a hundred.
-const MOVED_IN_BASINS: u64 = 512;
+/// Number of perturbed cells in a map of basins. Where basins are mixed on every scale, one start in a hundred may lead to
+/// an attractor.
+const PERTURBED_IN_BASINS: u64 = 512;
 
-/// More of them where a transient has to last as long by chance.
-const MANY_MOVED: u64 = 48;
+/// Number of perturbed cells where a transient must be as long as the record's.
+const MANY_PERTURBED: u64 = 48;
 
-/// What lanes on a device say of a cell when they run it again.
+/// Records of lanes that computed the cell again.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Lanes<'a> {
-    /// The same lane.
+    /// The lane with the map's settings.
     pub(super) again: Option<&'a Record>,
-    /// The same lane over the whole budget.
+    /// The lane without early stops.
     pub(super) whole: Option<&'a Record>,
-    /// That in double precision.
+    /// The lane without early stops in double precision.
     pub(super) double: Option<&'a Record>,
 }
 
-/// The kind of a mismatch. `claim` is what differs from `truth`, the reference's answer: the map's record, or what
-/// judges a map of the reference itself.
+/// Returns the kind of a mismatch between `claim` and `truth`. The claim is the map's record, or the second judge's for a
+/// map that the reference computed. The truth is the reference's answer.
 pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes<'_>) -> Kind {
-    // Such numbers are no engine's answer: there is nothing to explain.
+    // No engine produces such numbers.
     if claim.periods_run > cell.longest() || !cell.is_finite(claim) {
         return Kind::Unexplained;
     }
-    // Caps and resolution are the lanes' own; the reference cannot tell whether they were met.
+    // Caps and the resolution are properties of lanes, so only a repeated lane can confirm them.
     let is_reproduced = lanes.again.is_some_and(|again| again.status == claim.status);
     if status(claim).is_failure() {
         return if is_reproduced { Kind::Cap } else { Kind::Unexplained };
     }
-    // Early stops spare a costly cell what its judge has no allowance for.
+    // With early stops a costly cell may end before the cap that its judge meets.
     if matches!(status(&truth.record), Status::TooStiff | Status::CapEvents) {
         let is_own = lanes.again.is_some_and(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(claim));
         return if is_own { Kind::Budget } else { Kind::Unexplained };
@@ -50,9 +51,12 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes
         return Kind::Border;
     }
     let agrees = |answer: &Answer| cell.bars.agree(claim, answer) || is_hidden(answer);
-    let moved = if cell.bars.labels.is_some() { MOVED_IN_BASINS } else { MOVED };
-    let ways = [false, true].into_iter().flat_map(|shaken| (0..moved).map(move |k| (k, shaken)));
-    if ways.filter_map(|(k, shaken)| cell.moved_truth(k, shaken)).any(|answer| agrees(&answer)) {
+    let count = if cell.bars.labels.is_some() { PERTURBED_IN_BASINS } else { PERTURBED };
+    let ways = [false, true].into_iter().flat_map(|every_period| (0..count).map(move |k| (k, every_period)));
+    if ways
+        .filter_map(|(k, every_period)| cell.perturbed_truth(k, every_period))
+        .any(|answer| agrees(&answer))
+    {
         let stays = claim.valid & valid::STROBE != 0
             && claim.strobe.iter().all(|x| x.is_finite())
             && agrees(&cell.starting_at(claim.strobe));
@@ -61,18 +65,18 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes
     if is_too_short(cell, claim, truth, &agrees) {
         return Kind::Budget;
     }
-    if is_same_beside(cell, claim, truth) {
+    if agrees_on_cycle(cell, claim, truth) {
         return if status(claim) == Status::Slow { Kind::Budget } else { Kind::Border };
     }
-    // What a lane says because it stopped early is no rounding.
-    let says = |lane: Option<&Record>| lane.is_some_and(|lane| agrees(&Answer::new(*lane, None)));
+    // Rounding explains the claim only if the lane repeats it without early stops.
+    let repeats = |lane: Option<&Record>| lane.is_some_and(|lane| agrees(&Answer::new(*lane, None)));
     let is_right = lanes.double.is_some_and(|double| cell.bars.agree(double, truth));
-    let is_rounding = is_right && says(lanes.again) && says(lanes.whole);
+    let is_rounding = is_right && repeats(lanes.again) && repeats(lanes.whole);
     if is_rounding { Kind::Border } else { Kind::Unexplained }
 }
 
-/// Whether a lane says that points of its cycle lie closer together than it can tell, and so they do: the answer's
-/// cycle is the same or closes earlier, within what the resolution makes of it.
+/// Whether the claim has the status `below_resolution` and the answer's cycle confirms it: it is the same cycle or closes
+/// earlier, within the effect of rounding.
 fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     status(claim) == Status::BelowResolution
         && claim.period.is_multiple_of(answer.record.period.max(1))
@@ -80,8 +84,8 @@ fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
         && cell.closes_earlier(answer.record.strobe, claim.period)
 }
 
-/// Whether a record says the same of its cycle, but for what it was to be read on the cycle for.
-fn is_same_beside(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
+/// Whether a record agrees once its exponent and status are replaced by those of the cycle itself.
+fn agrees_on_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     let cycle = &truth.record;
     let is_on_strobe =
         status(claim) == Status::StrobeOnEvent && meets_strobe(cell, cycle.strobe, cycle.period);
@@ -91,7 +95,7 @@ fn is_same_beside(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     agrees(&claim) || on_its_cycle(cell, &claim).is_some_and(|claim| agrees(&claim))
 }
 
-/// Whether two cycles are the same but for status and how often one repeats the other.
+/// Whether two cycles agree except for their status, and except that one may repeat the other several times.
 fn is_multiple(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     let record = &answer.record;
     let (Class::Periodic { period: ours }, Class::Periodic { period: theirs }) =
@@ -99,30 +103,30 @@ fn is_multiple(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     else {
         return false;
     };
-    // A multiple has neither word, pattern nor symmetry of what it repeats.
+    // The word, pattern and symmetry of a repetition differ from those of the cycle.
     let repeated = if ours == theirs { 0 } else { valid::WORD | valid::PATTERN | valid::SYMMETRIC };
     let valid = claim.valid & !repeated;
     let once = Record { period: theirs, status: record.status, valid, ..*claim };
     (ours % theirs == 0 || theirs % ours == 0) && cell.bars.agree(&once, answer)
 }
 
-/// Whether one side would say what the other does with fewer or with more periods, or neither can tell within them.
+/// Whether one side gives the other's answer with fewer or more periods, or no side can decide within the budget.
 fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn(&Answer) -> bool) -> bool {
-    // An approach that is called slow is not over. Where it is, lanes and the reference draw the line elsewhere.
+    // A slow approach is not finished. Lanes and the reference have different limits for it.
     let is_open = |record: &Record| {
         matches!(classify(record), Class::Chaotic | Class::Undecided) || status(record) == Status::Slow
     };
-    // What is left open claims nothing; nobody could have told where the motion is as slow. Nor could one tell a cycle
-    // there from one that has just split off it.
+    // An undecided claim contradicts nothing if the motion is too slow to be decided. A slow approach cannot distinguish
+    // a cycle from one that has just bifurcated from it.
     let is_undecided = classify(claim) == Class::Undecided;
-    let is_untold = |answer: &Answer| {
+    let cannot_decide = |answer: &Answer| {
         let claims_nothing =
             is_undecided || status(claim) == Status::Slow && is_multiple(cell, claim, answer);
-        claims_nothing && !cell.bars.is_told(&answer.record)
+        claims_nothing && !cell.bars.is_decisive(&answer.record)
     };
-    let stopped = || (0..MANY_MOVED).filter_map(|k| cell.moved_after(k, claim.periods_run));
-    let later = || (0..MOVED).filter_map(|k| cell.moved_at_leisure(k));
-    is_untold(truth)
-        || is_open(claim) && stopped().any(|answer| agrees(&answer) || is_untold(&answer))
+    let stopped = || (0..MANY_PERTURBED).filter_map(|k| cell.perturbed_after(k, claim.periods_run));
+    let later = || (0..PERTURBED).filter_map(|k| cell.perturbed_for_long(k));
+    cannot_decide(truth)
+        || is_open(claim) && stopped().any(|answer| agrees(&answer) || cannot_decide(&answer))
         || is_open(&truth.record) && later().any(|answer| agrees(&answer))
 }

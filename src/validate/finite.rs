@@ -1,13 +1,13 @@
-//! Whether a record holds the numbers that it claims to hold.
+//! Check that the numbers of a record are finite.
 
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::Budget;
 use rattlemap_dynamics::stability::LEAST_FOR_ERROR;
 
-/// The first field of a record that claims a number and holds none, by its name in files, with what it holds instead.
+/// Returns the name and value of the first field that is not finite.
 ///
-/// Two infinities are answers: the exponent of a superstable cycle, and the error of an exponent that was averaged over
-/// too few periods to have one.
+/// Two infinities are allowed: the exponent of a superstable cycle, and the standard error of an exponent averaged over
+/// too few periods.
 pub(super) fn not_finite(record: &Record, budget: &Budget) -> Option<(&'static str, f64)> {
     let is_cycle = record.period > 0;
     let averaged = record.periods_run.saturating_sub(budget.exponent_from());
@@ -42,7 +42,7 @@ mod tests {
     };
 
     #[test]
-    fn claims_alone_are_looked_at_and_two_infinities_are_answers() {
+    fn valid_fields_are_checked_and_two_infinities_are_allowed() {
         let all = valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH | valid::STROBE;
         let right = Record { periods_run: 44, valid: all, ..Record::default() };
         let named = |record: Record| not_finite(&record, &BUDGET).map(|(name, _)| name);

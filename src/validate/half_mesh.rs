@@ -1,7 +1,7 @@
-//! How much of a map rests on the leaving speed at which bouncing ends?
+//! Dependence of a map on the meshing speed.
 //!
-//! It cuts off a series of ever smaller impacts, and models leave it open. What changes when it is halved says where
-//! bouncing is taken to end, not what the motion is.
+//! The meshing speed ends a series of ever smaller impacts. Its value is a choice of the modeller. Results that change
+//! when it is halved depend on this choice.
 
 use super::cell::Cell;
 use super::compare::Answer;
@@ -10,8 +10,8 @@ use crate::record::classify::classify;
 use rattlemap_dynamics::model::Law;
 use rattlemap_dynamics::orbit::Class;
 
-/// What changes with half the meshing speed, in cells that mesh. Periods, words and patterns are compared where the motion is
-/// periodic with both.
+/// Rates of change with half the meshing speed, among meshing cells. Periods, words and patterns are compared if the motion
+/// is periodic with both speeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HalfMesh {
     /// Cells whose class changes.
@@ -20,19 +20,20 @@ pub struct HalfMesh {
     pub periods: Rate,
     /// Cycles whose word changes, up to mirror image.
     pub words: Rate,
-    /// Cycles whose pattern does.
+    /// Cycles whose pattern changes, up to mirror image.
     pub patterns: Rate,
 }
 
-/// What changed in one cell.
+/// Changes in one cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Changes {
     class: bool,
-    /// Period, word and pattern of a cycle.
+    /// Whether period, word and pattern of a cycle change.
     cycle: Option<[bool; 3]>,
 }
 
-/// What changes in a cell whose start reaches `truth`; none if that does not mesh, or at no speed.
+/// Compares a cell's answer `truth` with the answer for half the meshing speed; none if the motion does not mesh or the
+/// meshing speed is zero.
 pub(super) fn changes(cell: &Cell<'_>, truth: &Answer) -> Option<Changes> {
     if truth.record.mesh_fraction <= 0.0 || cell.law.mesh_speed.iter().all(|&speed| speed <= 0.0) {
         return None;
@@ -49,8 +50,8 @@ pub(super) fn changes(cell: &Cell<'_>, truth: &Answer) -> Option<Changes> {
     Some(Changes { class: before.index() != after.index(), cycle })
 }
 
-/// What all of them say; none if no cell meshes.
-pub(super) fn told(changes: &[Changes]) -> Option<HalfMesh> {
+/// Computes the rates over all meshing cells; none if there are none.
+pub(super) fn rates(changes: &[Changes]) -> Option<HalfMesh> {
     let cycles: Vec<[bool; 3]> = changes.iter().filter_map(|changes| changes.cycle).collect();
     let of = |k: usize| Rate::new(cycles.iter().filter(|cycle| cycle[k]).count(), cycles.len());
     (!changes.is_empty()).then(|| HalfMesh {

@@ -1,9 +1,9 @@
-//! A cell by an adaptive ODE library with event location, which shares nothing with the reference but the
-//! description of the oscillator.
+//! Independent judge: an adaptive ODE solver with event location that shares only the description of the oscillator with
+//! the reference.
 //!
-//! The motion is followed over the whole budget. It is on a cycle where its strobe states recur, and the cycle is
-//! stable: its multipliers are those of differences of motions beside it. It is chaotic where a motion beside it
-//! separates. Where neither is seen, as on the way to a cycle that is slow, nothing is claimed.
+//! The motion is integrated over the whole budget. It is periodic if its strobe states recur and the cycle is stable;
+//! multipliers come from finite differences of neighbouring motions. It is chaotic if a neighbouring motion separates from
+//! it. If neither is found, for instance while a motion approaches its cycle slowly, the judge gives no answer.
 
 pub mod dop853;
 pub mod field;
@@ -28,36 +28,36 @@ use rattlemap_dynamics::word::Word;
 /// Relative and absolute tolerance of one step.
 const TOLERANCE: f64 = 1e-12;
 
-/// Strobe states this close, relative to the motion, are the same.
+/// Relative distance below which two strobe states are the same.
 const RECURS: f64 = 1e-7;
 
-/// And those that come this close may be in the end.
-const NEARLY: f64 = 1e-4;
+/// Relative distance below which two strobe states may still converge.
+const NEARLY_RECURS: f64 = 1e-4;
 
-/// How far beside it, relative to the motion, another one starts.
-const BESIDE: f64 = 1e-7;
+/// Relative displacement of a neighbouring motion.
+const DISPLACEMENT: f64 = 1e-7;
 
-/// Multipliers below this are rounding of such differences.
+/// Smallest multiplier that these finite differences resolve.
 const LEAST_MULTIPLIER: f64 = 1e-4;
 
-/// A motion that is followed from strobe to strobe.
+/// A motion that advances from strobe to strobe.
 #[derive(Clone)]
 struct Strobed<'a> {
     solver: Solver,
     period: f64,
     flight: Flight,
-    /// The last event before this period.
+    /// The last event before the current period.
     before: Option<Ended>,
     tally: Tally,
-    /// Once it is raised, the motion is lost.
+    /// Once set, the integration stops.
     halt: &'a AtomicBool,
 }
 
-/// What was met on the way.
+/// Events and meshing time since the tally began.
 #[derive(Clone, Debug, Default)]
 struct Tally {
     impacts: usize,
-    /// Whether there were infinitely many, of which not all are counted.
+    /// Whether an infinite series of impacts was cut off, so that `impacts` is too small.
     series: bool,
     meshing_time: f64,
     symbols: Vec<u8>,
@@ -75,7 +75,7 @@ impl Strobed<'_> {
         }
     }
 
-    /// One forcing period; none for a motion that is lost.
+    /// Advances by one forcing period; none if the solver fails or is halted.
     fn advance(&mut self) -> Option<()> {
         if self.halt.load(Ordering::Relaxed) {
             return None;
@@ -100,7 +100,7 @@ impl Strobed<'_> {
     }
 }
 
-/// The name of a flight between two events.
+/// Returns the symbol of a flight between two events.
 fn symbol(before: Ended, side: Side) -> u8 {
     match (before.kind, before.side, side) {
         (EventKind::MeshStart, Side::Right, _) => b'1',
@@ -112,12 +112,12 @@ fn symbol(before: Ended, side: Side) -> u8 {
     }
 }
 
-/// What a run's cell is; none where nothing is claimed of it.
+/// Computes the record of a run; none if the judge gives no answer.
 pub fn record(plan: &Plan, id: u32, records: &[Record]) -> Option<Record> {
     record_until(plan, id, records, &super::NEVER)
 }
 
-/// [`record`] until a flag is raised; none if it was by then.
+/// Like [`record`], but returns `None` once `halt` is set.
 pub(super) fn record_until(plan: &Plan, id: u32, records: &[Record], halt: &AtomicBool) -> Option<Record> {
     let cell = plan.cell(id);
     let (oscillator, start) = (plan.oscillator(cell.flow), plan.start(id, records));
@@ -125,13 +125,13 @@ pub(super) fn record_until(plan: &Plan, id: u32, records: &[Record], halt: &Atom
 }
 
 fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> Option<Record> {
-    let kept = 2 * budget.settings.max_period as usize + 1;
+    let stored = 2 * budget.settings.max_period as usize + 1;
     let mut strobes = Vec::new();
     for _ in 0..budget.periods() {
         motion.advance()?;
         strobes.push(motion.flight.q);
     }
-    let window = &strobes[strobes.len().saturating_sub(kept)..];
+    let window = &strobes[strobes.len().saturating_sub(stored)..];
     let largest = |i: usize| window.iter().map(|q| q[i].abs().max(q[i + 2].abs())).fold(0.0, f64::max);
     let position = largest(0).max(oscillator.length_scale());
     let units = [position, largest(1).max(oscillator.omega * position)];
@@ -143,8 +143,10 @@ fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> 
     };
     let lags = 1..=window.len() / 2;
     let record = match lags.clone().find(|&lag| recurs(lag, RECURS)) {
-        // It comes to its cycle from either side in turn, or to one of a shorter period.
-        Some(lag) if lags.clone().any(|part| part < lag && lag % part == 0 && recurs(part, NEARLY)) => {
+        // The motion may still converge to a cycle of a shorter period.
+        Some(lag)
+            if lags.clone().any(|part| part < lag && lag % part == 0 && recurs(part, NEARLY_RECURS)) =>
+        {
             return None;
         }
         Some(lag) => cycle(&motion, lag as u32, oscillator.degrees, units)?,
@@ -153,7 +155,7 @@ fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> 
     Some(Record { periods_run: budget.periods(), ..record })
 }
 
-/// The derivative of one period, by differences of motions to either side, in the directions that there are.
+/// Computes the derivative of the strobe map over one period by central differences.
 fn derivative(on: &Strobed, degrees: usize, units: [f64; 2]) -> Option<Matrix4<f64>> {
     let image = |j: usize, by: f64| {
         let mut direction = [0.0; 4];
@@ -165,14 +167,14 @@ fn derivative(on: &Strobed, degrees: usize, units: [f64; 2]) -> Option<Matrix4<f
     let mut derivative = Matrix4::zeros();
     let held = if on.flight.is_stuck() { 2 } else { 0 };
     for j in held..2 * degrees {
-        let by = BESIDE * units[j % 2];
+        let by = DISPLACEMENT * units[j % 2];
         let (ahead, behind) = (image(j, by)?, image(j, -by)?);
         (0..4).for_each(|i| derivative[(i, j)] = (ahead[i] - behind[i]) / (2.0 * by));
     }
     Some(derivative)
 }
 
-/// A cycle, if it is stable.
+/// Builds the record of a cycle; none if it is unstable.
 fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<Record> {
     let span = f64::from(period) * on.period;
     let mut motion = on.clone();
@@ -196,7 +198,7 @@ fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<R
     };
     let word = Word::cyclic(&tally.symbols);
     record.set_pattern(&word.pattern());
-    // How many of infinitely many impacts are told is nobody's claim.
+    // After an infinite series the number of impacts is unknown.
     if tally.series {
         record.valid &= !valid::IMPACTS;
     } else {
@@ -208,12 +210,12 @@ fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<R
     (radius < 1.0).then_some(record)
 }
 
-/// Chaos, if a motion beside it separates from it on average.
+/// Builds the record of a chaotic motion; none unless a neighbouring motion separates from it on average.
 fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
     motion.tally = Tally::default();
     let mut other = motion.clone();
     let mut aside = [0.0; 4];
-    aside[if motion.flight.is_stuck() { 2 } else { 0 }] = BESIDE * units[0];
+    aside[if motion.flight.is_stuck() { 2 } else { 0 }] = DISPLACEMENT * units[0];
     other.flight = motion.flight.displaced(&aside);
     let mut growth = Vec::new();
     for _ in 0..periods {
@@ -222,10 +224,10 @@ fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
         let difference: [f64; 4] =
             std::array::from_fn(|i| (other.flight.q[i] - motion.flight.q[i]) / units[i % 2]);
         let length = difference.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-        growth.push((length / BESIDE).ln());
-        // In its domain, and as near as it was.
+        growth.push((length / DISPLACEMENT).ln());
+        // The neighbour starts again in the same direction, at the initial distance.
         other = motion.clone();
-        aside = std::array::from_fn(|i| BESIDE * units[i % 2] * difference[i] / length);
+        aside = std::array::from_fn(|i| DISPLACEMENT * units[i % 2] * difference[i] / length);
         other.flight = motion.flight.displaced(&aside);
     }
     let mean = growth.iter().sum::<f64>() / growth.len().max(1) as f64;

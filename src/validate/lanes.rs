@@ -1,4 +1,4 @@
-//! Lanes of a sample, run again on a device.
+//! Lanes of a sample, computed again on a device.
 
 use std::collections::HashMap;
 
@@ -12,27 +12,27 @@ use crate::record::Record;
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::Status;
 
-/// What lanes said when they were run again; empty where there is no device.
+/// Results of lanes that were computed again; empty without a device.
 #[derive(Clone, Debug, Default)]
 pub struct Lanes {
-    /// What ran them.
+    /// Description of the device.
     pub device: Option<String>,
-    /// The same lanes, by run; of a map of lanes alone.
+    /// Records with the map's settings, by run. Only for maps that lanes computed.
     again: HashMap<u32, Record>,
-    /// The same without early stops, where there are lanes in double precision to compare them with.
+    /// Records without early stops, by run. Only if there are lanes in double precision to compare with.
     whole: HashMap<u32, Record>,
-    /// In double precision without early stops, by run: the arbiter of single precision, and the judge of the reference.
+    /// Records in double precision without early stops, by run. They judge single precision and the reference.
     double: HashMap<u32, Record>,
-    /// States after [`HORIZON`] periods; none for a lane that failed.
+    /// States after [`HORIZON`] periods by run; none for a lane that failed.
     states: Vec<(u32, Option<State>)>,
 }
 
 impl Lanes {
-    /// Runs the lanes of a sample again. `single` has the map's precision, `double` is in f64 where the adapter can; of
-    /// a map of the reference it alone is used.
+    /// Computes the lanes of a sample again. `single` has the map's precision and is none for a map of the reference.
+    /// `double` is a device in f64, if the adapter supports it.
     ///
     /// # Errors
-    /// A [`GpuError`].
+    /// [`GpuError`] if a device fails.
     pub async fn run(
         subject: &Subject<'_>,
         sample: &Sample,
@@ -100,10 +100,10 @@ async fn states(
     Ok(ids.iter().copied().zip(records.iter().map(state)).collect())
 }
 
-/// Runs lanes of a plan's runs: one record per id. `records` are as for [`Plan::start`].
+/// Computes runs of a plan on lanes and returns one record per id. `records` are as for [`Plan::start`].
 ///
 /// # Errors
-/// A [`GpuError`].
+/// [`GpuError`] if the device fails.
 pub async fn run_lanes(
     gpu: &mut Gpu,
     plan: &Plan,

@@ -1,16 +1,15 @@
-//! How right is a finished map? A sample of its cells, judged by what did not make them.
+//! Validation of a finished map: a sample of its cells is recomputed by another engine and compared.
 //!
-//! What a cell's start reaches is computed by the reference within the plan's whole budget, without early stops. A
-//! record that says something else is a mismatch, of one of five kinds ([`Kind`]); each kind but the last rests on a
-//! computation. Averages over chaos are compared as distributions over the class ([`ChaosTest`]), and states of many
-//! lanes a few periods after their start ([`StateCheck`]). Cells that mesh are computed with half the meshing speed, too
-//! ([`HalfMesh`]). What one reads first is a rate per kind with its 95 %
-//! interval ([`Rate`]), of cells drawn uniformly.
+//! The reference computes each sampled cell over the plan's whole budget, without early stops. A record that differs is
+//! a mismatch of one of five kinds ([`Kind`]). Every kind except the last rests on a computation that explains the
+//! difference. Averages of chaotic motion are compared as distributions over the class ([`ChaosTest`]). States of many
+//! lanes are compared a few periods after their start ([`StateCheck`]). Meshing cells are also computed with half the
+//! meshing speed ([`HalfMesh`]). The main result is a rate per kind with its 95 % interval ([`Rate`]), from cells drawn
+//! uniformly.
 //!
-//! A map of the reference is judged by lanes in f64 as well, or where there are none by an adaptive ODE library
-//! with event location (`independent`): whoever reads the result is told by which ([`Judge`]).
+//! A map that the reference computed is also judged by lanes in f64, or by an adaptive ODE solver with event location
+//! (`independent`) where no adapter has f64. The result names the judge ([`Judge`]).
 
-mod beside;
 mod cell;
 mod chaos;
 mod compare;
@@ -20,6 +19,7 @@ mod half_mesh;
 #[cfg(feature = "independent")]
 pub mod independent;
 mod lanes;
+mod near_cycle;
 mod rate;
 mod sample;
 mod states;
@@ -45,46 +45,46 @@ use cell::Cell;
 use compare::{Answer, Bars, Compared};
 use rattlemap_dynamics::orbit::{Budget, Class};
 
-/// Cells that a sample has unless something else is asked for.
+/// Default number of cells in a sample.
 pub const DEFAULT_SAMPLES: usize = 400;
 
-/// A finished map, and what made it.
+/// A finished map and the engine that computed it.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
     /// Its cells and their starts.
     pub plan: &'a Plan,
-    /// One record per run.
+    /// Records, one per run.
     pub records: &'a [Record],
-    /// The precision that the records were computed in.
+    /// Precision in which the records were computed.
     pub precision: Precision,
-    /// Whether lanes on a graphics device computed them; otherwise the reference itself did.
+    /// Whether lanes on a graphics device computed the records; otherwise the reference did.
     pub is_lane: bool,
 }
 
-/// Why a record is not what its judge says.
+/// Explanation of a mismatch between a record and its judge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
-    /// The cell's start, moved within the engine's resolution, reaches the record's answer, and the reference stays
-    /// on it when it starts from the record's last state.
+    /// A start within the engine's resolution of the cell's start leads to the record's answer, and the reference stays on
+    /// that attractor from the record's last state.
     Attractor,
-    /// The reference says what the record says when parameters and start move within the engine's resolution; or
-    /// the lane does say it in single precision, and in double precision what the reference says, both without
-    /// early stops; or its period is hidden below the resolution, as it says.
+    /// The cell lies at a border that rounding can cross: the reference gives the record's answer when parameters and
+    /// start move within the engine's resolution; or the lane gives its answer in single precision and the reference's
+    /// in double precision, both without early stops; or its status says that the period is below the resolution.
     Border,
-    /// One side gives the other's answer with fewer or with more periods; or the motion settles, or separates, too
-    /// slowly for either to tell.
+    /// One engine gives the other's answer with fewer or with more periods, or the motion settles or separates too slowly
+    /// to be decided within the budget.
     Budget,
-    /// A cap ended the lane, and does so again.
+    /// A cap ended the lane, and ends it again when it is repeated.
     Cap,
-    /// No computation gives a reason.
+    /// No computation explains the difference.
     Unexplained,
 }
 
 impl Kind {
-    /// Every kind, in the order in which they are told.
+    /// All kinds, in the order in which they are reported.
     pub const ALL: [Kind; 5] = [Kind::Attractor, Kind::Border, Kind::Budget, Kind::Cap, Kind::Unexplained];
 
-    /// Its name in files.
+    /// Returns the kind's name in files.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Attractor => "other_attractor",
@@ -96,113 +96,113 @@ impl Kind {
     }
 }
 
-/// What judged the records.
+/// The engines that judged the records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Judge {
-    /// The event-driven reference, without early stops: it made none of them, or nothing else is at hand.
+    /// The event-driven reference without early stops.
     Reference,
-    /// That, and lanes in f64.
+    /// The reference and lanes in f64.
     Lanes,
-    /// That, and an adaptive ODE library with event location.
+    /// The reference and an adaptive ODE solver with event location.
     Independent,
 }
 
-/// Agreement of one field, over all replayed cells.
+/// Agreement of one field over all compared cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Agreement {
-    /// What is compared.
+    /// The compared field.
     pub field: Field,
-    /// Cells in which both sides have it.
+    /// Number of cells in which both sides have the field.
     pub compared: usize,
-    /// Cells in which they agree.
+    /// Number of cells in which the sides agree.
     pub agreeing: usize,
 }
 
-/// A cell whose record is not what its judge says.
+/// A cell whose record differs from its judge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mismatch {
     /// The run, as in [`Plan::cell`].
     pub id: u32,
-    /// What differs.
+    /// The fields that differ.
     pub differences: Vec<Difference>,
-    /// Why.
+    /// The explanation.
     pub kind: Kind,
 }
 
-/// What the cells of one stratum showed.
+/// Results of one stratum of the sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StratumResult {
-    /// Which.
+    /// The stratum.
     pub stratum: Stratum,
-    /// Integrated runs of the map that belong to it.
+    /// Number of integrated runs of the map in the stratum.
     pub runs: usize,
-    /// Those that were replayed.
+    /// Number of runs that were compared.
     pub sampled: usize,
-    /// Mismatches of every kind, in the order of [`Kind::ALL`].
+    /// Number of mismatches of each kind, in the order of [`Kind::ALL`].
     pub kinds: [usize; 5],
 }
 
 impl StratumResult {
-    /// The rate of one kind.
+    /// Returns the rate of one kind.
     pub fn rate(&self, kind: Kind) -> Rate {
         Rate::new(self.kinds[kind as usize], self.sampled)
     }
 
-    /// The rate of cells that differ.
+    /// Returns the rate of cells that differ.
     pub fn differing(&self) -> Rate {
         Rate::new(self.kinds.iter().sum(), self.sampled)
     }
 }
 
-/// What the replay of a sample showed.
+/// Result of the validation of a sample.
 #[derive(Clone, Debug)]
 pub struct Validation {
     /// Seed of the sample.
     pub seed: u64,
-    /// Runs of the map: one per cell and start.
+    /// Number of runs of the map, one per cell and start.
     pub runs: usize,
-    /// Those that were filled from their neighbours and never integrated; none of them is replayed.
+    /// Number of runs that were filled from their neighbours. They are not sampled.
     pub filled: usize,
     /// Whether cells have several starts.
     pub has_starts: bool,
-    /// What judged the records.
+    /// The engines that judged the records.
     pub judge: Judge,
     /// Rates by stratum, the uniform one first.
     pub strata: Vec<StratumResult>,
-    /// Cells that were replayed, each once.
+    /// Number of distinct cells that were compared.
     pub replayed: usize,
-    /// Those whose record their engine gave again to the bit, among those that it computed again.
+    /// Number of records that their engine reproduced to the bit, and number of cells that it computed again.
     pub again: [usize; 2],
-    /// Cells compared, by field.
+    /// Agreement by field.
     pub agreement: Vec<Agreement>,
-    /// Averages over chaos, in the uniform stratum.
+    /// Comparison of averages of chaotic motion in the uniform stratum.
     pub chaos: Vec<ChaosTest>,
-    /// What hangs on the meshing speed, in the uniform stratum; none where no cell of it meshes.
+    /// Dependence on the meshing speed in the uniform stratum; none if no cell meshes.
     pub half_mesh: Option<HalfMesh>,
-    /// States of lanes; none where no lanes ran.
+    /// Comparison of lanes' states; none if no lanes ran.
     pub states: Option<StateCheck>,
-    /// Every cell that differs, by id.
+    /// All cells that differ, by id.
     pub mismatches: Vec<Mismatch>,
-    /// Runs of the whole map, replayed or not, whose record claims a number and holds none.
+    /// Runs of the whole map whose records contain NaN or an unexpected infinity.
     pub not_finite: Vec<u32>,
 }
 
 impl Validation {
-    /// What is counted.
+    /// Returns the noun for what is counted: runs or cells.
     pub fn counted(&self) -> &'static str {
         if self.has_starts { "runs" } else { "cells" }
     }
 
-    /// Mismatches of one kind, in all strata.
+    /// Counts mismatches of one kind in all strata.
     pub fn of_kind(&self, kind: Kind) -> usize {
         self.mismatches.iter().filter(|mismatch| mismatch.kind == kind).count()
     }
 
-    /// Why the map is not to be trusted, in words; empty if it is.
+    /// Describes why the map fails the validation; empty if it passes.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         if self.replayed == 0 {
-            faults.push(format!("none of {} {} was replayed", self.runs, self.counted()));
+            faults.push(format!("none of {} {} was compared", self.runs, self.counted()));
         }
         if !self.not_finite.is_empty() {
             let (count, runs, counted) = (self.not_finite.len(), self.runs, self.counted());
@@ -218,7 +218,7 @@ impl Validation {
         }
         faults.extend(self.chaos.iter().filter(|test| test.fails()).map(|test| {
             let ChaosTest { name, cells, distance, .. } = test;
-            format!("{name} of {cells} chaotic cells is distributed otherwise (distance {distance:.2})")
+            format!("{name} of {cells} chaotic cells has a different distribution (distance {distance:.2})")
         }));
         if let Some(states) = self.states.as_ref().filter(|states| states.rate().is_too_many()) {
             let (off, compared) = (states.off.len(), states.compared);
@@ -228,10 +228,10 @@ impl Validation {
     }
 }
 
-/// What one cell showed.
+/// Result of one cell.
 struct Replayed {
     id: u32,
-    /// Whether the engine gave the record again to the bit, if it was asked.
+    /// Whether the engine reproduced the record to the bit; none if it did not compute the cell again.
     again: Option<bool>,
     fields: Vec<Compared>,
     kind: Option<Kind>,
@@ -239,8 +239,8 @@ struct Replayed {
     half_mesh: Option<half_mesh::Changes>,
 }
 
-/// Replays a sample. `lanes` are those that a device ran again, if there is one; `report` is told how many cells are
-/// done, from any thread.
+/// Validates a sample. `lanes` are the results of lanes that a device computed again; empty without a device. `report`
+/// receives the number of finished cells and may be called from any thread.
 pub fn replay(
     subject: &Subject<'_>,
     sample: &Sample,
@@ -250,8 +250,7 @@ pub fn replay(
     replay_whole(subject, None, sample, lanes, report, &NEVER)
 }
 
-/// [`replay`] until a flag is raised; none if it was by then. In a map of basins a start has to lead to its attractor,
-/// too.
+/// Like [`replay`], but returns `None` once `halt` is set. In a map of basins the attractors are compared, too.
 pub fn replay_until(
     subject: &Subject<'_>,
     basins: Option<&Basins>,
@@ -264,10 +263,10 @@ pub fn replay_until(
     (!halt.load(Ordering::Relaxed)).then_some(validation)
 }
 
-/// A flag that nobody raises.
+/// A halt flag that is never set.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// What comes back once `halt` is raised is of no use.
+/// Validates a sample. The result is incomplete once `halt` is set.
 fn replay_whole(
     subject: &Subject<'_>,
     basins: Option<&Basins>,
@@ -282,7 +281,7 @@ fn replay_whole(
     let uniform: &[u32] = uniform.map_or(&[], |draw| &draw.ids);
     let mut replayed: Vec<Replayed> = ids
         .par_iter()
-        // Cells differ a thousandfold in cost: no task holds more than one.
+        // The cost of cells varies by a factor of 1,000, so each is a task of its own.
         .with_max_len(1)
         .filter_map(|&id| {
             let is_halted = || halt.load(Ordering::Relaxed);
@@ -318,21 +317,21 @@ fn replay_whole(
         again,
         agreement: agreement.to_vec(),
         chaos: chaos::tests(&chaos),
-        half_mesh: half_mesh::told(&changes),
+        half_mesh: half_mesh::rates(&changes),
         states: has_states.then(|| states::check(subject, lanes.states(), halt)),
         mismatches,
         not_finite: not_finite(subject),
     }
 }
 
-/// Runs whose record claims a number and holds none.
+/// Lists runs whose records contain NaN or an unexpected infinity.
 fn not_finite(subject: &Subject<'_>) -> Vec<u32> {
     let budget = subject.plan.budget();
     let is_wrong = |record: &Record| finite::not_finite(record, budget).is_some();
     (0..).zip(subject.records).filter(|(_, record)| is_wrong(record)).map(|(id, _)| id).collect()
 }
 
-/// Where a record differs from another of the same cell, without asking why.
+/// Compares two records of the same cell and lists the fields that differ.
 pub fn differences(
     record: &Record,
     judge: &Record,
@@ -353,8 +352,8 @@ fn judge(subject: &Subject<'_>, lanes: &Lanes) -> Judge {
     }
 }
 
-/// What a judge beside the reference says of a cell of the reference's own map.
-#[cfg_attr(not(feature = "independent"), expect(unused_variables, reason = "for the ODE library alone"))]
+/// Computes a cell with the second judge of a map that the reference computed.
+#[cfg_attr(not(feature = "independent"), expect(unused_variables, reason = "used by the ODE solver only"))]
 fn judged(subject: &Subject<'_>, cell: &Cell<'_>, id: u32, judge: Judge, lanes: &Lanes) -> Option<Record> {
     match judge {
         Judge::Reference => None,
@@ -384,10 +383,10 @@ fn replay_cell(
     if kind.is_none()
         && let Some(judged) = judged(subject, cell, id, judge, lanes)
     {
-        // The same question, asked of the judge: may the reference say what it says, within rounding?
+        // The second judge is compared with the reference as a lane would be.
         fields = cell.bars.compare(cell.record, &Answer::new(judged, None));
         kind = differs(&fields).then(|| match classify(&judged) {
-            // It contradicts nothing.
+            // An undecided answer contradicts nothing.
             Class::Undecided => Kind::Budget,
             _ => explain::kind(cell, &judged, &truth, explain::Lanes::default()),
         });
@@ -402,16 +401,16 @@ fn replay_cell(
     }
 }
 
-/// Where an engine gives most records again to the bit, those that it does not are not its own. How many it gave, and
-/// was asked for.
+/// Marks records that their engine does not reproduce to the bit as unexplained, if it reproduces most of them. Returns
+/// the number of reproduced records and of repeated cells.
 fn again(replayed: &mut [Replayed]) -> [usize; 2] {
     let count = |same| replayed.iter().filter(|cell| cell.again == Some(same)).count();
     let [same, other] = [count(true), count(false)];
     if same > other {
         for cell in replayed {
             let Some(is_same) = cell.again else { continue };
-            let shown = || (Value::Text("another record".into()), Value::Text("the engine's".into()));
-            cell.fields.push(compare::compared(Field::Again, is_same, shown));
+            let values = || (Value::Text("another record".into()), Value::Text("the engine's".into()));
+            cell.fields.push(compare::compared(Field::Again, is_same, values));
             if !is_same {
                 cell.kind = Some(Kind::Unexplained);
             }
@@ -455,9 +454,9 @@ mod tests {
         (0..).zip(again).map(cell).collect()
     }
 
-    /// Another processor may round differently: then most records are others, and none is at fault.
+    /// Another processor may round differently. Then most records differ, and this is no fault.
     #[test]
-    fn a_record_that_is_not_its_engines_is_found_where_most_are() {
+    fn a_record_that_its_engine_does_not_reproduce_is_unexplained_if_most_are_reproduced() {
         let mut one = replayed(&[true, true, false]);
         assert_eq!(again(&mut one), [2, 3]);
         assert_eq!(one[2].kind, Some(Kind::Unexplained));

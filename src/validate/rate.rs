@@ -1,27 +1,27 @@
-//! Rates with their intervals, and how much may be left unexplained.
+//! Rates with confidence intervals, and the limit for unexplained cells.
 
-/// Unexplained cells that are tolerated: one in so many.
+/// Tolerated rate of unexplained cells: one in 10,000.
 pub const TOLERATED: f64 = 1e-4;
 
-/// A stratum fails where as many would be unexplained by chance less often than this.
+/// A stratum fails if its number of unexplained cells has less than this probability at the tolerated rate.
 const CHANCE: f64 = 0.01;
 
-/// Probability that an interval does not hold the true rate.
+/// Probability that an interval does not contain the true rate.
 const OUTSIDE: f64 = 0.05;
 
-/// A share of cells that were drawn at random, with its 95 % interval (Clopper and Pearson).
+/// Share of randomly drawn cells with a property, and its 95 % interval (Clopper and Pearson 1934).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
-    /// Cells that have the property.
+    /// Number of cells with the property.
     pub count: usize,
-    /// Cells that were drawn.
+    /// Number of drawn cells.
     pub among: usize,
-    /// Ends of the interval; one-sided where `count` is none or all.
+    /// Ends of the interval, which is one-sided if `count` is 0 or `among`.
     pub interval: [f64; 2],
 }
 
 impl Rate {
-    /// The rate of `count` cells among so many.
+    /// Computes the rate of `count` cells among `among`.
     pub fn new(count: usize, among: usize) -> Rate {
         if among == 0 {
             return Rate { count, among, interval: [0.0, 1.0] };
@@ -33,7 +33,7 @@ impl Rate {
         Rate { count, among, interval: [low, high] }
     }
 
-    /// In words, as a percentage: `0.5 %, 0.06 to 1.8`; `below 0.75 %` where there is none.
+    /// Formats the rate as a percentage with its interval: `0.5 %, 0.06 to 1.8`, or `below 0.75 %` if `count` is 0.
     pub fn text(&self) -> String {
         let [low, high] = self.interval.map(|end| percent(100.0 * end));
         match self.count {
@@ -44,13 +44,13 @@ impl Rate {
         }
     }
 
-    /// Whether so many unexplained cells are too many: more than one cell in 10,000 allows at 99 % confidence.
+    /// Whether this number of unexplained cells exceeds one in 10,000 at 99 % confidence.
     pub fn is_too_many(&self) -> bool {
         self.count > 0 && at_least(self.count, self.among, TOLERATED) < CHANCE
     }
 }
 
-/// Two significant digits, and whole numbers from ten on.
+/// Formats two significant digits below 10, and a whole number otherwise.
 fn percent(value: f64) -> String {
     if value == 0.0 || value >= 9.95 {
         return format!("{value:.0}");
@@ -60,9 +60,9 @@ fn percent(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// The probability of `count` successes or more among so many, each of probability `p`.
+/// Returns the binomial probability of at least `count` successes in `among` trials of probability `p`.
 fn at_least(count: usize, among: usize, p: f64) -> f64 {
-    // Terms of the binomial distribution, each from the one before, as logarithms.
+    // Logarithms of the binomial terms, each computed from the one before.
     let (success, failure) = (p.ln(), (-p).ln_1p());
     let mut term = among as f64 * failure;
     let mut below = 0.0;
@@ -70,7 +70,7 @@ fn at_least(count: usize, among: usize, p: f64) -> f64 {
         below += term.exp();
         term += ((among - k) as f64 / (k + 1) as f64).ln() + success - failure;
     }
-    // Where the sum is all but 1 it says nothing: the other tail is summed.
+    // Near 1 the difference cancels, so the other tail is summed.
     if below < 0.5 {
         return 1.0 - below;
     }
@@ -84,7 +84,7 @@ fn at_least(count: usize, among: usize, p: f64) -> f64 {
     above
 }
 
-/// The least probability at which `is_below` no longer holds.
+/// Returns the smallest probability for which `is_below` is false.
 fn bisect(is_below: impl Fn(f64) -> bool) -> f64 {
     let [mut low, mut high] = [0.0, 1.0];
     for _ in 0..60 {

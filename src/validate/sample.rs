@@ -1,4 +1,4 @@
-//! Which cells are replayed: a uniform sample, and two of rare kinds that are counted apart.
+//! The sample of cells to validate: uniform cells, and two strata of rare cells that are counted separately.
 
 use crate::map::plan::Plan;
 use crate::map::random::Random;
@@ -6,13 +6,13 @@ use crate::record::classify::{classify, status};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::{Class, Status};
 
-/// Lanes whose states are looked at beside, per cell of the sample: a few periods each.
+/// Number of lanes whose states are compared, per cell of the sample. Each takes a few periods only.
 const STATES_PER_CELL: usize = 10;
 
-/// What a cell was drawn from.
+/// The set from which a cell was drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stratum {
-    /// All runs that were integrated: rates of the map come from these alone.
+    /// All integrated runs. Only this stratum gives rates of the map.
     Uniform,
     /// Runs with a neighbour of another class or period.
     Border,
@@ -21,10 +21,10 @@ pub enum Stratum {
 }
 
 impl Stratum {
-    /// Every stratum, the uniform one first.
+    /// All strata, the uniform one first.
     pub const ALL: [Stratum; 3] = [Stratum::Uniform, Stratum::Border, Stratum::Status];
 
-    /// Its name in files.
+    /// Returns the name in files.
     pub fn name(self) -> &'static str {
         match self {
             Stratum::Uniform => "uniform",
@@ -34,30 +34,30 @@ impl Stratum {
     }
 }
 
-/// Cells of one stratum, drawn without regard to the other strata.
+/// Cells of one stratum, drawn independently of the other strata.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Draw {
-    /// Which.
+    /// The stratum.
     pub stratum: Stratum,
-    /// Integrated runs of the map that belong to it.
+    /// Number of integrated runs of the map in the stratum.
     pub runs: usize,
-    /// Those that were drawn, by id, ascending.
+    /// Ids of the drawn runs, ascending.
     pub ids: Vec<u32>,
 }
 
-/// Cells to replay.
+/// Cells to validate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sample {
-    /// What decided the draw.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// The cells by stratum; one may be in several.
+    /// Cells by stratum. A cell may be in several.
     pub draws: Vec<Draw>,
-    /// Cells whose states are compared after a few periods, drawn from all.
+    /// Runs whose states are compared after a few periods, drawn from all integrated runs.
     pub states: Vec<u32>,
 }
 
 impl Sample {
-    /// The cells, each once, ascending.
+    /// Returns the ids of all cells without repetition, ascending.
     pub fn ids(&self) -> Vec<u32> {
         let mut ids: Vec<u32> = self.draws.iter().flat_map(|draw| &draw.ids).copied().collect();
         ids.sort_unstable();
@@ -66,11 +66,11 @@ impl Sample {
     }
 }
 
-/// Draws `size` runs: half of them from all that were integrated, a quarter at borders of classes, a quarter by
-/// status. What a stratum is short of is drawn from all; a map that has no more runs is replayed whole. The same map,
-/// size and seed give the same sample.
+/// Draws `size` runs: half from all integrated runs, a quarter at borders of classes, and a quarter with a status other
+/// than `ok`. If a stratum has too few runs, the rest is drawn from all. A map with no more than `size` runs is validated
+/// completely. Equal maps, sizes and seeds give equal samples.
 pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample {
-    // Filled cells were never integrated: the audit of an adaptive map looks after them.
+    // The audit of an adaptive map checks filled cells.
     let is_own = |id: &u32| records[*id as usize].valid & valid::FILLED == 0;
     let all: Vec<u32> = (0..records.len() as u32).filter(is_own).collect();
     let rare: [Vec<u32>; 2] = if size >= all.len() {
@@ -100,7 +100,7 @@ pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample
     Sample { seed, draws: draws.collect(), states }
 }
 
-/// Runs with a neighbour to the side, above or below of another class or period; in a list there are no neighbours.
+/// Lists runs with a neighbour of another class or period, left, right, above or below. A list of cells has no neighbours.
 fn border(plan: &Plan, records: &[Record]) -> Vec<u32> {
     if plan.is_list() {
         return Vec::new();

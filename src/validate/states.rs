@@ -1,9 +1,8 @@
-//! States of lanes after a few periods against the reference's.
+//! Comparison of lanes' states with the reference after a few periods.
 //!
-//! A lane that misses one impact in thousands comes to the same attractor, and its record is right. Its state a few
-//! periods after the start is not. Many lanes are compared, a few periods each. How far rounding alone may lead is
-//! measured: on the reference from starts and parameters that are the same within the engine's resolution, with the
-//! state moved as much at every period.
+//! A lane that misses one impact in thousands reaches the same attractor, so its record is right. Its state a few periods
+//! after the start is wrong. Therefore many lanes are compared over a few periods. The effect of rounding is measured on
+//! the reference: parameters, start, and the state after each period are perturbed within the engine's resolution.
 
 use super::Subject;
 use super::cell::{Cell, resolution};
@@ -14,55 +13,55 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-/// Forcing periods after which states are compared: few enough for chaos to be foreseen.
+/// Number of forcing periods after which states are compared, small enough that chaotic motion is still predictable.
 pub const HORIZON: u32 = 4;
 
-/// Starts that are the same within the resolution: for every lane, and for one that seems off.
+/// Numbers of perturbed motions: for every lane, and for a lane that seems wrong.
 const FEW: u64 = 6;
 const MANY: u64 = 200;
 
-/// A lane may be farther off than the farthest of these by this factor: it rounds at every step.
+/// Tolerated factor between a lane's deviation and the largest of the perturbed motions. A lane rounds at every step.
 const FACTOR: f64 = 8.0;
 
-/// Where rounding may lead farther than this share of the motion, nothing is foreseen.
-const FORESEEN: f64 = 0.05;
+/// Largest relative deviation by rounding for which states are compared.
+const PREDICTABLE: f64 = 0.05;
 
-/// A lane whose state is off.
+/// A compared lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Off {
     /// The run, as in [`Plan::cell`](crate::map::plan::Plan::cell).
     pub id: u32,
-    /// How far it is from the reference, relative to the motion.
+    /// Distance from the reference, relative to the size of the motion.
     pub distance: f64,
-    /// How far rounding may lead.
+    /// Largest distance that rounding explains.
     pub bar: f64,
 }
 
-/// What the comparison of states came to.
+/// Result of the comparison of states.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateCheck {
-    /// Lanes that were compared: neither side failed, and rounding leads nowhere else.
+    /// Number of compared lanes: neither side failed, and the motion is predictable.
     pub compared: usize,
-    /// Those that are off.
+    /// Lanes with a wrong state.
     pub off: Vec<Off>,
-    /// The median and the largest distance of the others.
+    /// Median and largest distance of the other lanes.
     pub distances: [f64; 2],
 }
 
 impl StateCheck {
-    /// The rate of lanes that are off.
+    /// Returns the rate of lanes with a wrong state.
     pub fn rate(&self) -> Rate {
         Rate::new(self.off.len(), self.compared)
     }
 }
 
-/// Compares the states of lanes after [`HORIZON`] periods; none for a lane that failed.
+/// Compares the states of lanes after [`HORIZON`] periods. A lane without a state has failed and is skipped.
 pub(super) fn check(subject: &Subject<'_>, lanes: &[(u32, Option<State>)], halt: &AtomicBool) -> StateCheck {
-    let told: Vec<Off> = lanes
+    let compared: Vec<Off> = lanes
         .par_iter()
         .filter_map(|&(id, state)| compare(&Cell::new(subject, id, halt), id, state?, subject))
         .collect();
-    let (off, right): (Vec<Off>, Vec<Off>) = told.into_iter().partition(|lane| lane.distance > lane.bar);
+    let (off, right): (Vec<Off>, Vec<Off>) = compared.into_iter().partition(|lane| lane.distance > lane.bar);
     let mut distances: Vec<f64> = right.iter().map(|lane| lane.distance).collect();
     distances.sort_by(f64::total_cmp);
     let at = |i: usize| distances.get(i).copied().unwrap_or(0.0);
@@ -71,13 +70,13 @@ pub(super) fn check(subject: &Subject<'_>, lanes: &[(u32, Option<State>)], halt:
 }
 
 fn compare(cell: &Cell<'_>, id: u32, state: State, subject: &Subject<'_>) -> Option<Off> {
-    let told = |count: u64| {
+    let compare = |count: u64| {
         let (end, moved) = cell.states(count, HORIZON)?;
         let spread = moved.iter().map(|other| cell.apart(&end, other)).fold(0.0, farther);
         let bar = FACTOR * spread.max(resolution(subject.precision));
-        (bar < FORESEEN).then(|| Off { id, distance: cell.apart(&end, &state), bar })
+        (bar < PREDICTABLE).then(|| Off { id, distance: cell.apart(&end, &state), bar })
     };
-    let few = told(FEW)?;
-    // An event near to grazing moves few of the starts, and those far.
-    if few.distance > few.bar { told(MANY) } else { Some(few) }
+    let few = compare(FEW)?;
+    // An event near grazing moves only few of the perturbed motions, but these far.
+    if few.distance > few.bar { compare(MANY) } else { Some(few) }
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use rattlemap::map::printable::is_printable;
+use rattlemap::text::printable::is_printable;
 use tempfile::TempDir;
 
 /// Control characters: colour, window title, bell, direction of text, deletion.

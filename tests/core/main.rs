@@ -1,4 +1,4 @@
-//! What needs no device: texts, the order of the layers, scenes.
+//! Tests that need no device: texts, scenes, models, and the order of the layers.
 
 mod docs;
 mod layers;

@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use rattlemap::map::printable::line;
 use rattlemap::map::scene::Place;
 use rattlemap::model_file::{BUILT_IN, FileModel};
+use rattlemap::text::printable::line;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Model};
 
@@ -18,24 +18,12 @@ fn number() -> impl Strategy<Value = f64> {
 }
 
 fn pair() -> impl Strategy<Value = GearPair> {
-    let fields = proptest::array::uniform11(number());
-    (fields, 0.0..=1.0_f64, -50.0..50.0_f64).prop_map(
-        |([m1, m2, r1, r2, k1, k2, r, k, omega, b, mesh_speed], e, force)| GearPair {
-            m1,
-            m2,
-            r1,
-            r2,
-            k1,
-            k2,
-            r,
-            k,
-            force,
-            omega,
-            b,
-            e,
-            mesh_speed,
-        },
-    )
+    let values = proptest::array::uniform13(number());
+    (values, 0.0..=1.0_f64, -50.0..50.0_f64).prop_map(|(values, e, force)| {
+        let mut pair = GearPair::paper(e);
+        values.into_iter().enumerate().for_each(|(index, value)| pair.assign(index, value));
+        GearPair { e, force, ..pair }
+    })
 }
 
 #[test]

@@ -1,10 +1,10 @@
-//! Random scenes: mutated ones and arbitrary text. None makes the reader panic; accepted scenes are valid, and errors have a
-//! place, a cause and a remedy.
+//! Random scenes: mutated ones and arbitrary text. None makes the reader panic; accepted scenes are valid, and errors
+//! have a place, a cause and a remedy.
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use rattlemap::map::printable::line;
 use rattlemap::map::scene::{Axis, Fault, FileText, Place, Problem, Purpose, Scene, SceneError, Steps};
+use rattlemap::text::printable::line;
 use rattlemap_dynamics::model::{GearPair, Parameter};
 
 const SCENES: [&str; 5] = [
@@ -234,8 +234,8 @@ fn arguments() -> impl Strategy<Value = Vec<String>> {
     prop::collection::vec(one, 0..2)
 }
 
-/// Tests values of a strategy: 20,000, or the number in the environment variable `RATTLEMAP_TORTURE`. Prints a line that
-/// scripts read.
+/// Tests values of a strategy: 20,000, or the number in the environment variable `RATTLEMAP_TORTURE`. Prints a line
+/// that scripts read.
 fn torture<S: Strategy>(strategy: &S, test: impl Fn(S::Value) -> Result<(), TestCaseError>) {
     let requested = std::env::var("RATTLEMAP_TORTURE").ok().and_then(|count| count.parse().ok());
     let config = ProptestConfig {

@@ -1,9 +1,11 @@
-//! A ball on a shaking table, in the table's frame: `z'' = -1 + G cos(omega t)`, `z >= 0`, with G the table's acceleration in
-//! units of gravity (Luck and Mehta, Phys. Rev. E 48 (1993) 3988-3997; Tufillaro, ibid. 50 (1994) 4509).
+//! A ball on a shaking table, in the table's frame: `z'' = -1 + G cos(omega t)`, `z >= 0`, with G the table's
+//! acceleration in units of gravity (Luck and Mehta, Phys. Rev. E 48 (1993) 3988-3997; Tufillaro, ibid. 50 (1994)
+//! 4509).
 //!
-//! The orbit of one bounce per period leaves the table with `w+ = T e/(1 + e)` at a phase with `-G sin(phi) = pi (1 - e)/(1 + e)`.
-//! Its multipliers have the product `e^2` and the sum `-2 e - (1 + e)^2 (G cos(phi) - 1)`. It begins in a fold at
-//! `G = pi (1 - e)/(1 + e)`, and its period doubles at `G^2 = (pi (1 - e)/(1 + e))^2 + (2 (1 + e^2)/(1 + e)^2)^2`.
+//! The orbit of one bounce per period leaves the table with `w+ = T e/(1 + e)` at a phase with `-G sin(phi) = pi (1 -
+//! e)/(1 + e)`. Its multipliers have the product `e^2` and the sum `-2 e - (1 + e)^2 (G cos(phi) - 1)`. It begins in a
+//! fold at `G = pi (1 - e)/(1 + e)`, and its period doubles at `G^2 = (pi (1 - e)/(1 + e))^2 + (2 (1 + e^2)/(1 +
+//! e)^2)^2`.
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};

@@ -1,9 +1,10 @@
-//! Two masses with a clearance between them: the linear case (eta = 0) of the impact Duffing oscillator of PWSDDE-cont (Nonlinear
-//! Dynamics 2024, doi 10.1007/s11071-024-10188-8), with the other numbers of its demo.
+//! Two masses with a clearance between them: the linear case (eta = 0) of the impact Duffing oscillator of PWSDDE-cont
+//! (Nonlinear Dynamics 2024, doi 10.1007/s11071-024-10188-8), with the other numbers of its demo.
 //!
-//! A symmetric orbit has impacts on both sides half a period apart. With the impact law R, the propagator E of half a period
-//! and the steady state s at the impact, `E (R y - s) = -y + s`. So the state before the impact is `y = (E R + 1)^-1 (E + 1) s`,
-//! which is linear in the cosine and sine of the phase of the impact. The phase follows from `g . y = delta`.
+//! A symmetric orbit has impacts on both sides half a period apart. With the impact law R, the propagator E of half a
+//! period and the steady state s at the impact, `E (R y - s) = -y + s`. So the state before the impact is `y = (E R +
+//! 1)^-1 (E + 1) s`, which is linear in the cosine and sine of the phase of the impact. The phase follows from `g . y =
+//! delta`.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2, Vector4};
 

@@ -38,8 +38,8 @@ pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods:
     }
 }
 
-/// Returns the distance of the last states of the reference and of the independent integrator. Both must find the same number
-/// of events.
+/// Returns the distance of the last states of the reference and of the independent integrator. Both must find the same
+/// number of events.
 pub(crate) fn off_the_integrator(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> f64 {
     let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
     let mut flight = Flight::new(oscillator, law, start);

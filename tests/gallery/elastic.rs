@@ -1,5 +1,5 @@
-//! Contact with springs, without jumps: the bilinear oscillator, the soft impact oscillator, elastic backlash with a mean
-//! load. Between crossings, all motions have closed forms.
+//! Contact with springs, without jumps: the bilinear oscillator, the soft impact oscillator, elastic backlash with a
+//! mean load. Between crossings, all motions have closed forms.
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
@@ -13,8 +13,8 @@ pub(crate) fn bilinear(omega: f64, force: f64) -> Walled {
     Walled { free, walls: [Some(Wall::Elastic { at: 0.0, k: 3.0, c: 0.0 }), None] }
 }
 
-/// The soft impact oscillator of Ing, Pavlovskaia, Wiercigroch and Banerjee (Phil. Trans. R. Soc. A 366 (2008) 679-704):
-/// `x'' + 2 zeta x' + x + beta (x - e) H(x - e) = a omega^2 cos(omega t)`, zeta = 0.01, beta = 29, e = 1.26.
+/// The soft impact oscillator of Ing, Pavlovskaia, Wiercigroch and Banerjee (Phil. Trans. R. Soc. A 366 (2008)
+/// 679-704): `x'' + 2 zeta x' + x + beta (x - e) H(x - e) = a omega^2 cos(omega t)`, zeta = 0.01, beta = 29, e = 1.26.
 pub(crate) fn soft(omega: f64, a: f64) -> Walled {
     let free = Linear { m: 1.0, c: 0.02, k: 1.0, force: a * omega * omega, omega, load: 0.0 };
     Walled { free, walls: [Some(Wall::Elastic { at: 1.26, k: 29.0, c: 0.0 }), None] }
@@ -30,7 +30,7 @@ pub(crate) fn backlash(omega: f64) -> Walled {
     Walled { free, walls: [tooth(1.0), tooth(-1.0)] }
 }
 
-/// zeta, F_m, F_a.
+/// Parameters zeta, F_m, F_a of the backlash model.
 pub(crate) const BACKLASH: (f64, f64, f64) = (0.05, 0.1, 0.05);
 
 fn agrees(walled: &Walled, start: [f64; 2], periods: u32, what: &str) {
@@ -99,8 +99,8 @@ fn a_free_bilinear_oscillator_has_the_bilinear_frequency() {
     }
 }
 
-/// Teeth in permanent contact are a linear oscillator about the mean deflection. They separate if its amplitude reaches F_m:
-/// `F_a w^2 = F_m |1 - w^2 + 2 i zeta w|`.
+/// Teeth in permanent contact are a linear oscillator about the mean deflection. They separate if its amplitude reaches
+/// F_m: `F_a w^2 = F_m |1 - w^2 + 2 i zeta w|`.
 #[test]
 fn teeth_separate_when_the_amplitude_reaches_the_mean_load() {
     let (zeta, mean, alternating) = BACKLASH;
@@ -150,8 +150,8 @@ fn grazing_of_the_soft_stop_agrees_with_the_response() {
     assert!((high - grazing).abs() < 1e-12);
 }
 
-/// A point of the frequency response computed by harmonic balance (`benches/peers/harmonic_balance.py`) with 40 harmonics, which
-/// needs no events.
+/// A point of the frequency response computed by harmonic balance (`benches/peers/harmonic_balance.py`) with 40
+/// harmonics, which needs no events.
 struct ResponsePoint {
     kind: String,
     omega: f64,

@@ -81,7 +81,8 @@ fn known_cycles() -> Vec<Known> {
     for (what, walled, start) in springs {
         let ([x, v], period) = settled(&walled, start);
         let (oscillator, law) = walled.oscillator();
-        // The multipliers are a complex pair. Their product is the change of the phase volume, which the damper determines.
+        // The multipliers are a complex pair. Their product is the change of the phase volume, which the damper
+        // determines.
         let radius = (-0.5 * walled.free.c * f64::from(period) * walled.free.period()).exp();
         let (what, strobe) = (what.to_owned(), [x, v, 0.0, 0.0]);
         list.push(Known { what, oscillator, law, period, strobe, radius, impacts: 0.0 });
@@ -116,7 +117,8 @@ fn start(known: &Known) -> State {
     known.strobe.map(|x| 1.001 * x)
 }
 
-/// Returns the errors of a record: that of the state, relative to the motion, and that of the logarithm of the multiplier.
+/// Returns the errors of a record: that of the state, relative to the motion, and that of the logarithm of the
+/// multiplier.
 fn off(known: &Known, record: &Record) -> [f64; 2] {
     assert_eq!(record.period, known.period, "{}: {record:?}", known.what);
     let impacts = known.impacts / f64::from(known.period);

@@ -1,4 +1,5 @@
-//! Models with independent solutions: closed forms, published numbers, and an integrator that shares no code with the engines.
+//! Models with independent solutions: closed forms, published numbers, and an integrator that shares no code with the
+//! engines.
 //!
 //! Each file contains one kind of model, with equations of its own. A test compares them with the files in `models/`.
 

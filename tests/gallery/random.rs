@@ -1,5 +1,5 @@
-//! Random models: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written as a model
-//! file and read.
+//! Random models: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written as
+//! a model file and read.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -47,7 +47,8 @@ fn even(random: &mut Random, reach: f64) -> f64 {
     reach * (2.0 * random.unit() - 1.0)
 }
 
-/// Returns a symmetric matrix with the given diagonal, definite if the diagonal is positive, and coupled with probability 1/2.
+/// Returns a symmetric matrix with the given diagonal, definite if the diagonal is positive, and coupled with
+/// probability 1/2.
 fn matrix(random: &mut Random, degrees: usize, diagonal: [f64; 2]) -> String {
     let [a, b] = diagonal;
     let coupling = even(random, 0.9);
@@ -120,11 +121,11 @@ pub(crate) fn random_cell(seed: u64) -> RandomCell {
     };
     let names = if degrees == 1 { "[\"x\"]" } else { "[\"x1\", \"x2\"]" };
     let text = format!(
-        "name = \"drawn\"\ntitle = \"RandomCell\"\n[parameters]\nomega = {{ default = {omega:?}, min = 0.0, open = true }}\n\
+        "name = \"random\"\ntitle = \"Random\"\n[parameters]\nomega = {{ default = {omega:?}, min = 0.0, open = true }}\n\
          [motion]\ncoordinates = {names}\nmass = {mass}\ndamping = {damping}\nstiffness = {stiffness}\nforce = {force}\n\
          load = {load}\nfrequency = \"omega\"\ngap = {gap}\n{walls}"
     );
-    let model = FileModel::parse(&text, "drawn.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let model = FileModel::parse(&text, "random.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let mut start = [0.0; 4];
     if random.unit() < 0.5 {
         (0..2 * degrees).for_each(|i| start[i] = even(random, 2.0));

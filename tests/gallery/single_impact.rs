@@ -1,16 +1,17 @@
 //! One rigid stop on the right: orbits of one impact in n periods, in closed form.
 //!
 //! `x'' + c x' + x = F cos(omega t)`, `x <= sigma`, `v+ = -e v-`. The difference of the state from the steady response
-//! `(x_s, v_s)` follows the unforced equation with the propagator `E`. An orbit leaves the stop with velocity `V` and returns
-//! after `n T` with `-V/e`:
+//! `(x_s, v_s)` follows the unforced equation with the propagator `E`. An orbit leaves the stop with velocity `V` and
+//! returns after `n T` with `-V/e`:
 //!
 //! ```text
 //! E (sigma - x_s, V - v_s) = (sigma - x_s, -V/e - v_s)
 //! ```
 //!
-//! This is linear: `sigma - x_s = a V`, `v_s = b V`. Since `x_s^2 + (v_s/omega)^2 = P^2` with the amplitude `P` of the steady
-//! response, `(sigma - a V)^2 + (b V/omega)^2 = P^2`. So V and sigma are on an ellipse, whose ends are folds (Budd and Dux,
-//! Phil. Trans. R. Soc. A 347 (1994) 365-389, for c = 0; Shaw and Holmes, J. Sound Vib. 90 (1983) 129-155).
+//! This is linear: `sigma - x_s = a V`, `v_s = b V`. Since `x_s^2 + (v_s/omega)^2 = P^2` with the amplitude `P` of the
+//! steady response, `(sigma - a V)^2 + (b V/omega)^2 = P^2`. So V and sigma are on an ellipse, whose ends are folds
+//! (Budd and Dux, Phil. Trans. R. Soc. A 347 (1994) 365-389, for c = 0; Shaw and Holmes, J. Sound Vib. 90 (1983)
+//! 129-155).
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
@@ -68,7 +69,8 @@ impl Stop {
         ([a, b], [square, -2.0 * a * self.sigma, self.sigma * self.sigma - amplitude * amplitude])
     }
 
-    /// Returns the orbits of one impact in n periods, the faster one first. It is not checked whether they cross the stop later.
+    /// Returns the orbits of one impact in n periods, the faster one first. It is not checked whether they cross the
+    /// stop later.
     pub(crate) fn orbits(&self, n: u32) -> Vec<Orbit> {
         let ([a, b], [square, linear, constant]) = self.ellipse(n);
         let root = (linear * linear - 4.0 * square * constant).sqrt();
@@ -143,8 +145,8 @@ fn states_and_multipliers_agree_with_the_closed_form() {
     }
 }
 
-/// Compares with the printed start of the demo's first continuation: velocity and phase after the impact, and the state half
-/// a period later.
+/// Compares with the printed start of the demo's first continuation: velocity and phase after the impact, and the state
+/// half a period later.
 #[test]
 fn the_orbit_agrees_with_the_coco_demo() {
     let orbit = COCO.orbits(1)[0];

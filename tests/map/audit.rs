@@ -52,8 +52,8 @@ fn adaptive(audited: usize) -> (Vec<Record>, Audit) {
     (records, audit)
 }
 
-/// An audit of all filled cells has the errors that follow from both maps. For comparison, an audit of a single cell leaves
-/// nearly all cells filled.
+/// An audit of all filled cells has the errors that follow from both maps. For comparison, an audit of a single cell
+/// leaves nearly all cells filled.
 #[test]
 fn an_audit_of_all_filled_cells_agrees_with_both_maps() {
     let (_, audit) = adaptive(WHOLE.len());

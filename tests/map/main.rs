@@ -1,4 +1,12 @@
-//! Many motions: plans, schedules, engines, starts.
+//! Tests of maps: plans, schedules, engines, starts, basins.
+
+use std::sync::Arc;
+
+use rattlemap::map::engine::Engine;
+use rattlemap::map::plan::Plan;
+use rattlemap::map::schedule::Schedule;
+use rattlemap::map::sweep::{self, SweepError};
+use rattlemap::record::Record;
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -9,14 +17,6 @@ mod basins;
 mod models;
 mod runs;
 mod starts;
-
-use std::sync::Arc;
-
-use rattlemap::map::engine::Engine;
-use rattlemap::map::plan::Plan;
-use rattlemap::map::schedule::Schedule;
-use rattlemap::map::sweep::{self, SweepError};
-use rattlemap::record::Record;
 
 /// A map computed by a sweep, or the part before an error.
 struct Swept {

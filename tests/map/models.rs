@@ -22,8 +22,8 @@ fn stops(e: f64) -> Stops {
     }
 }
 
-/// Between elastic impacts, a free particle of speed `v` reaches a wall every `2 b / v`: `2 pi v / (2 b omega)` impacts per
-/// forcing period.
+/// Between elastic impacts, a free particle of speed `v` reaches a wall every `2 b / v`: `2 pi v / (2 b omega)` impacts
+/// per forcing period.
 #[test]
 fn impacts_between_stops_agree_with_the_closed_form() {
     let speed = 0.7;

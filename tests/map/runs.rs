@@ -220,10 +220,10 @@ fn slow_cells_do_not_delay_other_cells() {
 /// End and id of the cells under way.
 type Ends = BTreeSet<(u32, u32)>;
 
-/// Compares the time, in periods, until an adaptive map ends, on a device that computes all cells under way in parallel.
-/// Records are accepted one by one, after half of the cells under way has ended (as the sweep does), or after all have ended.
-/// The last variant is that of hardware: the device is checked every 64 periods while the next 64 run, and records are
-/// accepted after at most four checks.
+/// Compares the time, in periods, until an adaptive map ends, on a device that computes all cells under way in
+/// parallel. Records are accepted one by one, after half of the cells under way has ended (as the sweep does), or after
+/// all have ended. The last variant is that of hardware: the device is checked every 64 periods while the next 64 run,
+/// and records are accepted after at most four checks.
 #[test]
 fn refinement_waits_less_for_slow_cells_than_rounds_would() {
     let sets = ["refine.minimum_grid=8", "refine.max_error=0.02", "integration.undecided_periods=1584"];

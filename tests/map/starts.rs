@@ -277,7 +277,7 @@ fn attractors_are_distinguished_by_their_states() {
     let perturbed = |state: [f64; 4]| state.map(|x| 1.001 * x + 1e-3);
     for (expected, runs) in [
         (2, vec![cycle(2, two), cycle(3, three)]),
-        // Other phases of the same cycles.
+        // Other states of the same cycles.
         (
             1,
             vec![

@@ -1,34 +1,54 @@
-//! The figures are written, show what they should, and survive poor data.
+//! Figures of orbits and bifurcation diagrams: what they show, and that they accept incomplete data.
 
 use std::f64::consts::TAU;
-use std::fs;
 use std::io::Read;
-use std::path::Path;
 
 use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap::map::scene::Format;
 use rattlemap::model_file::FileModel;
-use rattlemap::show::drawing::axes::Scale;
-use rattlemap::show::figure;
-use rattlemap::show::figure::bifurcation::Shown;
+use rattlemap::show::drawing::axis::Scale;
+use rattlemap::show::figure::bifurcation::{self, Panels};
+use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
 use rattlemap_dynamics::model::{GearPair, Model, REST, Side, State};
 use rattlemap_dynamics::orbit::{self, Class, Event, EventKind, Orbit, Sample, Settings, Status};
-use rattlemap_dynamics::word::Word;
 
-/// An axis, as figures take it.
+/// Label and scale of an axis.
 const E: (&str, Scale) = ("coefficient of restitution, e", Scale::Linear);
 const RIGHT: [u8; 3] = [0xd5, 0x5e, 0x00];
 const LEFT: [u8; 3] = [0x00, 0x72, 0xb2];
 const MESHING: [u8; 3] = [0x00, 0x9e, 0x73];
 const PERIOD: f64 = TAU / 5.6;
 
-/// What diagrams show of the gear pair.
-fn pair() -> Shown {
-    Shown::of(&GearPair::paper(0.5), None)
+/// Returns a diagram of the gear pair.
+fn diagram(format: Format, title: [&str; 2], axis: (&str, Scale), columns: &[Column]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let panels = Panels::of(&GearPair::paper(0.5), None);
+    bifurcation::write(&mut bytes, format, title, axis, &panels, columns).unwrap();
+    bytes
 }
 
-/// Two sinusoids whose gap just touches the right wall and sinks into the left one.
+/// Returns a diagram without title as pixels.
+fn pixels(columns: &[Column]) -> RgbImage {
+    read(&diagram(Format::Png, [""; 2], E, columns))
+}
+
+/// Returns a diagram as SVG.
+fn svg(title: [&str; 2], axis: (&str, Scale), columns: &[Column]) -> String {
+    String::from_utf8(diagram(Format::Svg, title, axis, columns)).unwrap()
+}
+
+/// Returns phase plane, time history and gap of an orbit.
+fn orbit_figures(model: &dyn Model, orbit: &Orbit, trace: &[Sample], format: Format) -> [Vec<u8>; 3] {
+    let plot = OrbitPlot::new(model, orbit, trace).unwrap();
+    OrbitFigure::ALL.map(|figure| {
+        let mut bytes = Vec::new();
+        figure.write(&mut bytes, format, &plot).unwrap();
+        bytes
+    })
+}
+
+/// Two sinusoids whose gap touches the right wall and penetrates the left one.
 fn state(turns: f64) -> State {
     let common = |phase: f64| 0.9 * phase.cos() + 0.1 * (3.0 * phase).sin();
     let common_speed = |phase: f64| 5.6 * (-0.9 * phase.sin() + 0.3 * (3.0 * phase).cos());
@@ -38,29 +58,20 @@ fn state(turns: f64) -> State {
     [x + z / 2.0, v + w / 2.0, x - z / 2.0, v - w / 2.0]
 }
 
-/// When that gap passes the left wall, in turns.
+/// Phases at which that gap passes the left wall, in turns.
 fn meshing() -> [f64; 2] {
     let angle = (0.975f64 / 1.025).asin() / TAU;
     [0.5 + angle, 1.0 - angle]
 }
 
 fn orbit(events: Vec<Event>) -> Orbit {
+    let orbit = orbit::analyse(&GearPair::paper(0.605), REST, &Settings::default()).unwrap();
     Orbit {
         class: Class::Periodic { period: 1 },
-        status: Status::Ok,
-        lyapunov: -0.15,
-        lyapunov_error: None,
-        floquet: None,
-        symmetric: Some(false),
-        word: Word::default(),
-        impacts_per_period: 1.0,
-        mesh_fraction: 0.1,
         strobe: state(0.0),
-        strobe_meshing: None,
         events,
-        cycle_periods: 1,
         forcing_period: PERIOD,
-        periods_run: 0,
+        ..orbit
     }
 }
 
@@ -84,15 +95,15 @@ fn meshing_orbit() -> (Orbit, Vec<Sample>) {
     (orbit(events), (0..=400).map(|i| sample(f64::from(i) / 400.0)).collect())
 }
 
-fn read(path: &Path) -> RgbImage {
-    image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display())).to_rgb8()
+fn read(png: &[u8]) -> RgbImage {
+    image::load_from_memory(png).unwrap().to_rgb8()
 }
 
 fn count(picture: &RgbImage, color: [u8; 3]) -> usize {
     picture.pixels().filter(|pixel| pixel.0 == color).count()
 }
 
-/// Pixels in the inner half of the picture, where data lie, that are darker than the grid.
+/// Counts the pixels in the inner half of the picture that are darker than the grid.
 fn ink(picture: &RgbImage) -> usize {
     let (w, h) = picture.dimensions();
     let inner = |(x, y, _): &(u32, u32, &image::Rgb<u8>)| {
@@ -108,30 +119,23 @@ fn distinct_colors(picture: &RgbImage) -> usize {
 
 #[test]
 fn orbit_figures_show_motion_meshing_and_events() {
-    let dir = tempfile::tempdir().unwrap();
     let (orbit, trace) = meshing_orbit();
-    let files =
-        figure::orbit::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &[Format::Png]).unwrap();
-    let names: Vec<_> = files.iter().map(|f| f.file_name().unwrap().to_str().unwrap()).collect();
-    assert_eq!(names, ["phase_plane.png", "time_history.png", "gap.png"]);
-    for file in &files {
-        let picture = read(file);
-        assert_eq!(picture.width(), 1600, "{}", file.display());
-        assert!(distinct_colors(&picture) > 100, "{}", file.display());
-        assert!(ink(&picture) > 2000, "{}: {}", file.display(), ink(&picture));
+    let pictures = orbit_figures(&GearPair::paper(0.06), &orbit, &trace, Format::Png);
+    for (figure, picture) in OrbitFigure::ALL.iter().zip(pictures.map(|png| read(&png))) {
+        assert_eq!(picture.width(), 1600, "{figure:?}");
+        assert!(distinct_colors(&picture) > 100, "{figure:?}");
+        assert!(ink(&picture) > 2000, "{figure:?}: {}", ink(&picture));
         for wall in [RIGHT, LEFT] {
-            // More than the legend's patch alone, which takes 38 by 18.
-            assert!(count(&picture, wall) > 38 * 18 + 50, "{}: {}", file.display(), count(&picture, wall));
+            // The legend's patch alone has 38 by 18 pixels.
+            assert!(count(&picture, wall) > 38 * 18 + 50, "{figure:?}: {}", count(&picture, wall));
         }
-    }
-    for file in [&files[0], &files[2]] {
-        assert!(count(&read(file), MESHING) > 300, "{}", file.display());
+        let has_meshing = *figure != OrbitFigure::TimeHistory;
+        assert!(!has_meshing || count(&picture, MESHING) > 300, "{figure:?}");
     }
 }
 
 #[test]
-fn motion_without_contact_without_data_or_without_numbers_is_drawn() {
-    let dir = tempfile::tempdir().unwrap();
+fn orbits_without_contact_without_samples_or_with_infinite_numbers_are_drawn() {
     let rest = |t: f64| Sample {
         t,
         state: [0.3 * (5.6 * t).cos(), -1.68 * (5.6 * t).sin(), 0.0, 0.0],
@@ -150,70 +154,69 @@ fn motion_without_contact_without_data_or_without_numbers_is_drawn() {
         (&blown_up, Class::Failed),
     ] {
         let orbit = Orbit { class, lyapunov: f64::NAN, ..orbit(vec![]) };
-        let files =
-            figure::orbit::write(dir.path(), &GearPair::paper(0.5), &orbit, trace, &[Format::Png]).unwrap();
-        files.iter().for_each(|file| assert!(distinct_colors(&read(file)) > 10, "{}", file.display()));
+        for picture in orbit_figures(&GearPair::paper(0.5), &orbit, trace, Format::Png) {
+            assert!(distinct_colors(&read(&picture)) > 10, "{class:?}");
+        }
     }
 }
 
-/// Phase plane, time history and gap of the motion that a built-in model settles on, as SVG.
-fn drawn(name: &str, values: &[(&str, f64)]) -> [String; 3] {
+/// Returns phase plane, time history and gap of the attractor of a built-in model from rest, as SVG.
+fn attractor_figures(name: &str, values: &[(&str, f64)]) -> [String; 3] {
     let mut model = FileModel::built_in(name).unwrap();
     values.iter().for_each(|(name, value)| model.set(name, *value).unwrap());
     let orbit = orbit::analyse(&model, REST, &Settings::default()).unwrap();
     assert!(matches!(orbit.class, Class::Periodic { .. }), "{name} {values:?}: {:?}", orbit.class);
     let trace = orbit::trace(&model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, 100).unwrap();
-    let dir = tempfile::tempdir().unwrap();
-    let files = figure::orbit::write(dir.path(), &model, &orbit, &trace, &[Format::Svg]).unwrap();
-    let files: Vec<String> = files.iter().map(|file| fs::read_to_string(file).unwrap()).collect();
-    assert!(files.iter().all(|svg| !svg.contains("NaN") && !svg.contains("inf")), "{name}");
-    files.try_into().unwrap()
+    let figures =
+        orbit_figures(&model, &orbit, &trace, Format::Svg).map(|svg| String::from_utf8(svg).unwrap());
+    assert!(figures.iter().all(|svg| !svg.contains("NaN") && !svg.contains("inf")), "{name}");
+    figures
 }
 
 fn has(svg: &str, text: &str) -> bool {
     svg.contains(&format!(">{text}</text>"))
 }
 
-/// Lines of a wall's colour across a panel: such as have two points.
+/// Counts the lines of a wall's colour.
 fn wall_lines(svg: &str, color: &str) -> usize {
     let of_wall = |line: &&str| line.starts_with("<polyline") && line.contains(color);
     svg.lines().filter(of_wall).count()
 }
 
 #[test]
-fn orbits_of_any_model_are_drawn_with_the_walls_that_there_are() {
+fn orbits_of_any_model_are_drawn_with_the_walls_of_the_model() {
     const RIGHT: &str = "#d55e00";
     const LEFT: &str = "#0072b2";
     let stop = "impact-oscillator";
-    // One rigid wall, at which the motion has impacts.
-    let [plane, time, gap] = drawn(stop, &[("sigma", 0.2)]);
+    // One rigid wall with impacts.
+    let [plane, time, gap] = attractor_figures(stop, &[("sigma", 0.2)]);
     assert!(has(&plane, "displacement, x") && has(&plane, "velocity, v") && has(&time, "displacement, x"));
     assert!(has(&gap, "displacement, x") && has(&gap, "x = \u{3c3}") && has(&gap, "right wall"));
     assert_eq!([&plane, &gap].map(|svg| [RIGHT, LEFT].map(|color| wall_lines(svg, color))), [[1, 0]; 2]);
     for svg in [&plane, &time, &gap] {
         assert!(!svg.contains("left wall") && !svg.contains("z =") && !svg.contains("meshing"));
     }
-    // The same out of reach: it must not make the motion a flat line.
-    let [plane, _, gap] = drawn(stop, &[("sigma", 50.0)]);
+    // A wall out of reach must not make the motion a flat line.
+    let [plane, _, gap] = attractor_figures(stop, &[("sigma", 50.0)]);
     assert!(has(&gap, "(above)") && has(&gap, "x = \u{3c3}") && has(&gap, "\u{2212}0.3"));
     assert!(!has(&gap, "\u{2212}0.5"), "{gap:.3000}");
     assert_eq!([&plane, &gap].map(|svg| wall_lines(svg, RIGHT)), [0, 0]);
-    // A wall to which a slow motion sticks: it has no depth.
-    let [_, time, gap] = drawn(stop, &[("sigma", 0.0), ("omega", 0.3), ("e", 0.3)]);
+    // A wall at which a slow motion stays in contact has no depth.
+    let [_, time, gap] = attractor_figures(stop, &[("sigma", 0.0), ("omega", 0.3), ("e", 0.3)]);
     assert!(has(&time, "contact, right wall") && has(&gap, "contact starts") && has(&gap, "contact ends"));
     assert!(!gap.contains("depth"));
-    // Walls that give way at once: nothing jumps, and how deep the motion goes shows in the gap.
-    let [plane, _, gap] = drawn("kahraman-singh", &[("omega", 1.0)]);
+    // Elastic walls have no velocity jumps, and their depth is visible in the gap.
+    let [plane, _, gap] = attractor_figures("kahraman-singh", &[("omega", 1.0)]);
     assert!(has(&gap, "x = +b") && has(&gap, "x = \u{2212}b") && !gap.contains("depth"));
     assert!(has(&plane, "contact starts") && !plane.contains("jump"));
     // Two walls of two masses.
-    let [plane, _, gap] = drawn("two-masses", &[]);
+    let [plane, _, gap] = attractor_figures("two-masses", &[]);
     assert!(has(&plane, "displacement of first mass, x\u{2081}"));
     assert!(has(&gap, "gap, z = x\u{2081} \u{2212} x\u{2082}"));
     assert!(has(&gap, "z = \u{3b4}\u{2082}") && has(&gap, "z = \u{2212}\u{3b4}\u{2081}"));
 }
 
-/// A stream of a PDF, by what stands before it.
+/// Returns the stream of a PDF that follows a text.
 fn stream(pdf: &[u8], after: &str) -> Vec<u8> {
     let find =
         |from: usize, mark: &[u8]| from + pdf[from..].windows(mark.len()).position(|w| w == mark).unwrap();
@@ -224,19 +227,13 @@ fn stream(pdf: &[u8], after: &str) -> Vec<u8> {
 }
 
 #[test]
-fn figures_in_svg_and_pdf_have_lines_and_text() {
+fn figures_in_svg_and_pdf_have_lines_and_text_and_are_reproducible() {
     let (orbit, trace) = meshing_orbit();
-    let written = || {
-        let dir = tempfile::tempdir().unwrap();
-        let formats = [Format::Svg, Format::Pdf];
-        let files =
-            figure::orbit::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &formats).unwrap();
-        files.iter().map(|file| fs::read(file).unwrap()).collect::<Vec<_>>()
-    };
-    let files = written();
-    assert_eq!((files.len(), &files), (6, &written()), "the same picture gives the same bytes");
-    for pair in files.chunks(2) {
-        let svg = std::str::from_utf8(&pair[0]).unwrap();
+    let figures = |format| orbit_figures(&GearPair::paper(0.06), &orbit, &trace, format);
+    let [svgs, pdfs] = [Format::Svg, Format::Pdf].map(figures);
+    assert_eq!([Format::Svg, Format::Pdf].map(figures), [svgs.clone(), pdfs.clone()]);
+    for (svg, pdf) in svgs.iter().zip(&pdfs) {
+        let svg = std::str::from_utf8(svg).unwrap();
         assert!(svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n") && !svg.contains("<image"));
         let title = "Gear pair: e = 0.06, \u{3c9} = 5.6; all other parameters at their defaults";
         for part in [&format!(">{title}</text>"), ">meshing starts</text>", "stroke=\"#262626\"", "<polyline"]
@@ -244,40 +241,33 @@ fn figures_in_svg_and_pdf_have_lines_and_text() {
             assert!(svg.contains(part), "{part}");
         }
         assert!(!svg.contains("omega") && !svg.contains("NaN") && !svg.contains("inf"));
-        let pdf = &pair[1];
         assert!(pdf.starts_with(b"%PDF-1.") && pdf.ends_with(b"%%EOF"));
         let text = String::from_utf8_lossy(pdf);
         assert!(text.contains("+Ubuntu-Light") && text.contains("/FontFile2") && !text.contains("Date"));
-        // A reader finds the letters: the map from glyphs to characters has omega, 03C9.
+        // Text can be searched: the map from glyphs to characters contains omega, 03C9.
         let map = String::from_utf8(stream(pdf, "/Type /CMap")).unwrap();
         assert!(map.to_uppercase().contains("<03C9>"), "{map}");
     }
-    assert!(files[0].len() < 150_000, "a line of few pixels has few points: {}", files[0].len());
+    assert!(svgs[0].len() < 150_000, "a line of few pixels has few points: {}", svgs[0].len());
 }
 
-/// A title is anybody's text.
 #[test]
-fn titles_stay_text_in_svg() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("b.svg");
+fn titles_are_escaped_in_svg() {
     let title = "a < b && \"c\" </text><script>\u{7}\u{2028}10\u{207b}\u{b2}";
-    figure::bifurcation::write(&path, [title, "second\nthird"], E, &pair(), &columns(9, 3)).unwrap();
-    let svg = fs::read_to_string(path).unwrap();
+    let svg = svg([title, "second\nthird"], E, &columns(9, 3));
     let expected = "a &lt; b &amp;&amp; \"c\" &lt;/text&gt;&lt;script&gt; \u{2028}10<tspan dy=";
     assert!(svg.contains(expected) && !svg.contains("<script"), "{svg:.600}");
     assert!(
         svg.contains(">\u{2212}2</tspan>") && svg.contains(">second</text>") && svg.contains(">third</text>")
     );
-    assert_eq!(svg.matches("<image").count(), 2, "a cloud of points for each gear");
+    assert_eq!(svg.matches("<image").count(), 2, "an image of points for each gear");
 }
 
-/// All of these have one glyph.
+/// Unknown characters share one glyph.
 #[test]
-fn characters_that_the_typeface_lacks_are_no_others_in_pdf() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("b.pdf");
-    figure::bifurcation::write(&path, ["\u{65e5}\u{672c}", "second"], E, &pair(), &columns(9, 3)).unwrap();
-    let map = String::from_utf8(stream(&fs::read(path).unwrap(), "/Type /CMap")).unwrap().to_uppercase();
+fn unknown_characters_are_not_mapped_to_others_in_pdf() {
+    let pdf = diagram(Format::Pdf, ["\u{65e5}\u{672c}", "second"], E, &columns(9, 3));
+    let map = String::from_utf8(stream(&pdf, "/Type /CMap")).unwrap().to_uppercase();
     assert!(map.contains("<0073>") && !map.contains("<65E5>") && !map.contains("<672C>"), "{map}");
 }
 
@@ -312,7 +302,7 @@ fn columns(count: u32, points: u32) -> Vec<Column> {
     (0..count).map(column).collect()
 }
 
-/// The panel of exponents: the part of the picture below the section points.
+/// Returns the panel of exponents: the part of the picture below the section points.
 fn lower_panel(picture: &RgbImage) -> RgbImage {
     let (w, h) = picture.dimensions();
     image::imageops::crop_imm(picture, 140, h * 3 / 4, w - 210, h * 3 / 16).to_image()
@@ -320,27 +310,19 @@ fn lower_panel(picture: &RgbImage) -> RgbImage {
 
 #[test]
 fn bifurcation_figure_shows_both_walls() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("bifurcation.png");
-    figure::bifurcation::write(&path, ["Bifurcation", "from rest"], E, &pair(), &columns(1000, 200)).unwrap();
-    let picture = read(&path);
+    let picture = pixels(&columns(1000, 200));
     assert_eq!(picture.dimensions(), (1600, 1750));
     assert!(ink(&picture) > 5000, "{}", ink(&picture));
-    // Single dots are not opaque, so hues are counted here and not exact colours.
+    // Single dots are not opaque, so the test counts hues and not exact colours.
     let warm = picture.pixels().filter(|p| p.0[0] > p.0[2].saturating_add(60)).count();
     let cold = picture.pixels().filter(|p| p.0[2] > p.0[0].saturating_add(60)).count();
     assert!(warm > 20_000 && cold > 20_000, "{warm} {cold}");
 }
 
 #[test]
-fn the_panel_of_exponents_tells_chaos_from_cycles_and_has_a_band() {
+fn exponents_have_the_colours_of_classes_and_a_band_of_the_standard_error() {
     const CHAOS: [u8; 3] = [0x26, 0x26, 0x26];
-    let drawn = |columns: &[Column]| {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("b.png");
-        figure::bifurcation::write(&path, [""; 2], E, &pair(), columns).unwrap();
-        lower_panel(&read(&path))
-    };
+    let panel = |columns: &[Column]| lower_panel(&pixels(columns));
     let chaos = columns(40, 2);
     let cycle = |column: &Column| Column {
         class: Class::Periodic { period: 1 },
@@ -349,10 +331,10 @@ fn the_panel_of_exponents_tells_chaos_from_cycles_and_has_a_band() {
         ..column.clone()
     };
     let cycles: Vec<Column> = chaos.iter().map(cycle).collect();
-    let [chaotic, periodic] = [&chaos, &cycles].map(|columns| drawn(columns));
+    let [chaotic, periodic] = [&chaos, &cycles].map(|columns| panel(columns));
     assert!(count(&chaotic, CHAOS) > 300 && count(&chaotic, MESHING) == 0, "{}", count(&chaotic, CHAOS));
     assert!(count(&periodic, MESHING) > 300, "{}", count(&periodic, MESHING));
-    // Zero is a line, and the panel holds it whatever the exponents.
+    // The panel always contains the zero line.
     let lines = |picture: &RgbImage| {
         let dark = |y| (0..picture.width()).filter(|&x| picture.get_pixel(x, y).0[0] < 0xb0).count();
         (0..picture.height()).filter(|&y| dark(y) > picture.width() as usize * 9 / 10).count()
@@ -362,63 +344,50 @@ fn the_panel_of_exponents_tells_chaos_from_cycles_and_has_a_band() {
         chaos.iter().map(|column| Column { lyapunov_error: Some(0.0), ..column.clone() }).collect();
     let pale =
         |picture: &RgbImage| picture.pixels().filter(|pixel| (0xb0..0xd8).contains(&pixel.0[0])).count();
-    assert!(pale(&chaotic) > 20 * pale(&drawn(&narrow)).max(100), "no band of the standard error");
+    assert!(pale(&chaotic) > 20 * pale(&panel(&narrow)).max(100), "no band of the standard error");
 }
 
 #[test]
-fn two_passes_are_told_apart_by_colour_and_grey_where_they_agree() {
+fn two_passes_have_different_colours_and_are_grey_where_they_agree() {
     let pass = |direction, lyapunov| {
         let of = move |column: Column| Column { direction: Some(direction), lyapunov, ..column };
         columns(40, 8).into_iter().map(of)
     };
-    let drawn = |lyapunov| {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("b.png");
-        let both: Vec<Column> = pass(Direction::Up, 0.3).chain(pass(Direction::Down, lyapunov)).collect();
-        figure::bifurcation::write(&path, [""; 2], E, &pair(), &both).unwrap();
-        read(&path)
-    };
-    let [apart, same] = [0.1, 0.3].map(drawn);
+    let both = |lyapunov| pass(Direction::Up, 0.3).chain(pass(Direction::Down, lyapunov));
+    let [apart, same] = [0.1, 0.3].map(|lyapunov| pixels(&both(lyapunov).collect::<Vec<_>>()));
     for hue in [RIGHT, LEFT] {
         assert!(count(&lower_panel(&apart), hue) > 300, "{}", count(&lower_panel(&apart), hue));
         assert_eq!(count(&lower_panel(&same), hue), 0);
-        // The legend alone: where both have been, no wall's colour is left.
+        // Only the legend has the colours of the directions.
         assert!(count(&same, hue) < 200, "{}", count(&same, hue));
     }
 }
 
 #[test]
 fn a_logarithmic_axis_has_its_decades() {
-    let dir = tempfile::tempdir().unwrap();
     let decades: Vec<Column> = columns(5, 2)
         .into_iter()
         .enumerate()
         .map(|(i, column)| Column { value: 10f64.powi(i as i32), ..column })
         .collect();
     let ticks = |scale| {
-        let path = dir.path().join("b.svg");
-        figure::bifurcation::write(&path, [""; 2], ("k", scale), &pair(), &decades).unwrap();
-        let svg = fs::read_to_string(path).unwrap();
-        // A linear axis to 10,000 has a tick at 1000, too.
+        let svg = svg([""; 2], ("k", scale), &decades);
+        // A linear axis up to 10,000 also has a tick at 1000.
         ["10", "100"].map(|label| svg.contains(&format!(">{label}</text>")))
     };
     assert_eq!(ticks(Scale::Logarithmic), [true; 2]);
     assert_eq!(ticks(Scale::Linear), [false; 2]);
 }
 
-/// Motion at rest has one value for ever: its axis must not be made of rounding, nor its name lie beyond the edge.
 #[test]
-fn a_constant_has_short_labels_and_a_whole_axis_name() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("b.svg");
+fn the_axis_of_a_constant_has_short_labels_and_its_name_is_not_cut() {
     let still = |value: f64| {
         let point = |column: &mut Column, x: f64| {
             column.points.iter_mut().for_each(|point| point.before = [x, 0.0, x, 0.0]);
         };
         let mut columns = columns(9, 2);
         columns.iter_mut().for_each(|column| point(column, value));
-        figure::bifurcation::write(&path, [""; 2], E, &pair(), &columns).unwrap();
-        fs::read_to_string(&path).unwrap()
+        svg([""; 2], E, &columns)
     };
     for (value, label) in [(0.2, "0.20"), (0.0, "0.0"), (3e-8, "3.0\u{b7}10"), (4e7, "4.0\u{b7}10")] {
         let svg = still(value);
@@ -430,33 +399,16 @@ fn a_constant_has_short_labels_and_a_whole_axis_name() {
 }
 
 #[test]
-fn bifurcation_figure_survives_poor_data() {
-    let dir = tempfile::tempdir().unwrap();
+fn diagrams_without_columns_without_points_or_with_infinite_numbers_are_drawn() {
     let mut wild = columns(3, 4);
     wild[0].value = f64::NAN;
     wild[1].points[0].before = [f64::INFINITY, 0.0, f64::NAN, 0.0];
     (wild[0].lyapunov, wild[1].lyapunov, wild[2].lyapunov_error) =
         (f64::NAN, f64::NEG_INFINITY, Some(f64::INFINITY));
     let long = "a title that no figure has room for, ".repeat(12);
-    for (name, title, columns) in [
-        ("none", "", vec![]),
-        ("one", "one column", columns(1, 1)),
-        ("empty", "no points", columns(9, 0)),
-        ("wild", &long, wild),
-    ] {
-        let path = dir.path().join(format!("{name}.png"));
-        figure::bifurcation::write(&path, [title, ""], E, &pair(), &columns).unwrap();
-        assert_eq!(read(&path).width(), 1600);
+    for (title, columns) in
+        [("", vec![]), ("one column", columns(1, 1)), ("no points", columns(9, 0)), (&long, wild)]
+    {
+        assert_eq!(read(&diagram(Format::Png, [title, ""], E, &columns)).width(), 1600);
     }
-}
-
-#[test]
-fn a_file_that_cannot_be_written_is_named() {
-    let dir = tempfile::tempdir().unwrap().path().join("absent");
-    let error = figure::bifurcation::write(&dir.join("b.png"), ["", ""], E, &pair(), &[]).unwrap_err();
-    assert!(format!("{error:#}").contains("b.png"), "{error:#}");
-    let (orbit, trace) = meshing_orbit();
-    let error =
-        figure::orbit::write(&dir, &GearPair::paper(0.5), &orbit, &trace, &[Format::Png]).unwrap_err();
-    assert!(format!("{error:#}").contains("phase_plane.png"), "{error:#}");
 }

@@ -1,7 +1,5 @@
-//! The report: what the page holds, and in a real browser that it unpacks, zooms, reads out, switches layers and
-//! replays.
-//!
-//! Without Chromium the last of these is skipped, which it says on stderr.
+//! The report: its data, its security policy, and its behaviour in a browser. Without Chromium the tests in a browser are
+//! skipped, with a message on stderr.
 
 use std::fs;
 use std::io::{self, Read, Write};
@@ -19,7 +17,7 @@ use tempfile::TempDir;
 const COLUMNS: usize = 24;
 const ROWS: usize = 19;
 
-/// The cell that a reader points at.
+/// The cell under the pointer.
 const CELL: [usize; 2] = [6, 8];
 
 const LAYERS: [&str; 6] = ["period and chaos", "exponent", "impacts", "meshing", "pattern", "word"];
@@ -50,7 +48,7 @@ quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "patt
 files = ["csv", "html"]
 "#;
 
-/// Does what a reader does and writes down what the page then says.
+/// A script that uses the page like a reader and collects the texts that it shows.
 const VISIT: &str = r##"<script>
 const said = {};
 const text = (id) => document.getElementById(id).textContent;
@@ -67,7 +65,7 @@ function visit() {
   said.layers = [...document.querySelectorAll("#layers button")].map((button) => button.textContent);
   const [x, y] = pixel(6.5, 8.5);
   point("pointermove", x, y);
-  said.hovered = ["cell", "e", "\u03c9", "class", "exponent", "word", "periods run", "pattern"].map(fact);
+  said.readout = ["cell", "e", "\u03c9", "class", "exponent", "word", "periods run", "pattern"].map(fact);
   point("pointerdown", x, y);
   point("pointerup", x, y);
   said.command = text("command");
@@ -105,7 +103,7 @@ fn chromium() -> Option<&'static str> {
     })
 }
 
-/// The page's own account of a visit.
+/// Opens a page in a browser and returns the texts that the script has collected.
 fn visit(browser: &str, page: &Path) -> Value {
     let url = format!("file://{}", page.display());
     let run = Command::new(browser)
@@ -116,12 +114,12 @@ fn visit(browser: &str, page: &Path) -> Value {
         .unwrap();
     let dom = String::from_utf8(run.stdout).unwrap();
     let said = dom.split_once("<pre id=\"said\">").and_then(|(_, rest)| rest.split_once("</pre>"));
-    let (said, _) = said.unwrap_or_else(|| panic!("the visit did not come to its end: {dom:.2000}"));
+    let (said, _) = said.unwrap_or_else(|| panic!("the script did not finish: {dom:.2000}"));
     serde_json::from_slice(&STANDARD.decode(said).unwrap()).unwrap()
 }
 
 fn skipped() {
-    // Past the harness, which keeps what tests that pass print.
+    // The test harness captures `eprintln!` of passing tests, but not this.
     let mut stderr = io::stderr();
     writeln!(stderr, "SKIPPED: no Chromium to open the report with").unwrap();
 }
@@ -162,25 +160,26 @@ impl Report {
         fs::read_to_string(self.file("report.html")).unwrap()
     }
 
-    /// What the page's script reads.
+    /// Returns the data of the page.
     fn data(&self) -> Value {
         let page = self.page();
         let (_, rest) = page.split_once("<script id=\"map\" type=\"application/json\">").unwrap();
         serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
     }
 
-    /// The rows of `cells.csv`.
+    /// Returns the rows of `cells.csv`.
     fn table(&self) -> Vec<Vec<String>> {
         let mut reader = csv::Reader::from_path(self.file("cells.csv")).unwrap();
         reader.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect()
     }
 
-    /// The row of the cell that is pointed at.
+    /// Returns the row of the cell under the pointer.
     fn row(&self) -> Vec<String> {
         self.table().swap_remove(CELL[1] * COLUMNS + CELL[0])
     }
 
-    /// What the page says in a browser, with some more of it read; none without a browser.
+    /// Opens the page in a browser and returns the collected texts; none without a browser. `also` is a script that collects
+    /// more.
     fn visited(&self, also: &str) -> Option<Value> {
         let Some(browser) = chromium() else {
             skipped();
@@ -189,7 +188,7 @@ impl Report {
         let visited = self.file("visited.html");
         let visit_and_read = VISIT.replacen("const result", &format!("{also} const result"), 1);
         let page = self.page().replace("</body>", &visit_and_read);
-        // The policy lets no foreign script run: this one is told to it, beside the page's own.
+        // The security policy must allow the test's own script.
         let own = between(&visit_and_read, "<script>", "</script>");
         let page = page.replacen("script-src ", &format!("script-src {} ", hashed(own)), 1);
         fs::write(&visited, page).unwrap();
@@ -197,24 +196,24 @@ impl Report {
     }
 }
 
-/// What stands between two marks, the first of each.
+/// Returns the text between the first occurrences of two marks.
 fn between<'t>(text: &'t str, from: &str, to: &str) -> &'t str {
     let (_, rest) = text.split_once(from).unwrap_or_else(|| panic!("no {from}"));
     rest.split_once(to).unwrap_or_else(|| panic!("no {to}")).0
 }
 
-/// A part as a policy names it.
+/// Returns the hash of a part as it is written in a policy.
 fn hashed(part: &str) -> String {
     format!("'sha256-{}'", STANDARD.encode(Sha256::digest(part)))
 }
 
-/// The command that replays a cell.
+/// Returns the expected command that replays a cell.
 fn command(row: &[String]) -> String {
     let omega = row[3].trim_end_matches(".0");
     format!("rattlemap orbit --set e={} --set omega={omega} --set F=45.0 --start 0.1,0.0,-0.25,1.0", row[2])
 }
 
-/// An array over the cells, as the page unpacks it.
+/// Unpacks an array of the page.
 fn unpacked(array: &Value) -> Vec<u8> {
     let packed = STANDARD.decode(array["data"].as_str().unwrap()).unwrap();
     let mut bytes = Vec::new();
@@ -222,23 +221,9 @@ fn unpacked(array: &Value) -> Vec<u8> {
     bytes
 }
 
+/// Event handlers and styles in attributes would need a wider policy.
 #[test]
-fn the_report_is_one_page_that_stands_alone() {
-    let report = Report::new();
-    let page = report.page();
-    assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("src="), "not alone");
-    assert_eq!(page.matches("</script>").count(), 2, "the title got out of its script");
-    let data = report.data();
-    assert_eq!(data["title"], "Evil </script><b>title</b> & more");
-    let layers: Vec<&Value> = data["layers"].as_array().unwrap().iter().map(|layer| &layer["name"]).collect();
-    assert_eq!(layers.len(), LAYERS.len(), "{layers:?}");
-    assert_eq!(data["validation"], Value::Null);
-}
-
-/// The policy lets the two inline parts run and nothing else, and nothing in the page needs more: handlers and styles in
-/// attributes have no hash.
-#[test]
-fn the_policy_allows_the_pages_own_parts_alone() {
+fn the_policy_allows_only_the_script_and_style_of_the_page() {
     let page = Report::validated().page();
     let policy = between(&page, "<meta http-equiv=\"Content-Security-Policy\" content=\"", "\">");
     let style = hashed(between(&page, "<style>", "</style>"));
@@ -260,20 +245,12 @@ fn the_policy_allows_the_pages_own_parts_alone() {
     let tags: Vec<&str> = markup.split('<').skip(1).filter_map(|rest| rest.split('>').next()).collect();
     assert!(tags.len() > 40, "{}", tags.len());
     assert_eq!(tags.into_iter().find(handles), None);
-    // What the script makes has none either.
-    for made in [
-        "setAttribute(\"style\"",
-        "setAttribute(\"on",
-        "innerHTML",
-        "insertAdjacentHTML",
-        "document.write",
-        "eval(",
-    ] {
-        assert!(!script.contains(made), "{made}");
+    let unsafe_calls = ["setAttribute(\"style\"", "setAttribute(\"on", "innerHTML", "insertAdjacentHTML"];
+    for call in unsafe_calls.into_iter().chain(["document.write", "eval("]) {
+        assert!(!script.contains(call), "{call}");
     }
 }
 
-/// In a browser, of scripts that got into the page all the same: neither runs, and the browser says so.
 #[test]
 fn a_browser_refuses_foreign_scripts() {
     let report = Report::new();
@@ -300,16 +277,15 @@ fn a_browser_refuses_foreign_scripts() {
     };
     let page = report.page();
     let (title, refused) = opened(page.clone());
-    assert!(title != "run" && refused == 0, "{title}: {refused} of the page's own parts were refused");
+    assert!(title != "run" && refused == 0, "{title}: the browser refused {refused} parts of the page");
     let (title, refused) = opened(page.replace("</body>", intruders));
     assert!(title != "run" && refused >= 2, "{title}, {refused} refused");
     let without = page.replacen("http-equiv=\"Content-Security-Policy\"", "name=\"none\"", 1);
-    assert_eq!(opened(without.replace("</body>", intruders)).0, "run", "they would run without it");
+    assert_eq!(opened(without.replace("</body>", intruders)).0, "run", "without the policy they run");
 }
 
-/// Of axes whose values are not a formula's the page has the values, and of what follows them, too.
 #[test]
-fn axes_of_any_kind_are_marked_and_read_out_at_their_values() {
+fn logarithmic_and_listed_axes_have_ticks_and_commands_at_their_values() {
     let forces: Vec<String> = (0..ROWS).map(|j| format!("{:.1}", 2.0 + (j * j) as f64)).collect();
     let scene = format!(
         "[parameters]\ne = 0.5\n[derived]\nk2 = \"2/3*k1\"\n\
@@ -342,47 +318,48 @@ fn axes_of_any_kind_are_marked_and_read_out_at_their_values() {
     assert_eq!(texts(&said["marks"][0]), ["10", "100", "1000"]);
     let middle = place(&said["marks"][0][1]);
     assert!((middle - COLUMNS as f64 / 2.0).abs() < 1e-9, "100 is at {middle}");
-    // Every fourth of the listed values, each in the middle of its cell.
+    // Every fourth listed value, in the middle of its cell.
     assert_eq!(texts(&said["marks"][1]), ["2", "18", "66", "146", "258"]);
     assert_eq!(place(&said["marks"][1][1]), 4.5);
-    // Where there is no round value, those of the cells.
+    // Without round values in the visible part, cells have the ticks.
     assert_eq!(texts(&said["zoomed"]).len(), 3, "{}", said["zoomed"]);
 }
 
 #[test]
-fn the_report_holds_every_cell() {
+fn the_report_is_one_page_with_all_cells() {
     let report = Report::new();
+    let page = report.page();
+    assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("src="));
+    assert_eq!(page.matches("</script>").count(), 2, "the title ended a script");
     let (data, table) = (report.data(), report.table());
-    assert_eq!(table.len(), COLUMNS * ROWS);
-    for layer in data["layers"].as_array().unwrap() {
-        assert_eq!(
-            (&layer["type"], unpacked(layer).len()),
-            (&json!("u8"), COLUMNS * ROWS),
-            "{}",
-            layer["name"]
-        );
+    assert_eq!(data["title"], "Evil </script><b>title</b> & more");
+    assert_eq!((table.len(), &data["validation"]), (COLUMNS * ROWS, &Value::Null));
+    let layers = data["layers"].as_array().unwrap();
+    assert_eq!(layers.len(), LAYERS.len());
+    for layer in layers {
+        let size = unpacked(layer).len();
+        assert_eq!((&layer["type"], size), (&json!("u8"), COLUMNS * ROWS), "{}", layer["name"]);
     }
     let values = &data["values"];
     let bytes = |name: &str| unpacked(&values[name]);
     let words = |name: &str| -> Vec<[u8; 4]> {
         bytes(name).chunks_exact(4).map(|four| four.try_into().unwrap()).collect()
     };
-    let [periods, exponents, spelled, patterns] = ["periods_run", "lyapunov", "word", "pattern"].map(words);
+    let [periods, exponents, words, patterns] = ["periods_run", "lyapunov", "word", "pattern"].map(words);
     for (id, row) in table.iter().enumerate() {
         assert_eq!(data["classes"][usize::from(bytes("class")[id])], row[4], "cell {id}");
         assert_eq!(u32::from_le_bytes(periods[id]).to_string(), row[14], "cell {id}");
         let exponent: f64 = row[6].parse().unwrap();
         assert_eq!(f32::from_le_bytes(exponents[id]), exponent as f32, "cell {id}");
-        for (list, number, column) in [("words", spelled[id], 11), ("patterns", patterns[id], 12)] {
+        for (list, number, column) in [("words", words[id], 11), ("patterns", patterns[id], 12)] {
             let text = data[list][u32::from_le_bytes(number) as usize].as_str();
             assert_eq!(text.map_or(String::new(), |text| format!("w{text}")), row[column], "cell {id}");
         }
     }
 }
 
-/// The command that the page shows gives the cell's class and word.
 #[test]
-fn the_command_of_a_cell_replays_it() {
+fn the_command_of_a_cell_gives_its_class_period_word_and_pattern() {
     let report = Report::new();
     let row = report.row();
     let command = command(&row);
@@ -398,30 +375,26 @@ fn the_command_of_a_cell_replays_it() {
 }
 
 #[test]
-fn a_validated_report_holds_what_was_found() {
+fn a_validated_report_contains_the_validation_and_works_in_a_browser() {
     let report = Report::validated();
-    assert_eq!(report.page().matches("</script>").count(), 2, "the validation got out of its script");
+    assert_eq!(report.page().matches("</script>").count(), 2, "the validation ended its script");
     let found = &report.data()["validation"];
     let uniform = &found["strata"][0];
     let numbers = [&found["seed"], &found["cells"], &uniform["kinds"]["unexplained"]["count"]];
     assert_eq!((json!(numbers), &found["faults"]), (json!([1, COLUMNS * ROWS, 0]), &json!([])), "{found}");
-}
-
-#[test]
-fn the_page_works_in_a_browser() {
-    let report = Report::new();
-    let Some(said) = report.visited("") else { return };
+    let read = "said.validation = text(\"validation\"); said.verdict = text(\"verdict\");";
+    let Some(said) = report.visited(read) else { return };
     let row = report.row();
     assert_eq!(said["title"], "Evil </script><b>title</b> & more");
     assert_eq!(said["layers"], json!(LAYERS));
     assert_eq!((&*row[0], &*row[1]), ("6", "8"));
-    let hovered: Vec<&str> = said["hovered"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
-    assert_eq!(hovered[..3], ["6, 8", &row[2], row[3].trim_end_matches(".0")]);
-    assert_eq!((hovered[3], hovered[6]), (&*format!("period {}", row[5]), &*row[14]));
-    // Bare, as the literature writes them.
-    assert_eq!([hovered[5], hovered[7]].map(|text| format!("w{text}")), [&*row[11], &*row[12]]);
-    let (shown, exact): (f64, f64) = (hovered[4].parse().unwrap(), row[6].parse().unwrap());
-    assert!((shown - exact).abs() < 1e-4 * exact.abs(), "{shown} {exact}");
+    let readout: Vec<&str> = said["readout"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    assert_eq!(readout[..3], ["6, 8", &row[2], row[3].trim_end_matches(".0")]);
+    assert_eq!((readout[3], readout[6]), (&*format!("period {}", row[5]), &*row[14]));
+    // The page shows words without the prefix that tables have.
+    assert_eq!([readout[5], readout[7]].map(|text| format!("w{text}")), [&*row[11], &*row[12]]);
+    let (rounded, exact): (f64, f64) = (readout[4].parse().unwrap(), row[6].parse().unwrap());
+    assert!((rounded - exact).abs() < 1e-4 * exact.abs(), "{rounded} {exact}");
     assert_eq!(said["command"], command(&row));
     for fact in ["zoomed", "panned", "all"] {
         assert_eq!(said[fact], true, "{fact}: {said}");
@@ -429,26 +402,17 @@ fn the_page_works_in_a_browser() {
     assert_eq!((&said["stays"], &said["moved"]), (&json!("6, 8"), &json!("7, 8")));
     assert_eq!(said["legend"], "largest Lyapunov exponent, \u{3bb}");
     assert!(said["colors"].as_u64().unwrap() > 20, "{said}");
-}
-
-/// Once the map has been validated, the page says so and works as before.
-#[test]
-fn a_validated_page_works_in_a_browser() {
-    let report = Report::validated();
-    let read = "said.validation = text(\"validation\"); said.verdict = text(\"verdict\");";
-    let Some(said) = report.visited(read) else { return };
     let verdict = said["verdict"].as_str().unwrap();
     assert!(verdict.contains("cells differ; unexplained 0 of ") && verdict.contains("below"), "{verdict}");
     let section = said["validation"].as_str().unwrap();
-    for part in
-        [verdict, "drawn at borders of classes", "judged by lanes in f64", "seed 1", "half the mesh_speed"]
-    {
+    let sentences =
+        ["sample at borders between classes", "judged by lanes in f64", "seed 1", "half the mesh_speed"];
+    for part in sentences.into_iter().chain([verdict]) {
         assert!(section.contains(part), "{part}: {section}");
     }
-    assert_eq!((&said["stays"], &said["zoomed"]), (&json!("6, 8"), &json!(true)));
 }
 
-/// An adaptive map, of which chaos is filled, too.
+/// Settings of an adaptive map in which chaos is filled, too.
 const ADAPTIVE: [&str; 5] = [
     "axis.0.count=81",
     "axis.1.count=65",
@@ -457,8 +421,8 @@ const ADAPTIVE: [&str; 5] = [
     "refine.rounds=2",
 ];
 
-/// Chooses a filled cell of chaos and an integrated one, and keeps what is read out of each.
-const CHOOSE: &str = r#"hovered = said.hovered = null;
+/// A script that selects a filled and an integrated cell of chaos and collects the texts shown for each.
+const SELECT: &str = r#"pointerCell = null;
   for (const [code, name] of map.sources.entries()) {
     const id = values.source.findIndex((source, id) => source === code && map.classes[values.class[id]] === "chaotic");
     choose({ i: id % columns, j: Math.floor(id / columns) });
@@ -466,9 +430,8 @@ const CHOOSE: &str = r#"hovered = said.hovered = null;
       .map((label) => fact(label).replace("\u00b1", "+-").replace("\u2013", "none"));
   }"#;
 
-/// Nobody measured them, and the page must not look as if somebody had.
 #[test]
-fn filled_cells_say_so() {
+fn values_of_filled_cells_are_marked_as_interpolated() {
     let report = Report::new();
     assert_eq!(report.data()["values"]["source"], Value::Null, "every cell was integrated");
     let sets = ADAPTIVE.map(|set| ["--set", set]).concat();
@@ -476,7 +439,7 @@ fn filled_cells_say_so() {
     let (data, table) = (report.data(), report.table());
     let sources = unpacked(&data["values"]["source"]);
     assert!(sources.iter().zip(&table).all(|(&code, row)| data["sources"][usize::from(code)] == row[15]));
-    let Some(said) = report.visited(CHOOSE) else { return };
+    let Some(said) = report.visited(SELECT) else { return };
     let facts = |source: &str| -> [String; 5] { serde_json::from_value(said[source].clone()).unwrap() };
     let [filled, integrated] = ["filled", "integrated"].map(facts);
     assert_eq!(filled[..2], ["filled", "0"]);

@@ -1,13 +1,15 @@
 //! Figures of `stress`: errors that may or may not grow, contacts that may or
 //! may not be missed.
 
-use std::path::Path;
+use std::io::Write;
 
 use super::{EngineName, grazing, grid, long_runs, stiffness};
-use rattlemap::show::drawing::axes::{Axis, Frame};
+use rattlemap::map::scene::Format;
+use rattlemap::show::drawing::axis::Axis;
+use rattlemap::show::drawing::frame::Frame;
 use rattlemap::show::drawing::legend::{Entry, Key, draw_head};
-use rattlemap::show::drawing::{Canvas, DARK, FAINT, Marker, RGBColor, Shape, save_figure};
-use rattlemap::show::error::{DrawError, FigureError};
+use rattlemap::show::drawing::{Canvas, Color, DARK, FAINT, Marker, Shape, write_figure};
+use rattlemap::show::error::WriteError;
 
 const SIZE: (u32, u32) = (1500, 1150);
 const LEFT: f64 = 160.0;
@@ -24,7 +26,7 @@ struct Figure<'a> {
 /// Curves of one kind: one entry in the legend.
 struct Group {
     label: String,
-    color: RGBColor,
+    color: Color,
     style: Style,
     curves: Vec<Vec<(f64, f64)>>,
 }
@@ -46,10 +48,10 @@ impl Group {
     }
 }
 
-fn color(engine: EngineName) -> RGBColor {
+fn color(engine: EngineName) -> Color {
     match engine {
-        EngineName::LanesF32 => RGBColor(0xd5, 0x5e, 0x00),
-        EngineName::LanesF64 => RGBColor(0x00, 0x72, 0xb2),
+        EngineName::LanesF32 => [0xd5, 0x5e, 0x00],
+        EngineName::LanesF64 => [0x00, 0x72, 0xb2],
         EngineName::Reference => DARK,
     }
 }
@@ -62,40 +64,40 @@ fn shape(engine: EngineName) -> Shape {
     }
 }
 
-fn save(path: &Path, figure: &Figure<'_>, groups: &[Group]) -> Result<(), FigureError> {
-    save_figure(path, SIZE, |canvas| draw(canvas, figure, groups))
+fn save(out: impl Write, figure: &Figure<'_>, groups: &[Group]) -> Result<(), WriteError> {
+    write_figure(out, Format::Png, SIZE, |canvas| draw(canvas, figure, groups))
 }
 
-fn draw(canvas: &Canvas<'_>, figure: &Figure<'_>, groups: &[Group]) -> Result<(), DrawError> {
+fn draw(canvas: &Canvas, figure: &Figure<'_>, groups: &[Group]) {
     let entries: Vec<Entry> = groups.iter().map(|group| Entry::new(group.key(), &group.label)).collect();
-    let top = draw_head(canvas, figure.title, figure.subtitle, &entries)? + 10.0;
+    let top = draw_head(canvas, figure.title, figure.subtitle, &entries) + 10.0;
     let points = || groups.iter().flat_map(|group| group.curves.iter().flatten());
     let frame = Frame {
         rect: canvas.panel(LEFT, top),
         x: Axis::decades(figure.labels[0], points().map(|point| point.0)),
         y: Axis::decades(figure.labels[1], points().map(|point| point.1)),
     };
-    frame.draw_grid(canvas)?;
+    frame.draw_grid(canvas);
     for group in groups {
         for curve in &group.curves {
             let path: Vec<_> = curve.iter().map(|&(x, y)| frame.at(x, y)).collect();
             match group.style {
                 Style::Dashes => {
-                    path.windows(2).try_for_each(|two| canvas.dashes(two[0], two[1], 2.0, group.color))?;
+                    path.windows(2).for_each(|two| canvas.dashes(two[0], two[1], 2.0, group.color));
                 }
                 Style::Points(shape) => {
-                    canvas.stroke(&path, 1.5, group.color)?;
+                    canvas.stroke(&path, 1.5, group.color);
                     let marker = Marker { shape, color: group.color, radius: 5.0, hollow: false };
-                    path.iter().try_for_each(|&at| canvas.marker(at, marker))?;
+                    path.iter().for_each(|&at| canvas.marker(at, marker));
                 }
             }
         }
     }
-    frame.draw_axes(canvas, true)
+    frame.draw_axes(canvas, true);
 }
 
 /// Error against forcing periods, a curve per cell and engine.
-pub(super) fn long_runs(path: &Path, device: &str, rows: &[long_runs::Row]) -> Result<(), FigureError> {
+pub(super) fn long_runs(out: impl Write, device: &str, rows: &[long_runs::Row]) -> Result<(), WriteError> {
     let mut cells: Vec<(f64, f64)> = rows.iter().map(|row| (row.e, row.omega)).collect();
     cells.dedup();
     cells.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
@@ -118,11 +120,11 @@ pub(super) fn long_runs(path: &Path, device: &str, rows: &[long_runs::Row]) -> R
         ),
         labels: ["forcing periods since the start", "largest error of the state"],
     };
-    save(path, &figure, &EngineName::ALL.map(group))
+    save(out, &figure, &EngineName::ALL.map(group))
 }
 
 /// Error of the speed of contact against distance from grazing, and what conditioning allows.
-pub(super) fn grazing(path: &Path, device: &str, rows: &[grazing::Row]) -> Result<(), FigureError> {
+pub(super) fn grazing(out: impl Write, device: &str, rows: &[grazing::Row]) -> Result<(), WriteError> {
     let beyond = |engine: EngineName| {
         rows.iter().filter(move |row| row.engine == engine && row.distance > 0.0 && row.contacts == row.cells)
     };
@@ -132,7 +134,7 @@ pub(super) fn grazing(path: &Path, device: &str, rows: &[grazing::Row]) -> Resul
         style: Style::Points(shape(engine)),
         curves: vec![beyond(engine).map(|row| (row.distance, row.speed_error.max(LEAST_ERROR))).collect()],
     };
-    let law = |engine: EngineName, name: &str, color: RGBColor| Group {
+    let law = |engine: EngineName, name: &str, color: Color| Group {
         label: format!("law for {} roundings of {name}", grazing::ROUNDINGS),
         color,
         style: Style::Dashes,
@@ -149,11 +151,11 @@ pub(super) fn grazing(path: &Path, device: &str, rows: &[grazing::Row]) -> Resul
             "largest error of the contact speed, over omega b",
         ],
     };
-    save(path, &figure, &groups)
+    save(out, &figure, &groups)
 }
 
 /// Error against meshing stiffness, the worst motion of each.
-pub(super) fn stiffness(path: &Path, device: &str, rows: &[stiffness::Row]) -> Result<(), FigureError> {
+pub(super) fn stiffness(out: impl Write, device: &str, rows: &[stiffness::Row]) -> Result<(), WriteError> {
     let worst = |engine: EngineName, of: fn(&stiffness::Row) -> Option<f64>| {
         let mut curve: Vec<(f64, f64)> = Vec::new();
         for row in rows.iter().filter(|row| row.engine == engine) {
@@ -179,7 +181,7 @@ pub(super) fn stiffness(path: &Path, device: &str, rows: &[stiffness::Row]) -> R
     };
     let spread = Group {
         label: "lanes f64 against twice their steps".to_owned(),
-        color: RGBColor(0x00, 0x9e, 0x73),
+        color: [0x00, 0x9e, 0x73],
         style: Style::Points(Shape::Circle),
         curves: vec![worst(EngineName::LanesF64, |row| row.spread)],
     };
@@ -197,18 +199,13 @@ pub(super) fn stiffness(path: &Path, device: &str, rows: &[stiffness::Row]) -> R
         subtitle: &format!("the worst of four motions that mesh; the supports' stiffness is 30; {device}"),
         labels: ["meshing stiffness k", "largest difference of states"],
     };
-    save(path, &figure, &groups)
+    save(out, &figure, &groups)
 }
 
 /// Share of the contacts that are missed against steps per period.
-pub(super) fn grid(path: &Path, device: &str, rows: &[grid::Swings]) -> Result<(), FigureError> {
-    const DEPTH_COLORS: [RGBColor; 5] = [
-        RGBColor(0x00, 0x9e, 0x73),
-        RGBColor(0x56, 0xb4, 0xe9),
-        RGBColor(0xe6, 0x9f, 0x00),
-        RGBColor(0xcc, 0x79, 0xa7),
-        RGBColor(0x60, 0x60, 0x60),
-    ];
+pub(super) fn grid(out: impl Write, device: &str, rows: &[grid::Swings]) -> Result<(), WriteError> {
+    const DEPTH_COLORS: [Color; 5] =
+        [[0x00, 0x9e, 0x73], [0x56, 0xb4, 0xe9], [0xe6, 0x9f, 0x00], [0xcc, 0x79, 0xa7], [0x60, 0x60, 0x60]];
     let mut depths: Vec<f64> = rows.iter().map(|row| row.depth).collect();
     depths.sort_by(|a, b| b.total_cmp(a));
     depths.dedup();
@@ -249,5 +246,5 @@ pub(super) fn grid(path: &Path, device: &str, rows: &[grid::Swings]) -> Result<(
         subtitle: &format!("swings that reach into a wall, depth over half the backlash; {device}"),
         labels: ["steps per forcing period asked for", "share of the contacts that is missed"],
     };
-    save(path, &figure, &groups)
+    save(out, &figure, &groups)
 }

@@ -1,6 +1,7 @@
 //! The folder of `stress`: a table per part, figures, and the manifest.
 
-use std::path::Path;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::time::Duration;
 
 use serde::Serialize;
@@ -79,40 +80,40 @@ impl<'a> From<&'a Verdict> for VerdictObject<'a> {
 pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> Result<Vec<&'static str>, OutputError> {
     folder.remove(&FILES)?;
     let mut files = Vec::new();
-    let mut file = |name: &'static str, write: &dyn Fn(&Path) -> Result<(), WriteError>| {
+    let mut file = |name: &'static str, write: &dyn Fn(&mut BufWriter<File>) -> Result<(), WriteError>| {
         files.push(name);
         folder.replace(name, write)
     };
     let device = made.device;
     if let Some(found) = &report.long_runs {
-        file("long_runs.csv", &|path| rows(path, found))?;
-        file("long_runs.png", &|path| Ok(figures::long_runs(path, device, found)?))?;
+        file("long_runs.csv", &|out| rows(out, found))?;
+        file("long_runs.png", &|out| figures::long_runs(out, device, found))?;
     }
     if let Some(found) = &report.impacts {
-        file("impacts.csv", &|path| rows(path, found))?;
+        file("impacts.csv", &|out| rows(out, found))?;
     }
     if let Some(found) = &report.grazing {
-        file("grazing.csv", &|path| rows(path, found))?;
-        file("grazing.png", &|path| Ok(figures::grazing(path, device, found)?))?;
+        file("grazing.csv", &|out| rows(out, found))?;
+        file("grazing.png", &|out| figures::grazing(out, device, found))?;
     }
     if let Some(found) = &report.chatter {
-        file("chatter.csv", &|path| rows(path, found))?;
+        file("chatter.csv", &|out| rows(out, found))?;
     }
     if let Some(found) = &report.stiffness {
-        file("stiffness.csv", &|path| rows(path, found))?;
-        file("stiffness.png", &|path| Ok(figures::stiffness(path, device, found)?))?;
+        file("stiffness.csv", &|out| rows(out, found))?;
+        file("stiffness.png", &|out| figures::stiffness(out, device, found))?;
     }
     if let Some(found) = &report.grid {
-        file("grid_swings.csv", &|path| rows(path, &found.swings))?;
-        file("grid_motions.csv", &|path| rows(path, &found.motions))?;
-        file("grid.png", &|path| Ok(figures::grid(path, device, &found.swings)?))?;
+        file("grid_swings.csv", &|out| rows(out, &found.swings))?;
+        file("grid_motions.csv", &|out| rows(out, &found.motions))?;
+        file("grid.png", &|out| figures::grid(out, device, &found.swings))?;
     }
     if let Some(found) = &report.work {
-        file("work.csv", &|path| rows(path, found))?;
+        file("work.csv", &|out| rows(out, found))?;
     }
     if let Some(found) = &report.fuzz {
-        file("fuzz.csv", &|path| rows(path, &found.counts))?;
-        file("fuzz_mismatches.csv", &|path| mismatches(path, &found.mismatches))?;
+        file("fuzz.csv", &|out| rows(out, &found.counts))?;
+        file("fuzz_mismatches.csv", &|out| mismatches(out, &found.mismatches))?;
     }
     let listed = inventory::entries(folder, &files)?;
     files.push(MANIFEST);
@@ -131,15 +132,15 @@ pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> Result<Vec<&'
 }
 
 /// One line per row, under the names of its fields.
-fn rows<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), WriteError> {
-    let mut writer = csv::Writer::from_path(path)?;
+fn rows<R: Serialize>(out: impl Write, rows: &[R]) -> Result<(), WriteError> {
+    let mut writer = csv::Writer::from_writer(out);
     rows.iter().try_for_each(|row| writer.serialize(row))?;
     Ok(writer.flush()?)
 }
 
 /// Cells that differ from the reference: what they are, in what, and why.
-fn mismatches(path: &Path, mismatches: &[fuzz::Mismatch]) -> Result<(), WriteError> {
-    let mut writer = csv::Writer::from_path(path)?;
+fn mismatches(out: impl Write, mismatches: &[fuzz::Mismatch]) -> Result<(), WriteError> {
+    let mut writer = csv::Writer::from_writer(out);
     let names = GearPair::PARAMETERS.iter().map(|parameter| &*parameter.name);
     let header = std::iter::once("engine").chain(names);
     writer.write_record(header.chain(["x1", "v1", "x2", "v2", "differences", "kind"]))?;

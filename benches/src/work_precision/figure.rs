@@ -1,13 +1,15 @@
 //! Run time against error, one curve per method.
 
-use std::path::Path;
+use std::io::Write;
 
 use super::points::Point;
-use rattlemap::show::drawing::axes::{Axis, Frame};
+use rattlemap::map::scene::Format;
+use rattlemap::show::drawing::axis::Axis;
+use rattlemap::show::drawing::frame::Frame;
 use rattlemap::show::drawing::labels::Labels;
 use rattlemap::show::drawing::legend::{Entry, Key, draw_head};
-use rattlemap::show::drawing::{Canvas, DARK, FAINT, Marker, RGBColor, Shape, save_figure};
-use rattlemap::show::error::{DrawError, FigureError};
+use rattlemap::show::drawing::{Canvas, Color, DARK, FAINT, Marker, Shape, write_figure};
+use rattlemap::show::error::WriteError;
 
 const SIZE: (u32, u32) = (1500, 1280);
 const LEFT: f64 = 160.0;
@@ -21,12 +23,12 @@ const ERRORS: (f64, f64) = (1e-16, 10.0);
 struct Style {
     method: &'static str,
     label: &'static str,
-    color: RGBColor,
+    color: Color,
     shape: Shape,
 }
 
-const fn style(method: &'static str, label: &'static str, [r, g, b]: [u8; 3], shape: Shape) -> Style {
-    Style { method, label, color: RGBColor(r, g, b), shape }
+const fn style(method: &'static str, label: &'static str, color: Color, shape: Shape) -> Style {
+    Style { method, label, color, shape }
 }
 
 /// Methods in the order of the legend: circles for this project's.
@@ -56,12 +58,17 @@ pub(super) struct Shown {
 /// Draws the points as a PNG; `subtitle` names the hardware.
 ///
 /// # Errors
-/// A file that cannot be written, by name.
-pub(super) fn write(path: &Path, subtitle: &str, shown: Shown, points: &[Point]) -> Result<(), FigureError> {
-    save_figure(path, SIZE, |canvas| draw(canvas, subtitle, shown, points))
+/// If the figure cannot be written.
+pub(super) fn write(
+    out: impl Write,
+    subtitle: &str,
+    shown: Shown,
+    points: &[Point],
+) -> Result<(), WriteError> {
+    write_figure(out, Format::Png, SIZE, |canvas| draw(canvas, subtitle, shown, points))
 }
 
-fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> Result<(), DrawError> {
+fn draw(canvas: &Canvas, subtitle: &str, shown: Shown, points: &[Point]) {
     let present: Vec<(&Style, Vec<&Point>)> = STYLES
         .iter()
         .map(|style| (style, points.iter().filter(|point| point.method == style.method).collect()))
@@ -78,7 +85,7 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
         Key::Mark { color: FAINT },
         "number: finest setting (steps per period, or tolerance)",
     ));
-    let top = draw_head(canvas, shown.title, subtitle, &entries)? + 10.0;
+    let top = draw_head(canvas, shown.title, subtitle, &entries) + 10.0;
     let error = |point: &Point| (shown.error)(point).clamp(ERRORS.0, ERRORS.1);
     let drawn = || present.iter().flat_map(|(style, points)| points.iter().map(move |point| (style, *point)));
     let frame = Frame {
@@ -92,29 +99,29 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
             drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
         ),
     };
-    frame.draw_grid(canvas)?;
+    frame.draw_grid(canvas);
     let place = |point: &Point| frame.at(microseconds(point), error(point));
     let markers: Vec<_> =
         drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| place(point)).collect();
-    let mut labels = Labels::beside(&markers, RADIUS, frame.rect, SMALLEST);
+    let mut labels = Labels::new(&markers, RADIUS, frame.rect, SMALLEST);
     for (style, points) in &present {
         if style.method == MEASURE {
             let x = frame.at(microseconds(points[0]), 1.0).0;
-            canvas.dashes((x, frame.rect.top), (x, frame.rect.bottom), 2.0, style.color)?;
+            canvas.dashes((x, frame.rect.top), (x, frame.rect.bottom), 2.0, style.color);
             continue;
         }
         let path: Vec<_> = points.iter().map(|point| place(point)).collect();
-        canvas.stroke(&path, 2.0, style.color)?;
+        canvas.stroke(&path, 2.0, style.color);
         for (point, at) in points.iter().zip(&path) {
-            canvas.marker(*at, Marker { hollow: is_lost(shown, point), ..marker(style) })?;
+            canvas.marker(*at, Marker { hollow: is_lost(shown, point), ..marker(style) });
         }
         if let (Some(point), Some(at)) = (points.last(), path.last()) {
             let before = path.iter().rev().nth(1).copied();
-            labels.add(canvas, setting(point), *at, before, style.color)?;
+            labels.add(canvas, setting(point), *at, before, style.color);
         }
     }
-    labels.draw(canvas)?;
-    frame.draw_axes(canvas, true)
+    labels.draw(canvas);
+    frame.draw_axes(canvas, true);
 }
 
 /// The steps per period or the tolerance of a point.

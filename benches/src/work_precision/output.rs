@@ -1,6 +1,6 @@
 //! Files of `work-precision`: tables, figures, the cells for other programs, a manifest.
 
-use std::path::Path;
+use std::io::Write;
 
 use serde::Serialize;
 
@@ -140,13 +140,13 @@ pub fn write(
 ) -> Result<(), OutputError> {
     let all: Vec<Point> =
         curves.iter().map(|curve| curve.point.clone()).chain(peers.iter().cloned()).collect();
-    folder.replace(TABLE, |at| points::write(at, &all))?;
-    folder.replace(CELLS_TABLE, |at| write_cells(at, subjects, curves))?;
+    folder.replace(TABLE, |out| points::write(out, &all))?;
+    folder.replace(CELLS_TABLE, |out| write_cells(out, subjects, curves))?;
     let objects: Vec<_> = subjects.iter().map(subject).collect();
     folder.write_json(CELLS, &objects)?;
     let subtitle = format!("{} cores: {}; lanes on {}", run.cores, run.processor, run.adapter);
     for (name, shown) in FIGURES {
-        folder.replace(name, |at| Ok(figure::write(at, &subtitle, shown, &all)?))?;
+        folder.replace(name, |out| figure::write(out, &subtitle, shown, &all))?;
     }
     let manifest = Manifest {
         head: Head::of("work-precision"),
@@ -183,8 +183,8 @@ fn subject(subject: &Subject) -> SubjectObject {
 }
 
 /// One row per method, setting and cell: the largest errors over the cell's variants.
-fn write_cells(path: &Path, subjects: &[Subject], curves: &[Curve]) -> Result<(), WriteError> {
-    let mut writer = csv::Writer::from_path(path)?;
+fn write_cells(out: impl Write, subjects: &[Subject], curves: &[Curve]) -> Result<(), WriteError> {
+    let mut writer = csv::Writer::from_writer(out);
     for Curve { point, errors } in curves {
         let mut errors = errors.iter();
         for variants in subjects.chunk_by(|a, b| a.cell == b.cell) {

@@ -1,6 +1,7 @@
 //! One row per method and setting: the table that figures are drawn from, and that programs
 //! outside of this crate join by.
 
+use std::io::Write;
 use std::path::Path;
 
 use anyhow::Context;
@@ -67,9 +68,9 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<Point>> {
 /// Writes a table of points.
 ///
 /// # Errors
-/// A file that cannot be written.
-pub fn write(path: &Path, points: &[Point]) -> Result<(), WriteError> {
-    let mut writer = csv::Writer::from_path(path)?;
+/// If the table cannot be written.
+pub fn write(out: impl Write, points: &[Point]) -> Result<(), WriteError> {
+    let mut writer = csv::Writer::from_writer(out);
     for point in points {
         writer.serialize(point)?;
     }

@@ -1,13 +1,15 @@
 //! Figure of `bench engines`: throughput against the number of lanes, a curve per engine.
 
-use std::path::Path;
+use std::io::Write;
 
 use super::measure::{Point, Run, Series, Target};
 use crate::gpu::Precision;
-use crate::show::drawing::axes::{Axis, Frame};
+use crate::map::scene::Format;
+use crate::show::drawing::axis::Axis;
+use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::{Entry, Key, draw_head};
-use crate::show::drawing::{Canvas, Marker, RGBColor, Shape, save_figure};
-use crate::show::error::{DrawError, FigureError};
+use crate::show::drawing::{Canvas, Color, Marker, Shape, write_figure};
+use crate::show::error::WriteError;
 
 /// Size in pixels.
 const SIZE: (u32, u32) = (1700, 1150);
@@ -21,24 +23,20 @@ const MIN_DECADES: f64 = 0.8;
 const BAR_END: f64 = 6.0;
 
 /// Colours of hardware in f32 and f64, then of software drivers in f32 and f64.
-const GPU_COLORS: [RGBColor; 4] = [
-    RGBColor(0xd5, 0x5e, 0x00),
-    RGBColor(0x00, 0x72, 0xb2),
-    RGBColor(0xe6, 0x9f, 0x00),
-    RGBColor(0x56, 0xb4, 0xe9),
-];
-const CPU_COLOR: RGBColor = RGBColor(0x00, 0x5a, 0x3c);
+const GPU_COLORS: [Color; 4] =
+    [[0xd5, 0x5e, 0x00], [0x00, 0x72, 0xb2], [0xe6, 0x9f, 0x00], [0x56, 0xb4, 0xe9]];
+const CPU_COLOR: Color = [0x00, 0x5a, 0x3c];
 
 /// Draws throughput against lanes, engines sorted by their best rate.
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(super) fn write(path: &Path, all: &[Series], processor: &str) -> Result<(), FigureError> {
+pub(super) fn write(out: impl Write, all: &[Series], processor: &str) -> Result<(), WriteError> {
     let rate = |point: &Point| point.spread(Run::rate).median;
     let best = |series: &Series| series.points.iter().map(rate).fold(0.0, f64::max);
     let mut sorted: Vec<&Series> = all.iter().collect();
     sorted.sort_by(|a, b| best(b).total_cmp(&best(a)));
-    save_figure(path, SIZE, |canvas| {
+    write_figure(out, Format::Png, SIZE, |canvas| {
         let entry = |series: &&Series| {
             Entry::new(Key::Line { color: color(&series.target), width: WIDTH }, &series.target.label())
         };
@@ -48,17 +46,17 @@ pub(super) fn write(path: &Path, all: &[Series], processor: &str) -> Result<(), 
             "restitution x frequency, integration and transfer of records; medians, bars from the slowest run to the \
              fastest; processor: {processor}"
         );
-        let top = draw_head(canvas, title, &subtitle, &entries)? + 10.0;
+        let top = draw_head(canvas, title, &subtitle, &entries) + 10.0;
         let frame = frame(canvas, top, &sorted);
-        frame.draw_grid(canvas)?;
+        frame.draw_grid(canvas);
         for series in &sorted {
-            curve(canvas, &frame, series)?;
+            curve(canvas, &frame, series);
         }
-        frame.draw_axes(canvas, true)
+        frame.draw_axes(canvas, true);
     })
 }
 
-fn color(target: &Target) -> RGBColor {
+fn color(target: &Target) -> Color {
     match target.adapter {
         None => CPU_COLOR,
         Some(_) => {
@@ -68,7 +66,7 @@ fn color(target: &Target) -> RGBColor {
     }
 }
 
-fn frame(canvas: &Canvas<'_>, top: f64, all: &[&Series]) -> Frame {
+fn frame(canvas: &Canvas, top: f64, all: &[&Series]) -> Frame {
     let points = || all.iter().flat_map(|series| &series.points);
     let lanes = points().map(|point| point.lanes as f64);
     let rates = points().flat_map(|point| point.runs.iter().map(Run::rate));
@@ -79,20 +77,19 @@ fn frame(canvas: &Canvas<'_>, top: f64, all: &[&Series]) -> Frame {
     }
 }
 
-fn curve(canvas: &Canvas<'_>, frame: &Frame, series: &Series) -> Result<(), DrawError> {
+fn curve(canvas: &Canvas, frame: &Frame, series: &Series) {
     let color = color(&series.target);
     let place = |point: &Point, rate: f64| frame.at(point.lanes as f64, rate);
     let medians = series.points.iter().map(|point| place(point, point.spread(Run::rate).median));
     let line: Vec<_> = medians.collect();
-    canvas.stroke(&line, WIDTH, color)?;
+    canvas.stroke(&line, WIDTH, color);
     for (point, &at) in series.points.iter().zip(&line) {
         let spread = point.spread(Run::rate);
         let bar = [spread.low, spread.high].map(|rate| place(point, rate));
-        canvas.stroke(&bar, 1.5, color)?;
+        canvas.stroke(&bar, 1.5, color);
         for (x, y) in bar {
-            canvas.stroke(&[(x - BAR_END, y), (x + BAR_END, y)], 1.5, color)?;
+            canvas.stroke(&[(x - BAR_END, y), (x + BAR_END, y)], 1.5, color);
         }
-        canvas.marker(at, Marker { shape: Shape::Circle, color, radius: 7.0, hollow: false })?;
+        canvas.marker(at, Marker { shape: Shape::Circle, color, radius: 7.0, hollow: false });
     }
-    Ok(())
 }

@@ -1,7 +1,7 @@
 //! The folder of `bench engines`: one table, one figure, the manifest.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::io::Write;
 
 use serde::Serialize;
 
@@ -31,8 +31,8 @@ pub(super) fn write(
     budget_seconds: f64,
 ) -> Result<[&'static str; 3], OutputError> {
     folder.remove(&[MANIFEST, TABLE, FIGURE])?;
-    folder.replace(TABLE, |path| write_table(path, all))?;
-    folder.replace(FIGURE, |path| Ok(figure::write(path, all, &processor::described())?))?;
+    folder.replace(TABLE, |out| write_table(out, all))?;
+    folder.replace(FIGURE, |out| figure::write(out, all, &processor::described()))?;
     let files = inventory::entries(folder, &[TABLE, FIGURE])?;
     inventory::write_manifest(folder, &manifest(all, budget_seconds, &files))?;
     Ok([TABLE, FIGURE, MANIFEST])
@@ -62,8 +62,8 @@ fn number(x: f64) -> String {
 }
 
 /// Writes one row per engine and size.
-fn write_table(path: &Path, all: &[Series]) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
+fn write_table(out: impl Write, all: &[Series]) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(out);
     let head = ["engine", "precision", "device", "lanes", "runs"].into_iter();
     let rates = ["lane_periods_per_s", "lane_periods_per_s_low", "lane_periods_per_s_high"];
     let names = head.chain(COLUMNS.map(|(name, _)| name)).chain(rates).chain(Class::NAMES);

@@ -1,10 +1,10 @@
 //! Several equal cards as one engine: one thread per card, one queue for all.
 //!
-//! A card takes cells when it has room. Its share of all cells that are queued or under way is proportional to the rate at
-//! which it has computed so far, so that all cards are busy for about the same time. While there are more cells than the
-//! cards need to be busy, a quarter of them stays in the queue for the card that ends first. The last cells are all under
-//! way at once. So a slow card gets few of them, and no card idles while another has a queue. The cells of a lost card go
-//! to the others.
+//! A card takes cells when it has room. Its share of all cells that are queued or under way is proportional to the rate
+//! at which it has computed so far, so that all cards are busy for about the same time. While there are more cells than
+//! the cards need to be busy, a quarter of them stays in the queue for the card that ends first. The last cells are all
+//! under way at once. So a slow card gets few of them, and no card idles while another has a queue. The cells of a lost
+//! card go to the others.
 //!
 //! A record does not depend on which card computed it.
 
@@ -22,8 +22,8 @@ use crate::record::Record;
 /// Longest time that records wait for further records while cells are queued.
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
-/// Longest time that records wait for those of other cards without a queue. It is short, because the next cells may depend
-/// on these records. [`GRACE_SHARE`] of the time until the first record is added.
+/// Longest time that records wait for those of other cards without a queue. It is short, because the next cells may
+/// depend on these records. [`GRACE_SHARE`] of the time until the first record is added.
 const GRACE: Duration = Duration::from_millis(2);
 /// Part of the time until the first record that is added to [`GRACE`].
 const GRACE_SHARE: f64 = 0.25;
@@ -58,6 +58,7 @@ pub struct Cards {
 /// Callback for losses of cards.
 type Listener = Box<dyn Fn(&Loss) + Send>;
 
+#[derive(Default)]
 struct Shared {
     state: Mutex<PoolState>,
     /// Signals that there are cells to take, or that no more will come.
@@ -68,6 +69,7 @@ struct Shared {
     stop: Arc<AtomicBool>,
 }
 
+#[derive(Default)]
 struct PoolState {
     queue: VecDeque<Cell>,
     ended: Vec<(u32, Record)>,
@@ -91,6 +93,23 @@ struct Card {
     lost: Option<EngineError>,
 }
 
+impl Card {
+    fn new(adapter: AdapterId, most: usize, least: usize) -> Card {
+        let under_way = HashMap::new();
+        Card {
+            adapter,
+            under_way,
+            most,
+            least,
+            rate: None,
+            cells: 0,
+            steps: None,
+            is_at_work: false,
+            lost: None,
+        }
+    }
+}
+
 impl Cards {
     /// Combines engines of one plan, each on a card of its own.
     ///
@@ -98,30 +117,12 @@ impl Cards {
     /// Without engines.
     pub fn new(engines: Vec<(AdapterId, Engine<'static>)>) -> Cards {
         let (_, first) = engines.first().expect("one card at least");
-        let cards = engines.iter().map(|(adapter, engine)| Card {
-            adapter: adapter.clone(),
-            under_way: HashMap::new(),
-            most: engine.room(),
-            least: engine.least_batch(),
-            rate: None,
-            cells: 0,
+        let card = |(adapter, engine): &(AdapterId, Engine<'static>)| Card {
             steps: engine.lane_steps(),
-            is_at_work: false,
-            lost: None,
-        });
-        let state = PoolState {
-            queue: VecDeque::new(),
-            ended: Vec::new(),
-            cards: cards.collect(),
-            losses: Vec::new(),
-            is_closed: false,
+            ..Card::new(adapter.clone(), engine.room(), engine.least_batch())
         };
-        let shared = Arc::new(Shared {
-            state: Mutex::new(state),
-            work: Condvar::new(),
-            news: Condvar::new(),
-            stop: Arc::default(),
-        });
+        let state = PoolState { cards: engines.iter().map(card).collect(), ..PoolState::default() };
+        let shared = Arc::new(Shared { state: Mutex::new(state), ..Shared::default() });
         let (name, precision, device) = (first.name(), first.precision(), first.device());
         let steps_per_period = first.steps_per_period();
         let bytes = engines.iter().map(|(_, engine)| engine.device_bytes());
@@ -276,8 +277,8 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts the next cells of a card into `cells`; none if it continues with cells under way. Waits if there are neither.
-    /// Returns false if no more cells will come.
+    /// Puts the next cells of a card into `cells`; none if it continues with cells under way. Waits if there are
+    /// neither. Returns false if no more cells will come.
     fn next(&self, nth: usize, cells: &mut Vec<Cell>) -> bool {
         let mut state = self.lock();
         loop {
@@ -458,7 +459,8 @@ mod tests {
         rule(cell)
     }
 
-    /// Runs cells as a sweep does, at most `at_a_time` under way. Returns the cells that ended, and the error if there was one.
+    /// Runs cells as a sweep does, at most `at_a_time` under way. Returns the cells that ended, and the error if there
+    /// was one.
     fn run(cards: &mut Cards, cells: &[Cell], at_a_time: usize) -> (Vec<u32>, Option<EngineError>) {
         let (mut left, mut under_way, mut ended_ids) = (cells, 0, Vec::new());
         while under_way > 0 || !left.is_empty() {
@@ -609,26 +611,10 @@ mod tests {
 
     #[test]
     fn shares_follow_rates_and_leave_a_quarter_in_the_queue() {
-        let card = |least, rate| Card {
-            adapter: adapter(0),
-            under_way: HashMap::new(),
-            most: 1000,
-            least,
-            rate,
-            cells: 0,
-            steps: None,
-            is_at_work: false,
-            lost: None,
-        };
+        let card = |least, rate| Card { rate, ..Card::new(adapter(0), 1000, least) };
         let shares = |cards: Vec<Card>, queued: u32| {
             let count = cards.len();
-            let state = PoolState {
-                queue: cells(queued).into(),
-                ended: Vec::new(),
-                cards,
-                losses: Vec::new(),
-                is_closed: false,
-            };
+            let state = PoolState { queue: cells(queued).into(), cards, ..PoolState::default() };
             (0..count).map(|nth| state.share(nth)).collect::<Vec<_>>()
         };
         // More cells than needed: a quarter waits.

@@ -7,12 +7,12 @@ use std::time::Duration;
 use rayon::prelude::*;
 use web_time::Instant;
 
-use super::Device;
 use super::flows::Flows;
-use crate::map::plan::{Cell, Needs, Plan};
-use crate::record::{Record, valid};
+use super::{Device, measured_record};
+use crate::map::plan::{Cell, Plan};
+use crate::record::Record;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::orbit::{Measurement, measure_until};
+use rattlemap_dynamics::orbit::measure_until;
 
 /// Time after which a batch begins no more cells and returns those that have ended.
 const BATCH_TIME: Duration = Duration::from_secs(2);
@@ -39,7 +39,8 @@ impl<'p> Cpu<'p> {
     pub(super) fn advance(&mut self) -> Vec<(u32, Record)> {
         let cells = std::mem::take(&mut self.under_way);
         let clock = Instant::now();
-        // Costs of cells differ by a factor of 1000, so each task has one cell. If many are slow, some wait for the next call.
+        // Costs of cells differ by a factor of 1000, so each task has one cell. If many are slow, some wait for the
+        // next call.
         let ended: Vec<Option<(u32, Record)>> = cells
             .par_iter()
             .with_max_len(1)
@@ -58,7 +59,7 @@ impl<'p> Cpu<'p> {
     fn cell(&self, cell: &Cell) -> Option<Record> {
         let (law, budget) = (self.plan.law(cell.law), self.plan.budget());
         let of = |flow: &Flow| measure_until(flow, law, cell.start, budget, &self.halt);
-        self.flows.with(cell.flow, of).map(|measured| record(&measured, self.plan.needs()))
+        self.flows.with(cell.flow, of).map(|measured| measured_record(&measured, self.plan.needs()))
     }
 }
 
@@ -78,43 +79,4 @@ impl Device for Cpu<'_> {
     fn least_batch(&self) -> usize {
         64 * rayon::current_num_threads()
     }
-}
-
-/// Converts a measurement to a record with the requested quantities.
-pub fn record(measured: &Measurement, needs: &Needs) -> Record {
-    let mut record = Record {
-        strobe: measured.strobe,
-        periods_run: measured.periods_run,
-        status: measured.status.code(),
-        valid: valid::STROBE,
-        ..Record::default()
-    };
-    if measured.status.is_failure() {
-        return record;
-    }
-    record.valid |= valid::PERIOD;
-    record.period = measured.period.unwrap_or(0);
-    if let (true, Some([lyapunov, error])) = (needs.exponent, measured.lyapunov) {
-        record.valid |= valid::LYAPUNOV;
-        (record.lyapunov, record.lyapunov_error) = (lyapunov, error);
-    }
-    if needs.impacts {
-        record.valid |= valid::IMPACTS;
-        record.impacts_per_period = measured.impacts_per_period;
-    }
-    if needs.mesh {
-        record.valid |= valid::MESH;
-        record.mesh_fraction = measured.mesh_fraction;
-    }
-    if let (true, Some(symmetric)) = (needs.symmetric, measured.symmetric) {
-        record.valid |= valid::SYMMETRIC;
-        record.symmetric = symmetric.into();
-    }
-    if let (true, Some(word)) = (needs.word, &measured.word) {
-        record.set_word(word);
-    }
-    if let (true, Some(word)) = (needs.pattern, &measured.word) {
-        record.set_pattern(&word.pattern());
-    }
-    record
 }

@@ -1,17 +1,17 @@
 //! Lanes on a graphics device, as an engine.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
-use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::{Device, EngineError};
+use super::{Device, EngineError, drop_unrequested};
 use crate::gpu::{self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Pool, Tables};
-use crate::map::plan::{Cell, Needs, Plan};
+use crate::map::plan::{Cell, Plan};
 use crate::map::scene::Steps;
-use crate::record::{Record, valid};
+use crate::record::Record;
 use rattlemap_dynamics::model::{Contact, Oscillator};
 
 /// Smallest batch on a hardware device: enough to keep it busy.
@@ -24,7 +24,7 @@ const FLOWS_IN_SOFTWARE: usize = 8_192;
 
 /// The engine of a plan's lanes on one device, in one precision.
 pub struct Gpu<'p> {
-    plan: PlanRef<'p>,
+    plan: Cow<'p, Plan>,
     device: gpu::Gpu,
     settings: LaneSettings,
     /// All flows and laws; none if they are too many to be stored.
@@ -41,30 +41,13 @@ pub struct Gpu<'p> {
     most_waiting: usize,
 }
 
-/// A borrowed or shared plan.
-enum PlanRef<'p> {
-    Borrowed(&'p Plan),
-    Shared(Arc<Plan>),
-}
-
-impl Deref for PlanRef<'_> {
-    type Target = Plan;
-
-    fn deref(&self) -> &Plan {
-        match self {
-            PlanRef::Borrowed(plan) => plan,
-            PlanRef::Shared(plan) => plan,
-        }
-    }
-}
-
 impl Gpu<'static> {
     /// Builds an engine that can move to another thread.
     ///
     /// # Errors
     /// As for [`Gpu::new`].
     pub async fn shared(plan: Arc<Plan>, device: gpu::Gpu) -> Result<Gpu<'static>, EngineError> {
-        Gpu::open(PlanRef::Shared(plan), device).await
+        Gpu::open(Cow::Owned(Arc::unwrap_or_clone(plan)), device).await
     }
 }
 
@@ -74,10 +57,10 @@ impl<'p> Gpu<'p> {
     /// # Errors
     /// [`EngineError`] if the device cannot store the constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        Gpu::open(PlanRef::Borrowed(plan), device).await
+        Gpu::open(Cow::Borrowed(plan), device).await
     }
 
-    async fn open(plan: PlanRef<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+    async fn open(plan: Cow<'p, Plan>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         // Each oscillator is derived once: if the flows are stored, together with its constants.
         let (constants, survey) = if plan.stores_flows() {
             let derived = survey_flows(&plan, |oscillator, steps| Constants::new(oscillator, steps));
@@ -378,24 +361,6 @@ fn survey_flows<T: Send>(
     })
 }
 
-/// Clears the fields of a record that the scene did not request.
-pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
-    let mut clear_unless = |is_requested: bool, bits: u32, clear: fn(&mut Record)| {
-        if !is_requested {
-            record.valid &= !bits;
-            clear(record);
-        }
-    };
-    clear_unless(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
-    clear_unless(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
-    clear_unless(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
-    clear_unless(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
-    clear_unless(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
-    clear_unless(needs.pattern, valid::PATTERN, |r| {
-        (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
-    });
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -407,40 +372,5 @@ mod tests {
         assert_eq!(fitting([1; 10].into_iter(), 8), 8);
         assert_eq!(fitting([1; 10].into_iter(), 80), 10);
         assert_eq!(fitting([4 * third; 2].into_iter(), 8), 1);
-    }
-
-    #[test]
-    fn quantities_that_are_not_requested_are_cleared() {
-        let mut record = Record {
-            lyapunov: 1.0,
-            lyapunov_error: 1.0,
-            impacts_per_period: 1.0,
-            mesh_fraction: 1.0,
-            word: [1; 4],
-            word_hash: 1,
-            word_length: 1,
-            pattern: [1; 4],
-            pattern_hash: 1,
-            pattern_length: 1,
-            symmetric: 1,
-            valid: !valid::FILLED & (u32::MAX >> 23),
-            ..Record::default()
-        };
-        let whole = record;
-        drop_unrequested(&mut record, &Needs::EVERYTHING);
-        assert_eq!(record, whole);
-        drop_unrequested(
-            &mut record,
-            &Needs {
-                exponent: false,
-                lyapunov: false,
-                impacts: false,
-                mesh: false,
-                symmetric: false,
-                word: false,
-                pattern: false,
-            },
-        );
-        assert_eq!(record, Record { valid: valid::PERIOD | valid::STROBE, ..Record::default() });
     }
 }

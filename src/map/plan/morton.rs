@@ -6,8 +6,8 @@ pub(crate) fn key([i, j]: [usize; 2]) -> u64 {
     spread(i) | spread(j) << 1
 }
 
-/// Returns the indices of the cell at a place of the Morton order of a grid. `place` is below the number of cells. The order is
-/// computed, because a table of 10^9 cells would take 4 GB.
+/// Returns the indices of the cell at a place of the Morton order of a grid. `place` is below the number of cells. The
+/// order is computed, because a table of 10^9 cells would take 4 GB.
 pub(super) fn at(mut place: usize, counts: [usize; 2]) -> [usize; 2] {
     let mut corner = [0, 0];
     let mut side = counts[0].max(counts[1]).next_power_of_two();

@@ -6,28 +6,29 @@ use crate::record::classify::status;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::{Oscillator, REST, State};
 
-/// Range of random starts: displacements are within this many scales of length of the middle, velocities within this many
-/// times the corresponding velocity. The attractors of the paper's plane are inside.
+/// Range of random starts: displacements are within this many scales of length of the middle, velocities within this
+/// many times the corresponding velocity. The attractors of the paper's plane are inside.
 const START_RANGE: f64 = 4.0;
 
 /// The starts of every cell, in units that depend on the cell.
 #[derive(Clone, Debug)]
 pub(super) struct Starts {
     policy: Start,
-    /// Random starts after the first. All cells have the same ones, so that neighbouring cells differ only in their parameters.
-    drawn: Vec<[f64; 4]>,
+    /// Random starts after the first. All cells have the same ones, so that neighbouring cells differ only in their
+    /// parameters.
+    draws: Vec<[f64; 4]>,
 }
 
 impl Starts {
     pub(super) fn new(policy: Start, draw: Option<Draw>) -> Starts {
         let Draw { count, seed } = draw.unwrap_or(Draw { count: 1, seed: 0 });
         let mut random = Random::new(u64::from(seed));
-        let drawn = (1..count).map(|_| std::array::from_fn(|_| 2.0 * random.unit() - 1.0)).collect();
-        Starts { policy, drawn }
+        let draws = (1..count).map(|_| std::array::from_fn(|_| 2.0 * random.unit() - 1.0)).collect();
+        Starts { policy, draws }
     }
 
     pub(super) fn count(&self) -> usize {
-        1 + self.drawn.len()
+        1 + self.draws.len()
     }
 
     pub(super) fn policy(&self) -> Start {
@@ -42,10 +43,10 @@ impl Starts {
         }
     }
 
-    /// Returns the random start `nth`, from 1. With the scale of length `l`, the gap is uniform between the walls, or within `2 l`
-    /// of a single wall; the second displacement is within `4 l`, both velocities within `4 l omega`.
-    pub(super) fn drawn(&self, nth: usize, oscillator: &Oscillator) -> State {
-        let [gap, v1, x2, v2] = self.drawn[nth - 1];
+    /// Returns the random start `nth`, from 1. With the scale of length `l`, the gap is uniform between the walls, or
+    /// within `2 l` of a single wall; the second displacement is within `4 l`, both velocities within `4 l omega`.
+    pub(super) fn random(&self, nth: usize, oscillator: &Oscillator) -> State {
+        let [gap, v1, x2, v2] = self.draws[nth - 1];
         let length = oscillator.length_scale();
         let [right, left] = match oscillator.walls {
             [f64::INFINITY, f64::NEG_INFINITY] => [length, -length],
@@ -88,7 +89,7 @@ mod tests {
         ] {
             let oscillator = Oscillator { walls, force: [64.0, 0.0], omega: 1.0, ..pair };
             for nth in 1..200 {
-                let y = starts.drawn(nth, &oscillator);
+                let y = starts.random(nth, &oscillator);
                 let gap = y[0] - y[2];
                 assert!((low..=high).contains(&gap) && y.iter().all(|x| x.is_finite()), "{walls:?}: {y:?}");
             }
@@ -104,7 +105,7 @@ mod tests {
         let large = of(GearPair { b: 1.0, omega: 2.0 * small.omega, ..GearPair::paper(0.5) });
         let mut ranges = [[0.0f64; 2]; 2];
         for nth in 1..200 {
-            let (a, b) = (starts.drawn(nth, &small), starts.drawn(nth, &large));
+            let (a, b) = (starts.random(nth, &small), starts.random(nth, &large));
             let gap = a[0] - a[2];
             assert!(gap.abs() < 0.5 && a[2].abs() < 2.0, "{a:?}");
             // Twice the backlash and twice the frequency.
@@ -118,7 +119,7 @@ mod tests {
         }
         assert!(ranges.iter().all(|[low, high]| *low < -0.95 && *high > 0.95), "{ranges:?}");
         let other = Starts::new(Start::Rest, Some(Draw { count: 200, seed: 8 }));
-        assert_ne!(starts.drawn(1, &small), other.drawn(1, &small));
+        assert_ne!(starts.random(1, &small), other.random(1, &small));
     }
 
     #[test]

@@ -134,8 +134,8 @@ fn keep_one(root: &mut Table, place: Option<usize>) {
     }
 }
 
-/// Sets a parameter whose axis was removed. It is an error if the scene sets the parameter to another value. As in a map, an
-/// axis that is named by an argument overrides a value in the text.
+/// Sets a parameter whose axis was removed. It is an error if the scene sets the parameter to another value. As in a
+/// map, an axis that is named by an argument overrides a value in the text.
 fn fix(root: &mut Table, name: &str, value: Node, is_argument: bool) -> Result<(), SceneError> {
     let place = value.place.clone();
     let empty = || Node {

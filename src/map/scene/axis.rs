@@ -97,17 +97,6 @@ impl Axis {
         self.target
     }
 
-    /// Sets the parameter in `model` to value `i` of the axis.
-    pub(crate) fn set(&self, model: &mut dyn Model, i: usize) {
-        // The value is in the parameter's range: both ends are, and the range is an interval.
-        self.target.set(model, self.value(i));
-    }
-
-    /// Sets the component of `start` to value `i` of the axis.
-    pub(crate) fn begin(&self, start: &mut State, i: usize) {
-        self.target.begin(start, self.value(i));
-    }
-
     /// Returns the first value.
     pub fn min(&self) -> f64 {
         self.min
@@ -140,8 +129,8 @@ impl Axis {
     /// exp10((log10(min) * (n - i) + log10(max) * i) / n)
     /// ```
     ///
-    /// The first value is exactly `min` and the last exactly `max`. No value is outside, whatever the rounding, so each is in
-    /// the parameter's range.
+    /// The first value is exactly `min` and the last exactly `max`. No value is outside, whatever the rounding, so each
+    /// is in the parameter's range.
     pub fn value(&self, i: usize) -> f64 {
         let last = self.count - 1;
         if i >= last {
@@ -171,11 +160,11 @@ fn geometric(min: f64, max: f64, count: usize) -> Arc<[f64]> {
     (0..count).map(value).collect()
 }
 
-/// Reads the `[[axis]]` tables. `command`, which messages name, needs `wanted` of them.
+/// Reads the `[[axis]]` tables. `command`, which messages name, needs `required` of them.
 pub(super) fn read(
     root: &Section<'_>,
     model: &dyn Model,
-    wanted: usize,
+    required: usize,
     command: &str,
 ) -> Result<Vec<Axis>, SceneError> {
     let list = root.require("axis", EXAMPLE)?;
@@ -184,12 +173,11 @@ pub(super) fn read(
     for table in &tables {
         axes.push(read_one(table, model, &axes)?);
     }
-    if axes.len() != wanted {
-        let excess = tables.get(wanted).unwrap_or(&list);
-        let plural = if wanted == 1 { "axis" } else { "axes" };
-        return Err(Field { path: "axis".into(), node: &count_node(excess.node, axes.len()) }.conflict(
-            format!("`{command}` needs {wanted} {plural}; add or remove [[axis]] tables to have as many"),
-        ));
+    if axes.len() != required {
+        let excess = tables.get(required).unwrap_or(&list);
+        let plural = if required == 1 { "axis" } else { "axes" };
+        return Err(Field { path: "axis".into(), node: &count_node(excess.node, axes.len()) }
+            .conflict(format!("`{command}` needs {required} {plural}; add or remove [[axis]] tables")));
     }
     Ok(axes)
 }
@@ -204,7 +192,8 @@ pub(super) fn refuse_starts(root: &Section<'_>, axes: &[Axis], command: &str) ->
     }
 }
 
-/// Builds the node that an error about the number of axes shows: the place of the first superfluous axis, and the number.
+/// Builds the node that an error about the number of axes shows: the place of the first superfluous axis, and the
+/// number.
 fn count_node(at: &Node, count: usize) -> Node {
     let excerpt = format!("{count} {}", if count == 1 { "table" } else { "tables" });
     Node { place: at.name_place.clone(), excerpt, value: Value::Other, ..at.clone() }
@@ -234,8 +223,8 @@ fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axi
     }
 }
 
-/// Returns the field that names the swept quantity, and whether it is a component of the start. An argument overrides the
-/// text.
+/// Returns the field that names the swept quantity, and whether it is a component of the start. An argument overrides
+/// the text.
 fn swept_name<'a>(section: &Section<'a>) -> Result<(Field<'a>, bool), SceneError> {
     match (section.get("parameter"), section.get("start")) {
         (Some(parameter), Some(start)) if parameter.is_argument() == start.is_argument() => Err(start
@@ -264,8 +253,8 @@ pub(super) fn component(model: &dyn Model, place: usize) -> Parameter {
     }
 }
 
-/// Returns the field `values` if it defines the axis. Both `values` and a range may be given if one of them is an argument,
-/// which overrides the text.
+/// Returns the field `values` if it defines the axis. Both `values` and a range may be given if one of them is an
+/// argument, which overrides the text.
 fn listed_values<'a>(section: &Section<'a>) -> Result<Option<Field<'a>>, SceneError> {
     let Some(values) = section.get("values") else { return Ok(None) };
     let others = ["min", "max", "count", "scale"].map(|name| section.get(name));
@@ -281,10 +270,10 @@ fn listed_values<'a>(section: &Section<'a>) -> Result<Option<Field<'a>>, SceneEr
 }
 
 fn read_values(field: &Field<'_>, parameter: Parameter, target: Target) -> Result<Axis, SceneError> {
-    let wanted = format!("a list of 2 to {MAX_COUNT} numbers, each greater than the one before it");
-    let items = field.list(&wanted)?;
+    let requirement = format!("a list of 2 to {MAX_COUNT} numbers, each greater than the one before it");
+    let items = field.list(&requirement)?;
     if !(2..=MAX_COUNT as usize).contains(&items.len()) {
-        return Err(field.out_of_range(&wanted));
+        return Err(field.out_of_range(&requirement));
     }
     let mut table: Vec<f64> = Vec::with_capacity(items.len());
     for item in &items {

@@ -1,4 +1,5 @@
-//! A scene built in Rust. It is written as TOML and then read like a file, so the same checks, errors and manifests apply.
+//! A scene built in Rust. It is written as TOML and then read like a file, so the same checks, errors and manifests
+//! apply.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -11,7 +12,8 @@ use super::settings::{Continuous, Format, Integration, Quantity, Refine, Steps};
 use super::{Draw, Purpose, Scene, SceneError, Start};
 use rattlemap_dynamics::model::Model;
 
-/// Builds a scene step by step; [`SceneBuilder::build`] checks it. Anything that is not set has the default of scene files.
+/// Builds a scene step by step; [`SceneBuilder::build`] checks it. Anything that is not set has the default of scene
+/// files.
 #[derive(Clone, Debug)]
 #[must_use]
 pub struct SceneBuilder {
@@ -56,7 +58,8 @@ impl SceneBuilder {
         self.with("derived", name, quoted(expression))
     }
 
-    /// Sweeps a parameter over `count` values with equal differences, both ends included. The first axis runs along columns.
+    /// Sweeps a parameter over `count` values with equal differences, both ends included. The first axis runs along
+    /// columns.
     pub fn axis(self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
         self.sweep(parameter, range_lines(&range, count))
     }

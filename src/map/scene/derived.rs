@@ -3,7 +3,7 @@
 use super::axis::{meanings, names};
 use super::error::SceneError;
 use super::section::{Field, Section};
-use crate::map::expression::Expression;
+use crate::text::expression::Expression;
 use rattlemap_dynamics::model::{Model, Parameter};
 
 /// Derived parameters, ordered so that each needs only earlier ones.

@@ -10,7 +10,7 @@ use super::document::shorten;
 use super::error::{Fault, Place, Problem, SceneError, suggest};
 use super::keys;
 use super::section::Section;
-use rattlemap_dynamics::model::{Model, Parameter, State};
+use rattlemap_dynamics::model::{Model, Parameter};
 
 /// A file that a scene names, as the caller has read it.
 #[derive(Clone, Debug)]
@@ -102,16 +102,6 @@ impl List {
     /// Returns the quantities that the columns set.
     pub(crate) fn targets(&self) -> impl ExactSizeIterator<Item = Target> {
         self.columns.iter().map(|column| column.target)
-    }
-
-    /// Sets the parameters of a cell in `model`.
-    pub(crate) fn set(&self, model: &mut dyn Model, cell: usize) {
-        self.targets().zip(self.row(cell)).for_each(|(target, &value)| target.set(model, value));
-    }
-
-    /// Sets the components of a cell in `start`.
-    pub(crate) fn begin(&self, start: &mut State, cell: usize) {
-        self.targets().zip(self.row(cell)).for_each(|(target, &value)| target.begin(start, value));
     }
 }
 

@@ -33,7 +33,8 @@ pub(super) fn read(root: &Section<'_>, find: FindFile<'_>) -> Result<FileModel, 
     }
 }
 
-/// Returns the value of `model` in a scene: the name of a built-in model or of one implemented in Rust, else a file name.
+/// Returns the value of `model` in a scene: the name of a built-in model or of one implemented in Rust, else a file
+/// name.
 pub(super) fn named(model: &dyn Model) -> String {
     match model.downcast_ref::<FileModel>() {
         Some(file) if !file.is_built_in() => format!("{}{FILE}", model.name()),

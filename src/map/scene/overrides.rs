@@ -11,8 +11,8 @@ const DEEPEST: usize = 8;
 
 /// Writes the value of one `NAME=VALUE` argument into the tree.
 ///
-/// `e=0.6` means `parameters.e`. Other settings need their full path; axes are numbered from 0. Names are checked later,
-/// when the tree is read.
+/// `e=0.6` means `parameters.e`. Other settings need their full path; axes are numbered from 0. Names are checked
+/// later, when the tree is read.
 pub(super) fn apply(document: &mut Node, argument: &str) -> Result<(), SceneError> {
     let argument: Arc<str> = argument.into();
     let fail = |problem| SceneError { place: Place::Set { argument: argument.clone() }, problem };

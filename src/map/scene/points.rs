@@ -59,21 +59,20 @@ impl Points {
     /// Returns the model of a cell.
     pub(crate) fn model(&self, cell: usize) -> Box<dyn Model> {
         let mut model = self.base.clone();
-        match &self.list {
-            Some(list) => list.set(&mut *model, cell),
-            None => self.axes.iter().zip(self.indices(cell)).for_each(|(axis, i)| axis.set(&mut *model, i)),
-        }
+        self.assignments(cell).for_each(|(target, value)| target.set(&mut *model, value));
         self.derived.apply(&mut *model);
         model
     }
 
     /// Returns the start of a cell: `start` with the swept components replaced.
     pub(crate) fn start(&self, cell: usize, mut start: State) -> State {
-        match &self.list {
-            Some(list) => list.begin(&mut start, cell),
-            None => self.axes.iter().zip(self.indices(cell)).for_each(|(axis, i)| axis.begin(&mut start, i)),
-        }
+        self.assignments(cell).for_each(|(target, value)| target.begin(&mut start, value));
         start
+    }
+
+    /// Returns the swept quantities of a cell with their values.
+    fn assignments(&self, cell: usize) -> impl Iterator<Item = (Target, f64)> {
+        self.targets().zip(self.values(cell))
     }
 
     /// Whether cells differ in their starts.

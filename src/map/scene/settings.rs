@@ -64,16 +64,18 @@ impl From<&Integration> for orbit::Settings {
 pub struct Refine {
     /// Distance of the lines of the coarse grid, in cells. Cells where lines cross are always integrated.
     pub minimum_grid: u32,
-    /// Largest number of times that a block is halved; none means down to single cells. A block in which the audit finds a
-    /// wrong cell is halved further in any case.
+    /// Largest number of times that a block is halved; none means down to single cells. A block in which the audit
+    /// finds a wrong cell is halved further in any case.
     pub rounds: Option<u32>,
     /// Allowed fraction of wrong filled cells, as measured by the audit.
     pub max_error: f64,
-    /// Number of filled cells that an audit integrates at first; none means [`DEFAULT_AUDIT`], or a quarter of the filled
-    /// cells if that is less. If the result may be due to chance, the audit integrates up to sixteen times as many.
+    /// Number of filled cells that an audit integrates at first; none means [`DEFAULT_AUDIT`], or a quarter of the
+    /// filled cells if that is less. If the result may be due to chance, the audit integrates up to sixteen times as
+    /// many.
     pub audit: Option<u32>,
-    /// Whether a change of the word alone is a border, if the scene computes words; of the pattern alone, if it computes
-    /// patterns. At low frequencies words change between most neighbouring cells, while class, period and symmetry do not.
+    /// Whether a change of the word alone is a border, if the scene computes words; of the pattern alone, if it
+    /// computes patterns. At low frequencies words change between most neighbouring cells, while class, period and
+    /// symmetry do not.
     pub word: bool,
     /// Treatment of the continuous quantities in filled cells.
     pub continuous: Continuous,
@@ -96,8 +98,8 @@ impl Default for Refine {
 }
 
 impl Refine {
-    /// Returns how many of `filled` cells an audit integrates. By default it is at most a quarter, because an audit of all
-    /// filled cells of a small map would cancel the saving.
+    /// Returns how many of `filled` cells an audit integrates. By default it is at most a quarter, because an audit of
+    /// all filled cells of a small map would cancel the saving.
     pub fn audited(&self, filled: usize) -> usize {
         match self.audit {
             Some(cells) => filled.min(cells as usize),
@@ -179,7 +181,7 @@ const FORMATS: [(&str, Format); 6] = [
 ];
 
 impl Quantity {
-    /// The name in scenes.
+    /// Returns the name in scenes.
     pub fn name(self) -> &'static str {
         name(&QUANTITIES, self)
     }

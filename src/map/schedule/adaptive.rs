@@ -1,8 +1,8 @@
-//! Refinement: coarse blocks, then blocks that a border crosses, down to single cells; then an audit of the filled cells
-//! ([`auditing`]).
+//! Refinement: coarse blocks, then blocks that a border crosses, down to single cells; then an audit of the filled
+//! cells ([`auditing`]).
 //!
-//! The integrated cells do not depend on the order of the records. A block is halved because cells are known to differ, and
-//! further records cannot change that. So no block waits for others.
+//! The integrated cells do not depend on the order of the records. A block is halved because cells are known to differ,
+//! and further records cannot change that. So no block waits for others.
 
 mod auditing;
 
@@ -16,9 +16,9 @@ use crate::map::random::Random;
 use crate::map::scene::Refine;
 use crate::record::Record;
 
-/// Smallest width of a block that is halved because it touches a block with a border. In narrower blocks, the cells on the
-/// common edge show whether the border continues. With classes alone, 0.24 % of the filled cells of the main map are then
-/// wrong.
+/// Smallest width of a block that is halved because it touches a block with a border. In narrower blocks, the cells on
+/// the common edge show whether the border continues. With classes alone, 0.24 % of the filled cells of the main map
+/// are then wrong.
 const NARROW: usize = 8;
 
 /// Smallest width of such a block if symmetries are borders, which adds 0.1 % of wrong cells in thin bands, or after an
@@ -304,8 +304,8 @@ impl Adaptive {
         self.labels[self.id(at)]
     }
 
-    /// Fills all cells that were not integrated. Returns their number and, for a map of basins, the cell from which each cell
-    /// was filled.
+    /// Fills all cells that were not integrated. Returns their number and, for a map of basins, the cell from which
+    /// each cell was filled.
     pub(super) fn fill(&self, records: &mut [Record]) -> (usize, Vec<u32>) {
         let mut count = 0;
         let cells = if self.basins.is_some() { records.len() } else { 0 };

@@ -10,8 +10,8 @@ pub struct Audit {
     pub filled: usize,
     /// Number of random filled cells that were integrated.
     pub sampled: usize,
-    /// Number of sampled cells with a wrong filled value: class, period, symmetry if the scene requests it, and word or pattern
-    /// if its changes are borders.
+    /// Number of sampled cells with a wrong filled value: class, period, symmetry if the scene requests it, and word or
+    /// pattern if its changes are borders.
     pub wrong: usize,
     /// Number of sampled cells with a filled word.
     pub words: usize,
@@ -25,9 +25,9 @@ pub struct Audit {
     pub errors: Errors,
 }
 
-/// Largest sample of an audit, in multiples of the first. An audit goes on if it finds too many wrong cells, but possibly by
-/// chance. With 0.3 % allowed and 0.26 % wrong, one map in forty is then refined needlessly instead of one in four. With
-/// 0.4 % wrong 38 % of the maps pass instead of 31 %; with 0.5 % wrong 15 % instead of 13 %.
+/// Largest sample of an audit, in multiples of the first. An audit goes on if it finds too many wrong cells, but
+/// possibly by chance. With 0.3 % allowed and 0.26 % wrong, one map in forty is then refined needlessly instead of one
+/// in four. With 0.4 % wrong 38 % of the maps pass instead of 31 %; with 0.5 % wrong 15 % instead of 13 %.
 const PROLONGED: usize = 16;
 
 impl Audit {
@@ -36,15 +36,15 @@ impl Audit {
         self.wrong as f64 / self.sampled.max(1) as f64
     }
 
-    /// Returns the 95 % interval of [`Audit::rate`]. It ignores that the size of the sample depends on earlier results: after a
-    /// longer audit its coverage may be 92 %.
+    /// Returns the 95 % interval of [`Audit::rate`]. It ignores that the size of the sample depends on earlier results:
+    /// after a longer audit its coverage may be 92 %.
     pub fn interval(&self) -> [f64; 2] {
         score_interval(self.wrong, self.sampled, TWO_SIDED_95)
     }
 
-    /// Returns the number of further cells to audit until it is known whether more than `max_error` of the filled cells are
-    /// wrong. `first` is the size of the first sample. At most a quarter of the filled cells is audited. The 99 % interval is
-    /// used because the test is repeated and a needless refinement is expensive.
+    /// Returns the number of further cells to audit until it is known whether more than `max_error` of the filled cells
+    /// are wrong. `first` is the size of the first sample. At most a quarter of the filled cells is audited. The 99 %
+    /// interval is used because the test is repeated and a needless refinement is expensive.
     pub(super) fn more(&self, first: usize, max_error: f64) -> usize {
         let most = (PROLONGED * first).min(self.filled / 4);
         let [low, _] = score_interval(self.wrong, self.sampled, TWO_SIDED_99);

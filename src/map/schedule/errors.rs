@@ -11,8 +11,8 @@ const HALF_AN_IMPACT: f64 = 0.5;
 /// Tolerance for the rounding of counts per period whose difference is exactly 1.
 const COUNT_ROUNDING: f64 = 1e-9;
 
-/// Errors of the continuous quantities of audited cells; none if the scene does not request a quantity, or leaves it empty in
-/// filled cells.
+/// Errors of the continuous quantities of audited cells; none if the scene does not request a quantity, or leaves it
+/// empty in filled cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Errors {
     /// Errors of the largest Lyapunov exponent.

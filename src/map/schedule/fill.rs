@@ -38,9 +38,9 @@ impl<'r> Filling<'r> {
         Filling { block: *block, corners, valid, averages }
     }
 
-    /// Returns the filled record of a cell: that of the nearest corner, with bilinear averages of continuous quantities. A word
-    /// or pattern is filled only if all corners agree. So are the impacts of cycles, which are whole numbers over the period,
-    /// and an average of different counts need not be.
+    /// Returns the filled record of a cell: that of the nearest corner, with bilinear averages of continuous
+    /// quantities. A word or pattern is filled only if all corners agree. So are the impacts of cycles, which are whole
+    /// numbers over the period, and an average of different counts need not be.
     pub(super) fn record(&self, at: [usize; 2]) -> Record {
         let [u, v] = self.block.shares(at);
         let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];

@@ -44,8 +44,8 @@ impl Label {
     }
 }
 
-/// Returns the smaller of the hashes of the word and of the word of the symmetry-conjugate orbit. The two orbits coexist, so
-/// both must have one label. Returns 0 without a word.
+/// Returns the smaller of the hashes of the word and of the word of the symmetry-conjugate orbit. The two orbits
+/// coexist, so both must have one label. Returns 0 without a word.
 pub(super) fn word_of(record: &Record) -> u64 {
     lesser(record.word_hash, record.spelling())
 }

@@ -13,7 +13,7 @@ const SYMMETRIC: u32 = 1000;
 const OTHER_WORD: u32 = 2000;
 
 /// Converts a number of a picture to a record.
-fn shown(number: u32) -> Record {
+fn record_of(number: u32) -> Record {
     let mut record = Record {
         period: number % SYMMETRIC,
         symmetric: number / SYMMETRIC % 2,
@@ -31,10 +31,11 @@ fn plan([columns, rows]: [usize; 2], refine: &str) -> Plan {
 
 /// Runs a schedule on a picture, a function that gives every cell a number.
 fn run(plan: &Plan, picture: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refined) {
-    run_in(plan, std::mem::take, |i, j| shown(picture(i, j)))
+    run_in(plan, std::mem::take, |i, j| record_of(picture(i, j)))
 }
 
-/// Runs a schedule. `record` computes a record; `arrive` removes the cells whose records arrive next from those under way.
+/// Runs a schedule. `record` computes a record; `arrive` removes the cells whose records arrive next from those under
+/// way.
 fn run_in(
     plan: &Plan,
     mut arrive: impl FnMut(&mut Vec<u32>) -> Vec<u32>,
@@ -47,7 +48,7 @@ fn run_in(
         waiting.extend(schedule.next(plan, usize::MAX).iter().map(|cell| cell.id));
         for id in arrive(&mut waiting) {
             let [i, j] = plan.indices(id);
-            assert_eq!(records[id as usize].periods_run, 0, "cell {id} was asked for twice");
+            assert_eq!(records[id as usize].periods_run, 0, "cell {id} was requested twice");
             records[id as usize] = record(i, j);
             assert!(schedule.is_waiting_for(id));
             schedule.take(id, &records);
@@ -136,8 +137,8 @@ fn the_audit_finds_planted_islands_and_mends_the_map() {
     assert_eq!(wrong(&records, 241, one), 0, "{refined:?}");
 }
 
-/// If only classes are borders, narrow blocks are not halved for touching one until an audit fails. Here islands near a border
-/// meet no corner of the blocks.
+/// If only classes are borders, narrow blocks are not halved for touching one until an audit fails. Here islands near a
+/// border meet no corner of the blocks.
 #[test]
 fn after_a_failed_audit_borders_are_first_followed_in_narrower_blocks() {
     let beaded = |i: usize, j: usize| {
@@ -231,8 +232,8 @@ fn rounds_bound_the_refinement() {
     assert!(refined.integrated < 1000, "{refined:?}");
 }
 
-/// The order of the records changes neither the integrated cells nor the audits, for discs, bands and scattered cells, and with
-/// failed and prolonged audits.
+/// The order of the records changes neither the integrated cells nor the audits, for discs, bands and scattered cells,
+/// and with failed and prolonged audits.
 #[test]
 fn integrated_cells_do_not_depend_on_the_order_of_records() {
     let picture = |i: usize, j: usize| {
@@ -262,7 +263,7 @@ fn integrated_cells_do_not_depend_on_the_order_of_records() {
                 1 => waiting.split_off(waiting.len() - (waiting.len() / 3).max(1)),
                 _ => waiting.split_off(usize::from(waiting.len() > 1)),
             };
-            let (others, other) = run_in(&plan, arrive, |i, j| shown(picture(i, j)));
+            let (others, other) = run_in(&plan, arrive, |i, j| record_of(picture(i, j)));
             assert_eq!(refined, other, "{seed}");
             assert!(records == others, "{seed}");
         }
@@ -280,7 +281,7 @@ fn the_audit_reports_errors_of_filled_values() {
     let number = |i: usize, _| 1 + u32::from(stepped(i)) * SYMMETRIC + u32::from(i > 64) * OTHER_WORD;
     // The symmetry of the picture becomes a step of the exponent, its word a number of impacts.
     let record = |number: u32| {
-        let counted = shown(number);
+        let counted = record_of(number);
         Record {
             lyapunov: -1.0 - 0.25 * f64::from(counted.symmetric),
             impacts_per_period: f64::from(2 + 3 * (number / OTHER_WORD)),
@@ -304,7 +305,7 @@ fn the_audit_reports_errors_of_filled_values() {
     let impacts = errors.impacts.unwrap();
     assert_eq!((impacts.compared + impacts.empty, impacts.worst, impacts.off_by_one), (4000, 0.0, 0));
     assert!((300..650).contains(&impacts.empty), "{impacts:?}");
-    assert_eq!(errors.mesh, None, "not asked for");
+    assert_eq!(errors.mesh, None, "not requested");
     // Empty quantities have no errors.
     assert_eq!(audit_of(&outputs("continuous = 'empty'")).errors, Errors::default());
 }

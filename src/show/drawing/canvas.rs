@@ -1,47 +1,47 @@
-//! What a picture consists of, and how it is put there.
+//! The picture under construction: a list of areas, lines, texts and images.
 
 use std::cell::RefCell;
 
-use crate::show::drawing::raster::Bitmap;
+use crate::show::color::Color;
+use crate::show::drawing::shapes::{Align, Marker, Point, Rect, Shape};
+use crate::show::drawing::style::{BELOW, DARK, RIGHT, WHITE};
 use crate::show::drawing::typeface::Typeface;
-use crate::show::drawing::{Align, BELOW, DARK, Marker, Point, RGBColor, RIGHT, Rect, Shape, WHITE};
-use crate::show::error::DrawError;
 
-/// Points of a line closer to the one before than this many pixels are left out.
+/// Points of a line that are closer to the previous one than this many pixels are skipped.
 const THIN: f64 = 0.1;
-/// Nothing is drawn further away than this, in pixels.
+/// Coordinates are clamped to this many pixels from the origin.
 const FAR: f64 = 1e5;
 
-/// A shape that is filled.
+/// The shape of an area.
 #[derive(Debug)]
-pub(crate) enum Shaped {
+pub(crate) enum Outline {
     Rect(Rect),
     Circle { center: Point, radius: f64 },
     Polygon(Vec<Point>),
 }
 
-/// What a picture consists of, in the order in which it is drawn.
+/// An element of the picture.
 #[derive(Debug)]
 pub(crate) enum Item {
     Area {
-        shape: Shaped,
-        color: RGBColor,
+        outline: Outline,
+        color: Color,
         opacity: f64,
     },
-    /// With round joints and ends; two points at least.
+    /// A line with round joints and ends, of at least two points.
     Line {
         path: Vec<Point>,
         width: f64,
-        color: RGBColor,
+        color: Color,
         is_dashed: bool,
     },
-    /// `at` lies on the baseline: where it begins, its middle or its end. `em` is the size of the type.
+    /// `at` lies on the baseline: at the beginning, middle or end of the text. `em` is the type size.
     Text {
         text: String,
         at: Point,
         em: f64,
         align: Align,
-        color: RGBColor,
+        color: Color,
     },
     Image {
         rect: Rect,
@@ -49,62 +49,82 @@ pub(crate) enum Item {
     },
 }
 
-/// A picture being drawn.
-#[derive(Debug)]
-pub struct Canvas<'a> {
-    pub(crate) items: RefCell<Vec<Item>>,
-    pub(crate) size: (f64, f64),
-    pub(crate) typeface: &'a Typeface,
+/// Pixels, row by row from the top.
+#[derive(Clone, Debug)]
+pub struct Bitmap {
+    /// Numbers of columns and rows.
+    pub size: [usize; 2],
+    /// Three bytes per pixel.
+    pub rgb: Vec<u8>,
+    /// Opacity of each pixel from 0 to 255. Without it all pixels are opaque.
+    pub alpha: Option<Vec<u8>>,
+    /// Whether scaling blends neighbouring pixels.
+    pub is_smooth: bool,
 }
 
-impl<'a> Canvas<'a> {
-    pub(crate) fn empty(size: (f64, f64), typeface: &'a Typeface) -> Canvas<'a> {
-        Canvas { items: RefCell::default(), size, typeface }
+impl Bitmap {
+    /// Returns transparent pixels.
+    pub fn clear(size: [usize; 2]) -> Bitmap {
+        let count = size[0] * size[1];
+        Bitmap { size, rgb: vec![0xff; 3 * count], alpha: Some(vec![0; count]), is_smooth: true }
     }
 
-    /// Width and height.
+    /// Sets colour and opacity of a pixel, counted row by row.
+    pub fn set(&mut self, pixel: usize, color: Color, opacity: f64) {
+        self.rgb[3 * pixel..3 * pixel + 3].copy_from_slice(&color);
+        if let Some(alpha) = &mut self.alpha {
+            alpha[pixel] = (opacity * 255.0).round() as u8;
+        }
+    }
+}
+
+/// A picture under construction.
+#[derive(Debug)]
+pub struct Canvas {
+    pub(crate) items: RefCell<Vec<Item>>,
+    size: (f64, f64),
+}
+
+impl Canvas {
+    /// Returns a white picture.
+    pub(crate) fn empty(size: (f64, f64)) -> Canvas {
+        Canvas { items: RefCell::default(), size }
+    }
+
+    /// Returns width and height.
     pub fn size(&self) -> (f64, f64) {
         self.size
     }
 
-    /// What is left for panels of the picture below `top`, `left` pixels from its left edge.
+    /// Returns the room for panels below `top`, `left` pixels from the left edge.
     pub fn panel(&self, left: f64, top: f64) -> Rect {
         Rect { left, top, right: self.size.0 - RIGHT, bottom: self.size.1 - BELOW }
     }
 
-    pub(crate) fn add(&self, item: Item) {
+    fn add(&self, item: Item) {
         self.items.borrow_mut().push(item);
     }
 
-    fn area(&self, shape: Shaped, color: RGBColor, opacity: f64) {
-        self.add(Item::Area { shape, color, opacity });
+    fn area(&self, outline: Outline, color: Color, opacity: f64) {
+        self.add(Item::Area { outline, color, opacity });
     }
 
     /// Fills a rectangle.
-    pub fn fill(&self, rect: Rect, color: RGBColor, opacity: f64) -> Result<(), DrawError> {
-        if rect.right > rect.left && rect.bottom > rect.top {
-            self.area(Shaped::Rect(rect), color, opacity);
+    pub fn fill(&self, rect: Rect, color: Color, opacity: f64) {
+        if !rect.is_empty() {
+            self.area(Outline::Rect(rect), color, opacity);
         }
-        Ok(())
     }
 
     /// Fills a polygon.
-    pub fn polygon(&self, corners: &[Point], color: RGBColor) -> Result<(), DrawError> {
-        self.area(Shaped::Polygon(corners.to_vec()), color, 1.0);
-        Ok(())
+    pub fn polygon(&self, corners: &[Point], color: Color) {
+        self.area(Outline::Polygon(corners.to_vec()), color, 1.0);
     }
 
-    /// Writes one line of text. Raised digits and minus are those of Unicode.
-    pub fn text(
-        &self,
-        text: &str,
-        at: Point,
-        size: f64,
-        align: Align,
-        color: RGBColor,
-    ) -> Result<(), DrawError> {
-        let em = self.typeface.em(size);
-        let half = self.typeface.cap_height(em) / 2.0;
+    /// Writes one line of text. Superscripts are Unicode's raised digits and minus.
+    pub fn text(&self, text: &str, at: Point, size: f64, align: Align, color: Color) {
+        let em = Typeface::of_figures().em(size);
+        let half = Typeface::of_figures().cap_height(em) / 2.0;
         let at = match align {
             Align::Upwards => (at.0 + half, at.1),
             _ => (at.0, at.1 + half),
@@ -112,16 +132,15 @@ impl<'a> Canvas<'a> {
         if !text.is_empty() {
             self.add(Item::Text { text: text.to_owned(), at, em, align, color });
         }
-        Ok(())
     }
 
-    /// Draws an event marker, with a thin white rim that sets it off from the line.
-    pub fn marker(&self, at: Point, marker: Marker) -> Result<(), DrawError> {
+    /// Draws a marker. A thin white rim separates large markers from the line below them.
+    pub fn marker(&self, at: Point, marker: Marker) {
         let Marker { shape, color, radius, hollow } = marker;
         if !(at.0.abs() < FAR && at.1.abs() < FAR) {
-            return Ok(());
+            return;
         }
-        // Small markers are many, and the rim of one would wipe out its neighbour.
+        // The rims of many small markers would cover their neighbours.
         if radius > 4.0 {
             self.shape(at, shape, radius + 1.0, WHITE);
         }
@@ -129,55 +148,67 @@ impl<'a> Canvas<'a> {
         if hollow {
             self.shape(at, shape, 0.6 * radius, WHITE);
         }
-        Ok(())
     }
 
-    fn shape(&self, at: Point, shape: Shape, radius: f64, color: RGBColor) {
+    fn shape(&self, at: Point, shape: Shape, radius: f64, color: Color) {
         let corner = |dx: f64, dy: f64| (at.0 + dx * radius, at.1 + dy * radius);
-        let shaped = match shape {
-            Shape::Circle => Shaped::Circle { center: at, radius },
+        let outline = match shape {
+            Shape::Circle => Outline::Circle { center: at, radius },
             Shape::Square => {
                 let ((left, top), (right, bottom)) = (corner(-0.85, -0.85), corner(0.85, 0.85));
-                Shaped::Rect(Rect { left, top, right, bottom })
+                Outline::Rect(Rect { left, top, right, bottom })
             }
             Shape::Triangle => {
-                Shaped::Polygon(vec![corner(0.0, -1.25), corner(1.1, 0.75), corner(-1.1, 0.75)])
+                Outline::Polygon(vec![corner(0.0, -1.25), corner(1.1, 0.75), corner(-1.1, 0.75)])
             }
         };
-        self.area(shaped, color, 1.0);
+        self.area(outline, color, 1.0);
     }
 
-    /// Draws a polyline with round joints and ends; points that are not finite are left out.
-    pub fn stroke(&self, path: &[Point], width: f64, color: RGBColor) -> Result<(), DrawError> {
+    /// Draws a polyline with round joints and ends. Points that are not finite are skipped.
+    pub fn stroke(&self, path: &[Point], width: f64, color: Color) {
         self.line(path, width, color, false);
-        Ok(())
     }
 
-    fn line(&self, path: &[Point], width: f64, color: RGBColor, is_dashed: bool) {
+    /// Draws a dashed straight line.
+    pub fn dashes(&self, from: Point, to: Point, width: f64, color: Color) {
+        self.line(&[from, to], width, color, true);
+    }
+
+    fn line(&self, path: &[Point], width: f64, color: Color, is_dashed: bool) {
         match thinned(path) {
             path if path.is_empty() => {}
             path if path.len() == 1 => {
-                self.area(Shaped::Circle { center: path[0], radius: width / 2.0 }, color, 1.0);
+                self.area(Outline::Circle { center: path[0], radius: width / 2.0 }, color, 1.0);
             }
             path => self.add(Item::Line { path, width, color, is_dashed }),
         }
     }
 
     /// Draws the border of a rectangle.
-    pub fn outline(&self, rect: Rect, width: f64) -> Result<(), DrawError> {
+    pub fn outline(&self, rect: Rect, width: f64) {
         let Rect { left, top, right, bottom } = rect;
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
-        self.stroke(&corners, width, DARK)
+        self.stroke(&corners, width, DARK);
     }
 
-    /// Draws a dashed straight line.
-    pub fn dashes(&self, from: Point, to: Point, width: f64, color: RGBColor) -> Result<(), DrawError> {
-        self.line(&[from, to], width, color, true);
-        Ok(())
+    /// Fills a rectangle with a grid of colours, `[column, row]` counted from its lower left corner.
+    pub fn raster(&self, rect: Rect, [columns, rows]: [usize; 2], color: impl Fn([usize; 2]) -> Color) {
+        let cells = (0..rows).rev().flat_map(|row| (0..columns).map(move |column| [column, row]));
+        let mut rgb = Vec::with_capacity(3 * columns * rows);
+        cells.for_each(|cell| rgb.extend(color(cell)));
+        self.image(rect, Bitmap { size: [columns, rows], rgb, alpha: None, is_smooth: false });
+    }
+
+    /// Draws pixels into a rectangle.
+    pub fn image(&self, rect: Rect, bitmap: Bitmap) {
+        if !rect.is_empty() && !bitmap.rgb.is_empty() {
+            self.add(Item::Image { rect, bitmap });
+        }
     }
 }
 
-/// A path without points that are not finite or too close to the one before; its end is kept.
+/// Returns a path without points that are not finite or too close to the previous one. Its last point is always kept.
 fn thinned(path: &[Point]) -> Vec<Point> {
     let near = |v: f64| v.clamp(-FAR, FAR);
     let finite = path.iter().filter(|p| p.0.is_finite() && p.1.is_finite());

@@ -1,47 +1,50 @@
 //! The head of a figure: title, subtitle and a legend in rows.
 
-use crate::show::drawing::{Align, Canvas, DARK, LARGE, MEDIUM, Marker, Point, RGBColor, Rect, SMALL};
-use crate::show::error::DrawError;
+use crate::show::color::Color;
+use crate::show::drawing::canvas::Canvas;
+use crate::show::drawing::shapes::{Align, Marker, Point, Rect};
+use crate::show::drawing::style::{DARK, LARGE, MEDIUM, SMALL};
 
-/// Width of a legend's key, and the room on either side of its text.
+/// Width of a legend key.
 const KEY: f64 = 38.0;
-const GAP: f64 = 10.0;
+/// Room between a key and its text, between entries, and from one row to the next.
+const AFTER_KEY: f64 = 10.0;
 const BETWEEN: f64 = 34.0;
-const ROW: f64 = 34.0;
-/// Smallest type of a title that has to be squeezed.
-const SMALLEST: f64 = 16.0;
-const MARGIN: f64 = 40.0;
+const LEGEND_ROW: f64 = 34.0;
+/// Smallest type of a title that is too long, and the margin at its sides.
+const SMALLEST_TITLE: f64 = 16.0;
+const SIDE_MARGIN: f64 = 40.0;
 
-/// What stands before a legend's text.
+/// The symbol of a legend entry.
 #[derive(Clone, Copy, Debug)]
 pub enum Key {
-    /// A stretch of a line.
+    /// A solid line.
     Line {
-        /// Its colour.
-        color: RGBColor,
-        /// Its width in pixels.
+        /// Colour.
+        color: Color,
+        /// Width in pixels.
         width: f64,
     },
     /// A dashed line.
     Dashes {
-        /// Its colour.
-        color: RGBColor,
+        /// Colour.
+        color: Color,
     },
     /// A marker.
     Marker(Marker),
-    /// A filled and a hollow marker: the states before and after.
+    /// A filled and a hollow marker: the states before and after an event.
     MarkerPair(Marker),
-    /// An area.
+    /// A filled rectangle.
     Patch {
-        /// Its colour.
-        color: RGBColor,
-        /// From 0 to 1.
+        /// Colour.
+        color: Color,
+        /// Opacity from 0 to 1.
         opacity: f64,
     },
     /// A short upright stroke.
     Mark {
-        /// Its colour.
-        color: RGBColor,
+        /// Colour.
+        color: Color,
     },
 }
 
@@ -53,63 +56,57 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// `text` behind `key`.
+    /// Returns the entry with symbol `key` and a text.
     pub fn new(key: Key, text: &str) -> Entry {
         Entry { key, text: text.to_owned() }
     }
 }
 
-/// Draws title, subtitle (of several lines, or none) and legend; returns where the panels may start.
-pub fn draw_head(
-    canvas: &Canvas<'_>,
-    title: &str,
-    subtitle: &str,
-    entries: &[Entry],
-) -> Result<f64, DrawError> {
+/// Draws title, subtitle (any number of lines) and legend. Returns the y coordinate below them.
+pub fn draw_head(canvas: &Canvas, title: &str, subtitle: &str, entries: &[Entry]) -> f64 {
     let mut y = 40.0;
-    draw_fitted(canvas, title, y, LARGE)?;
+    draw_fitted(canvas, title, y, LARGE);
     for (i, line) in subtitle.lines().enumerate() {
         y += if i == 0 { 40.0 } else { 34.0 };
-        draw_fitted(canvas, line, y, MEDIUM)?;
+        draw_fitted(canvas, line, y, MEDIUM);
     }
     y += 44.0;
-    for row in rows(canvas, entries)?.into_iter().filter(|row| !row.is_empty()) {
-        let widths = row.iter().map(|e| width(canvas, e)).collect::<Result<Vec<_>, DrawError>>()?;
+    for row in rows(canvas, entries).into_iter().filter(|row| !row.is_empty()) {
+        let widths: Vec<f64> = row.iter().map(|e| width(canvas, e)).collect();
         let total = widths.iter().sum::<f64>() + BETWEEN * (row.len() - 1) as f64;
         let mut x = (canvas.size().0 - total) / 2.0;
         for (entry, width) in row.iter().zip(widths) {
-            draw_key(canvas, entry.key, (x, y))?;
-            canvas.text(&entry.text, (x + KEY + GAP, y), SMALL, Align::Left, DARK)?;
+            draw_key(canvas, entry.key, (x, y));
+            canvas.text(&entry.text, (x + KEY + AFTER_KEY, y), SMALL, Align::Left, DARK);
             x += width + BETWEEN;
         }
-        y += ROW;
+        y += LEGEND_ROW;
     }
-    Ok(y)
+    y
 }
 
-/// A centred line, in smaller type if it is too long, and cut if that is not enough.
-fn draw_fitted(canvas: &Canvas<'_>, text: &str, y: f64, size: f64) -> Result<(), DrawError> {
-    let room = canvas.size().0 - 2.0 * MARGIN;
-    let size = (size * room / canvas.text_width(text, size)?.max(1.0)).clamp(SMALLEST, size);
-    let text = canvas.fitted(text, size, room + 1.0)?;
-    canvas.text(&text, (canvas.size().0 / 2.0, y), size, Align::Center, DARK)
+/// Draws a centred line, in smaller type if it is too long, and cut if that is not enough.
+fn draw_fitted(canvas: &Canvas, text: &str, y: f64, size: f64) {
+    let room = canvas.size().0 - 2.0 * SIDE_MARGIN;
+    let size = (size * room / canvas.text_width(text, size).max(1.0)).clamp(SMALLEST_TITLE, size);
+    let text = canvas.fitted(text, size, room + 1.0);
+    canvas.text(&text, (canvas.size().0 / 2.0, y), size, Align::Center, DARK);
 }
 
-fn width(canvas: &Canvas<'_>, entry: &Entry) -> Result<f64, DrawError> {
-    Ok(KEY + GAP + canvas.text_width(&entry.text, SMALL)?)
+fn width(canvas: &Canvas, entry: &Entry) -> f64 {
+    KEY + AFTER_KEY + canvas.text_width(&entry.text, SMALL)
 }
 
-/// Breaks the legend into as few rows as fit, of about the same length.
-fn rows<'e>(canvas: &Canvas<'_>, entries: &'e [Entry]) -> Result<Vec<&'e [Entry]>, DrawError> {
-    let room = canvas.size().0 - 2.0 * MARGIN;
-    let widths =
-        entries.iter().map(|e| Ok(width(canvas, e)? + BETWEEN)).collect::<Result<Vec<_>, DrawError>>()?;
+/// Splits the legend into the smallest number of rows, of about equal length.
+fn rows<'e>(canvas: &Canvas, entries: &'e [Entry]) -> Vec<&'e [Entry]> {
+    let room = canvas.size().0 - 2.0 * SIDE_MARGIN;
+    let widths: Vec<f64> = entries.iter().map(|e| width(canvas, e) + BETWEEN).collect();
     let total: f64 = widths.iter().sum();
     let count = (total / room).ceil().max(1.0);
     let mut rows = Vec::new();
     let (mut start, mut used, mut before) = (0, 0.0, 0.0);
     for (i, width) in widths.iter().enumerate() {
-        // An entry belongs to the row in whose share of the total its middle lies.
+        // The row of an entry is the one whose share of the total contains the entry's middle.
         let row_is_full = before + width / 2.0 > total / count * (rows.len() + 1) as f64;
         if i > start && (row_is_full || used + width - BETWEEN > room) {
             rows.push(&entries[start..i]);
@@ -119,17 +116,17 @@ fn rows<'e>(canvas: &Canvas<'_>, entries: &'e [Entry]) -> Result<Vec<&'e [Entry]
         before += width;
     }
     rows.push(&entries[start..]);
-    Ok(rows)
+    rows
 }
 
-fn draw_key(canvas: &Canvas<'_>, key: Key, (x, y): Point) -> Result<(), DrawError> {
+fn draw_key(canvas: &Canvas, key: Key, (x, y): Point) {
     let middle = x + KEY / 2.0;
     match key {
         Key::Line { color, width } => canvas.stroke(&[(x, y), (x + KEY, y)], width, color),
         Key::Dashes { color } => canvas.dashes((x, y), (x + KEY, y), 1.5, color),
         Key::Marker(marker) => canvas.marker((middle, y), marker),
         Key::MarkerPair(marker) => {
-            canvas.marker((middle - 10.0, y), marker)?;
+            canvas.marker((middle - 10.0, y), marker);
             canvas.marker((middle + 10.0, y), Marker { hollow: true, ..marker })
         }
         Key::Patch { color, opacity } => {

@@ -1,6 +1,6 @@
-//! Pictures as PDF: one page, text as text in the embedded typeface, maps as images with one pixel per cell.
+//! Pictures as PDF: one page, text in an embedded typeface, maps as images with one pixel per cell.
 //!
-//! Nothing in the file tells when or where it was made: the same picture gives the same bytes.
+//! The file contains no date and no host: the same picture gives the same bytes.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -11,47 +11,47 @@ use pdf_writer::types::{CidFontType, FontFlags, LineCapStyle, LineJoinStyle, Sys
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect as PdfRect, Ref, Str, TextStr};
 use subsetter::GlyphRemapper;
 
-use crate::show::drawing::canvas::{Item, Shaped};
+use crate::show::color::Color;
+use crate::show::drawing::canvas::{Bitmap, Canvas, Item, Outline};
+use crate::show::drawing::shapes::{Point, Rect};
+use crate::show::drawing::style::{DASH, PER_INCH};
 use crate::show::drawing::typeface::{Glyph, Typeface, beginning};
-use crate::show::drawing::{Bitmap, Canvas, DASH, PER_INCH, Point, RGBColor, Rect};
-use crate::show::error::DrawError;
+use crate::show::error::WriteError;
 
-/// Points of PDF to a pixel.
+/// PDF points per pixel.
 const SCALE: f64 = 72.0 / PER_INCH;
 const FONT: Name<'static> = Name(b"F");
-/// From a circle's centre to the handles of its quarters, over its radius.
+/// Offset of the control points of a quarter circle's Bezier curve, over the radius.
 const HANDLE: f64 = 0.552_284_75;
 const IDENTITY: SystemInfo<'static> =
     SystemInfo { registry: Str(b"Adobe"), ordering: Str(b"Identity"), supplement: 0 };
 
-/// The bytes of the file.
-pub(crate) fn encoded(canvas: &Canvas<'_>) -> Result<Vec<u8>, DrawError> {
+/// Returns the bytes of the file.
+pub(crate) fn encoded(canvas: &Canvas) -> Result<Vec<u8>, WriteError> {
     let mut page = Page {
         content: Content::new(),
-        typeface: canvas.typeface,
         glyphs: GlyphRemapper::new(),
         signs: BTreeMap::new(),
         opacities: BTreeMap::new(),
         images: Vec::new(),
     };
-    // Pixels from the upper left corner, as on the canvas.
-    let (scale, height) = (SCALE as f32, canvas.size.1 * SCALE);
+    // Coordinates are pixels from the upper left corner.
+    let (scale, height) = (SCALE as f32, canvas.size().1 * SCALE);
     page.content.transform([scale, 0.0, 0.0, -scale, 0.0, height as f32]);
     page.content.set_line_cap(LineCapStyle::RoundCap).set_line_join(LineJoinStyle::RoundJoin);
     let items = canvas.items.borrow();
     items.iter().for_each(|item| page.draw(item));
-    page.finish(canvas.size)
+    page.finish(canvas.size())
 }
 
-/// A page under construction, and what it uses.
+/// A page under construction and the resources that it uses.
 struct Page<'c> {
     content: Content,
-    typeface: &'c Typeface,
-    /// Glyphs that occur, numbered anew.
+    /// Glyphs that occur, with new numbers.
     glyphs: GlyphRemapper,
-    /// Their characters and widths in thousandths of an em, by new number.
+    /// Characters and widths (thousandths of an em) of the glyphs, by new number.
     signs: BTreeMap<u16, (char, f32)>,
-    /// Opacities in thousandths, and the object of each.
+    /// Objects of the opacities, by thousandths.
     opacities: BTreeMap<u32, Ref>,
     images: Vec<&'c Bitmap>,
 }
@@ -59,14 +59,14 @@ struct Page<'c> {
 impl<'c> Page<'c> {
     fn draw(&mut self, item: &'c Item) {
         match item {
-            Item::Area { shape, color, opacity } => {
+            Item::Area { outline, color, opacity } => {
                 let thousandths = (opacity * 1000.0).round() as u32;
                 self.fill_color(*color);
                 if thousandths < 1000 {
                     self.opacities.insert(thousandths, Ref::new(1));
                     self.content.save_state().set_parameters(Name(&opacity_name(thousandths)));
                 }
-                self.outline(shape);
+                self.outline(outline);
                 self.content.fill_nonzero();
                 if thousandths < 1000 {
                     self.content.restore_state();
@@ -82,7 +82,7 @@ impl<'c> Page<'c> {
             }
             Item::Text { text, at, em, align, color } => {
                 self.fill_color(*color);
-                let (glyphs, width) = self.typeface.set(text, *em);
+                let (glyphs, width) = Typeface::of_figures().set(text, *em);
                 let (origin, direction) = beginning(*at, width, *align);
                 self.content.begin_text();
                 for run in glyphs.chunk_by(|a, b| a.em == b.em && a.raise == b.raise) {
@@ -102,7 +102,7 @@ impl<'c> Page<'c> {
         }
     }
 
-    fn fill_color(&mut self, color: RGBColor) {
+    fn fill_color(&mut self, color: Color) {
         let [r, g, b] = shares(color);
         self.content.set_fill_rgb(r, g, b);
     }
@@ -118,18 +118,18 @@ impl<'c> Page<'c> {
         }
     }
 
-    fn outline(&mut self, shape: &Shaped) {
-        match shape {
-            Shaped::Rect(Rect { left, top, right, bottom }) => {
+    fn outline(&mut self, outline: &Outline) {
+        match outline {
+            Outline::Rect(Rect { left, top, right, bottom }) => {
                 let [x, y, width, height] = [*left, *top, right - left, bottom - top].map(hundredths);
                 self.content.rect(x, y, width, height);
             }
-            Shaped::Circle { center, radius } => {
+            Outline::Circle { center, radius } => {
                 let at = |dx: f64, dy: f64| [center.0 + dx * radius, center.1 + dy * radius].map(hundredths);
                 let [x, y] = at(1.0, 0.0);
                 self.content.move_to(x, y);
                 for (x, y) in [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)] {
-                    // A quarter, from (x, y) to (-y, x).
+                    // The quarter from (x, y) to (-y, x).
                     let [x1, y1] = at(x - HANDLE * y, y + HANDLE * x);
                     let [x2, y2] = at(-y + HANDLE * x, x + HANDLE * y);
                     let [x3, y3] = at(-y, x);
@@ -137,31 +137,31 @@ impl<'c> Page<'c> {
                 }
                 self.content.close_path();
             }
-            Shaped::Polygon(corners) => {
+            Outline::Polygon(corners) => {
                 self.path(corners);
                 self.content.close_path();
             }
         }
     }
 
-    /// Glyphs of one size on one line.
+    /// Adds glyphs of one size on one line.
     fn text(&mut self, run: &[Glyph], origin: Point, (dx, dy): Point) {
         let Some(first) = run.first() else { return };
         let (x, y) =
             (origin.0 + first.along * dx + first.raise * dy, origin.1 + first.along * dy - first.raise * dx);
-        // The page is upside down, its text upright.
+        // The page's y axis points downwards, the text's upwards.
         let [a, b, c, d] = [dx, dy, dy, -dx].map(|v| v as f32);
-        let mut shown = Vec::with_capacity(2 * run.len());
+        let mut numbers = Vec::with_capacity(2 * run.len());
         for glyph in run {
             let new = self.glyphs.remap(glyph.id);
-            self.signs.insert(new, (glyph.sign, (1000.0 * self.typeface.advance(glyph.id)) as f32));
-            shown.extend(new.to_be_bytes());
+            self.signs.insert(new, (glyph.sign, (1000.0 * Typeface::of_figures().advance(glyph.id)) as f32));
+            numbers.extend(new.to_be_bytes());
         }
         self.content.set_font(FONT, hundredths(first.em));
-        self.content.set_text_matrix([a, b, c, d, hundredths(x), hundredths(y)]).show(Str(&shown));
+        self.content.set_text_matrix([a, b, c, d, hundredths(x), hundredths(y)]).show(Str(&numbers));
     }
 
-    fn finish(self, (width, height): (f64, f64)) -> Result<Vec<u8>, DrawError> {
+    fn finish(self, (width, height): (f64, f64)) -> Result<Vec<u8>, WriteError> {
         let mut pdf = Pdf::new();
         let mut last = 0;
         let mut next = || {
@@ -197,10 +197,10 @@ impl<'c> Page<'c> {
         for (bitmap, ids) in self.images.iter().zip(images) {
             write_image(&mut pdf, ids, bitmap);
         }
-        let drawn = compressed(&self.content.finish());
-        pdf.stream(content, &drawn).filter(Filter::FlateDecode);
+        let data = compressed(&self.content.finish());
+        pdf.stream(content, &data).filter(Filter::FlateDecode);
         let ids = [font, next(), next(), next(), next()];
-        write_font(&mut pdf, ids, self.typeface, &self.glyphs, &self.signs)?;
+        write_font(&mut pdf, ids, &self.glyphs, &self.signs)?;
         pdf.document_info(next()).producer(TextStr("rattlemap"));
         Ok(pdf.finish())
     }
@@ -208,34 +208,31 @@ impl<'c> Page<'c> {
 
 fn write_image(pdf: &mut Pdf, [id, mask]: [Ref; 2], bitmap: &Bitmap) {
     let [columns, rows] = bitmap.size.map(|side| side as i32);
-    let samples = compressed(&bitmap.rgb);
-    let mut image = pdf.image_xobject(id, &samples);
-    image.filter(Filter::FlateDecode);
-    image.width(columns).height(rows).bits_per_component(8).interpolate(bitmap.is_smooth);
-    image.color_space().device_rgb();
-    if bitmap.alpha.is_some() {
-        image.s_mask(mask);
-    }
-    image.finish();
-    if let Some(alpha) = &bitmap.alpha {
-        let samples = compressed(alpha);
-        let mut image = pdf.image_xobject(mask, &samples);
+    for (id, samples) in [(id, Some(&bitmap.rgb)), (mask, bitmap.alpha.as_ref())] {
+        let Some(samples) = samples.map(|samples| compressed(samples)) else { continue };
+        let mut image = pdf.image_xobject(id, &samples);
         image.filter(Filter::FlateDecode);
         image.width(columns).height(rows).bits_per_component(8).interpolate(bitmap.is_smooth);
-        image.color_space().device_gray();
+        if id == mask {
+            image.color_space().device_gray();
+            continue;
+        }
+        image.color_space().device_rgb();
+        if bitmap.alpha.is_some() {
+            image.s_mask(mask);
+        }
     }
 }
 
-/// The typeface, cut down to the glyphs that occur, with the characters that they stand for.
+/// Embeds the glyphs that occur and the table of the characters that they represent.
 fn write_font(
     pdf: &mut Pdf,
     [font, descendant, descriptor, file, unicode]: [Ref; 5],
-    typeface: &Typeface,
     glyphs: &GlyphRemapper,
     signs: &BTreeMap<u16, (char, f32)>,
-) -> Result<(), DrawError> {
-    let subset = subsetter::subset(typeface.bytes(), 0, glyphs)?;
-    // Another cut of the same typeface needs another name.
+) -> Result<(), WriteError> {
+    let subset = subsetter::subset(Typeface::bytes(), 0, glyphs)?;
+    // Different subsets of a typeface need different names.
     let mut hash = crc32fast::hash(&subset);
     let tag = std::iter::from_fn(|| {
         let letter = char::from(b'A' + (hash % 26) as u8);
@@ -258,7 +255,7 @@ fn write_font(
     }
     widths.finish();
     cid.finish();
-    let face = typeface.face();
+    let face = Typeface::of_figures().face();
     let thousandths = |units: i16| 1000.0 * f32::from(units) / f32::from(face.units_per_em());
     let bounds = face.global_bounding_box();
     let [left, bottom, right, top] =
@@ -276,7 +273,7 @@ fn write_font(
     let data = compressed(&subset);
     pdf.stream(file, &data).filter(Filter::FlateDecode);
     let mut map = UnicodeCmap::new(Name(b"Characters"), IDENTITY);
-    // One glyph, number 0, stands for all characters that the typeface lacks: it is none of them.
+    // Glyph 0 represents all characters that the typeface lacks, so it has no character of its own.
     signs.iter().filter(|(glyph, _)| **glyph != 0).for_each(|(glyph, (sign, _))| map.pair(*glyph, *sign));
     let data = compressed(&map.finish());
     pdf.cmap(unicode, &data).filter(Filter::FlateDecode);
@@ -291,17 +288,17 @@ fn image_name(nth: usize) -> Vec<u8> {
     format!("I{nth}").into_bytes()
 }
 
-fn shares(RGBColor(r, g, b): RGBColor) -> [f32; 3] {
-    [r, g, b].map(|value| f32::from(value) / 255.0)
+fn shares(color: Color) -> [f32; 3] {
+    color.map(|value| f32::from(value) / 255.0)
 }
 
-/// Rounded: more digits would only make the file longer.
+/// Rounds to hundredths. More digits would only make the file longer.
 fn hundredths(value: f64) -> f32 {
     ((value * 100.0).round() / 100.0) as f32
 }
 
 fn compressed(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    // Memory takes whatever is written to it.
+    // Writing to memory cannot fail.
     encoder.write_all(bytes).and_then(|()| encoder.finish()).unwrap_or_default()
 }

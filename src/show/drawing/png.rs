@@ -4,23 +4,25 @@ use std::collections::HashMap;
 
 use png::{BitDepth, ColorType, Encoder, PixelDimensions, Unit};
 use tiny_skia::{
-    Color, FillRule, FilterQuality, IntSize, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap,
-    PixmapPaint, Rect as SkiaRect, Stroke, StrokeDash, Transform,
+    Color as SkiaColor, FillRule, FilterQuality, IntSize, LineCap, LineJoin, Paint, Path, PathBuilder,
+    Pixmap, PixmapPaint, Rect as SkiaRect, Stroke, StrokeDash, Transform,
 };
 use ttf_parser::{GlyphId, OutlineBuilder};
 
-use crate::show::drawing::canvas::{Item, Shaped};
-use crate::show::drawing::typeface::{Glyph, beginning};
-use crate::show::drawing::{Bitmap, Canvas, DASH, PER_INCH, Point, RGBColor, Rect};
-use crate::show::error::DrawError;
+use crate::show::color::Color;
+use crate::show::drawing::canvas::{Bitmap, Canvas, Item, Outline};
+use crate::show::drawing::shapes::{Point, Rect};
+use crate::show::drawing::style::{DASH, PER_INCH};
+use crate::show::drawing::typeface::{Glyph, Typeface, beginning};
+use crate::show::error::WriteError;
 
-/// The bytes of the file.
-pub(crate) fn encoded(canvas: &Canvas<'_>) -> Result<Vec<u8>, DrawError> {
-    let (width, height) = (canvas.size.0 as u32, canvas.size.1 as u32);
-    let mut page = Pixmap::new(width, height).ok_or(DrawError::Size { width, height })?;
-    page.fill(Color::WHITE);
+/// Returns the bytes of the file.
+pub(crate) fn encoded(canvas: &Canvas) -> Result<Vec<u8>, WriteError> {
+    let (width, height) = (canvas.size().0 as u32, canvas.size().1 as u32);
+    let mut page = Pixmap::new(width, height).ok_or(WriteError::Size { width, height })?;
+    page.fill(SkiaColor::WHITE);
     for item in canvas.items.borrow().iter() {
-        draw(&mut page, canvas, item);
+        draw(&mut page, item);
     }
     let mut rgb = Vec::with_capacity(3 * page.pixels().len());
     page.pixels().iter().for_each(|pixel| rgb.extend([pixel.red(), pixel.green(), pixel.blue()]));
@@ -28,8 +30,8 @@ pub(crate) fn encoded(canvas: &Canvas<'_>) -> Result<Vec<u8>, DrawError> {
     bitmap(&Bitmap { size: [width as usize, height as usize], rgb, alpha: None, is_smooth: false })
 }
 
-/// The bytes of a file of these pixels alone: by their place in a palette where they have few colours.
-pub(crate) fn bitmap(bitmap: &Bitmap) -> Result<Vec<u8>, DrawError> {
+/// Returns a file of these pixels alone, with a palette if they have at most 256 colours.
+pub(crate) fn bitmap(bitmap: &Bitmap) -> Result<Vec<u8>, WriteError> {
     let [width, height] = bitmap.size.map(|side| side as u32);
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, width, height);
@@ -54,7 +56,7 @@ pub(crate) fn bitmap(bitmap: &Bitmap) -> Result<Vec<u8>, DrawError> {
     Ok(bytes)
 }
 
-/// The colours, in the order in which they occur, and each pixel's place among them; none if they are more than 256.
+/// Returns the colours in order of occurrence and each pixel's index, or none for more than 256 colours.
 fn palette(rgb: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     let (mut places, mut palette) = (HashMap::new(), Vec::new());
     let index = |pixel: &[u8]| {
@@ -70,18 +72,18 @@ fn palette(rgb: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     Some((palette, indices))
 }
 
-fn paint(RGBColor(r, g, b): RGBColor, opacity: f64) -> Paint<'static> {
+fn paint([r, g, b]: Color, opacity: f64) -> Paint<'static> {
     let mut paint = Paint::default();
     paint.set_color_rgba8(r, g, b, (opacity * 255.0).round() as u8);
     paint
 }
 
-fn draw(page: &mut Pixmap, canvas: &Canvas<'_>, item: &Item) {
+fn draw(page: &mut Pixmap, item: &Item) {
     let at_rest = Transform::identity();
-    // What has no extent has no path, and nothing to be seen.
+    // Shapes without extent have no path.
     match item {
-        Item::Area { shape, color, opacity } => {
-            if let Some(path) = outline(shape) {
+        Item::Area { outline, color, opacity } => {
+            if let Some(path) = path_of(outline) {
                 page.fill_path(&path, &paint(*color, *opacity), FillRule::Winding, at_rest, None);
             }
         }
@@ -99,15 +101,15 @@ fn draw(page: &mut Pixmap, canvas: &Canvas<'_>, item: &Item) {
             }
         }
         Item::Text { text, at, em, align, color } => {
-            let (glyphs, width) = canvas.typeface.set(text, *em);
+            let typeface = Typeface::of_figures();
+            let (glyphs, width) = typeface.set(text, *em);
             let (origin, direction) = beginning(*at, width, *align);
-            let mut outlines =
-                Outlines { path: PathBuilder::new(), origin, direction, glyph: None, units: 1.0 };
-            outlines.units = f64::from(canvas.typeface.face().units_per_em());
+            let units = f64::from(typeface.face().units_per_em());
+            let mut outlines = Outlines { path: PathBuilder::new(), origin, direction, glyph: None, units };
             for glyph in glyphs {
                 outlines.glyph = Some(glyph);
                 // A space has no outline.
-                let _ = canvas.typeface.face().outline_glyph(GlyphId(glyph.id), &mut outlines);
+                let _ = typeface.face().outline_glyph(GlyphId(glyph.id), &mut outlines);
             }
             if let Some(path) = outlines.path.finish() {
                 page.fill_path(&path, &paint(*color, 1.0), FillRule::Winding, at_rest, None);
@@ -115,16 +117,9 @@ fn draw(page: &mut Pixmap, canvas: &Canvas<'_>, item: &Item) {
         }
         Item::Image { rect, bitmap } => {
             let [columns, rows] = bitmap.size;
-            let (width, height) = (rect.right - rect.left, rect.bottom - rect.top);
-            let scale = (width / columns as f64, height / rows as f64);
-            let place = Transform::from_row(
-                scale.0 as f32,
-                0.0,
-                0.0,
-                scale.1 as f32,
-                rect.left as f32,
-                rect.top as f32,
-            );
+            let scale = [(rect.right - rect.left) / columns as f64, (rect.bottom - rect.top) / rows as f64];
+            let [sx, sy, left, top] = [scale[0], scale[1], rect.left, rect.top].map(|v| v as f32);
+            let place = Transform::from_row(sx, 0.0, 0.0, sy, left, top);
             let quality = if bitmap.is_smooth { FilterQuality::Bilinear } else { FilterQuality::Nearest };
             let paint = PixmapPaint { quality, ..PixmapPaint::default() };
             if let Some(pixels) = premultiplied(bitmap) {
@@ -146,16 +141,16 @@ fn premultiplied(bitmap: &Bitmap) -> Option<Pixmap> {
     Pixmap::from_vec(data, IntSize::from_wh(columns, rows)?)
 }
 
-fn outline(shape: &Shaped) -> Option<Path> {
-    match shape {
-        Shaped::Rect(Rect { left, top, right, bottom }) => {
+fn path_of(outline: &Outline) -> Option<Path> {
+    match outline {
+        Outline::Rect(Rect { left, top, right, bottom }) => {
             let [left, top, right, bottom] = [left, top, right, bottom].map(|v| *v as f32);
             Some(PathBuilder::from_rect(SkiaRect::from_ltrb(left, top, right, bottom)?))
         }
-        Shaped::Circle { center, radius } => {
+        Outline::Circle { center, radius } => {
             PathBuilder::from_circle(center.0 as f32, center.1 as f32, *radius as f32)
         }
-        Shaped::Polygon(corners) => polyline(corners, true),
+        Outline::Polygon(corners) => polyline(corners, true),
     }
 }
 
@@ -170,11 +165,11 @@ fn polyline(points: &[Point], is_closed: bool) -> Option<Path> {
     path.finish()
 }
 
-/// Takes outlines of glyphs to their places on the canvas.
+/// Builds a path of glyph outlines, moved to their positions on the canvas.
 struct Outlines {
     path: PathBuilder,
     origin: Point,
-    /// In which the text runs; up is a quarter turn from it.
+    /// Direction of the text.
     direction: Point,
     glyph: Option<Glyph>,
     units: f64,

@@ -1,67 +1,69 @@
-//! Pictures as SVG: text stays text, maps are embedded with one pixel per cell.
+//! Pictures as SVG. Text stays text; maps are embedded with one pixel per cell.
 
-use std::fmt::{self, Write};
+use std::io::{self, Write};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::show::drawing::canvas::{Item, Shaped};
+use crate::show::color::{Color, hex};
+use crate::show::drawing::canvas::{Canvas, Item, Outline};
+use crate::show::drawing::png;
+use crate::show::drawing::shapes::{Align, Point, Rect};
+use crate::show::drawing::style::{DASH, PER_INCH};
 use crate::show::drawing::typeface::runs;
-use crate::show::drawing::{Align, Canvas, DASH, PER_INCH, Point, RGBColor, Rect, png};
-use crate::show::error::DrawError;
+use crate::show::error::WriteError;
 
-/// The typeface that figures are laid out for, then common ones about as wide.
+/// The typeface that determines the layout, then common typefaces of about the same width.
 const FAMILIES: &str = "Ubuntu, 'Ubuntu Sans', 'Open Sans', 'Helvetica Neue', Arial, sans-serif";
 
-/// The file's text.
-pub(crate) fn encoded(canvas: &Canvas<'_>) -> Result<String, DrawError> {
-    let (width, height) = canvas.size;
-    let [inches_wide, inches_high] = [width, height].map(|side| Number(side / PER_INCH));
-    let mut svg = String::new();
+/// Writes the picture.
+pub(crate) fn write(svg: &mut impl Write, canvas: &Canvas) -> Result<(), WriteError> {
+    let (width, height) = canvas.size();
     let page = Rect { left: 0.0, top: 0.0, right: width, bottom: height };
-    write!(
+    writeln!(
         svg,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{inches_wide}in\" height=\"{inches_high}in\" \
-         viewBox=\"0 0 {} {}\" font-family=\"{FAMILIES}\" font-weight=\"300\" stroke-linecap=\"round\" \
-         stroke-linejoin=\"round\">\n<rect{} fill=\"#ffffff\"/>\n",
-        Number(width),
-        Number(height),
-        Place(page),
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}in\" height=\"{}in\" viewBox=\"0 0 {} {}\" \
+         font-family=\"{FAMILIES}\" font-weight=\"300\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n\
+         <rect{} fill=\"#ffffff\"/>",
+        rounded(width / PER_INCH),
+        rounded(height / PER_INCH),
+        rounded(width),
+        rounded(height),
+        place(page),
     )?;
     for item in canvas.items.borrow().iter() {
-        draw(&mut svg, item)?;
+        draw(svg, item)?;
     }
-    svg.push_str("</svg>\n");
-    Ok(svg)
+    Ok(writeln!(svg, "</svg>")?)
 }
 
-fn draw(svg: &mut String, item: &Item) -> Result<(), DrawError> {
+fn draw(svg: &mut impl Write, item: &Item) -> Result<(), WriteError> {
     match item {
-        Item::Area { shape, color, opacity } => {
-            match shape {
-                Shaped::Rect(rect) => write!(svg, "<rect{}", Place(*rect))?,
-                Shaped::Circle { center, radius } => {
-                    let [x, y, r] = [center.0, center.1, *radius].map(Number);
+        Item::Area { outline, color, opacity } => {
+            match outline {
+                Outline::Rect(rect) => write!(svg, "<rect{}", place(*rect))?,
+                Outline::Circle { center, radius } => {
+                    let [x, y, r] = [center.0, center.1, *radius].map(rounded);
                     write!(svg, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\"")?;
                 }
-                Shaped::Polygon(corners) => write!(svg, "<polygon points=\"{}\"", Points(corners))?,
+                Outline::Polygon(corners) => write!(svg, "<polygon points=\"{}\"", points(corners))?,
             }
-            write!(svg, " fill=\"{}\"", Hex(*color))?;
-            if *opacity < 1.0 {
-                write!(svg, " fill-opacity=\"{}\"", Number(*opacity))?;
-            }
-            svg.push_str("/>\n");
+            let opacity = match *opacity {
+                opacity if opacity < 1.0 => format!(" fill-opacity=\"{}\"", rounded(opacity)),
+                _ => String::new(),
+            };
+            writeln!(svg, " fill=\"#{}\"{opacity}/>", hex(*color))?;
         }
         Item::Line { path, width, color, is_dashed } => {
-            let (points, color, width) = (Points(path), Hex(*color), Number(*width));
-            write!(
+            let dashes = match is_dashed {
+                true => format!(" stroke-dasharray=\"{}\"", rounded(DASH)),
+                false => String::new(),
+            };
+            let (points, color, width) = (points(path), hex(*color), rounded(*width));
+            writeln!(
                 svg,
-                "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\""
+                "<polyline points=\"{points}\" fill=\"none\" stroke=\"#{color}\" stroke-width=\"{width}\"{dashes}/>"
             )?;
-            if *is_dashed {
-                write!(svg, " stroke-dasharray=\"{}\"", Number(DASH))?;
-            }
-            svg.push_str("/>\n");
         }
         Item::Text { text, at, em, align, color } => write_text(svg, text, (*at, *em, *align), *color)?,
         Item::Image { rect, bitmap } => {
@@ -70,8 +72,7 @@ fn draw(svg: &mut String, item: &Item) -> Result<(), DrawError> {
             } else {
                 " image-rendering=\"optimizeSpeed\" style=\"image-rendering:pixelated\""
             };
-            let data = STANDARD.encode(png::bitmap(bitmap)?);
-            let place = Place(*rect);
+            let (place, data) = (place(*rect), STANDARD.encode(png::bitmap(bitmap)?));
             writeln!(
                 svg,
                 "<image{place} preserveAspectRatio=\"none\"{rendering} href=\"data:image/png;base64,{data}\"/>"
@@ -82,96 +83,58 @@ fn draw(svg: &mut String, item: &Item) -> Result<(), DrawError> {
 }
 
 fn write_text(
-    svg: &mut String,
+    svg: &mut impl Write,
     text: &str,
     (at, em, align): (Point, f64, Align),
-    color: RGBColor,
-) -> fmt::Result {
-    let [x, y] = [at.0, at.1].map(Number);
-    write!(svg, "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"", Number(em), Hex(color))?;
-    match align {
-        Align::Left => {}
-        Align::Center => svg.push_str(" text-anchor=\"middle\""),
-        Align::Right => svg.push_str(" text-anchor=\"end\""),
-        Align::Upwards => write!(svg, " text-anchor=\"middle\" transform=\"rotate(-90 {x} {y})\"")?,
-    }
-    svg.push_str(" xml:space=\"preserve\">");
+    color: Color,
+) -> io::Result<()> {
+    let [x, y] = [at.0, at.1].map(rounded);
+    let anchor = match align {
+        Align::Left => String::new(),
+        Align::Center => " text-anchor=\"middle\"".to_owned(),
+        Align::Right => " text-anchor=\"end\"".to_owned(),
+        Align::Upwards => format!(" text-anchor=\"middle\" transform=\"rotate(-90 {x} {y})\""),
+    };
+    let (size, color) = (rounded(em), hex(color));
+    write!(
+        svg,
+        "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"#{color}\"{anchor} xml:space=\"preserve\">"
+    )?;
     let mut height = 0.0;
     for run in runs(text) {
         let (scale, raise) = run.place();
-        let text = Escaped(&run.text);
-        // The shift counts from where the run before has left the line.
+        let text = escaped(&run.text);
+        // The shift is relative to the previous run.
         if scale == 1.0 && height == 0.0 {
             write!(svg, "{text}")?;
         } else {
-            let (shift, size) = (Number((height - raise) * em), Number(scale * em));
+            let (shift, size) = (rounded((height - raise) * em), rounded(scale * em));
             write!(svg, "<tspan dy=\"{shift}\" font-size=\"{size}\">{text}</tspan>")?;
         }
         height = raise;
     }
-    svg.push_str("</text>\n");
-    Ok(())
+    writeln!(svg, "</text>")
 }
 
-/// With two decimals at most.
-struct Number(f64);
-
-impl fmt::Display for Number {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rounded = (self.0 * 100.0).round() / 100.0;
-        // Zero has no sign.
-        write!(f, "{}", if rounded == 0.0 { 0.0 } else { rounded })
-    }
+/// Rounds to two decimals. Zero becomes positive, because a negative zero would have a sign.
+fn rounded(value: f64) -> f64 {
+    (value * 100.0).round() / 100.0 + 0.0
 }
 
-/// A colour.
-struct Hex(RGBColor);
-
-impl fmt::Display for Hex {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let RGBColor(r, g, b) = self.0;
-        write!(f, "#{r:02x}{g:02x}{b:02x}")
-    }
+fn points(points: &[Point]) -> String {
+    let texts: Vec<String> = points.iter().map(|(x, y)| format!("{},{}", rounded(*x), rounded(*y))).collect();
+    texts.join(" ")
 }
 
-/// A list of points.
-struct Points<'p>(&'p [Point]);
-
-impl fmt::Display for Points<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, (x, y)) in self.0.iter().enumerate() {
-            let before = if i == 0 { "" } else { " " };
-            write!(f, "{before}{},{}", Number(*x), Number(*y))?;
-        }
-        Ok(())
-    }
+/// Returns the attributes of a rectangle.
+fn place(Rect { left, top, right, bottom }: Rect) -> String {
+    let [x, y, width, height] = [left, top, right - left, bottom - top].map(rounded);
+    format!(" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"")
 }
 
-/// Attributes of a rectangle.
-struct Place(Rect);
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Rect { left, top, right, bottom } = self.0;
-        let [x, y, width, height] = [left, top, right - left, bottom - top].map(Number);
-        write!(f, " x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"")
-    }
-}
-
-/// Text between tags; XML knows no control characters.
-struct Escaped<'t>(&'t str);
-
-impl fmt::Display for Escaped<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for sign in self.0.chars() {
-            match sign {
-                '&' => f.write_str("&amp;")?,
-                '<' => f.write_str("&lt;")?,
-                '>' => f.write_str("&gt;")?,
-                _ if sign.is_control() || matches!(sign, '\u{fffe}' | '\u{ffff}') => f.write_char(' ')?,
-                _ => f.write_char(sign)?,
-            }
-        }
-        Ok(())
-    }
+/// Escapes text between tags. Control characters, which XML does not allow, become spaces.
+fn escaped(text: &str) -> String {
+    let is_allowed = |sign: char| !sign.is_control() && !matches!(sign, '\u{fffe}' | '\u{ffff}');
+    let text: String = text.chars().map(|sign| if is_allowed(sign) { sign } else { ' ' }).collect();
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -1,35 +1,35 @@
-//! Which values an axis marks, and how they are written.
+//! Ticks of an axis: which values are marked, and their labels.
 
-use crate::show::drawing::axes::{Axis, Scale};
+use crate::show::drawing::axis::{Axis, Scale};
+use crate::show::symbols::{number, superscript};
 
-/// A marked place of an axis.
+/// A mark on an axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Tick {
-    /// On the axis, in its own scale.
+    /// Position on the axis' scale.
     pub(crate) at: f64,
-    /// What is written there; empty for a minor tick.
+    /// Label; empty for a minor tick.
     pub(crate) label: String,
 }
 
-/// The ticks of an axis `length` pixels long, one to `apart` pixels at most where there is a choice.
-pub(crate) fn ticks(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
+/// Returns the ticks of an axis of `length` pixels, with labels at least `spacing` pixels apart where possible.
+pub(crate) fn ticks(axis: &Axis, length: f64, spacing: f64) -> Vec<Tick> {
     match axis.scale {
-        Scale::Linear => linear(axis, length / apart),
-        Scale::Logarithmic => logarithmic(axis, length, apart),
-        Scale::Listed => listed(axis, length, apart),
+        Scale::Linear => linear(axis, length / spacing),
+        Scale::Logarithmic => logarithmic(axis, length, spacing),
+        Scale::Listed => listed(axis, length, spacing),
     }
 }
 
-/// Every so many listed values, the first among them.
-fn listed(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
+/// Returns every n-th listed value, beginning with the first.
+fn listed(axis: &Axis, length: f64, spacing: f64) -> Vec<Tick> {
     let room = length / (axis.high - axis.low);
-    let step = (apart / room).ceil().max(1.0) as usize;
+    let step = (spacing / room).ceil().max(1.0) as usize;
     let each = axis.listed.iter().enumerate().step_by(step);
-    let written = |value: &f64| value.to_string().replace('-', "\u{2212}");
-    each.map(|(i, value)| Tick { at: i as f64, label: written(value) }).collect()
+    each.map(|(i, value)| Tick { at: i as f64, label: number(*value) }).collect()
 }
 
-/// At most `most` round values.
+/// Returns at most `most` round values.
 fn linear(axis: &Axis, most: f64) -> Vec<Tick> {
     let rough = (axis.high - axis.low) / most.max(1.0);
     let decade = 10f64.powf(rough.log10().floor());
@@ -47,16 +47,16 @@ fn linear(axis: &Axis, most: f64) -> Vec<Tick> {
         .collect()
 }
 
-/// With the typographic minus.
+/// Formats a decimal with the typographic minus.
 fn decimal(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
     text.trim_start_matches(if zero { "-" } else { "" }).replace('-', "\u{2212}")
 }
 
-/// As `4\u{b7}10\u{207b}\u{2077}`, with as many digits as a step shows.
+/// Formats a number like `4\u{b7}10\u{207b}\u{2077}`, with the digits that distinguish values one `step` apart.
 fn scientific(value: f64, step: f64) -> String {
-    // What is far less than a step is zero that was rounded.
+    // A value far smaller than the step is a rounding error of zero.
     if value.abs() < 1e-3 * step {
         return "0".to_owned();
     }
@@ -68,37 +68,37 @@ fn scientific(value: f64, step: f64) -> String {
     format!("{part}\u{b7}10{raised}").replace('-', "\u{2212}")
 }
 
-/// The least of a decade's ticks that is worth drawing, in pixels from the next.
-const MINOR_APART: f64 = 4.0;
-/// Plain numbers are written for values within these powers of ten.
+/// Least distance of minor ticks in pixels.
+const MINOR_SPACING: f64 = 4.0;
+/// Labels within these powers of ten are plain numbers.
 const PLAIN: (f64, f64) = (-3.0, 4.0);
 
-/// Powers of ten with minor ticks between them; where there is room twice and five times as much, too; round values where
-/// the axis is too short for either.
-fn logarithmic(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
+/// Returns powers of ten with minor ticks between them, and where there is room also 2 and 5 times these powers. An axis
+/// that is too short for two such labels has round values instead.
+fn logarithmic(axis: &Axis, length: f64, spacing: f64) -> Vec<Tick> {
     let Axis { low, high, .. } = *axis;
     let decade = length / (high - low);
-    let named: &[u32] = if decade * 2f64.log10() >= apart { &[1, 2, 5] } else { &[1] };
-    // Every so many decades.
-    let step = (apart / decade).ceil().max(1.0) as i32;
-    // By the outermost decades that are named: an axis reaches a little beyond its values.
+    let named: &[u32] = if decade * 2f64.log10() >= spacing { &[1, 2, 5] } else { &[1] };
+    // Number of decades from one label to the next.
+    let step = (spacing / decade).ceil().max(1.0) as i32;
+    // An axis extends a little beyond its values, so only whole decades count.
     let is_plain = (low - 1e-9).ceil() >= PLAIN.0 && (high + 1e-9).floor() <= PLAIN.1;
     let is_named = move |part: u32, power: i32| named.contains(&part) && power.rem_euclid(step) == 0;
-    let is_shown = move |part: u32| match part {
+    let is_marked = move |part: u32| match part {
         1 => true,
-        // The narrowest interval is that from 9 to 10.
-        _ => step == 1 && decade * (10f64 / 9.0).log10() >= MINOR_APART,
+        // The narrowest interval is from 9 to 10.
+        _ => step == 1 && decade * (10f64 / 9.0).log10() >= MINOR_SPACING,
     };
     let tick = |power: i32, part: u32| Tick {
         at: f64::from(power) + f64::from(part).log10(),
         label: if is_named(part, power) { power_label(part, power, is_plain) } else { String::new() },
     };
-    // An axis of absurd length would have no end of decades.
+    // Limits the number of ticks of an extremely long axis.
     let powers = (low.floor().max(-400.0) as i32)..=(high.ceil().min(400.0) as i32);
     let ticks: Vec<Tick> = powers
         .flat_map(|power| {
             (1..10)
-                .filter(move |&part| is_shown(part) || is_named(part, power))
+                .filter(move |&part| is_marked(part) || is_named(part, power))
                 .map(move |part| (power, part))
         })
         .map(|(power, part)| tick(power, part))
@@ -107,16 +107,16 @@ fn logarithmic(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
     if ticks.iter().filter(|tick| !tick.label.is_empty()).count() >= 2 {
         ticks
     } else {
-        round(axis, length, apart)
+        round(axis, length, spacing)
     }
 }
 
-/// Round values on a logarithmic axis of less than a decade or so, which lie closest at its upper end.
-fn round(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
+/// Returns round values on a logarithmic axis of about a decade or less.
+fn round(axis: &Axis, length: f64, spacing: f64) -> Vec<Tick> {
     let [low, high] = [axis.low, axis.high].map(|power| 10f64.powf(power));
     let values = Axis { scale: Scale::Linear, ..Axis::exact("", low, high) };
     let pixels = length / (axis.high - axis.low);
-    let mut most = length / apart;
+    let mut most = length / spacing;
     loop {
         let ticks: Vec<Tick> = linear(&values, most)
             .into_iter()
@@ -125,14 +125,14 @@ fn round(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
             .collect();
         let closest =
             ticks.windows(2).map(|pair| (pair[1].at - pair[0].at) * pixels).fold(f64::MAX, f64::min);
-        if closest >= 0.75 * apart || most < 2.0 {
+        if closest >= 0.75 * spacing || most < 2.0 {
             return ticks;
         }
         most *= 0.7;
     }
 }
 
-/// `part` times a power of ten: as a plain number, or with the exponent raised.
+/// Formats `part` times a power of ten, as a plain number or with a superscript.
 fn power_label(part: u32, power: i32, is_plain: bool) -> String {
     if is_plain {
         let decimals = (-power).max(0) as usize;
@@ -140,17 +140,6 @@ fn power_label(part: u32, power: i32, is_plain: bool) -> String {
     }
     let raised: String = power.to_string().chars().map(superscript).collect();
     if part == 1 { format!("10{raised}") } else { format!("{part}\u{b7}10{raised}") }
-}
-
-/// A digit or minus above the line.
-pub(crate) fn superscript(sign: char) -> char {
-    match sign {
-        '-' | '\u{2212}' => '\u{207b}',
-        '1' => '\u{b9}',
-        '2' => '\u{b2}',
-        '3' => '\u{b3}',
-        _ => sign.to_digit(10).and_then(|digit| char::from_u32(0x2070 + digit)).unwrap_or(sign),
-    }
 }
 
 #[cfg(test)]
@@ -162,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_are_round_and_written_with_a_true_minus() {
+    fn ticks_are_round_and_have_a_typographic_minus() {
         let labels = |low, high, most| labels(&Axis::exact("", low, high), most);
         assert_eq!(labels(-1.02, 1.02, 5.0), ["\u{2212}1.0", "\u{2212}0.5", "0.0", "0.5", "1.0"]);
         assert_eq!(labels(0.0, 0.031, 4.0), ["0.00", "0.01", "0.02", "0.03"]);
@@ -188,18 +177,18 @@ mod tests {
     }
 
     fn log_axis(low: f64, high: f64) -> Axis {
-        Axis::logarithmic("", low, high)
+        Axis::logarithmic("", [low, high], 0.0)
     }
 
-    /// Labels of a logarithmic axis and the number of its minor ticks.
-    fn log_labels(low: f64, high: f64, length: f64, apart: f64) -> (Vec<String>, usize) {
-        let ticks = ticks(&log_axis(low, high), length, apart);
+    /// Returns the labels of a logarithmic axis and the number of its minor ticks.
+    fn log_labels(low: f64, high: f64, length: f64, spacing: f64) -> (Vec<String>, usize) {
+        let ticks = ticks(&log_axis(low, high), length, spacing);
         let minor = ticks.iter().filter(|tick| tick.label.is_empty()).count();
         (ticks.into_iter().map(|tick| tick.label).filter(|label| !label.is_empty()).collect(), minor)
     }
 
     #[test]
-    fn logarithmic_ticks_are_decades_with_minor_ticks_and_parts_where_there_is_room() {
+    fn logarithmic_axes_mark_decades_with_minor_ticks_and_label_2_and_5_where_there_is_room() {
         let plain = |labels: &[&str]| labels.iter().map(|&label| label.to_owned()).collect::<Vec<_>>();
         // 200 pixels to a decade: no room for 2 and 5, each 60 or more from the next.
         assert_eq!(log_labels(10.0, 1000.0, 400.0, 90.0), (plain(&["10", "100", "1000"]), 16));
@@ -220,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn short_logarithmic_axes_have_round_values_that_do_not_crowd() {
+    fn short_logarithmic_axes_have_round_values_with_enough_room() {
         assert_eq!(log_labels(900.0, 1100.0, 500.0, 90.0).0, ["900", "950", "1000", "1050", "1100"]);
         for (low, high) in [(150.0, 450.0), (2.0, 9.0), (1.1, 1.9), (7e7, 7.1e7), (3e-9, 4e-9)] {
             let axis = log_axis(low, high);
@@ -238,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn listed_values_are_written_as_they_are_and_left_out_where_there_is_no_room() {
+    fn listed_values_have_unrounded_labels_and_are_skipped_where_there_is_no_room() {
         let axis = Axis::listed("", [0.1, 0.25, 1.0, 40.0, 1e5].into_iter());
         assert_eq!(labels(&axis, 500.0), ["0.1", "0.25", "1", "40", "100000"]);
         let few: Vec<(f64, String)> =
@@ -247,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn extreme_axes_do_not_fill_with_ticks() {
+    fn the_number_of_ticks_of_extreme_axes_is_limited() {
         for (low, high) in [(1e300, -1e300), (-1e300, 1e300), (1e-12, 1.1e-12), (0.0, 0.0)] {
             assert!(ticks(&Axis::exact("", low, high), 8.0, 1.0).len() <= 101, "{low} {high}");
             let logarithmic = Axis { scale: Scale::Logarithmic, ..Axis::exact("", low, high) };

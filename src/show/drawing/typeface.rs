@@ -1,37 +1,39 @@
-//! The typeface of figures: widths and outlines of its glyphs, and how raised digits are set.
+//! The typeface of figures: widths and outlines of its glyphs, and the layout of superscripts.
 
 use std::sync::LazyLock;
 
 use epaint_default_fonts::UBUNTU_LIGHT;
 use ttf_parser::{Face, GlyphId};
 
-use crate::show::drawing::{Align, Point};
+use crate::show::drawing::shapes::{Align, Point};
+use crate::show::symbols::lowered;
 
-/// The size and place of what is raised, over those of the line.
+/// Size and height of superscripts, as shares of the line's type size.
 const RAISED: (f64, f64) = (0.7, 0.36);
 
-/// A typeface and its measures.
+/// A parsed typeface.
 #[derive(Debug)]
 pub(crate) struct Typeface {
     face: Face<'static>,
-    /// Units of the face to an em.
+    /// Units of the typeface per em.
     units: f64,
 }
 
-/// A glyph in its place.
+/// A glyph and its position.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Glyph {
     pub(crate) id: u16,
-    /// The character that it shows.
+    /// Character that it represents.
     pub(crate) sign: char,
-    /// From the line's beginning, in pixels.
+    /// Distance from the beginning of the line, in pixels.
     pub(crate) along: f64,
-    /// Above the baseline.
+    /// Height above the baseline.
     pub(crate) raise: f64,
+    /// Type size.
     pub(crate) em: f64,
 }
 
-/// A stretch of text, on the line or raised.
+/// Consecutive characters that are all on the line or all superscripts.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Run {
     pub(crate) text: String,
@@ -39,15 +41,14 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    /// Its size and how far it is raised, over the size of the line.
+    /// Returns size and height as shares of the line's type size.
     pub(crate) fn place(&self) -> (f64, f64) {
         if self.is_raised { RAISED } else { (1.0, 0.0) }
     }
 }
 
-/// Splits a text; what is raised has ordinary digits and minus.
-///
-/// The typeface has no raised minus, and raised digits of its own are higher than those of the line made smaller.
+/// Splits a text into runs. Superscripts are replaced by ordinary digits and minus, to be drawn smaller: the typeface has
+/// no raised minus, and its raised digits are higher.
 pub(crate) fn runs(text: &str) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     for sign in text.chars() {
@@ -61,61 +62,50 @@ pub(crate) fn runs(text: &str) -> Vec<Run> {
     runs
 }
 
-fn lowered(sign: char) -> Option<char> {
-    match sign {
-        '\u{207b}' => Some('\u{2212}'),
-        '\u{b9}' => Some('1'),
-        '\u{b2}' => Some('2'),
-        '\u{b3}' => Some('3'),
-        '\u{2070}' | '\u{2074}'..='\u{2079}' => char::from_digit(sign as u32 - 0x2070, 10),
-        _ => None,
-    }
-}
-
 impl Typeface {
-    /// That of all figures.
+    /// Returns the typeface of all figures.
     pub(crate) fn of_figures() -> &'static Typeface {
         static FACE: LazyLock<Typeface> = LazyLock::new(|| {
-            // Cannot fail: the bytes are compiled in and every test of a figure draws with them.
-            let face = Face::parse(UBUNTU_LIGHT, 0).expect("the typeface that is compiled in");
+            let face = Face::parse(UBUNTU_LIGHT, 0).expect("the bytes of the typeface are compiled in");
             let units = f64::from(face.units_per_em());
             Typeface { face, units }
         });
         &FACE
     }
 
-    /// The file that it comes from.
-    pub(crate) fn bytes(&self) -> &'static [u8] {
+    /// Returns the typeface's file.
+    pub(crate) fn bytes() -> &'static [u8] {
         UBUNTU_LIGHT
     }
 
+    /// Returns the parsed file.
     pub(crate) fn face(&self) -> &Face<'static> {
         &self.face
     }
 
-    /// The em of type whose lines are `size` high, from the lowest descender to the highest ascender.
+    /// Returns the em of type whose lines have height `size`, from the lowest descender to the highest ascender.
     pub(crate) fn em(&self, size: f64) -> f64 {
         size * self.units / f64::from(self.face.ascender() - self.face.descender())
     }
 
-    /// Of capitals and digits.
+    /// Returns the height of capitals and digits.
     pub(crate) fn cap_height(&self, em: f64) -> f64 {
         f64::from(self.face.capital_height().unwrap_or(0)) / self.units * em
     }
 
-    /// How far a glyph moves on, in ems.
+    /// Returns the width of a glyph in ems.
     pub(crate) fn advance(&self, id: u16) -> f64 {
         f64::from(self.face.glyph_hor_advance(GlyphId(id)).unwrap_or(0)) / self.units
     }
 
-    /// The glyphs of a text and its width.
+    /// Returns the glyphs of a text and its width.
     pub(crate) fn set(&self, text: &str, em: f64) -> (Vec<Glyph>, f64) {
         let mut glyphs = Vec::with_capacity(text.len());
         let mut along = 0.0;
         for run in runs(text) {
             let (scale, raise) = run.place();
             for sign in run.text.chars() {
-                // Without one it is the face's box for what it does not know.
+                // Glyph 0 is a box; it represents unknown characters.
                 let id = self.face.glyph_index(sign).map_or(0, |id| id.0);
                 glyphs.push(Glyph { id, sign, along, raise: raise * em, em: scale * em });
                 along += self.advance(id) * scale * em;
@@ -125,7 +115,7 @@ impl Typeface {
     }
 }
 
-/// Where a text of some width begins on the canvas, and the direction in which it runs.
+/// Returns the beginning of a text of the given width, and its direction.
 pub(crate) fn beginning(at: Point, width: f64, align: Align) -> (Point, Point) {
     match align {
         Align::Left => (at, (1.0, 0.0)),
@@ -140,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn raised_digits_are_ordinary_ones_made_smaller() {
+    fn superscripts_are_ordinary_digits_in_smaller_type() {
         let run = |text: &str, is_raised| Run { text: text.to_owned(), is_raised };
         assert_eq!(
             runs("2\u{b7}10\u{207b}\u{b9}\u{2076} s"),
@@ -151,9 +141,8 @@ mod tests {
         assert!(raised < plain && raised > face.set("10", 10.0).1);
     }
 
-    /// A figure must not show the box that stands for what a typeface does not know.
     #[test]
-    fn the_typeface_has_every_sign_of_figures() {
+    fn the_typeface_has_every_character_of_figures() {
         let face = Typeface::of_figures();
         let signs = "\u{3c9}\u{3bb}\u{2212}\u{b7}\u{d7}\u{b1}\u{2026}\u{2264}\u{2265}\u{2080}\u{2081}\u{2082}\u{2089}\u{207b}\u{2074}";
         assert!(face.set(signs, 10.0).0.iter().all(|glyph| glyph.id != 0), "{:?}", face.set(signs, 10.0).0);

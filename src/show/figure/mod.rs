@@ -3,4 +3,5 @@
 pub mod bifurcation;
 pub mod compare;
 pub mod map;
+mod map_layout;
 pub mod orbit;

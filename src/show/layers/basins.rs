@@ -1,58 +1,57 @@
-//! To which attractor each start leads.
+//! The main layer of a map of basins: the attractor that each start leads to.
 
 use crate::findings::attractors::{Basins, NONE};
-use crate::show::layers::colors::{self, NO_VALUE, SYMMETRIC, UNDECIDED};
-use crate::show::layers::{Color, Entry, Layer};
-use crate::show::table::attractors_csv::named;
+use crate::show::color::Color;
+use crate::show::layers::colors::{self, CHAOTIC, NO_VALUE, SYMMETRIC, UNDECIDED};
+use crate::show::layers::layer::{Layer, NamedColor, legend};
+use crate::show::table::attractors_csv::attractor_name;
 use rattlemap_dynamics::orbit::Class;
 
-/// Attractors that have a colour, and a name in the legend, of their own.
-const COLORED: usize = 63;
-const NAMED: usize = 20;
+/// Numbers of attractors with a colour of their own, and with an entry of their own in the legend.
+const COLORED_ATTRACTORS: usize = 63;
+const LISTED_ATTRACTORS: usize = 20;
 
-/// Places in the palette.
-const REST: u8 = COLORED as u8;
-const CHAOS: u8 = REST + 1;
-const UNKNOWN: u8 = CHAOS + 1;
+/// Indices into the palette after those of the coloured attractors.
+const OTHER_INDEX: u8 = COLORED_ATTRACTORS as u8;
+const CHAOS_INDEX: u8 = OTHER_INDEX + 1;
+const UNKNOWN_INDEX: u8 = CHAOS_INDEX + 1;
 
-/// As dark as in the map of classes.
-const CHAOTIC: Color = [0x2a, 0x2a, 0x2a];
-
+/// Returns the layer.
 pub(crate) fn layer(basins: &Basins) -> Layer {
     let list = basins.attractors();
-    let place = |label: usize| match list[label].class {
-        Class::Chaotic => CHAOS,
-        _ => label.min(COLORED) as u8,
+    let index = |label: usize| match list[label].class {
+        Class::Chaotic => CHAOS_INDEX,
+        _ => label.min(COLORED_ATTRACTORS) as u8,
     };
-    let index = |&label: &u16| if label == NONE { UNKNOWN } else { place(usize::from(label)) };
-    let indices: Vec<u8> = basins.labels().iter().map(index).collect();
-    // The largest basin stays pale.
+    let labels = basins.labels();
+    let index_of_cell = |&label: &u16| if label == NONE { UNKNOWN_INDEX } else { index(label.into()) };
+    // The largest basin has a pale colour.
     let palette: Vec<Color> = std::iter::once(SYMMETRIC)
-        .chain((1..COLORED).map(colors::distinct))
+        .chain((1..COLORED_ATTRACTORS).map(colors::distinct))
         .chain([NO_VALUE, CHAOTIC, UNDECIDED])
         .collect();
-    let entry = |(label, attractor): (usize, &_)| Entry {
-        color: palette[usize::from(place(label))],
-        text: named(label, attractor),
+    let color = |label: usize| palette[usize::from(index(label))];
+    let entry = |(label, attractor): (usize, &_)| NamedColor {
+        color: color(label),
+        text: attractor_name(label, attractor),
         cells: attractor.cells,
     };
-    let mut entries: Vec<Entry> = list.iter().enumerate().take(NAMED).map(entry).collect();
-    let rest = &list[list.len().min(NAMED)..];
+    let mut entries: Vec<NamedColor> = list.iter().enumerate().take(LISTED_ATTRACTORS).map(entry).collect();
+    let rest = &list[entries.len()..];
     if !rest.is_empty() {
         let cells = rest.iter().map(|attractor| attractor.cells).sum();
-        let color = palette[usize::from(place(NAMED))];
-        entries.push(Entry { color, text: format!("{} more attractors", rest.len()), cells });
+        let text = format!("{} more attractors", rest.len());
+        entries.push(NamedColor { color: color(LISTED_ATTRACTORS), text, cells });
     }
-    let unknown = basins.labels().iter().filter(|&&label| label == NONE).count();
-    entries.push(Entry { color: UNDECIDED, text: "undecided or failed".to_owned(), cells: unknown });
-    entries.retain(|entry| entry.cells > 0);
+    let cells = labels.iter().filter(|&&label| label == NONE).count();
+    entries.push(NamedColor { color: UNDECIDED, text: "undecided or failed".to_owned(), cells });
     Layer {
         name: "map",
         short: "attractor",
         title: "basins of attraction",
-        indices,
+        indices: labels.iter().map(index_of_cell).collect(),
         palette,
-        entries,
+        entries: legend(entries),
         bar: None,
     }
 }

@@ -1,21 +1,20 @@
-//! Colours: one per period, greys for chaos, ramps for numbers.
+//! Palettes: a colour per period, shades of grey for chaos, colour ramps for numbers.
 
-/// Red, green and blue.
-pub(crate) type Color = [u8; 3];
+use crate::show::color::Color;
 
 const fn hex(rgb: u32) -> Color {
     [(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]
 }
 
-/// Period 1 without any contact, its own mirror image, and one of a pair of mirror images.
+/// Period 1 without contact, symmetric, and unsymmetric.
 pub(crate) const NO_CONTACT: Color = hex(0xf7f6f3);
 pub(crate) const SYMMETRIC: Color = hex(0xc9e5fc);
 pub(crate) const UNSYMMETRIC: Color = hex(0x8bb3f5);
-/// Period 1 that is too slow an approach to tell.
+/// Period 1 of unknown symmetry, because the motion converges too slowly.
 pub(crate) const SYMMETRY_UNKNOWN: Color = hex(0x546f90);
 
-/// Colours of things in a row, the first the most common: periods from 2 on, words. Searched for (annealing, then greedily)
-/// so that those near each other in a legend differ for people who see no red or no green, too, which a test measures.
+/// Colours of the items of a list, such as periods from 2 on, or words by frequency. An annealing search chose them so that
+/// neighbours in a legend differ, also for people who cannot see red or green. A test measures the differences.
 #[rustfmt::skip]
 const DISTINCT: [Color; 63] = [
     hex(0xe6a700), hex(0x059d76), hex(0xe26a38), hex(0xf2ea30), hex(0x01569d), hex(0xba7db8), hex(0x8d5d31), hex(0x6fdcae),
@@ -28,49 +27,37 @@ const DISTINCT: [Color; 63] = [
     hex(0x7ba8d7), hex(0x751455), hex(0xe48422), hex(0xa18757), hex(0xaa468c), hex(0x77bca1), hex(0xcd8bb9),
 ];
 
-/// The least and the largest exponent of chaos.
-const CHAOS: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
-/// Meant to catch the eye: they are exceptions.
+/// Chaos in layers that do not show its exponent.
+pub(crate) const CHAOTIC: Color = hex(0x2a2a2a);
+/// The smallest and the largest exponent of chaos.
+const CHAOS_RAMP: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
+/// Exceptions have conspicuous colours.
 pub(crate) const UNDECIDED: Color = hex(0xce44fa);
 pub(crate) const FAILED: Color = hex(0x8d130f);
 /// Cells without a value of a continuous layer.
 pub(crate) const NO_VALUE: Color = hex(0x8f8f8f);
 
-/// Viridis in nine steps.
+/// The colour map Viridis in nine steps.
+#[rustfmt::skip]
 const SEQUENTIAL: [Color; 9] = [
-    hex(0x440154),
-    hex(0x472d7b),
-    hex(0x3b528b),
-    hex(0x2c728e),
-    hex(0x21918c),
-    hex(0x28ae80),
-    hex(0x5ec962),
-    hex(0xaddc30),
-    hex(0xfde725),
+    hex(0x440154), hex(0x472d7b), hex(0x3b528b), hex(0x2c728e), hex(0x21918c),
+    hex(0x28ae80), hex(0x5ec962), hex(0xaddc30), hex(0xfde725),
 ];
 
-/// ColorBrewer's RdBu, blue below zero.
+/// ColorBrewer's palette RdBu, with blue for negative numbers.
+#[rustfmt::skip]
 const DIVERGING: [Color; 11] = [
-    hex(0x053061),
-    hex(0x2166ac),
-    hex(0x4393c3),
-    hex(0x92c5de),
-    hex(0xd1e5f0),
-    hex(0xf7f7f7),
-    hex(0xfddbc7),
-    hex(0xf4a582),
-    hex(0xd6604d),
-    hex(0xb2182b),
-    hex(0x67001f),
+    hex(0x053061), hex(0x2166ac), hex(0x4393c3), hex(0x92c5de), hex(0xd1e5f0), hex(0xf7f7f7),
+    hex(0xfddbc7), hex(0xf4a582), hex(0xd6604d), hex(0xb2182b), hex(0x67001f),
 ];
 
-/// The colour of a period of 2 or more.
+/// Returns the colour of a period of 2 or more.
 pub(crate) fn period(period: u32) -> Color {
     distinct(period as usize - 1)
 }
 
-/// A colour for the `n`th of many things, counted from 1. Beyond those that were searched for: hues a golden angle
-/// apart, in three lightnesses.
+/// Returns the colour of the `n`th item of a list, counted from 1. Beyond the table, hues differ by the golden angle, in
+/// three lightnesses.
 pub(crate) fn distinct(n: usize) -> Color {
     if let Some(color) = n.checked_sub(1).and_then(|place| DISTINCT.get(place)) {
         return *color;
@@ -85,25 +72,25 @@ pub(crate) fn distinct(n: usize) -> Color {
     })
 }
 
-/// The colour of a share, 0 to 1, of what is counted from zero. The root leaves more colours
-/// to small numbers, which are the most.
+/// Returns the colour of a non-negative number, given as a share (0 to 1) of the largest. The square root gives more colours
+/// to small numbers, which are more frequent.
 pub(crate) fn sequential(share: f64) -> Color {
     between(&SEQUENTIAL, share.max(0.0).sqrt())
 }
 
-/// The colour of a number from -1 to 1; zero is white. Positive ones are spread by the root,
-/// for most exponents of chaos are far below the largest.
+/// Returns the colour of a number from -1 to 1. Zero is white. The square root spreads positive numbers, because most
+/// exponents of chaos are far below the largest.
 pub(crate) fn diverging(value: f64) -> Color {
     let spread = if value > 0.0 { value.sqrt() } else { value };
     between(&DIVERGING, 0.5 * (spread + 1.0))
 }
 
-/// The grey of chaos with a share, 0 to 1, of the largest exponent.
+/// Returns the grey of chaos whose exponent is a share (0 to 1) of the largest.
 pub(crate) fn chaos(share: f64) -> Color {
-    between(&CHAOS, share.max(0.0).sqrt())
+    between(&CHAOS_RAMP, share.max(0.0).sqrt())
 }
 
-/// The colour at a share, 0 to 1, of the way along a chain of anchors.
+/// Returns the colour at a share (0 to 1) of a ramp through `anchors`.
 fn between(anchors: &[Color], share: f64) -> Color {
     let place = share.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
     let first = (place as usize).min(anchors.len() - 2);
@@ -116,10 +103,10 @@ fn between(anchors: &[Color], share: f64) -> Color {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::show::color_difference;
+    use crate::show::color_difference::least_difference;
 
     #[test]
-    fn periods_have_colours_of_their_own() {
+    fn periods_have_different_colours() {
         let mut colors: Vec<Color> = (2..=64).map(period).collect();
         colors.extend([NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, FAILED]);
         let count = colors.len();
@@ -128,20 +115,18 @@ mod tests {
         assert_eq!(colors.len(), count);
     }
 
-    /// For all eyes, those without receptors for long (protanopes) or medium (deuteranopes) wavelengths included.
     #[test]
-    fn neighbours_in_a_legend_can_be_told_apart() {
+    fn neighbours_in_a_legend_differ_also_for_colour_blind_people() {
         let least = |pairs: Vec<(Color, Color)>| {
-            pairs.into_iter().map(|(a, b)| (color_difference::least_difference(a, b), a, b)).for_each(
-                |(difference, a, b)| {
-                    assert!(difference >= 10.0, "{a:02x?} {b:02x?}: {difference}");
-                },
-            );
+            for (a, b) in pairs {
+                let difference = least_difference(a, b);
+                assert!(difference >= 10.0, "{a:02x?} {b:02x?}: {difference}");
+            }
         };
         let kinds = [NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN];
         let legend: Vec<Color> = kinds.into_iter().chain((2..=64).map(period)).collect();
-        // What is not on a map is not in its legend. Periods up to 12 may stand beside any other, of longer ones those
-        // that are four apart.
+        // A legend lists only periods that occur. Periods up to 12 may be neighbours of any other, longer ones only of those
+        // that differ by up to 4.
         let usual = kinds.len() + 11;
         let near = |i: usize, j: usize| i < j && (j < usual || j - i <= 4);
         let all = |near: &dyn Fn(usize, usize) -> bool| {
@@ -154,13 +139,13 @@ mod tests {
         let exceptions =
             legend[..usual].iter().copied().chain((0..=20).map(|step| chaos(f64::from(step) / 20.0)));
         least(exceptions.map(|color| (color, FAILED)).collect());
-        // Chaos in legends has the middle of its scale; it follows the periods, at most seventeen of them.
+        // The legend entry of chaos has the middle colour of its ramp. It follows at most 17 periods.
         least(legend[..kinds.len() + 17].iter().map(|color| (*color, chaos(0.5))).collect());
     }
 
     #[test]
     fn ramps_begin_and_end_with_their_anchors() {
-        assert_eq!([0.0, 1.0].map(chaos), CHAOS);
+        assert_eq!([0.0, 1.0].map(chaos), CHAOS_RAMP);
         assert_eq!([-1.0, 0.0, 1.0].map(diverging), [DIVERGING[0], DIVERGING[5], DIVERGING[10]]);
         assert_eq!([0.0, 0.25, 2.0].map(sequential), [SEQUENTIAL[0], SEQUENTIAL[4], SEQUENTIAL[8]]);
     }

@@ -7,13 +7,13 @@ const pen = canvas.getContext("2d");
 const MARGIN = { left: 78, right: 28, top: 10, bottom: 58 };
 
 let values = {};
-// Four numbers per cell where cells follow their neighbours.
+// Start states of cells that follow their neighbours: four numbers per cell.
 let starts = null;
 let layer = 0;
-// What is shown, in cells: the lower left corner and the extent.
+// The visible part of the map, in cells: its lower left corner and its extent.
 let view = { left: 0, bottom: 0, width: columns, height: rows };
-let hovered = null;
-let chosen = null;
+let pointerCell = null;
+let selectedCell = null;
 
 async function unpack({ data, type }) {
   const packed = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
@@ -27,7 +27,7 @@ async function unpack({ data, type }) {
 
 const axisValue = ({ min, max, count, values }, i) =>
   values ? values[i] : i >= count - 1 ? max : Math.min(min + ((max - min) * i) / (count - 1), max);
-// Values of the derived parameters in a cell; each is stored along the axes on which it depends.
+// Names and values of the derived parameters in a cell. Each is stored along the axes that it depends on.
 const derivedValues = ({ i, j }) => map.derived.map(({ parameter, along, values: list }) =>
   [parameter, list?.[(along[1] ? j : 0) * (along[0] ? columns : 1) + (along[0] ? i : 0)]]);
 const panel = () => {
@@ -44,7 +44,7 @@ function cellAt(x, y) {
   return inside && i >= 0 && i < columns && j >= 0 && j < rows ? { i, j } : null;
 }
 
-// Pixel of a place in cells; cell i spans i to i + 1.
+// Returns the pixel of a position in cells. Cell i spans i to i + 1.
 function pixel(i, j) {
   const p = panel();
   return [p.x + ((i - view.left) / view.width) * p.width,
@@ -63,7 +63,7 @@ function ticks(low, high, most) {
   return list;
 }
 
-// Marks of an axis from one place to another, in cells: each with its own place. Cell i has its value at i + 0.5.
+// Returns positions (in cells) and labels of the ticks of an axis. Cell i has its value at i + 0.5.
 function marks(axis, from, extent, most) {
   const { min, max, count, scale, values } = axis;
   if (scale === "linear") {
@@ -71,7 +71,7 @@ function marks(axis, from, extent, most) {
     const value = (place) => min + (place - 0.5) * step;
     return ticks(value(from), value(from + extent), most).map(([at, text]) => [(at - min) / step + 0.5, text]);
   }
-  const written = (value) => String(Number(value.toPrecision(4))).replaceAll("-", "\u2212");
+  const label = (value) => String(Number(value.toPrecision(4))).replaceAll("-", "\u2212");
   const list = [];
   if (scale === "log") {
     const step = Math.log10(max / min) / (count - 1);
@@ -83,19 +83,19 @@ function marks(axis, from, extent, most) {
       if (power % every) continue;
       for (const part of parts) {
         const at = place(part * 10 ** power);
-        if (at >= from && at <= from + extent) list.push([at, written(part * 10 ** power)]);
+        if (at >= from && at <= from + extent) list.push([at, label(part * 10 ** power)]);
       }
     }
     if (list.length > 1) return list;
   }
-  // Listed values, and a part of a logarithmic axis without round ones.
+  // Listed values, or a part of a logarithmic axis without round values.
   const every = Math.max(1, Math.ceil(extent / most));
   const first = Math.max(0, Math.ceil(from - 0.5));
-  const named = [];
+  const cells = [];
   for (let i = Math.ceil(first / every) * every; i < count && i + 0.5 <= from + extent; i += every) {
-    named.push([i + 0.5, written(values[i])]);
+    cells.push([i + 0.5, label(values[i])]);
   }
-  return named;
+  return cells;
 }
 
 // ---- drawing
@@ -127,19 +127,19 @@ function draw() {
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
   const p = panel();
-  const shown = map.layers[layer];
-  if (!shown.indices) return;
-  shown.picture ??= paint(shown);
+  const current = map.layers[layer];
+  if (!current.indices) return;
+  current.picture ??= paint(current);
   pen.save();
   pen.beginPath();
   pen.rect(p.x, p.y, p.width, p.height);
   pen.clip();
-  // Fewer pixels than cells: averaging would invent colours that mean something else.
+  // Averaging cells would produce colours that represent something else.
   pen.imageSmoothingEnabled = false;
   const [x, y] = pixel(0, rows);
   const [right, bottom] = pixel(columns, 0);
-  pen.drawImage(shown.picture, x, y, right - x, bottom - y);
-  for (const [cell, color] of [[hovered, "#0008"], [chosen, "#000"]]) if (cell) frame(cell, color);
+  pen.drawImage(current.picture, x, y, right - x, bottom - y);
+  for (const [cell, color] of [[pointerCell, "#0008"], [selectedCell, "#000"]]) if (cell) frame(cell, color);
   pen.restore();
   drawAxes(p);
 }
@@ -147,7 +147,7 @@ function draw() {
 function frame({ i, j }, color) {
   const [x, y] = pixel(i, j + 1);
   const [right, bottom] = pixel(i + 1, j);
-  // Small cells get a frame that is larger than they are.
+  // The frame of a small cell is larger than the cell.
   const grow = Math.max(0, (8 - (right - x)) / 2);
   const box = [x - grow, y - grow, right - x + 2 * grow, bottom - y + 2 * grow];
   pen.lineWidth = 3.5;
@@ -168,7 +168,7 @@ function drawAxes(p) {
   for (const [place, text] of marks(map.axes[0], view.left, view.width, p.width / 90)) {
     const [x] = pixel(place, 0);
     pen.fillRect(Math.round(x), p.y + p.height, 1, 6);
-    // The last one must not run over the edge.
+    // The last label must not exceed the edge.
     const half = pen.measureText(text).width / 2;
     pen.fillText(text, Math.min(x, p.x + p.width + MARGIN.right - half), p.y + p.height + 9);
   }
@@ -181,7 +181,7 @@ function drawAxes(p) {
   }
   pen.font = "14px system-ui, sans-serif";
   pen.textAlign = "center";
-  // Where nobody said what a parameter means its name stands for that.
+  // A parameter without a description has its name as meaning.
   const name = ({ parameter, meaning, symbol }) => (meaning === parameter ? symbol : `${meaning}, ${symbol}`);
   pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44, p.width + 60);
   pen.save();
@@ -194,10 +194,10 @@ function drawAxes(p) {
 // ---- the panel beside the map
 
 const element = (tag, text, className) => {
-  const made = document.createElement(tag);
-  if (text !== undefined) made.textContent = text;
-  if (className) made.className = className;
-  return made;
+  const node = document.createElement(tag);
+  if (text !== undefined) node.append(text);
+  if (className) node.className = className;
+  return node;
 };
 
 function facts({ i, j }) {
@@ -215,7 +215,7 @@ function facts({ i, j }) {
   const [word, pattern] = [map.words?.[at("word")], map.patterns?.[at("pattern")]]
     .map((text) => (text === "" ? "no events" : text));
   const source = map.sources[at("source")];
-  // Of a filled cell nothing was measured.
+  // The values of filled cells are not measured.
   const between = (text) => (text !== undefined && source === "filled" ? `${text}, interpolated` : text);
   return [
     [map.axes[0].symbol, a], [map.axes[1].symbol, b], ...derivedValues({ i, j }),
@@ -235,19 +235,19 @@ function facts({ i, j }) {
   ];
 }
 
-function tell() {
-  const cell = hovered ?? chosen;
-  byId("which").textContent = !hovered && chosen ? "The chosen cell" : "Under the pointer";
-  const shown = facts(cell ?? { i: 0, j: 0 }).map(([name, value]) => {
+function updateReadout() {
+  const cell = pointerCell ?? selectedCell;
+  byId("which").textContent = !pointerCell && selectedCell ? "Selected cell" : "Under the pointer";
+  const lines = facts(cell ?? { i: 0, j: 0 }).map(([name, value]) => {
     const row = element("tr");
     row.append(element("th", name), element("td", cell ? String(value ?? "\u2013") : "\u2013"));
     return row;
   });
-  byId("readout").replaceChildren(...shown);
+  byId("readout").replaceChildren(...lines);
 }
 
 function choose(cell) {
-  chosen = cell;
+  selectedCell = cell;
   byId("replay").hidden = !cell;
   if (cell) {
     const [a, b] = [axisValue(map.axes[0], cell.i), axisValue(map.axes[1], cell.j)];
@@ -257,35 +257,35 @@ function choose(cell) {
     const sets = map.axes.map((axis, k) => (axis.start === undefined ? ` --set ${axis.parameter}=${[a, b][k]}` : "")).join("");
     const derived = derivedValues(cell).map(([name, value]) => ` --set ${name}=${value}`).join("");
     const words = `rattlemap orbit${sets}${derived}${map.replay}${start}`.split(" --");
-    // Lines break between arguments, never inside one.
+    // Lines break only between arguments.
     byId("command").replaceChildren(...words.flatMap((word, k) =>
       k === 0 ? [element("span", word)] : [" ", element("span", `--${word}`)]));
     history.replaceState(null, "", `#${cell.i},${cell.j},${map.layers[layer].name}`);
   }
-  tell();
+  updateReadout();
   draw();
 }
 
 function showLayer(index) {
   layer = index;
-  const shown = map.layers[layer];
+  const current = map.layers[layer];
   [...byId("layers").children].forEach((button, k) => button.setAttribute("aria-checked", k === layer));
-  byId("legend-title").textContent = shown.title;
+  byId("legend-title").textContent = current.title;
   byId("bar").replaceChildren();
-  if (shown.bar) {
+  if (current.bar) {
     const ramp = element("div", undefined, "ramp");
-    ramp.style.background = `linear-gradient(to right, ${shown.bar.colors.map((c) => `#${c}`).join(",")})`;
+    ramp.style.background = `linear-gradient(to right, ${current.bar.colors.map((c) => `#${c}`).join(",")})`;
     const scale = element("div", undefined, "ticks");
-    const { low, high, label, left_out: leftOut } = shown.bar;
+    const { low, high, label, left_out: leftOut } = current.bar;
     for (const [value, text] of ticks(low, high, 6)) {
       const tick = element("span", text);
       tick.style.left = `${(100 * (value - low)) / (high - low)}%`;
       scale.append(tick);
     }
-    byId("bar").append(...(label === shown.title ? [] : [element("div", label)]), ramp, scale,
+    byId("bar").append(...(label === current.title ? [] : [element("div", label)]), ramp, scale,
       ...leftOut.map((text) => element("div", text, "beyond")));
   }
-  byId("legend").replaceChildren(...shown.entries.map(({ color, text, cells }) => {
+  byId("legend").replaceChildren(...current.entries.map(({ color, text, cells }) => {
     const patch = element("span", undefined, "patch");
     patch.style.background = `#${color}`;
     const share = (100 * cells) / (columns * rows);
@@ -334,8 +334,8 @@ canvas.addEventListener("pointermove", (event) => {
   const here = [event.offsetX, event.offsetY];
   const before = pointers.get(event.pointerId);
   if (!before) {
-    hovered = cellAt(...here);
-    tell();
+    pointerCell = cellAt(...here);
+    updateReadout();
     draw();
     return;
   }
@@ -363,8 +363,8 @@ canvas.addEventListener("pointerup", (event) => {
 });
 canvas.addEventListener("pointercancel", (event) => pointers.delete(event.pointerId));
 canvas.addEventListener("pointerleave", () => {
-  hovered = null;
-  tell();
+  pointerCell = null;
+  updateReadout();
   draw();
 });
 
@@ -383,11 +383,11 @@ document.addEventListener("keydown", (event) => {
   else if (event.key === "-") zoom(1 / 0.7, p.x + p.width / 2, p.y + p.height / 2);
   else if (event.key === "0") showAll();
   else if (number >= 1 && number <= map.layers.length) showLayer(number - 1);
-  else if (steps[event.key] && chosen) {
+  else if (steps[event.key] && selectedCell) {
     event.preventDefault();
-    hovered = null;
+    pointerCell = null;
     const [di, dj] = steps[event.key];
-    choose({ i: Math.min(Math.max(chosen.i + di, 0), columns - 1), j: Math.min(Math.max(chosen.j + dj, 0), rows - 1) });
+    choose({ i: Math.min(Math.max(selectedCell.i + di, 0), columns - 1), j: Math.min(Math.max(selectedCell.j + dj, 0), rows - 1) });
   }
 });
 
@@ -397,9 +397,9 @@ byId("copy").addEventListener("click", async () => {
     await navigator.clipboard.writeText(command.textContent);
     byId("copy").textContent = "Copied";
   } catch {
-    // A page opened from a disk may not write to the clipboard: mark the text instead.
+    // A page opened from a disk cannot always write to the clipboard.
     getSelection().selectAllChildren(command);
-    byId("copy").textContent = "Marked: press Ctrl-C";
+    byId("copy").textContent = "Selected: press Ctrl-C";
   }
   setTimeout(() => { byId("copy").textContent = "Copy"; }, 1500);
 });
@@ -407,21 +407,22 @@ byId("copy").addEventListener("click", async () => {
 // ---- adaptive maps
 
 const percent = (rate) => `${Number((100 * rate).toPrecision(2))} %`;
+const interval = (rate, [low, high]) => `${percent(rate)} (95 % interval: ${percent(low)} to ${percent(high)})`;
 
-// How much was integrated, and what integrating a sample of the rest has shown.
-function tellRefinement({ integrated, filled, rounds, audits }) {
+// Shows how many cells were integrated, and the audit of the filled cells.
+function showRefinement({ integrated, filled, rounds, audits }) {
   byId("refined").hidden = false;
   const last = audits.at(-1);
   const share = (100 * integrated / (integrated + filled)).toFixed(1);
-  byId("audit").textContent = `${share} % of the cells were integrated, in ${count(rounds, "round")}; the others are `
-    + "filled with what lies around them. " + (last
-    ? `Of ${count(last.sampled, "filled cell")}, drawn at random and integrated, ${last.wrong} turned out wrong: `
-      + `${percent(last.rate)} (95 %: ${percent(last.interval[0])} to ${percent(last.interval[1])}).`
-      + (last.words ? ` Of ${count(last.words, "filled word")} among them, ${last.wrong_words} turned out wrong.` : "")
-      + (last.patterns ? ` Of ${count(last.patterns, "filled pattern")}, ${last.wrong_patterns}.` : "")
-    : "No audit was asked for.");
-  if (last) byId("audit-errors").append(...Object.keys(FILLED).filter((name) => last.errors[name])
-    .map((name) => element("li", tellError(FILLED[name], last.errors[name]))));
+  const wrong = (some, wrong, what) => (some ? ` Of ${count(some, `filled ${what}`)} in the sample, ${wrong} were wrong.` : "");
+  byId("audit").textContent = `${share} % of the cells were integrated in ${count(rounds, "round")}. `
+    + "The others were filled from their neighbours. " + (last
+    ? `A random sample of ${count(last.sampled, "filled cell")} was integrated; ${last.wrong} of them were wrong: `
+      + `${interval(last.rate, last.interval)}.`
+      + wrong(last.words, last.wrong_words, "word") + wrong(last.patterns, last.wrong_patterns, "pattern")
+    : "The scene requests no audit.");
+  if (last) byId("audit-errors").append(...["lyapunov", "impacts_per_period", "mesh_fraction"]
+    .filter((name) => last.errors[name]).map((name) => element("li", errorText(FIELDS[name], last.errors[name]))));
   if (audits.length > 1) {
     byId("audits").append(...audits.map((audit, k) => {
       const row = element("tr");
@@ -431,16 +432,13 @@ function tellRefinement({ integrated, filled, rounds, audits }) {
   }
 }
 
-const FILLED = { lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing" };
-
-// How far one quantity of the sampled cells was from what had been filled.
-function tellError(name, error) {
-  const [low, high] = error.off_by_one_interval ?? [];
+// Describes the errors of one quantity of the sampled cells.
+function errorText(name, error) {
   return `${name}: ${count(error.compared, "filled cell")} compared`
-    + (error.empty ? `, ${error.empty} left empty` : "")
-    + `; off by ${short(error.median)} in the median, ${short(error.p95)} at 95 %, ${short(error.worst)} at worst`
-    + (low === undefined ? "." : `; by 1 or more in ${error.off_by_one}: ${percent(error.off_by_one_rate)} `
-      + `(95 %: ${percent(low)} to ${percent(high)}).`);
+    + (error.empty ? `, ${error.empty} without a value` : "")
+    + `; median error ${short(error.median)}, 95th percentile ${short(error.p95)}, largest ${short(error.worst)}`
+    + (error.off_by_one_interval
+      ? `; 1 or more in ${error.off_by_one}: ${interval(error.off_by_one_rate, error.off_by_one_interval)}.` : ".");
 }
 
 // ---- validation
@@ -448,39 +446,34 @@ function tellError(name, error) {
 const count = (n, one, many = `${one}s`) => `${n} ${n === 1 ? one : many}`;
 const short = (value) => (typeof value === "number" ? Number(value.toPrecision(4)).toString() : String(value ?? "\u2013"));
 
-// A table with a caption; columns of numbers are named by their index.
+// Returns a table with a caption. `numbers` are the indices of columns of numbers.
 function table(caption, heads, lines, numbers = []) {
-  const made = element("table");
-  const cell = (tag, text, k) => {
-    const one = element(tag, text instanceof Node ? undefined : text, numbers.includes(k) ? "number" : undefined);
-    if (text instanceof Node) one.append(text);
-    return one;
+  const row = (tag, cells, bad) => {
+    const node = element("tr", undefined, bad ? "bad" : undefined);
+    node.append(...cells.map((text, k) => element(tag, text, numbers.includes(k) ? "number" : undefined)));
+    return node;
   };
-  const head = element("tr");
-  head.append(...heads.map((text, k) => cell("th", text, k)));
-  made.append(head, ...lines.map(({ cells, bad }) => {
-    const row = element("tr", undefined, bad ? "bad" : undefined);
-    row.append(...cells.map((text, k) => cell("td", text, k)));
-    return row;
-  }));
+  const body = element("table");
+  body.append(row("th", heads), ...lines.map(({ cells, bad }) => row("td", cells, bad)));
   const box = element("div");
-  box.append(element("h3", caption), made);
+  box.append(element("h3", caption), body);
   return box;
 }
 
-const STRATA = { uniform: "drawn from all that were integrated", border: "drawn at borders of classes", status: "drawn by status" };
+const STRATA = { uniform: "uniform sample", border: "sample at borders between classes", status: "sample by status" };
 const FIELDS = { class: "class", period: "period", word: "word, up to mirror image",
   pattern: "pattern, up to mirror image", symmetric: "symmetry",
   lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing", status: "status",
-  attractor: "attractor of the start", periods_run: "periods integrated", finite: "numbers are finite", again: "the same record again" };
+  attractor: "attractor of the start", periods_run: "periods integrated", finite: "numbers are finite", again: "record computed again" };
 const JUDGES = { reference: "the event-driven reference, without early stops",
   lanes_f64: "lanes in f64 and by the reference without early stops",
   dop853: "DOP853, an adaptive ODE library, with event location, and by the reference without early stops" };
 
 const rateText = ({ count, text }, among) => `${count} of ${among} (${text})`;
 
+// Returns the table of the cells that differ.
 function differing(found) {
-  const differs = ({ field, map, judge }) => `${FIELDS[field] ?? field}: ${short(map)}, judge ${short(judge)}`;
+  const difference = ({ field, map, judge }) => `${FIELDS[field] ?? field}: ${short(map)}, judge ${short(judge)}`;
   const parameters = map.axes.map((axis) => axis.parameter);
   const line = ({ i, j, values, differences, kind, replay }) => {
     const go = element("button", `${i}, ${j}`);
@@ -490,13 +483,13 @@ function differing(found) {
     const why = element("span", kind.replaceAll("_", " "));
     why.title = found.kinds[kind];
     return { bad: kind === "unexplained",
-      cells: [go, ...parameters.map((name) => short(values[name])), differences.map(differs).join("; "), why, element("code", replay)] };
+      cells: [go, ...parameters.map((name) => short(values[name])), differences.map(difference).join("; "), why, element("code", replay)] };
   };
   const worstFirst = [...found.mismatches].sort((a, b) => (b.kind === "unexplained") - (a.kind === "unexplained"));
   return table("Cells that differ", ["cell", ...parameters, "what differs", "kind", "replay"], worstFirst.map(line));
 }
 
-function tellValidation(found) {
+function showValidation(found) {
   const section = byId("validation");
   document.body.classList.add("validated");
   section.hidden = false;
@@ -504,7 +497,7 @@ function tellValidation(found) {
   const verdict = `${rateText(uniform.differing, uniform.sampled)} ${found.counted} differ; `
     + `unexplained ${rateText(uniform.kinds.unexplained, uniform.sampled)}.`;
   byId("validated").hidden = false;
-  byId("verdict").textContent = found.faults.length ? `Not to be trusted: ${found.faults.join("; ")}.` : verdict;
+  byId("verdict").textContent = found.faults.length ? `Do not trust this map: ${found.faults.join("; ")}.` : verdict;
   byId("details").addEventListener("click", () => section.scrollIntoView({ behavior: "smooth" }));
   const tables = element("div");
   tables.id = "tables";
@@ -519,31 +512,31 @@ function tellValidation(found) {
     table("Kinds", ["", ""], kinds.map((kind) => ({ cells: [kind.replaceAll("_", " "), found.kinds[kind]] }))),
   );
   if (found.chaos.some(({ cells }) => cells)) {
-    tables.append(table("Averages over chaos, as distributions", ["", found.counted, "distance", "at most"],
+    tables.append(table("Distributions of averages over chaos", ["", found.counted, "distance", "limit"],
       found.chaos.map(({ name, cells, distance, bar, fails }) =>
         ({ bad: fails, cells: [FIELDS[name] ?? "the exponent's error", cells, short(distance), bar ? short(bar) : "too few"] })), [1, 2, 3]));
   }
   section.append(
     element("h2", "Validation"),
     element("p", verdict, "verdict"),
-    ...found.faults.map((fault) => element("p", `Not to be trusted: ${fault}.`, "verdict bad")),
-    element("p", `A sample of ${found.samples} of ${found.integrated} integrated ${found.counted} (seed ${found.seed}), made by the engine `
-      + `${found.engine} in ${found.precision} on ${found.device}, was judged by ${JUDGES[found.judge]}, over the whole budget.`
-      + (found.filled ? ` The other ${found.filled} were filled from their neighbours: the audit looks after them.` : "")));
+    ...found.faults.map((fault) => element("p", `Do not trust this map: ${fault}.`, "verdict bad")),
+    element("p", `A sample of ${found.samples} of ${found.integrated} integrated ${found.counted} (seed ${found.seed}) was judged by `
+      + `${JUDGES[found.judge]}, over the full number of periods. The engine of the map is ${found.engine} in ${found.precision} on `
+      + `${found.device}.` + (found.filled ? ` The other ${found.filled} were filled from their neighbours; the audit covers them.` : "")));
   if (found.computed_again) {
-    section.append(element("p", `Computed again by the same engine${found.same_device ? "" : ` on ${found.again_on}, not on the map's own device`}: `
-      + `${found.identical} of ${found.computed_again} are the same to the bit.`));
+    section.append(element("p", `The same engine computed ${found.computed_again} of them again${
+      found.same_device ? "" : ` on another device, ${found.again_on}`}: ${found.identical} are identical to the bit.`));
   }
   if (found.half_mesh_speed) {
     const { class: kinds, period, word, pattern } = found.half_mesh_speed;
     const changed = ({ changed, compared, text }) => (compared ? `${changed} of ${compared} (${text})` : "none compared");
-    section.append(element("p", `With half the mesh_speed, cells that mesh change in class: ${changed(kinds)}; cycles among them in period: `
-      + `${changed(period)}, in word: ${changed(word)}, in pattern: ${changed(pattern)}. What changes is a matter of where bouncing is `
-      + "taken to end, not of the motion."));
+    section.append(element("p", `Changes of meshing cells with half the mesh_speed: class ${changed(kinds)}. Changes of periodic ones: `
+      + `period ${changed(period)}, word ${changed(word)}, pattern ${changed(pattern)}. They depend on the definition of the end of `
+      + "bouncing, not on the motion."));
   }
   if (found.states) {
     section.append(element("p", `States of ${found.states.compared} lanes ${found.states.horizon_periods} periods after their start: `
-      + `${rateText(found.states.off, found.states.compared)} are off by more than rounding may lead.`));
+      + `${rateText(found.states.off, found.states.compared)} differ by more than rounding explains.`));
   }
   section.append(tables);
   if (found.mismatches.length) section.append(differing(found));
@@ -562,18 +555,18 @@ async function start() {
     button.addEventListener("click", () => showLayer(k));
     return button;
   }));
-  if (map.refinement) tellRefinement(map.refinement);
-  if (map.validation) tellValidation(map.validation);
+  if (map.refinement) showRefinement(map.refinement);
+  if (map.validation) showValidation(map.validation);
   const names = Object.keys(map.values);
   const unpacked = await Promise.all(names.map((name) => unpack(map.values[name])));
   values = Object.fromEntries(names.map((name, k) => [name, unpacked[k]]));
   if (map.starts) starts = await unpack(map.starts);
   for (const derived of map.derived) derived.values = await unpack(derived);
-  await Promise.all(map.layers.map(async (shown) => { shown.indices = await unpack(shown); }));
+  await Promise.all(map.layers.map(async (packed) => { packed.indices = await unpack(packed); }));
   byId("wait").remove();
   // A link may name a cell and a layer.
   const [i, j, name] = location.hash.slice(1).split(",");
-  showLayer(Math.max(map.layers.findIndex((shown) => shown.name === name), 0));
+  showLayer(Math.max(map.layers.findIndex((candidate) => candidate.name === name), 0));
   choose(i < columns && j < rows ? { i: Number(i), j: Number(j) } : null);
 }
 new ResizeObserver(draw).observe(canvas);

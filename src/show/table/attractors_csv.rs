@@ -1,4 +1,4 @@
-//! `attractors.csv`: what the starts of a map of basins lead to.
+//! `attractors.csv`: the attractors of a map of basins.
 
 use std::io;
 
@@ -6,15 +6,16 @@ use crate::findings::attractors::{Attractor, Basins};
 use crate::record::Spelling;
 use crate::show::cells::Cells;
 use crate::show::error::WriteError;
-use crate::show::names::{self, float};
+use crate::show::names::{self, float, optional};
 use rattlemap_dynamics::orbit::Class;
 
-/// Fields before the strobe state, and after it.
-const BEFORE: [&str; 7] = ["label", "class", "period", "word", "exponent", "largest_multiplier", "symmetric"];
-const AFTER: [&str; 2] = ["cells", "share"];
+/// Columns before and after the strobe state.
+const FIELDS_BEFORE: [&str; 7] =
+    ["label", "class", "period", "word", "exponent", "largest_multiplier", "symmetric"];
+const FIELDS_AFTER: [&str; 2] = ["cells", "share"];
 
-/// What a legend calls an attractor.
-pub(crate) fn named(label: usize, attractor: &Attractor) -> String {
+/// Returns the name of an attractor in legends.
+pub(crate) fn attractor_name(label: usize, attractor: &Attractor) -> String {
     let kind = match attractor.class {
         Class::Periodic { period } => format!("period {period}"),
         _ => "chaos".to_owned(),
@@ -27,13 +28,10 @@ pub(crate) fn named(label: usize, attractor: &Attractor) -> String {
     format!("{label}: {kind}{word}")
 }
 
-/// Writes the table: an attractor per row, the largest basin first. Where a parameter is swept, a last field has its value
-/// there.
-///
-/// # Errors
-/// If it cannot be written.
-pub(crate) fn write(to: impl io::Write, cells: &Cells<'_>, basins: &Basins) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_writer(to);
+/// Writes the table: one attractor per row, the largest basin first. The last columns are the swept parameters at which the
+/// attractor was found.
+pub fn write(out: impl io::Write, cells: &Cells<'_>, basins: &Basins) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(out);
     let scene = cells.scene();
     let names = scene.base().state_names();
     let states = names.iter().map(|name| format!("strobe_{name}"));
@@ -42,24 +40,25 @@ pub(crate) fn write(to: impl io::Write, cells: &Cells<'_>, basins: &Basins) -> R
         .filter(|(_, axis)| !axis.target().is_start())
         .map(|(i, axis)| (i, &*axis.parameter().name))
         .collect();
-    let before = BEFORE.iter().map(ToString::to_string);
-    let after = AFTER.iter().map(ToString::to_string).chain(swept.iter().map(|(_, name)| (*name).to_owned()));
+    let before = FIELDS_BEFORE.iter().map(ToString::to_string);
+    let after =
+        FIELDS_AFTER.iter().map(ToString::to_string).chain(swept.iter().map(|(_, name)| (*name).to_owned()));
     table.write_record(before.chain(states).chain(after))?;
     let total = basins.labels().len() as f64;
     for (label, attractor) in basins.attractors().iter().enumerate() {
         let word = attractor.word.as_ref().map_or(String::new(), |word| Spelling::new(word).in_table());
         let before = [
             label.to_string(),
-            names::class(attractor.class).to_owned(),
-            names::period(attractor.class).map_or(String::new(), |period| period.to_string()),
+            attractor.class.name().to_owned(),
+            optional(names::period(attractor.class)),
             word,
             float(attractor.exponent),
             float(attractor.multiplier),
-            attractor.symmetric.map_or(String::new(), |symmetric| symmetric.to_string()),
+            optional(attractor.symmetric),
         ];
         let state = (0..names.len()).map(|i| float(attractor.strobe.map(|state| state[i])));
         let after = [attractor.cells.to_string(), float(attractor.cells as f64 / total)];
-        // What is read of chaos is read over all values.
+        // Chaos is one attractor over all swept values, so it has none of its own.
         let is_cycle = attractor.strobe.is_some();
         let values = cells.values(attractor.cell);
         let at = swept.iter().map(|&(i, _)| float(Some(values[i]).filter(|_| is_cycle)));

@@ -1,165 +1,223 @@
-//! A map's rows by column, each of its own type: what `cells.npy` holds, and what goes to Python.
+//! Columns of a map's rows: texts for `cells.csv`, typed values for `cells.npy` and Python.
 
 use crate::map::scene::Quantity;
-use crate::show::cells::{Cells, Row};
-use crate::show::names;
-use crate::show::table::cells_csv::{ATTRACTOR, ATTRACTORS, places, swept};
-use crate::show::table::words_csv::Rows;
+use crate::record::Spelling;
+use crate::show::cells::{Cells, Row, Source};
+use crate::show::names::{float, optional};
+use crate::show::table::words_csv::WordRows;
+use rattlemap_dynamics::orbit::Class;
 
-/// What stands for an absent class or an absent symmetry.
-pub(crate) const ABSENT: i8 = -1;
+/// Code of an absent class or an absent symmetry.
+pub const ABSENT: i8 = -1;
 
-/// What a column shows: a row, and the rows of `words.csv` that have its word and its pattern.
-pub(crate) struct Shown {
-    pub(crate) row: Row,
-    word: u32,
-    pattern: u32,
+/// A cell whose columns are read.
+pub(crate) struct CellRow<'a> {
+    cells: &'a Cells<'a>,
+    id: usize,
+    row: Row,
 }
 
-impl Shown {
-    /// The cell `id`.
-    pub(crate) fn new(cells: &Cells<'_>, rows: &Rows<'_>, id: usize) -> Shown {
-        Shown { row: cells.row(id), word: rows.word(id), pattern: rows.pattern(id) }
+impl<'a> CellRow<'a> {
+    pub(crate) fn new(cells: &'a Cells<'a>, id: usize) -> CellRow<'a> {
+        CellRow { cells, id, row: cells.row(id) }
+    }
+
+    /// Returns the indices on the axes, which a list of cells does not have.
+    pub(crate) fn indices(&self) -> &[usize] {
+        &self.row.indices[..index_names(self.cells).len()]
+    }
+
+    /// Returns indices and swept values as texts.
+    pub(crate) fn location(&self) -> impl Iterator<Item = String> {
+        let values = self.cells.values(self.id).into_iter().map(|value| format!("{value:?}"));
+        self.indices().iter().map(ToString::to_string).chain(values)
     }
 }
 
-/// A column after places and values.
-pub(crate) struct Column {
+/// Returns the names of the columns of indices on the axes, which a list of cells does not have.
+fn index_names(cells: &Cells<'_>) -> &'static [&'static str] {
+    if cells.scene().list().is_some() { &[] } else { &["i", "j"] }
+}
+
+/// Returns the names of the columns of swept values.
+fn swept_names<'a>(cells: &Cells<'a>) -> impl Iterator<Item = &'a str> {
+    cells.scene().swept().map(|parameter| &*parameter.name)
+}
+
+/// Returns the names of the columns of indices and swept values.
+pub(crate) fn location_names<'a>(cells: &Cells<'a>) -> impl Iterator<Item = &'a str> {
+    index_names(cells).iter().copied().chain(swept_names(cells))
+}
+
+/// A column after indices and swept values.
+pub(crate) struct CellColumn {
     pub(crate) name: &'static str,
-    /// What has to be asked for.
-    of: Option<Quantity>,
-    pub(crate) read: Read,
+    /// Quantity that the scene must request.
+    quantity: Option<Quantity>,
+    pub(crate) text: fn(&CellRow<'_>) -> String,
+    pub(crate) value: TypedValue,
 }
 
-/// How a value of a column is read, by its type.
-pub(crate) enum Read {
-    I8(fn(&Shown) -> i8),
-    U8(fn(&Shown) -> u8),
-    U16(fn(&Shown) -> u16),
-    U32(fn(&Shown) -> u32),
-    I32(fn(&Shown) -> i32),
-    F64(fn(&Shown) -> f64),
+/// Defines the types of columns: [`TypedValue`] reads one value, [`Values`] holds those of all cells.
+macro_rules! types {
+    ($($(#[$doc:meta])* $name:ident, $type:ty, $numpy:literal;)*) => {
+        /// A function that reads one value of a column, by its type.
+        pub(crate) enum TypedValue {
+            $($name(fn(&CellRow<'_>, &WordRows<'_>) -> $type),)*
+        }
+
+        /// Values of a column, one per cell.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Values {
+            $($(#[$doc])* $name(Vec<$type>),)*
+        }
+
+        impl TypedValue {
+            /// Returns the type in NumPy's notation.
+            pub(crate) fn numpy_type(&self) -> &'static str {
+                match self {
+                    $(TypedValue::$name(_) => $numpy,)*
+                }
+            }
+
+            /// Appends the bytes of the value.
+            pub(crate) fn put(&self, cell: &CellRow<'_>, rows: &WordRows<'_>, to: &mut Vec<u8>) {
+                match self {
+                    $(TypedValue::$name(value) => to.extend(value(cell, rows).to_le_bytes()),)*
+                }
+            }
+
+            fn empty(&self, count: usize) -> Values {
+                match self {
+                    $(TypedValue::$name(_) => Values::$name(Vec::with_capacity(count)),)*
+                }
+            }
+
+            fn push(&self, cell: &CellRow<'_>, rows: &WordRows<'_>, to: &mut Values) {
+                match (self, to) {
+                    $((TypedValue::$name(value), Values::$name(to)) => to.push(value(cell, rows)),)*
+                    _ => unreachable!("the values have the type of their column"),
+                }
+            }
+        }
+    };
 }
 
-const fn column(name: &'static str, of: Option<Quantity>, read: Read) -> Column {
-    Column { name, of, read }
+types! {
+    /// Codes; -1 where absent.
+    I8, i8, "|i1";
+    /// Counts up to 255.
+    U8, u8, "|u1";
+    /// Periods; 0 where absent.
+    U16, u16, "<u2";
+    /// Counts, indices, and rows of the table of words.
+    U32, u32, "<u4";
+    /// Labels; -1 where absent.
+    I32, i32, "<i4";
+    /// Numbers; NaN where absent.
+    F64, f64, "<f8";
+}
+
+const fn column(
+    name: &'static str,
+    quantity: Option<Quantity>,
+    text: fn(&CellRow<'_>) -> String,
+    value: TypedValue,
+) -> CellColumn {
+    CellColumn { name, quantity, text, value }
 }
 
 #[rustfmt::skip]
-const COLUMNS: [Column; 12] = [
-    column("class", Some(Quantity::Class), Read::I8(|shown| shown.row.class.map_or(ABSENT, names::class_code))),
-    column("period", Some(Quantity::Class), Read::U16(|shown| shown.row.period.unwrap_or(0) as u16)),
-    column("lyapunov", Some(Quantity::Lyapunov), Read::F64(|shown| float(shown.row.lyapunov))),
-    column("lyapunov_error", Some(Quantity::Lyapunov), Read::F64(|shown| float(shown.row.lyapunov_error))),
-    column("impacts_per_period", Some(Quantity::Impacts), Read::F64(|shown| float(shown.row.impacts_per_period))),
-    column("mesh_fraction", Some(Quantity::Mesh), Read::F64(|shown| float(shown.row.mesh_fraction))),
-    column("symmetric", Some(Quantity::Symmetric), Read::I8(|shown| shown.row.symmetric.map_or(ABSENT, i8::from))),
-    column("word", Some(Quantity::Word), Read::U32(|shown| shown.word)),
-    column("pattern", Some(Quantity::Pattern), Read::U32(|shown| shown.pattern)),
-    column("status", None, Read::I8(|shown| shown.row.status.code() as i8)),
-    column("periods_run", None, Read::U32(|shown| shown.row.periods_run)),
-    column("source", None, Read::I8(|shown| shown.row.source as i8)),
+const COLUMNS: [CellColumn; 12] = [
+    column("class", Some(Quantity::Class), |c| optional(c.row.class.map(Class::name)),
+        TypedValue::I8(|c, _| c.row.class.map_or(ABSENT, |class| class.index() as i8))),
+    column("period", Some(Quantity::Class), |c| optional(c.row.period),
+        TypedValue::U16(|c, _| c.row.period.unwrap_or(0) as u16)),
+    column("lyapunov", Some(Quantity::Lyapunov), |c| float(c.row.lyapunov),
+        TypedValue::F64(|c, _| number(c.row.lyapunov))),
+    column("lyapunov_error", Some(Quantity::Lyapunov), |c| float(c.row.lyapunov_error),
+        TypedValue::F64(|c, _| number(c.row.lyapunov_error))),
+    column("impacts_per_period", Some(Quantity::Impacts), |c| float(c.row.impacts_per_period),
+        TypedValue::F64(|c, _| number(c.row.impacts_per_period))),
+    column("mesh_fraction", Some(Quantity::Mesh), |c| float(c.row.mesh_fraction),
+        TypedValue::F64(|c, _| number(c.row.mesh_fraction))),
+    column("symmetric", Some(Quantity::Symmetric), |c| optional(c.row.symmetric),
+        TypedValue::I8(|c, _| c.row.symmetric.map_or(ABSENT, i8::from))),
+    column("word", Some(Quantity::Word), |c| spelling(c.cells.word(c.id)),
+        TypedValue::U32(|c, rows| rows.word(c.id))),
+    column("pattern", Some(Quantity::Pattern), |c| spelling(c.cells.pattern(c.id)),
+        TypedValue::U32(|c, rows| rows.pattern(c.id))),
+    column("status", None, |c| c.row.status.name().to_owned(), TypedValue::I8(|c, _| c.row.status.code() as i8)),
+    column("periods_run", None, |c| c.row.periods_run.to_string(), TypedValue::U32(|c, _| c.row.periods_run)),
+    column("source", None, |c| c.row.source.name().to_owned(), TypedValue::I8(|c, _| c.row.source as i8)),
 ];
 
-const COUNTED: Column = column(ATTRACTORS, None, Read::U8(|shown| shown.row.attractors.unwrap_or(0)));
+/// Number of attractors, in maps whose cells have several starts.
+const ATTRACTORS: CellColumn = column(
+    "attractors",
+    None,
+    |c| optional(c.row.attractors),
+    TypedValue::U8(|c, _| c.row.attractors.unwrap_or(0)),
+);
 
-const LABELLED: Column =
-    column(ATTRACTOR, None, Read::I32(|shown| shown.row.attractor.map_or(i32::from(ABSENT), i32::from)));
+/// Label of the attractor that the start leads to, in maps of basins.
+const ATTRACTOR: CellColumn = column(
+    "attractor",
+    None,
+    |c| optional(c.row.attractor),
+    TypedValue::I32(|c, _| c.row.attractor.map_or(i32::from(ABSENT), i32::from)),
+);
 
-fn float(value: Option<f64>) -> f64 {
+// `Source::ALL` gives the codes.
+const _: () = assert!(Source::Integrated as i8 == 0 && Source::Filled as i8 == 1);
+
+fn number(value: Option<f64>) -> f64 {
     value.unwrap_or(f64::NAN)
 }
 
-impl Read {
-    /// The type as NumPy writes it.
-    pub(crate) fn kind(&self) -> &'static str {
-        match self {
-            Read::I8(_) => "|i1",
-            Read::U8(_) => "|u1",
-            Read::U16(_) => "<u2",
-            Read::U32(_) => "<u4",
-            Read::I32(_) => "<i4",
-            Read::F64(_) => "<f8",
-        }
-    }
-
-    /// Appends the value's bytes.
-    pub(crate) fn put(&self, shown: &Shown, to: &mut Vec<u8>) {
-        match self {
-            Read::I8(read) => to.extend(read(shown).to_le_bytes()),
-            Read::U8(read) => to.push(read(shown)),
-            Read::U16(read) => to.extend(read(shown).to_le_bytes()),
-            Read::U32(read) => to.extend(read(shown).to_le_bytes()),
-            Read::I32(read) => to.extend(read(shown).to_le_bytes()),
-            Read::F64(read) => to.extend(read(shown).to_le_bytes()),
-        }
-    }
+fn spelling(word: Option<Spelling>) -> String {
+    word.map_or(String::new(), |word| word.in_table())
 }
 
-/// The columns that a map has.
-pub(crate) fn asked(cells: &Cells<'_>) -> Vec<&'static Column> {
-    let is_asked = |column: &&Column| column.of.is_none_or(|quantity| cells.asks(quantity));
-    let counted = cells.attractors().map(|_| &COUNTED).or(cells.basins().map(|_| &LABELLED));
-    COLUMNS.iter().filter(is_asked).chain(counted).collect()
+fn columns(cells: &Cells<'_>, is_present: impl Fn(Quantity) -> bool) -> Vec<&'static CellColumn> {
+    let last = cells.attractors().map(|_| &ATTRACTORS).or(cells.basins().map(|_| &ATTRACTOR));
+    COLUMNS.iter().filter(|column| column.quantity.is_none_or(&is_present)).chain(last).collect()
 }
 
-/// A column's values, a value per cell.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Values {
-    /// Codes, -1 where absent.
-    I8(Vec<i8>),
-    /// Counts up to 255.
-    U8(Vec<u8>),
-    /// Periods, 0 where absent.
-    U16(Vec<u16>),
-    /// Counts, places, and rows of the table of texts.
-    U32(Vec<u32>),
-    /// Labels, -1 where absent.
-    I32(Vec<i32>),
-    /// Numbers; NaN where absent.
-    F64(Vec<f64>),
+/// Returns the columns of `cells.csv`. Only the pattern is left out where the scene does not request it.
+pub(crate) fn of_csv(cells: &Cells<'_>) -> Vec<&'static CellColumn> {
+    columns(cells, |quantity| quantity != Quantity::Pattern || cells.has(quantity))
 }
 
-impl Values {
-    fn like(read: &Read, count: usize) -> Values {
-        match read {
-            Read::I8(_) => Values::I8(Vec::with_capacity(count)),
-            Read::U8(_) => Values::U8(Vec::with_capacity(count)),
-            Read::U16(_) => Values::U16(Vec::with_capacity(count)),
-            Read::U32(_) => Values::U32(Vec::with_capacity(count)),
-            Read::I32(_) => Values::I32(Vec::with_capacity(count)),
-            Read::F64(_) => Values::F64(Vec::with_capacity(count)),
-        }
-    }
-
-    fn push(&mut self, read: &Read, shown: &Shown) {
-        match (self, read) {
-            (Values::I8(to), Read::I8(read)) => to.push(read(shown)),
-            (Values::U8(to), Read::U8(read)) => to.push(read(shown)),
-            (Values::U16(to), Read::U16(read)) => to.push(read(shown)),
-            (Values::U32(to), Read::U32(read)) => to.push(read(shown)),
-            (Values::I32(to), Read::I32(read)) => to.push(read(shown)),
-            (Values::F64(to), Read::F64(read)) => to.push(read(shown)),
-            _ => unreachable!("values are made for their column"),
-        }
-    }
+/// Returns the columns that the scene requests.
+pub(crate) fn requested(cells: &Cells<'_>) -> Vec<&'static CellColumn> {
+    columns(cells, |quantity| cells.has(quantity))
 }
 
-/// Every column by name, in the order of `cells.npy`: places on the axes, values there, what was measured.
-pub(crate) fn read(cells: &Cells<'_>, rows: &Rows<'_>) -> Vec<(String, Values)> {
-    let count = cells.counts().iter().product();
-    let mut places: Vec<Vec<u32>> = places(cells).iter().map(|_| Vec::with_capacity(count)).collect();
-    let mut values: Vec<Vec<f64>> = swept(cells).map(|_| Vec::with_capacity(count)).collect();
-    let columns = asked(cells);
-    let mut measured: Vec<Values> = columns.iter().map(|column| Values::like(&column.read, count)).collect();
+/// Returns all columns of `cells.npy`, by name.
+pub fn read(cells: &Cells<'_>, rows: &WordRows<'_>) -> Vec<(String, Values)> {
+    let count = cells.count();
+    let mut indices: Vec<Vec<u32>> = index_names(cells).iter().map(|_| Vec::with_capacity(count)).collect();
+    let mut swept: Vec<Vec<f64>> = swept_names(cells).map(|_| Vec::with_capacity(count)).collect();
+    let columns = requested(cells);
+    let mut measured: Vec<Values> = columns.iter().map(|column| column.value.empty(count)).collect();
     for id in 0..count {
-        let shown = Shown::new(cells, rows, id);
-        places.iter_mut().zip(shown.row.indices).for_each(|(to, index)| to.push(index as u32));
-        values.iter_mut().zip(cells.values(id)).for_each(|(to, value)| to.push(value));
-        columns.iter().zip(&mut measured).for_each(|(column, to)| to.push(&column.read, &shown));
+        let cell = CellRow::new(cells, id);
+        indices.iter_mut().zip(cell.indices()).for_each(|(to, &index)| to.push(index as u32));
+        swept.iter_mut().zip(cells.values(id)).for_each(|(to, value)| to.push(value));
+        columns.iter().zip(&mut measured).for_each(|(column, to)| column.value.push(&cell, rows, to));
     }
-    let places = self::places(cells).iter().map(ToString::to_string).zip(places.into_iter().map(Values::U32));
-    let values = swept(cells).map(str::to_owned).zip(values.into_iter().map(Values::F64));
-    let measured = columns.iter().map(|column| column.name.to_owned()).zip(measured);
-    places.chain(values).chain(measured).collect()
+    let location = indices.into_iter().map(Values::U32).chain(swept.into_iter().map(Values::F64));
+    let names = location_names(cells).chain(columns.iter().map(|column| column.name));
+    names.map(str::to_owned).zip(location.chain(measured)).collect()
+}
+
+/// Returns names and NumPy types of all columns of `cells.npy`.
+pub(crate) fn numpy_types<'a>(
+    cells: &Cells<'a>,
+    columns: &[&'static CellColumn],
+) -> impl Iterator<Item = (&'a str, &'static str)> {
+    let indices = index_names(cells).iter().map(|&name| (name, "<u4"));
+    let swept = swept_names(cells).map(|name| (name, "<f8"));
+    indices.chain(swept).chain(columns.iter().map(|column| (column.name, column.value.numpy_type())))
 }

@@ -1,9 +1,7 @@
-//! Tables of results, one module per format.
+//! Tables of results.
 
 pub mod attractors_csv;
-pub mod bifurcation_columns_csv;
-pub mod bifurcation_csv;
-pub mod bifurcation_strobe_csv;
+pub mod bifurcation_tables;
 pub mod cell_columns;
 pub mod cells_csv;
 pub mod cells_npy;

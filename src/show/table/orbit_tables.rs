@@ -1,6 +1,6 @@
-//! What an orbit looks like in time and by frequency, as tables.
+//! Tables of an orbit: its motion in time and its spectrum.
 
-use std::path::Path;
+use std::io::Write;
 
 use crate::show::error::WriteError;
 use crate::show::names;
@@ -8,27 +8,27 @@ use crate::show::orbit_spectrum::{Spectrum, gap};
 use rattlemap_dynamics::model::{Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Event, EventKind, Orbit, Sample};
 
-/// One moment of a motion: a sample, or the state before or after an event.
+/// A row of the motion: a sample, or the state before or after an event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// Time since phase 0 of the cycle.
+    /// Time since phase 0 of the first period.
     pub t: f64,
-    /// Of the forcing, in turns.
+    /// Phase of the forcing in turns.
     pub phase: f64,
-    /// The gap and its velocity.
+    /// Gap and its velocity.
     pub gap: [f64; 2],
-    /// The state, as many components as the model has.
+    /// State. Only the components of the model are used.
     pub state: State,
     /// `free`, `meshing_right` or `meshing_left`.
     pub domain: &'static str,
-    /// Of an event its kind, its side and whether this is `before` or `after`.
+    /// Kind and side of the event, and `before` or `after`.
     pub event: Option<(&'static str, i8, &'static str)>,
 }
 
-/// The motion moment by moment: samples, and two moments for every event among them.
+/// Merges the samples of `trace` with the states before and after every event.
 ///
-/// `trace` has so many samples in a forcing period, the first at phase 0, and goes as far as the events.
-pub(crate) fn moments(
+/// `trace` has `samples_per_period` samples per forcing period, begins at phase 0 and spans the events.
+pub fn moments(
     oscillator: &Oscillator,
     orbit: &Orbit,
     trace: &[Sample],
@@ -44,13 +44,13 @@ pub(crate) fn moments(
     for (i, sample) in trace.iter().enumerate() {
         while let Some(event) = events.next_if(|event| event.t <= sample.t) {
             let phase = event.t_mod_period / orbit.forcing_period;
-            let mark = |moment| Some((names::kind(event.kind), names::side(event.side), moment));
+            let mark = |moment| Some((names::kind(event.kind), names::side_code(event.side), moment));
             add(event.t, phase, &event.before, domain, mark("before"));
             domain = domain_after(event);
             add(event.t, phase, &event.after, domain, mark("after"));
             last = event.t;
         }
-        // A sample on an event says nothing new.
+        // A sample at the time of an event repeats it.
         if sample.t > last {
             let phase = (i % samples_per_period) as f64 / samples_per_period as f64;
             domain = sample.meshing;
@@ -60,16 +60,9 @@ pub(crate) fn moments(
     moments
 }
 
-/// Writes a motion to `path`, a row for each moment.
-///
-/// # Errors
-/// If the file cannot be written.
-pub(crate) fn write_trajectory(
-    path: &Path,
-    state_names: &[&str],
-    moments: &[Moment],
-) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
+/// Writes `trajectory.csv`, one row per moment.
+pub fn write_trajectory(out: impl Write, state_names: &[&str], moments: &[Moment]) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(out);
     let head = ["t", "phase", "z", "w"].into_iter().chain(state_names.iter().copied());
     table.write_record(head.chain(["domain", "event", "side", "moment"]))?;
     for Moment { t, phase, gap, state, domain, event } in moments {
@@ -81,7 +74,7 @@ pub(crate) fn write_trajectory(
     Ok(table.flush()?)
 }
 
-/// Where an event leads.
+/// Returns the wall that the teeth mesh on after an event.
 fn domain_after(event: &Event) -> Option<Side> {
     (event.kind == EventKind::MeshStart).then_some(event.side)
 }
@@ -94,12 +87,9 @@ fn domain_name(meshing: Option<Side>) -> &'static str {
     }
 }
 
-/// Writes a spectrum to `path`, a row for each line.
-///
-/// # Errors
-/// If the file cannot be written.
-pub(crate) fn write_spectrum(path: &Path, spectrum: &Spectrum) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
+/// Writes `spectrum.csv`, one row per line of the spectrum.
+pub fn write_spectrum(out: impl Write, spectrum: &Spectrum) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(out);
     table.write_record(["frequency", "z", "w"])?;
     for line in &spectrum.lines {
         let [z, w] = line.amplitudes;

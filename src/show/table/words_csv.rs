@@ -1,78 +1,75 @@
-//! `words.csv`: the texts of the words and patterns that `cells.npy` has by their row.
+//! `words.csv`: the words and patterns that `cells.npy` refers to by row.
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::io::Write;
 
 use crate::record::Spelling;
 use crate::show::error::WriteError;
-use crate::show::words::{Spelled, Words};
+use crate::show::words::{MapWords, WordIndex};
 
-/// Rows of the table, and which of them a cell's word and pattern have. Row 0 is that of cells without one.
+/// Rows of the table, and the rows of each cell's word and pattern. Row 0 is for cells without one.
 #[derive(Clone, Debug)]
-pub(crate) struct Rows<'s> {
-    /// From row 1 on: words, then patterns that are no words, the most frequent first.
+pub struct WordRows<'s> {
+    /// Rows from 1 on: words, then patterns that are not also words, the most frequent first.
     list: Vec<&'s Spelling>,
-    word: Option<Column<'s>>,
-    pattern: Option<Column<'s>>,
+    word: Option<IndexRows<'s>>,
+    pattern: Option<IndexRows<'s>>,
 }
 
 #[derive(Clone, Debug)]
-struct Column<'s> {
-    words: &'s Words,
-    /// Row of each of them.
+struct IndexRows<'s> {
+    index: &'s WordIndex,
+    /// Row of each word.
     rows: Vec<u32>,
 }
 
-impl<'s> Rows<'s> {
-    pub(crate) fn new(spelled: &'s Spelled) -> Rows<'s> {
+impl<'s> WordRows<'s> {
+    /// Assigns rows to the words and patterns of a map.
+    pub fn new(words: &'s MapWords) -> WordRows<'s> {
         let (mut list, mut known) = (Vec::new(), HashMap::new());
-        let mut column = |words: &'s Words| {
+        let mut rows = |index: &'s WordIndex| {
             let row = |(spelling, _): &'s (Spelling, usize)| {
                 *known.entry(spelling).or_insert_with(|| {
                     list.push(spelling);
                     list.len() as u32
                 })
             };
-            Column { words, rows: words.list.iter().map(row).collect() }
+            IndexRows { index, rows: index.list.iter().map(row).collect() }
         };
-        let word = spelled.words.as_ref().map(&mut column);
-        let pattern = spelled.patterns.as_ref().map(&mut column);
-        Rows { list, word, pattern }
+        let word = words.words.as_ref().map(&mut rows);
+        let pattern = words.patterns.as_ref().map(&mut rows);
+        WordRows { list, word, pattern }
     }
 
-    /// The row of the word of the cell `id`.
+    /// Returns the row of the word of the cell `id`.
     pub(crate) fn word(&self, id: usize) -> u32 {
-        self.word.as_ref().map_or(0, |column| column.row(id))
+        self.word.as_ref().map_or(0, |rows| rows.row(id))
     }
 
-    /// That of its pattern.
+    /// Returns the row of the pattern of the cell `id`.
     pub(crate) fn pattern(&self, id: usize) -> u32 {
-        self.pattern.as_ref().map_or(0, |column| column.row(id))
+        self.pattern.as_ref().map_or(0, |rows| rows.row(id))
     }
 
-    /// The texts by row.
-    pub(crate) fn texts(&self) -> Vec<String> {
-        let spelled = self.list.iter().map(|spelling| spelling.in_table());
-        std::iter::once(String::new()).chain(spelled).collect()
+    /// Returns the texts by row.
+    pub fn texts(&self) -> Vec<String> {
+        let texts = self.list.iter().map(|spelling| spelling.in_table());
+        std::iter::once(String::new()).chain(texts).collect()
     }
 
-    /// Writes the table to `path`.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub(crate) fn write(&self, path: &Path) -> Result<(), WriteError> {
-        let mut table = csv::Writer::from_path(path)?;
+    /// Writes the table.
+    pub fn write(&self, out: impl Write) -> Result<(), WriteError> {
+        let mut table = csv::Writer::from_writer(out);
         table.write_record(["row", "text"])?;
-        table.write_record(["0", ""])?;
-        for (row, spelling) in self.list.iter().enumerate() {
-            table.write_record([(row + 1).to_string(), spelling.in_table()])?;
+        for (row, text) in self.texts().into_iter().enumerate() {
+            table.write_record([row.to_string(), text])?;
         }
         Ok(table.flush()?)
     }
 }
 
-impl Column<'_> {
+impl IndexRows<'_> {
     fn row(&self, id: usize) -> u32 {
-        self.rows.get(self.words.numbers[id] as usize).copied().unwrap_or(0)
+        self.rows.get(self.index.numbers[id] as usize).copied().unwrap_or(0)
     }
 }

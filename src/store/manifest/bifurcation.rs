@@ -9,10 +9,10 @@ use crate::findings::hysteresis::{self, Hysteresis};
 use crate::map::bifurcation::Column;
 use crate::map::plan::count_classes;
 use crate::map::scene::{Along, Scene};
-use crate::show::names;
 use crate::show::parameters::Parameters;
 use crate::store::inventory::FileEntry;
 use crate::store::manifest::{self, Head, joined, without_nulls};
+use rattlemap_dynamics::orbit::Class;
 
 /// Arguments of the command, apart from its scene.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +36,7 @@ pub(crate) fn bifurcation(
     let elapsed = elapsed.as_secs_f64();
     let (along, at) = (arguments.along.map(|along| &along.parameter), arguments.along.map(|along| &along.at));
     // The columns of two passes are added.
-    let classes = names::CLASSES.into_iter().zip(count_classes(columns.iter().map(|column| column.class)));
+    let classes = Class::NAMES.into_iter().zip(count_classes(columns.iter().map(|column| column.class)));
     joined([
         json!(Head::of("bifurcation")),
         json!({

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::findings::attractors::Attractor;
@@ -11,28 +10,18 @@ use crate::gpu::AdapterId;
 use crate::map::engine::{CardReport, Engine};
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
-use crate::map::schedule::{Audit, Deviation, Refined};
 use crate::map::shard::Shard;
-use crate::show::cells::{Cells, SOURCES};
+use crate::show::cells::{Cells, Source};
 use crate::show::names;
 use crate::show::parameters::Parameters;
+use crate::show::provenance::Provenance;
+use crate::show::refinement;
 use crate::show::table::cell_columns::ABSENT;
 use crate::store::file_names::LIST;
 use crate::store::inventory::FileEntry;
 use crate::store::manifest::{self, Head, joined, without_nulls};
 use crate::store::record_file::Identity;
-use rattlemap_dynamics::orbit::Status;
-
-/// The engine that computed a map.
-#[derive(Clone, Copy, Debug)]
-pub struct Made<'a> {
-    /// Name of the engine.
-    pub engine: &'a str,
-    /// Name of the precision.
-    pub precision: &'a str,
-    /// Description of the device.
-    pub device: &'a str,
-}
+use rattlemap_dynamics::orbit::{Class, Status};
 
 /// Everything about the computation of a map that is not in its records.
 #[derive(Clone, Debug)]
@@ -40,7 +29,7 @@ pub struct Run<'a> {
     /// The `--set` arguments.
     pub sets: &'a [String],
     /// The engine.
-    pub made: Made<'a>,
+    pub made: Provenance<'a>,
     /// The graphics adapter, if there was one.
     pub adapter: Option<AdapterId>,
     /// A report for each card, if there were several.
@@ -65,7 +54,7 @@ pub struct Run<'a> {
 
 impl<'a> Run<'a> {
     /// Returns a run with these properties; its times are zero.
-    pub fn new(made: Made<'a>, sets: &'a [String], processor: &'a str) -> Run<'a> {
+    pub fn new(made: Provenance<'a>, sets: &'a [String], processor: &'a str) -> Run<'a> {
         Run {
             sets,
             made,
@@ -114,7 +103,7 @@ pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, writing: Duration, files: &[
             "start": manifest::start(scene),
             "integration": integration(scene, run.lane_grid),
             "quantities": quantities,
-            "cells": cells.counts().iter().product::<usize>(),
+            "cells": cells.count(),
         }),
         counts(cells),
         json!({
@@ -123,7 +112,7 @@ pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, writing: Duration, files: &[
             "codes": codes(),
             "elapsed_seconds": (run.elapsed_before + run.elapsed).as_secs_f64(),
             "resumed_cells": run.resumed_cells,
-            "refinement": cells.refinement().map(RefinementObject::from),
+            "refinement": cells.refinement().map(refinement::object),
             "timings": timings(run, writing),
             "files": files,
         }),
@@ -140,7 +129,7 @@ pub(crate) fn run_and_scene(
     joined([
         json!(Head::of(command)),
         without_nulls(json!({ "shard": shard })),
-        made(run),
+        engine_and_cards(run),
         json!({
             "processor": run.processor,
             "sources": run.shards.map_or(Identity::own_sources(), |shards| shards.sources),
@@ -159,8 +148,8 @@ pub(crate) fn run_and_scene(
 }
 
 /// Describes the engine and its graphics adapters.
-pub(crate) fn made(run: &Run<'_>) -> Value {
-    let Made { engine, precision, device } = run.made;
+pub(crate) fn engine_and_cards(run: &Run<'_>) -> Value {
+    let Provenance { engine, precision, device } = run.made;
     let adapter = run.adapter.as_ref();
     let cards: Vec<Value> = run.cards.iter().map(card).collect();
     joined([
@@ -217,10 +206,10 @@ pub(crate) fn timings(run: &Run<'_>, writing: Duration) -> Value {
 
 /// Counts the cells by class, status and number of attractors, and describes the basins.
 pub(crate) fn counts(cells: &Cells<'_>) -> Value {
-    let classes = names::CLASSES.into_iter().zip(count_classes(cells.classes()));
-    let mut statuses: BTreeMap<_, usize> = Status::ALL.iter().map(|&s| (names::status(s), 0)).collect();
+    let classes = Class::NAMES.into_iter().zip(count_classes(cells.classes()));
+    let mut statuses: BTreeMap<_, usize> = Status::ALL.iter().map(|status| (status.name(), 0)).collect();
     for status in cells.statuses() {
-        *statuses.entry(names::status(status)).or_default() += 1;
+        *statuses.entry(status.name()).or_default() += 1;
     }
     let attractors = cells.attractors().map(|list| {
         let mut counts = BTreeMap::<u8, usize>::new();
@@ -239,7 +228,7 @@ fn basins(cells: &Cells<'_>) -> Option<Vec<Value>> {
     let total = basins.labels().len() as f64;
     let describe = |attractor: &Attractor| {
         json!({
-            "class": names::class(attractor.class),
+            "class": attractor.class.name(),
             "period": names::period(attractor.class),
             "cells": attractor.cells,
             "share": attractor.cells as f64 / total,
@@ -251,105 +240,12 @@ fn basins(cells: &Cells<'_>) -> Option<Vec<Value>> {
 /// Meaning of the small integers in `cells.npy`.
 fn codes() -> Value {
     let numbered = |names: Vec<&'static str>| names.into_iter().zip(0..).collect::<BTreeMap<_, i8>>();
-    let mut class = numbered(names::CLASSES.to_vec());
+    let mut class = numbered(Class::NAMES.to_vec());
     class.insert("absent", ABSENT);
     json!({
         "class": class,
-        "status": numbered(Status::ALL.iter().map(|&status| names::status(status)).collect()),
-        "source": numbered(SOURCES.iter().map(|&source| names::source(source)).collect()),
+        "status": numbered(Status::ALL.iter().map(|status| status.name()).collect()),
+        "source": numbered(Source::ALL.map(Source::name).to_vec()),
         "symmetric": BTreeMap::from([("false", 0), ("true", 1), ("absent", ABSENT)]),
     })
-}
-/// An adaptive map: how much was integrated, and how good the rest is.
-#[derive(Serialize)]
-pub(crate) struct RefinementObject {
-    integrated: usize,
-    filled: usize,
-    rounds: usize,
-    audits: Vec<AuditObject>,
-}
-
-/// `rate` is the fraction of filled cells that integration shows to be wrong, `interval` its
-/// 95 % interval (Wilson); `words` of the sampled cells had been filled with a word, of which
-/// `wrong_words` were not theirs; `patterns` and `wrong_patterns` are the same of patterns.
-#[derive(Serialize)]
-struct AuditObject {
-    filled: usize,
-    sampled: usize,
-    wrong: usize,
-    rate: f64,
-    interval: [f64; 2],
-    words: usize,
-    wrong_words: usize,
-    patterns: usize,
-    wrong_patterns: usize,
-    errors: ErrorsObject,
-}
-
-/// Absolute differences between what the sampled cells had been filled with and what integration shows; null
-/// where filled cells show no such quantity.
-#[derive(Serialize)]
-struct ErrorsObject {
-    lyapunov: Option<DeviationObject>,
-    impacts_per_period: Option<DeviationObject>,
-    mesh_fraction: Option<DeviationObject>,
-}
-
-/// `empty` cells have a value but were filled with none, and are not `compared`.
-#[derive(Serialize)]
-struct DeviationObject {
-    compared: usize,
-    empty: usize,
-    median: f64,
-    p95: f64,
-    worst: f64,
-    #[serde(flatten)]
-    off_by_one: Option<OffByOneObject>,
-}
-
-/// Cells whose counts differ by 1 or more.
-#[derive(Serialize)]
-struct OffByOneObject {
-    off_by_one: usize,
-    off_by_one_rate: f64,
-    off_by_one_interval: [f64; 2],
-}
-
-impl DeviationObject {
-    fn of(deviation: Deviation) -> DeviationObject {
-        let Deviation { compared, empty, median, p95, worst, .. } = deviation;
-        DeviationObject { compared, empty, median, p95, worst, off_by_one: None }
-    }
-
-    fn of_counts(deviation: Deviation) -> DeviationObject {
-        let off_by_one = OffByOneObject {
-            off_by_one: deviation.off_by_one,
-            off_by_one_rate: deviation.off_by_one_rate(),
-            off_by_one_interval: deviation.off_by_one_interval(),
-        };
-        DeviationObject { off_by_one: Some(off_by_one), ..DeviationObject::of(deviation) }
-    }
-}
-
-impl From<&Refined> for RefinementObject {
-    fn from(refined: &Refined) -> Self {
-        let audit = |audit: &Audit| AuditObject {
-            filled: audit.filled,
-            sampled: audit.sampled,
-            wrong: audit.wrong,
-            rate: audit.rate(),
-            interval: audit.interval(),
-            words: audit.words,
-            wrong_words: audit.wrong_words,
-            patterns: audit.patterns,
-            wrong_patterns: audit.wrong_patterns,
-            errors: ErrorsObject {
-                lyapunov: audit.errors.lyapunov.map(DeviationObject::of),
-                impacts_per_period: audit.errors.impacts.map(DeviationObject::of_counts),
-                mesh_fraction: audit.errors.mesh.map(DeviationObject::of),
-            },
-        };
-        let Refined { integrated, filled, rounds, ref audits, .. } = *refined;
-        RefinementObject { integrated, filled, rounds, audits: audits.iter().map(audit).collect() }
-    }
 }

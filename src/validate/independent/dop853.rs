@@ -1,7 +1,7 @@
-//! DOP853 of the crate `ode_solvers`, with events.
+//! The integrator DOP853 of the crate `ode_solvers`, with events.
 //!
-//! The crate can stop at a step, but knows no events. So every accepted step is looked at, a step with an event stops
-//! the integration, and the event is located by integrating anew from the start of that step.
+//! The crate has no event location. Therefore each accepted step is searched for an event, a step with an event stops the
+//! integration, and the event is located by integrating again from the start of that step.
 
 use std::cell::Cell;
 
@@ -12,20 +12,21 @@ use super::field::Field;
 use super::flight::{Flight, Sighting};
 use rattlemap_dynamics::flow::Gap;
 
-/// Endings in one stretch beyond which a motion is given up.
+/// Largest number of endings in one interval.
 const ENDINGS: u32 = 10_000;
 
-/// Durations in which the crate's first trial step underflows; one Euler step is exact there.
+/// Shortest duration for the crate, whose first trial step underflows below it. One Euler step is exact there.
 const SHORTEST: f64 = 1e-12;
 
+/// Largest number of steps of one integration.
 const MOST_STEPS: u32 = 100_000;
 
-/// Accelerations of two degrees of freedom, by time and state `(x1, v1, x2, v2)` in any coordinates. The fifth state is
-/// time: this DOP853 takes stage 12 at the wrong one (its table has 0 for `c_12 = 1`), which an autonomous system
-/// does not feel.
+/// Equations of motion of two degrees of freedom with state `(x1, v1, x2, v2)` in any coordinates. Time is a fifth state:
+/// the crate evaluates stage 12 at the wrong time (its table has 0 for `c_12 = 1`), which does not affect an autonomous
+/// system.
 struct Motion<A, W> {
     accelerations: A,
-    /// Told of every step; whether to stop there.
+    /// Receives each step and returns whether to stop there.
     watch: W,
 }
 
@@ -48,20 +49,20 @@ fn state(y: &Vector5<f64>) -> Gap {
     [y[0], y[1], y[2], y[3]]
 }
 
-/// How the equations are integrated.
+/// Settings of an integration.
 #[derive(Clone, Copy, Debug)]
 pub struct Integration {
     /// Relative and absolute tolerance.
     pub tolerance: f64,
-    /// The longest step.
+    /// Longest step.
     pub longest: f64,
-    /// Where the solution is told: at such distances, or after every step.
+    /// Distance of the returned samples; none for the ends of steps.
     pub samples: Option<f64>,
 }
 
 impl Integration {
-    /// The solution from `start` at time `t`, which `watch` may stop after any step: times since `t`, and states. None
-    /// where the library gives up.
+    /// Integrates from `start` at time `t`. `watch` may stop the integration after any step. Returns times since `t` and
+    /// states; none if the crate fails.
     pub fn run(
         &self,
         start: &Gap,
@@ -92,7 +93,7 @@ impl Integration {
             duration.min(self.longest),
             0.0,
             MOST_STEPS,
-            // Its test for stiffness takes rounding for it.
+            // The crate's stiffness test reacts to rounding, so it is disabled.
             u32::MAX,
             if self.samples.is_some() { OutputType::Dense } else { OutputType::Sparse },
         );
@@ -101,16 +102,16 @@ impl Integration {
     }
 }
 
-/// A step that holds an ending.
+/// A step that contains an ending.
 #[derive(Clone, Copy)]
-struct Seen {
-    /// Since the start of the flight.
+struct StepWithEnding {
+    /// Time since the start of the flight.
     start: f64,
     y: Gap,
     sighting: Sighting,
 }
 
-/// Motions between walls.
+/// Integrator of motions between walls.
 #[derive(Clone, Copy, Debug)]
 pub struct Solver {
     /// Excitation frequency.
@@ -120,21 +121,21 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// From one time since phase 0 to another; none for a motion that is lost.
+    /// Integrates from one time since phase 0 to another; none if the integration fails.
     pub fn advance(&self, flight: &mut Flight, from: f64, until: f64) -> Option<()> {
         let mut t = from;
         for _ in 0..ENDINGS {
-            let (seen, field, start) = (Cell::new(None), *flight.field(), flight.q);
+            let (found, field, start) = (Cell::new(None), *flight.field(), flight.q);
             let mut last = (0.0, start);
             let watch = |x: f64, y: &Gap| {
                 let (begun, q) = std::mem::replace(&mut last, (x, *y));
                 let after = |tau| self.after(&field, q, t + begun, tau).unwrap_or(q);
                 let sighting = flight.find_ending(begun == 0.0, &q, t + begun, x - begun, y, after);
-                seen.set(sighting.map(|sighting| Seen { start: begun, y: q, sighting }));
+                found.set(sighting.map(|sighting| StepWithEnding { start: begun, y: q, sighting }));
                 sighting.is_some()
             };
             let end = self.run(&field, start, t, until - t, flight.longest_step(), watch)?;
-            let Some(Seen { start, y, sighting }) = seen.get() else {
+            let Some(StepWithEnding { start, y, sighting }) = found.get() else {
                 flight.q = end;
                 flight.leave_wall();
                 return end.iter().all(|x| x.is_finite()).then_some(());
@@ -148,7 +149,7 @@ impl Solver {
         None
     }
 
-    /// The state a time `tau` later, whatever walls are in the way.
+    /// Returns the state after a time `tau`, ignoring walls.
     fn after(&self, field: &Field, y: Gap, t: f64, tau: f64) -> Option<Gap> {
         self.run(field, y, t, tau, tau, |_, _| false)
     }

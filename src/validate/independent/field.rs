@@ -1,22 +1,23 @@
-//! Equations of motion in gap coordinates `(z, w, x, v)`: the gap, and the displacement that is the less of it.
+//! Equations of motion in gap coordinates `(z, w, x, v)`: the gap and its rate, and the displacement with the smaller share
+//! of the gap and its velocity.
 
 use nalgebra::{Matrix2, Vector2};
 
 use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{Domain, Oscillator, State};
 
-/// How gap coordinates follow from displacements.
+/// Conversion between displacements and gap coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Coordinates {
     gap: [f64; 2],
-    /// The displacement that is kept.
+    /// Index of the displacement that is a coordinate.
     other: usize,
-    /// What it gets of an impulse that changes the gap's rate by 1.
+    /// Change of its velocity by an impulse that changes the gap's rate by 1.
     kick: f64,
 }
 
 impl Coordinates {
-    /// Those of an oscillator. Of two equal entries of the gap row the second displacement is kept.
+    /// Builds the coordinates of an oscillator. If both displacements have equal shares of the gap, the second is used.
     pub fn new(oscillator: &Oscillator) -> Coordinates {
         let gap = oscillator.gap;
         let other = usize::from(gap[0].abs() >= gap[1].abs());
@@ -25,21 +26,21 @@ impl Coordinates {
         Coordinates { gap, other, kick: along[other] / row.dot(&along) }
     }
 
-    /// What the displacement that is kept gets of an impulse that changes the gap's rate by 1.
+    /// Returns the change of `v` by an impulse that changes the gap's rate by 1.
     pub(super) fn kick(&self) -> f64 {
         self.kick
     }
 
-    /// Gap coordinates of a state.
+    /// Converts a state to gap coordinates.
     pub fn gap(&self, y: &State) -> Gap {
         let [g0, g1] = self.gap;
         [g0 * y[0] + g1 * y[2], g0 * y[1] + g1 * y[3], y[2 * self.other], y[2 * self.other + 1]]
     }
 
-    /// The state of gap coordinates.
+    /// Converts gap coordinates to a state.
     pub fn state(&self, [z, w, x, v]: &Gap) -> State {
-        let (kept, told) = (self.gap[self.other], self.gap[1 - self.other]);
-        let (y, rate) = ((z - kept * x) / told, (w - kept * v) / told);
+        let (own, rest) = (self.gap[self.other], self.gap[1 - self.other]);
+        let (y, rate) = ((z - own * x) / rest, (w - own * v) / rest);
         if self.other == 1 { [y, rate, *x, *v] } else { [*x, *v, y, rate] }
     }
 }
@@ -52,26 +53,25 @@ fn inverse(m: [[f64; 2]; 2]) -> Matrix2<f64> {
 /// The equations of motion of one domain in gap coordinates, solved for the accelerations.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
-    /// Accelerations of the gap and of the displacement that is kept, per `(z, w, x, v)`.
+    /// Coefficients of `(z, w, x, v)` in the accelerations of the gap and of the displacement.
     rows: [[f64; 4]; 2],
     force: [f64; 2],
     load: [f64; 2],
 }
 
 impl Field {
-    /// Those of one domain.
+    /// Builds the equations of one domain.
     pub fn new(oscillator: &Oscillator, domain: &Domain) -> Field {
         let Coordinates { gap, other, .. } = Coordinates::new(oscillator);
-        // Rows of `(z, x)` in terms of displacements, and back.
-        let kept = |value: [f64; 2]| if other == 1 { value } else { [value[1], value[0]] };
-        let [told, rest] = kept(gap);
+        // Matrices from displacements to `(z, x)` and back.
+        let [own, rest] = if other == 1 { gap } else { [gap[1], gap[0]] };
         let to_gap = match other {
-            1 => Matrix2::new(told, rest, 0.0, 1.0),
-            _ => Matrix2::new(rest, told, 1.0, 0.0),
+            1 => Matrix2::new(own, rest, 0.0, 1.0),
+            _ => Matrix2::new(rest, own, 1.0, 0.0),
         };
         let from_gap = match other {
-            1 => Matrix2::new(1.0 / told, -rest / told, 0.0, 1.0),
-            _ => Matrix2::new(0.0, 1.0, 1.0 / told, -rest / told),
+            1 => Matrix2::new(1.0 / own, -rest / own, 0.0, 1.0),
+            _ => Matrix2::new(0.0, 1.0, 1.0 / own, -rest / own),
         };
         let per_mass = to_gap * inverse(oscillator.mass);
         let matrix =
@@ -85,7 +85,7 @@ impl Field {
         }
     }
 
-    /// The same with the gap held at rest: the wall takes up its acceleration.
+    /// Returns the equations with the gap held at rest by a wall that takes up its acceleration.
     pub(super) fn held(&self, coordinates: &Coordinates) -> Field {
         let kick = coordinates.kick();
         let of = |pair: [f64; 2]| [0.0, pair[1] - kick * pair[0]];
@@ -94,7 +94,7 @@ impl Field {
         Field { rows: [[0.0; 4], row], force: of(self.force), load: of(self.load) }
     }
 
-    /// Accelerations of gap and displacement where the forcing stands at `cos`.
+    /// Returns the accelerations of gap and displacement, given the cosine of the forcing's phase.
     #[inline(always)]
     pub fn accelerations(&self, q: &Gap, cos: f64) -> [f64; 2] {
         [0, 1].map(|i| {
@@ -103,13 +103,13 @@ impl Field {
         })
     }
 
-    /// The rate of the gap's acceleration where the state changes so fast, and the forcing by `cos_rate`.
+    /// Returns the rate of the gap's acceleration, given the rates of the state and of the forcing's cosine.
     pub(super) fn gap_rate(&self, rates: &Gap, cos_rate: f64) -> f64 {
         let row = self.rows[0].iter().zip(rates);
         row.map(|(a, rate)| a * rate).sum::<f64>() + self.force[0] * cos_rate
     }
 
-    /// A bound on the frequencies of undamped motion.
+    /// Returns an upper bound of the undamped frequencies.
     pub(super) fn rate(&self) -> f64 {
         let [gap, kept] = self.rows.map(|row| row[0].abs() + row[2].abs());
         gap.max(kept).sqrt()
@@ -121,8 +121,7 @@ mod tests {
     use super::*;
     use rattlemap_dynamics::model::GearPair;
 
-    /// A full mass matrix, and a gap that the second displacement has the larger share of: the accelerations are those
-    /// of the equations of motion.
+    /// Covers a full mass matrix and gaps in which either displacement has the larger share.
     #[test]
     fn any_gap_row_obeys_the_equations_of_motion() {
         let pair = GearPair::paper(0.5).oscillator().unwrap();

@@ -1,45 +1,45 @@
-//! Flights and contacts for integrators that step through time: where a step meets a wall, and
-//! what happens there. Written from the equations of motion, in time and in gap coordinates
-//! `(z, w, x, v)`: a gap that is put on a wall is exactly there.
+//! Flights and contacts for an integrator with time steps: finds where a step meets a wall and applies the contact law.
+//! Written from the equations of motion in gap coordinates `(z, w, x, v)`, in which a gap can be set to a wall exactly.
 
 use super::field::{Coordinates, Field};
 use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::reference::EventKind;
 
-/// Trials of a root search; Newton's method gets the first of them.
+/// Largest number of iterations of a root search.
 const ROOT_CAP: u32 = 100;
+/// Largest number of Newton steps, which come first.
 const NEWTON_CAP: u32 = 20;
 
-/// Bisections for the least of an acceleration.
+/// Number of bisections for the minimum of an acceleration.
 const TURN_CAP: u32 = 30;
 
-/// An infinite series of impacts is over where what is left of it takes no more than this, in radians of free motion:
-/// what that leaves out is of second order in it.
+/// An infinite series of impacts ends when its remaining duration is below this, in radians of free motion. The error is
+/// of second order in this value.
 const SERIES_ENDS: f64 = 1e-6;
 
-/// A gap that opens from a wall is rounding where it lies no farther beyond, relative to its position.
+/// Relative penetration of a wall that counts as rounding if the gap is opening.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// What may end a flight.
+/// A possible end of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// Free motion reaches a wall.
     Contact(Side),
-    /// The contact onset is over; no event.
+    /// The contact onset ends. This is no event.
     OnsetEnds(Side),
     /// The gap falls back through the wall.
     MeshEnds(Side),
-    /// Pressing ceases inside the contact onset.
+    /// The load stops pressing the gap to the wall during the contact onset.
     PressingEnds(Side),
     /// A gap that opens during the contact onset reaches the other wall.
     Through(Side),
-    /// The load pulls the gap off the rigid wall that it sticks to.
+    /// The load pulls the gap off the rigid wall on which it rests.
     PulledOff(Side),
 }
 
 impl Ending {
-    /// Whether it is where the gap meets a wall; otherwise it is where an acceleration falls through zero.
+    /// Whether the gap meets a wall; otherwise an acceleration changes sign.
     fn is_of_gap(self) -> bool {
         !matches!(self, Ending::PressingEnds(_) | Ending::PulledOff(_))
     }
@@ -54,14 +54,14 @@ enum Mode {
     Stuck(Side),
 }
 
-/// A step that holds an ending: its distance is negative `within` after the start.
+/// An ending found in a step: its distance is negative at the time `within` after the start of the step.
 #[derive(Clone, Copy, Debug)]
 pub struct Sighting {
-    /// What ends the flight.
+    /// The ending.
     pub ending: Ending,
-    /// Zero where the start itself lies beyond, by rounding.
+    /// Zero if the start itself lies beyond by rounding.
     pub within: f64,
-    /// Where the search for the root begins.
+    /// First guess of the root.
     pub guess: f64,
 }
 
@@ -70,11 +70,11 @@ pub struct Sighting {
 pub struct Ended {
     /// Time since phase 0.
     pub t: f64,
-    /// What happened.
+    /// Kind of the event.
     pub kind: EventKind,
-    /// At which wall.
+    /// The wall.
     pub side: Side,
-    /// Whether infinitely many impacts, of which not all are told, came before it.
+    /// Whether the event ends an infinite series of impacts, of which not all are listed.
     pub after_series: bool,
 }
 
@@ -86,19 +86,20 @@ pub struct Flight {
     omega: f64,
     law: Law,
     coordinates: Coordinates,
-    /// Of free motion, and of contact that lasts with the right and the left wall.
+    /// Equations of free motion, and of lasting contact with the right and the left wall.
     fields: [Field; 3],
     mode: Mode,
-    /// The ending that the present motion starts on, and the order of that root.
+    /// The ending at which the present motion starts, and the order of that root.
     from: Option<(Ending, u32)>,
     /// Gap coordinates.
     pub q: Gap,
-    /// The events so far; whoever reads them takes them away.
+    /// Events since the caller last took them.
     pub events: Vec<Ended>,
 }
 
 impl Flight {
-    /// A motion from `start` at phase 0; beyond a wall it is meshing, but beyond a rigid one it begins on it.
+    /// Builds a motion from `start` at phase 0. A start beyond a wall is meshing; beyond a rigid wall it is moved to the
+    /// wall.
     pub fn new(oscillator: &Oscillator, law: Law, start: State) -> Flight {
         let coordinates = Coordinates::new(oscillator);
         let free = Field::new(oscillator, &oscillator.free);
@@ -129,12 +130,12 @@ impl Flight {
         flight
     }
 
-    /// The state `(x1, v1, x2, v2)`.
+    /// Returns the state `(x1, v1, x2, v2)`.
     pub fn state(&self) -> State {
         self.coordinates.state(&self.q)
     }
 
-    /// The wall that a contact lasts on, if one does.
+    /// Returns the wall of a lasting contact, if there is one.
     pub fn meshing(&self) -> Option<Side> {
         match self.mode {
             Mode::Free => None,
@@ -142,12 +143,12 @@ impl Flight {
         }
     }
 
-    /// Whether the gap is held where it is.
+    /// Whether the gap is at rest on a rigid wall.
     pub fn is_stuck(&self) -> bool {
         matches!(self.mode, Mode::Stuck(_))
     }
 
-    /// A motion beside it, by so much in gap coordinates as the gap is free to move.
+    /// Returns a motion displaced by `by` in gap coordinates. A gap at rest on a wall is not displaced.
     pub fn displaced(&self, by: &Gap) -> Flight {
         let mut other = self.clone();
         let held = if self.is_stuck() { 2 } else { 0 };
@@ -155,7 +156,7 @@ impl Flight {
         other
     }
 
-    /// The equations that govern the motion now.
+    /// Returns the present equations of motion.
     #[inline]
     pub fn field(&self) -> &Field {
         match self.meshing() {
@@ -164,15 +165,15 @@ impl Flight {
         }
     }
 
-    /// The longest step that leaves nothing unseen: a radian of the supports; of the mesh
-    /// during contact onset, since that and the meshing after it may be over sooner.
+    /// Returns the longest step in which no ending can be missed: a radian of free motion, or of meshing during contact
+    /// onset.
     pub fn longest_step(&self) -> f64 {
         let field =
             if let Mode::Onset(side) = self.mode { self.meshing_field(side) } else { &self.fields[0] };
         field.rate().max(self.omega).recip()
     }
 
-    /// The next step does not start on a wall any more.
+    /// Notes that the next step does not start on a wall.
     #[inline]
     pub fn leave_wall(&mut self) {
         self.from = None;
@@ -190,33 +191,32 @@ impl Flight {
         self.contacts[side.index()] == Contact::Rigid
     }
 
-    /// How far the gap lies beyond a wall.
+    /// Returns the penetration of a wall.
     #[inline]
     fn beyond(&self, side: Side, q: &Gap) -> f64 {
         side.sign() * (q[0] - self.wall(side))
     }
 
-    /// Acceleration of the gap into a wall by the equations of a domain.
+    /// Returns the acceleration of the gap into a wall by the equations of a domain.
     #[inline]
     fn pressing(&self, field: &Field, side: Side, q: &Gap, t: f64) -> f64 {
         side.sign() * field.accelerations(q, self.cos(t))[0]
     }
 
-    /// Whether a gap at rest on a wall is driven into it by the equations of a domain: the first derivative that is not
-    /// zero decides.
+    /// Whether the equations of a domain press a gap at rest into a wall. The first derivative that is not zero decides.
     fn presses(&self, field: &Field, side: Side, q: &Gap, t: f64) -> bool {
         let pressing = self.pressing(field, side, q, t);
         pressing > 0.0 || pressing == 0.0 && self.pressing_rate(field, field, side, q, t) > 0.0
     }
 
-    /// How fast the acceleration into a wall by one domain's equations changes along the motion by another's.
+    /// Returns the rate of the acceleration into a wall by the equations `of`, along the motion by the equations `along`.
     fn pressing_rate(&self, of: &Field, along: &Field, side: Side, q: &Gap, t: f64) -> f64 {
         let (sin, cos) = (self.omega * t).sin_cos();
         let [a, b] = along.accelerations(q, cos);
         side.sign() * of.gap_rate(&[q[1], a, q[3], b], -self.omega * sin)
     }
 
-    /// What may end the motion now; the last ones may be told twice.
+    /// Lists the endings that are possible now. The list may repeat one.
     fn endings(&self) -> [Ending; 3] {
         match self.mode {
             Mode::Free => [Side::Right, Side::Left, Side::Left].map(Ending::Contact),
@@ -228,8 +228,7 @@ impl Flight {
         }
     }
 
-    /// What is left until an ending, positive before it, and its rate; no rate for the end of
-    /// pressing.
+    /// Returns the distance to an ending, positive before it, and its rate. The rate of `PressingEnds` is not computed.
     #[inline]
     fn distance(&self, ending: Ending, q: &Gap, t: f64) -> (f64, f64) {
         let rate = |side: Side| side.sign() * q[1];
@@ -251,9 +250,9 @@ impl Flight {
         (self.omega * t).cos()
     }
 
-    /// The ending on a step of length `h` from `q0` at time `t` to `q1`, if one is seen: beyond
-    /// at the end, or at the turning point in between, which a cubic Hermite polynomial tells. `first`:
-    /// the step starts where the flight does. `after(tau)` integrates from `q0`.
+    /// Finds the earliest ending in a step of length `h` from `q0` at time `t` to `q1`. The distance is tested at the end
+    /// of the step and at its minimum, which a cubic Hermite polynomial predicts. `first` says that the step starts with
+    /// the flight. `after(tau)` integrates from `q0`.
     #[inline]
     pub fn find_ending(
         &self,
@@ -264,8 +263,8 @@ impl Flight {
         q1: &Gap,
         after: impl Fn(f64) -> Gap,
     ) -> Option<Sighting> {
-        let seen = |ending| self.find(ending, first, q0, t, h, q1, &after);
-        let sightings = self.endings().into_iter().filter_map(seen);
+        let find = |ending| self.find(ending, first, q0, t, h, q1, &after);
+        let sightings = self.endings().into_iter().filter_map(find);
         sightings.min_by(|a, b| a.guess.total_cmp(&b.guess))
     }
 
@@ -286,7 +285,7 @@ impl Flight {
             return Some(Sighting { ending, within: 0.0, guess: 0.0 });
         }
         let right = self.distance(ending, q1, t + h);
-        // Off a wall that the gap leaves slowly.
+        // The gap leaves its wall slowly.
         let is_rounding = ending.is_of_gap() && right.1 > 0.0 && right.0 >= -ROUNDING * q1[0].abs();
         if right.0 < 0.0 && !(starts_there && is_rounding) {
             let share = if starts_there { second_root(left, right, h) } else { left.0 / (left.0 - right.0) };
@@ -297,7 +296,7 @@ impl Flight {
         }
         let left = if starts_there { (0.0, left.1) } else { left };
         let mut turn = h * turning_point(left, right, h)?;
-        // The polynomial is no proof: the equations decide, at their own turning point.
+        // The polynomial only predicts the minimum; the equations decide.
         if ending.is_of_gap() {
             let q = after(turn);
             let [acceleration, _] = self.field().accelerations(&q, self.cos(t + turn));
@@ -317,8 +316,8 @@ impl Flight {
         is_beyond.then_some(Sighting { ending, within: turn, guess: 0.5 * turn })
     }
 
-    /// The time from `q0` at `t` to an ending that was seen: Newton's method on the integrator,
-    /// the root at the start divided out, bisection where that fails. None if neither ends.
+    /// Locates an ending: Newton's method on the integrator with the root at the start divided out, and bisection if it
+    /// fails. Returns the time since `t`; none if neither converges.
     pub fn locate(&self, first: bool, t: f64, sighting: Sighting, after: impl Fn(f64) -> Gap) -> Option<f64> {
         let Sighting { ending, within, guess } = sighting;
         if within == 0.0 {
@@ -341,11 +340,11 @@ impl Flight {
             if slope < 0.0 && trial < NEWTON_CAP {
                 let step = -f / slope;
                 let next = tau + step;
-                // What a Newton step leaves over is of second order in it.
+                // The error of a Newton step is of second order in the step.
                 let [acceleration, _] = self.field().accelerations(&q, self.cos(t + tau));
-                let left_over = acceleration.abs() * step * step;
-                let is_left_over = ending.is_of_gap() && left_over <= 0.5 * f64::EPSILON * tau * rate.abs();
-                let within_rounding = is_left_over || step.abs() <= 2.0 * f64::EPSILON * tau;
+                let remainder = acceleration.abs() * step * step;
+                let is_remainder = ending.is_of_gap() && remainder <= 0.5 * f64::EPSILON * tau * rate.abs();
+                let within_rounding = is_remainder || step.abs() <= 2.0 * f64::EPSILON * tau;
                 if (0.0..=within).contains(&next) && within_rounding {
                     return Some(next);
                 }
@@ -362,8 +361,8 @@ impl Flight {
         None
     }
 
-    /// Acts on an ending at the present state and time; `settling` where the flight started
-    /// there and may only have been put there by rounding.
+    /// Applies an ending at the present state and time. `settling` says that the flight started there, so that rounding
+    /// alone may have caused the ending.
     pub fn act(&mut self, ending: Ending, t: f64, settling: bool) {
         match ending {
             Ending::Contact(side) => self.contact(side, t, settling),
@@ -382,47 +381,47 @@ impl Flight {
                 }
                 self.put_on_wall(side);
                 self.leave(side, t);
-                self.tell(t, EventKind::MeshEnd, side);
+                self.record(t, EventKind::MeshEnd, side);
             }
             Ending::PressingEnds(side) => {
                 self.mode = Mode::Free;
                 self.from = None;
-                self.tell(t, EventKind::MeshEnd, side);
+                self.record(t, EventKind::MeshEnd, side);
             }
             Ending::Through(side) => {
                 self.mode = Mode::Free;
-                self.tell(t, EventKind::MeshEnd, side.mirrored());
+                self.record(t, EventKind::MeshEnd, side.mirrored());
                 self.contact(side, t, false);
             }
             Ending::PulledOff(side) => {
                 self.mode = Mode::Free;
                 self.from = Some((Ending::Contact(side), 3));
-                self.tell(t, EventKind::MeshEnd, side);
+                self.record(t, EventKind::MeshEnd, side);
             }
         }
     }
 
-    /// Free motion reaches a wall.
+    /// Applies the contact law when free motion reaches a wall.
     fn contact(&mut self, side: Side, t: f64, settling: bool) {
         self.put_on_wall(side);
         let closing = side.sign() * self.q[1];
         if settling && (closing < 0.0 || closing == 0.0 && !self.presses(&self.fields[0], side, &self.q, t)) {
             self.leave(side, t);
         } else if self.contacts[side.index()] == Contact::Elastic {
-            // The motion goes on at once.
+            // The motion continues without a jump.
             self.mode = Mode::Sustained(side);
             self.from = Some((Ending::MeshEnds(side), if closing > 0.0 { 1 } else { 2 }));
-            self.tell(t, EventKind::MeshStart, side);
+            self.record(t, EventKind::MeshStart, side);
         } else {
             self.impact(side, t, closing.max(0.0));
         }
     }
 
-    /// The impact law, then lasting contact or not: equations (5), (6), (22), (37) of the paper.
+    /// Applies the impact law and decides whether contact lasts: equations (5), (6), (22), (37) of the paper.
     fn impact(&mut self, side: Side, t: f64, closing: f64) {
         let (s, e) = (side.sign(), self.law.restitution[side.index()]);
         let leaving = e * closing;
-        // The impulse acts along the gap row.
+        // The impulse acts in the direction of the gap.
         let kicked = |e: f64| {
             let [z, _, x, v] = self.q;
             [z, -s * e * closing, x, v - s * (1.0 + e) * closing * self.coordinates.kick()]
@@ -443,7 +442,7 @@ impl Flight {
         self.q = if lasts && rests { at_rest } else { after };
         if !lasts {
             self.leave(side, t);
-            self.tell(t, EventKind::Impact, side);
+            self.record(t, EventKind::Impact, side);
             return;
         }
         (self.mode, self.from) = match (self.is_rigid(side), leaving > 0.0 && !rests) {
@@ -451,13 +450,13 @@ impl Flight {
             (false, true) => (Mode::Onset(side), Some((Ending::OnsetEnds(side), 1))),
             (false, false) => (Mode::Sustained(side), Some((Ending::MeshEnds(side), 2))),
         };
-        self.tell(t, EventKind::MeshStart, side);
+        self.record(t, EventKind::MeshStart, side);
         if let Some(ended) = self.events.last_mut() {
             ended.after_series = is_series_over;
         }
     }
 
-    /// Free motion from a wall.
+    /// Begins free motion from a wall.
     fn leave(&mut self, side: Side, t: f64) {
         self.mode = Mode::Free;
         let order = match self.q[1] == 0.0 {
@@ -468,7 +467,7 @@ impl Flight {
         self.from = Some((Ending::Contact(side), order));
     }
 
-    fn tell(&mut self, t: f64, kind: EventKind, side: Side) {
+    fn record(&mut self, t: f64, kind: EventKind, side: Side) {
         self.events.push(Ended { t, kind, side, after_series: false });
     }
 
@@ -477,29 +476,27 @@ impl Flight {
     }
 }
 
-/// A cubic through the ends of a step of a radian is off by less than this share of its
-/// slopes.
+/// Error bound of the cubic through the ends of a step of one radian, relative to its slopes.
 const CUBIC_ERROR: f64 = 0.01;
 
-/// Where, as a share of the step, the cubic through values and rates at both ends turns up, if
-/// the motion may be beyond there. It rises at the end.
+/// Returns the minimum, as a share of the step, of the cubic through values and rates at both ends, if the motion may be
+/// beyond the ending there. The cubic must rise at the end.
 fn turning_point(left: (f64, f64), right: (f64, f64), h: f64) -> Option<f64> {
     let (rise, s0, s1) = (right.0 - left.0, h * left.1, h * right.1);
     let room = CUBIC_ERROR * (s0.abs() + s1.abs());
-    // The inner Bernstein coefficients: where both are positive, so is the cubic.
+    // If both inner Bernstein coefficients are positive, so is the cubic.
     if left.0 + s0 / 3.0 > room && right.0 - s1 / 3.0 > room {
         return None;
     }
     let (b, a) = (3.0 * rise - 2.0 * s0 - s1, s0 + s1 - 2.0 * rise);
     let root = (b * b - 3.0 * a * s0).max(0.0).sqrt();
-    // The same number, written without cancellation.
+    // This form avoids cancellation.
     let u = if b > 0.0 { -s0 / (b + root) } else { (root - b) / (3.0 * a) };
     let least = left.0 + u * (s0 + u * (b + u * a));
     (u > 0.0 && u < 1.0 && least < room).then_some(u)
 }
 
-/// Where, as a share of the step, the cubic through a root at the start and a negative value at
-/// the end comes back to zero.
+/// Returns the second root, as a share of the step, of a cubic with a root at the start and a negative value at the end.
 fn second_root(left: (f64, f64), right: (f64, f64), h: f64) -> f64 {
     let (rise, s0, s1) = (right.0, h * left.1, h * right.1);
     let (b, a) = (3.0 * rise - 2.0 * s0 - s1, s0 + s1 - 2.0 * rise);
@@ -511,7 +508,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cubics_turn_where_they_do() {
+    fn minima_and_roots_of_cubics_are_found() {
         // (u - 0.25)^2 - 0.01: down at 0.25, negative there.
         let left = (0.0525, -0.5);
         let right = (0.5525, 1.5);

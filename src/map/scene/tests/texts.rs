@@ -1,7 +1,7 @@
 //! Long texts, many errors, and unprintable characters.
 
 use super::*;
-use crate::map::printable::is_printable;
+use crate::text::printable::is_printable;
 use std::time::Instant;
 
 #[test]

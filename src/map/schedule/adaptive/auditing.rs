@@ -42,10 +42,11 @@ impl Adaptive {
         count
     }
 
-    /// Evaluates an audit. Blocks with wrong cells are halved down to them. If there are too many wrong cells, borders are
-    /// first followed in narrower blocks. If that was done before, all blocks are halved that are filled with the kinds
-    /// that are wrong most often, usually chaos with its windows; blocks of other kinds stay. If the number of wrong cells may be due to
-    /// chance, more cells are audited first. Blocks that may not be halved further remain as they are.
+    /// Evaluates an audit. Blocks with wrong cells are halved down to them. If there are too many wrong cells, borders
+    /// are first followed in narrower blocks. If that was done before, all blocks are halved that are filled with the
+    /// kinds that are wrong most often, usually chaos with its windows; blocks of other kinds stay. If the number of
+    /// wrong cells may be due to chance, more cells are audited first. Blocks that may not be halved further remain as
+    /// they are.
     pub(super) fn judge_audit(&mut self, records: &[Record], requests: &mut Vec<u32>) {
         let Verdict { wrong, bad } = self.count_wrong(records);
         let audit = *self.audits.last().unwrap_or(&Audit::default());
@@ -137,7 +138,8 @@ impl Adaptive {
 }
 
 /// Returns the kinds with the largest fractions of wrong cells, so many that at most `allowed` wrong cells are of other
-/// kinds. Equal fractions are ordered by the first number of the key. The values are the numbers of sampled and of wrong cells.
+/// kinds. Equal fractions are ordered by the first number of the key. The values are the numbers of sampled and of
+/// wrong cells.
 fn worst(by_kind: &BTreeMap<(usize, u32), [usize; 2]>, allowed: usize) -> HashSet<u32> {
     let mut kinds: Vec<_> = by_kind.iter().collect();
     // Compares wrong / sampled, without a division.

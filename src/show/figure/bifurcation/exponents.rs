@@ -1,35 +1,26 @@
 //! The panel of exponents: the largest Lyapunov exponent of each column, with its standard error.
 
 use crate::map::bifurcation::{Column, Direction};
-use crate::show::drawing::axes::{Axis, Frame};
-use crate::show::drawing::{Canvas, DARK, FAINT, MESHING, Marker, RGBColor, Rect, Shape};
-use crate::show::error::DrawError;
-use crate::show::figure::bifurcation::{Look, both_directions, direction_color};
-use rattlemap_dynamics::orbit::Class;
+use crate::show::color::Color;
+use crate::show::drawing::axis::Axis;
+use crate::show::drawing::frame::Frame;
+use crate::show::drawing::{Canvas, DARK, Marker, Rect};
+use crate::show::figure::bifurcation::coloring::{Coloring, both_directions, class_color, direction_color};
 
-/// Height of one pass' strip of classes.
+/// Height of the strip of classes of one pass.
 const STRIP: f64 = 9.0;
 /// Opacity of the band of the standard error.
-pub(crate) const BAND: f64 = 0.28;
-/// Radius of a dot: the larger where columns lie apart, the smaller where they touch.
-const DOT: (f64, f64) = (1.3, 3.5);
-/// Exponents of two passes within this many pixels are one dot.
-const TOGETHER: f64 = 1.5;
-/// The panel shows this many times the largest positive exponent below zero, and at least so much: cycles that attract
-/// much more are at the lower edge.
+pub(crate) const ERROR_BAND: f64 = 0.28;
+/// Least and largest radius of a dot. Dots are larger where columns are farther apart.
+const EXPONENT_DOT: (f64, f64) = (1.3, 3.5);
+/// Exponents of two passes that are closer than this many pixels are drawn as one dot.
+const SAME_EXPONENT: f64 = 1.5;
+/// The panel extends below zero by `DEPTH` times the largest positive exponent, and at least by `LEAST_DEPTH`. Smaller exponents
+/// are drawn at the lower edge.
 const DEPTH: f64 = 4.0;
 const LEAST_DEPTH: f64 = 0.5;
 
-/// The colour of a class.
-pub(crate) fn class_color(class: Class) -> RGBColor {
-    match class {
-        Class::Periodic { .. } => MESHING,
-        Class::Chaotic => DARK,
-        Class::Undecided | Class::Failed => FAINT,
-    }
-}
-
-/// The scale of the panel.
+/// Returns the vertical axis.
 pub(crate) fn axis(columns: &[Column], strips: usize, height: f64) -> Axis {
     let ends = columns.iter().flat_map(|column| {
         let error = column.lyapunov_error.unwrap_or(0.0);
@@ -41,73 +32,66 @@ pub(crate) fn axis(columns: &[Column], strips: usize, height: f64) -> Axis {
     let is_clipped = finite.iter().any(|&x| x < floor);
     let label = if is_clipped { "exponent \u{3bb}, cut below" } else { "largest exponent \u{3bb}" };
     let mut axis = Axis::around(label, finite.iter().map(|x| x.max(floor)).chain([0.0]), 1e-3);
-    // The strips must not lie on data.
+    // Leaves room for the strips below the data.
     axis.low -= (axis.high - axis.low) * STRIP * strips as f64 / height;
     axis
 }
 
-/// Draws zero, error bands and exponents; then the strips, one per pass.
-pub(crate) fn draw(
-    canvas: &Canvas<'_>,
-    frame: &Frame,
-    columns: &[Column],
-    look: Look,
-) -> Result<(), DrawError> {
+/// Draws the zero line, error bands and exponents, then the strips, one per pass.
+pub(crate) fn draw(canvas: &Canvas, frame: &Frame, columns: &[Column], coloring: Coloring) {
     let Rect { left, right, .. } = frame.rect;
     let zero = frame.at(0.0, 0.0).1;
-    canvas.stroke(&[(left, zero), (right, zero)], 1.2, DARK)?;
+    canvas.stroke(&[(left, zero), (right, zero)], 1.2, DARK);
     let of = |pass: Option<Direction>| columns.iter().filter(move |column| column.direction == pass);
-    for &pass in look.passes() {
+    for &pass in coloring.passes() {
         let other = pass.map(|direction| match direction {
             Direction::Up => Direction::Down,
             Direction::Down => Direction::Up,
         });
         let others = of(other).map(|column| column.lyapunov);
-        let pass: Vec<(&Column, RGBColor)> = of(pass)
+        let pass: Vec<(&Column, Color)> = of(pass)
             .zip(others)
             .map(|(column, other)| {
                 let apart = (frame.at(0.0, column.lyapunov).1 - frame.at(0.0, other).1).abs();
                 let color = match column.direction {
                     None => class_color(column.class),
-                    Some(_) if apart < TOGETHER => both_directions(),
+                    Some(_) if apart < SAME_EXPONENT => both_directions(),
                     Some(direction) => direction_color(direction),
                 };
                 (column, color)
             })
             .collect();
-        draw_pass(canvas, frame, &pass)?;
+        draw_pass(canvas, frame, &pass);
     }
-    for (row, &pass) in look.passes().iter().rev().enumerate().filter(|_| look.has_strips()) {
+    for (row, &pass) in coloring.passes().iter().rev().enumerate().take(coloring.strips()) {
         let pass: Vec<&Column> = of(pass).collect();
         let bottom = frame.rect.bottom - STRIP * row as f64;
         for (column, [from, to]) in pass.iter().zip(spans(frame, &pass)) {
             let rect = Rect { left: from, right: to, top: bottom - STRIP + 1.0, bottom };
-            canvas.fill(rect, class_color(column.class), 1.0)?;
+            canvas.fill(rect, class_color(column.class), 1.0);
         }
     }
-    Ok(())
 }
 
-fn draw_pass(canvas: &Canvas<'_>, frame: &Frame, pass: &[(&Column, RGBColor)]) -> Result<(), DrawError> {
+fn draw_pass(canvas: &Canvas, frame: &Frame, pass: &[(&Column, Color)]) {
     let Rect { left, top, right, bottom } = frame.rect;
     let height = |value: f64| frame.at(0.0, value).1.clamp(top, bottom);
     let columns: Vec<&Column> = pass.iter().map(|(column, _)| *column).collect();
     for ((column, color), [from, to]) in pass.iter().zip(spans(frame, &columns)) {
         let Some(error) = column.lyapunov_error.filter(|_| column.lyapunov.is_finite()) else { continue };
         let [high, low] = [1.0, -1.0].map(|sign| height(column.lyapunov + sign * error));
-        canvas.fill(Rect { left: from, right: to, top: high, bottom: low }, *color, BAND)?;
+        canvas.fill(Rect { left: from, right: to, top: high, bottom: low }, *color, ERROR_BAND);
     }
     let spacing = (right - left) / pass.len().max(1) as f64;
-    let radius = (0.4 * spacing).clamp(DOT.0, DOT.1);
+    let radius = (0.4 * spacing).clamp(EXPONENT_DOT.0, EXPONENT_DOT.1);
     let is_drawn = |column: &Column| column.value.is_finite() && !column.lyapunov.is_nan();
     for (column, color) in pass.iter().filter(|(column, _)| is_drawn(column)) {
-        let marker = Marker { shape: Shape::Circle, color: *color, radius, hollow: false };
-        canvas.marker((frame.at(column.value, 0.0).0, height(column.lyapunov)), marker)?;
+        let at = (frame.at(column.value, 0.0).0, height(column.lyapunov));
+        canvas.marker(at, Marker::dot(*color, radius));
     }
-    Ok(())
 }
 
-/// The pixels of each column, from the middle between it and the one before to the middle between it and the next.
+/// Returns the left and right edges of each column: the middles between it and its neighbours.
 fn spans(frame: &Frame, pass: &[&Column]) -> Vec<[f64; 2]> {
     let Rect { left, right, .. } = frame.rect;
     let at: Vec<f64> = pass.iter().map(|column| frame.at(column.value, 0.0).0).collect();
@@ -118,19 +102,4 @@ fn spans(frame: &Frame, pass: &[&Column]) -> Vec<[f64; 2]> {
         [from, to].map(|x| if x.is_finite() { x.clamp(left, right) } else { left })
     };
     (0..at.len()).map(span).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::show::color_difference::least_difference;
-
-    #[test]
-    fn classes_can_be_told_apart_by_all_eyes() {
-        let colors = [Class::Periodic { period: 1 }, Class::Chaotic, Class::Undecided].map(class_color);
-        let [periodic, chaotic, undecided] = colors.map(|RGBColor(r, g, b)| [r, g, b]);
-        for (a, b) in [(periodic, chaotic), (chaotic, undecided), (periodic, undecided)] {
-            assert!(least_difference(a, b) >= 10.0, "{a:?} {b:?}: {}", least_difference(a, b));
-        }
-    }
 }

@@ -1,71 +1,66 @@
-//! The gap against time between its walls, the word's symbols on it, and how deep the teeth press.
+//! The gap against time between its walls, with the symbols of the word, and the depth of penetration. Lengths are in pixels.
 
-use crate::show::drawing::Canvas;
-use crate::show::drawing::axes::{Axis, Frame};
-use crate::show::drawing::legend::{Entry, Key, draw_head};
-use crate::show::error::DrawError;
+use crate::show::drawing::axis::Axis;
+use crate::show::drawing::frame::Frame;
+use crate::show::drawing::legend::draw_head;
+use crate::show::drawing::{Align, Canvas, DARK, MEDIUM, MESHING, Rect, SMALL, wall_color};
+use crate::show::figure::orbit::flights;
 use crate::show::figure::orbit::motion::Piece;
-use crate::show::figure::orbit::{
-    Align, DARK, LEFT, LINE, MEDIUM, MESHING, Rect, SMALL, Scene, name, symbols, wall_color,
-};
+use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
+use crate::show::names;
 use crate::show::symbols::number;
 use rattlemap_dynamics::model::{Contact, Side, State};
 
-/// Room for the walls' names beside the gap.
+/// Room for the walls' names right of the panel, and the room for their text, which includes the margin.
 const WALL_NAMES: f64 = 97.0;
-/// And what of it, and of the margin, their text may take.
 const WALL_TEXT: f64 = 135.0;
-/// Between a symbol of the word and its flight.
+/// Distance between a symbol of the word and its flight.
 const SYMBOL_AWAY: f64 = 30.0;
+/// A single wall is shown if its distance from the motion is less than this many times the motion's extent.
+const FAR_WALL: f64 = 2.0;
+/// Margin beyond the motion's ends, as a share of its extent, unless two walls bound it.
+const MOTION_MARGIN: f64 = 0.15;
 
-/// A single wall that is farther from the motion than this many times its extent is out of the picture.
-const FAR: f64 = 2.0;
-/// Room beyond the motion's ends, as a share of its extent, where no two walls bound it.
-const BEYOND: f64 = 0.15;
-
-impl Scene<'_> {
-    pub(crate) fn draw_gap(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
+impl OrbitPlot<'_> {
+    pub(crate) fn draw_gap(&self, canvas: &Canvas) {
         let is_coordinate = self.names.iter().any(|name| name == self.walls.gap());
         let free = if is_coordinate { "free motion" } else { "gap in free motion" };
-        let mut legend = vec![Entry::new(Key::Line { color: DARK, width: LINE }, free)];
-        legend.extend(self.meshing_entry());
-        legend.extend(self.event_entries(false));
-        let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
-        let panel = canvas.panel(LEFT, top);
+        let legend = self.legend(self.motion_entries(free), false);
+        let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
+        let panel = canvas.panel(ORBIT_LEFT, top);
         let panel = Rect { right: panel.right - WALL_NAMES, ..panel };
         let bottom = panel.bottom;
-        let split = if self.yields() { top + 0.64 * (bottom - top) } else { bottom };
+        let split = if self.has_depth() { top + 0.64 * (bottom - top) } else { bottom };
         let label = match is_coordinate {
             true => format!("displacement, {}", self.walls.gap()),
-            false => format!("gap, z = {}", self.gap_in_words()),
+            false => format!("gap, z = {}", self.gap_expression()),
         };
         let frame =
             Frame { rect: Rect { bottom: split, ..panel }, x: self.time_axis(), y: self.gap_axis(&label) };
-        self.draw_walls(canvas, &frame)?;
+        self.draw_walls(canvas, &frame);
         let at = |t: f64, state: &State| (t, self.gap(state));
-        self.draw_lines(canvas, &frame, (DARK, MESHING), at)?;
-        self.draw_markers(canvas, &frame, false, at)?;
-        self.draw_symbols(canvas, &frame)?;
-        frame.draw_axes(canvas, split == bottom)?;
+        self.draw_lines(canvas, &frame, (DARK, MESHING), at);
+        self.draw_markers(canvas, &frame, false, at);
+        self.draw_symbols(canvas, &frame);
+        frame.draw_axes(canvas, split == bottom);
         if split < bottom {
-            self.draw_penetration(canvas, Rect { top: split + 30.0, ..panel })?;
+            self.draw_penetration(canvas, Rect { top: split + 30.0, ..panel });
         }
-        Ok(())
     }
 
-    /// Whether the motion goes behind a wall that hits back, less than can be seen in the gap itself. Behind an elastic
-    /// wall it goes far, and on a rigid one nowhere.
-    fn yields(&self) -> bool {
+    /// Whether the motion meshes with a wall of impacts, so that a panel shows the depth, which is too small to be visible in the
+    /// gap. Behind an elastic wall the depth is visible; on a rigid wall it is zero.
+    fn has_depth(&self) -> bool {
         let meshing = self.motion.pieces.iter().filter_map(|piece| piece.meshing);
         meshing.into_iter().any(|side| self.contact(side) == Some(Contact::Impact))
     }
 
-    /// Holds the motion and both walls, or the single one if it is near.
+    /// Returns an axis that holds the motion and both walls, or a single wall if it is near.
     fn gap_axis(&self, label: &str) -> Axis {
         let length = self.oscillator.length_scale();
         let gaps = || self.motion.points().map(|(_, state)| self.gap(state));
         let (low, high) = gaps().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(z), b.max(z)));
-        let extent = (high - low).max(self.died_down());
+        let extent = (high - low).max(self.decayed());
         let [right, left] = self.oscillator.walls;
         let are_two = right.is_finite() && left.is_finite();
         let mut ends: Vec<f64> = Vec::new();
@@ -74,25 +69,26 @@ impl Scene<'_> {
         }
         let is_elastic = Side::BOTH.iter().any(|side| self.contact(*side) == Some(Contact::Elastic));
         if !are_two || is_elastic {
-            ends.extend([high + BEYOND * extent, low - BEYOND * extent]);
+            ends.extend([high + MOTION_MARGIN * extent, low - MOTION_MARGIN * extent]);
             let near = [(right, right - high, 1.0), (left, low - left, -1.0)];
-            let near = near.into_iter().filter(|(wall, away, _)| wall.is_finite() && *away < FAR * extent);
-            ends.extend(near.map(|(wall, _, sign)| wall + sign * BEYOND * extent));
+            let near =
+                near.into_iter().filter(|(wall, away, _)| wall.is_finite() && *away < FAR_WALL * extent);
+            ends.extend(near.map(|(wall, _, sign)| wall + sign * MOTION_MARGIN * extent));
         }
-        let least_span = if are_two { length } else { self.died_down() };
+        let least_span = if are_two { length } else { self.decayed() };
         Axis::around(label, gaps().chain(ends), least_span)
     }
 
-    /// The word, symbol by symbol: behind its wall where a flight returns to it, else beside the flight.
-    fn draw_symbols(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), DrawError> {
+    /// Draws the symbols of the word: behind the wall of a flight that returns to it, else beside the flight.
+    fn draw_symbols(&self, canvas: &Canvas, frame: &Frame) {
         let walls = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
         let is_elastic = |side: Side| self.contact(side) == Some(Contact::Elastic);
-        for (t, symbol) in symbols::symbols(&self.motion.events, self.cycle) {
+        for (t, symbol) in flights::symbols(&self.motion.events, self.cycle) {
             let nearest = self.motion.points().min_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
             let Some((_, state)) = nearest else { continue };
             let (x, y) = frame.at(t, self.gap(state));
             let [mut upper, mut lower] = walls;
-            // Behind an elastic wall the motion is where the symbol would be.
+            // The symbol of contact with an elastic wall is drawn behind the motion.
             if symbol == '1' && is_elastic(Side::Right) {
                 upper = y.min(upper);
             }
@@ -105,59 +101,52 @@ impl Scene<'_> {
                 '3' => (x + SYMBOL_AWAY, y - 0.5 * SYMBOL_AWAY),
                 _ => (x - SYMBOL_AWAY, y - 0.5 * SYMBOL_AWAY),
             };
-            canvas.text(&symbol.to_string(), at, MEDIUM, Align::Center, DARK)?;
+            canvas.text(&symbol.to_string(), at, MEDIUM, Align::Center, DARK);
         }
-        Ok(())
     }
 
-    /// The walls of the gap, and what lies behind them.
-    fn draw_walls(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), DrawError> {
+    /// Draws the walls and the areas behind them.
+    fn draw_walls(&self, canvas: &Canvas, frame: &Frame) {
         let rect = frame.rect;
         let walls = || Side::BOTH.into_iter().filter(|side| self.contact(*side).is_some());
         let height = |side: Side| frame.at(0.0, self.oscillator.walls[side.index()]).1;
-        let is_shown = |side: Side| (rect.top..=rect.bottom).contains(&height(side));
-        for side in walls().filter(|side| is_shown(*side)) {
+        let is_visible = |side: Side| (rect.top..=rect.bottom).contains(&height(side));
+        for side in walls().filter(|side| is_visible(*side)) {
             let behind = match side {
                 Side::Right => Rect { bottom: height(side), ..rect },
                 Side::Left => Rect { top: height(side), ..rect },
             };
-            canvas.fill(behind, DARK, 0.08)?;
+            canvas.fill(behind, DARK, 0.08);
         }
-        frame.draw_grid(canvas)?;
+        frame.draw_grid(canvas);
         let x = rect.right + 14.0;
         for side in walls() {
             let color = wall_color(side);
-            let (y, beyond) = match (is_shown(side), side) {
+            let (y, beyond) = match (is_visible(side), side) {
                 (true, _) => (height(side), None),
                 (false, Side::Right) => (rect.top + 28.0, Some("(above)")),
                 (false, Side::Left) => (rect.bottom - 56.0, Some("(below)")),
             };
-            if is_shown(side) {
-                canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, color)?;
+            if is_visible(side) {
+                canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, color);
             }
-            let lines = [Some(format!("{} wall", name(side))), self.position(canvas, side)?];
+            let lines = [Some(format!("{} wall", names::side(side))), self.position(canvas, side)];
             let lines = lines.into_iter().flatten().chain(beyond.map(str::to_owned));
             for (line, text) in lines.enumerate() {
-                canvas.text(&text, (x, y - 14.0 + 28.0 * line as f64), SMALL, Align::Left, color)?;
+                canvas.text(&text, (x, y - 14.0 + 28.0 * line as f64), SMALL, Align::Left, color);
             }
         }
-        Ok(())
     }
 
-    /// Where a wall is: as the model says it, or its value where there is no room for that.
-    fn position(&self, canvas: &Canvas<'_>, side: Side) -> Result<Option<String>, DrawError> {
-        let words = self.walls.position(side);
+    /// Returns the position of a wall: the model's expression, or its value if the expression is too long.
+    fn position(&self, canvas: &Canvas, side: Side) -> Option<String> {
+        let expression = self.walls.position(side);
         let value = format!("{} = {}", self.walls.gap(), number(self.oscillator.walls[side.index()]));
-        for text in words.into_iter().chain([value]) {
-            if canvas.text_width(&text, SMALL)? <= WALL_TEXT {
-                return Ok(Some(text));
-            }
-        }
-        Ok(None)
+        expression.into_iter().chain([value]).find(|text| canvas.text_width(text, SMALL) <= WALL_TEXT)
     }
 
-    /// How deep the teeth press into the wall: too little to be seen in the gap itself.
-    fn draw_penetration(&self, canvas: &Canvas<'_>, rect: Rect) -> Result<(), DrawError> {
+    /// Draws the depth of penetration into the walls.
+    fn draw_penetration(&self, canvas: &Canvas, rect: Rect) {
         let depth = |piece: &Piece, state: &State| {
             piece
                 .meshing
@@ -173,18 +162,18 @@ impl Scene<'_> {
             x: self.time_axis(),
             y: Axis::around(&label, depths, 1e-6 * self.oscillator.length_scale()),
         };
-        frame.draw_grid(canvas)?;
+        frame.draw_grid(canvas);
         let y = frame.at(0.0, 0.0).1;
-        canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, DARK)?;
-        canvas.text("wall", (rect.right + 14.0, y), SMALL, Align::Left, DARK)?;
+        canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, DARK);
+        canvas.text("wall", (rect.right + 14.0, y), SMALL, Align::Left, DARK);
         for piece in &self.motion.pieces {
             if let Some(side) = piece.meshing {
                 let path: Vec<_> =
                     piece.points.iter().map(|(t, state)| frame.at(*t, depth(piece, state))).collect();
-                canvas.stroke(&path, LINE + 0.6, wall_color(side))?;
+                canvas.stroke(&path, FREE_LINE + 0.6, wall_color(side));
             }
         }
-        frame.draw_axes(canvas, true)
+        frame.draw_axes(canvas, true);
     }
 
     fn gap(&self, state: &State) -> f64 {
@@ -192,22 +181,22 @@ impl Scene<'_> {
         g1 * state[0] + g2 * state[2]
     }
 
-    /// The gap in terms of the displacements.
-    fn gap_in_words(&self) -> String {
-        let mut words = String::new();
+    /// Returns the gap as an expression of the displacements.
+    fn gap_expression(&self) -> String {
+        let mut text = String::new();
         let terms = self.oscillator.gap.into_iter().zip(self.names.iter().step_by(2));
         for (factor, name) in terms.filter(|(factor, _)| *factor != 0.0) {
-            words += match (words.is_empty(), factor < 0.0) {
+            text += match (text.is_empty(), factor < 0.0) {
                 (true, true) => "\u{2212}",
                 (true, false) => "",
                 (false, true) => " \u{2212} ",
                 (false, false) => " + ",
             };
             match factor.abs() {
-                1.0 => words += name,
-                size => words += &format!("{size} {name}"),
+                1.0 => text += name,
+                size => text += &format!("{size} {name}"),
             }
         }
-        words
+        text
     }
 }

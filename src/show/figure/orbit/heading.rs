@@ -1,20 +1,20 @@
-//! The words above an orbit's figures.
+//! Title and subtitle of an orbit's figures.
 
 use crate::show::caption;
-use crate::show::drawing::superscript;
 use crate::show::orbit_summary::has_mirror_images;
+use crate::show::symbols::superscript;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::{Class, Orbit};
 
-/// Symbols of a word that a heading has room for.
+/// Largest number of symbols of a word in a heading.
 const WORD_SYMBOLS: usize = 32;
 
-/// The oscillator: what it is, and what tells it from the model's defaults.
+/// Returns the title: the model and its parameters.
 pub(crate) fn parameters(model: &dyn Model) -> String {
     format!("{}: {}", model.title(), caption::parameters(model, |_| false))
 }
 
-/// Class, word and Lyapunov exponent of the orbit; its symmetry where motion has mirror images.
+/// Returns the subtitle: class, word and Lyapunov exponent, and the symmetry if the model is symmetric.
 pub(crate) fn character(model: &dyn Model, orbit: &Orbit) -> String {
     let class = match (orbit.class, orbit.symmetric.filter(|_| has_mirror_images(model))) {
         (Class::Periodic { period }, Some(true)) => format!("period {period}, symmetric"),
@@ -42,7 +42,7 @@ fn flights(orbit: &Orbit) -> String {
     }
 }
 
-/// A long word with runs of a symbol as powers, cut where even that is too long.
+/// Writes runs of a symbol in a long word as powers, and cuts the word if that is still too long.
 fn shortened(word: &str) -> String {
     if word.len() <= WORD_SYMBOLS {
         return word.to_owned();
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_words_are_written_with_powers() {
+    fn long_words_have_powers_and_are_cut() {
         assert_eq!(shortened("13554622"), "13554622");
         assert_eq!(shortened(&format!("1{}36", "2".repeat(130))), "12\u{b9}\u{b3}\u{2070}36");
         let long = shortened(&"36".repeat(40));

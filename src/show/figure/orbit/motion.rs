@@ -1,39 +1,38 @@
-//! A trace and its events, merged into polylines whose corners are exact.
+//! The motion as polylines with exact corners, merged from a trace and its events.
 
 use std::collections::BTreeSet;
 
 use rattlemap_dynamics::model::{Side, State};
 use rattlemap_dynamics::orbit::{Event, EventKind, Orbit, Sample};
 
-/// A stretch of motion between two events.
+/// The motion between two events.
 pub(crate) struct Piece {
-    /// The wall the teeth mesh on, if they do.
+    /// Wall that the teeth mesh on; none in free motion.
     pub(crate) meshing: Option<Side>,
-    /// Times in forcing periods and states, in order; at least one.
+    /// Times in forcing periods and states in order, at least one.
     pub(crate) points: Vec<(f64, State)>,
 }
 
 impl Piece {
-    /// Start and end in forcing periods.
+    /// Returns start and end in forcing periods.
     pub(crate) fn span(&self) -> (f64, f64) {
         (self.points[0].0, self.points[self.points.len() - 1].0)
     }
 }
 
-/// What there is to draw of an orbit.
+/// The motion of an orbit.
 pub(crate) struct Motion {
     pub(crate) pieces: Vec<Piece>,
-    /// The events on the trace: time in forcing periods, and the event.
+    /// Events within the trace, with their times in forcing periods.
     pub(crate) events: Vec<(f64, Event)>,
 }
 
 impl Motion {
-    /// Merges trace and events; states that are not finite are left out.
+    /// Merges trace and events. States that are not finite are skipped.
     pub(crate) fn new(orbit: &Orbit, trace: &[Sample]) -> Motion {
         let period = if orbit.forcing_period > 0.0 { orbit.forcing_period } else { 1.0 };
         let finite = |t: f64, state: &State| t.is_finite() && state.iter().all(|v| v.is_finite());
-        // A chaotic orbit's events may go on after the trace has stopped; those between its
-        // last sample and where the next would lie still belong to it.
+        // The events of a chaotic orbit may continue after the trace. Those up to one sample after its end belong to it.
         let end = match trace {
             [] => f64::INFINITY,
             [only] => only.t,
@@ -55,30 +54,30 @@ impl Motion {
         Motion { pieces: pieces.finished(), events }
     }
 
-    /// Whether the teeth mesh anywhere.
+    /// Whether the motion contains meshing.
     pub(crate) fn meshes(&self) -> bool {
         self.pieces.iter().any(|piece| piece.meshing.is_some())
     }
 
-    /// The kinds of event that occur, in the order of a legend.
+    /// Returns the kinds of events that occur, in the order of a legend.
     pub(crate) fn kinds(&self) -> Vec<EventKind> {
         let all = [EventKind::Impact, EventKind::MeshStart, EventKind::MeshEnd];
         all.into_iter().filter(|kind| self.events.iter().any(|(_, e)| e.kind == *kind)).collect()
     }
 
-    /// The walls at which there are events or meshing.
+    /// Returns the walls with events or meshing.
     pub(crate) fn walls(&self) -> BTreeSet<Side> {
         let meshing = self.pieces.iter().filter_map(|piece| piece.meshing);
         self.events.iter().map(|(_, e)| e.side).chain(meshing).collect()
     }
 
-    /// Every state that is drawn, with its time in forcing periods.
+    /// Returns all states with their times in forcing periods.
     pub(crate) fn points(&self) -> impl Iterator<Item = (f64, &State)> {
         self.pieces.iter().flat_map(|piece| piece.points.iter().map(|(t, state)| (*t, state)))
     }
 }
 
-/// The pieces under construction; the last one is open.
+/// Pieces under construction. The last one is open.
 struct Pieces(Vec<Piece>);
 
 impl Pieces {
@@ -99,13 +98,13 @@ impl Pieces {
 
     fn push(&mut self, t: f64, sample: &Sample) {
         let piece = self.open();
-        // A sample on an event says nothing new, and may hold the state on either side of it.
+        // A sample at the time of an event may hold the state before or after it.
         if piece.points.last().is_some_and(|(last, _)| t <= *last) {
             return;
         }
         piece.points.push((t, sample.state));
         if piece.meshing != sample.meshing {
-            // No event told of it: the events span less than the trace.
+            // The events span less than the trace, so this change has no event.
             self.0.push(Piece { meshing: sample.meshing, points: vec![(t, sample.state)] });
         }
     }
@@ -119,27 +118,12 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::orbit::{Class, Status};
-    use rattlemap_dynamics::word::Word;
+    use rattlemap_dynamics::model::{GearPair, REST};
+    use rattlemap_dynamics::orbit::{Settings, analyse};
 
     fn orbit(events: Vec<Event>) -> Orbit {
-        Orbit {
-            class: Class::Periodic { period: 1 },
-            status: Status::Ok,
-            lyapunov: -0.1,
-            lyapunov_error: None,
-            floquet: None,
-            symmetric: None,
-            word: Word::default(),
-            impacts_per_period: 0.0,
-            mesh_fraction: 0.0,
-            strobe: [0.0; 4],
-            strobe_meshing: None,
-            events,
-            cycle_periods: 1,
-            forcing_period: 2.0,
-            periods_run: 0,
-        }
+        let orbit = analyse(&GearPair::paper(0.605), REST, &Settings::default()).unwrap();
+        Orbit { events, strobe_meshing: None, forcing_period: 2.0, ..orbit }
     }
 
     fn event(kind: EventKind, t: f64) -> Event {
@@ -171,19 +155,19 @@ mod tests {
         assert_eq!(modes, [None, None, meshing, None]);
         assert_eq!(motion.pieces[0].points.last().unwrap().1, [0.5, 1.0, 0.0, 0.0]);
         assert_eq!(motion.pieces[1].points[0], (0.25, [0.5, 0.2, 0.0, 0.8]));
-        // The sample on the start of meshing was left out.
+        // The sample at the start of meshing is skipped.
         assert_eq!(motion.pieces[2].points.len(), 3);
         assert_eq!(motion.pieces[3].span(), (0.8, 1.0));
     }
 
     #[test]
-    fn gaps_in_the_data_are_survived() {
+    fn incomplete_data_are_accepted() {
         assert!(Motion::new(&orbit(vec![]), &[]).pieces.is_empty());
         let late =
             Motion::new(&orbit(vec![event(EventKind::Impact, 9.0)]), &[sample(0.0, None), sample(1.0, None)]);
         assert!(late.events.is_empty());
-        let unannounced = [sample(0.0, None), sample(1.0, Some(Side::Left)), sample(2.0, None)];
-        assert_eq!(Motion::new(&orbit(vec![]), &unannounced).pieces.len(), 3);
+        let without_event = [sample(0.0, None), sample(1.0, Some(Side::Left)), sample(2.0, None)];
+        assert_eq!(Motion::new(&orbit(vec![]), &without_event).pieces.len(), 3);
         let mut broken = sample(1.0, None);
         broken.state[2] = f64::NAN;
         assert_eq!(Motion::new(&orbit(vec![]), &[sample(0.0, None), broken]).points().count(), 1);

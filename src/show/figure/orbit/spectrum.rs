@@ -1,98 +1,79 @@
-//! The spectrum of gap and velocity, one below the other.
+//! The spectra of gap and velocity, one below the other.
 
-use std::path::Path;
+use std::io::Write;
 
 use crate::map::scene::Format;
-use crate::show::drawing::axes::{Axis, Frame};
+use crate::show::drawing::axis::Axis;
+use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::draw_head;
-use crate::show::drawing::{Canvas, DARK, GEAR_2, Marker, Rect, Shape, save_figure};
-use crate::show::error::{DrawError, FigureError};
-use crate::show::figure::orbit::{LEFT, LINE, WIDTH, heading};
+use crate::show::drawing::{Canvas, DARK, GEAR_2, Marker, Rect, write_figure};
+use crate::show::error::WriteError;
+use crate::show::figure::orbit::heading;
+use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, ORBIT_WIDTH};
 use crate::show::orbit_spectrum::Spectrum;
-use crate::show::wall_words::WallWords;
-use crate::store::error::OutputError;
+use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::Orbit;
 
-/// Lines below this share of the largest are rounding or folded back, and are not shown.
-const FLOOR: f64 = 1e-5;
+/// Lines below this share of the largest one are not drawn: they are rounding errors or aliases.
+const SMALLEST_SHARE: f64 = 1e-5;
 
-/// Lines that can be told apart as such.
-const APART: usize = 200;
+/// Spectra of more lines have thinner strokes and smaller dots.
+const THICK_LINES: usize = 200;
 
-/// Every file that [`write_each`] may make.
-pub(crate) const NAMES: [&str; 3] = ["spectrum.png", "spectrum.svg", "spectrum.pdf"];
+/// Name of the figure's file without its extension.
+pub const NAME: &str = "spectrum";
 
-/// Draws a spectrum in each of the `formats` of figures; `place` gets the name of each and what saves it at a path.
-///
-/// # Errors
-/// As `place`.
-pub(crate) fn write_each(
+/// Draws a spectrum and writes it.
+pub fn write(
+    out: impl Write,
+    format: Format,
     model: &dyn Model,
     orbit: &Orbit,
     spectrum: &Spectrum,
-    formats: &[Format],
-    mut place: impl FnMut(&'static str, &dyn Fn(&Path) -> Result<(), FigureError>) -> Result<(), OutputError>,
-) -> Result<(), OutputError> {
-    let is_asked = |name: &&str| formats.iter().any(|format| *name == format!("spectrum.{}", format.name()));
-    NAMES
-        .into_iter()
-        .filter(is_asked)
-        .try_for_each(|name| place(name, &|path| save(path, model, orbit, spectrum)))
-}
-
-fn save(path: &Path, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Result<(), FigureError> {
+) -> Result<(), WriteError> {
     let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
-    save_figure(path, (WIDTH, 1050), |canvas| {
-        let top = draw_head(canvas, &heading::parameters(model), &subtitle, &[])? + 14.0;
-        let whole = canvas.panel(LEFT, top);
+    write_figure(out, format, (ORBIT_WIDTH, 1050), |canvas| {
+        let top = draw_head(canvas, &heading::parameters(model), &subtitle, &[]) + 14.0;
+        let whole = canvas.panel(ORBIT_LEFT, top);
         let middle = (top + whole.bottom) / 2.0;
-        let words = WallWords::of(model);
-        // A gap that is a displacement has its name.
-        let quantity = if words.gap() == "z" { "the gap" } else { words.gap() };
+        let labels = WallLabels::of(model);
+        let quantity = if labels.gap() == "z" { "the gap" } else { labels.gap() };
         let of_gap = format!("amplitude of {quantity}");
         let panels = [
             (of_gap.as_str(), top, middle - 15.0),
             ("amplitude of its velocity", middle + 15.0, whole.bottom),
         ];
         for (which, (label, top, bottom)) in panels.into_iter().enumerate() {
-            draw(canvas, Rect { top, bottom, ..whole }, spectrum, which, label)?;
+            draw(canvas, Rect { top, bottom, ..whole }, spectrum, which, label);
         }
-        Ok(())
     })
 }
 
-/// The gap's lines, or with `which` 1 those of its velocity.
-fn draw(
-    canvas: &Canvas<'_>,
-    rect: Rect,
-    spectrum: &Spectrum,
-    which: usize,
-    label: &str,
-) -> Result<(), DrawError> {
+/// Draws the lines of the gap, or with `which` 1 those of its velocity.
+fn draw(canvas: &Canvas, rect: Rect, spectrum: &Spectrum, which: usize, label: &str) {
     let lines = || spectrum.lines.iter().map(|line| (line.frequency, line.amplitudes[which]));
     let largest = lines().map(|(_, size)| size).fold(0.0, f64::max);
-    let is_shown = |size: f64| size > FLOOR * largest;
+    let is_visible = |size: f64| size > SMALLEST_SHARE * largest;
     let end = spectrum.lines.last().map_or(1.0, |line| line.frequency);
     let frame = Frame {
         rect,
         x: Axis::exact("frequency in multiples of the forcing frequency", 0.0, end),
-        y: Axis::decades(label, lines().map(|(_, size)| size).filter(|&size| is_shown(size))),
+        y: Axis::decades(label, lines().map(|(_, size)| size).filter(|&size| is_visible(size))),
     };
-    frame.draw_grid(canvas)?;
+    frame.draw_grid(canvas);
     if spectrum.cycle.is_none() {
         let path: Vec<_> = lines().map(|(frequency, size)| frame.at(frequency, size)).collect();
-        canvas.stroke(&path, 1.4, DARK)?;
+        canvas.stroke(&path, 1.4, DARK);
     } else {
-        let few = spectrum.lines.len() <= APART;
-        for (frequency, size) in lines().filter(|&(_, size)| is_shown(size)) {
+        let [width, radius] = if spectrum.lines.len() <= THICK_LINES { [FREE_LINE, 5.0] } else { [1.0, 2.5] };
+        for (frequency, size) in lines().filter(|&(_, size)| is_visible(size)) {
             let at = frame.at(frequency, size);
-            canvas.stroke(&[(at.0, rect.bottom), at], if few { LINE } else { 1.0 }, DARK)?;
-            // What is no multiple of the forcing is what the cycle adds.
+            canvas.stroke(&[(at.0, rect.bottom), at], width, DARK);
+            // Subharmonics have another colour than multiples of the forcing frequency.
             let color = if frequency.fract() == 0.0 { DARK } else { GEAR_2 };
-            let radius = if few { 5.0 } else { 2.5 };
-            canvas.marker(at, Marker { shape: Shape::Circle, color, radius, hollow: false })?;
+            canvas.marker(at, Marker::dot(color, radius));
         }
     }
-    frame.draw_axes(canvas, which == 1)
+    frame.draw_axes(canvas, which == 1);
 }

@@ -1,59 +1,60 @@
-//! What figures call the gap of a model and its walls.
+//! Labels of a model's gap and walls in figures.
 
 use rattlemap_dynamics::model::{Model, Side};
 
 use crate::model_file::{Definition, FileModel};
+use crate::show::names;
 use crate::show::symbols::{number, symbol};
 use crate::text::expression::Expression;
 
-/// Characters of a position that a legend has room for.
-const LONGEST: usize = 24;
+/// Largest number of characters of a position in a legend.
+const LONGEST_POSITION: usize = 24;
 
-/// The gap and the positions of its walls, in the model's own words.
+/// The gap and the positions of the walls, by the symbols of the model.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct WallWords {
-    /// The gap: its coordinate's name where it is one displacement, else `z`.
+pub(crate) struct WallLabels {
+    /// Symbol of the gap: that of the displacement if it is a single one, else `z`.
     gap: String,
-    /// Positions of the right and the left wall: none where there is no wall, empty where a legend has no room.
+    /// Positions of the right and the left wall: none without a wall, empty if too long for a legend.
     at: [Option<String>; 2],
 }
 
-impl WallWords {
-    /// Those of a model, whatever its parameters' values where its file has expressions.
-    pub(crate) fn of(model: &dyn Model) -> WallWords {
-        // A model of the library's own is described by the file of its name.
+impl WallLabels {
+    /// Returns the labels of a model. Positions given as expressions in its file do not depend on parameter values.
+    pub(crate) fn of(model: &dyn Model) -> WallLabels {
+        // The library's own models are described by the files of the same name.
         let named = FileModel::built_in(model.name());
         match model.downcast_ref::<FileModel>().or(named.as_ref()) {
-            Some(file) => WallWords::of_file(file.definition()),
-            None => WallWords::of_values(model),
+            Some(file) => WallLabels::of_file(file.definition()),
+            None => WallLabels::of_values(model),
         }
     }
 
-    fn of_file(definition: &Definition) -> WallWords {
+    fn of_file(definition: &Definition) -> WallLabels {
         let motion = &definition.motion;
         let is = |entry: &Expression, value: f64| entry.as_number() == Some(value);
         let alone = (0..motion.degrees()).find(|&i| {
             is(&motion.gap[i], 1.0) && (0..motion.degrees()).all(|j| j == i || is(&motion.gap[j], 0.0))
         });
         let at = |side| definition.wall(side).map(|wall| position(&wall.at));
-        WallWords::new(alone.map(|i| symbol(&motion.coordinates[i])), Side::BOTH.map(at))
+        WallLabels::new(alone.map(|i| symbol(&motion.coordinates[i])), Side::BOTH.map(at))
     }
 
-    fn of_values(model: &dyn Model) -> WallWords {
-        let Ok(oscillator) = model.oscillator() else { return WallWords::new(None, [None, None]) };
+    fn of_values(model: &dyn Model) -> WallLabels {
+        let Ok(oscillator) = model.oscillator() else { return WallLabels::new(None, [None, None]) };
         let alone = [[1.0, 0.0], [0.0, 1.0]].iter().position(|row| *row == oscillator.gap);
         let names = model.state_names();
         let at = oscillator.walls.map(|wall| wall.is_finite().then(|| number(wall)));
-        WallWords::new(alone.and_then(|i| names.get(2 * i)).map(|name| symbol(name)), at)
+        WallLabels::new(alone.and_then(|i| names.get(2 * i)).map(|name| symbol(name)), at)
     }
 
-    fn new(gap: Option<String>, at: [Option<String>; 2]) -> WallWords {
-        let mut words = WallWords { gap: gap.unwrap_or_else(|| "z".to_owned()), at };
-        if words.half().is_some() {
-            let [right, _] = &mut words.at;
+    fn new(gap: Option<String>, at: [Option<String>; 2]) -> WallLabels {
+        let mut labels = WallLabels { gap: gap.unwrap_or_else(|| "z".to_owned()), at };
+        if labels.half().is_some() {
+            let [right, _] = &mut labels.at;
             *right = right.take().map(|half| format!("+{half}"));
         }
-        words
+        labels
     }
 
     /// Whether there is a wall on a side.
@@ -61,24 +62,24 @@ impl WallWords {
         self.at[side.index()].is_some()
     }
 
-    /// The gap's name.
+    /// Returns the symbol of the gap.
     pub(crate) fn gap(&self) -> &str {
         &self.gap
     }
 
-    /// Where a wall is: `z = +b`.
+    /// Returns the position of a wall as an equation: `z = +b`.
     pub(crate) fn position(&self, side: Side) -> Option<String> {
         let at = self.at[side.index()].as_ref().filter(|at| !at.is_empty())?;
         Some(format!("{} = {at}", self.gap))
     }
 
-    /// A wall in a legend: `right wall, z = +b`.
+    /// Returns the legend entry of a wall: `right wall, z = +b`.
     pub(crate) fn entry(&self, side: Side) -> String {
         let position = self.position(side).map_or(String::new(), |position| format!(", {position}"));
-        format!("{} wall{position}", name(side))
+        format!("{} wall{position}", names::side(side))
     }
 
-    /// All walls: `|z| = b` where they lie as far on either side.
+    /// Returns the label of all walls: `|z| = b` if they are symmetric about zero.
     pub(crate) fn section(&self) -> String {
         match (self.half(), &self.at) {
             (Some(half), _) => format!("|{}| = {half}", self.gap),
@@ -87,7 +88,7 @@ impl WallWords {
         }
     }
 
-    /// How far each of two walls is from the middle between them, where they lie about zero.
+    /// Returns the distance of both walls from zero, if they are symmetric about zero.
     pub(crate) fn half(&self) -> Option<&str> {
         let [Some(right), Some(left)] = &self.at else { return None };
         let half = right.trim_start_matches('+');
@@ -96,15 +97,7 @@ impl WallWords {
     }
 }
 
-/// The name of a side.
-pub(crate) fn name(side: Side) -> &'static str {
-    match side {
-        Side::Right => "right",
-        Side::Left => "left",
-    }
-}
-
-/// An entry as it was written, in the field's symbols; empty where it is too long.
+/// Returns an expression with mathematical symbols, or nothing if it is too long.
 fn position(at: &Expression) -> String {
     if let Some(value) = at.as_number() {
         return number(value);
@@ -125,7 +118,7 @@ fn position(at: &Expression) -> String {
         }
         rest = after;
     }
-    if text.chars().count() > LONGEST { String::new() } else { text }
+    if text.chars().count() > LONGEST_POSITION { String::new() } else { text }
 }
 
 #[cfg(test)]
@@ -133,28 +126,28 @@ mod tests {
     use super::*;
     use rattlemap_dynamics::model::{GearPair, Stops};
 
-    fn words(model: &dyn Model) -> [String; 3] {
-        let words = WallWords::of(model);
-        let entry = |side: Side| if words.has(side) { words.entry(side) } else { String::new() };
-        [entry(Side::Right), entry(Side::Left), words.section()]
+    fn labels(model: &dyn Model) -> [String; 3] {
+        let labels = WallLabels::of(model);
+        let entry = |side: Side| if labels.has(side) { labels.entry(side) } else { String::new() };
+        [entry(Side::Right), entry(Side::Left), labels.section()]
     }
 
     #[test]
-    fn walls_have_the_models_own_words() {
+    fn walls_have_the_symbols_of_the_model() {
         let pair = ["right wall, z = +b", "left wall, z = \u{2212}b", "|z| = b"];
-        assert_eq!(words(&GearPair::paper(0.5)), pair);
-        let built_in = |name: &str| words(&FileModel::built_in(name).unwrap());
+        assert_eq!(labels(&GearPair::paper(0.5)), pair);
+        let built_in = |name: &str| labels(&FileModel::built_in(name).unwrap());
         assert_eq!(built_in("gear-pair"), pair);
         assert_eq!(built_in("impact-oscillator"), ["right wall, x = \u{3c3}", "", "the wall"]);
         assert_eq!(built_in("shaking-table"), ["", "left wall, x = 0", "the wall"]);
         let two = ["right wall, z = \u{3b4}\u{2082}", "left wall, z = \u{2212}\u{3b4}\u{2081}", "the walls"];
         assert_eq!(built_in("two-masses"), two);
         let stops = ["right wall, x = +0.5", "left wall, x = \u{2212}0.5", "|x| = 0.5"];
-        assert_eq!(words(&Stops::with_restitution(0.5)), stops);
+        assert_eq!(labels(&Stops::with_restitution(0.5)), stops);
     }
 
     #[test]
-    fn positions_are_typeset_and_left_out_where_they_are_long() {
+    fn positions_have_mathematical_symbols_and_are_empty_if_too_long() {
         let names = ["omega", "sigma", "k1"];
         let position = |text: &str| position(&Expression::parse(text, &names).unwrap());
         assert_eq!(position("sigma - 2e-3*k1"), "\u{3c3} \u{2212} 2e\u{2212}3*k\u{2081}");

@@ -1,22 +1,22 @@
-//! Which symbol of the word belongs to which flight, and where it is written.
+//! Symbols of the word and the times of their flights.
 
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::{Event, EventKind};
 
-/// Events of figures that have room for symbols.
-const MOST: usize = 40;
+/// Figures of more events have no symbols.
+const MOST_EVENTS: usize = 40;
 
-/// The middle of every flight between two events, in forcing periods, and its symbol.
+/// Returns the time of the middle of every flight between two events, in forcing periods, and its symbol.
 ///
-/// `cycle` is the length of a cycle that begins at 0 and comes round; the flight across its end is named in the longer
-/// of its two parts. None where the motion is no cycle: what lies before the first event and after the last has no name.
+/// `cycle` is the length of a periodic motion. The symbol of the flight across its end lies in the longer of its two parts.
+/// Without a cycle, the parts before the first event and after the last one have no symbol.
 pub(crate) fn symbols(events: &[(f64, Event)], cycle: Option<f64>) -> Vec<(f64, char)> {
-    if events.len() > MOST {
+    if events.len() > MOST_EVENTS {
         return Vec::new();
     }
     let inner = events.windows(2).map(|pair| (0.5 * (pair[0].0 + pair[1].0), symbol(&pair[0].1, &pair[1].1)));
     let mut symbols: Vec<(f64, char)> = inner.collect();
-    // A single event is both.
+    // A single event is both the first and the last one.
     if let (Some(end), Some((first, to)), Some((last, from))) = (cycle, events.first(), events.last()) {
         let middle = if end - last >= *first { 0.5 * (last + end) } else { 0.5 * first };
         symbols.push((middle, symbol(from, to)));
@@ -24,7 +24,7 @@ pub(crate) fn symbols(events: &[(f64, Event)], cycle: Option<f64>) -> Vec<(f64, 
     symbols
 }
 
-/// The symbol of the flight between two events (18)-(23).
+/// Returns the symbol of the flight between two events, by equations (18) to (23) of the paper.
 fn symbol(from: &Event, to: &Event) -> char {
     match (from.kind == EventKind::MeshStart, from.side, to.side) {
         (true, Side::Right, _) => '1',
@@ -47,26 +47,26 @@ mod tests {
         orbit::analyse(&GearPair::paper(e), REST, &Settings::default()).unwrap()
     }
 
-    fn named(orbit: &Orbit, cycle: Option<f64>) -> Vec<(f64, char)> {
+    fn flights(orbit: &Orbit, cycle: Option<f64>) -> Vec<(f64, char)> {
         let events: Vec<_> = orbit.events.iter().map(|e| (e.t / orbit.forcing_period, *e)).collect();
         symbols(&events, cycle)
     }
 
     #[test]
-    fn symbols_of_a_cycle_are_its_word() {
+    fn the_symbols_of_a_cycle_form_its_word() {
         for (e, length) in [(0.06, 8), (0.0997, 4), (0.605, 2)] {
             let orbit = orbit(e);
-            let named = named(&orbit, Some(f64::from(orbit.cycle_periods)));
-            assert_eq!(named.len(), length);
-            let letters: Vec<u8> = named.iter().map(|&(_, symbol)| symbol as u8).collect();
+            let flights = flights(&orbit, Some(f64::from(orbit.cycle_periods)));
+            assert_eq!(flights.len(), length);
+            let letters: Vec<u8> = flights.iter().map(|&(_, symbol)| symbol as u8).collect();
             assert_eq!(Word::cyclic(&letters), orbit.word, "e = {e}");
-            assert!(named.iter().all(|(t, _)| (0.0..=1.0).contains(t)), "{named:?}");
+            assert!(flights.iter().all(|(t, _)| (0.0..=1.0).contains(t)), "{flights:?}");
         }
     }
 
     #[test]
-    fn open_ends_have_no_name() {
-        assert_eq!(named(&orbit(0.06), None).len(), 7);
+    fn flights_before_the_first_and_after_the_last_event_have_no_symbol() {
+        assert_eq!(flights(&orbit(0.06), None).len(), 7);
         assert!(symbols(&[], Some(1.0)).is_empty());
         let orbit = orbit(0.605);
         let alone = [(0.25, orbit.events[0])];

@@ -1,8 +1,8 @@
-//! What a record says that was read beside its cycle.
+//! Records whose multipliers were computed near a cycle instead of on it.
 //!
-//! A lane reads multipliers where it stands: near the cycle, or on the way to it where it calls the approach slow.
-//! Where the strobe map is bent, or amplifies rounding, they are not the cycle's. What was read is right if the
-//! reference reads the same there, and it belongs to the cycle that lies there.
+//! A lane computes multipliers at its present state, which is near the cycle, or still approaching it if the status is
+//! `slow`. Where the strobe map is strongly curved or amplifies rounding, these multipliers differ from those of the
+//! cycle. The record is right if the reference computes the same values at the same state.
 
 use super::cell::{Cell, FACTOR};
 use crate::gpu::rules;
@@ -14,12 +14,12 @@ use rattlemap_dynamics::orbit::{Class, Status};
 use rattlemap_dynamics::reference::{Allowance, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
-/// A record of a cycle as it would be on the cycle, if the reference confirms its exponent where it stands; none
-/// otherwise.
+/// Returns the record with the exponent of the cycle itself, if the reference confirms the record's exponent at the
+/// record's state; none otherwise.
 pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
     let Class::Periodic { period } = classify(record) else { return None };
-    let said = valid::STROBE | valid::LYAPUNOV;
-    if record.valid & said != said || !record.strobe.iter().all(|x| x.is_finite()) {
+    let needed = valid::STROBE | valid::LYAPUNOV;
+    if record.valid & needed != needed || !record.strobe.iter().all(|x| x.is_finite()) {
         return None;
     }
     let seed = Trajectory::<0>::new(&cell.flow, cell.law, record.strobe)
@@ -30,22 +30,22 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
     let is_there = cell.apart(&record.strobe, &cycle.state) <= FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };
-    // The cycle that was read ends at the strobe; where the multiplier is negative, it began on the other side.
+    // The lane's window ends at the strobe state. With a negative multiplier it began on the other side of the cycle.
     let turns = cycle.multipliers.first().is_some_and(|[re, _]| *re < 0.0);
     let before = |i: usize| if turns { 2.0 * cycle.state[i] - record.strobe[i] } else { record.strobe[i] };
     let began = std::array::from_fn(before);
-    (is_there && may_be_read(cell, began, record.lyapunov * time, period)).then(|| Record {
+    (is_there && is_within_scatter(cell, began, record.lyapunov * time, period)).then(|| Record {
         lyapunov: cycle.exponent(cell.flow.period),
         status,
         ..*record
     })
 }
 
-/// Whether a multiplier, as a logarithm, may be read along the motion from a state: what the reference reads scatters
-/// where every period rounds, and the record's reading is one of them.
-fn may_be_read(cell: &Cell<'_>, state: State, said: f64, period: u32) -> bool {
+/// Whether rounding explains a multiplier: the logarithm `log_multiplier` lies in the range that the reference computes
+/// from this state when each period is perturbed by rounding.
+fn is_within_scatter(cell: &Cell<'_>, state: State, log_multiplier: f64, period: u32) -> bool {
     let mut read = cell.multipliers_from(state, period);
-    // A multiplier that vanishes is one that is as good as zero.
+    // A multiplier of zero counts as the smallest that can be resolved.
     let none = cell.bars.none();
     read.iter_mut().filter(|log| **log == f64::NEG_INFINITY).for_each(|log| *log = none);
     if read.is_empty() || !read.iter().all(|log| log.is_finite()) {
@@ -53,12 +53,12 @@ fn may_be_read(cell: &Cell<'_>, state: State, said: f64, period: u32) -> bool {
     }
     let least = read.iter().copied().fold(f64::INFINITY, f64::min);
     let most = read.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // As far again: a few readings do not show all of their range.
-    let nearest = said.clamp(least - (most - least), most + (most - least));
-    cell.bars.is_same_multiplier(said, nearest, f64::from(period))
+    // A few samples underestimate their range, so it is extended by its own width on both sides.
+    let nearest = log_multiplier.clamp(least - (most - least), most + (most - least));
+    cell.bars.is_same_multiplier(log_multiplier, nearest, f64::from(period))
 }
 
-/// Whether an event of a cycle lies on phase 0, as far as the engine can tell.
+/// Whether an event of a cycle lies at phase 0 within the engine's resolution.
 pub(super) fn meets_strobe(cell: &Cell<'_>, state: State, period: u32) -> bool {
     let mut trajectory =
         Trajectory::<0>::new(&cell.flow, cell.law, state).allowing(Allowance::UNLIMITED.until(cell.halt));
@@ -67,8 +67,8 @@ pub(super) fn meets_strobe(cell: &Cell<'_>, state: State, period: u32) -> bool {
         return false;
     }
     let bar = FACTOR * rules::on_strobe(cell.precision);
-    met.iter().any(|happening| {
-        let turns = happening.t / cell.flow.period;
+    met.iter().any(|event| {
+        let turns = event.t / cell.flow.period;
         apart(turns, turns.round()) < bar
     })
 }

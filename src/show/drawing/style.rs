@@ -1,0 +1,44 @@
+//! Colours, type sizes and margins that all figures share. Lengths are in pixels.
+
+use crate::show::color::Color;
+use rattlemap_dynamics::model::Side;
+
+/// Background.
+pub const WHITE: Color = [0xff; 3];
+/// Text, axes and outlines.
+pub const DARK: Color = [0x26; 3];
+/// Lines of secondary importance: velocity jumps, marks of columns without data.
+pub const FAINT: Color = [0xa0; 3];
+/// Grid lines.
+pub const GRID: Color = [0xe6; 3];
+/// Trajectory while the teeth mesh.
+pub const MESHING: Color = [0x00, 0x9e, 0x73];
+/// Gear 1 where both gears share a panel.
+pub const GEAR_1: Color = DARK;
+/// Gear 2 where both gears share a panel.
+pub const GEAR_2: Color = [0xcc, 0x79, 0xa7];
+
+/// Type size of tick labels and legends.
+pub const SMALL: f64 = 23.0;
+/// Type size of axis labels and subtitles.
+pub const MEDIUM: f64 = 26.0;
+/// Type size of titles.
+pub const LARGE: f64 = 32.0;
+
+/// Margin right of the panels: room for half of the last tick label.
+pub(crate) const RIGHT: f64 = 58.0;
+/// Margin below the panels: room for tick labels and the name of the axis.
+pub const BELOW: f64 = 105.0;
+
+/// Pixels per inch of the printed figure. Small text is then about 7 points high.
+pub(crate) const PER_INCH: f64 = 200.0;
+/// Length of dashes and of the gaps between them.
+pub(crate) const DASH: f64 = 5.0;
+
+/// Returns the colour of a wall, from Okabe and Ito's colour-blind safe set.
+pub fn wall_color(side: Side) -> Color {
+    match side {
+        Side::Right => [0xd5, 0x5e, 0x00],
+        Side::Left => [0x00, 0x72, 0xb2],
+    }
+}

@@ -1,0 +1,57 @@
+//! Displacements and velocities of all bodies against time.
+
+use crate::show::color::Color;
+use crate::show::drawing::frame::Frame;
+use crate::show::drawing::legend::{Entry, Key, draw_head};
+use crate::show::drawing::{Canvas, GEAR_1, GEAR_2, Rect, wall_color};
+use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
+use crate::show::names;
+use rattlemap_dynamics::model::{Side, State};
+
+/// Opacity of the bands that show meshing.
+const MESHING_BAND: f64 = 0.16;
+
+impl OrbitPlot<'_> {
+    pub(crate) fn draw_time_history(&self, canvas: &Canvas) {
+        let colored = || self.bodies.iter().zip([GEAR_1, GEAR_2]).enumerate();
+        let line = |(_, (body, color)): (usize, (&&str, Color))| {
+            Entry::new(Key::Line { color, width: FREE_LINE }, body)
+        };
+        let mut motion: Vec<Entry> = colored().map(line).collect();
+        let meshes = |side: &Side| self.motion.pieces.iter().any(|piece| piece.meshing == Some(*side));
+        for side in Side::BOTH.into_iter().filter(meshes) {
+            let band = Key::Patch { color: wall_color(side), opacity: MESHING_BAND };
+            motion.push(Entry::new(band, &format!("{}, {} wall", self.contact_name(), names::side(side))));
+        }
+        let top = draw_head(canvas, &self.title, &self.subtitle, &self.legend(motion, true)) + 14.0;
+        let whole = canvas.panel(ORBIT_LEFT, top);
+        let middle = (top + whole.bottom) / 2.0;
+        let panels = [
+            (0, "displacement, x", 1.0, top, middle - 15.0),
+            (1, "velocity, v", self.oscillator.omega, middle + 15.0, whole.bottom),
+        ];
+        for (quantity, label, scale, top, bottom) in panels {
+            let components: Vec<usize> = (quantity..self.names.len()).step_by(2).collect();
+            let frame = Frame {
+                rect: Rect { top, bottom, ..whole },
+                x: self.time_axis(),
+                y: self.state_axis(label, &components, scale),
+            };
+            for piece in &self.motion.pieces {
+                if let Some(side) = piece.meshing {
+                    let (from, to) = piece.span();
+                    canvas.fill(frame.column(from, to), wall_color(side), MESHING_BAND);
+                }
+            }
+            frame.draw_grid(canvas);
+            for (i, (_, color)) in colored() {
+                let index = quantity + 2 * i;
+                let at = |t: f64, state: &State| (t, state[index]);
+                self.draw_jumps(canvas, &frame, at);
+                self.draw_lines(canvas, &frame, (color, color), at);
+                self.draw_markers(canvas, &frame, quantity == 1, at);
+            }
+            frame.draw_axes(canvas, quantity == 1);
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Layers of continuous quantities: exponent, impacts, time in meshing.
+
+use rayon::prelude::*;
+
+use crate::map::scene::Quantity;
+use crate::show::cells::{Cells, Row};
+use crate::show::color::Color;
+use crate::show::layers::bar::{Bar, count_beyond, round_bound};
+use crate::show::layers::colors::{NO_VALUE, diverging, sequential};
+use crate::show::layers::layer::{Layer, NamedColor, legend};
+
+/// A continuous quantity and its colours.
+struct Continuous {
+    quantity: Quantity,
+    name: &'static str,
+    short: &'static str,
+    title: &'static str,
+    value: fn(&Row) -> Option<f64>,
+    color: fn(f64) -> Color,
+}
+
+const CONTINUOUS: [Continuous; 3] = [
+    Continuous {
+        quantity: Quantity::Lyapunov,
+        name: "lyapunov",
+        short: "exponent",
+        title: "largest Lyapunov exponent, \u{3bb}",
+        value: |row| row.lyapunov,
+        color: diverging,
+    },
+    Continuous {
+        quantity: Quantity::Impacts,
+        name: "impacts",
+        short: "impacts",
+        title: "impacts per forcing period",
+        value: |row| row.impacts_per_period,
+        color: sequential,
+    },
+    Continuous {
+        quantity: Quantity::Mesh,
+        name: "mesh",
+        short: "meshing",
+        title: "fraction of time in meshing",
+        value: |row| row.mesh_fraction,
+        color: sequential,
+    },
+];
+
+/// Number of colours. The next index is for cells without a value.
+const LEVELS: u8 = 255;
+
+/// Returns the layers of the continuous quantities that the scene requests.
+pub(crate) fn layers(cells: &Cells<'_>) -> impl Iterator<Item = Layer> {
+    CONTINUOUS
+        .iter()
+        .filter(|continuous| cells.has(continuous.quantity))
+        .map(|continuous| continuous.layer(cells))
+}
+
+impl Continuous {
+    fn layer(&self, cells: &Cells<'_>) -> Layer {
+        let values: Vec<f64> =
+            cells.ids().map(|id| (self.value)(&cells.row(id)).unwrap_or(f64::NAN)).collect();
+        let numbers = || values.iter().copied().filter(|value| !value.is_nan());
+        let sizes = |sign: f64| numbers().map(move |value| sign * value).filter(|size| *size > 0.0);
+        let has_negative = sizes(-1.0).next().is_some();
+        let high =
+            if has_negative && numbers().all(|value| value < 0.0) { 0.0 } else { round_bound(sizes(1.0)) };
+        let low = if has_negative { -round_bound(sizes(-1.0)) } else { 0.0 };
+        let level = |value: f64| {
+            let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+            (share * f64::from(LEVELS - 1)).round() as u8
+        };
+        let color = |level: u8| {
+            let value = low + f64::from(level) / f64::from(LEVELS - 1) * (high - low);
+            // Each side uses all its colours: values are relative to the end of their side.
+            (self.color)(match value {
+                negative if negative < 0.0 => negative / -low,
+                positive if high > 0.0 => positive / high,
+                _ => 0.0,
+            })
+        };
+        let colors: Vec<Color> = (0..LEVELS).map(color).collect();
+        let absent = values.iter().filter(|value| value.is_nan()).count();
+        let index = |&value: &f64| if value.is_nan() { LEVELS } else { level(value) };
+        Layer {
+            name: self.name,
+            short: self.short,
+            title: self.title,
+            indices: values.par_iter().map(index).collect(),
+            palette: colors.iter().copied().chain([NO_VALUE]).collect(),
+            entries: legend([NamedColor { color: NO_VALUE, text: "no value".to_owned(), cells: absent }]),
+            bar: Some(Bar {
+                label: self.title,
+                colors,
+                low,
+                high,
+                beyond: count_beyond(numbers(), low, high),
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::plan::Plan;
+    use crate::map::scene::{Purpose, Scene};
+    use crate::record::{Record, valid};
+
+    /// Returns the layer of exponents of a map of 400 cells.
+    fn exponents(value: impl Fn(usize) -> f64) -> Layer {
+        let axis = |name: &str| format!("[[axis]]\nparameter = '{name}'\nmin = 0.1\nmax = 1.0\ncount = 20\n");
+        let scene = Scene::parse(&(axis("e") + &axis("omega")), "s", &[], Purpose::Map).unwrap();
+        let plan = Plan::new(&scene);
+        let record = |id| Record {
+            lyapunov: value(id),
+            period: 1,
+            valid: valid::LYAPUNOV | valid::PERIOD,
+            ..Record::default()
+        };
+        let records: Vec<Record> = (0..plan.run_count()).map(record).collect();
+        let cells = Cells::new(&scene, &plan, &records);
+        layers(&cells).find(|layer| layer.name == "lyapunov").unwrap()
+    }
+
+    #[test]
+    fn a_bar_extends_only_to_signs_that_occur() {
+        let ends = |layer: &Layer| layer.bar.as_ref().map(|bar| (bar.low, bar.high)).unwrap();
+        let negative = exponents(|id| -0.001 * (id + 1) as f64);
+        assert_eq!(ends(&negative), (-0.4, 0.0));
+        assert_eq!(negative.palette[254], diverging(0.0), "its upper end is white");
+        assert!(exponents(|_| -0.1).palette.contains(&diverging(-1.0)));
+        assert_eq!(ends(&exponents(|id| if id < 200 { -0.2 } else { 1.9 })), (-0.2, 2.0));
+        assert_eq!(ends(&exponents(|_| 0.0)), (0.0, 1.0));
+    }
+
+    #[test]
+    fn values_beyond_the_ends_of_a_bar_are_counted() {
+        let layer = exponents(|id| if id == 7 { -5.0 } else { -0.2 });
+        let bar = layer.bar.unwrap();
+        assert_eq!((bar.low, bar.beyond), (-0.2, [1, 0]));
+        assert_eq!(bar.remarks(2000), ["values below \u{2212}0.2: 1 cell"]);
+        assert_eq!(bar.remarks(100), ["values below \u{2212}0.2: 1.0 %"]);
+    }
+}
