@@ -1,4 +1,4 @@
-"""The native module: what the package is built on. Nothing here is for users."""
+"""The native module. The package uses it; nothing here is for users."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, TypedDict
@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 __version__: str
-# Hash of the sources that decide the bits of results, and what they were built for: a manifest's fields of these names.
+# Hash of the sources that decide the bits of results, and the target of the build: fields `sources` and `target` of manifests.
 SOURCES: str
 TARGET: str
 
-_Tell = Callable[[int, int], object] | None
+_Report = Callable[[int, int], object] | None
 
 def main(arguments: Sequence[str]) -> int: ...
 _Color = tuple[int, int, int]
@@ -19,6 +19,21 @@ _Color = tuple[int, int, int]
 def colors() -> tuple[dict[str, _Color], list[_Color]]: ...
 def manifest(folder: str) -> str: ...
 def missing_variable() -> tuple[str, str] | None: ...
+def models() -> list[tuple[str, str]]: ...
+def check_folder(folder: str, repair: bool = ...) -> tuple[list[tuple[str, str, str]], list[str], list[str]]: ...
+def compare(a: str, b: str) -> tuple[str, str, list[str]]: ...
+def validate(
+    folder: str, samples: int, seed: int, progress: _Report = ...
+) -> tuple[str | None, list[str]]: ...
+
+class DevicesResult(TypedDict):
+    processor: str
+    adapters: list[dict[str, Any]]
+    engine: str
+    precision: str
+    reason: str
+
+def devices() -> DevicesResult: ...
 
 class Model:
     def __new__(cls, text: str, file: str) -> Model: ...
@@ -44,7 +59,7 @@ class Model:
     @property
     def changed(self) -> dict[str, float]: ...
     @property
-    def meanings(self) -> list[tuple[str, str, str]]: ...
+    def meanings(self) -> list[tuple[str, str, str, float | None]]: ...
 
 class Scene:
     def __new__(
@@ -70,12 +85,12 @@ class Scene:
     @property
     def is_basin(self) -> bool: ...
 
-class MadeMap(TypedDict):
+class MapResult(TypedDict):
     manifest: str
     columns: dict[str, npt.NDArray[Any]]
     texts: list[str]
     attractors: str | None
-    why: str
+    reason: str
     warnings: list[str]
     files: list[str]
 
@@ -86,9 +101,9 @@ def map(
     out: str | None = ...,
     force: bool = ...,
     resume: bool = ...,
-    progress: _Tell = ...,
+    progress: _Report = ...,
     adapter: str | None = ...,
-) -> MadeMap: ...
+) -> MapResult: ...
 
 def shard(
     scene: Scene,
@@ -99,7 +114,7 @@ def shard(
     out: str,
     resume: bool = ...,
     threads: int | None = ...,
-    progress: _Tell = ...,
+    progress: _Report = ...,
     adapter: str | None = ...,
 ) -> list[str]: ...
 def check_shards(
@@ -111,16 +126,16 @@ def check_shards(
     out: str | None = ...,
     force: bool = ...,
 ) -> None: ...
-def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Tell = ...) -> MadeMap: ...
+def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Report = ...) -> MapResult: ...
 
-class MadeDiagram(TypedDict):
+class DiagramResult(TypedDict):
     manifest: str
     columns: str
     points: dict[str, npt.NDArray[Any]]
     kinds: list[str]
     directions: list[str]
 
-def bifurcation(scene: Scene, progress: _Tell = ...) -> MadeDiagram: ...
+def bifurcation(scene: Scene, progress: _Report = ...) -> DiagramResult: ...
 
 class Orbit:
     def json(self) -> str: ...

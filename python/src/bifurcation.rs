@@ -14,7 +14,7 @@ use rattlemap::store::in_memory;
 use crate::arrays::columns;
 use crate::problem::Problem;
 use crate::scene::{Scene, Use};
-use crate::waiting::{self, Watch};
+use crate::worker::{self, Watch};
 
 /// Computes a diagram: its manifest, the table of its columns as text, and its points by column.
 #[pyfunction]
@@ -25,7 +25,7 @@ pub(crate) fn bifurcation<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (library, sets, purpose) = (Arc::clone(&scene.scene), scene.sets.clone(), scene.purpose.clone());
-    let result = waiting::run(py, progress, move |watch| compute(&library, &sets, &purpose, watch))?;
+    let result = worker::run(py, progress, move |watch| compute(&library, &sets, &purpose, watch))?;
     let dict = PyDict::new(py);
     dict.set_item("manifest", result.manifest)?;
     dict.set_item("columns", result.columns)?;

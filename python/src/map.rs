@@ -9,9 +9,9 @@ use pyo3::types::PyDict;
 use rattlemap::store::in_memory::{self, SharedColors};
 
 use crate::arrays::columns;
-use crate::engines::{Out, Task, request};
 use crate::scene::Scene;
-use crate::waiting;
+use crate::task::{Out, Task, request};
+use crate::worker;
 
 /// A map for Python.
 pub(crate) struct MapResult {
@@ -30,7 +30,7 @@ impl MapResult {
         dict.set_item("columns", columns(py, self.map.columns)?)?;
         dict.set_item("texts", self.map.texts)?;
         dict.set_item("attractors", self.map.attractors)?;
-        dict.set_item("why", self.reason)?;
+        dict.set_item("reason", self.reason)?;
         dict.set_item("warnings", self.warnings)?;
         dict.set_item("files", self.files)?;
         Ok(dict)
@@ -60,7 +60,7 @@ pub(crate) fn map<'py>(
         out: out.map(|path| Out { path, force, resume }),
     };
     task.check()?;
-    let result = waiting::run(py, progress, move |watch| {
+    let result = worker::run(py, progress, move |watch| {
         task.compute(watch, |_, run, warnings| {
             let map = run.finish();
             let (files, reason) = (map.write()?, map.reason().to_owned());

@@ -9,6 +9,12 @@ use rattlemap::model_file::FileModel;
 
 use crate::problem::Problem;
 
+/// Returns the name and a summary of every built-in model.
+#[pyfunction]
+pub(crate) fn models() -> Vec<(String, String)> {
+    job::models::list()
+}
+
 /// A model with values of its parameters.
 #[pyclass(frozen, module = "rattlemap._native")]
 pub(crate) struct Model {
@@ -105,13 +111,13 @@ impl Model {
         Ok(values)
     }
 
-    /// Name, meaning and range of each parameter.
+    /// Name, meaning, range and default of each parameter.
     #[getter]
-    fn meanings(&self) -> Vec<(String, String, String)> {
+    fn meanings(&self) -> Vec<(String, String, String, Option<f64>)> {
         let parameters = self.model.parameters().iter();
         let meanings = parameters.map(|parameter| {
             let range = parameter.range.requirement().into_owned();
-            (parameter.name.to_string(), parameter.meaning.to_string(), range)
+            (parameter.name.to_string(), parameter.meaning.to_string(), range, parameter.default)
         });
         meanings.collect()
     }

@@ -13,7 +13,7 @@ use rattlemap::store;
 use crate::arrays::array;
 use crate::model::Model;
 use crate::problem::Problem;
-use crate::waiting;
+use crate::worker;
 
 /// An orbit and its model.
 #[pyclass(frozen, module = "rattlemap._native")]
@@ -48,7 +48,7 @@ impl Orbit {
     /// Columns of `trajectory.csv`, with this number of samples per forcing period.
     fn moments<'py>(&self, py: Python<'py>, samples_per_period: usize) -> PyResult<Bound<'py, PyDict>> {
         let (model, orbit) = (Arc::clone(&self.model), Arc::clone(&self.orbit));
-        let moments = waiting::run(py, None, move |_| {
+        let moments = worker::run(py, None, move |_| {
             if orbit.class == Class::Failed {
                 return Ok(Some(Vec::new()));
             }
@@ -99,7 +99,7 @@ pub(crate) fn orbit(
         max_period: Settings::default().max_period.min(periods / 2),
     };
     let own = Arc::clone(&model);
-    let orbit = waiting::run(py, None, move |watch| {
+    let orbit = worker::run(py, None, move |watch| {
         Ok(analysis::analyse_until(&*own, state, &settings, analysis::EVENT_PERIODS, watch.halt())?)
     })?;
     Ok(Orbit { model, orbit: Arc::new(orbit) })

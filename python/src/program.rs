@@ -5,6 +5,7 @@ use std::io::{Write, stdout};
 
 use pyo3::prelude::*;
 use rattlemap::cli;
+use rattlemap::job::environment;
 
 /// Runs a command, the program's name first, and returns its exit code.
 #[pyfunction]
@@ -20,5 +21,5 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 /// Returns the environment variable that the program sets for itself, and its value.
 #[pyfunction]
 pub(crate) fn missing_variable() -> Option<(&'static str, &'static str)> {
-    cli::missing_variable()
+    environment::missing_variable()
 }

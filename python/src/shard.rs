@@ -15,11 +15,11 @@ use rattlemap::store::folder::Folder;
 use rattlemap::store::merge::{MergeError, Parts, Progress};
 use rayon::ThreadPoolBuilder;
 
-use crate::engines::{Out, Task, request};
 use crate::map::MapResult;
 use crate::problem::Problem;
 use crate::scene::Scene;
-use crate::waiting::{self, Watch};
+use crate::task::{Out, Task, request};
+use crate::worker::{self, Watch};
 
 /// Checks that a map can be computed in so many shards and merged into a folder.
 #[pyfunction]
@@ -90,7 +90,7 @@ pub(crate) fn of_map<'py>(
     // 0 threads: as many as the machine has.
     let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
     let pool = pool.map_err(|error| Problem::engine(format!("no threads to compute with: {error}")))?;
-    waiting::run(py, progress, move |watch| {
+    worker::run(py, progress, move |watch| {
         pool.install(|| task.compute(watch, |_, run, _| Ok(run.write_shard()?)))
     })
 }
@@ -108,7 +108,7 @@ pub(crate) fn merge<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let out = Out { path: out, force, resume: false };
-    waiting::run(py, progress, move |watch| gather(&parts, out, writes, watch))?.to_dict(py)
+    worker::run(py, progress, move |watch| gather(&parts, out, writes, watch))?.to_dict(py)
 }
 
 fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Option<MapResult>, Problem> {

@@ -13,8 +13,8 @@ use super::stdout::print_json;
 use crate::findings::compare::{Comparison, Kind, Tally};
 use crate::job::compare::CompareJob;
 use crate::map::scene::Scene;
-use crate::store;
 use crate::show::map_pair::MapPair;
+use crate::store;
 use crate::store::folder::Folder;
 
 /// Reads both maps, compares, writes.
@@ -64,7 +64,8 @@ fn summary(maps: &MapPair<'_>, scene: &Scene) -> String {
         .iter()
         .map(|found| say::quoted(format_args!("{}: {} in A, {} in B", found.name, found.a, found.b)))
         .collect();
-    let [a, b] = sides.map(|side| say::quoted(format_args!("{} {}", side.provenance.engine, side.provenance.precision)));
+    let [a, b] = sides
+        .map(|side| say::quoted(format_args!("{} {}", side.provenance.engine, side.provenance.precision)));
     if a != b {
         lines.push(format!("engine: {a} in A, {b} in B"));
     }

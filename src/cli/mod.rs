@@ -7,7 +7,6 @@ mod check;
 mod compare;
 mod completions;
 mod devices;
-mod environment;
 pub mod failure;
 mod interrupt;
 mod map;
@@ -25,7 +24,6 @@ use std::process::ExitCode;
 use arguments::{Bench, Cli, Command, parsed_from};
 
 pub use arguments::parsed;
-pub use environment::missing_variable;
 pub use progress::Progress;
 pub use say::note;
 

@@ -12,6 +12,8 @@ pub mod dry_run;
 #[cfg(feature = "gpu")]
 pub mod engine_choice;
 #[cfg(feature = "job")]
+pub mod environment;
+#[cfg(feature = "job")]
 pub mod error;
 #[cfg(feature = "job")]
 mod finished;

@@ -6,8 +6,8 @@ use rattlemap_dynamics::model::Model;
 
 use crate::job::error::JobError;
 use crate::job::scene_file;
-use crate::text::printable;
 use crate::model_file::{BUILT_IN, FileModel};
+use crate::text::printable;
 
 /// Parts of file names. Names of built-in models contain none of them.
 const FILE_MARKS: [&str; 3] = [".toml", "/", "\\"];

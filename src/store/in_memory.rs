@@ -1,4 +1,4 @@
-//! Builds the manifest and the tables of a map or diagram in memory, for callers that write no folder (Python).
+//! Builds the manifest and the tables of a map, diagram or comparison in memory, for callers that write no folder (Python).
 
 use std::time::Duration;
 
@@ -7,10 +7,12 @@ use crate::map::scene::Scene;
 use crate::show::cells::Cells;
 use crate::show::error::WriteError;
 pub use crate::show::layers::SharedColors;
+use crate::show::map_pair::MapPair;
 use crate::show::table::cell_columns::{self, Values};
 use crate::show::table::words_csv::WordRows;
-use crate::show::table::{attractors_csv, bifurcation_tables};
+use crate::show::table::{attractors_csv, bifurcation_tables, compare_csv};
 use crate::show::{layers, words};
+use crate::store::compare;
 use crate::store::error::OutputError;
 use crate::store::manifest::bifurcation::{DiagramArguments, bifurcation};
 use crate::store::manifest::map::{self, Run};
@@ -86,6 +88,14 @@ pub fn diagram(
         kinds,
         directions,
     })
+}
+
+/// Returns a comparison as JSON, without a folder and its files, and its table `compare.csv`.
+///
+/// # Errors
+/// [`OutputError`] if the table cannot be formatted.
+pub fn comparison(pair: &MapPair<'_>) -> Result<(String, String), OutputError> {
+    Ok((compare::result(pair).to_string(), text(|to| compare_csv::write(to, pair))?))
 }
 
 /// Returns a table as text.

@@ -10,18 +10,19 @@ use std::time::{Duration, Instant};
 
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
+use rattlemap::job::observer::Observer;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::problem::Problem;
 
-/// Interval at which signals and progress are looked at.
+/// Interval at which the waiting thread checks signals and progress.
 pub(crate) const TICK: Duration = Duration::from_millis(50);
 
-/// Interval at which `progress` is called if there is no progress: it can end the computation by an exception.
+/// Longest interval between calls of `progress`: it may raise an exception to end the computation.
 const CALL_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Time that a halted computation has to end. After it the computation is abandoned: a driver that compiles cannot be
-/// halted.
+/// Time that a halted computation has to end. After it the computation is abandoned, because a driver that compiles cannot
+/// be halted.
 const GRACE: Duration = Duration::from_millis(700);
 
 /// Connects a computation with the thread that waits for it.
@@ -54,11 +55,42 @@ impl Watch {
     }
 }
 
+/// Collects notes and warnings, and passes progress on.
+pub(crate) struct Collector {
+    watch: Arc<Watch>,
+    lines: Mutex<Vec<String>>,
+}
+
+impl Collector {
+    pub(crate) fn new(watch: &Arc<Watch>) -> Collector {
+        Collector { watch: Arc::clone(watch), lines: Mutex::default() }
+    }
+
+    /// Removes and returns the collected lines.
+    pub(crate) fn lines(&self) -> Vec<String> {
+        std::mem::take(&mut *self.lines.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Observer for Collector {
+    fn note(&self, text: &str) {
+        self.warn(text);
+    }
+
+    fn warn(&self, text: &str) {
+        self.lines.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+    }
+
+    fn progress(&self, done: usize, expected: usize) {
+        self.watch.set_progress(done, expected);
+    }
+}
+
 /// Number of abandoned computations of this process that are still running.
 static ABANDONED: AtomicUsize = AtomicUsize::new(0);
 
-/// Whether abandoned computations are running. They have their folders until they end.
-pub(crate) fn is_anything_abandoned() -> bool {
+/// Whether abandoned computations are running. They lock their folders until they end.
+pub(crate) fn has_abandoned_work() -> bool {
     ABANDONED.load(Ordering::SeqCst) > 0
 }
 
@@ -74,12 +106,12 @@ impl Drop for End {
     }
 }
 
-/// The process that loaded the module.
-static LOADED_BY: OnceLock<u32> = OnceLock::new();
+/// Id of the process that loaded the module.
+static FIRST_PROCESS: OnceLock<u32> = OnceLock::new();
 
-/// Stores the process that loads the module.
-pub(crate) fn loaded() {
-    let _ = LOADED_BY.set(process::id());
+/// Stores the id of the process that loads the module.
+pub(crate) fn store_process() {
+    let _ = FIRST_PROCESS.set(process::id());
 }
 
 /// Returns a thread pool for a process that was forked after it had loaded the module, and none for other processes. A
@@ -87,7 +119,7 @@ pub(crate) fn loaded() {
 fn own_threads() -> Result<Option<&'static ThreadPool>, Problem> {
     static OWN: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
     let this = process::id();
-    if LOADED_BY.get() == Some(&this) {
+    if FIRST_PROCESS.get() == Some(&this) {
         return Ok(None);
     }
     let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);

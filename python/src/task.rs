@@ -1,13 +1,12 @@
 //! Jobs that compute a map or a shard of one.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::thread;
 
 use rattlemap::gpu::Precision;
 use rattlemap::job::engine_choice::{self, EngineRequest};
 use rattlemap::job::map::{MapJob, MapRun};
-use rattlemap::job::observer::Observer;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::Scene;
 use rattlemap::map::shard::Shard;
@@ -15,7 +14,7 @@ use rattlemap::store::folder::{Folder, FolderError};
 use rattlemap::store::run_records::{RunRecordsError, open_folder};
 
 use crate::problem::Problem;
-use crate::waiting::{self, Watch};
+use crate::worker::{self, Collector, Watch};
 
 /// Reads a request for an engine.
 ///
@@ -62,38 +61,18 @@ pub(crate) struct Out {
 }
 
 impl Out {
-    /// Opens the folder. Waits while an abandoned computation of this process may still have it.
+    /// Opens the folder. Waits while an abandoned computation of this process may still use it.
     pub(crate) fn open(&self, watch: &Watch) -> Result<Folder, Problem> {
         loop {
             match open_folder(&self.path, self.force, self.resume) {
                 Err(RunRecordsError::Folder(FolderError::InUse { .. }))
-                    if waiting::is_anything_abandoned() && !watch.is_halted() =>
+                    if worker::has_abandoned_work() && !watch.is_halted() =>
                 {
-                    thread::sleep(waiting::TICK);
+                    thread::sleep(worker::TICK);
                 }
                 opened => return Ok(opened?),
             }
         }
-    }
-}
-
-/// Collects notes and warnings, and passes progress on.
-struct Collector {
-    watch: Arc<Watch>,
-    lines: Mutex<Vec<String>>,
-}
-
-impl Observer for Collector {
-    fn note(&self, text: &str) {
-        self.warn(text);
-    }
-
-    fn warn(&self, text: &str) {
-        self.lines.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
-    }
-
-    fn progress(&self, done: usize, expected: usize) {
-        self.watch.set_progress(done, expected);
     }
 }
 
@@ -123,7 +102,7 @@ impl Task {
         let job = self.job();
         let plan = job.plan()?;
         let folder = self.out.as_ref().map(|out| out.open(watch)).transpose()?;
-        let observer = Arc::new(Collector { watch: Arc::clone(watch), lines: Mutex::default() });
+        let observer = Arc::new(Collector::new(watch));
         let opened = job.open(&plan, folder.as_ref(), observer.clone())?;
         if watch.is_halted() {
             return Ok(None);
@@ -132,7 +111,6 @@ impl Task {
         if !run.integrate(watch.halt())? {
             return Ok(None);
         }
-        let warnings = std::mem::take(&mut *observer.lines.lock().unwrap_or_else(PoisonError::into_inner));
-        finish(&plan, run, warnings).map(Some)
+        finish(&plan, run, observer.lines()).map(Some)
     }
 }
