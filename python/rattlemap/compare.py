@@ -79,9 +79,12 @@ def compare(a: str | os.PathLike[str] | xr.Dataset, b: str | os.PathLike[str] | 
     result, text, warnings = _native.compare(_folder(a), _folder(b))
     warn(warnings)
     data = json.loads(result)
-    counts = [data[name] for name in ("cells", "differing", "by_class", "by_period", "by_pattern", "by_word")]
-    transitions = pd.DataFrame(data["transitions"], columns=["a", "b", "cells"])
-    return Comparison(*counts, transitions, pd.DataFrame(dataset.table_columns(dataset.text_table(StringIO(text)))), data)
+    return Comparison(
+        **{name: data[name] for name in ("cells", "differing", "by_class", "by_period", "by_pattern", "by_word")},
+        transitions=pd.DataFrame(data["transitions"], columns=["a", "b", "cells"]),
+        table=pd.DataFrame(dataset.table_columns(dataset.text_table(StringIO(text)))),
+        data=data,
+    )
 
 
 def _folder(map_: str | os.PathLike[str] | xr.Dataset) -> str:
