@@ -78,9 +78,6 @@ def bifurcation(
         settings=settings,
     )
     with reporter(progress, "columns") as report:
-        result = _native.bifurcation(request, report)
-    manifest, points = json.loads(result["manifest"]), result["points"]
-    for name, texts in (("kind", result["kinds"]), ("direction", result["directions"])):
-        if name in points:
-            points[name] = dataset.name_array(texts, points[name])
-    return dataset.diagram(manifest["axis"]["parameter"], dataset.text_table(StringIO(result["columns"])), points, manifest)
+        manifest, *tables = _native.bifurcation(request, report)
+    columns, points = (dataset.text_table(StringIO(table)) for table in tables)
+    return dataset.diagram(columns, points, json.loads(manifest))

@@ -63,12 +63,6 @@ def text_array(texts: Iterable[str]) -> Array:
     return np.array([*texts], dtype=object)
 
 
-def name_array(names: list[str], codes: Array) -> Array:
-    """Return the names at these places of a list, as wide as the longest name that occurs."""
-    width = max((len(names[code]) for code in np.unique(codes)), default=1)
-    return np.array(names)[codes].astype(f"<U{width}")
-
-
 def look_up(table: Array, rows: Array) -> Array:
     """Return the entries of a table at these rows, in the shape of the rows. Raises IndexError if a row is not in the table."""
     rows = np.asarray(rows)
@@ -188,7 +182,7 @@ _TYPES: dict[str, Any] = {
     "i": np.int64,
     "j": np.int64,
 }
-_NAMES = frozenset(("class", "class_a", "class_b", "status", "kind", "direction"))
+_NAMES = frozenset(("class", "class_a", "class_b", "status", "kind", "direction", "domain", "event", "moment"))
 
 
 def text_table(source: Path | StringIO) -> pd.DataFrame:
@@ -233,28 +227,24 @@ def with_attractors(ds: xr.Dataset, table: pd.DataFrame) -> xr.Dataset:
     return ds.assign(variables).assign_coords(label=label, component=component)
 
 
-def diagram(axis: str, columns: pd.DataFrame, points: Mapping[str, Array], manifest: Mapping[str, Any]) -> xr.Dataset:
+def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, Any]) -> xr.Dataset:
     """Return the Dataset of a bifurcation diagram.
 
     Parameters
     ----------
-    axis
-        The swept parameter.
-    columns
-        ``bifurcation_columns.csv``, every field as text: one row per value (and direction).
-    points
-        Columns of ``bifurcation.csv`` with their types: one value per section point.
+    columns, points
+        ``bifurcation_columns.csv`` and ``bifurcation.csv``, every field as text.
     manifest
         Becomes the attributes.
 
     Returns
     -------
     xarray.Dataset
-        Class, period, exponent and so on over ``axis``, or over (direction, ``axis``) if the attractor was followed in both
+        Class, period, exponent and so on over the swept parameter, or over (direction, parameter) if the attractor was followed in both
         directions. Section points are over the dimension ``point``: ``side``, ``kind``, ``t_mod_period``, states before and
-        after. ``point_<axis>`` is the parameter's value there, ``point_direction`` the direction.
+        after. ``point_<parameter>`` is the parameter's value there, ``point_direction`` the direction.
     """
-    data = table_columns(columns)
+    axis, data = manifest["axis"]["parameter"], table_columns(columns)
     value, direction = data.pop(axis), data.pop("direction", None)
     coords: dict[str, Any]
     dims: tuple[str, ...]
@@ -269,7 +259,8 @@ def diagram(axis: str, columns: pd.DataFrame, points: Mapping[str, Array], manif
     variables = {
         name: xr.Variable(dims, values[place], variable_attributes(name, codes)) for name, values in data.items()
     }
-    for name, values in points.items():
+    # A row without a side is a column without a point.
+    for name, values in table_columns(points[points["side"] != ""]).items():
         if name in (axis, "direction"):
             coords[f"point_{name}"] = (("point",), values)
         elif name not in ("class", "period", "status"):

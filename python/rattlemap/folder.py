@@ -133,9 +133,7 @@ def _map(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
 
 def _diagram(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
     columns, points = (dataset.text_table(_require(folder, manifest, name, "csv")) for name in (_COLUMNS, _POINTS))
-    # Rows without a side are columns without a point.
-    points = points[points["side"] != ""]
-    return dataset.diagram(manifest["axis"]["parameter"], columns, dataset.table_columns(points), manifest)
+    return dataset.diagram(columns, points, manifest)
 
 
 class _Cells:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from . import _native, scenes
+from . import _native, dataset, scenes
 from .errors import SceneError
 from .model import Model, required
 
@@ -27,7 +28,7 @@ class Orbit:
 
     def __init__(self, model: Model, transient: int, periods: int, start: list[float] | None) -> None:
         self._arguments = (model, transient, periods, start)
-        self._native = _native.orbit(model._model, [], transient, periods, start)
+        self._native = _native.orbit(model._model, transient, periods, start)
         self._facts: dict[str, Any] = json.loads(self._native.json())
         self.model = model
         """The model with the values of this orbit."""
@@ -163,7 +164,8 @@ class Orbit:
         if points < 1:
             raise ValueError(f"points = {points}: it must be at least 1")
         periods = max(self._native.cycle_periods, 1)
-        return pd.DataFrame(self._native.moments(-(-points // periods)))
+        table = StringIO(self._native.trajectory(-(-points // periods)))
+        return pd.DataFrame(dataset.table_columns(dataset.text_table(table)))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that ``rattlemap orbit --json`` prints; absent values are None."""

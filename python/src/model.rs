@@ -23,15 +23,6 @@ pub(crate) struct Model {
     file: String,
 }
 
-impl Model {
-    /// Returns a copy with parameters set by `NAME=VALUE`.
-    pub(crate) fn with(&self, sets: &[String]) -> Result<FileModel, Problem> {
-        let cell = single_cell(&self.model, sets)?;
-        let model = cell.downcast_ref::<FileModel>().cloned();
-        model.ok_or_else(|| Problem::model("the model is not read from a file"))
-    }
-}
-
 #[pymethods]
 impl Model {
     /// Reads a model from a text. Messages name it `file`.
@@ -50,7 +41,10 @@ impl Model {
 
     /// Returns a copy with parameters set by `NAME=VALUE`.
     fn replace(&self, sets: Vec<String>) -> Result<Model, Problem> {
-        Ok(Model { model: self.with(&sets)?, file: self.file.clone() })
+        let cell = single_cell(&self.model, &sets)?;
+        let model = cell.downcast_ref::<FileModel>().cloned();
+        let model = model.ok_or_else(|| Problem::model("the model is not read from a file"))?;
+        Ok(Model { model, file: self.file.clone() })
     }
 
     #[getter]

@@ -94,25 +94,9 @@ impl Scene {
         (self.scene.text().to_owned(), self.sets.clone(), model, cells, purpose, along)
     }
 
-    #[getter]
-    fn text(&self) -> &str {
-        self.scene.text()
-    }
-
-    #[getter]
-    fn sets(&self) -> Vec<String> {
-        self.sets.clone()
-    }
-
     /// Number of runs: cells times starts per cell. The progress of a map counts them.
     #[getter]
     fn runs(&self) -> u64 {
         self.scene.run_count()
-    }
-
-    /// Whether an axis sweeps a component of the start.
-    #[getter]
-    fn is_basin(&self) -> bool {
-        self.scene.is_basin()
     }
 }
