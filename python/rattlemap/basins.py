@@ -12,7 +12,7 @@ from . import scenes
 from .engine import Adapter, Engine, Precision
 from .errors import SceneError
 from .map import map as compute_map
-from .model import Model, required
+from .model import Model, require_model
 from .progress import Report
 
 
@@ -66,7 +66,7 @@ def basins(
     >>> bs["attractor"].plot(); bs["attractor_share"].values
     """
     swept = [name for name, value in scenes.all_names(names, axes, parameters).items() if scenes.is_axis(value)]
-    components = required(model).state_names
+    components = require_model(model).state_names
     if swept and not any(name in components for name in swept):
         raise SceneError(
             f"the axes {', '.join(swept)} are no components of the start, {', '.join(components)}; at least one axis must be"

@@ -65,7 +65,7 @@ def bifurcation(
     >>> bd = rm.bifurcation(rm.gear_pair(), e=(0, 0.999, 40), omega=5.6)
     >>> plt.plot(bd["point_e"], bd["v1"], ",")
     """
-    request = scenes.requested(
+    request = scenes.scene_of(
         model,
         scene,
         scenes.all_names(names, axes, parameters),

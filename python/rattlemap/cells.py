@@ -11,7 +11,7 @@ import pandas as pd
 from . import _native, dataset, scenes, toml
 from .engine import Adapter, Engine, Precision, adapter_text, map_dataset, no_display, warn
 from .errors import SceneError
-from .model import Model, required
+from .model import Model, require_model
 from .progress import Report, reporter
 
 
@@ -62,15 +62,15 @@ def cells(
     >>> rm.cells(rm.gear_pair(), pd.DataFrame({"e": [0.06, 0.605], "omega": [5.6, 5.6]}))["class"]
     """
     frame = frame if isinstance(frame, pd.DataFrame) else pd.DataFrame({name: np.asarray(frame[name]) for name in frame})
-    taken = [name for name in frame.columns if name in dataset.RESULTS]
-    if taken:
-        raise SceneError(f"the frame has a column {taken[0]!r}, which is the name of a result; rename it")
+    reserved = [name for name in frame.columns if name in dataset.RESULTS]
+    if reserved:
+        raise SceneError(f"the frame has a column {reserved[0]!r}, which is the name of a result; rename it")
     used = [*frame.columns] if columns is None else [columns] if isinstance(columns, str) else [*columns]
     missing = [name for name in used if name not in frame.columns]
     if missing:
         raise SceneError(f"the frame has no column {missing[0]!r}; it has {', '.join(map(str, frame.columns))}")
-    request = scenes.requested(
-        required(model),
+    request = scenes.scene_of(
+        require_model(model),
         None,
         scenes.all_names(names, None, parameters),
         purpose="map",

@@ -37,7 +37,7 @@ class _Cancelled(Exception):
     """The client no longer needs the shard."""
 
 
-def merged(
+def compute_shards(
     scene: _native.Scene,
     client: Any,
     *,
@@ -50,33 +50,8 @@ def merged(
     """Return a map whose shards the workers of a cluster compute.
 
     A task is a shard and uses one thread of its worker; on a graphics card a worker computes one shard at a time. A finished
-    shard is fetched at once. If a worker is lost, Dask gives its unfinished shards to other workers.
-
-    Parameters
-    ----------
-    scene
-        The scene of the map.
-    client
-        A ``distributed.Client``. The workers must have this package, built from the same sources.
-    choice
-        Engine, precision and adapter; see :func:`rattlemap.map`. The engine ``"auto"`` is refused.
-    shards
-        Number of shards; by default 4 for each thread of the cluster.
-    out, force
-        See :func:`rattlemap.map`.
-    report
-        Called with the number of finished shards and of all shards.
-
-    Raises
-    ------
-    SceneError
-        If the map cannot be split.
-    EngineError
-        If the engine is not named, or the engine of a worker fails.
-    FolderError
-        If workers have different builds, or ``out`` cannot be used.
-    distributed.KilledWorker
-        If a shard repeatedly ends its worker.
+    shard is fetched at once. If a worker is lost, Dask gives its unfinished shards to other workers. ``report`` receives the
+    number of finished shards and of all shards.
     """
     if getattr(client, "asynchronous", False):
         raise SceneError("the client is asynchronous, and this call waits for results; make one with Client(...) outside of a coroutine")

@@ -20,9 +20,9 @@ import xarray as xr
 Array = npt.NDArray[Any]
 
 #: Columns that are row numbers of a table of texts.
-SPELLED = ("word", "pattern")
+TEXT_COLUMNS = ("word", "pattern")
 #: Columns whose codes become text. Codes of ``symmetric`` stay: -1 absent, 0 false, 1 true.
-CODED = ("class", "status", "source")
+CODE_COLUMNS = ("class", "status", "source")
 #: Indices along the axes, which a Dataset does not need.
 INDICES = ("i", "j")
 #: Dimension of a list of cells.
@@ -99,23 +99,10 @@ Reader = Callable[[str, tuple[int, ...], "str | None"], Any]
 
 
 def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable[[str], Array], read: Reader) -> xr.Dataset:
-    """Return the Dataset of a map.
+    """Return the Dataset of a map: dimensions (second axis, first axis), or ``cell`` for a list.
 
-    Parameters
-    ----------
-    fields
-        Names of the columns, in their order.
-    manifest
-        Manifest of the map with ``axes`` or ``list``, and ``codes``; it becomes the attributes.
-    column
-        Returns a column without conversion, shape (cells,). It is called for the values of axes.
-    read
-        Returns the data of a variable: of a column, in a shape, converted by a table (``"words"`` or a name in ``codes``).
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimensions (second axis, first axis); or ``cell`` for a list, whose parameters are coordinates.
+    ``fields`` names the columns. ``column`` returns the values of an axis, shape (cells,). ``read`` returns the data of a
+    variable. The manifest becomes the attributes.
     """
     axes = manifest.get("axes") or []
     codes = manifest["codes"]
@@ -137,7 +124,7 @@ def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable
     for name in fields:
         if name in INDICES or name in coords:
             continue
-        table = "words" if name in SPELLED else name if name in CODED else None
+        table = "words" if name in TEXT_COLUMNS else name if name in CODE_COLUMNS else None
         variables[name] = xr.Variable(dims, read(name, shape, table), variable_attributes(name, codes))
     return xr.Dataset(variables, coords, attributes(manifest))
 
@@ -145,19 +132,7 @@ def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable
 def from_columns(columns: Mapping[str, Array], manifest: Mapping[str, Any], texts: Iterable[str] = ("",)) -> xr.Dataset:
     """Return the Dataset of a map whose columns are in memory. Numbers are not copied.
 
-    Parameters
-    ----------
-    columns
-        Columns of ``cells.npy`` by name, shape (cells,), without conversion.
-    manifest
-        See :func:`arrange`.
-    texts
-        Texts that ``word`` and ``pattern`` refer to by row; the first is empty.
-
-    Returns
-    -------
-    xarray.Dataset
-        The Dataset that :func:`rattlemap.open` returns for the folder of the map.
+    ``word`` and ``pattern`` are row numbers of ``texts``, of which the first is empty.
     """
     words = text_array(texts)
 
@@ -193,7 +168,7 @@ def text_table(source: Path | StringIO) -> pd.DataFrame:
 def table_column(name: str, values: pd.Series) -> Array:
     """Convert a column of :func:`text_table` to the type that its variable has in a map."""
     text = values.fillna("")
-    if name in SPELLED:
+    if name in TEXT_COLUMNS:
         return text_array(text)
     if name in _NAMES:
         return np.asarray(text.to_numpy(), dtype=str)
@@ -228,21 +203,10 @@ def with_attractors(ds: xr.Dataset, table: pd.DataFrame) -> xr.Dataset:
 
 
 def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, Any]) -> xr.Dataset:
-    """Return the Dataset of a bifurcation diagram.
+    """Return the Dataset of a bifurcation diagram from its two tables with every field as text.
 
-    Parameters
-    ----------
-    columns, points
-        ``bifurcation_columns.csv`` and ``bifurcation.csv``, every field as text.
-    manifest
-        Becomes the attributes.
-
-    Returns
-    -------
-    xarray.Dataset
-        Class, period, exponent and so on over the swept parameter, or over (direction, parameter) if the attractor was followed in both
-        directions. Section points are over the dimension ``point``: ``side``, ``kind``, ``t_mod_period``, states before and
-        after. ``point_<parameter>`` is the parameter's value there, ``point_direction`` the direction.
+    Columns are over the swept parameter, or over (direction, parameter) if the attractor was followed in both directions. Section
+    points are over the dimension ``point``; ``point_<parameter>`` is the parameter's value there.
     """
     axis, data = manifest["axis"]["parameter"], table_columns(columns)
     value, direction = data.pop(axis), data.pop("direction", None)

@@ -115,7 +115,7 @@ def _map(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
     cells = _Cells(path, int(manifest["cells"]))
     array = cells.array
     fields = array.dtype.names or ()
-    if any(name in fields for name in dataset.SPELLED):
+    if any(name in fields for name in dataset.TEXT_COLUMNS):
         _require(folder, manifest, _WORDS, "npy")
 
     def read(name: str, shape: tuple[int, ...], table: str | None) -> indexing.LazilyIndexedArray:
@@ -151,24 +151,24 @@ class _Cells:
         try:
             array: npt.NDArray[Any] = np.load(self.path, mmap_mode="r", allow_pickle=False)
         except (ValueError, OSError, EOFError) as error:
-            raise self._damaged(self.path.name, str(error)) from error
+            raise self._damage_error(self.path.name, str(error)) from error
         if array.shape != (self.count,) or array.dtype.names is None:
-            raise self._damaged(self.path.name, f"it has the shape {array.shape}, not ({self.count},)")
+            raise self._damage_error(self.path.name, f"it has the shape {array.shape}, not ({self.count},)")
         return array
 
     @cached_property
     def texts(self) -> npt.NDArray[Any]:
         return dataset.text_array(dataset.text_table(self.path.with_name(_WORDS))["text"])
 
-    def _damaged(self, name: str, why: str) -> FolderError:
+    def _damage_error(self, name: str, why: str) -> FolderError:
         folder = self.path.parent
         return FolderError(f"{folder}: {name} is damaged: {why}; `rattlemap check {folder} --repair` makes it again")
 
-    def decoded(self, table: str, codes: dict[str, int] | None, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    def convert(self, table: str, codes: dict[str, int] | None, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
         try:
             return dataset.look_up(self.texts if codes is None else dataset.code_names(codes), rows)
         except IndexError as error:
-            raise self._damaged(_WORDS, str(error)) from error
+            raise self._damage_error(_WORDS, str(error)) from error
 
 
 class _Column(BackendArray):
@@ -185,7 +185,7 @@ class _Column(BackendArray):
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> npt.NDArray[Any]:
         raw = indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._raw)
-        return raw if self.table is None else self.cells.decoded(self.table, self.codes, raw)
+        return raw if self.table is None else self.cells.convert(self.table, self.codes, raw)
 
     def _raw(self, key: tuple[Any, ...]) -> npt.NDArray[Any]:
         return np.asarray(self.cells.array[self.name].reshape(self.shape)[key])

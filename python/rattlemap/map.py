@@ -104,7 +104,7 @@ def map(  # noqa: A001
     >>> ds["lyapunov"].sel(e=0.6, method="nearest").plot()
     >>> ds = rm.map(scene="scenes/e_omega.toml", set=["axis.0.count=16", "axis.1.count=16"])
     """
-    request = scenes.requested(
+    request = scenes.scene_of(
         model,
         scene,
         scenes.all_names(names, axes, parameters),
@@ -119,11 +119,11 @@ def map(  # noqa: A001
     if client is not None:
         if resume:
             raise SceneError("resume: a map on a cluster cannot be resumed; use force=True to compute it again")
-        from .cluster import merged
+        from .cluster import compute_shards
 
         with reporter(progress, "shards") as report:
             choice = (engine, precision, adapter_text(adapter))
-            result = merged(request, client, choice=choice, shards=shards, out=folder, force=force, report=report)
+            result = compute_shards(request, client, choice=choice, shards=shards, out=folder, force=force, report=report)
     elif shards is not None:
         raise SceneError(f"shards = {shards}: only a cluster computes shards; give its client, too")
     else:

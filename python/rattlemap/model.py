@@ -95,17 +95,17 @@ class Model:
         return f"Model({self.name!r}{changed})"
 
     def __reduce__(self) -> tuple[Callable[..., Model], tuple[Any, ...]]:
-        return _rebuilt, (self.text, self._model.file, self._model.changed)
+        return _rebuild, (self.text, self._model.file, self._model.changed)
 
 
-def required(model: object) -> Model:
+def require_model(model: object) -> Model:
     """Return the model, or raise TypeError if it is not one."""
     if not isinstance(model, Model):
         raise TypeError(f"{model!r} is not a model; rm.gear_pair() is one, rm.load_model(NAME_OR_FILE) makes others")
     return model
 
 
-def _rebuilt(text: str, file: str, changed: dict[str, float]) -> Model:
+def _rebuild(text: str, file: str, changed: dict[str, float]) -> Model:
     return Model(_native.Model(text, file).replace(assignments(changed)))
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 
 from . import _native, dataset, scenes
 from .errors import SceneError
-from .model import Model, required
+from .model import Model, require_model
 
 #: Ranges of the arguments, those of the program.
 _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
@@ -238,7 +238,7 @@ def orbit(
         is_whole = isinstance(value, (int, np.integer)) or (isinstance(value, float) and value.is_integer())
         if not is_whole or not least <= value <= most:
             raise SceneError(f"{name} = {value!r}: it must be a whole number from {least} to {most}")
-    model = required(model).replace(**scenes.all_names(names, None, parameters))
+    model = require_model(model).replace(**scenes.all_names(names, None, parameters))
     state = None if start is None else _state(model, start)
     return Orbit(model, int(transient), int(periods), state)
 

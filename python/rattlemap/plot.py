@@ -28,7 +28,7 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     Parameters
     ----------
     data
-        A map of :func:`rattlemap.map`, :func:`rattlemap.basins` or :func:`rattlemap.open`: its attractors are drawn if it has
+        A map of :func:`rattlemap.map`, :func:`rattlemap.basins` or :func:`rattlemap.open`: its attractors are image if it has
         any, else periods and classes. Or one of its variables: ``ds["class"]``, ``ds["pattern"]``, ``ds["word"]``,
         ``ds["status"]``, ``ds["period"]``, ``ds["attractor"]``; two dimensions.
     ax
@@ -58,15 +58,15 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    cells = _named(data) if isinstance(data, xr.Dataset) else data
+    cells = _cell_names(data) if isinstance(data, xr.Dataset) else data
     if cells.ndim != 2:
         raise ValueError(f"a map must have two dimensions; this has {cells.ndim}: {', '.join(map(str, cells.dims))}")
     names, places = _categories(cells, most)
     colors = [_color(name, place, str(cells.name)) for place, name in enumerate(names)]
     # The type stubs of xarray do not describe the method `plot`.
-    drawn: Any = cells.copy(data=places)
+    image: Any = cells.copy(data=places)
     axes = plt.gca() if ax is None else ax
-    drawn.plot(ax=axes, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(names) - 0.5, add_colorbar=False)
+    image.plot(ax=axes, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(names) - 0.5, add_colorbar=False)
     axes.set_title("")
     if legend:
         shares = np.bincount(places.ravel(), minlength=len(names)) / max(places.size, 1)
@@ -76,7 +76,7 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     return axes
 
 
-def _named(ds: xr.Dataset) -> xr.DataArray:
+def _cell_names(ds: xr.Dataset) -> xr.DataArray:
     """Return the names of a Dataset's cells."""
     if "attractor" in ds:
         return ds["attractor"]

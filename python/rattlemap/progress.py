@@ -16,15 +16,7 @@ _DELAY = 0.5
 
 @contextmanager
 def reporter(progress: bool | Report, unit: str) -> Iterator[Report | None]:
-    """Provide the function that receives progress.
-
-    Parameters
-    ----------
-    progress
-        A function, which may raise an exception to end the computation; True for a bar of tqdm; False for none.
-    unit
-        Name of what is counted.
-    """
+    """Provide the function that receives progress: ``progress`` itself, or if it is True a bar of tqdm that counts ``unit``s."""
     if callable(progress):
         yield progress
         return

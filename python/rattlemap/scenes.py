@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from . import _native, toml
 from .errors import SceneError
-from .model import Model, required
+from .model import Model, require_model
 
 #: Keywords of the scene's table ``[integration]``. A model's parameter of the same name takes precedence.
 INTEGRATION = (
@@ -43,13 +43,7 @@ def is_axis(value: Any) -> bool:
 
 
 def all_names(names: Mapping[str, Any], axes: Axes | None, parameters: Parameters | None) -> dict[str, Any]:
-    """Return axes, keywords and parameters in one dictionary, in this order.
-
-    Raises
-    ------
-    SceneError
-        If a name is given twice, or ``axes`` has a single value, or ``parameters`` has an axis.
-    """
+    """Return axes, keywords and parameters in one dictionary, in this order. Raises SceneError if a name is given twice."""
     for name, value in (axes or {}).items():
         if not is_axis(value):
             raise SceneError(f"axes: `{name} = {value!r}` must be a tuple (min, max, count) or an array of values")
@@ -65,7 +59,7 @@ def all_names(names: Mapping[str, Any], axes: Axes | None, parameters: Parameter
     return merged
 
 
-def requested(
+def scene_of(
     model: Model | None,
     path: str | os.PathLike[str] | None,
     names: Mapping[str, Any],
@@ -80,38 +74,13 @@ def requested(
     settings: Mapping[str, Any] | None = None,
     cells: str | None = None,
 ) -> _native.Scene:
-    """Return the scene of a model and keywords, or of a scene file.
-
-    Parameters
-    ----------
-    model
-        Its values are those of all parameters that no keyword names.
-    path
-        A scene file. It excludes ``model``; ``sets``, ``along`` and ``at`` apply to it alone.
-    names
-        Axes, parameters, components of the start and settings of ``[integration]``, in their order.
-    purpose
-        ``"map"`` or ``"bifurcation"``.
-    axes
-        Number of axes that ``names`` must have beside a model.
-    quantities, start, settings
-        See :func:`rattlemap.map`.
-    cells
-        A table of cells instead of axes, CSV.
-
-    Raises
-    ------
-    SceneError
-        For anything wrong in the scene, with the program's message.
-    TypeError
-        If ``model`` is not a model.
-    """
+    """Return the scene of a model and keywords, or of a scene file at ``path``. Beside a model there must be ``axes`` axes."""
     if path is None:
         if model is None:
             raise SceneError("no model and no scene is given; give a model, such as rm.gear_pair(), or scene=PATH")
         if [*sets] or along is not None or at is not None:
             raise SceneError("`set`, `along` and `at` apply to a scene file; with a model use settings={...} or keywords")
-        return _of_keywords(required(model), names, purpose, axes, quantities, start, settings, cells)
+        return _of_keywords(require_model(model), names, purpose, axes, quantities, start, settings or {}, cells)
     if model is not None:
         raise SceneError("a model and a scene are given, and the scene names its own model; leave one of the two out")
     line = None if along is None else (along, toml.assignments(at or {}))
@@ -125,7 +94,7 @@ def _of_keywords(
     axes: int,
     quantities: Iterable[str] | None,
     start: Start | None,
-    settings: Mapping[str, Any] | None,
+    settings: Mapping[str, Any],
     cells: str | None,
 ) -> _native.Scene:
     native = model._model
@@ -161,7 +130,7 @@ def _of_keywords(
     document["integration"] = integration
     document["start"] = _start_table(model, start, states)
     document["outputs"] = {} if quantities is None else {"quantities": _list_of(quantities)}
-    for path, value in (settings or {}).items():
+    for path, value in settings.items():
         _put(document, path, value)
     # A formula replaces the model's own value of a parameter.
     for name in document.get("derived", {}):
@@ -191,7 +160,7 @@ def _sets(
         changes.append(f"integration.{name}={toml.value_text(value)}" if is_setting else toml.assignments({name: value})[0])
     by_path: dict[str, Any] = {} if quantities is None else {"outputs.quantities": _list_of(quantities)}
     if isinstance(start, Mapping):
-        raise SceneError("start: beside a scene file it must be a policy or a state with all components")
+        raise SceneError("start: with a scene file it must be a policy or a state with all components")
     if start is not None:
         by_path["start.policy"] = start if isinstance(start, str) else "state"
         if not isinstance(start, str):

@@ -122,7 +122,7 @@ def test_a_shard_of_another_map_is_refused_at_once(client: Any, tmp_path: Path, 
     began: list[int] = []
 
     def of_two_runs(scene: Any, client: Any, count: int, choice: cluster.Choice, *_: Any) -> Iterator[Path]:
-        other = scenes.requested(rm.gear_pair(F=51), None, {"e": (0, 1, 8), "omega": (1, 12, 8)}, purpose="map", axes=2)
+        other = scenes.scene_of(rm.gear_pair(F=51), None, {"e": (0, 1, 8), "omega": (1, 12, 8)}, purpose="map", axes=2)
         for index, request in enumerate((scene, other, scene), 1):
             began.append(index)
             part = tmp_path / f"part-{index}"

@@ -150,9 +150,9 @@ def test_a_diagram_has_columns_and_points(program: Program, scratch: Path, polic
     for way in ways:
         rows = [row for row in range(len(columns["e"])) if way is None or columns["direction"][row] == way]
         rows.sort(key=lambda row: float(columns["e"][row]))
-        shown = ds if way is None else ds.sel(direction=way)
-        assert shown["e"].values.tolist() == [float(columns["e"][row]) for row in rows]
-        assert_as_table(shown, {name: [texts[row] for row in rows] for name, texts in columns.items()})
+        selected = ds if way is None else ds.sel(direction=way)
+        assert selected["e"].values.tolist() == [float(columns["e"][row]) for row in rows]
+        assert_as_table(selected, {name: [texts[row] for row in rows] for name, texts in columns.items()})
 
 
 def edit_manifest(folder: Path, **changes: object) -> None:

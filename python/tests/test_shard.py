@@ -15,7 +15,7 @@ def test_all_shards_are_the_map(tmp_path: Path) -> None:
     model = rm.gear_pair(F=60)
     axes = {"e": (0.0, 1.0, 10), "omega": (1.0, 12.0, 8)}
     # A task on another machine receives the scene as a pickle.
-    scene = pickle.loads(pickle.dumps(scenes.requested(model, None, axes, purpose="map", axes=2)))
+    scene = pickle.loads(pickle.dumps(scenes.scene_of(model, None, axes, purpose="map", axes=2)))
     parts = [str(tmp_path / f"part-{index}") for index in (1, 2, 3)]
     for index, part in enumerate(parts, 1):
         _native.shard(scene, index, 3, "cpu", None, part)
@@ -28,7 +28,7 @@ def test_all_shards_are_the_map(tmp_path: Path) -> None:
 
 def test_wrong_shards_are_refused(tmp_path: Path) -> None:
     axes = {"e": (0, 1, 4), "omega": (1, 12, 4)}
-    scene = scenes.requested(rm.gear_pair(), None, axes, purpose="map", axes=2)
+    scene = scenes.scene_of(rm.gear_pair(), None, axes, purpose="map", axes=2)
     with pytest.raises(rm.EngineError, match="auto may choose otherwise on another machine"):
         _native.shard(scene, 1, 2, "auto", None, str(tmp_path / "part"))
     with pytest.raises(rm.SceneError, match="--shard 0/2: shards are counted from 1"):
