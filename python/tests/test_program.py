@@ -32,13 +32,13 @@ def test_a_signal_ends_the_program_with_its_exit_code(tmp_path: Path, number: si
     command += set_arguments("integration.early_stop=false", "integration.transient_periods=20000")
     running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
-        while not (tmp_path / "out/records.bin").is_file():
+        records = tmp_path / "out/records.bin"
+        while not records.is_file() or not records.stat().st_size:
             assert running.poll() is None, running.stderr
             time.sleep(0.02)
-        time.sleep(1)
         running.send_signal(number)
-        said = running.communicate(timeout=20)[1]
+        message = running.communicate(timeout=20)[1]
     finally:
         running.kill()
     assert running.returncode == code
-    assert "interrupted; " in said and "go on with: rattlemap map " in said
+    assert "interrupted; " in message and "go on with: rattlemap map " in message
