@@ -59,7 +59,8 @@ def test_values_of_an_array_are_exact() -> None:
 
 
 def test_lanes_are_the_programs(rerun: Rerun, tmp_path: Path) -> None:
-    axes = {"e": (0.1, 0.9, 3), "omega": (4.0, 8.0, 2)}
+    # Without words and exponents a software driver compiles in half the time.
+    axes = {"e": (0.1, 0.9, 3), "omega": (4.0, 8.0, 2), "quantities": ["impacts"]}
     ds = rm.map(rm.gear_pair(), **axes, engine="gpu", out=tmp_path / "python")
     assert (ds.attrs["engine"], ds.attrs["precision"]) == ("gpu", "f32")
     assert_same(ds, rerun(ds, engine="gpu"))
@@ -220,7 +221,7 @@ def test_an_interrupted_map_is_resumed(tmp_path: Path) -> None:
         if 0 < done < total:
             raise Enough
 
-    setting = {"engine": "cpu", "early_stop": False, "transient_periods": 4000, "out": tmp_path / "out"}
+    setting = {"engine": "cpu", "early_stop": False, "transient_periods": 1500, "out": tmp_path / "out"}
     with pytest.raises(Enough):
         rm.map(rm.gear_pair(), **axes, **setting, progress=stop)
     with pytest.raises(rm.FolderError, match="unfinished"):
@@ -239,7 +240,7 @@ def test_resuming_warns_of_damage(tmp_path: Path) -> None:
     (out / "manifest.json").unlink()
     records = out / "records.bin"
     records.write_bytes(records.read_bytes()[:-10])
-    with pytest.warns(RuntimeWarning, match="records.bin: .* what is damaged is dropped"):
+    with pytest.warns(RuntimeWarning, match="records.bin: .* are damaged"):
         again = rm.map(rm.gear_pair(), **SMALL, engine="cpu", out=out, resume=True)
     xr.testing.assert_equal(again, whole)
 
