@@ -14,7 +14,6 @@ use rattlemap::store::error::OutputError;
 use rattlemap::store::finished_map::FinishedMapError;
 use rattlemap::store::folder::FolderError;
 use rattlemap::store::merge::MergeError;
-use rattlemap::store::record_file::RecordFileError;
 use rattlemap::store::run_records::RunRecordsError;
 
 /// An exception of the package to be raised.
@@ -47,28 +46,20 @@ impl Problem {
     }
 }
 
-macro_rules! problems {
-    ($($error:ty => $class:ident),+ $(,)?) => {
+/// Converts errors of layers below jobs.
+macro_rules! from_errors {
+    ($($error:ty),+ $(,)?) => {
         $(impl From<$error> for Problem {
             fn from(error: $error) -> Problem {
-                Problem::$class(error)
+                JobError::from(error).into()
             }
         })+
     };
 }
 
-problems! {
-    SceneError => scene,
-    ModelError => model,
-    NoMotion => model,
-    ChoiceError => engine,
-    SweepError => engine,
-    FinishedMapError => folder,
-    FolderError => folder,
-    OutputError => folder,
-    RecordFileError => folder,
-    RunRecordsError => folder,
-    MergeError => folder,
+from_errors! {
+    SceneError, ModelError, NoMotion, ChoiceError, SweepError, FinishedMapError, FolderError, OutputError,
+    RunRecordsError, MergeError,
 }
 
 impl From<JobError> for Problem {

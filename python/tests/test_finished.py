@@ -102,9 +102,9 @@ def test_models_and_their_parameters_are_listed(program: Program) -> None:
 
 
 def test_devices_are_the_programs(program: Program) -> None:
-    found, said = rm.devices(), program("devices").stdout
-    assert f"auto takes {found.engine} ({found.precision}): {found.reason}" in said
-    assert found.processor in said
+    found, printed = rm.devices(), program("devices").stdout
+    assert f"auto takes {found.engine} ({found.precision}): {found.reason}" in printed
+    assert found.processor in printed
     for number, adapter in found.adapters.iterrows():
-        assert f"(--adapter {number})" in said and f"gpu: {adapter['name']}" in said
-        assert f"precision   {adapter['precisions'].replace(' ', ', ')}" in said
+        assert f"(--adapter {number})" in printed and f"gpu: {adapter['name']}" in printed
+        assert f"precision   {adapter['precisions'].replace(' ', ', ')}" in printed
