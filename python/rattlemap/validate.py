@@ -107,9 +107,8 @@ def validate(
         for difference in cell["differences"]
     ]
     columns = None if rows else ["id", "i", "j", "kind", "field", "map", "judge", "replay"]
-    return Validation(
-        data["judge"], data["samples"], strata, pd.DataFrame(rows, columns=columns), data["faults"], failure, data
-    )
+    mismatches = pd.DataFrame(rows, columns=columns)
+    return Validation(data["judge"], data["samples"], strata, mismatches, data["faults"], failure, data)
 
 
 def _stratum(stratum: dict[str, Any]) -> dict[str, Any]:

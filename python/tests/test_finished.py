@@ -12,6 +12,7 @@ import pytest
 import rattlemap as rm
 import xarray as xr
 from conftest import Program, assert_same_columns
+from rattlemap import _native
 
 AXES = {"e": (0.5, 1.0, 6), "omega": (2.0, 8.0, 5), "engine": "cpu", "progress": False}
 
@@ -25,11 +26,12 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return folder / "a", folder / "b"
 
 
-def test_a_validation_is_the_programs(program: Program, pair: tuple[Path, Path], tmp_path: Path) -> None:
-    for name in ("python", "program"):
-        shutil.copytree(pair[0], tmp_path / name)
-        # The map is right, and a file of its folder is missing.
-        (tmp_path / name / "cells.csv").unlink()
+def test_a_validation_is_the_programs(program: Program, tmp_path: Path) -> None:
+    # Without words and exponents a software driver compiles in half the time.
+    rm.map(rm.gear_pair(), **AXES, quantities=["impacts"], out=tmp_path / "python")
+    # The map is right, and a file of its folder is missing.
+    (tmp_path / "python/cells.csv").unlink()
+    shutil.copytree(tmp_path / "python", tmp_path / "program")
     calls: list[tuple[int, int]] = []
     with pytest.warns(RuntimeWarning, match="cells.csv is missing"):
         found = rm.validate(tmp_path / "python", samples=8, seed=3, progress=lambda done, total: calls.append((done, total)))
@@ -50,6 +52,21 @@ def test_a_validation_is_the_programs(program: Program, pair: tuple[Path, Path],
     assert calls and calls[-1][0] <= calls[-1][1]
     with pytest.raises(rm.SceneError, match="samples = 0: it must be a whole number from 1"):
         rm.validate(tmp_path / "python", samples=0)
+
+
+def test_mismatches_have_a_row_per_field(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    differences = [{"field": "class", "map": "chaotic", "judge": "periodic"}, {"field": "period", "map": None, "judge": 3}]
+    cell = {"id": 7, "i": 1, "j": 1, "values": {"e": 0.6, "omega": 3.5}, "differences": differences}
+    cell |= {"kind": "border", "replay": "rattlemap orbit"}
+    stratum = {"name": "uniform", "runs": 1, "sampled": 1, "differing": {"count": 1, "interval": [0.05, 1.0]}, "kinds": {}}
+    data = {"judge": "reference", "samples": 1, "strata": [stratum], "mismatches": [cell], "faults": []}
+    (tmp_path / "validation.json").write_text(json.dumps(data))
+    monkeypatch.setattr(_native, "validate", lambda *_: (None, []))
+    found = rm.validate(tmp_path, progress=False)
+    assert found.strata.loc["uniform", "differing_low"] == 0.05
+    rows = found.mismatches
+    assert [*rows.columns] == ["id", "i", "j", "e", "omega", "kind", "field", "map", "judge", "replay"]
+    assert rows["field"].tolist() == ["class", "period"] and rows["id"].tolist() == [7, 7]
 
 
 def test_a_comparison_is_the_programs(program: Program, pair: tuple[Path, Path], tmp_path: Path) -> None:
