@@ -24,7 +24,7 @@ pub(crate) struct MapResult {
 
 impl MapResult {
     /// Returns the map as a dictionary.
-    pub(crate) fn to_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    pub(crate) fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         let dict = PyDict::new(py);
         dict.set_item("manifest", self.map.manifest)?;
         dict.set_item("columns", columns(py, self.map.columns)?)?;
@@ -67,7 +67,7 @@ pub(crate) fn map<'py>(
             Ok(MapResult { map: map.in_memory()?, reason, warnings, files })
         })
     })?;
-    result.to_dict(py)
+    result.into_dict(py)
 }
 
 /// Red, green and blue. A tuple, because Python would receive an array of bytes as `bytes`.

@@ -108,7 +108,7 @@ pub(crate) fn merge<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let out = Out { path: out, force, resume: false };
-    worker::run(py, progress, move |watch| gather(&parts, out, writes, watch))?.to_dict(py)
+    worker::run(py, progress, move |watch| gather(&parts, out, writes, watch))?.into_dict(py)
 }
 
 fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Option<MapResult>, Problem> {
