@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 
 use rattlemap::gpu::Constants;
 use rattlemap::job;
-use rattlemap::job::run::{MapError, Processor};
+use rattlemap::job::Processor;
+use rattlemap::job::error::JobError;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Quantity, Scene, SceneError};
 use rattlemap::map::schedule::Schedule;
@@ -55,7 +56,7 @@ pub enum ScaleError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     #[error(transparent)]
-    Map(#[from] MapError),
+    Map(#[from] JobError),
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error(transparent)]
@@ -103,7 +104,7 @@ pub fn write_shards(ask: Ask, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Taken>), 
     let stretched = Stretched::new(&small, ask.counts.map(|count| count as usize));
     let phase = Phase::begin("plan");
     let plan = Plan::new(&scene);
-    plan.check().map_err(MapError::from)?;
+    plan.check().map_err(JobError::from)?;
     let mut taken = vec![phase.end()];
     let phase = Phase::begin("schedule of a shard");
     drop(Schedule::of(&plan, Shard::all(ask.shards).next()));

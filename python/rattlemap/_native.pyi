@@ -1,17 +1,16 @@
-"""The native module: what the package is built on. Nothing here is for users."""
+"""The native module. The package uses it; nothing here is for users."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, TypedDict
 
-import numpy as np
 import numpy.typing as npt
 
 __version__: str
-# Hash of the sources that decide the bits of results, and what they were built for: a manifest's fields of these names.
+# Hash of the sources that decide the bits of results, and the target of the build: fields `sources` and `target` of manifests.
 SOURCES: str
 TARGET: str
 
-_Tell = Callable[[int, int], object] | None
+_Report = Callable[[int, int], object] | None
 
 def main(arguments: Sequence[str]) -> int: ...
 _Color = tuple[int, int, int]
@@ -19,32 +18,37 @@ _Color = tuple[int, int, int]
 def colors() -> tuple[dict[str, _Color], list[_Color]]: ...
 def manifest(folder: str) -> str: ...
 def missing_variable() -> tuple[str, str] | None: ...
+def models() -> list[tuple[str, str]]: ...
+def check_folder(folder: str, repair: bool = ...) -> tuple[list[tuple[str, str, str]], list[str], list[str]]: ...
+def compare(a: str, b: str) -> tuple[str, str, list[str]]: ...
+def validate(
+    folder: str, samples: int, seed: int, progress: _Report = ...
+) -> tuple[str | None, list[str]]: ...
+
+class DevicesResult(TypedDict):
+    processor: str
+    adapters: list[dict[str, Any]]
+    engine: str
+    precision: str
+    reason: str
+
+def devices() -> DevicesResult: ...
 
 class Model:
     def __new__(cls, text: str, file: str) -> Model: ...
     @staticmethod
     def find(name: str) -> Model: ...
     def replace(self, sets: list[str]) -> Model: ...
-    @property
-    def file(self) -> str: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def text(self) -> str: ...
-    @property
-    def is_built_in(self) -> bool: ...
-    @property
-    def state_names(self) -> list[str]: ...
-    @property
-    def equations(self) -> list[str]: ...
-    @property
-    def parameters(self) -> dict[str, float]: ...
-    @property
-    def changed(self) -> dict[str, float]: ...
-    @property
-    def meanings(self) -> list[tuple[str, str, str]]: ...
+    file: str
+    name: str
+    title: str
+    text: str
+    is_built_in: bool
+    state_names: list[str]
+    equations: list[str]
+    parameters: dict[str, float]
+    changed: dict[str, float]
+    meanings: list[tuple[str, str, str, float | None]]
 
 class Scene:
     def __new__(
@@ -61,21 +65,14 @@ class Scene:
         path: str, sets: list[str] = ..., purpose: str = ..., along: tuple[str, list[str]] | None = ...
     ) -> Scene: ...
     def __getnewargs__(self) -> tuple[Any, ...]: ...
-    @property
-    def text(self) -> str: ...
-    @property
-    def sets(self) -> list[str]: ...
-    @property
-    def runs(self) -> int: ...
-    @property
-    def is_basin(self) -> bool: ...
+    runs: int
 
-class MadeMap(TypedDict):
+class MapResult(TypedDict):
     manifest: str
     columns: dict[str, npt.NDArray[Any]]
     texts: list[str]
     attractors: str | None
-    why: str
+    reason: str
     warnings: list[str]
     files: list[str]
 
@@ -86,9 +83,9 @@ def map(
     out: str | None = ...,
     force: bool = ...,
     resume: bool = ...,
-    progress: _Tell = ...,
+    progress: _Report = ...,
     adapter: str | None = ...,
-) -> MadeMap: ...
+) -> MapResult: ...
 
 def shard(
     scene: Scene,
@@ -99,7 +96,7 @@ def shard(
     out: str,
     resume: bool = ...,
     threads: int | None = ...,
-    progress: _Tell = ...,
+    progress: _Report = ...,
     adapter: str | None = ...,
 ) -> list[str]: ...
 def check_shards(
@@ -111,25 +108,15 @@ def check_shards(
     out: str | None = ...,
     force: bool = ...,
 ) -> None: ...
-def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Tell = ...) -> MadeMap: ...
+def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Report = ...) -> MapResult: ...
 
-class MadeDiagram(TypedDict):
-    manifest: str
-    columns: str
-    points: dict[str, npt.NDArray[Any]]
-    kinds: list[str]
-    directions: list[str]
-
-def bifurcation(scene: Scene, progress: _Tell = ...) -> MadeDiagram: ...
+def bifurcation(scene: Scene, progress: _Report = ...) -> tuple[str, str, str]: ...
 
 class Orbit:
     def json(self) -> str: ...
-    @property
-    def cycle_periods(self) -> int: ...
-    @property
-    def forcing_period(self) -> float: ...
-    @property
-    def state_names(self) -> list[str]: ...
-    def moments(self, samples_per_period: int) -> dict[str, list[str] | npt.NDArray[np.float64] | npt.NDArray[np.int8]]: ...
+    cycle_periods: int
+    forcing_period: float
+    state_names: list[str]
+    def trajectory(self, samples_per_period: int) -> str: ...
 
-def orbit(model: Model, sets: list[str], transient: int, periods: int, start: list[float] | None = ...) -> Orbit: ...
+def orbit(model: Model, transient: int, periods: int, start: list[float] | None = ...) -> Orbit: ...

@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Mapping
+from io import StringIO
 from typing import Any
 
 import xarray as xr
 
-from . import _native, asking, decode
-from .engine import table
-from .errors import SceneError
-from .model import Model, required
-from .progress import Tell, telling
+from . import _native, dataset, scenes
+from .model import Model
+from .progress import Report, reporter
 
 
 def bifurcation(
@@ -23,26 +22,26 @@ def bifurcation(
     set: Iterable[str] = (),  # noqa: A002
     along: str | None = None,
     at: Mapping[str, float] | None = None,
-    start: asking.Start | None = None,
+    axes: scenes.Axes | None = None,
+    parameters: scenes.Parameters | None = None,
+    start: scenes.Start | None = None,
     settings: Mapping[str, Any] | None = None,
-    progress: bool | Tell = True,
+    progress: bool | Report = True,
     **names: Any,
 ) -> xr.Dataset:
-    """Follow the attractor along one parameter: ``rattlemap bifurcation``.
+    """Follow the attractor along one parameter, like ``rattlemap bifurcation``.
 
     Parameters
     ----------
     model
-        What moves; its values are those of all parameters that no keyword names.
+        The oscillator. Its values are those of all parameters that no keyword names.
     scene
-        A scene file in the place of a model and an axis, with changes ``set`` as the program's ``--set`` takes them. Of
-        a scene of two axes ``along`` names the one to run along, and ``at`` says where the other one stays.
+        A scene file instead of a model and an axis, with changes ``set`` in the form of the program's ``--set``. If the scene
+        has two axes, ``along`` names the one that is swept, and ``at`` gives the value of the other one.
+    axes, parameters, settings, progress
+        See :func:`rattlemap.map`.
     start
-        ``"rest"``, a state, or ``"up"``, ``"down"``, ``"both"``: the attractor is followed from one value to the next.
-    settings
-        Any other setting of a scene by its path, such as ``{"integration.max_period": 32}``.
-    progress
-        A bar of tqdm where that is installed, or a function of (done, total).
+        ``"rest"``, a state, or ``"up"``, ``"down"``, ``"both"``: each column starts from the end of its neighbour.
     **names
         One axis, a tuple ``(min, max, count)`` or an array of increasing values; values of single parameters; settings of
         ``[integration]``. All quantities are dimensionless.
@@ -50,39 +49,35 @@ def bifurcation(
     Returns
     -------
     xarray.Dataset
-        Over the parameter (over ``direction``, too, with ``start="both"``): ``class``, ``period``, ``word``,
-        ``pattern``, ``lyapunov``, ``lyapunov_error``, ``impacts_per_period``, ``mesh_fraction``, ``symmetric``,
-        ``status``, ``periods_run``. Over ``point``, a row per crossing of a wall: ``side``, ``kind``,
-        ``t_mod_period``, the state before (``x1_before`` ...) and after (``x1`` ...); the coordinate ``point_<name>``
-        is the parameter's value there. The same as :func:`rattlemap.open` gives for the program's folder.
+        Over the parameter (and over ``direction`` with ``start="both"``): ``class``, ``period``, ``word``, ``pattern``,
+        ``lyapunov``, ``lyapunov_error``, ``impacts_per_period``, ``mesh_fraction``, ``symmetric``, ``status``,
+        ``periods_run``. Over ``point``, one row per crossing of a wall: ``side``, ``kind``, ``t_mod_period``, and the state
+        before (``x1_before`` ...) and after (``x1`` ...); the coordinate ``point_<name>`` is the parameter's value there.
+        :func:`rattlemap.open` returns the same for the program's folder.
 
     Raises
     ------
     SceneError, ModelError, KeyboardInterrupt
-        As :func:`rattlemap.map`.
+        In the cases of :func:`rattlemap.map`.
 
     Examples
     --------
-    >>> bd = rm.bifurcation(rm.gear_pair(), e=(0, 0.999, 200), omega=5.6)
+    >>> bd = rm.bifurcation(rm.gear_pair(), e=(0, 0.999, 40), omega=5.6)
     >>> plt.plot(bd["point_e"], bd["v1"], ",")
     """
-    if scene is not None:
-        if model is not None:
-            raise SceneError("a scene says which model it is about; give a model or a scene, not both")
-        line = None if along is None else (along, asking.assignments(at or {}))
-        asked = asking.scene_file(
-            scene, names, purpose="bifurcation", sets=set, start=start, settings=settings, along=line
-        )
-    elif model is None:
-        raise SceneError("give a model, such as rm.gear_pair(), or the path of a scene")
-    elif along is not None or at is not None or [*set]:
-        raise SceneError("`set`, `along` and `at` are for a scene file; beside a model say settings={...} or keywords")
-    else:
-        asked = asking.scene(required(model), names, purpose="bifurcation", axes=1, start=start, settings=settings)
-    with telling(progress, "columns") as tell:
-        made = _native.bifurcation(asked, tell)
-    manifest, points = json.loads(made["manifest"]), made["points"]
-    for name, names_of in (("kind", made["kinds"]), ("direction", made["directions"])):
-        if name in points:
-            points[name] = decode.named(names_of, points[name])
-    return decode.diagram(manifest["axis"]["parameter"], table(made["columns"]), points, manifest)
+    request = scenes.scene_of(
+        model,
+        scene,
+        scenes.all_names(names, axes, parameters),
+        purpose="bifurcation",
+        axes=1,
+        sets=set,
+        along=along,
+        at=at,
+        start=start,
+        settings=settings,
+    )
+    with reporter(progress, "columns") as report:
+        manifest, *tables = _native.bifurcation(request, report)
+    columns, points = (dataset.text_table(StringIO(table)) for table in tables)
+    return dataset.diagram(columns, points, json.loads(manifest))

@@ -1,34 +1,33 @@
-"""What the native functions need around them."""
+"""Engines, and the conversion of native results."""
 
 from __future__ import annotations
 
 import json
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from io import StringIO
 from typing import Any, Literal
 
-import pandas as pd
 import xarray as xr
 
-from . import _native, decode
+from . import _native, dataset
 
 Engine = Literal["auto", "cpu", "gpu"]
 Precision = Literal["f32", "f64"]
-#: A graphics adapter by its number in `rattlemap devices`, by a part of its name that no other has, or "all" equal ones.
+#: A graphics adapter: its number in :func:`rattlemap.devices`, a part of its name that no other has, or "all" equal ones.
 Adapter = int | str
 
 
 def adapter_text(adapter: Adapter | None) -> str | None:
-    """An adapter as the program's ``--adapter`` takes it."""
+    """Return an adapter in the form of the program's ``--adapter``."""
     return None if adapter is None else str(adapter)
 
 
 @contextmanager
 def no_display() -> Iterator[None]:
-    """Keeps a Vulkan driver from complaining that there is no screen, where none can be."""
+    """Set the environment variable that keeps Vulkan drivers from reporting a missing screen, if there is no screen."""
     variable = _native.missing_variable()
     if variable is None:
         yield
@@ -45,16 +44,14 @@ def no_display() -> Iterator[None]:
             os.environ[name] = before
 
 
-def table(text: str) -> pd.DataFrame:
-    """A table of the program, every field as text: :mod:`rattlemap.decode` gives types."""
-    return pd.read_csv(StringIO(text), dtype=str, keep_default_na=False)
+def warn(lines: Iterable[str]) -> None:
+    """Issue warnings at the line that called the public function, which called this one."""
+    for line in lines:
+        warnings.warn(line, RuntimeWarning, stacklevel=3)
 
 
-def dataset(made: _native.MadeMap) -> xr.Dataset:
-    """The Dataset of a map that the native module has made."""
-    for warning in made["warnings"]:
-        # The one who called the package's function.
-        warnings.warn(warning, RuntimeWarning, stacklevel=3)
-    ds = decode.dataset(made["columns"], json.loads(made["manifest"]), made["texts"])
-    attractors: Any = made["attractors"]
-    return ds if attractors is None else decode.with_attractors(ds, table(attractors))
+def map_dataset(result: _native.MapResult) -> xr.Dataset:
+    """Return the Dataset of a map that the native module has computed."""
+    ds = dataset.from_columns(result["columns"], json.loads(result["manifest"]), result["texts"])
+    attractors = result["attractors"]
+    return ds if attractors is None else dataset.with_attractors(ds, dataset.text_table(StringIO(attractors)))

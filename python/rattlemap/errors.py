@@ -1,23 +1,23 @@
-"""What goes wrong, as exceptions: their texts are those of the program."""
+"""Exceptions of the package. Their messages are the program's."""
 
 __all__ = ["EngineError", "FolderError", "ModelError", "RattlemapError", "SceneError"]
 
 
 class RattlemapError(Exception):
-    """The base of all exceptions of this package."""
+    """Base class of all exceptions of this package."""
 
 
 class SceneError(RattlemapError, ValueError):
-    """What is asked is wrong: an unknown name, a value out of its range, axes that do not fit."""
+    """The request is wrong: an unknown name, a value out of its range, unsuitable axes, or a map larger than this machine."""
 
 
 class ModelError(RattlemapError, ValueError):
-    """A model's file is wrong, or the model has no motion at the values that it is given."""
+    """The file of a model is wrong, or the model has no motion at some values of its parameters."""
 
 
 class EngineError(RattlemapError, RuntimeError):
-    """The engine that is asked for is not there, or failed on the way."""
+    """The requested engine does not exist on this machine, or it failed."""
 
 
 class FolderError(RattlemapError, ValueError):
-    """A folder cannot be opened: it is not finished, not whole, or not of a map."""
+    """A folder cannot be used: it is not finished, damaged, not a map's, or not empty."""

@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
-from . import _native, decode
+from . import _native, dataset
 from .errors import FolderError
 
 _MANIFEST, _CELLS, _WORDS, _RECORDS = "manifest.json", "cells.npy", "words.csv", "records.bin"
@@ -103,17 +102,12 @@ def _require(folder: Path, manifest: dict[str, Any], name: str, kind: str) -> Pa
     if any(entry["name"] == name for entry in manifest["files"]):
         has_records = (folder / _RECORDS).is_file()
         again = f"rattlemap check {folder} --repair" if has_records else f"rattlemap {command} SCENE --out {folder} --force"
-        raise FolderError(f"{folder}: {name} is missing; `{again}` makes it anew")
+        raise FolderError(f"{folder}: {name} is missing; `{again}` makes it again")
     again = "--resume" if command == "map" else "--force"
     raise FolderError(
-        f"{folder}: there is no {name}, because outputs.files of the scene lacks {kind!r}; add it and write the files anew: "
+        f"{folder}: there is no {name}, because outputs.files of the scene lacks {kind!r}; add it and write the files again: "
         f"`rattlemap {command} SCENE --out {folder} {again}`"
     )
-
-
-def _table(path: Path) -> pd.DataFrame:
-    """Read a table with every field as text; :mod:`decode` converts them."""
-    return pd.read_csv(path, dtype=str, keep_default_na=False)
 
 
 def _map(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
@@ -121,25 +115,25 @@ def _map(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
     cells = _Cells(path, int(manifest["cells"]))
     array = cells.array
     fields = array.dtype.names or ()
-    if any(name in fields for name in decode.SPELLED):
+    if any(name in fields for name in dataset.TEXT_COLUMNS):
         _require(folder, manifest, _WORDS, "npy")
 
     def read(name: str, shape: tuple[int, ...], table: str | None) -> indexing.LazilyIndexedArray:
         codes = manifest["codes"].get(table)
         return indexing.LazilyIndexedArray(_Column(cells, name, shape, table, codes))
 
-    ds = decode.arrange(fields, manifest, array.__getitem__, read)
+    ds = dataset.arrange(fields, manifest, array.__getitem__, read)
     if "attractor" in fields:
         # The table is written together with cells.csv.
         attractors = folder / _ATTRACTORS
         if attractors.is_file() or any(entry["name"] == _ATTRACTORS for entry in manifest["files"]):
-            ds = decode.with_attractors(ds, _table(_require(folder, manifest, _ATTRACTORS, "csv")))
+            ds = dataset.with_attractors(ds, dataset.text_table(_require(folder, manifest, _ATTRACTORS, "csv")))
     return ds
 
 
 def _diagram(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
-    columns, points = (_table(_require(folder, manifest, name, "csv")) for name in (_COLUMNS, _POINTS))
-    return decode.diagram(manifest["axis"]["parameter"], columns, decode.typed_points(points), manifest)
+    columns, points = (dataset.text_table(_require(folder, manifest, name, "csv")) for name in (_COLUMNS, _POINTS))
+    return dataset.diagram(columns, points, manifest)
 
 
 class _Cells:
@@ -157,24 +151,24 @@ class _Cells:
         try:
             array: npt.NDArray[Any] = np.load(self.path, mmap_mode="r", allow_pickle=False)
         except (ValueError, OSError, EOFError) as error:
-            raise self._damaged(self.path.name, str(error)) from error
+            raise self._damage_error(self.path.name, str(error)) from error
         if array.shape != (self.count,) or array.dtype.names is None:
-            raise self._damaged(self.path.name, f"it has the shape {array.shape}, not ({self.count},)")
+            raise self._damage_error(self.path.name, f"it has the shape {array.shape}, not ({self.count},)")
         return array
 
     @cached_property
     def texts(self) -> npt.NDArray[Any]:
-        return decode.texts_of(_table(self.path.with_name(_WORDS))["text"])
+        return dataset.text_array(dataset.text_table(self.path.with_name(_WORDS))["text"])
 
-    def _damaged(self, name: str, why: str) -> FolderError:
+    def _damage_error(self, name: str, why: str) -> FolderError:
         folder = self.path.parent
-        return FolderError(f"{folder}: {name} is damaged: {why}; `rattlemap check {folder} --repair` makes it anew")
+        return FolderError(f"{folder}: {name} is damaged: {why}; `rattlemap check {folder} --repair` makes it again")
 
-    def decoded(self, table: str, codes: dict[str, int] | None, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    def convert(self, table: str, codes: dict[str, int] | None, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
         try:
-            return decode.look_up(self.texts if codes is None else decode.names_of(codes), rows)
+            return dataset.look_up(self.texts if codes is None else dataset.code_names(codes), rows)
         except IndexError as error:
-            raise self._damaged(_WORDS, str(error)) from error
+            raise self._damage_error(_WORDS, str(error)) from error
 
 
 class _Column(BackendArray):
@@ -187,11 +181,11 @@ class _Column(BackendArray):
         if table is None:
             self.dtype = cells.array.dtype[name]
         else:
-            self.dtype = np.dtype(object) if codes is None else decode.names_of(codes).dtype
+            self.dtype = np.dtype(object) if codes is None else dataset.code_names(codes).dtype
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> npt.NDArray[Any]:
         raw = indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._raw)
-        return raw if self.table is None else self.cells.decoded(self.table, self.codes, raw)
+        return raw if self.table is None else self.cells.convert(self.table, self.codes, raw)
 
     def _raw(self, key: tuple[Any, ...]) -> npt.NDArray[Any]:
         return np.asarray(self.cells.array[self.name].reshape(self.shape)[key])

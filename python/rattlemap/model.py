@@ -1,4 +1,4 @@
-"""Models: which oscillator moves, with which parameters."""
+"""Models: oscillators with values of their parameters."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Callable
 from typing import Any
 
 from . import _native
-from .asking import assignments
+from .toml import assignments
 
 
 class Model:
-    """An oscillator with walls, and values of its parameters. It does not change: :meth:`replace` gives another one.
+    """An oscillator with walls, and values of its parameters. Immutable: :meth:`replace` returns another one.
 
-    :func:`gear_pair` and :func:`load_model` make it. All quantities are dimensionless.
+    :func:`gear_pair` and :func:`load_model` return it. All quantities are dimensionless.
     """
 
     __slots__ = ("_model",)
@@ -23,53 +23,57 @@ class Model:
 
     @property
     def name(self) -> str:
-        """What scenes and the program call it."""
+        """Name in scenes and in the program."""
         return self._model.name
 
     @property
     def title(self) -> str:
-        """What it is, in a few words."""
+        """Title of the model."""
         return self._model.title
 
     @property
     def text(self) -> str:
-        """The file that it is read from, TOML."""
+        """Text of the model's file, TOML."""
         return self._model.text
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The value of every parameter, in the order of the model's table: a copy."""
+        """Values of all parameters, in the order of the model's table."""
         return self._model.parameters
 
     @property
     def state_names(self) -> list[str]:
-        """The components of a state: displacement and velocity of each body, such as ``x1, v1, x2, v2``."""
+        """Components of a state: displacement and velocity of each body, such as ``x1, v1, x2, v2``."""
         return self._model.state_names
 
     @property
     def equations(self) -> list[str]:
-        """The equations of motion, a line each."""
+        """Equations of motion, one line each."""
         return self._model.equations
 
     @property
     def help(self) -> str:
-        """Every parameter with its value, its meaning and its range, a line each."""
+        """All parameters with value, meaning and range, one line each."""
         values = self.parameters
-        lines = [f"{name} = {values[name]!r}: {meaning}; {range_}" for name, meaning, range_ in self._model.meanings]
+        lines = [f"{name} = {values[name]!r}: {meaning}; {range_}" for name, meaning, range_, _ in self._model.meanings]
         return "\n".join(lines)
 
-    def replace(self, **parameters: float) -> Model:
-        """The same model with other values of some parameters.
+    def replace(self, /, **parameters: float) -> Model:
+        """Return the model with other values of some parameters.
 
         Parameters
         ----------
         **parameters
-            By name; :attr:`help` has their ranges.
+            Values by name; :attr:`help` lists their ranges.
+
+        Returns
+        -------
+        Model
 
         Raises
         ------
         SceneError
-            For an unknown name, a value out of its range, or values with which there is no motion.
+            For an unknown name, a value out of its range, or values without a motion.
 
         Examples
         --------
@@ -91,35 +95,29 @@ class Model:
         return f"Model({self.name!r}{changed})"
 
     def __reduce__(self) -> tuple[Callable[..., Model], tuple[Any, ...]]:
-        return _rebuilt, (self.text, self._model.file, self._model.changed)
+        return _rebuild, (self.text, self._model.file, self._model.changed)
 
 
-def required(model: object) -> Model:
-    """The model, if it is one.
-
-    Raises
-    ------
-    TypeError
-        For anything else, such as a model's name.
-    """
+def require_model(model: object) -> Model:
+    """Return the model, or raise TypeError if it is not one."""
     if not isinstance(model, Model):
         raise TypeError(f"{model!r} is not a model; rm.gear_pair() is one, rm.load_model(NAME_OR_FILE) makes others")
     return model
 
 
-def _rebuilt(text: str, file: str, changed: dict[str, float]) -> Model:
+def _rebuild(text: str, file: str, changed: dict[str, float]) -> Model:
     return Model(_native.Model(text, file).replace(assignments(changed)))
 
 
 def gear_pair(**parameters: float) -> Model:
-    """The gear pair with backlash: two gears, light load, teeth that impact and mesh.
+    """Return the gear pair with backlash: two gears under light load, with teeth that impact and mesh.
 
     Parameters
     ----------
     **parameters
         Any of ``m1 m2 r1 r2 k1 k2 r k F omega b e mesh_speed``, dimensionless: masses, dampings, stiffnesses, damping
         and stiffness of meshing, amplitude and frequency of the forcing, half the backlash, restitution, meshing speed.
-        The others have the paper's values. ``rm.gear_pair().help`` has meanings and ranges.
+        The others have the paper's values. ``rm.gear_pair().help`` lists meanings and ranges.
 
     Returns
     -------
@@ -128,7 +126,7 @@ def gear_pair(**parameters: float) -> Model:
     Raises
     ------
     SceneError
-        For an unknown name, a value out of its range, or values with which there is no motion.
+        For an unknown name, a value out of its range, or values without a motion.
 
     Examples
     --------
@@ -139,14 +137,14 @@ def gear_pair(**parameters: float) -> Model:
 
 
 def load_model(model: str | os.PathLike[str], /, **parameters: float) -> Model:
-    """A model that is built in, or one that stands in a file.
+    """Return a built-in model, or read one from a file.
 
     Parameters
     ----------
     model
-        A name that ``rattlemap models`` lists, or the path of a model's file (``docs/models.md`` tells what it can say).
+        A name that :func:`rattlemap.models` lists, or the path of a model's file (``docs/models.md`` describes it).
     **parameters
-        Values by name; the others have the file's own.
+        Values by name; the others have those of the file.
 
     Returns
     -------
@@ -157,7 +155,7 @@ def load_model(model: str | os.PathLike[str], /, **parameters: float) -> Model:
     ModelError
         If there is no such model, or its file is wrong.
     SceneError
-        For an unknown parameter, a value out of its range, or values with which there is no motion.
+        For an unknown parameter, a value out of its range, or values without a motion.
 
     Examples
     --------

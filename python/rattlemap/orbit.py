@@ -1,108 +1,107 @@
-"""Single orbits: one motion, read."""
+"""Single orbits."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from . import _native
-from .asking import assignments
+from . import _native, dataset, scenes
 from .errors import SceneError
-from .model import Model, required
+from .model import Model, require_model
 
-#: What `orbit` takes, as the program bounds it.
+#: Ranges of the arguments, those of the program.
 _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
 
 
 class Orbit:
-    """What a motion settles on: its class, its cycle and every event on it. :func:`orbit` makes it.
+    """A motion after its transient: its class, its cycle and every event. :func:`orbit` returns it.
 
-    A periodic motion is shown over one cycle, any other over its last 8 forcing periods. All quantities are
+    A periodic motion is described over one cycle, any other over its last 8 forcing periods. All quantities are
     dimensionless.
     """
 
     def __init__(self, model: Model, transient: int, periods: int, start: list[float] | None) -> None:
-        self._asked = (model, transient, periods, start)
-        self._native = _native.orbit(model._model, [], transient, periods, start)
-        self._told: dict[str, Any] = json.loads(self._native.json())
+        self._arguments = (model, transient, periods, start)
+        self._native = _native.orbit(model._model, transient, periods, start)
+        self._facts: dict[str, Any] = json.loads(self._native.json())
         self.model = model
         """The model with the values of this orbit."""
 
     def __reduce__(self) -> tuple[type[Orbit], tuple[Model, int, int, list[float] | None]]:
-        """What it was made from: elsewhere it is computed again, which takes milliseconds and gives the same bits."""
-        return Orbit, self._asked
+        """Return the arguments: another process computes the orbit again, which takes milliseconds and gives the same bits."""
+        return Orbit, self._arguments
 
     @property
     def class_(self) -> str:
-        """``periodic``, ``chaotic``, ``undecided`` or ``failed``. With the underscore of names that Python keeps."""
-        return str(self._told["class"])
+        """Class: ``periodic``, ``chaotic``, ``undecided`` or ``failed``. ``class`` itself is a keyword of Python."""
+        return str(self._facts["class"])
 
     @property
     def status(self) -> str:
-        """How the integration ended; ``ok`` if there is nothing to remark."""
-        return str(self._told["status"])
+        """How the integration ended; ``ok`` if there is no remark."""
+        return str(self._facts["status"])
 
     @property
     def parameters(self) -> dict[str, float]:
         """The value of every parameter."""
-        return dict(self._told["parameters"])
+        return dict(self._facts["parameters"])
 
     @property
     def period(self) -> int | None:
-        """Forcing periods per cycle; none unless it is periodic."""
-        return None if self._told["period"] is None else int(self._told["period"])
+        """Forcing periods per cycle; None unless the motion is periodic."""
+        return None if self._facts["period"] is None else int(self._facts["period"])
 
     @property
     def word(self) -> str:
-        """The word in time order, of a periodic motion in canonical rotation. Not preceded by ``w``, as in tables."""
-        return str(self._told["word"])
+        """The word in order of time, without the ``w`` of tables. That of a periodic motion is in canonical rotation."""
+        return str(self._facts["word"])
 
     @property
     def pattern(self) -> str:
-        """The word with each run of one symbol counted once."""
-        return str(self._told["pattern"])
+        """The word with each run of one symbol written once."""
+        return str(self._facts["pattern"])
 
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:
-        """Floquet multipliers of a periodic motion, the largest modulus first, shape (components of the state,); else empty."""
-        pairs = self._told["floquet"] or []
+        """Floquet multipliers of a periodic motion by decreasing modulus, shape (components of the state,); otherwise empty."""
+        pairs = self._facts["floquet"] or []
         return np.array([complex(*pair) for pair in pairs], dtype=np.complex128)
 
     @property
     def lyapunov(self) -> float:
-        """The largest Lyapunov exponent per unit of time; NaN if the motion failed."""
-        return _number(self._told["lyapunov"])
+        """Largest Lyapunov exponent per unit of time; NaN if the motion failed."""
+        return _number(self._facts["lyapunov"])
 
     @property
     def lyapunov_error(self) -> float:
-        """Its standard error where it is an average, else NaN: that of a cycle comes from its multipliers."""
-        return _number(self._told["lyapunov_error"])
+        """Standard error of the exponent. NaN for a cycle, whose exponent comes from its multipliers."""
+        return _number(self._facts["lyapunov_error"])
 
     @property
     def symmetric(self) -> bool | None:
-        """Whether a periodic motion is its own mirror image; none of others."""
-        symmetric: bool | None = self._told["symmetric"]
-        return symmetric
+        """Whether a periodic motion is its own mirror image; None for other motions."""
+        return None if self._facts["symmetric"] is None else bool(self._facts["symmetric"])
 
     @property
     def impacts_per_period(self) -> float:
         """Impacts per forcing period; starts of meshing are not counted."""
-        return _number(self._told["impacts_per_period"])
+        return _number(self._facts["impacts_per_period"])
 
     @property
     def mesh_fraction(self) -> float:
         """Share of the time spent meshing, 0 to 1."""
-        return _number(self._told["mesh_fraction"])
+        return _number(self._facts["mesh_fraction"])
 
     @property
     def periods_run(self) -> int:
         """Forcing periods that the motion was followed for."""
-        return int(self._told["periods_run"])
+        return int(self._facts["periods_run"])
 
     @property
     def forcing_period(self) -> float:
@@ -112,16 +111,16 @@ class Orbit:
     @property
     def strobe(self) -> npt.NDArray[np.float64]:
         """The state at the phase 0 that precedes the first event, shape (components of the state,)."""
-        return np.array(self._told["strobe"], dtype=np.float64)
+        return np.array(self._facts["strobe"], dtype=np.float64)
 
     @property
     def events(self) -> npt.NDArray[np.void]:
-        """Every event, in order of time: a structured array, shape (events,).
+        """All events in order of time: a structured array, shape (events,).
 
         Fields: ``kind`` (``impact``, ``mesh_start``, ``mesh_end``), ``side`` (1 right, -1 left), ``t`` (since phase 0 of
         the cycle), ``t_mod_period`` (in [0, T)), ``before`` and ``after`` (states).
         """
-        events = self._told["events"]
+        events = self._facts["events"]
         count = len(self._native.state_names)
         kind = np.dtype(
             [
@@ -137,20 +136,25 @@ class Orbit:
         return np.array([tuple(event[name] for name in kind.names) for event in events], dtype=kind)
 
     def trajectory(self, points: int = 2000) -> pd.DataFrame:
-        """The motion over its cycle, or over the periods that are shown, on the exact flow.
+        """Return the motion over its cycle, or over its last 8 forcing periods.
 
         Parameters
         ----------
         points
-            Evenly spaced samples in all, at least: each forcing period has as many as any other, and at least one.
+            Least number of evenly spaced samples. Each forcing period has the same number.
 
         Returns
         -------
         pandas.DataFrame
             The columns of ``trajectory.csv``: ``t`` since phase 0 of the cycle, ``phase`` of the forcing in turns, the gap
-            ``z`` and its velocity ``w``, the state, ``domain`` (``free``, ``meshing_right``, ``meshing_left``). Two rows
-            for each event among them, ``before`` and ``after`` in ``moment``, with its kind in ``event`` and its
-            ``side`` (1 or -1; 0 elsewhere). Empty if the motion failed.
+            ``z`` and its velocity ``w``, the state, ``domain`` (``free``, ``meshing_right``, ``meshing_left``). Each
+            event has two more rows, ``before`` and ``after`` in ``moment``, with its kind in ``event`` and its ``side``
+            (1 or -1; 0 in other rows). Empty if the motion failed.
+
+        Raises
+        ------
+        ValueError
+            If ``points`` is less than 1.
 
         Examples
         --------
@@ -158,14 +162,15 @@ class Orbit:
         >>> plt.plot(path["z"], path["w"])
         """
         if points < 1:
-            raise ValueError(f"points = {points}: at least one is needed")
+            raise ValueError(f"points = {points}: it must be at least 1")
         periods = max(self._native.cycle_periods, 1)
-        return pd.DataFrame(self._native.moments(-(-points // periods)))
+        table = StringIO(self._native.trajectory(-(-points // periods)))
+        return pd.DataFrame(dataset.table_columns(dataset.text_table(table)))
 
     def to_dict(self) -> dict[str, Any]:
-        """The object that ``rattlemap orbit --json`` prints: numbers, texts, lists; what is absent is None."""
-        told: dict[str, Any] = json.loads(self._native.json())
-        return told
+        """Return the object that ``rattlemap orbit --json`` prints; absent values are None."""
+        facts: dict[str, Any] = json.loads(self._native.json())
+        return facts
 
     def __repr__(self) -> str:
         facts = [self.model.name, self.class_]
@@ -175,7 +180,7 @@ class Orbit:
             facts.append(f"status {self.status}")
         if self.class_ != "failed":
             facts.append(f"exponent {self.lyapunov:.4g}")
-        return f"<Orbit: {', '.join(facts)}; {len(self._told['events'])} events>"
+        return f"<Orbit: {', '.join(facts)}; {len(self._facts['events'])} events>"
 
 
 def _number(value: float | None) -> float:
@@ -185,26 +190,29 @@ def _number(value: float | None) -> float:
 def orbit(
     model: Model,
     *,
+    parameters: scenes.Parameters | None = None,
     periods: int = 128,
     transient: int = 400,
     start: Sequence[float] | Mapping[str, float] | None = None,
-    **parameters: float,
+    **names: float,
 ) -> Orbit:
-    """Follow one motion until it is decided, and read what it settles on: ``rattlemap orbit``.
+    """Compute one motion after its transient, like ``rattlemap orbit``.
 
     Parameters
     ----------
     model
-        What moves.
+        The oscillator.
+    parameters
+        Values by name, for parameters whose names are keywords of this function.
     periods
-        Forcing periods of the first check, 2 to 10,000,000. While the motion is undecided checks of twice the length
-        follow, up to 32,768 periods or this many. Cycles of up to half as many are found, at most 64.
+        Forcing periods of the first check, 2 to 10,000,000. While the motion is undecided, the length is doubled, up to
+        32,768 periods or this number. Cycles of up to half this number, at most 64, are found.
     transient
         Forcing periods before the first check, 1 to 1,000,000,000.
     start
-        The state at phase 0 to start from, all components or some by name (the others are 0); at rest unless told.
-    **parameters
-        Values of parameters; the others have the model's own.
+        The state at phase 0: all components, or some by name (the others are 0); by default rest.
+    **names
+        Values of parameters; the others have those of the model.
 
     Returns
     -------
@@ -213,8 +221,8 @@ def orbit(
     Raises
     ------
     SceneError
-        For an unknown parameter, a value out of its range, values with which there is no motion, a start of another
-        number of components.
+        For an unknown parameter, a value out of its range, values without a motion, or a start with a wrong number of
+        components.
     KeyboardInterrupt
         Within a second of Ctrl-C.
 
@@ -230,20 +238,18 @@ def orbit(
         is_whole = isinstance(value, (int, np.integer)) or (isinstance(value, float) and value.is_integer())
         if not is_whole or not least <= value <= most:
             raise SceneError(f"{name} = {value!r}: it must be a whole number from {least} to {most}")
-    own = required(model).replace(**parameters)
-    state = None if start is None else _state(own, start)
-    return Orbit(own, int(transient), int(periods), state)
+    model = require_model(model).replace(**scenes.all_names(names, None, parameters))
+    state = None if start is None else _state(model, start)
+    return Orbit(model, int(transient), int(periods), state)
 
 
 def _state(model: Model, start: Sequence[float] | Mapping[str, float]) -> list[float]:
     names = model.state_names
     if isinstance(start, Mapping):
-        unknown = [name for name in start if name not in names]
-        if unknown:
-            raise SceneError(f"start: the model has no component {unknown[0]!r}; its state is {', '.join(names)}")
+        scenes.check_components(model, start)
         values = [float(start.get(name, 0.0)) for name in names]
     else:
         values = [float(x) for x in start]
     if not np.isfinite(values).all():
-        raise SceneError(f"start: it must be finite numbers, the model's {', '.join(names)}")
+        raise SceneError(f"start: it must be finite numbers for {', '.join(names)}")
     return values

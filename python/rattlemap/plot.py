@@ -1,4 +1,4 @@
-"""Maps of what has names: classes and periods, words, patterns, attractors."""
+"""Figures of maps whose cells have names: classes and periods, words, patterns, attractors."""
 
 from __future__ import annotations
 
@@ -14,29 +14,30 @@ from . import _native
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: What a cell without a cycle is, in the order of legends.
+#: Names of cells without a cycle, in the order of legends.
 _WITHOUT_CYCLE = ("chaotic", "undecided", "failed")
 
 Texts = npt.NDArray[Any]
 
 
 def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int = 16, legend: bool = True) -> Axes:
-    """Draw a map whose cells have names, in the colours of the program's own figures.
+    """Draw a map whose cells have names, in the colours of the program's figures.
 
-    Numbers (``ds["lyapunov"]``) need nothing of it: ``.plot()`` of xarray draws them.
+    Use ``.plot()`` of xarray for numbers, such as ``ds["lyapunov"]``.
 
     Parameters
     ----------
     data
-        A map of :func:`rattlemap.map`, :func:`rattlemap.basins` or :func:`rattlemap.open`: attractors where it has them,
-        else periods and classes. Or one of its variables: ``ds["class"]``, ``ds["pattern"]``, ``ds["word"]``,
+        A map of :func:`rattlemap.map`, :func:`rattlemap.basins` or :func:`rattlemap.open`: its attractors are image if it has
+        any, else periods and classes. Or one of its variables: ``ds["class"]``, ``ds["pattern"]``, ``ds["word"]``,
         ``ds["status"]``, ``ds["period"]``, ``ds["attractor"]``; two dimensions.
     ax
-        Where to draw; the current axes unless told.
+        Axes to draw on; by default the current ones.
     most
-        Names that get a colour and a line in the legend, the most frequent ones; others share one. Of periods the lowest.
+        Largest number of names with a colour and a line in the legend: the most frequent ones, or the lowest periods. Other
+        names share one.
     legend
-        Whether to list the names, with their share of the cells, beside the map.
+        Whether to list the names and their shares of the cells.
 
     Returns
     -------
@@ -45,7 +46,7 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     Raises
     ------
     ValueError
-        If there are not two dimensions, or a Dataset has neither classes nor attractors.
+        If the data does not have two dimensions, or a Dataset has neither classes nor attractors.
 
     Examples
     --------
@@ -57,30 +58,30 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    cells = _named(data) if isinstance(data, xr.Dataset) else data
+    cells = _cell_names(data) if isinstance(data, xr.Dataset) else data
     if cells.ndim != 2:
-        raise ValueError(f"a map has two dimensions, and this has {cells.ndim}: {', '.join(map(str, cells.dims))}")
+        raise ValueError(f"a map must have two dimensions; this has {cells.ndim}: {', '.join(map(str, cells.dims))}")
     names, places = _categories(cells, most)
     colors = [_color(name, place, str(cells.name)) for place, name in enumerate(names)]
-    # Stubs of xarray do not know that a DataArray has its plot bound.
-    drawn: Any = cells.copy(data=places)
+    # The type stubs of xarray do not describe the method `plot`.
+    image: Any = cells.copy(data=places)
     axes = plt.gca() if ax is None else ax
-    drawn.plot(ax=axes, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(names) - 0.5, add_colorbar=False)
+    image.plot(ax=axes, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(names) - 0.5, add_colorbar=False)
     axes.set_title("")
     if legend:
         shares = np.bincount(places.ravel(), minlength=len(names)) / max(places.size, 1)
-        lines = [f"{_told(name)}  {_percent(share)}" for name, share in zip(names, shares, strict=True)]
+        lines = [f"{_label(name)}  {_percent(share)}" for name, share in zip(names, shares, strict=True)]
         handles = [Patch(facecolor=color, edgecolor="0.4", linewidth=0.5) for color in colors]
         axes.legend(handles, lines, loc="upper left", bbox_to_anchor=(1.01, 1), title=str(cells.name), fontsize="small")
     return axes
 
 
-def _named(ds: xr.Dataset) -> xr.DataArray:
-    """What a Dataset's cells are called."""
+def _cell_names(ds: xr.Dataset) -> xr.DataArray:
+    """Return the names of a Dataset's cells."""
     if "attractor" in ds:
         return ds["attractor"]
     if "class" not in ds:
-        raise ValueError("there is neither a class nor an attractor to draw; ask for the quantity class, or draw one variable")
+        raise ValueError("the map has neither classes nor attractors; compute it with the quantity class, or draw one variable")
     classes, periods = ds["class"].values, ds["period"].values
     known = {period: f"period {period}" for period in np.unique(periods)}
     texts = np.array([known[period] for period in periods.ravel()], dtype=object).reshape(periods.shape)
@@ -88,7 +89,7 @@ def _named(ds: xr.Dataset) -> xr.DataArray:
 
 
 def _categories(cells: xr.DataArray, most: int) -> tuple[list[str], npt.NDArray[np.intp]]:
-    """Names in the order of a legend, and the place among them of every cell."""
+    """Return the names in the order of the legend, and the place of each cell's name in it."""
     values = cells.values
     if values.dtype.kind in "iu":
         prefix = "attractor" if cells.name == "attractor" else str(cells.name)
@@ -110,7 +111,7 @@ def _categories(cells: xr.DataArray, most: int) -> tuple[list[str], npt.NDArray[
 
 
 def _color(name: str, place: int, variable: str) -> tuple[float, float, float]:
-    """The colour of a name that stands at this place of the legend."""
+    """Return the colour of a name at this place of the legend."""
     named, in_a_row = _native.colors()
     kind, _, number = name.rpartition(" ")
     if name == "not periodic":
@@ -131,8 +132,8 @@ def _color(name: str, place: int, variable: str) -> tuple[float, float, float]:
     return red / 255, green / 255, blue / 255
 
 
-def _told(name: str) -> str:
-    """A name as legends have it: words without the letter that makes them text in tables."""
+def _label(name: str) -> str:
+    """Return a name for the legend: words without the letter `w` that makes them text in tables."""
     if name == "w":
         return "no events"
     return name[1:] if name.startswith("w") and name[1:2] in tuple("#123456") else name

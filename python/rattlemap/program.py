@@ -10,8 +10,8 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Run the command in `sys.argv` and exit with the program's code: 0 done, 1 failed, 2 bad usage, 130 interrupted."""
-    # Commands that do not listen for Ctrl-C end by it, as the program does; the others put their own handler in its place.
+    """Run the command in `sys.argv` and exit with the program's code: 0 done, 1 failed, 2 wrong usage, 130 interrupted."""
+    # Ctrl-C ends commands that have no signal handler of their own.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     variable = _native.missing_variable()
     if variable is not None:

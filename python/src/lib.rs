@@ -1,12 +1,12 @@
 //! The native module of the Python package `rattlemap`: the library's functions, and the program.
 //!
-//! What is asked comes as texts and is read by the library, so that errors are the program's. Every computation runs on a
-//! thread of its own, free of the interpreter's lock.
+//! Scenes and models arrive as texts and are parsed by the library, so that error messages are the program's. Every
+//! computation runs on its own thread, without the interpreter's lock.
 
 mod arrays;
 mod bifurcation;
-mod engines;
-mod folder;
+mod devices;
+mod finished;
 mod map;
 mod model;
 mod orbit;
@@ -14,7 +14,8 @@ mod problem;
 mod program;
 mod scene;
 mod shard;
-mod waiting;
+mod task;
+mod worker;
 
 use pyo3::prelude::*;
 use rattlemap::store::record_file::Identity;
@@ -24,9 +25,10 @@ mod _native {
     #[pymodule_export]
     use super::{
         bifurcation::bifurcation,
-        folder::manifest,
+        devices::devices,
+        finished::{check_folder, compare, manifest, validate},
         map::{colors, map},
-        model::Model,
+        model::{Model, models},
         orbit::{Orbit, orbit},
         program::{main, missing_variable},
         scene::Scene,
@@ -37,7 +39,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        waiting::loaded();
+        worker::store_process();
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("SOURCES", Identity::own_sources())?;
         module.add("TARGET", Identity::own_target())

@@ -1,4 +1,4 @@
-//! Maps: what `rattlemap map` computes, handed back as columns and, where asked for, written to a folder, too.
+//! Maps: computed like `rattlemap map`, returned as columns, and written to a folder if there is one.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -6,41 +6,34 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rattlemap::findings::effect;
-use rattlemap::job;
-use rattlemap::map::plan::Plan;
-use rattlemap::show::cells::{Cells, Survey};
-use rattlemap::store::in_memory::SharedColors;
-use rattlemap::store::map::Run;
-use rattlemap::store::{self, in_memory};
+use rattlemap::store::in_memory::{self, SharedColors};
 
 use crate::arrays::columns;
-use crate::engines::{Out, Task, ask};
-use crate::problem::Problem;
 use crate::scene::Scene;
-use crate::waiting::{self, Watch};
+use crate::task::{Out, Task, request};
+use crate::worker;
 
-/// What a map came to.
-pub(crate) struct Made {
+/// A map for Python.
+pub(crate) struct MapResult {
     pub(crate) map: in_memory::Map,
-    /// Why that engine.
-    pub(crate) why: String,
+    /// Reason for the choice of the engine.
+    pub(crate) reason: String,
     pub(crate) warnings: Vec<String>,
     pub(crate) files: Vec<String>,
 }
 
-impl Made {
-    /// What Python gets.
-    pub(crate) fn told(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-        let told = PyDict::new(py);
-        told.set_item("manifest", self.map.manifest)?;
-        told.set_item("columns", columns(py, self.map.columns)?)?;
-        told.set_item("texts", self.map.texts)?;
-        told.set_item("attractors", self.map.attractors)?;
-        told.set_item("why", self.why)?;
-        told.set_item("warnings", self.warnings)?;
-        told.set_item("files", self.files)?;
-        Ok(told)
+impl MapResult {
+    /// Returns the map as a dictionary.
+    pub(crate) fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+        let dict = PyDict::new(py);
+        dict.set_item("manifest", self.map.manifest)?;
+        dict.set_item("columns", columns(py, self.map.columns)?)?;
+        dict.set_item("texts", self.map.texts)?;
+        dict.set_item("attractors", self.map.attractors)?;
+        dict.set_item("reason", self.reason)?;
+        dict.set_item("warnings", self.warnings)?;
+        dict.set_item("files", self.files)?;
+        Ok(dict)
     }
 }
 
@@ -62,45 +55,25 @@ pub(crate) fn map<'py>(
     let task = Task {
         scene: Arc::clone(&scene.scene),
         sets: scene.sets.clone(),
-        ask: ask(engine, precision, adapter)?,
+        engine: request(engine, precision, adapter)?,
         shard: None,
         out: out.map(|path| Out { path, force, resume }),
     };
     task.check()?;
-    waiting::run(py, progress, move |watch| compute(&task, watch))?.told(py)
+    let result = worker::run(py, progress, move |watch| {
+        task.compute(watch, |_, run, warnings| {
+            let map = run.finish();
+            let (files, reason) = (map.write()?, map.reason().to_owned());
+            Ok(MapResult { map: map.in_memory()?, reason, warnings, files })
+        })
+    })?;
+    result.into_dict(py)
 }
 
-/// None if it was told to end before the last cell.
-fn compute(task: &Task, watch: &Watch) -> Result<Option<Made>, Problem> {
-    let plan = Plan::new(&task.scene);
-    plan.check()?;
-    let folder = task.out.as_ref().map(|out| out.open(watch)).transpose()?;
-    let Some(mut integrated) = task.integrate(&plan, folder.as_ref(), watch)? else { return Ok(None) };
-    let refined = integrated.work.schedule.finish(&mut integrated.work.records);
-    let records = &integrated.work.records;
-    let survey = Survey::of(&plan, records, refined);
-    let cells = Cells::new(&task.scene, &plan, records).surveyed(&survey);
-    let (device, processor) = (integrated.engine.device(), job::processor::described());
-    let run = Run {
-        without_effect: effect::names(&plan, records, integrated.engine.precision()),
-        ..integrated.run(task, &device, &processor)
-    };
-    let files = match &folder {
-        Some(folder) => store::map::write(folder, &cells, &run)?,
-        None => Vec::new(),
-    };
-    Ok(Some(Made {
-        map: in_memory::map(&cells, &run)?,
-        why: integrated.why,
-        warnings: integrated.warnings,
-        files,
-    }))
-}
-
-/// Red, green and blue. A list of bytes would be Python's `bytes`.
+/// Red, green and blue. A tuple, because Python would receive an array of bytes as `bytes`.
 type Rgb = (u8, u8, u8);
 
-/// Colours of the program's figures: by name, and of things in a row.
+/// Returns the colours of the program's figures: by name, and in the order of items without a name.
 #[pyfunction]
 pub(crate) fn colors() -> (BTreeMap<&'static str, Rgb>, Vec<Rgb>) {
     let SharedColors { named, in_a_row } = in_memory::colors();

@@ -1,4 +1,4 @@
-//! Models: built in, or read from files.
+//! Models: built in, or from files.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -9,42 +9,42 @@ use rattlemap::model_file::FileModel;
 
 use crate::problem::Problem;
 
+/// Returns the name and a summary of every built-in model.
+#[pyfunction]
+pub(crate) fn models() -> Vec<(String, String)> {
+    job::models::list()
+}
+
 /// A model with values of its parameters.
 #[pyclass(frozen, module = "rattlemap._native")]
 pub(crate) struct Model {
     pub(crate) model: FileModel,
-    /// What messages call its file.
+    /// Name of its file in messages.
     file: String,
-}
-
-impl Model {
-    /// The same with parameters set by `NAME=VALUE`.
-    pub(crate) fn with(&self, sets: &[String]) -> Result<FileModel, Problem> {
-        let cell = single_cell(&self.model, sets)?;
-        let model = cell.downcast_ref::<FileModel>().cloned();
-        model.ok_or_else(|| Problem::model("the model is not read from a file"))
-    }
 }
 
 #[pymethods]
 impl Model {
-    /// The model of this text, which messages call `file`.
+    /// Reads a model from a text. Messages name it `file`.
     #[new]
     fn new(text: &str, file: String) -> Result<Model, Problem> {
         let model = FileModel::parse(text, &file).map_err(Problem::model)?;
         Ok(Model { model, file })
     }
 
-    /// The model that is built in under a name, or stands in a file.
+    /// Finds a built-in model by name, or reads the file of this name.
     #[staticmethod]
     fn find(name: String) -> Result<Model, Problem> {
         let model = job::model_choice::find(&name).map_err(Problem::model)?;
         Ok(Model { model, file: name })
     }
 
-    /// The same with parameters set by `NAME=VALUE`.
+    /// Returns a copy with parameters set by `NAME=VALUE`.
     fn replace(&self, sets: Vec<String>) -> Result<Model, Problem> {
-        Ok(Model { model: self.with(&sets)?, file: self.file.clone() })
+        let cell = single_cell(&self.model, &sets)?;
+        let model = cell.downcast_ref::<FileModel>().cloned();
+        let model = model.ok_or_else(|| Problem::model("the model is not read from a file"))?;
+        Ok(Model { model, file: self.file.clone() })
     }
 
     #[getter]
@@ -82,7 +82,7 @@ impl Model {
         self.model.equations()
     }
 
-    /// Values by name, in the order of the model's table.
+    /// Parameter values by name, in the order of the model's table.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
@@ -92,7 +92,7 @@ impl Model {
         Ok(values)
     }
 
-    /// Those that are not the file's own.
+    /// Parameter values that differ from the defaults.
     #[getter]
     fn changed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
@@ -105,14 +105,14 @@ impl Model {
         Ok(values)
     }
 
-    /// Meaning and range of each parameter.
+    /// Name, meaning, range and default of each parameter.
     #[getter]
-    fn meanings(&self) -> Vec<(String, String, String)> {
+    fn meanings(&self) -> Vec<(String, String, String, Option<f64>)> {
         let parameters = self.model.parameters().iter();
-        let told = parameters.map(|parameter| {
+        let meanings = parameters.map(|parameter| {
             let range = parameter.range.requirement().into_owned();
-            (parameter.name.to_string(), parameter.meaning.to_string(), range)
+            (parameter.name.to_string(), parameter.meaning.to_string(), range, parameter.default)
         });
-        told.collect()
+        meanings.collect()
     }
 }

@@ -1,11 +1,11 @@
-//! What goes wrong, by the exception that tells it; its text is the program's.
+//! Errors, and the Python exceptions that report them. Their texts are the program's.
 
 use pyo3::PyErr;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use rattlemap::job::engine_choice::ChoiceError;
-use rattlemap::job::error::Failure;
+use rattlemap::job::error::JobError;
 use rattlemap::map::plan::NoMotion;
 use rattlemap::map::scene::SceneError;
 use rattlemap::map::sweep::SweepError;
@@ -14,19 +14,18 @@ use rattlemap::store::error::OutputError;
 use rattlemap::store::finished_map::FinishedMapError;
 use rattlemap::store::folder::FolderError;
 use rattlemap::store::merge::MergeError;
-use rattlemap::store::record_file::RecordFileError;
 use rattlemap::store::run_records::RunRecordsError;
 
-/// An exception of the package that is to be raised, and its text.
+/// An exception of the package to be raised.
 #[derive(Debug)]
 pub(crate) struct Problem {
-    /// Its name in `rattlemap.errors`.
+    /// Name of its class in `rattlemap.errors`.
     class: &'static str,
     text: String,
 }
 
 impl Problem {
-    /// What is asked is wrong.
+    /// The scene or the request is wrong.
     pub(crate) fn scene(text: impl ToString) -> Problem {
         Problem { class: "SceneError", text: text.to_string() }
     }
@@ -36,7 +35,7 @@ impl Problem {
         Problem { class: "ModelError", text: text.to_string() }
     }
 
-    /// The engine is not there, or fails.
+    /// The engine cannot be opened, or fails.
     pub(crate) fn engine(text: impl ToString) -> Problem {
         Problem { class: "EngineError", text: text.to_string() }
     }
@@ -47,30 +46,36 @@ impl Problem {
     }
 }
 
-macro_rules! told {
-    ($($error:ty => $class:ident),+ $(,)?) => {
+/// Converts errors of layers below jobs.
+macro_rules! from_errors {
+    ($($error:ty),+ $(,)?) => {
         $(impl From<$error> for Problem {
             fn from(error: $error) -> Problem {
-                Problem::$class(error)
+                JobError::from(error).into()
             }
         })+
     };
 }
 
-told! {
-    SceneError => scene,
-    ModelError => model,
-    NoMotion => model,
-    ChoiceError => engine,
-    SweepError => engine,
-    FinishedMapError => folder,
-    FolderError => folder,
-    OutputError => folder,
-    RecordFileError => folder,
-    RunRecordsError => folder,
-    MergeError => folder,
-    // The request, unless somebody says better.
-    Failure => scene,
+from_errors! {
+    SceneError, ModelError, NoMotion, ChoiceError, SweepError, FinishedMapError, FolderError, OutputError,
+    RunRecordsError, MergeError,
+}
+
+impl From<JobError> for Problem {
+    fn from(error: JobError) -> Problem {
+        match error {
+            JobError::Model(_) | JobError::NoMotion(_) => Problem::model(error),
+            JobError::Engine(_) | JobError::Sweep(_) => Problem::engine(error),
+            JobError::Folder(_)
+            | JobError::Records(_)
+            | JobError::FinishedMap(_)
+            | JobError::Output(_)
+            | JobError::Merge(_)
+            | JobError::Failed(_) => Problem::folder(error),
+            JobError::Scene(_) | JobError::TooLarge(_) | JobError::Usage(_) => Problem::scene(error),
+        }
+    }
 }
 
 impl From<Problem> for PyErr {

@@ -1,24 +1,25 @@
-//! The program, in the interpreter's process.
+//! Runs the program in the interpreter's process.
 
 use std::ffi::OsString;
 use std::io::{Write, stdout};
 
 use pyo3::prelude::*;
 use rattlemap::cli;
+use rattlemap::job::environment;
 
 /// Runs a command, the program's name first, and returns its exit code.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| {
         let code = cli::run_with(arguments);
-        // Nobody else does: the process is the interpreter's.
+        // The interpreter does not flush Rust's stdout when it ends.
         let _ = stdout().flush();
         code
     })
 }
 
-/// The variable of the environment that the program sets for itself, and its value.
+/// Returns the environment variable that the program sets for itself, and its value.
 #[pyfunction]
 pub(crate) fn missing_variable() -> Option<(&'static str, &'static str)> {
-    cli::missing_variable()
+    environment::missing_variable()
 }

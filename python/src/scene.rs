@@ -1,53 +1,52 @@
-//! Scenes: texts that the library has read.
+//! Scenes.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use rattlemap::job;
-use rattlemap::map::scene::{Along, CompanionFile, FileText, Purpose, Scene as Read};
+use rattlemap::job::scene_file::SceneFile;
+use rattlemap::map::scene::{Along, CompanionFile, FileText, Purpose, Scene as LibraryScene};
 use rattlemap::model::Model as _;
 use rattlemap::model_file::FileModel;
 
 use crate::problem::Problem;
 
-/// What a scene is read for, and of a line of a plane which one.
+/// The purpose of a scene, and the line of a bifurcation diagram through a plane.
 #[derive(Clone)]
-pub(crate) struct For {
+pub(crate) struct Use {
     purpose: Purpose,
     pub(crate) along: Option<Along>,
 }
 
-impl For {
-    fn new(purpose: &str, along: Option<(String, Vec<String>)>) -> Result<For, Problem> {
+impl Use {
+    fn new(purpose: &str, along: Option<Line>) -> Result<Use, Problem> {
         let purpose = match purpose {
             "map" => Purpose::Map,
             "bifurcation" => Purpose::Bifurcation,
             _ => return Err(Problem::scene(format!("`{purpose}` is neither map nor bifurcation"))),
         };
-        Ok(For { purpose, along: along.map(|(parameter, at)| Along { parameter, at }) })
+        Ok(Use { purpose, along: along.map(|(parameter, at)| Along { parameter, at }) })
     }
 }
 
-/// A scene that has been checked whole.
+/// A scene that has been checked.
 #[pyclass(frozen, module = "rattlemap._native")]
 pub(crate) struct Scene {
-    pub(crate) scene: Arc<Read>,
+    pub(crate) scene: Arc<LibraryScene>,
     pub(crate) sets: Vec<String>,
-    pub(crate) read_for: For,
+    pub(crate) purpose: Use,
 }
 
-/// Purpose and line as they are given.
-type GivenFor = (String, Option<GivenAlong>);
-type GivenAlong = (String, Vec<String>);
+/// A parameter, and the values of the other axes.
+type Line = (String, Vec<String>);
 
-/// Text, sets, model, cells, purpose and line, as [`Scene::new`] takes them.
-type Parts = (String, Vec<String>, Option<(String, String)>, Option<String>, String, Option<GivenAlong>);
+/// The arguments of [`Scene::new`].
+type Arguments = (String, Vec<String>, Option<(String, String)>, Option<String>, String, Option<Line>);
 
 #[pymethods]
 impl Scene {
-    /// The scene of a text that the package has written. `model` is the file of the model that the text names, with its
-    /// name; `cells` the table of a list of cells.
+    /// Reads a text that the package has written. `model`: name and text of the model's file that the scene names. `cells`: the
+    /// table of a list of cells.
     #[new]
     #[pyo3(signature = (text, sets=Vec::new(), model=None, cells=None, purpose="map", along=None))]
     fn new(
@@ -56,9 +55,9 @@ impl Scene {
         model: Option<(String, String)>,
         cells: Option<String>,
         purpose: &str,
-        along: Option<(String, Vec<String>)>,
+        along: Option<Line>,
     ) -> Result<Scene, Problem> {
-        let read_for = For::new(purpose, along)?;
+        let checked = Use::new(purpose, along)?;
         let find = |what: CompanionFile, _: &str| match (what, &model, &cells) {
             (CompanionFile::Model, Some((name, text)), _) => {
                 Ok(FileText { name: name.clone(), text: text.clone() })
@@ -66,62 +65,38 @@ impl Scene {
             (CompanionFile::Cells, _, Some(text)) => {
                 Ok(FileText { name: "cells".to_owned(), text: text.clone() })
             }
-            _ => Err("names a file, and none was given".to_owned()),
+            _ => Err("names a file, and there is none".to_owned()),
         };
-        let scene = Read::parse_generated(text, &sets, read_for.purpose, read_for.along.as_ref(), &find)?;
-        Ok(Scene { scene: Arc::new(scene), sets, read_for })
+        let scene =
+            LibraryScene::parse_generated(text, &sets, checked.purpose, checked.along.as_ref(), &find)?;
+        Ok(Scene { scene: Arc::new(scene), sets, purpose: checked })
     }
 
-    /// The scene in a file.
+    /// Reads a scene from a file.
     #[staticmethod]
     #[pyo3(signature = (path, sets=Vec::new(), purpose="map", along=None))]
-    fn load(
-        path: PathBuf,
-        sets: Vec<String>,
-        purpose: &str,
-        along: Option<(String, Vec<String>)>,
-    ) -> Result<Scene, Problem> {
-        let read_for = For::new(purpose, along)?;
-        let scene = job::scene_file::load_along(&path, &sets, read_for.purpose, read_for.along.as_ref())?;
-        Ok(Scene { scene: Arc::new(scene), sets, read_for })
+    fn load(path: PathBuf, sets: Vec<String>, purpose: &str, along: Option<Line>) -> Result<Scene, Problem> {
+        let checked = Use::new(purpose, along)?;
+        let along = checked.along.as_ref();
+        let file = SceneFile { purpose: checked.purpose, along, ..SceneFile::map(&path) };
+        let scene = file.load(&sets)?;
+        Ok(Scene { scene: Arc::new(scene), sets, purpose: checked })
     }
 
-    /// What makes the same scene again, elsewhere and without any file.
-    fn __getnewargs__(&self) -> Parts {
+    /// Returns arguments that make the same scene in another process, without files.
+    fn __getnewargs__(&self) -> Arguments {
         let own = self.scene.base().downcast_ref::<FileModel>().filter(|model| !model.is_built_in());
         let model = own.map(|model| (format!("{}.toml", model.name()), model.definition().text.clone()));
         let cells = self.scene.list().map(|list| list.to_csv());
-        let (purpose, along) = self.read_for();
+        let Use { purpose, along } = &self.purpose;
+        let purpose = if *purpose == Purpose::Map { "map" } else { "bifurcation" }.to_owned();
+        let along = along.clone().map(|Along { parameter, at }| (parameter, at));
         (self.scene.text().to_owned(), self.sets.clone(), model, cells, purpose, along)
     }
 
-    #[getter]
-    fn text(&self) -> &str {
-        self.scene.text()
-    }
-
-    #[getter]
-    fn sets(&self) -> Vec<String> {
-        self.sets.clone()
-    }
-
-    /// Starts of cells, which is what is counted while a map is made.
+    /// Number of runs: cells times starts per cell. The progress of a map counts them.
     #[getter]
     fn runs(&self) -> u64 {
         self.scene.run_count()
-    }
-
-    /// Whether an axis sweeps a component of the start.
-    #[getter]
-    fn is_basin(&self) -> bool {
-        self.scene.is_basin()
-    }
-}
-
-impl Scene {
-    fn read_for(&self) -> GivenFor {
-        let For { purpose, along } = &self.read_for;
-        let purpose = if *purpose == Purpose::Map { "map" } else { "bifurcation" };
-        (purpose.to_owned(), along.clone().map(|Along { parameter, at }| (parameter, at)))
     }
 }

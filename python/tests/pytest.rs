@@ -1,6 +1,6 @@
-//! The Python package: its tests are Python's (`test_*.py` beside this file), run on the module that Cargo has just built.
+//! Runs the tests of the Python package (`test_*.py` in this folder) with the module that Cargo has just built.
 //!
-//! Without python3, its `venv` or what it installs they are skipped, which is said on stderr.
+//! If python3, its `venv` or a package that the tests need is missing, the tests are skipped with a message on stderr.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
@@ -8,42 +8,41 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// The folder of the package and of its tests.
+/// Returns a path in the folder of the Python package.
 fn source(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// A folder that is kept for the next run.
-fn kept(name: &str) -> PathBuf {
+/// Returns the path of a folder that remains for the next run.
+fn cache(name: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
 
-/// The interpreter of an environment with what tests need; else why there is none.
+/// Returns the interpreter of an environment that has the packages of `requirements.txt`; otherwise an error message.
 fn python() -> Result<PathBuf, String> {
-    let at = kept("python-venv");
-    let (wanted, installed) = (source("tests/requirements.txt"), at.join("installed.txt"));
-    let python = at.join(if cfg!(windows) { "Scripts" } else { "bin" }).join("python");
-    let is_there = fs::read(&installed).is_ok_and(|have| have == fs::read(&wanted).unwrap());
-    if !is_there {
-        run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&at))?;
+    let environment = cache("python-venv");
+    let (required, installed) = (source("tests/requirements.txt"), environment.join("installed.txt"));
+    let python = environment.join(if cfg!(windows) { "Scripts" } else { "bin" }).join("python");
+    if !fs::read(&installed).is_ok_and(|installed| installed == fs::read(&required).unwrap()) {
+        run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&environment))?;
         let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"];
-        run(Command::new(&python).args(install).arg(&wanted))?;
-        fs::copy(&wanted, &installed).unwrap();
+        run(Command::new(&python).args(install).arg(&required))?;
+        fs::copy(&required, &installed).unwrap();
     }
     Ok(python)
 }
 
-/// Runs a program; what it says last, if it fails.
+/// Runs a program. The error is the last line on its stderr.
 fn run(command: &mut Command) -> Result<(), String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let output = command.output().map_err(|error| format!("{name}: {error}"))?;
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    output.status.success().then_some(()).ok_or(said.lines().last().unwrap_or(&name).to_owned())
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    output.status.success().then_some(()).ok_or(stderr.lines().last().unwrap_or(&name).to_owned())
 }
 
-/// A folder with the package as a wheel has it: the sources, and the native module that this test was built beside.
+/// Creates a folder with the files of a wheel: the Python sources and the native module that was built with this test.
 fn package() -> PathBuf {
-    let root = kept("python-package");
+    let root = cache("python-package");
     let package = root.join("rattlemap");
     let _ = fs::remove_dir_all(&package);
     fs::create_dir_all(&package).unwrap();
@@ -54,8 +53,8 @@ fn package() -> PathBuf {
             fs::copy(&path, package.join(path.file_name().unwrap())).unwrap();
         }
     }
-    let program = std::env::current_exe().unwrap();
-    let built = program.with_file_name(format!("{DLL_PREFIX}_native{DLL_SUFFIX}"));
+    let test = std::env::current_exe().unwrap();
+    let built = test.with_file_name(format!("{DLL_PREFIX}_native{DLL_SUFFIX}"));
     let name = if cfg!(windows) { "_native.pyd" } else { "_native.abi3.so" };
     fs::copy(&built, package.join(name)).unwrap_or_else(|error| panic!("{}: {error}", built.display()));
     root
@@ -63,29 +62,28 @@ fn package() -> PathBuf {
 
 #[test]
 fn the_package_passes_its_tests() {
-    // Past the harness, which keeps what tests that pass print.
+    // Rust's test harness hides the output of print macros of passing tests, but not these lines.
     let mut stderr = io::stderr();
     let python = match python() {
         Ok(python) => python,
-        Err(why) => {
-            writeln!(stderr, "SKIPPED: no Python to test the package with ({why})").unwrap();
+        Err(reason) => {
+            writeln!(stderr, "SKIPPED: no Python to test the package with ({reason})").unwrap();
             return;
         }
     };
-    let nowhere = tempfile::tempdir().unwrap();
-    // What a test asks of this machine and does not find it tells as skipped; of others it tells the time.
+    let work = tempfile::tempdir().unwrap();
     let arguments =
         ["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "--durations=10", "--durations-min=1"];
     let mut tests = Command::new(python);
-    tests.args(arguments).arg(source("tests")).current_dir(nowhere.path()).stdin(Stdio::null());
+    tests.args(arguments).arg(source("tests")).current_dir(work.path()).stdin(Stdio::null());
     tests.env("PYTHONPATH", package()).env("PYTHONDONTWRITEBYTECODE", "1").env("MPLBACKEND", "Agg");
-    tests.env("MPLCONFIGDIR", kept("python-matplotlib")).env("MYPY_CACHE_DIR", kept("python-mypy"));
+    tests.env("MPLCONFIGDIR", cache("python-matplotlib")).env("MYPY_CACHE_DIR", cache("python-mypy"));
     let output = tests.output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout);
-    for line in said.lines().filter(|line| line.starts_with("SKIPPED") || line.contains("s call ")) {
-        let line = line.replacen("SKIPPED ", "SKIPPED: ", 1);
-        writeln!(stderr, "{line}").unwrap();
+    let report = String::from_utf8_lossy(&output.stdout);
+    // Skipped tests and the durations of the slowest ones.
+    for line in report.lines().filter(|line| line.starts_with("SKIPPED") || line.contains("s call ")) {
+        writeln!(stderr, "{}", line.replacen("SKIPPED ", "SKIPPED: ", 1)).unwrap();
     }
-    assert!(output.status.success(), "{said}\n{}", String::from_utf8_lossy(&output.stderr));
-    assert!(said.lines().last().is_some_and(|line| line.contains(" passed")), "{said}");
+    assert!(output.status.success(), "{report}\n{}", String::from_utf8_lossy(&output.stderr));
+    assert!(report.lines().last().is_some_and(|line| line.contains(" passed")), "{report}");
 }

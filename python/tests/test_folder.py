@@ -1,4 +1,4 @@
-"""rattlemap.open: the same as the program's tables, read when it is looked at; folders that cannot be opened."""
+"""rattlemap.open: Datasets equal the program's tables and are read on access; errors of damaged folders."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import rattlemap as rm
 import xarray as xr
-from conftest import SCENES, Program, small
-from rattlemap import decode
+from conftest import SCENES, Program, set_arguments, small
+from rattlemap import dataset
 from rattlemap.folder import FolderBackend
 
 ABSENT = {"period": 0, "symmetric": -1, "attractor": -1}
@@ -28,7 +28,7 @@ def table(path: Path) -> dict[str, list[str]]:
 
 
 def assert_as_table(ds: xr.Dataset, rows: dict[str, list[str]]) -> None:
-    """Every variable is what the table says, numbers to the last bit."""
+    """Every variable equals the column of the table, numbers to the last bit."""
     for name, variable in ds.data_vars.items():
         if variable.dims != ds["status"].dims:
             continue
@@ -58,15 +58,15 @@ def test_a_map_is_its_table(map_folder: Path) -> None:
     assert json.loads(ds.attrs["parameters"]) == manifest["parameters"]
 
 
-def test_nothing_is_read_before_it_is_looked_at(map_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_are_read_on_access(map_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     looked_up: list[int] = []
-    look_up = decode.look_up
+    look_up = dataset.look_up
 
-    def counting(names: decode.Array, rows: decode.Array) -> decode.Array:
+    def counting(names: dataset.Array, rows: dataset.Array) -> dataset.Array:
         looked_up.append(np.size(rows))
         return look_up(names, rows)
 
-    monkeypatch.setattr(decode, "look_up", counting)
+    monkeypatch.setattr(dataset, "look_up", counting)
     ds = rm.open(map_folder)
     assert "word" in repr(ds) and not looked_up
     assert ds["word"].isel(e=3).values.shape == (18,)
@@ -76,13 +76,13 @@ def test_nothing_is_read_before_it_is_looked_at(map_folder: Path, monkeypatch: p
     while base is not None and not isinstance(base, np.memmap):
         base = base.base
     assert isinstance(base, np.memmap) and not exponent.flags.writeable
-    # As a task on another machine gets it: a name, not the numbers.
+    # A task on another machine receives the path, not the numbers.
     sent = pickle.dumps(rm.open(map_folder)["lyapunov"].variable)
     assert len(sent) < exponent.nbytes
     assert np.array_equal(pickle.loads(sent).values, exponent, equal_nan=True)
 
 
-def test_cells_are_chosen_in_every_way_of_xarray(map_folder: Path) -> None:
+def test_all_selections_of_xarray_work(map_folder: Path) -> None:
     whole = rm.open(map_folder).load()
     for choice in (
         {"e": [5, 3], "omega": [0, 17]},
@@ -95,14 +95,14 @@ def test_cells_are_chosen_in_every_way_of_xarray(map_folder: Path) -> None:
     assert ((chunks["class"] == "chaotic").sum() == (whole["class"] == "chaotic").sum()).compute()
 
 
-def test_a_map_is_kept_as_netcdf(map_folder: Path, tmp_path: Path) -> None:
+def test_a_map_is_stored_as_netcdf(map_folder: Path, tmp_path: Path) -> None:
     ds = rm.open(map_folder)
     ds.to_netcdf(tmp_path / "map.nc", engine="scipy")
-    with xr.open_dataset(tmp_path / "map.nc", engine="scipy") as kept:
-        assert kept.attrs["scene"] == ds.attrs["scene"]
+    with xr.open_dataset(tmp_path / "map.nc", engine="scipy") as stored:
+        assert stored.attrs["scene"] == ds.attrs["scene"]
         for name in ds.data_vars:
-            assert kept[name].values.tolist() == ds[name].values.tolist() or ds[name].dtype.kind == "f", name
-            assert ds[name].dtype.kind != "f" or np.array_equal(kept[name], ds[name], equal_nan=True), name
+            assert stored[name].values.tolist() == ds[name].values.tolist() or ds[name].dtype.kind == "f", name
+            assert ds[name].dtype.kind != "f" or np.array_equal(stored[name], ds[name], equal_nan=True), name
 
 
 def test_a_list_has_one_dimension(program: Program, tmp_path: Path) -> None:
@@ -140,8 +140,7 @@ def test_cells_of_several_starts_count_attractors(program: Program, scratch: Pat
 def test_a_diagram_has_columns_and_points(program: Program, scratch: Path, policy: str) -> None:
     folder = scratch / f"diagram-{policy}"
     sets = ("axis.0.count=9", "axis.0.min=0.5", "outputs.files=['csv']", f"start.policy={policy}")
-    arguments = [argument for text in sets for argument in ("--set", text)]
-    program("bifurcation", SCENES / "paper_fig5.toml", "--quiet", "--out", folder, *arguments)
+    program("bifurcation", SCENES / "paper_fig5.toml", "--quiet", "--out", folder, *set_arguments(*sets))
     ds, columns, points = rm.open(folder), *(table(folder / f"bifurcation{part}.csv") for part in ("_columns", ""))
     with_contact = [row for row, side in enumerate(points["side"]) if side]
     assert ds["x1"].values.tolist() == [float(points["x1"][row]) for row in with_contact]
@@ -151,9 +150,9 @@ def test_a_diagram_has_columns_and_points(program: Program, scratch: Path, polic
     for way in ways:
         rows = [row for row in range(len(columns["e"])) if way is None or columns["direction"][row] == way]
         rows.sort(key=lambda row: float(columns["e"][row]))
-        shown = ds if way is None else ds.sel(direction=way)
-        assert shown["e"].values.tolist() == [float(columns["e"][row]) for row in rows]
-        assert_as_table(shown, {name: [texts[row] for row in rows] for name, texts in columns.items()})
+        selected = ds if way is None else ds.sel(direction=way)
+        assert selected["e"].values.tolist() == [float(columns["e"][row]) for row in rows]
+        assert_as_table(selected, {name: [texts[row] for row in rows] for name, texts in columns.items()})
 
 
 def edit_manifest(folder: Path, **changes: object) -> None:
@@ -171,13 +170,13 @@ def mark_unlisted(folder: Path) -> None:
 
 
 def keep_manifest_alone(folder: Path) -> None:
-    """What is left of a map without the records that other files are made of."""
+    """Removes the records, from which other files could be made."""
     for path in folder.iterdir():
         if path.name != "manifest.json":
             path.unlink()
 
 
-SPOILT: list[tuple[Callable[[Path], object], str]] = [
+DAMAGES: list[tuple[Callable[[Path], object], str]] = [
     (shutil.rmtree, "there is no such folder"),
     (lambda folder: (folder / "manifest.json").unlink(), "the run is unfinished: resume it with `rattlemap map SCENE --out "),
     (lambda folder: (folder / "manifest.json").write_text("{}"), "this is not the manifest of a map"),
@@ -192,14 +191,14 @@ SPOILT: list[tuple[Callable[[Path], object], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("spoil", "told"), SPOILT, ids=[told for _, told in SPOILT])
-def test_folders_that_cannot_be_opened(map_folder: Path, tmp_path: Path, spoil: Callable[[Path], object], told: str) -> None:
+@pytest.mark.parametrize(("damage", "message"), DAMAGES, ids=[message for _, message in DAMAGES])
+def test_folders_that_cannot_be_opened(map_folder: Path, tmp_path: Path, damage: Callable[[Path], object], message: str) -> None:
     folder = tmp_path / "map"
     shutil.copytree(map_folder, folder)
-    spoil(folder)
+    damage(folder)
     with pytest.raises(rm.FolderError) as raised:
         rm.open(folder)
-    assert told in str(raised.value) and str(folder) in str(raised.value)
+    assert message in str(raised.value) and str(folder) in str(raised.value)
 
 
 def test_words_that_are_not_in_their_table(map_folder: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Models: built in and in files, with values that the program checks."""
+"""Models: built in and of files, with values that the library checks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_a_model_has_names_and_values() -> None:
     assert 'name = "gear-pair"' in model.text and model.equations
 
 
-def test_what_is_wrong_is_told(tmp_path: Path) -> None:
+def test_errors_name_the_remedy(tmp_path: Path) -> None:
     with pytest.raises(rm.SceneError, match="unknown field `parameters.G = 1.0`"):
         rm.gear_pair(G=1)
     with pytest.raises(rm.SceneError, match="out of range: it must be between 0 and 1"):

@@ -1,4 +1,4 @@
-"""rattlemap.orbit: what `orbit --json` and its tables say."""
+"""rattlemap.orbit: equal to `orbit --json` and its tables."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import rattlemap as rm
-from compare import assert_same_frame
-from conftest import Program
+from conftest import Program, assert_same_columns
 
 
 @pytest.mark.parametrize(
@@ -19,7 +18,7 @@ from conftest import Program
     [
         ({"e": 0.06, "omega": 5.6}, {}),
         ({"e": 0.605, "omega": 5.6}, {"start": [0.1, 0.0, -0.2, 1.5]}),
-        # Chaos, with no cycle.
+        # Chaos.
         ({"e": 0.99, "omega": 5.6}, {"periods": 64, "transient": 100}),
     ],
 )
@@ -28,16 +27,14 @@ def test_an_orbit_is_the_programs(
 ) -> None:
     arguments = [text for name, value in sets.items() for text in ("--set", f"{name}={value}")]
     for name, value in more.items():
-        shown = ",".join(map(str, value)) if isinstance(value, list) else value
-        arguments += [f"--{name}", str(shown)]
-    said = program("orbit", *arguments, "--json", "--out", tmp_path / "orbit")
-    expected = json.loads(said.stdout)
-    made = rm.orbit(rm.gear_pair(), **sets, **more)
-    assert made.to_dict() == expected
-    assert (made.class_, made.period, made.word) == (expected["class"], expected["period"], expected["word"])
-    assert made.multipliers.tolist() == [complex(*pair) for pair in expected["floquet"] or []]
-    assert made.strobe.tolist() == expected["strobe"]
-    events = made.events
+        arguments += [f"--{name}", ",".join(map(str, value)) if isinstance(value, list) else str(value)]
+    expected = json.loads(program("orbit", *arguments, "--json", "--out", tmp_path / "orbit").stdout)
+    orbit = rm.orbit(rm.gear_pair(), **sets, **more)
+    assert orbit.to_dict() == expected
+    assert (orbit.class_, orbit.period, orbit.word) == (expected["class"], expected["period"], expected["word"])
+    assert orbit.multipliers.tolist() == [complex(*pair) for pair in expected["floquet"] or []]
+    assert orbit.strobe.tolist() == expected["strobe"]
+    events = orbit.events
     assert len(events) == len(expected["events"])
     for name in events.dtype.names:
         assert events[name].tolist() == [event[name] for event in expected["events"]], name
@@ -45,33 +42,33 @@ def test_an_orbit_is_the_programs(
     for name in table.columns.difference(["domain", "event", "moment", "side"]):
         table[name] = [float(text) for text in table[name]]
     table["side"] = [int(text or 0) for text in table["side"]]
-    assert_same_frame(made.trajectory(), table)
+    assert_same_columns(orbit.trajectory(), table)
 
 
-def test_a_trajectory_has_the_points_that_are_asked_for() -> None:
-    made = rm.orbit(rm.gear_pair(), e=0.605, omega=5.6)
-    assert made.period == 1
-    path = made.trajectory(400)
+def test_a_trajectory_has_the_requested_points() -> None:
+    orbit = rm.orbit(rm.gear_pair(), e=0.605, omega=5.6)
+    assert orbit.period == 1
+    path = orbit.trajectory(400)
     samples = path[path["moment"] == ""]
-    assert len(samples) == 401 and samples["t"].iloc[-1] == pytest.approx(made.forcing_period)
-    assert len(path) == 401 + 2 * len(made.events)
-    assert "periodic, period 1, word 36" in repr(made)
+    assert len(samples) == 401 and samples["t"].iloc[-1] == pytest.approx(orbit.forcing_period)
+    assert len(path) == 401 + 2 * len(orbit.events)
+    assert "periodic, period 1, word 36" in repr(orbit)
 
 
-def test_an_orbit_travels_to_other_processes() -> None:
-    made = rm.orbit(rm.gear_pair(), e=0.605, omega=5.6, start={"v1": 1.0})
-    again = pickle.loads(pickle.dumps(made))
-    assert again.to_dict() == made.to_dict() and again.model.parameters == made.model.parameters
+def test_an_orbit_can_be_pickled() -> None:
+    orbit = rm.orbit(rm.gear_pair(), e=0.605, omega=5.6, start={"v1": 1.0})
+    again = pickle.loads(pickle.dumps(orbit))
+    assert again.to_dict() == orbit.to_dict() and again.model.parameters == orbit.model.parameters
 
 
 def test_orbits_of_other_models_and_states_by_name(program: Program) -> None:
     model = rm.load_model("impact-oscillator", omega=2.8)
-    said = program("orbit", "--model", "impact-oscillator", "--set", "omega=2.8", "--start", "0,0.5", "--json")
-    assert rm.orbit(model, start={"v": 0.5}).to_dict() == json.loads(said.stdout)
+    printed = program("orbit", "--model", "impact-oscillator", "--set", "omega=2.8", "--start", "0,0.5", "--json")
+    assert rm.orbit(model, start={"v": 0.5}).to_dict() == json.loads(printed.stdout)
     assert rm.orbit(model, start=[0, 0.5]).events["before"].shape[1] == 2
 
 
-def test_what_is_wrong_is_told() -> None:
+def test_errors_name_the_remedy() -> None:
     with pytest.raises(rm.SceneError, match="it must be between 0 and 1"):
         rm.orbit(rm.gear_pair(), e=2)
     with pytest.raises(rm.SceneError, match="four finite numbers, the model's x1, v1, x2, v2; 2 were given"):
@@ -82,7 +79,7 @@ def test_what_is_wrong_is_told() -> None:
         rm.orbit(rm.gear_pair(), periods=2.5)
 
 
-def test_numbers_that_are_absent_are_not_a_number() -> None:
+def test_absent_numbers_are_nan() -> None:
     cycle = rm.orbit(rm.gear_pair(), e=0.605, omega=5.6)
     assert np.isnan(cycle.lyapunov_error) and cycle.symmetric is False
     chaos = rm.orbit(rm.gear_pair(), e=0.99, omega=5.6)

@@ -1,4 +1,4 @@
-"""rattlemap.plot: names, colours and shares of a map's cells, as the program's figures have them."""
+"""rattlemap.plot: names, colours and shares of cells, equal to those of the program's figures."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ def axes() -> Iterator[Axes]:
 
 
 def legend(axes: Axes) -> dict[str, tuple[str, str]]:
-    """By name the share and the colour."""
-    shown = axes.get_legend()
-    assert shown is not None
-    lines = [text.get_text().split("  ") for text in shown.get_texts()]
-    colors = [to_hex(patch.get_facecolor()) for patch in shown.get_patches()]
+    """Returns share and colour by name."""
+    found = axes.get_legend()
+    assert found is not None
+    lines = [text.get_text().split("  ") for text in found.get_texts()]
+    colors = [to_hex(patch.get_facecolor()) for patch in found.get_patches()]
     return {name: (share, color) for (name, share), color in zip(lines, colors, strict=True)}
 
 
-def drawn(axes: Axes, place: tuple[int, int]) -> str:
-    """The colour of a cell."""
+def cell_color(axes: Axes, place: tuple[int, int]) -> str:
+    """Returns the colour of a cell."""
     mesh = axes.collections[0]
     numbers = np.asarray(mesh.get_array())
     return to_hex(mesh.cmap(mesh.norm(numbers[place])))
@@ -43,27 +43,27 @@ def drawn(axes: Axes, place: tuple[int, int]) -> str:
 
 def test_periods_and_classes_of_a_map(ds: xr.Dataset, axes: Axes) -> None:
     assert rm.plot(ds, ax=axes) is axes
-    told = legend(axes)
-    names = list(told)
+    lines = legend(axes)
+    names = list(lines)
     assert names[:2] == ["period 1", "period 3"] and names[names.index("chaotic") - 1].startswith("period ")
     share = (ds["class"] == "chaotic").mean().item()
-    assert told["chaotic"] == (f"{100 * share:.1f} %", "#2a2a2a")
-    # Those of map.png.
-    assert [told[name][1] for name in ("period 1", "period 3")] == ["#c9e5fc", "#059d76"]
+    assert lines["chaotic"] == (f"{100 * share:.1f} %", "#2a2a2a")
+    # Colours of map.png.
+    assert [lines[name][1] for name in ("period 1", "period 3")] == ["#c9e5fc", "#059d76"]
     for place in np.ndindex(ds["class"].shape):
         cell = ds.isel(omega=place[0], e=place[1])
         name = f"period {cell['period'].item()}" if cell["class"] == "periodic" else cell["class"].item()
-        assert drawn(axes, place) == told[name][1], place
+        assert cell_color(axes, place) == lines[name][1], place
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("e", "omega")
 
 
 def test_the_most_frequent_words_have_names(ds: xr.Dataset, axes: Axes) -> None:
     rm.plot(ds["pattern"], ax=axes, most=4)
-    told = legend(axes)
+    lines = legend(axes)
     counts = ds["pattern"].to_series().value_counts().drop("")
-    assert list(told)[:4] == [text[1:] or "no events" for text in counts.index[:4]]
-    assert list(told)[4:] == [f"{len(counts) - 4} others", "not periodic"]
-    assert told["36"][1] == "#b4d0e8" and told["no events"][1] == "#f2f2f2"
+    assert list(lines)[:4] == [text[1:] or "no events" for text in counts.index[:4]]
+    assert list(lines)[4:] == [f"{len(counts) - 4} others", "not periodic"]
+    assert lines["36"][1] == "#b4d0e8" and lines["no events"][1] == "#f2f2f2"
 
 
 def test_attractors_and_single_variables(ds: xr.Dataset, axes: Axes) -> None:

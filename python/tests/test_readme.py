@@ -1,4 +1,4 @@
-"""The Python lines that people copy run as they stand."""
+"""The Python examples of the READMEs run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the package tells type checkers holds."""
+"""The type annotations of the package pass mypy."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import rattlemap
+from conftest import PACKAGE
 
 
-def test_mypy_is_strict_and_content(tmp_path: Path) -> None:
-    # A copy, lest whatever is installed beside it be looked at as its own.
+def test_strict_mypy_finds_no_error(tmp_path: Path) -> None:
+    # A copy, because mypy would check other packages in the same folder, too.
     package = tmp_path / "rattlemap"
-    shutil.copytree(Path(rattlemap.__file__).parent, package, ignore=shutil.ignore_patterns("_native.*so", "_native.*pyd"))
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("_native.*so", "_native.*pyd"))
     settings = Path(__file__).parents[1] / "pyproject.toml"
     command = [sys.executable, "-m", "mypy", "--config-file", str(settings), str(package)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)

@@ -9,11 +9,12 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 
-use crate::cli::arguments::{EngineChoice, Engines};
+use crate::cli::arguments::Engines;
+use crate::cli::failure::Failure;
 use crate::cli::say;
 use crate::gpu::{self, AdapterReport};
-use crate::job::capacity;
-use crate::job::error::Failure;
+use crate::job::engine_choice::EngineKind;
+use crate::job::size::{self, Free};
 use crate::record::Record;
 use crate::store::folder::Folder;
 use crate::validate::{DEFAULT_SAMPLES, Kind};
@@ -98,7 +99,7 @@ fn measure(
     let open_seconds = bench.open_seconds;
     let mut series =
         Series { target: target.clone(), open_seconds, points: Vec::new(), skipped: None, check: None };
-    let choice = if target.adapter.is_some() { EngineChoice::Gpu } else { EngineChoice::Cpu };
+    let choice = if target.adapter.is_some() { EngineKind::Gpu } else { EngineKind::Cpu };
     let mut largest: Option<(u32, Vec<Record>)> = None;
     for &side in if ask.run.quick { &QUICK_SIDES[..] } else { &SIDES } {
         let (scene, lanes) = (scene(side), (side * side) as usize);
@@ -106,7 +107,7 @@ fn measure(
         let needed = series.points.last().map_or(0.0, |point| {
             2.0 * point.spread(|run| run.prepare + run.integrate).median * lanes as f64 / point.lanes as f64
         });
-        let misfit = capacity::check(&scene, None, choice, folder.path()).err();
+        let misfit = size::check_map(&scene, None, choice, &Free::for_output(Some(folder.path()))).err();
         if needed > left {
             series.skipped =
                 Some((lanes, format!("it would take about {needed:.0} s, {left:.0} s are left")));

@@ -1,34 +1,40 @@
-//! `rattlemap bifurcation`: how the attractor changes along one axis.
+//! `rattlemap bifurcation`: computes how the motion changes along one axis.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use anyhow::anyhow;
 use rattlemap_dynamics::orbit::Class;
 
-use super::arguments::Bifurcation;
+use super::arguments::{Bifurcation, FigureFormat};
+use super::failure::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::progress::Progress;
 use crate::cli::say;
 use crate::findings::hysteresis::{self, Hysteresis};
-use crate::job::error::{Failure, fail_if};
-use crate::job::scene_file;
-use crate::map::{bifurcation, plan, scene};
+use crate::job::scene_file::SceneFile;
+use crate::map::scene::Purpose;
+use crate::map::{bifurcation, plan};
 use crate::store;
+use crate::store::bifurcation::DiagramArguments;
 use crate::store::folder::Folder;
 
-pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
-    let (along, out) = (ask.along(), ask.out());
-    let (along, purpose) = (along.as_ref(), scene::Purpose::Bifurcation);
-    let ask = &scene_file::with_figures(&ask.run, purpose, along)?;
-    let scene = scene_file::load_along(&ask.scene, &ask.set, purpose, along)?;
+/// Largest number of ranges that a message lists; the manifest lists all.
+const LISTED_RANGES: usize = 6;
+
+/// Computes every column, and writes the diagram.
+pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
+    let (along, options) = (arguments.along(), &arguments.run);
+    let along = along.as_ref();
+    let file = SceneFile { purpose: Purpose::Bifurcation, along, ..SceneFile::map(&options.scene) };
+    let sets = file.with_figures(options.set.clone(), &FigureFormat::scene(&options.format))?;
+    let scene = file.load(&sets)?;
     plan::check_line(&scene)?;
-    let interrupt = Interrupt::listen(ask.quiet)?;
-    let folder = Folder::open(&out, ask.force)?;
+    let interrupt = Interrupt::listen(options.quiet)?;
+    let folder = Folder::open(&arguments.out(), options.force)?;
     folder.refuse_links(store::bifurcation::names())?;
     let cells = scene.line();
     let count = bifurcation::column_count(cells.len(), scene.start());
-    let progress = Progress::new(count, 0, "columns", ask.quiet);
+    let progress = Progress::new(count, 0, "columns", options.quiet);
     let clock = Instant::now();
     let ended = AtomicUsize::new(0);
     let report = |done| {
@@ -39,34 +45,37 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
     let columns = bifurcation::run_until(&cells, start, &settings, &report, halt)?;
     // A signal may come with the last column.
     let Some(columns) = columns.filter(|_| !interrupt.is_raised()) else {
-        let (ended, all, path) = (ended.into_inner(), count, folder.path().display());
-        let words = anyhow!(
-            "interrupted after {ended} of {all} columns, and none is kept; nothing was written to {path}"
-        );
-        return Err(interrupt.failure(words));
+        let (ended, path) = (ended.into_inner(), folder.path().display());
+        return Err(interrupt.failure(format!(
+            "interrupted after {ended} of {count} columns; no column is stored, and nothing was written to {path}"
+        )));
     };
-    let asked = store::bifurcation::DiagramArguments { sets: &ask.set, along };
     let elapsed = clock.elapsed();
-    let files = store::bifurcation::write(&folder, &scene, asked, &columns, elapsed)?;
+    let files = store::bifurcation::write(
+        &folder,
+        &scene,
+        DiagramArguments { sets: &sets, along },
+        &columns,
+        elapsed,
+    )?;
     let [periodic, chaotic, undecided, failed] =
         plan::count_classes(columns.iter().map(|column| column.class));
-    let classes = format!(
-        "{count} columns in {:.3} s: {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
-        elapsed.as_secs_f64()
-    );
     let name = &scene.axes()[0].parameter().name;
-    let differing = hysteresis::hysteresis(&columns).map(|found| format!("{}\n", told(&found, name)));
-    let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
-    progress.finish(&format!("{classes}\n{}{files}", differing.unwrap_or_default()));
+    let hysteresis = hysteresis::hysteresis(&columns).map(|found| format!("{}\n", described(&found, name)));
+    progress.finish(&format!(
+        "{count} columns in {:.3} s: {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
+         {}{}: {}",
+        elapsed.as_secs_f64(),
+        hysteresis.unwrap_or_default(),
+        say::path(folder.path()),
+        files.join(", ")
+    ));
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);
     fail_if(all_failed, "every column failed; the status column says why")
 }
 
-/// Ranges that a message names; the manifest has all.
-const NAMED: usize = 6;
-
-/// Where the two passes disagree.
-fn told(found: &Hysteresis, name: &str) -> String {
+/// Describes where the two passes differ.
+fn described(found: &Hysteresis, name: &str) -> String {
     let Hysteresis { columns, differing, ranges, by_pattern, pattern_ranges } = found;
     let by_class = match differing {
         0 => format!("up and down have the same class and period in all {columns} columns"),
@@ -78,10 +87,8 @@ fn told(found: &Hysteresis, name: &str) -> String {
     match by_pattern {
         0 => by_class,
         _ => {
-            format!(
-                "{by_class}\nby pattern alone they differ in {by_pattern}, at {name} = {}",
-                listed(pattern_ranges)
-            )
+            let ranges = listed(pattern_ranges);
+            format!("{by_class}\nby pattern alone they differ in {by_pattern}, at {name} = {ranges}")
         }
     }
 }
@@ -91,9 +98,9 @@ fn listed(ranges: &[[f64; 2]]) -> String {
         true => format!("{first:?}"),
         false => format!("{first:?} to {last:?}"),
     };
-    let mut list: Vec<String> = ranges.iter().take(NAMED).map(range).collect();
-    if ranges.len() > NAMED {
-        list.push(format!("and {} more", ranges.len() - NAMED));
+    let mut list: Vec<String> = ranges.iter().take(LISTED_RANGES).map(range).collect();
+    if ranges.len() > LISTED_RANGES {
+        list.push(format!("and {} more", ranges.len() - LISTED_RANGES));
     }
     list.join(", ")
 }

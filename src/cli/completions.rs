@@ -1,4 +1,4 @@
-//! `rattlemap completions`: what shells and `man` want to know of the command line.
+//! `rattlemap completions`: prints completion scripts for shells, and a page for `man`.
 
 use std::io;
 
@@ -6,14 +6,14 @@ use clap::CommandFactory;
 use clap_mangen::Man;
 
 use super::arguments::{Cli, Completions};
+use super::failure::Failure;
 use super::stdout::print;
-use crate::job::error::Failure;
 
 /// Prints a script for a shell, or the page for `man`.
-pub(crate) fn run(ask: &Completions) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Completions) -> Result<(), Failure> {
     let mut command = Cli::command();
     let mut text = Vec::new();
-    match ask.target.shell() {
+    match arguments.target.shell() {
         Some(shell) => clap_complete::generate(shell, &mut command, "rattlemap", &mut text),
         None => {
             command.build();
@@ -23,7 +23,7 @@ pub(crate) fn run(ask: &Completions) -> Result<(), Failure> {
     print(&String::from_utf8_lossy(&text))
 }
 
-/// One page for the program and all of its commands.
+/// Writes one page for the program and all of its commands.
 fn page(program: &clap::Command, text: &mut Vec<u8>) -> io::Result<()> {
     let man = Man::new(program.clone());
     man.render_title(text)?;
@@ -31,7 +31,7 @@ fn page(program: &clap::Command, text: &mut Vec<u8>) -> io::Result<()> {
     sections(program, text)
 }
 
-/// What a command is, and then those below it.
+/// Writes the sections of a command and of its subcommands.
 fn sections(command: &clap::Command, text: &mut Vec<u8>) -> io::Result<()> {
     let man = Man::new(command.clone());
     man.render_synopsis_section(text)?;

@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: the first one asks a run to end, the second one ends it.
+//! Handles Ctrl-C and SIGTERM: the first signal asks the command to stop, the second one ends the process.
 
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,42 +7,43 @@ use anyhow::Context;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::low_level;
 
+use crate::cli::failure::{Failure, SIGNALLED};
 use crate::cli::say;
-use crate::job::error::{Failure, SIGNALLED};
 
-/// How soon a signal is heard where the system does not tell of it.
+/// Interval at which the flag of a signal is read on systems that do not wake a thread.
 #[cfg(not(unix))]
-const HEARS_WITHIN: std::time::Duration = std::time::Duration::from_millis(50);
+const INTERVAL: std::time::Duration = std::time::Duration::from_millis(50);
 
-/// Whether a signal has come, and which.
+/// Signals that the process has received.
 #[derive(Clone, Default)]
 pub(super) struct Interrupt {
     raised: Arc<AtomicBool>,
     signal: Arc<AtomicI32>,
-    /// What has to be over before the command can end, if that may take a while.
+    /// What must end before the command can stop, if that may take a while.
     waits_for: Arc<Mutex<Option<&'static str>>>,
-    /// What is done and said where nothing has to be over.
+    /// What to do if the process can end at once.
     ending: Arc<Mutex<Option<Ending>>>,
 }
 
-/// How a process ends at once.
+/// The end of a process.
 struct Ending {
-    words: String,
-    /// What is undone first.
-    leave: Box<dyn FnOnce() + Send>,
+    /// What is stored, and how to continue.
+    text: String,
+    /// Removes what the command has created so far.
+    clean_up: Box<dyn FnOnce() + Send>,
 }
 
 impl Interrupt {
-    /// Listens from now on. A second signal ends the process at once, which record files survive.
+    /// Listens to signals from now on. A second signal ends the process at once; record files stay readable.
     ///
     /// # Errors
     /// If the operating system refuses.
     #[cfg(unix)]
     pub(super) fn listen(quiet: bool) -> Result<Interrupt, Failure> {
         let interrupt = Interrupt::default();
-        let heard = interrupt.clone();
+        let listener = interrupt.clone();
         for signal in [SIGINT, SIGTERM] {
-            // In the handler itself: the thread below may wait for a terminal that takes no more text.
+            // The handler itself ends the process: the thread below may be blocked by a terminal that accepts no text.
             signal_hook::flag::register_conditional_shutdown(
                 signal,
                 SIGNALLED + signal,
@@ -52,11 +53,11 @@ impl Interrupt {
         }
         let mut signals =
             signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).context("cannot listen for signals")?;
-        std::thread::spawn(move || signals.forever().for_each(|signal| heard.hear(signal, quiet)));
+        std::thread::spawn(move || signals.forever().for_each(|signal| listener.receive(signal, quiet)));
         Ok(interrupt)
     }
 
-    /// Listens from now on. A second signal ends the process at once, which record files survive.
+    /// Listens to signals from now on. A second signal ends the process at once; record files stay readable.
     ///
     /// # Errors
     /// If the operating system refuses.
@@ -73,18 +74,17 @@ impl Interrupt {
             .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&interrupt.raised)))
             .context("cannot listen for signals")?;
         }
-        let heard = interrupt.clone();
-        // Nobody wakes a thread there when a signal comes.
+        let listener = interrupt.clone();
         std::thread::spawn(move || {
-            while !heard.is_raised() {
-                std::thread::sleep(HEARS_WITHIN);
+            while !listener.is_raised() {
+                std::thread::sleep(INTERVAL);
             }
-            heard.hear(SIGINT, quiet);
+            listener.receive(SIGINT, quiet);
         });
         Ok(interrupt)
     }
 
-    fn hear(&self, signal: i32, quiet: bool) {
+    fn receive(&self, signal: i32, quiet: bool) {
         self.signal.store(signal, Ordering::Relaxed);
         self.raised.store(true, Ordering::Relaxed);
         self.end();
@@ -99,32 +99,31 @@ impl Interrupt {
         say::note(format_args!("stopping{}; Ctrl-C again ends at once", once.unwrap_or_default()));
     }
 
-    /// Says what a signal waits for from now on: nothing that takes long, or the end of `what`. False if one has
-    /// come already.
+    /// From now on a signal stops the command soon, or as soon as `what`. Returns false if one has come already.
     pub(super) fn wait_for(&self, what: Option<&'static str>) -> bool {
         *self.ending.lock().unwrap_or_else(PoisonError::into_inner) = None;
         *self.waits_for.lock().unwrap_or_else(PoisonError::into_inner) = what;
         !self.is_raised()
     }
 
-    /// From now on a signal ends the process at once: `leave` undoes what nobody needs any more, and these words tell how
-    /// to go on. For as long as nothing is computed that is not kept.
-    pub(super) fn ends_at_once(&self, words: String, leave: impl FnOnce() + Send + 'static) {
-        let ending = Ending { words, leave: Box::new(leave) };
+    /// From now on a signal ends the process at once, after `clean_up`. The text says what is stored and how to continue.
+    /// Use it only while nothing is computed that is not stored.
+    pub(super) fn ends_at_once(&self, text: String, clean_up: impl FnOnce() + Send + 'static) {
+        let ending = Ending { text, clean_up: Box::new(clean_up) };
         *self.ending.lock().unwrap_or_else(PoisonError::into_inner) = Some(ending);
-        // A signal that came before found no words.
+        // A signal that came before this call found no ending.
         if self.is_raised() {
             self.end();
         }
     }
 
-    /// Ends the process, if it may end now.
+    /// Ends the process if it can end at once.
     fn end(&self) {
         let ending = self.ending.lock().unwrap_or_else(PoisonError::into_inner).take();
-        if let Some(Ending { words, leave }) = ending {
-            leave();
-            say::note(format_args!("error: interrupted; {words}"));
-            // Nothing of libraries is torn down: their threads may be at work.
+        if let Some(Ending { text, clean_up }) = ending {
+            clean_up();
+            say::note(format_args!("error: interrupted; {text}"));
+            // Without exit handlers: threads of libraries may be running.
             low_level::exit(SIGNALLED + self.signal.load(Ordering::Relaxed));
         }
     }
@@ -134,13 +133,13 @@ impl Interrupt {
         self.raised.load(Ordering::Relaxed)
     }
 
-    /// The flag that is raised.
+    /// The flag that a signal raises.
     pub(super) fn raised(&self) -> &Arc<AtomicBool> {
         &self.raised
     }
 
-    /// A run that it ended, in words.
-    pub(super) fn failure(&self, words: anyhow::Error) -> Failure {
-        Failure::Interrupted { signal: self.signal.load(Ordering::Relaxed), words }
+    /// Returns the error of a command that a signal stopped.
+    pub(super) fn failure(&self, text: String) -> Failure {
+        Failure::Interrupted { signal: self.signal.load(Ordering::Relaxed), text }
     }
 }

@@ -1,4 +1,4 @@
-//! The commands, each a pipeline: ask, check, compute, write.
+//! The command line: one file per command. Each command parses its arguments, calls `job` or `store`, and prints.
 
 pub(crate) mod arguments;
 pub mod bench;
@@ -7,7 +7,7 @@ mod check;
 mod compare;
 mod completions;
 mod devices;
-mod environment;
+pub mod failure;
 mod interrupt;
 mod map;
 mod merge;
@@ -15,7 +15,7 @@ mod models;
 mod orbit;
 mod progress;
 pub(crate) mod say;
-pub(crate) mod stdout;
+mod stdout;
 mod validate;
 
 use std::ffi::OsString;
@@ -24,34 +24,32 @@ use std::process::ExitCode;
 use arguments::{Bench, Cli, Command, parsed_from};
 
 pub use arguments::parsed;
-pub use environment::missing_variable;
-pub use map::open_engine;
 pub use progress::Progress;
 pub use say::note;
 
-/// Runs the command that the process was started with, and says how it ended.
+/// Runs the command of the process's arguments, and returns its exit code.
 pub fn run() -> ExitCode {
     ExitCode::from(run_with(std::env::args_os()))
 }
 
-/// Runs the command of these arguments, the program's name first, and returns the exit code.
+/// Runs the command of these arguments, the program's name first, and returns its exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match parsed_from::<Cli>(arguments) {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    let done = match cli.command {
-        Command::Map(ask) => map::run(&ask),
-        Command::Merge(ask) => merge::run(&ask),
-        Command::Orbit(ask) => orbit::run(&ask),
-        Command::Bifurcation(ask) => bifurcation::run(&ask),
-        Command::Models(ask) => models::run(&ask),
+    let result = match cli.command {
+        Command::Map(arguments) => map::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
+        Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Bifurcation(arguments) => bifurcation::run(&arguments),
+        Command::Models(arguments) => models::run(&arguments),
         Command::Devices => devices::run(),
-        Command::Validate(ask) => validate::run(&ask),
-        Command::Compare(ask) => compare::run(&ask),
-        Command::Check(ask) => check::run(&ask),
-        Command::Completions(ask) => completions::run(&ask),
-        Command::Bench(Bench::Engines(ask)) => bench::run(&ask),
+        Command::Validate(arguments) => validate::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
+        Command::Bench(Bench::Engines(arguments)) => bench::run(&arguments),
     };
-    done.map_or_else(|failure| failure.told(), |()| 0)
+    result.map_or_else(|failure| failure.print(), |()| 0)
 }

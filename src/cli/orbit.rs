@@ -1,4 +1,4 @@
-//! `rattlemap orbit`: one motion, read and written down.
+//! `rattlemap orbit`: computes and describes one motion.
 
 use std::time::Instant;
 
@@ -8,52 +8,57 @@ use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
 use super::arguments::{FigureFormat, Orbit};
+use super::failure::{Failure, fail_if};
 use super::interrupt::Interrupt;
+use super::stdout::print;
 use crate::cli::say;
-use crate::cli::stdout::print;
-use crate::job::error::{Failure, fail_if};
 use crate::job::model_choice;
 use crate::map::scene;
 use crate::show::orbit_summary::summary;
 use crate::store;
 use crate::store::folder::Folder;
-use crate::store::orbit::{Instant as At, OrbitRequest};
+use crate::store::orbit::OrbitRequest;
 
-pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
-    let model = model_choice::find(&ask.model)?;
-    if let Some(start) = &ask.start {
+/// Computes the motion, prints it, and writes its folder if there is one.
+pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
+    let model = model_choice::find(&arguments.model)?;
+    if let Some(start) = &arguments.start {
         model_choice::check_components(&model, start.count)?;
     }
-    let model = scene::single_cell(&model, &ask.set)?;
+    let model = scene::single_cell(&model, &arguments.set)?;
     let flow = Flow::of(&*model)?;
-    check_time(ask.time, flow.period)?;
+    check_time(arguments.time, flow.period)?;
     let interrupt = Interrupt::listen(true)?;
-    let folder = ask.out.as_ref().map(|dir| Folder::open(dir, ask.force)).transpose()?;
+    let folder = arguments.out.as_ref().map(|dir| Folder::open(dir, arguments.force)).transpose()?;
     if let Some(folder) = &folder {
         folder.refuse_links(store::orbit::names())?;
     }
     let clock = Instant::now();
-    let (start, settings) = (ask.start(), ask.settings());
-    let interrupted =
-        || interrupt.failure(anyhow!("interrupted before the motion was decided; nothing was written"));
-    let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(interrupted);
-    let instant = ask.time.map(|time| at(time).map(|state| At { time, state })).transpose()?;
+    let (start, settings) = (arguments.start(), arguments.settings());
+    let stopped = || {
+        let text = "interrupted before the motion was decided; nothing was written";
+        interrupt.failure(text.to_owned())
+    };
+    let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(stopped);
+    let instant =
+        arguments.time.map(|time| at(time).map(|state| store::orbit::Instant { time, state })).transpose()?;
     let (shown, halt) = (orbit::EVENT_PERIODS, interrupt.raised());
-    let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(interrupted)?;
-    let asked = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
-    print(&match ask.json {
+    let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(stopped)?;
+    print(&match arguments.json {
         true => store::orbit::json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),
     })?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
-        let files = store::orbit::write(&folder, &*model, &orbit, &asked, &FigureFormat::scene(&ask.format))?;
+        let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
+        let formats = FigureFormat::scene(&arguments.format);
+        let files = store::orbit::write(&folder, &*model, &orbit, &request, &formats)?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
     }
     fail_if(failed, "the integration failed; `status` says why")
 }
 
-/// Refuses a time that a minute is not enough for.
+/// Refuses a time that takes longer than a minute to compute.
 fn check_time(time: Option<f64>, forcing_period: f64) -> Result<(), Failure> {
     let most = LONGEST_TIME * forcing_period;
     match time {
@@ -64,7 +69,7 @@ fn check_time(time: Option<f64>, forcing_period: f64) -> Result<(), Failure> {
     }
 }
 
-/// The state at a time; none once a signal has come.
+/// Returns the state at a time. None if a signal came first.
 fn state_at(
     model: &dyn Model,
     flow: &Flow,
@@ -75,7 +80,7 @@ fn state_at(
     orbit::state_at(flow, model.law(), start, time, interrupt.raised()).map_err(|stop| {
         let status = orbit::status_of(stop).name();
         Failure::Run(anyhow!(
-            "--time {time:?}: the motion cannot be followed as far ({status}); ask for an earlier time"
+            "--time {time:?}: the integration stops before this time ({status}); give an earlier time"
         ))
     })
 }

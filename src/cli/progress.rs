@@ -1,4 +1,4 @@
-//! Progress on stderr: a bar on a terminal, plain lines in a pipe, nothing if asked.
+//! Reports progress on stderr: a bar on a terminal, lines in a pipe, nothing if quiet.
 
 use std::fmt::Write;
 use std::io::{IsTerminal, stderr};
@@ -9,47 +9,49 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use crate::cli::say;
 
-/// Plain lines come once per this many parts of the whole.
+/// Largest number of plain lines about the whole.
 const LINES: usize = 10;
 
-/// How often a bar is drawn again while nothing ends.
+/// Interval at which a bar is redrawn, so that its time goes on.
 const TICK: Duration = Duration::from_secs(1);
 
-/// Who is told how far a run has come.
+/// Reports progress.
 pub enum Progress {
-    /// Nobody.
+    /// Reports nothing.
     Quiet,
-    /// A person at a terminal.
+    /// Draws a bar on a terminal.
     Bar(ProgressBar),
-    /// A pipe or a log.
+    /// Prints lines into a pipe or a log.
     Lines(Lines),
 }
 
-/// Plain lines, for pipes and logs.
+/// Progress as lines.
 pub struct Lines {
     unit: &'static str,
     total: Total,
-    /// What was done before this run, and when this run began.
+    /// Units that earlier runs had done.
     from: usize,
+    /// Start of this run.
     clock: Instant,
-    said: AtomicUsize,
+    /// Number of lines that are due or printed.
+    printed: AtomicUsize,
 }
 
-/// What a total means.
+/// Meaning of a total.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Total {
     Exact,
-    /// What is foreseen, and may grow: nobody knows how much time is left.
+    /// A lower bound; it can grow, so the remaining time is not shown.
     AtLeast,
 }
 
 impl Progress {
-    /// Progress over `total` columns or other units, at least one, of which `from` are done.
+    /// Starts a report on `total` units, at least one, of which earlier runs have done `from`.
     pub fn new(total: usize, from: usize, unit: &'static str, quiet: bool) -> Progress {
         Progress::with(Total::Exact, total, from, unit, quiet)
     }
 
-    /// The same over a total that may grow.
+    /// Starts a report on at least `total` units.
     pub fn of_at_least(total: usize, from: usize, unit: &'static str, quiet: bool) -> Progress {
         Progress::with(Total::AtLeast, total, from, unit, quiet)
     }
@@ -59,8 +61,8 @@ impl Progress {
             return Progress::Quiet;
         }
         if !stderr().is_terminal() {
-            let (clock, said) = (Instant::now(), AtomicUsize::new(from * LINES / total));
-            return Progress::Lines(Lines { unit, total: kind, from, clock, said });
+            let (clock, printed) = (Instant::now(), AtomicUsize::new(from * LINES / total));
+            return Progress::Lines(Lines { unit, total: kind, from, clock, printed });
         }
         let bar = ProgressBar::new(total as u64).with_position(from as u64).with_style(style(kind, unit));
         bar.reset_eta();
@@ -68,8 +70,7 @@ impl Progress {
         Progress::Bar(bar)
     }
 
-    /// Says that `done` of `total` units are done so far; calls may come from any thread, in
-    /// any order. The total may grow.
+    /// Reports that `done` of `total` units are done. Threads may call it in any order. The total may grow.
     pub fn report(&self, done: usize, total: usize) {
         match self {
             Progress::Quiet => {}
@@ -80,24 +81,24 @@ impl Progress {
                 }
             }
             Progress::Lines(lines) => {
-                // Of a total that has grown, what has been said may be said again.
+                // When the total has grown, a part can be reported again.
                 let part = done * LINES / total;
-                if lines.said.swap(part, Ordering::Relaxed) < part {
+                if lines.printed.swap(part, Ordering::Relaxed) < part {
                     say::note(lines.text(done, total, lines.clock.elapsed()));
                 }
             }
         }
     }
 
-    /// Says something else meanwhile.
-    pub fn suspend(&self, say: impl FnOnce()) {
+    /// Removes the bar while `print` prints.
+    pub fn suspend(&self, print: impl FnOnce()) {
         match self {
-            Progress::Bar(bar) => bar.suspend(say),
-            Progress::Quiet | Progress::Lines(_) => say(),
+            Progress::Bar(bar) => bar.suspend(print),
+            Progress::Quiet | Progress::Lines(_) => print(),
         }
     }
 
-    /// Clears the bar, if there is one, and says one last line, or several, unless quiet.
+    /// Removes the bar and prints lines, unless quiet.
     pub fn finish(&self, line: &str) {
         match self {
             Progress::Quiet => {}
@@ -115,7 +116,6 @@ fn style(total: Total, unit: &str) -> ProgressStyle {
     style.unwrap_or_else(|_| ProgressStyle::default_bar()).with_key(
         "rate",
         |state: &ProgressState, text: &mut dyn Write| {
-            // Nothing to be done about a bar that cannot be written.
             let _ = text.write_str(&rate(state.per_sec()));
         },
     )
@@ -128,7 +128,7 @@ fn template(total: Total, unit: &str) -> String {
     }
 }
 
-/// A rate in as many digits as tell anything.
+/// Formats a rate with as many digits as its accuracy allows.
 fn rate(per_second: f64) -> String {
     if per_second < 10.0 { format!("{per_second:.1}") } else { format!("{per_second:.0}") }
 }
@@ -153,24 +153,25 @@ mod tests {
     use super::*;
 
     fn text(total: Total, done: usize) -> String {
-        let lines = Lines { unit: "cells", total, from: 0, clock: Instant::now(), said: AtomicUsize::new(0) };
+        let lines =
+            Lines { unit: "cells", total, from: 0, clock: Instant::now(), printed: AtomicUsize::new(0) };
         lines.text(done, 400, Duration::from_secs(10))
     }
 
     #[test]
-    fn time_is_left_where_the_total_is_known() {
+    fn the_remaining_time_is_shown_if_the_total_is_exact() {
         assert_eq!(text(Total::Exact, 200), "200 of 400 cells, 20 per second, 10 s left");
         assert_eq!(text(Total::AtLeast, 200), "200 of at least 400 cells, 20 per second");
         assert_eq!(text(Total::AtLeast, 400), "400 of at least 400 cells");
     }
 
     #[test]
-    fn rates_have_no_more_digits_than_they_mean() {
+    fn fast_rates_have_no_decimals() {
         assert_eq!([7816.8616, 12.5, 3.31, 0.0].map(rate), ["7817", "12", "3.3", "0.0"]);
     }
 
     #[test]
-    fn templates_can_be_read() {
+    fn templates_are_valid() {
         for total in [Total::Exact, Total::AtLeast] {
             assert!(ProgressStyle::with_template(&template(total, "cells")).is_ok());
         }

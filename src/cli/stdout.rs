@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write, stdout};
 
 use serde::Serialize;
 
-use crate::job::error::Failure;
+use crate::cli::failure::Failure;
 use crate::text::printable;
 use anyhow::{Context, anyhow};
 

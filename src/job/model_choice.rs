@@ -1,50 +1,48 @@
-//! Which model an argument means: one that is built in, or a file.
+//! Finds a model by its name or file.
 
 use std::path::Path;
 
-use anyhow::anyhow;
 use rattlemap_dynamics::model::Model;
 
-use crate::cli::say;
-use crate::job::error::Failure;
+use crate::job::error::JobError;
 use crate::job::scene_file;
 use crate::model_file::{BUILT_IN, FileModel};
+use crate::text::printable;
 
-/// What a model's file is known by: no name that is built in has either.
+/// Parts of file names. Names of built-in models contain none of them.
 const FILE_MARKS: [&str; 3] = [".toml", "/", "\\"];
 
-/// The model that is called `name`, or stands in the file `name`.
+/// Returns the built-in model of this name, or reads the model's file of this name.
 ///
 /// # Errors
-/// [`Failure::Usage`] if there is none, or its file cannot be read or is wrong.
-pub fn find(name: &str) -> Result<FileModel, Failure> {
+/// [`JobError`] if there is no such model, or its file cannot be read or is wrong.
+pub fn find(name: &str) -> Result<FileModel, JobError> {
     if let Some(model) = FileModel::built_in(name) {
         return Ok(model);
     }
+    let quoted = printable::line(name);
     if FILE_MARKS.iter().any(|mark| name.contains(mark)) {
         let file = scene_file::find_model(Path::new(name));
-        let file =
-            file.map_err(|reason| Failure::Usage(anyhow!("{}: the model {reason}", say::quoted(name))))?;
+        let file = file.map_err(|reason| JobError::Usage(format!("{quoted}: the model {reason}")))?;
         return Ok(FileModel::parse(&file.text, &file.name)?);
     }
     let names: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
-    Err(Failure::Usage(anyhow!(
-        "no model is called `{}`; there is {}, or give the path of a model's file, such as my-model.toml",
-        say::quoted(name),
+    Err(JobError::Usage(format!(
+        "no model is called `{quoted}`; there is {}, or give the path of a model's file, such as my-model.toml",
         names.join(", ")
     )))
 }
 
-/// Numbers of a state, checked against what the model has.
+/// Checks that a state has as many numbers as the model's state.
 ///
 /// # Errors
-/// [`Failure::Usage`] if there are not as many.
-pub fn check_components(model: &dyn Model, count: usize) -> Result<(), Failure> {
+/// [`JobError::Usage`] if it has not.
+pub fn check_components(model: &dyn Model, count: usize) -> Result<(), JobError> {
     let names = model.state_names();
     let number = if names.len() == 2 { "two" } else { "four" };
     match count == names.len() {
         true => Ok(()),
-        false => Err(Failure::Usage(anyhow!(
+        false => Err(JobError::Usage(format!(
             "--start: it must be {number} finite numbers, the model's {}; {count} were given",
             names.join(", ")
         ))),

@@ -1,65 +1,33 @@
-//! A whole map at once, for who needs neither files nor progress.
+//! Computes a whole map in memory with one call.
 
 use std::sync::Arc;
 
-use thiserror::Error;
-
 use crate::findings::attractors::{self, Basins};
 use crate::findings::coexistence;
-#[cfg(feature = "gpu")]
 use crate::gpu::Precision;
-#[cfg(feature = "gpu")]
-use crate::job::engine_choice::{self, Ask, ChoiceError, Who};
-use crate::map::engine::{Cpu, Engine};
-use crate::map::plan::{NoMotion, Plan};
+use crate::job::engine_choice::{EngineKind, EngineRequest};
+use crate::job::error::JobError;
+use crate::job::map::MapJob;
+use crate::map::plan::Plan;
 use crate::map::scene::Scene;
-use crate::map::schedule::{Refined, Schedule};
-use crate::map::sweep::{self, SweepError};
+use crate::map::schedule::Refined;
 use crate::record::Record;
 use crate::record::classify::classify;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::Class;
 
-/// Who computes a map.
+/// Engine of a map in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Processor {
     /// The event-driven reference on all processor cores, in f64.
     Cpu,
-    /// Lanes on the best graphics device that there is.
-    #[cfg(feature = "gpu")]
+    /// Lanes on the best graphics device.
     Gpu(Precision),
 }
 
-/// Why there is no map.
-#[derive(Debug, Error)]
-pub enum MapError {
-    /// The scene is not one of a map.
-    #[error("a map has two axes or a list of cells, and this scene has {axes} axes")]
-    Axes {
-        /// How many the scene has.
-        axes: usize,
-    },
-    /// More runs than can be numbered.
-    #[error("{runs} runs are more than the {} that can be numbered; lower the axes' counts", u32::MAX)]
-    TooLarge {
-        /// Cells times starts per cell.
-        runs: u64,
-    },
-    /// The model has no motion somewhere.
-    #[error(transparent)]
-    NoMotion(#[from] NoMotion),
-    /// There is no such engine.
-    #[cfg(feature = "gpu")]
-    #[error(transparent)]
-    Choice(#[from] ChoiceError),
-    /// The engine failed on the way.
-    #[error(transparent)]
-    Sweep(#[from] SweepError),
-}
-
-/// Computes every cell of a scene, and comes back once that is done.
+/// Computes every cell of a scene, and returns when all are done.
 ///
-/// A map of any model, without a file:
+/// A map of a model, without a file:
 ///
 /// ```
 /// use rattlemap::map::scene::{Quantity, Scene};
@@ -84,43 +52,25 @@ pub enum MapError {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// What wants to be told of progress, to stop on the way or to go on later drives
-/// [`sweep::run`] itself.
+/// Use [`MapJob`] for progress, interruption and records that can be resumed.
 ///
 /// # Errors
-/// [`MapError`]: those of the scene before anything is computed.
-pub fn run(scene: &Scene, on: Processor) -> Result<Map, MapError> {
-    if scene.axes().len() != 2 && scene.list().is_none() {
-        return Err(MapError::Axes { axes: scene.axes().len() });
-    }
-    let runs = scene.run_count();
-    if u32::try_from(runs).is_err() {
-        return Err(MapError::TooLarge { runs });
-    }
-    let plan = Plan::new(scene);
-    plan.check()?;
-    let mut schedule = Schedule::new(&plan);
-    let mut records = vec![Record::default(); plan.run_count()];
-    let mut engine = open(&plan, on)?;
-    let (halt, keep) = (Arc::default(), |_: &[(u32, Record)], _| Ok(()));
-    pollster::block_on(sweep::run(&plan, &mut schedule, &mut engine, &mut records, &halt, keep))?;
-    drop(engine);
-    let refined = schedule.finish(&mut records);
+/// [`JobError`]. Errors of the scene are found before anything is computed.
+pub fn run(scene: &Scene, processor: Processor) -> Result<Map, JobError> {
+    let (kind, precision) = match processor {
+        Processor::Cpu => (EngineKind::Cpu, None),
+        Processor::Gpu(precision) => (EngineKind::Gpu, Some(precision)),
+    };
+    let job = MapJob::new(scene, EngineRequest { kind, precision, adapter: None });
+    job.check(None)?;
+    let plan = job.plan()?;
+    let mut run = job.open(&plan, None, Arc::new(()))?.begin()?;
+    run.integrate(&Arc::default())?;
+    let (records, refined) = run.into_records();
     Ok(Map { plan, records, refined })
 }
 
-fn open(plan: &Plan, on: Processor) -> Result<Engine<'_>, MapError> {
-    match on {
-        Processor::Cpu => Ok(Engine::Cpu(Cpu::new(plan))),
-        #[cfg(feature = "gpu")]
-        Processor::Gpu(precision) => {
-            let ask = Ask { engine: Who::Gpu, precision: Some(precision), adapter: None };
-            Ok(pollster::block_on(engine_choice::open(plan, &ask))?.engine)
-        }
-    }
-}
-
-/// A finished map.
+/// A computed map.
 #[derive(Clone, Debug)]
 pub struct Map {
     plan: Plan,
@@ -128,34 +78,35 @@ pub struct Map {
     refined: Option<Refined>,
 }
 
-/// One cell of a finished map.
+/// A cell of a computed map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapCell<'m> {
-    /// Places on the two axes; in a list its place, and 0.
+    /// Indices along the two axes. Of a cell of a list: its row, and 0.
     pub indices: [usize; 2],
-    /// Of the axes' parameters; in a list of its columns.
+    /// Values of the swept parameters: of the axes, or of the columns of a list.
     pub values: Vec<f64>,
-    /// What was measured; its bits in `valid` say what of it there is.
+    /// The measured quantities. The bits of its field `valid` tell which of them are present.
     pub record: &'m Record,
-    /// What the motion is.
+    /// Class of the motion.
     pub class: Class,
 }
 
 impl Map {
-    /// How many cells lie along each axis; a list is one row.
+    /// Number of cells along each axis; a list is one row.
     pub fn counts(&self) -> [usize; 2] {
         self.plan.counts()
     }
 
-    /// Every cell, the first axis the fastest. Of several starts each has the first.
+    /// Iterates over all cells; the index along the first axis changes fastest. A cell of several starts has the record of
+    /// its first start.
     pub fn cells(&self) -> impl ExactSizeIterator<Item = MapCell<'_>> {
         (0..self.plan.cell_count() as u32).map(|id| self.cell_of(id))
     }
 
-    /// The cell at these places on the axes.
+    /// Returns the cell with these indices.
     ///
     /// # Panics
-    /// If there is none.
+    /// If an index is out of range.
     pub fn cell(&self, indices: [usize; 2]) -> MapCell<'_> {
         let [columns, rows] = self.counts();
         assert!(indices[0] < columns && indices[1] < rows, "a map of {columns} by {rows} cells");
@@ -169,33 +120,33 @@ impl Map {
         MapCell { indices, values, record, class: classify(record) }
     }
 
-    /// The model in a cell.
+    /// The model with the parameters of a cell.
     pub fn model(&self, cell: &MapCell<'_>) -> Box<dyn Model> {
         self.plan.model((cell.indices[1] * self.counts()[0] + cell.indices[0]) as u32)
     }
 
-    /// The map as numbered cells.
+    /// The numbered cells.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// One record per run, by its number in the plan.
+    /// Records by run number.
     pub fn records(&self) -> &[Record] {
         &self.records
     }
 
-    /// What became of an adaptive map.
+    /// Refinement of an adaptive map.
     pub fn refined(&self) -> Option<&Refined> {
         self.refined.as_ref()
     }
 
-    /// To which attractor each start leads; none where no axis sweeps the start.
+    /// The attractor that each start leads to. None if no axis sweeps the start.
     pub fn basins(&self) -> Option<Basins> {
         let filled_from = self.refined.as_ref().map_or(&[][..], |refined| &refined.filled_from);
         attractors::basins(&self.plan, &self.records, filled_from)
     }
 
-    /// On how many attractors the starts of each cell end, by id; none where each has one start.
+    /// Number of attractors that the starts of each cell reach, by cell. None if each cell has one start.
     pub fn attractors(&self) -> Option<Vec<u8>> {
         coexistence::attractors(&self.plan, &self.records)
     }

@@ -1,83 +1,96 @@
-//! A scene from its file.
+//! Loads scenes from files.
 
 use std::fs;
 use std::path::Path;
 
-use crate::cli::arguments::{FigureFormat, SceneOptions};
 use crate::map::scene::{Along, CompanionFile, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
 use crate::store::finished_map::MOST_LIST_BYTES;
 use crate::store::plain_file::read_text;
 
-/// The most bytes that a table of cells may have.
+/// Largest size of a table of cells, in bytes.
 const MOST: u64 = 256_000_000;
 
-/// The most bytes that a model may have.
+/// Largest size of a model's file, in bytes.
 const MOST_OF_MODEL: u64 = 1_000_000;
 
-/// The `--set` that says what is written.
+/// The `--set` argument that lists the output files.
 const FILES: &str = "outputs.files=";
 
-/// Reads and parses a map's scene, the file at `path`; messages call it by that path. Where the table that it names is
-/// gone, `kept` may be the copy in the folder of the run that goes on: one of other values does not go on.
+/// The file of a scene, and how it is read.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneFile<'a> {
+    /// Path of the file. Messages name the scene by it.
+    pub path: &'a Path,
+    /// Purpose of the scene.
+    pub purpose: Purpose,
+    /// The line of a bifurcation diagram through a scene of several axes.
+    pub along: Option<&'a Along>,
+    /// A copy of the scene's table of cells, used if the table itself does not exist: a run can be resumed without it.
+    pub list_copy: Option<&'a Path>,
+}
+
+impl SceneFile<'_> {
+    /// Returns the file of a map's scene.
+    pub fn map(path: &Path) -> SceneFile<'_> {
+        SceneFile { path, purpose: Purpose::Map, along: None, list_copy: None }
+    }
+
+    /// Reads and checks the scene, with parameters and settings overridden by `--set` arguments.
+    ///
+    /// # Errors
+    /// [`SceneError`] if the file cannot be read, or for the first error in it.
+    pub fn load(&self, sets: &[String]) -> Result<Scene, SceneError> {
+        let name = self.path.display().to_string();
+        let text = fs::read_to_string(self.path).map_err(|error| SceneError {
+            place: Place::File { file: name.as_str().into() },
+            problem: Problem::Unreadable { reason: error.to_string() },
+        })?;
+        let find = |what, file: &str| {
+            let path = self.path.parent().unwrap_or(Path::new("")).join(file);
+            if what == CompanionFile::Model {
+                return find_model(&path);
+            }
+            match self.list_copy.filter(|copy| !path.exists() && copy.exists()) {
+                Some(copy) => find_table(copy, MOST_LIST_BYTES),
+                None => find_table(&path, MOST),
+            }
+        };
+        Scene::parse_with_files(&text, &name, sets, self.purpose, self.along, &find)
+    }
+
+    /// Returns the `--set` arguments with one that replaces the scene's figures by these formats, if there are any.
+    /// Manifests list it and resumed runs compare it like any other.
+    ///
+    /// # Errors
+    /// [`SceneError`] if there are formats and the scene cannot be loaded.
+    pub fn with_figures(&self, mut sets: Vec<String>, formats: &[Format]) -> Result<Vec<String>, SceneError> {
+        if formats.is_empty() {
+            return Ok(sets);
+        }
+        let files = self.load(&sets)?.outputs().files.clone();
+        let others = files.iter().filter(|format| !Format::FIGURES.contains(format));
+        let names: Vec<String> = others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
+        sets.retain(|set| !set.starts_with(FILES));
+        sets.push(format!("{FILES}[{}]", names.join(",")));
+        Ok(sets)
+    }
+}
+
+/// Reads the file of a model.
 ///
 /// # Errors
-/// [`SceneError`] if the file cannot be read, or for the first thing wrong in it.
-pub(crate) fn load(path: &Path, sets: &[String], kept: Option<&Path>) -> Result<Scene, SceneError> {
-    load_from(path, sets, Purpose::Map, None, kept)
-}
-
-/// The scene in the file at `path`, of any purpose; a diagram may run along one of several axes. Messages call it by that
-/// path.
-///
-/// # Errors
-/// [`SceneError`] if the file cannot be read, or for the first thing wrong in it.
-pub fn load_along(
-    path: &Path,
-    sets: &[String],
-    purpose: Purpose,
-    along: Option<&Along>,
-) -> Result<Scene, SceneError> {
-    load_from(path, sets, purpose, along, None)
-}
-
-fn load_from(
-    path: &Path,
-    sets: &[String],
-    purpose: Purpose,
-    along: Option<&Along>,
-    kept: Option<&Path>,
-) -> Result<Scene, SceneError> {
-    let name = path.display().to_string();
-    let text = fs::read_to_string(path).map_err(|error| SceneError {
-        place: Place::File { file: name.as_str().into() },
-        problem: Problem::Unreadable { reason: error.to_string() },
-    })?;
-    let find = |what, file: &str| {
-        let beside = path.parent().unwrap_or(Path::new("")).join(file);
-        if what == CompanionFile::Model {
-            return find_model(&beside);
-        }
-        match kept.filter(|kept| !beside.exists() && kept.exists()) {
-            Some(kept) => find(kept, MOST_LIST_BYTES),
-            None => find(&beside, MOST),
-        }
-    };
-    Scene::parse_with_files(&text, &name, sets, purpose, along, &find)
-}
-
-/// Reads the file of a model; the error is the end of a sentence that names it.
+/// The end of a sentence that names the model.
 pub(crate) fn find_model(path: &Path) -> Result<FileText, String> {
     let name = path.display().to_string();
     match read_text(path, MOST_OF_MODEL, "write a shorter model") {
         Ok(text) => Ok(FileText { name, text }),
         Err(error) => Err(format!(
-            "cannot be read at {name} ({error}); give the path of a model's file, in a scene from the scene's folder"
+            "cannot be read at {name} ({error}); give the path of a model's file, in a scene relative to the scene's folder"
         )),
     }
 }
 
-/// Reads a table of cells.
-fn find(path: &Path, most: u64) -> Result<FileText, String> {
+fn find_table(path: &Path, most: u64) -> Result<FileText, String> {
     let name = path.display().to_string();
     match read_text(path, most, "list fewer cells") {
         Ok(text) => Ok(FileText { name, text }),
@@ -87,55 +100,13 @@ fn find(path: &Path, most: u64) -> Result<FileText, String> {
     }
 }
 
-/// The options with `--format` told as one more `--set`: that is what a manifest keeps and what resuming compares.
-///
-/// # Errors
-/// As [`load_along`], where there is such an option.
-pub(crate) fn with_figures(
-    options: &SceneOptions,
-    purpose: Purpose,
-    along: Option<&Along>,
-) -> Result<SceneOptions, SceneError> {
-    figures_from(options, purpose, along, None)
-}
-
-/// The same of a map's scene, as [`load`] reads it.
-///
-/// # Errors
-/// As [`load`], where there is such an option.
-pub(crate) fn map_with_figures(
-    options: &SceneOptions,
-    kept: Option<&Path>,
-) -> Result<SceneOptions, SceneError> {
-    figures_from(options, Purpose::Map, None, kept)
-}
-
-fn figures_from(
-    options: &SceneOptions,
-    purpose: Purpose,
-    along: Option<&Along>,
-    kept: Option<&Path>,
-) -> Result<SceneOptions, SceneError> {
-    let mut options = options.clone();
-    let formats = FigureFormat::scene(&std::mem::take(&mut options.format));
-    if formats.is_empty() {
-        return Ok(options);
-    }
-    let written = load_from(&options.scene, &options.set, purpose, along, kept)?.outputs().files.clone();
-    let others = written.into_iter().filter(|format| !Format::FIGURES.contains(format));
-    let names: Vec<String> = others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
-    options.set.retain(|set| !set.starts_with(FILES));
-    options.set.push(format!("{FILES}[{}]", names.join(",")));
-    Ok(options)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_cannot_be_read_is_named_with_an_example_of_one_that_can() {
-        let message = load(Path::new("no/such.toml"), &[], None).unwrap_err().to_string();
+    fn the_error_for_an_unreadable_scene_gives_an_example() {
+        let message = SceneFile::map(Path::new("no/such.toml")).load(&[]).unwrap_err().to_string();
         assert!(message.starts_with("no/such.toml: cannot read the scene ("), "{message}");
         assert!(message.contains("scenes/smoke.toml"), "{message}");
     }

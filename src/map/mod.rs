@@ -12,8 +12,6 @@ pub mod scene;
 pub mod plan;
 pub mod schedule;
 pub mod shard;
-#[cfg(feature = "gpu")]
-pub mod size;
 
 pub mod engine;
 pub mod sweep;

@@ -29,7 +29,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// Describes the result of the comparison. `by_pattern` and `by_word` count cells that agree in class and period and differ
 /// by pattern, or by word if a map has no patterns. Counts over cells with one period are null if a map has no such values;
 /// the largest difference of exponents is null if it is infinite.
-fn result(compared: &MapPair<'_>) -> Value {
+pub(crate) fn result(compared: &MapPair<'_>) -> Value {
     let MapPair { sides, comparison } = compared;
     let [a, b] = sides.map(|side| {
         json!({

@@ -1,4 +1,4 @@
-//! Builds the manifest and the tables of a map or diagram in memory, for callers that write no folder (Python).
+//! Builds the manifest and the tables of a map, diagram or comparison in memory, for callers that write no folder (Python).
 
 use std::time::Duration;
 
@@ -7,13 +7,18 @@ use crate::map::scene::Scene;
 use crate::show::cells::Cells;
 use crate::show::error::WriteError;
 pub use crate::show::layers::SharedColors;
+use crate::show::map_pair::MapPair;
 use crate::show::table::cell_columns::{self, Values};
 use crate::show::table::words_csv::WordRows;
-use crate::show::table::{attractors_csv, bifurcation_tables};
+use crate::show::table::{attractors_csv, bifurcation_tables, compare_csv, orbit_tables};
 use crate::show::{layers, words};
+use crate::store::compare;
 use crate::store::error::OutputError;
 use crate::store::manifest::bifurcation::{DiagramArguments, bifurcation};
 use crate::store::manifest::map::{self, Run};
+use crate::store::orbit::moments;
+use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::orbit::{Class, Orbit};
 
 /// A map in memory.
 #[derive(Clone, Debug)]
@@ -57,13 +62,8 @@ pub struct Diagram {
     pub manifest: String,
     /// `bifurcation_columns.csv`.
     pub columns: String,
-    /// The columns of `bifurcation.csv` without class, period and status, and without rows that have no point. Kinds and
-    /// directions are indices into `kinds` and `directions`.
-    pub points: Vec<(String, Values)>,
-    /// Names of the kinds.
-    pub kinds: Vec<&'static str>,
-    /// Names of the directions.
-    pub directions: Vec<&'static str>,
+    /// `bifurcation.csv`.
+    pub points: String,
 }
 
 /// Builds the manifest and the tables of a diagram.
@@ -78,14 +78,35 @@ pub fn diagram(
 ) -> Result<Diagram, OutputError> {
     let (axis, names) = (&*scene.axes()[0].parameter().name, scene.base().state_names());
     let manifest = bifurcation(scene, arguments, columns, [elapsed, Duration::ZERO], &[]);
-    let [kinds, directions] = bifurcation_tables::point_codes();
     Ok(Diagram {
         manifest: manifest.to_string(),
         columns: text(|to| bifurcation_tables::write_columns(to, axis, columns))?,
-        points: bifurcation_tables::points(axis, &names, columns),
-        kinds,
-        directions,
+        points: text(|to| bifurcation_tables::write_points(to, axis, &names, columns))?,
     })
+}
+
+/// Returns `trajectory.csv` of an orbit, with this number of samples per forcing period. It has no rows if the motion failed.
+///
+/// # Errors
+/// [`OutputError`] if the model is not valid.
+pub fn trajectory(
+    model: &dyn Model,
+    orbit: &Orbit,
+    samples_per_period: usize,
+) -> Result<String, OutputError> {
+    let moments = match orbit.class {
+        Class::Failed => Vec::new(),
+        _ => moments(model, orbit, samples_per_period)?,
+    };
+    text(|to| orbit_tables::write_trajectory(to, &model.state_names(), &moments))
+}
+
+/// Returns a comparison as JSON, without a folder and its files, and its table `compare.csv`.
+///
+/// # Errors
+/// [`OutputError`] if the table cannot be formatted.
+pub fn comparison(pair: &MapPair<'_>) -> Result<(String, String), OutputError> {
+    Ok((compare::result(pair).to_string(), text(|to| compare_csv::write(to, pair))?))
 }
 
 /// Returns a table as text.

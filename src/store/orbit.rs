@@ -13,8 +13,7 @@ use crate::show::names;
 use crate::show::orbit_json::to_json;
 use crate::show::orbit_spectrum::{Spectrum, samples_per_period};
 use crate::show::parameters::Parameters;
-use crate::show::table::orbit_tables;
-pub use crate::show::table::orbit_tables::Moment;
+use crate::show::table::orbit_tables::{self, Moment};
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
@@ -126,7 +125,7 @@ fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
-pub fn moments(
+pub(crate) fn moments(
     model: &dyn Model,
     orbit: &Orbit,
     samples_per_period: usize,

@@ -1,47 +1,32 @@
-//! Bifurcation diagrams: both ways, and one axis out of two.
+//! Bifurcation diagrams: upwards and downwards, and along one axis of a plane.
 
 use std::fs;
 use std::path::Path;
 
-use tempfile::TempDir;
+use crate::common::{empty as folder, json, names, rattlemap, rows, run, says};
 
-use crate::common::{rattlemap, rows, says};
-
-/// The fall of period 4 back to period 2.
+/// A range in which period 4 changes to period 2, with hysteresis.
 const HYSTERESIS: &str =
     "parameters = { omega = 5.6 }\naxis = [{ parameter = 'e', min = 0.915, max = 0.935, count = 21 }]\n";
 
-/// What a diagram's folder holds.
+/// Files in a diagram's folder.
 const DIAGRAM: [&str; 4] = ["bifurcation.csv", "bifurcation.png", "bifurcation_columns.csv", "manifest.json"];
-
-fn folder() -> TempDir {
-    tempfile::tempdir().unwrap()
-}
 
 /// The rows of `bifurcation_columns.csv` in a folder.
 fn columns(folder: &Path) -> Vec<Vec<String>> {
     rows(&folder.join("bifurcation_columns.csv")).1
 }
 
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> =
-        entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
-}
-
 fn manifest(folder: &Path) -> serde_json::Value {
-    serde_json::from_str(&fs::read_to_string(folder.join("manifest.json")).unwrap()).unwrap()
+    json(&folder.join("manifest.json"))
 }
 
-/// Between 0.92 and 0.927 the attractor depends on the way that it is followed.
+/// Between 0.92 and 0.927 the attractor depends on the direction in which it is followed.
 #[test]
-fn both_ways_are_in_one_diagram_and_where_they_differ_is_told() {
+fn a_diagram_of_both_directions_reports_where_they_differ() {
     let folder = folder();
     fs::write(folder.path().join("h.toml"), HYSTERESIS).unwrap();
-    let run = rattlemap(&folder).args(["bifurcation", "h.toml", "--set", "start.policy=both"]).assert();
-    run.success().stderr(says(&[
+    run(&folder, "bifurcation h.toml --set start.policy=both").success().stderr(says(&[
         "42 of 42 columns",
         "up and down differ by class or period in ",
         " of 21 columns, at e = 0.92",
@@ -52,11 +37,8 @@ fn both_ways_are_in_one_diagram_and_where_they_differ_is_told() {
     assert_eq!(both.len(), 42);
     let mut differing = 0;
     for (policy, rows) in ["up", "down"].into_iter().zip(both.chunks(21)) {
-        let set = format!("start.policy={policy}");
-        rattlemap(&folder)
-            .args(["bifurcation", "h.toml", "--quiet", "--out", policy, "--set", &set])
-            .assert()
-            .success();
+        let line = format!("bifurcation h.toml --quiet --out {policy} --set start.policy={policy}");
+        run(&folder, &line).success();
         let alone = columns(&folder.path().join(policy));
         for (row, alone) in rows.iter().zip(&alone) {
             assert_eq!(row[1], policy);
@@ -74,14 +56,14 @@ fn both_ways_are_in_one_diagram_and_where_they_differ_is_told() {
 }
 
 #[test]
-fn a_map_does_not_go_both_ways_and_says_what_does() {
+fn a_map_refuses_both_directions_with_the_remedy() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/e_omega.toml");
     let run = rattlemap(&folder()).args(["map", scene, "--set", "start.policy=both"]).assert();
     run.code(2).stderr(says(&["`start.policy = both` does not fit: a map shows one", "`rattlemap compare`"]));
 }
 
 #[test]
-fn one_axis_of_a_plane_at_exactly_a_value_of_the_other() {
+fn a_line_through_a_plane_equals_a_scene_of_one_axis() {
     let folder = folder();
     let plane = "title = 'A plane'\n[[axis]]\nparameter = 'e'\nmin = 0.3\nmax = 0.5\ncount = 3\n\
                  [[axis]]\nparameter = 'omega'\nmin = 5.0\nmax = 6.0\ncount = 2\n[refine]\n\
@@ -89,32 +71,33 @@ fn one_axis_of_a_plane_at_exactly_a_value_of_the_other() {
     let line = "parameters = { omega = 5.65 }\n[[axis]]\nparameter = 'e'\nmin = 0.3\nmax = 0.5\ncount = 3\n";
     fs::write(folder.path().join("plane.toml"), plane).unwrap();
     fs::write(folder.path().join("line.toml"), line).unwrap();
-    let of_plane = ["bifurcation", "plane.toml", "--along", "e"];
-    let run = rattlemap(&folder).args(["bifurcation", "plane.toml"]).assert();
-    run.code(2).stderr(says(&["needs 1 axis", "--along e --at omega=VALUE"]));
-    let run = rattlemap(&folder).args(of_plane).assert();
-    run.code(2).stderr(says(&["--along e: `--at omega=VALUE` is missing"]));
-    assert!(!folder.path().join("out").exists(), "an output folder was made");
-    rattlemap(&folder).args(of_plane).args(["--at", "omega=5.65"]).assert().success();
-    rattlemap(&folder).args(["bifurcation", "line.toml"]).assert().success();
+    run(&folder, "bifurcation plane.toml")
+        .code(2)
+        .stderr(says(&["needs 1 axis", "--along e --at omega=VALUE"]));
+    run(&folder, "bifurcation plane.toml --along e")
+        .code(2)
+        .stderr(says(&["--along e: `--at omega=VALUE` is missing"]));
+    assert!(!folder.path().join("out").exists(), "an output folder was created");
+    run(&folder, "bifurcation plane.toml --along e --at omega=5.65").success();
+    run(&folder, "bifurcation line.toml").success();
     let [out, alone] = ["out/plane.e.omega=5.65", "out/line"].map(|name| folder.path().join(name));
     assert_eq!(names(&out), ["bifurcation.csv", "bifurcation_columns.csv", "manifest.json"]);
     assert_eq!(columns(&out), columns(&alone));
     let manifest = manifest(&out);
     assert_eq!((&manifest["along"], &manifest["at"]), (&"e".into(), &serde_json::json!(["omega=5.65"])));
     assert_eq!((&manifest["scene"], &manifest["parameters"]["omega"]), (&plane.into(), &5.65.into()));
-    rattlemap(&folder).args(["bifurcation", "line.toml", "--at", "omega=5"]).assert().code(2);
+    run(&folder, "bifurcation line.toml --at omega=5").code(2);
 }
 
-/// At sigma = 0.2 the stop is hit, at 2 it is out of reach of a response of 1/3.
+/// At sigma = 0.2 the mass hits the stop; at 2 its amplitude of 1/3 does not reach it.
 const ONE_STOP: &str = "model = 'impact-oscillator'\nparameters = { omega = 2.0, zeta = 0.02 }\n\
     [[axis]]\nparameter = 'sigma'\nmin = 0.2\nmax = 2.0\ncount = 2\n[outputs]\nfiles = ['csv', 'svg']\n";
 
 #[test]
-fn where_a_wall_fixes_the_displacement_velocities_and_states_at_phase_0_are_shown() {
+fn a_model_whose_wall_fixes_the_displacement_has_a_table_of_strobe_states() {
     let folder = folder();
     fs::write(folder.path().join("stop.toml"), ONE_STOP).unwrap();
-    rattlemap(&folder).args(["bifurcation", "stop.toml", "--quiet"]).assert().success();
+    run(&folder, "bifurcation stop.toml --quiet").success();
     let out = folder.path().join("out/stop");
     let strobe = "bifurcation_strobe.csv";
     assert_eq!(
@@ -126,7 +109,7 @@ fn where_a_wall_fixes_the_displacement_velocities_and_states_at_phase_0_are_show
     let (header, strobes) = rows(&out.join(strobe));
     assert_eq!(header, "sigma,class,period,status,x,v");
     let of = |value: &str| strobes.iter().filter(|row| row[0] == value).collect::<Vec<_>>();
-    // A row per period of the cycle.
+    // One row per period of the cycle.
     let hit = of("0.2");
     assert_eq!(hit.len().to_string(), hit[0][2], "{hit:?}");
     // Without contact: the steady response, F / (1 - omega^2 + 2 i zeta omega).
@@ -142,8 +125,8 @@ fn where_a_wall_fixes_the_displacement_velocities_and_states_at_phase_0_are_show
         assert!(svg.contains(&format!(">{text}</text>")), "{text}");
     }
     assert!(!svg.contains("left wall") && !svg.contains("|z|"));
-    // Where the gap mixes displacements these are what the section shows, and there is no such file.
+    // A gap of two displacements does not fix them: the diagram shows displacements, and there is no strobe table.
     fs::write(folder.path().join("h.toml"), HYSTERESIS.replace("count = 21", "count = 2")).unwrap();
-    rattlemap(&folder).args(["bifurcation", "h.toml", "--quiet"]).assert().success();
+    run(&folder, "bifurcation h.toml --quiet").success();
     assert_eq!(names(&folder.path().join("out/h")), DIAGRAM);
 }

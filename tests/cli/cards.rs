@@ -1,6 +1,6 @@
-//! Several cards: numbers and names, one map by all of them, one that is lost on the way.
+//! Several cards: numbers and names, a map by all of them, and a card that is lost.
 //!
-//! Where there is Mesa's software driver it is listed twice to the loader: two adapters of one name.
+//! Mesa's software driver is given to the loader twice: two adapters of one name.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,7 +17,7 @@ use tempfile::TempDir;
 use crate::common::says;
 use crate::faults::{SCENE, build_layer};
 
-/// Folders in which loaders look for drivers.
+/// Folders with lists of Vulkan drivers.
 const DRIVERS: [&str; 3] = ["/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
 
 const GPU: [&str; 5] = ["map", "s.toml", "--quiet", "--engine", "gpu"];
@@ -29,12 +29,12 @@ struct Machine {
 }
 
 impl Machine {
-    /// None where there is no software driver to be listed twice, which is said.
+    /// Returns none and prints a line if there is no software driver.
     fn new() -> Option<Machine> {
         let Some(driver) = software_driver() else {
-            // Past the harness, which keeps what passing tests print.
+            // `eprintln!` would be captured.
             let mut stderr = std::io::stderr();
-            writeln!(stderr, "SKIPPED: no lavapipe that could be listed twice").unwrap();
+            writeln!(stderr, "SKIPPED: no lavapipe").unwrap();
             return None;
         };
         let folder = tempfile::tempdir().unwrap();
@@ -60,12 +60,12 @@ impl Machine {
         command
     }
 
-    /// A map in a folder of its own.
+    /// A map in the folder `out`.
     fn map(&self, out: &str, arguments: &[&str]) -> Command {
         self.command(&[&GPU, arguments, &["--out", out]].concat())
     }
 
-    /// The same over a layer that lets calls fail; the layer writes how often each was made to `calls`.
+    /// A map with a layer that makes calls fail. The layer writes the number of calls of each function to `calls`.
     fn failing_map(&self, out: &str, arguments: &[&str], fault: &str) -> Command {
         let path = self.folder.path();
         let mut command = self.map(out, arguments);
@@ -91,7 +91,7 @@ impl Machine {
         fs::read(self.file(out, "cells.csv")).unwrap()
     }
 
-    /// What was computed, by cell.
+    /// Records by cell.
     fn records(&self, out: &str) -> BTreeMap<u32, String> {
         let path = self.file(out, "records.bin");
         let identity = Identity::read(&path).unwrap().unwrap();
@@ -104,7 +104,7 @@ impl Machine {
         all
     }
 
-    /// Cells that each card computed, by its number, and why those were lost that were.
+    /// Number of cells that each card computed, and why it was lost.
     fn cards(&self, out: &str) -> Vec<(u64, Option<String>)> {
         let manifest = self.manifest(out);
         let cards = manifest["cards"].as_array().unwrap();
@@ -125,7 +125,7 @@ fn software_driver() -> Option<PathBuf> {
 }
 
 #[test]
-fn equal_cards_are_told_apart_by_their_numbers() {
+fn equal_cards_are_selected_by_number() {
     let Some(machine) = Machine::new() else { return };
     machine
         .command(&["devices"])
@@ -136,16 +136,25 @@ fn equal_cards_are_told_apart_by_their_numbers() {
         machine.map("no", arguments).assert().code(2).stdout("").stderr(says(parts));
         assert!(!machine.file("no", "records.bin").exists());
     };
-    refused(&["--adapter", "2"], &["no adapter has this number; there are: 0 (llvmpipe", ", 1 (llvmpipe"]);
+    refused(
+        &["--adapter", "2"],
+        &["no adapter has this number; the adapters are: 0 (llvmpipe", ", 1 (llvmpipe"],
+    );
     refused(
         &["--adapter", "llvm"],
         &["more than one adapter", "give a number: 0 (llvmpipe", ", 1 (llvmpipe"],
     );
-    refused(&["--adapter", "radeon"], &["--adapter radeon: no adapter's name", "there are: 0 (llvmpipe"]);
+    refused(
+        &["--adapter", "radeon"],
+        &["--adapter radeon: no adapter's name", "the adapters are: 0 (llvmpipe"],
+    );
     refused(&["--adapter", " "], &["a number or part of a name that `rattlemap devices` lists, or all"]);
     let cpu = machine.command(&["map", "s.toml", "--engine", "cpu", "--adapter", "0"]).assert();
-    cpu.code(2).stderr(says(&["--adapter 0: the CPU engine runs on no graphics adapter"]));
-    // It goes before the environment, and says which it is.
+    cpu.code(2).stderr(says(&["--adapter 0: the CPU engine uses no graphics adapter"]));
+    // `auto` uses no software driver, and the CPU engine has no f32.
+    let auto = machine.command(&["map", "s.toml", "--precision", "f32"]).assert();
+    auto.code(2).stderr(says(&["--precision f32: there is no hardware GPU", "--engine gpu"]));
+    // The option takes precedence over the environment.
     let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--json", "--adapter", "1"];
     let run = machine.map("one", &few).env("WGPU_ADAPTER_NAME", "no such thing").assert().success();
     let summary: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
@@ -157,14 +166,17 @@ fn equal_cards_are_told_apart_by_their_numbers() {
 }
 
 #[test]
-fn all_cards_make_the_map_that_one_makes() {
+fn all_cards_compute_the_same_map_as_one() {
     let Some(machine) = Machine::new() else { return };
     machine.map("one", &["--adapter", "1"]).assert().success();
-    // Where the engine is left open an adapter that is asked for is taken.
+    // `auto` takes an adapter that is named.
     let auto = ["map", "s.toml", "--adapter", "all", "--out", "all", "--json"];
     let run = machine.command(&auto).assert().success();
     let said = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
-    assert!(said.contains("gpu (f32): by --adapter") && said.contains("\n  adapter 1 (llvmpipe"), "{said}");
+    assert!(
+        said.contains("gpu (f32): --adapter names it") && said.contains("\n  adapter 1 (llvmpipe"),
+        "{said}"
+    );
     assert!(machine.table("all") == machine.table("one"));
     assert_eq!(machine.records("all"), machine.records("one"));
     let cards = machine.cards("all");
@@ -177,7 +189,7 @@ fn all_cards_make_the_map_that_one_makes() {
 }
 
 #[test]
-fn a_lost_card_leaves_its_cells_to_the_other() {
+fn the_cells_of_a_lost_card_go_to_the_other() {
     let Some(machine) = Machine::new() else { return };
     if !build_layer(machine.folder.path()) {
         return;
@@ -185,7 +197,7 @@ fn a_lost_card_leaves_its_cells_to_the_other() {
     let all = ["--adapter", "all"];
     machine.failing_map("whole", &all, "").assert().success();
     let (whole, calls) = (machine.table("whole"), machine.submissions());
-    // Half of what one of the two submits.
+    // Half of the submissions of one card.
     let lost =
         machine.failing_map("cut", &all, &format!("vkQueueSubmit:{}:-4:2", calls / 4)).assert().success();
     let said = String::from_utf8_lossy(&lost.get_output().stderr).into_owned();
@@ -198,7 +210,7 @@ fn a_lost_card_leaves_its_cells_to_the_other() {
     let cards = machine.cards("cut");
     assert_eq!(cards.iter().map(|(cells, _)| cells).sum::<u64>(), 576);
     assert_eq!(cards.iter().filter(|(_, lost)| lost.is_some()).count(), 1, "{cards:?}");
-    // The last one ends the run as a single card would; another can go on with it, and the other way round.
+    // If both cards are lost the run ends, and another card can resume it.
     let fault = format!("vkQueueSubmit:{}:-4", calls / 2);
     let gone = machine.failing_map("gone", &all, &fault).assert().code(1);
     let said = String::from_utf8_lossy(&gone.get_output().stderr).into_owned();
@@ -206,14 +218,14 @@ fn a_lost_card_leaves_its_cells_to_the_other() {
     assert!(said.contains("error: ") && said.contains(go_on) && !said.contains("panicked"), "{said}");
     machine.map("gone", &["--adapter", "0", "--resume"]).assert().success();
     assert!(machine.table("gone") == whole);
-    // One of them opens no device: the other does it alone.
+    // If one card cannot be opened, the other one computes the map.
     let alone = machine.failing_map("alone", &all, "vkCreateDevice:2:-3").assert().success();
     let said = String::from_utf8_lossy(&alone.get_output().stderr).into_owned();
     assert!(said.contains("warning: adapter ") && said.contains(" is left out: "), "{said}");
     assert!(machine.manifest("alone").get("cards").is_none() && machine.table("alone") == whole);
 }
 
-/// On a machine with one card the script's step is left out.
+/// The script measures several cards only where there are some.
 #[test]
 fn all_cards_are_measured_against_one() {
     let Some(machine) = Machine::new() else { return };
@@ -231,7 +243,7 @@ fn all_cards_are_measured_against_one() {
 }
 
 #[test]
-fn cards_that_are_stopped_keep_what_has_ended() {
+fn an_interrupted_map_of_several_cards_can_be_resumed() {
     let Some(machine) = Machine::new() else { return };
     let slow = ["--set", "integration.early_stop=false"];
     let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"));
@@ -240,7 +252,7 @@ fn cards_that_are_stopped_keep_what_has_ended() {
     let run = run.spawn().unwrap();
     let clock = Instant::now();
     let kept = || fs::metadata(machine.file("cut", "records.bin")).map_or(0, |data| data.len());
-    // A header, then records.
+    // The file grows beyond its header.
     let mut header = 0;
     while (header == 0 || kept() <= header) && clock.elapsed() < Duration::from_secs(60) {
         header = if header == 0 { kept() } else { header };

@@ -1,13 +1,13 @@
-//! The columns that docs/scenes.md lists are those of the files.
+//! docs/scenes.md lists the columns of all files.
 
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
+use crate::common::{empty, json, rows, run};
 
 const TEXT: &str = include_str!("../../docs/scenes.md");
 
-/// Names in the first column of the table under a heading.
+/// Names in the first column of the table under a heading of the page.
 fn listed(heading: &str) -> Vec<&'static str> {
     let text = TEXT.split_once(&format!("\n### {heading}\n")).unwrap_or_else(|| panic!("no {heading}")).1;
     let rows = text.lines().skip_while(|line| !line.starts_with("| ---")).skip(1);
@@ -15,18 +15,12 @@ fn listed(heading: &str) -> Vec<&'static str> {
     rows.flat_map(|row| row.split('|').nth(1).unwrap().trim().split(", ")).collect()
 }
 
-fn run(folder: &Path, arguments: &[&str]) {
-    let mut command = Command::cargo_bin("rattlemap").unwrap();
-    command.current_dir(folder).args(arguments).assert().code(0);
-}
-
 fn header(path: &Path) -> Vec<String> {
-    fs::read_to_string(path).unwrap().lines().next().unwrap().split(',').map(str::to_owned).collect()
+    rows(path).0.split(',').map(str::to_owned).collect()
 }
 
 fn fields(path: &Path) -> Vec<String> {
-    let object: serde_json::Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
-    object.as_object().unwrap().keys().cloned().collect()
+    json(path).as_object().unwrap().keys().cloned().collect()
 }
 
 fn sorted<T: Ord>(mut list: Vec<T>) -> Vec<T> {
@@ -35,8 +29,8 @@ fn sorted<T: Ord>(mut list: Vec<T>) -> Vec<T> {
 }
 
 #[test]
-fn columns_are_those_of_the_files() {
-    let folder = tempfile::tempdir().unwrap();
+fn the_page_lists_the_columns_of_all_files() {
+    let folder = empty();
     let dir = folder.path();
     let axis =
         |name, min, max| format!("[[axis]]\nparameter = \"{name}\"\nmin = {min}\nmax = {max}\ncount = 3\n");
@@ -45,24 +39,24 @@ fn columns_are_those_of_the_files() {
     let everything =
         "[outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word', 'pattern']\n";
     fs::write(dir.join("plane.toml"), format!("{e}{omega}[start]\ncount = 2\n{everything}")).unwrap();
-    run(dir, &["map", "plane.toml", "--engine", "cpu", "--quiet"]);
-    run(dir, &["validate", "out/plane", "--quiet"]);
-    run(dir, &["bifurcation", "line.toml", "--quiet", "--set", "start.policy=both"]);
-    run(dir, &["orbit", "--set", "e=0.3", "--out", "out/orbit"]);
-    run(dir, &["compare", "out/plane", "out/plane", "--quiet"]);
+    run(&folder, "map plane.toml --engine cpu --quiet").code(0);
+    run(&folder, "validate out/plane --quiet").code(0);
+    run(&folder, "bifurcation line.toml --quiet --set start.policy=both").code(0);
+    run(&folder, "orbit --set e=0.3 --out out/orbit").code(0);
+    run(&folder, "compare out/plane out/plane --quiet").code(0);
     assert_eq!(header(&dir.join("out/compare/plane-plane/compare.csv")), listed("compare.csv"));
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed("cells.csv and cells.npy"));
     let start = |name| axis(name, -0.5, 0.5).replace("parameter", "start");
     let starts = format!("[parameters]\ne = 0.3\n{}{}", start("x1"), start("v2"));
     fs::write(dir.join("starts.toml"), starts).unwrap();
-    run(dir, &["map", "starts.toml", "--engine", "cpu", "--quiet"]);
+    run(&folder, "map starts.toml --engine cpu --quiet").code(0);
     assert_eq!(header(&dir.join("out/starts/attractors.csv")), listed("attractors.csv"));
     assert_eq!(header(&dir.join("out/plane/words.csv")), listed("words.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation_columns.csv")), listed("bifurcation_columns.csv"));
     fs::write(dir.join("stop.toml"), format!("model = 'impact-oscillator'\n{}", axis("F", 0.1, 1.0)))
         .unwrap();
-    run(dir, &["bifurcation", "stop.toml", "--quiet", "--set", "start.policy=both"]);
+    run(&folder, "bifurcation stop.toml --quiet --set start.policy=both").code(0);
     let strobe = "bifurcation_strobe.csv";
     assert_eq!(header(&dir.join("out/stop").join(strobe)), listed(strobe));
     assert_eq!(sorted(fields(&dir.join("out/orbit/orbit.json"))), sorted(listed("orbit.json")));

@@ -3,15 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use tempfile::TempDir;
-
-use crate::common::{rattlemap, says};
+use crate::common::{empty as folder, json, names, rattlemap, rows, run, says};
 
 const SMOKE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/smoke.toml");
-
-fn folder() -> TempDir {
-    tempfile::tempdir().unwrap()
-}
 
 /// Asserts that a parsed `orbit --json` object has exactly the fields of the contract.
 fn assert_orbit_fields(orbit: &serde_json::Value) {
@@ -24,53 +18,30 @@ fn assert_orbit_fields(orbit: &serde_json::Value) {
     assert_eq!(orbit["strobe"].as_array().map(Vec::len), Some(4));
 }
 
-/// The names in a folder, sorted.
-fn file_names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("a folder");
-    let mut names: Vec<String> =
-        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
-}
-
 fn keys(object: &serde_json::Value) -> String {
     let mut keys: Vec<&str> = object.as_object().expect("an object").keys().map(String::as_str).collect();
     keys.sort_unstable();
     keys.join(" ")
 }
 
-/// Runs a changed smoke scene and expects exit code 2, all of `parts` in the message,
-/// nothing on stdout and no output folder.
+/// Runs a changed smoke scene. Expects exit code 2, a message with all `parts`, nothing on stdout and no output folder.
 #[track_caller]
 fn refuses(old: &str, new: &str, parts: &[&str]) {
     let folder = folder();
     let text = fs::read_to_string(SMOKE).unwrap();
     assert!(text.contains(old), "{old:?} is not in the smoke scene");
     fs::write(folder.path().join("bad.toml"), text.replacen(old, new, 1)).unwrap();
-    let run = rattlemap(&folder).args(["bifurcation", "bad.toml"]).assert();
-    run.code(2).stdout("").stderr(says(parts));
-    assert!(!folder.path().join("out").exists(), "an output folder was made");
+    run(&folder, "bifurcation bad.toml").code(2).stdout("").stderr(says(parts));
+    assert!(!folder.path().join("out").exists(), "an output folder was created");
 }
 
 #[test]
-fn unknown_field_is_refused() {
+fn wrong_values_in_a_scene_are_refused_with_their_place() {
     refuses("count = 5", "cuont = 5", &["bad.toml:11:1", "`axis.0.cuont = 5`", "did you mean `count`?"]);
-}
-
-#[test]
-fn value_out_of_range_is_refused() {
     refuses("max = 0.8", "max = 1.5", &["bad.toml:10:7", "`axis.0.max = 1.5`", "between 0 and 1"]);
-}
-
-#[test]
-fn not_a_number_is_refused() {
     refuses("min = 0.4", "min = nan", &["bad.toml:9:7", "`axis.0.min = nan`", "between 0 and 1"]);
     refuses("min = 0.4", "min = \"low\"", &["bad.toml:9:7", "`axis.0.min = \"low\"`", "it must be a number"]);
     refuses("min = 0.4", "min = low", &["bad.toml:9:7", "min = low", "not valid TOML"]);
-}
-
-#[test]
-fn empty_axis_is_refused() {
     refuses("count = 5", "count = 0", &["bad.toml:11:9", "`axis.0.count = 0`", "from 2 to"]);
     refuses("max = 0.8", "max = 0.4", &["bad.toml:10:7", "`axis.0.max = 0.4`", "greater than `axis.0.min"]);
 }
@@ -85,8 +56,10 @@ fn scene_for_another_command_is_refused() {
 #[test]
 fn missing_scene_is_refused() {
     let folder = folder();
-    let run = rattlemap(&folder).args(["bifurcation", "scenes/none.toml"]).assert();
-    run.code(2).stdout("").stderr(says(&["scenes/none.toml: cannot read", "give the path of a TOML file"]));
+    run(&folder, "bifurcation scenes/none.toml")
+        .code(2)
+        .stdout("")
+        .stderr(says(&["scenes/none.toml: cannot read", "give the path of a TOML file"]));
     assert!(!folder.path().join("out").exists());
 }
 
@@ -134,7 +107,7 @@ fn bad_orbit_requests_are_refused() {
 }
 
 #[test]
-fn files_in_the_way_of_the_output_are_refused() {
+fn a_file_with_the_name_of_the_output_folder_is_refused() {
     let folder = folder();
     fs::write(folder.path().join("taken"), "precious").unwrap();
     for arguments in [["bifurcation", SMOKE].as_slice(), &["orbit"]] {
@@ -148,7 +121,7 @@ fn files_in_the_way_of_the_output_are_refused() {
 }
 
 #[test]
-fn full_output_folders_are_refused() {
+fn output_folders_with_files_are_refused() {
     let folder = folder();
     let out = folder.path().join("out/smoke");
     fs::create_dir_all(&out).unwrap();
@@ -168,7 +141,7 @@ fn read_only_output_folders_are_refused() {
     let closed = folder.path().join("closed");
     fs::create_dir(&closed).unwrap();
     fs::set_permissions(&closed, fs::Permissions::from_mode(0o555)).unwrap();
-    // Root may write anywhere, and then there is nothing to refuse.
+    // Root may write anywhere.
     if fs::write(closed.join("probe"), "").is_ok() {
         return;
     }
@@ -183,43 +156,42 @@ fn every_command_has_help_with_an_example() {
         ("bifurcation", "rattlemap bifurcation scenes/"),
         ("map", "rattlemap map scenes/"),
     ] {
-        let run = rattlemap(&folder()).args([command, "--help"]).assert();
-        run.success().stdout(says(&["Example", example]));
+        run(&folder(), &format!("{command} --help")).success().stdout(says(&["Example", example]));
     }
 }
 
 #[test]
-fn shells_and_man_are_told_of_every_command() {
-    let told = |target: &str| {
-        let run = rattlemap(&folder()).args(["completions", target]).assert().success().stderr("");
+fn completions_contain_every_command() {
+    let script = |target: &str| {
+        let run = run(&folder(), &format!("completions {target}")).success().stderr("");
         String::from_utf8(run.get_output().stdout.clone()).unwrap()
     };
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
-        let script = told(shell);
+        let script = script(shell);
         for word in ["bifurcation", "validate", "resume", "repair"] {
             assert!(script.contains(word), "{shell}: {word}");
         }
     }
-    let page = told("man");
+    let page = script("man");
     assert!(page.contains(".TH rattlemap 1"), "{page}");
     for word in ["rattlemap bifurcation", "rattlemap bench engines", "transient", "repair"] {
         assert!(page.contains(word), "{word}: {page}");
     }
-    // As a shell reads it.
-    let script = folder();
-    let path = script.path().join("rattlemap");
-    fs::write(&path, told("bash")).unwrap();
+    // Bash completes an option.
+    let folder = folder();
+    let path = folder.path().join("rattlemap");
+    fs::write(&path, script("bash")).unwrap();
     let ask = ". ./rattlemap; COMP_WORDS=(rattlemap map --res); COMP_CWORD=2; _rattlemap rattlemap --res map; \
                echo \"${COMPREPLY[@]}\"";
-    if let Ok(run) = std::process::Command::new("bash").args(["-c", ask]).current_dir(&script).output() {
+    if let Ok(run) = std::process::Command::new("bash").args(["-c", ask]).current_dir(&folder).output() {
         assert_eq!(String::from_utf8_lossy(&run.stdout).trim(), "--resume", "{run:?}");
     }
-    rattlemap(&folder()).args(["completions", "tcsh"]).assert().code(2).stderr(says(&["bash", "man"]));
+    run(&folder, "completions tcsh").code(2).stderr(says(&["bash", "man"]));
 }
 
 #[test]
 fn orbit_json_has_the_fields_of_the_contract() {
-    let run = rattlemap(&folder()).args(["orbit", "--json"]).assert().success();
+    let run = run(&folder(), "orbit --json").success();
     let printed = &run.get_output().stdout;
     let orbit: serde_json::Value = serde_json::from_slice(printed).unwrap();
     assert_orbit_fields(&orbit);
@@ -231,14 +203,13 @@ fn orbit_json_has_the_fields_of_the_contract() {
     assert_eq!((&orbit["word"], &orbit["pattern"]), (&"36".into(), &"36".into()));
     assert_eq!(orbit["lyapunov_error"], serde_json::Value::Null);
     assert_eq!(orbit["events"].as_array().unwrap().len(), 2);
-    // The transient, a turning tangent vector, one check.
+    // The transient, the alignment of a tangent vector, and one check.
     assert_eq!(orbit["periods_run"], 400 + 50 + 128);
 }
 
 #[test]
-fn orbit_summary_is_for_the_eye() {
-    let run = rattlemap(&folder()).args(["orbit", "--set", "e=0.06"]).assert();
-    run.success().stderr("").stdout(says(&[
+fn orbit_prints_a_summary() {
+    run(&folder(), "orbit --set e=0.06").success().stderr("").stdout(says(&[
         "periodic, period 1",
         "e=0.06",
         "mesh_start",
@@ -249,9 +220,9 @@ fn orbit_summary_is_for_the_eye() {
     ]));
 }
 
-/// From the start, not from where the motion has settled.
+/// The time counts from the start, not from the end of the transient.
 #[test]
-fn orbit_tells_the_state_at_a_time() {
+fn orbit_prints_the_state_at_a_time() {
     use rattlemap::flow::Flow;
     use rattlemap::model::GearPair;
     use rattlemap::reference::Trajectory;
@@ -280,14 +251,13 @@ fn orbit_folder_is_written_once_and_again_with_force() {
     let orbit =
         |arguments: &[&str]| rattlemap(&folder).args(["orbit", "--out", "o"]).args(arguments).assert();
     orbit(&[]).success();
-    let json: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(folder.path().join("o/orbit.json")).unwrap()).unwrap();
-    assert_orbit_fields(&json);
-    let names = file_names(&folder.path().join("o"));
-    assert!(names.iter().any(|name| name.ends_with(".png")), "{names:?}");
+    let out = folder.path().join("o");
+    assert_orbit_fields(&json(&out.join("orbit.json")));
+    let files = names(&out);
+    assert!(files.iter().any(|name| name.ends_with(".png")), "{files:?}");
     orbit(&[]).code(2);
     orbit(&["--force"]).success();
-    assert_eq!(file_names(&folder.path().join("o")), names);
+    assert_eq!(names(&out), files);
 }
 
 #[test]
@@ -296,7 +266,7 @@ fn bifurcation_writes_table_figure_and_manifest() {
     let run = rattlemap(&folder).args(["bifurcation", SMOKE, "--set", "omega=5.6"]).assert();
     run.success().stdout("").stderr(says(&["5 of 5 columns", "bifurcation.csv"]));
     let out = folder.path().join("out/smoke");
-    assert_eq!(file_names(&out), DIAGRAM);
+    assert_eq!(names(&out), DIAGRAM);
     assert!(fs::read(out.join("bifurcation.png")).unwrap().starts_with(b"\x89PNG"));
     check_table(&out.join("bifurcation.csv"));
     check_columns(&out.join("bifurcation_columns.csv"));
@@ -311,25 +281,21 @@ fn bifurcation_writes_table_figure_and_manifest() {
     assert!(manifest["elapsed_seconds"].as_f64().unwrap() > 0.0);
 }
 
-/// What a diagram's folder holds.
+/// Files in a diagram's folder.
 const DIAGRAM: [&str; 4] = ["bifurcation.csv", "bifurcation.png", "bifurcation_columns.csv", "manifest.json"];
 
-/// One row per value, with what `orbit` says of it.
+/// Checks that the table has one row per value, with the results of `orbit`.
 fn check_columns(path: &Path) {
-    let mut table = csv::Reader::from_path(path).unwrap();
-    let header = "e,class,period,word,pattern,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
-                  periods_run";
-    assert_eq!(table.headers().unwrap().iter().collect::<Vec<_>>().join(","), header);
-    let rows: Vec<csv::StringRecord> = table.records().collect::<Result<_, _>>().unwrap();
-    assert_eq!(rows.len(), 5);
+    let (header, rows) = rows(path);
+    let columns = "e,class,period,word,pattern,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
+                   periods_run";
+    assert_eq!((&*header, rows.len()), (columns, 5));
     for row in &rows {
-        let settings = ["--transient", "200", "--periods", "64"];
         let set = format!("e={}", &row[0]);
-        let run =
-            rattlemap(&folder()).args(["orbit", "--json", "--set", &set]).args(settings).assert().success();
+        let run = run(&folder(), &format!("orbit --json --set {set} --transient 200 --periods 64")).success();
         let orbit: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
         let is_periodic = &row[1] == "periodic";
-        assert_eq!(orbit["class"], row[1]);
+        assert_eq!(orbit["class"], *row[1]);
         assert_eq!(orbit["period"].as_u64(), row[2].parse().ok());
         for (field, name) in [(3, "word"), (4, "pattern")] {
             let word = format!("w{}", orbit[name].as_str().unwrap());
@@ -341,21 +307,20 @@ fn check_columns(path: &Path) {
             assert_eq!(row[field].parse().ok(), orbit[name].as_f64(), "{name} at {set}");
         }
         assert_eq!(row[9].parse().ok(), orbit["symmetric"].as_bool());
-        assert_eq!(orbit["status"], row[10]);
+        assert_eq!(orbit["status"], *row[10]);
     }
     assert!(rows.iter().any(|row| &row[1] == "periodic") && rows.iter().any(|row| &row[1] == "chaotic"));
 }
 
 fn check_table(path: &Path) {
-    let mut table = csv::Reader::from_path(path).unwrap();
-    let header =
+    let (header, rows) = rows(path);
+    let columns =
         "e,class,period,status,side,kind,t_mod_period,x1_before,v1_before,x2_before,v2_before,x1,v1,x2,v2";
-    assert_eq!(table.headers().unwrap().iter().collect::<Vec<_>>().join(","), header);
-    let rows: Vec<csv::StringRecord> = table.records().collect::<Result<_, _>>().unwrap();
-    let mut values: Vec<&str> = rows.iter().map(|row| &row[0]).collect();
+    assert_eq!(header, columns);
+    let mut values: Vec<&str> = rows.iter().map(|row| &*row[0]).collect();
     values.dedup();
     assert_eq!((values.len(), values[0], values[4]), (5, "0.4", "0.8"));
-    assert_eq!(rows[0].iter().skip(1).take(3).collect::<Vec<_>>(), ["periodic", "1", "ok"]);
+    assert_eq!(rows[0][1..4], ["periodic", "1", "ok"]);
     let period = std::f64::consts::TAU / 5.6;
     for row in &rows {
         let numbers: Vec<f64> = row.iter().skip(6).map(|field| field.parse().unwrap()).collect();
@@ -380,14 +345,12 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
         "2 columns in ",
         " s: 1 periodic, 1 chaotic, 0 undecided, 0 failed\nout/smoke: bifurcation.csv, ",
     ]));
-    assert_eq!(
-        file_names(&out),
-        ["bifurcation.csv", "bifurcation_columns.csv", "manifest.json", "notes.txt"]
-    );
+    assert_eq!(names(&out), ["bifurcation.csv", "bifurcation_columns.csv", "manifest.json", "notes.txt"]);
 }
 
 #[test]
-fn orbit_help_says_that_periods_are_no_limit() {
-    let run = rattlemap(&folder()).args(["orbit", "--help"]).assert();
-    run.success().stdout(says(&["No limit", "All of them are integrated"]));
+fn orbit_help_explains_periods_and_transient() {
+    run(&folder(), "orbit --help")
+        .success()
+        .stdout(says(&["N does not limit the integration", "It is always integrated whole"]));
 }

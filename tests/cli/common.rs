@@ -1,8 +1,10 @@
-//! What tests of the program share.
+//! Helpers of all tests of the program.
 
+use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
+use assert_cmd::assert::Assert;
 use predicates::prelude::*;
 use tempfile::TempDir;
 
@@ -13,13 +15,44 @@ pub(crate) fn rattlemap(folder: &TempDir) -> Command {
     command
 }
 
-/// Whether a text has all of these parts.
+/// Runs the program in a folder with a line of arguments.
+pub(crate) fn run(folder: &TempDir, line: &str) -> Assert {
+    rattlemap(folder).args(line.split_whitespace()).assert()
+}
+
+/// A new folder.
+pub(crate) fn empty() -> TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+/// A new folder with a scene `s.toml`.
+pub(crate) fn with_scene(text: &str) -> TempDir {
+    let folder = empty();
+    fs::write(folder.path().join("s.toml"), text).unwrap();
+    folder
+}
+
+/// Sorted names of the files in a folder.
+pub(crate) fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// The JSON object in a file.
+pub(crate) fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+/// A predicate: a text contains all of these parts.
 pub(crate) fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
     let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
     predicate::function(move |text: &str| parts.iter().all(|part| text.contains(part.as_str())))
 }
 
-/// The header of a table in one line, and its rows.
+/// The header of a CSV table as a line, and its rows.
 pub(crate) fn rows(path: &Path) -> (String, Vec<Vec<String>>) {
     let mut table = csv::Reader::from_path(path).unwrap();
     let header = table.headers().unwrap().iter().collect::<Vec<_>>().join(",");

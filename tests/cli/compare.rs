@@ -1,16 +1,17 @@
-//! `rattlemap compare`: which cells of two maps differ, and what is refused.
+//! `rattlemap compare`: the differing cells of two maps, and maps that cannot be compared.
 
 use std::fs;
 use std::path::Path;
 
+use assert_cmd::assert::Assert;
 use rattlemap::record::Record;
 use rattlemap::store::inventory;
 use rattlemap::store::record_file::{Identity, Order, RecordFile};
 use tempfile::TempDir;
 
-use crate::common::{rattlemap, rows, says};
+use crate::common::{empty, json, rows, run, says, with_scene};
 
-/// Around the fall of period 4, which comes later on the way up than on the way down.
+/// A range in which period 4 ends, later on the way up than on the way down.
 const SCENE: &str = "title = 'Around a fold'
 [[axis]]
 parameter = 'omega'
@@ -27,36 +28,33 @@ quantities = ['class', 'lyapunov', 'symmetric', 'word', 'pattern']
 files = ['csv']
 ";
 
-/// A folder with finished maps: each has a name and what is set.
+/// Creates a folder with finished maps; each has a name and `--set` arguments.
 fn maps(of: &[(&str, &[&str])]) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
-    for (name, sets) in of {
-        let sets = sets.iter().flat_map(|set| ["--set", set]);
-        let map = ["map", "s.toml", "--engine", "cpu", "--quiet", "--out", name];
-        run(&folder, &map.into_iter().chain(sets).collect::<Vec<_>>()).success();
-    }
+    let folder = with_scene(SCENE);
+    of.iter().for_each(|(name, sets)| map(&folder, name, sets));
     folder
 }
 
-fn run(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    rattlemap(folder).args(arguments).assert()
+fn map(folder: &TempDir, name: &str, sets: &[&str]) {
+    let sets: String = sets.iter().map(|set| format!(" --set {set}")).collect();
+    run(folder, &format!("map s.toml --engine cpu --quiet --out {name}{sets}")).success();
 }
 
-fn compare(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    run(folder, &[&["compare"], arguments].concat())
+fn compare(folder: &TempDir, line: &str) -> Assert {
+    run(folder, &format!("compare {line}"))
 }
 
-fn json(text: &[u8]) -> serde_json::Value {
-    serde_json::from_slice(text).unwrap()
+/// The object that a command prints.
+fn printed(run: &Assert) -> serde_json::Value {
+    serde_json::from_slice(&run.get_output().stdout).unwrap()
 }
 
 #[test]
-fn up_against_down_is_what_their_tables_say() {
+fn differing_cells_are_those_of_the_tables() {
     let folder = maps(&[("m/up", &["start.policy=up"]), ("m/down", &["start.policy=down"])]);
     let [(_, up), (_, down)] =
         ["up", "down"].map(|name| rows(&folder.path().join(format!("m/{name}/cells.csv"))));
-    // i, j, omega, e, class, period, lyapunov of both tables, side by side.
+    // Columns of compare.csv, from i, j, omega, e, class, period and lyapunov of both tables.
     let differing: Vec<[String; 11]> = up
         .iter()
         .zip(&down)
@@ -69,8 +67,8 @@ fn up_against_down_is_what_their_tables_say() {
         })
         .collect();
     let kinds = ["class", "period"].map(|kind| differing.iter().filter(|row| row[10] == kind).count());
-    assert!(kinds.iter().all(|&count| count > 0), "{kinds:?}: nothing to see");
-    let done = compare(&folder, &["m/up", "m/down", "--json"]).success().stderr(says(&[
+    assert!(kinds.iter().all(|&count| count > 0), "{kinds:?}: no difference");
+    let done = compare(&folder, "m/up m/down --json").success().stderr(says(&[
         "start: up in A, down in B",
         &format!("{} of 144 cells differ (", differing.len()),
         &format!("): {} by class, {} by period", kinds[0], kinds[1]),
@@ -84,39 +82,42 @@ fn up_against_down_is_what_their_tables_say() {
     let (header, found) = rows(&out.join("compare.csv"));
     assert_eq!(header, "i,j,omega,e,class_a,period_a,class_b,period_b,lyapunov_a,lyapunov_b,kind");
     assert_eq!(found, differing);
-    let manifest = json(&fs::read(out.join("manifest.json")).unwrap());
-    let printed = json(&done.get_output().stdout);
+    let manifest = json(&out.join("manifest.json"));
+    let printed = printed(&done);
     assert_eq!(
         (&manifest["command"], &printed["folder"]),
         (&"compare".into(), &"out/compare/up-down".into())
     );
-    for told in [&manifest, &printed] {
-        assert_eq!((&told["cells"], &told["differing"]), (&144.into(), &differing.len().into()));
-        assert_eq!((&told["by_class"], &told["by_period"]), (&kinds[0].into(), &kinds[1].into()));
-        let sides =
-            ["a", "b"].map(|side| [&told[side]["folder"], &told[side]["engine"], &told[side]["precision"]]);
+    for object in [&manifest, &printed] {
+        assert_eq!((&object["cells"], &object["differing"]), (&144.into(), &differing.len().into()));
+        assert_eq!((&object["by_class"], &object["by_period"]), (&kinds[0].into(), &kinds[1].into()));
+        let sides = ["a", "b"]
+            .map(|side| [&object[side]["folder"], &object[side]["engine"], &object[side]["precision"]]);
         assert_eq!(sides, [["up", "cpu", "f64"], ["down", "cpu", "f64"]]);
         assert_eq!(
-            told["scene_differences"],
+            object["scene_differences"],
             serde_json::json!([{ "name": "start", "a": "up", "b": "down" }])
         );
-        let moved: u64 =
-            told["transitions"].as_array().unwrap().iter().map(|pair| pair["cells"].as_u64().unwrap()).sum();
+        let moved: u64 = object["transitions"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|pair| pair["cells"].as_u64().unwrap())
+            .sum();
         assert_eq!(moved, kinds[0] as u64);
     }
     check_picture(&out.join("compare.png"), &differing);
-    run(&folder, &["check", "out/compare/up-down"]).success();
-    // Again: the folder is guarded; with --fail the difference is the exit code, and the files are there.
-    compare(&folder, &["m/up", "m/down"]).code(2).stderr(says(&["the folder is not empty", "--force"]));
-    let failed = compare(&folder, &["m/down", "m/up", "--fail", "--quiet"]).code(1).stdout("");
+    run(&folder, "check out/compare/up-down").success();
+    compare(&folder, "m/up m/down").code(2).stderr(says(&["the folder is not empty", "--force"]));
+    // With --fail the exit code is 1, and the files are written.
+    let failed = compare(&folder, "m/down m/up --fail --quiet").code(1).stdout("");
     failed.stderr(format!("error: {} of 144 cells differ by class or period\n", differing.len()));
     assert!(folder.path().join("out/compare/down-up/manifest.json").is_file());
 }
 
-/// Rattling on the way up and motion without contact on the way down are of one class and period: rows of their own kind,
-/// which `--fail` does not heed.
+/// Rattling on the way up and motion without contact on the way down have the same class and period.
 #[test]
-fn cells_of_another_pattern_are_told_and_do_not_fail() {
+fn cells_that_differ_by_pattern_are_listed_and_do_not_fail() {
     let sets = |policy| {
         ["axis.0.parameter=e", "axis.0.min=0.05", "axis.0.max=0.1", "axis.0.count=2"]
             .into_iter()
@@ -132,8 +133,8 @@ fn cells_of_another_pattern_are_told_and_do_not_fail() {
     });
     let differing = patterns[0].iter().zip(&patterns[1]).filter(|(up, down)| up != down).count();
     assert!(differing > 3, "{patterns:?}");
-    let done = compare(&folder, &["up", "down", "--fail", "--json", "--out", "c"]).success();
-    let told = json(&done.get_output().stdout);
+    let done = compare(&folder, "up down --fail --json --out c").success();
+    let told = printed(&done);
     let counts = ["differing", "by_pattern", "by_word"].map(|name| told[name].as_u64().unwrap());
     assert_eq!(counts, [0, differing as u64, 0]);
     let (_, rows) = rows(&folder.path().join("c/compare.csv"));
@@ -141,10 +142,10 @@ fn cells_of_another_pattern_are_told_and_do_not_fail() {
     assert!(rows.iter().all(|row| row[10] == "pattern"), "{rows:?}");
     let picture = image::open(folder.path().join("c/compare.png")).unwrap().to_rgb8();
     let pixels = picture.pixels().filter(|pixel| pixel.0 == [0xf6, 0xd9, 0x8b]).count();
-    assert!(pixels > 0, "a colour of their own");
+    assert!(pixels > 0, "no pixel has the colour of patterns");
 }
 
-/// The colours of the kinds take as much of the picture as their cells of the map.
+/// Checks that each kind's colour has the area of its cells.
 fn check_picture(path: &Path, differing: &[[String; 11]]) {
     let picture = image::open(path).unwrap().to_rgb8();
     let cell = (1024 / 12 * 12 / 12) as usize * (1024 / 12) as usize;
@@ -160,12 +161,11 @@ fn check_picture(path: &Path, differing: &[[String; 11]]) {
 }
 
 #[test]
-fn equal_maps_of_other_sources_and_engines_differ_nowhere() {
+fn equal_maps_of_two_versions_do_not_differ() {
     let few = ["axis.0.count=4", "axis.1.count=3"];
     let folder = maps(&[("a", &few), ("b", &few)]);
     of_other_sources(&folder.path().join("b"));
-    let done =
-        compare(&folder, &["a", "b", "--fail", "--out", "c", "--format", "svg,pdf"]).success().stdout("");
+    let done = compare(&folder, "a b --fail --out c --format svg,pdf").success().stdout("");
     done.stderr(says(&["no cell of 12 differs by class or period", "exponents of 12 by 0.0e0 at most"]));
     let (_, found) = rows(&folder.path().join("c/compare.csv"));
     assert!(found.is_empty(), "{found:?}");
@@ -176,64 +176,62 @@ fn equal_maps_of_other_sources_and_engines_differ_nowhere() {
         "{svg:.400}"
     );
     assert!(fs::read(folder.path().join("c/compare.pdf")).unwrap().starts_with(b"%PDF"));
-    let manifest = json(&fs::read(folder.path().join("c/manifest.json")).unwrap());
+    let manifest = json(&folder.path().join("c/manifest.json"));
     assert_eq!(
         (&manifest["b"]["crate_version"], &manifest["b"]["commit"]),
         (&"0.0.9".into(), &"feed".into())
     );
     assert_eq!(manifest["exponents"]["largest"], 0.0);
     assert_eq!(manifest["attractors"], serde_json::Value::Null);
-    // A command that computes again does not take it.
-    run(&folder, &["validate", "b"]).code(2).stderr(says(&["made by rattlemap 0.0.9"]));
+    // `validate` needs a map of its own version.
+    run(&folder, "validate b").code(2).stderr(says(&["made by rattlemap 0.0.9"]));
 }
 
-/// Makes a map's folder one that another version of other sources has written.
+/// Changes a map's folder into one that another version with other sources has written.
 fn of_other_sources(out: &Path) {
     let (records, manifest) = (out.join("records.bin"), out.join("manifest.json"));
-    let mut told = json(&fs::read(&manifest).unwrap());
+    let mut object = json(&manifest);
     let foreign = Identity::read(&records).unwrap().unwrap().built_from("0123", "other processor");
-    let mut kept: Vec<(u32, Record)> = Vec::new();
+    let mut records_of_map: Vec<(u32, Record)> = Vec::new();
     let own = Identity::read(&records).unwrap().unwrap();
     let take = |batch: &[(u32, Record)]| {
-        kept.extend_from_slice(batch);
+        records_of_map.extend_from_slice(batch);
         true
     };
     RecordFile::read(&records, &own, Order::Any, take).unwrap();
-    RecordFile::create(&records, &foreign).unwrap().append(&kept).unwrap();
+    RecordFile::create(&records, &foreign).unwrap().append(&records_of_map).unwrap();
     for (field, value) in
         [("sources", "0123"), ("target", "other processor"), ("crate_version", "0.0.9"), ("commit", "feed")]
     {
-        told[field] = value.into();
+        object[field] = value.into();
     }
-    fs::write(manifest, inventory::sealed(told).unwrap()).unwrap();
+    fs::write(manifest, inventory::sealed(object).unwrap()).unwrap();
 }
 
-/// Without axes there is neither a place in a grid nor a picture.
+/// Lists have no indices along axes, and no figure.
 #[test]
 fn lists_of_cells_are_compared_row_by_row() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = empty();
     for (name, points) in [("s", "e,omega\n0.4,5.6\n0.92,5.6\n"), ("t", "e,omega\n0.4,5.6\n0.92,5.7\n")] {
         fs::write(folder.path().join(format!("{name}.csv")), points).unwrap();
         fs::write(folder.path().join(format!("{name}.toml")), format!("cells.file = '{name}.csv'\n"))
             .unwrap();
-        run(&folder, &["map", &format!("{name}.toml"), "--engine", "cpu", "--quiet"]).success();
+        run(&folder, &format!("map {name}.toml --engine cpu --quiet")).success();
     }
-    let rattling = ["--set", "start.policy=state", "--set", "start.state=[0.5, 4, -0.5, 0]"];
-    run(&folder, &[&["map", "s.toml", "--engine", "cpu", "--quiet", "--out", "u"], &rattling[..]].concat())
-        .success();
-    compare(&folder, &["out/s", "u", "--quiet", "--out", "c"]).success();
+    map(&folder, "u", &["start.policy=state", "start.state=[0.5,4,-0.5,0]"]);
+    compare(&folder, "out/s u --quiet --out c").success();
     let (header, _) = rows(&folder.path().join("c/compare.csv"));
     assert_eq!(header, "e,omega,class_a,period_a,class_b,period_b,lyapunov_a,lyapunov_b,kind");
     assert!(!folder.path().join("c/compare.png").exists());
-    compare(&folder, &["out/s", "out/t"]).code(2).stderr(says(&[
-        "maps of other cells",
+    compare(&folder, "out/s out/t").code(2).stderr(says(&[
+        "maps of different cells",
         "out/t",
-        "two lists",
+        "different lists",
     ]));
 }
 
 #[test]
-fn what_cannot_be_compared_is_refused_with_the_reason() {
+fn maps_that_cannot_be_compared_are_refused_with_the_reason() {
     let few = ["axis.0.count=3", "axis.1.count=2"];
     let with = |set: &'static str| [few[0], few[1], set];
     let folder = maps(&[
@@ -250,7 +248,7 @@ fn what_cannot_be_compared_is_refused_with_the_reason() {
         (
             "wider",
             &[
-                "two grids",
+                "different grids",
                 "axis 0 of a is omega from 5.5 to 5.7 in 3 values, of wider omega from 5.5 to 5.8",
             ][..],
         ),
@@ -261,15 +259,12 @@ fn what_cannot_be_compared_is_refused_with_the_reason() {
         ("empty", &["empty: there is no manifest.json; it is not the folder of a map"]),
         ("absent", &["absent: there is no such folder"]),
     ] {
-        compare(&folder, &["a", b]).code(2).stdout("").stderr(says(parts));
+        compare(&folder, &format!("a {b}")).code(2).stdout("").stderr(says(parts));
     }
-    assert!(!folder.path().join("out").exists(), "an output folder was made");
-    let run = compare(&folder, &["a", "a", "--out", "./a", "--force"]);
-    run.code(2).stderr(says(&["--out ./a: this is the folder of a, which is compared"]));
-    // Of another parameter that is not on an axis the maps may be.
-    let set = with("k=1010");
-    let sets: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).collect();
-    let map = ["map", "s.toml", "--engine", "cpu", "--quiet", "--out", "stiffer"];
-    self::run(&folder, &map.into_iter().chain(sets).collect::<Vec<_>>()).success();
-    compare(&folder, &["a", "stiffer"]).success().stderr(says(&["parameters.k: 1000.0 in A, 1010.0 in B"]));
+    assert!(!folder.path().join("out").exists(), "an output folder was created");
+    let run = compare(&folder, "a a --out ./a --force");
+    run.code(2).stderr(says(&["--out ./a: this is the folder of a, one of the compared maps"]));
+    // Parameters that are not axes may differ.
+    map(&folder, "stiffer", &with("k=1010"));
+    compare(&folder, "a stiffer").success().stderr(says(&["parameters.k: 1000.0 in A, 1010.0 in B"]));
 }

@@ -1,18 +1,17 @@
-//! Commands that keep nothing on their way, asked to stop: no folder is left, and how they ended is said.
+//! Signals to commands that store nothing before their end: no folder is left, and the message says how they ended.
 
-use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use tempfile::TempDir;
+use crate::common::{names, with_scene};
 
-/// Cells that would take a quarter of an hour each.
+/// A line whose cells take a quarter of an hour each.
 const SLOW: &str = "parameters = { r1 = 0, r2 = 0 }\n\
     axis = [{ parameter = 'e', min = 0.4, max = 0.8, count = 5 }]\n\
     integration = { transient_periods = 1_000_000_000 }\n";
 
-/// Cells that a map decides at once, and whose whole budget takes half a minute each and little memory.
+/// A map whose cells are decided at once; the whole budget of each takes half a minute.
 const LONG: &str = "axis = [{ parameter = 'e', min = 0.6, max = 0.606, count = 4 }, \
                     { parameter = 'omega', min = 5.7, max = 5.71, count = 2 }]\n\
     integration = { transient_periods = 20_000_000 }\n";
@@ -20,12 +19,12 @@ const LONG: &str = "axis = [{ parameter = 'e', min = 0.6, max = 0.606, count = 4
 fn rattlemap(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("rattlemap"));
     command.current_dir(folder).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
-    // No driver: opening one takes seconds, in which nothing can be stopped.
+    // Without a driver: while one is opened, which takes seconds, nothing can be stopped.
     command.env("VK_DRIVER_FILES", "none").env("VK_ICD_FILENAMES", "none");
     command
 }
 
-/// Sends a command a signal once it is at work, and expects that it ends soon, says how and is silent on stdout.
+/// Sends a signal to a running command. Expects that it ends soon, with a message and nothing on stdout.
 #[track_caller]
 fn stops(folder: &Path, arguments: &[&str], says: &str) {
     for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
@@ -41,44 +40,34 @@ fn stops(folder: &Path, arguments: &[&str], says: &str) {
     }
 }
 
-fn folder(scene: &str) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("s.toml"), scene).unwrap();
-    folder
-}
-
 #[test]
-fn a_diagram_that_is_stopped_leaves_no_folder() {
-    let folder = folder(SLOW);
+fn an_interrupted_diagram_leaves_no_folder() {
+    let folder = with_scene(SLOW);
     for start in ["rest", "up"] {
         let start = format!("start.policy={start}");
-        let says = "error: interrupted after 0 of 5 columns, and none is kept; nothing was written to out/s";
+        let says =
+            "error: interrupted after 0 of 5 columns; no column is stored, and nothing was written to out/s";
         stops(folder.path(), &["bifurcation", "s.toml", "--set", &start], says);
         assert!(!folder.path().join("out").exists());
     }
 }
 
 #[test]
-fn an_orbit_that_is_stopped_leaves_no_folder() {
-    let folder = folder(SLOW);
+fn an_interrupted_orbit_leaves_no_folder() {
+    let folder = with_scene(SLOW);
     let says = "error: interrupted before the motion was decided; nothing was written";
     stops(folder.path(), &["orbit", "--transient", "1000000000", "--out", "a/b"], says);
     assert!(!folder.path().join("a").exists());
 }
 
 #[test]
-fn a_validation_that_is_stopped_leaves_the_map_as_it_was() {
-    let folder = folder(LONG);
+fn an_interrupted_validation_does_not_change_the_map() {
+    let folder = with_scene(LONG);
     let made = rattlemap(folder.path(), &["map", "s.toml", "--engine", "cpu", "--quiet"]).output().unwrap();
     assert!(made.status.success(), "{made:?}");
-    let names = || {
-        let entries = fs::read_dir(folder.path().join("out/s")).unwrap();
-        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
-        names.sort();
-        names
-    };
-    let before = names();
+    let out = folder.path().join("out/s");
+    let before = names(&out);
     let says = " of 8 cells, and nothing was written to out/s";
     stops(folder.path(), &["validate", "out/s"], says);
-    assert_eq!(names(), before);
+    assert_eq!(names(&out), before);
 }

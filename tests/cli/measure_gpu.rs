@@ -1,4 +1,4 @@
-//! `scripts/measure_gpu.sh` on whatever adapter there is, at a tiny size: it keeps its time, and leaves a table.
+//! `scripts/measure_gpu.sh` at a tiny size on any adapter: it keeps its time limit and writes a table.
 
 use std::collections::HashMap;
 use std::fs;
@@ -10,13 +10,13 @@ use std::time::Instant;
 use rattlemap::gpu;
 use tempfile::TempDir;
 
-/// The software adapter, whose speed is known to be low; none where there is none.
+/// The name of a software adapter, which is slow. None if there is none.
 fn software() -> Option<String> {
     let adapters = pollster::block_on(gpu::adapters());
     adapters.iter().find(|adapter| !gpu::is_hardware(&adapter.info)).map(|found| gpu::describe(&found.info))
 }
 
-/// Steps of the script for so many seconds, in f32 on this adapter.
+/// Runs steps of the script in f32 on an adapter with a time limit in seconds. Returns its summary.
 fn measure(adapter: &str, out: &TempDir, seconds: u32, side: u32, steps: &[&str]) -> String {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/measure_gpu.sh");
     let mut run = Command::new(script);
@@ -29,7 +29,7 @@ fn measure(adapter: &str, out: &TempDir, seconds: u32, side: u32, steps: &[&str]
     fs::read_to_string(out.path().join("summary.md")).unwrap()
 }
 
-/// The first table's rows: what was measured, by column.
+/// Rows of the first table, by column.
 fn rows(summary: &str) -> Vec<HashMap<&str, &str>> {
     let mut table = summary.lines().skip_while(|line| !line.starts_with("| what |"));
     let header: Vec<&str> = table.next().unwrap().split('|').map(str::trim).collect();
@@ -41,7 +41,7 @@ fn rows(summary: &str) -> Vec<HashMap<&str, &str>> {
 }
 
 #[test]
-fn a_card_is_measured_and_told_in_a_table() {
+fn a_measurement_is_written_to_a_table() {
     let out = tempfile::tempdir().unwrap();
     let summary = measure(&software().unwrap_or_else(|| "vulkan".to_owned()), &out, 90, 8, &["classes"]);
     let rows = rows(&summary);
@@ -49,7 +49,7 @@ fn a_card_is_measured_and_told_in_a_table() {
     let row = &rows[0];
     assert_eq!(["what", "precision", "runs", "cells"].map(|name| row[name]), ["classes", "f32", "1", "64"]);
     let number = |name: &str| row[name].parse::<f64>().unwrap_or_else(|_| panic!("{name}: {summary}"));
-    // The wall time holds everything else.
+    // The wall time includes all other times.
     assert!(
         number("start to files, s") > number("integration, s") && number("integration, s") > 0.0,
         "{row:?}"
@@ -61,23 +61,23 @@ fn a_card_is_measured_and_told_in_a_table() {
 }
 
 #[test]
-fn a_card_that_is_too_slow_is_cut_and_still_told() {
+fn a_measurement_that_exceeds_the_time_limit_is_cut_and_reported() {
     let Some(adapter) = software() else {
-        // Past the harness, which keeps what passing tests print.
+        // `eprintln!` would be captured.
         let mut stderr = std::io::stderr();
-        writeln!(stderr, "SKIPPED: no software adapter that is sure to be too slow").unwrap();
+        writeln!(stderr, "SKIPPED: no software adapter, which would be slow enough").unwrap();
         return;
     };
     let out = tempfile::tempdir().unwrap();
     let clock = Instant::now();
-    // 2 10^8 periods of lanes take it minutes.
+    // 2 * 10^8 periods of lanes take minutes.
     let summary = measure(&adapter, &out, 18, 640, &["brute", "classes", "compile", "engines"]);
-    // A run that is cut has five seconds to write what it has.
+    // A run that is cut has five seconds to write its results.
     assert!(clock.elapsed().as_secs() <= 18 + 8, "it took {:?}", clock.elapsed());
     let rows = rows(&summary);
-    let told: Vec<[&str; 2]> = rows.iter().map(|row| ["what", "cells"].map(|name| row[name])).collect();
-    assert!(told[0][0] == "brute" && told[0][1].starts_with("cut after "), "{summary}");
+    let cells: Vec<[&str; 2]> = rows.iter().map(|row| ["what", "cells"].map(|name| row[name])).collect();
+    assert!(cells[0][0] == "brute" && cells[0][1].starts_with("cut after "), "{summary}");
     let late = ["classes", "compile_cold", "compile_warm"].map(|what| [what, "no time was left"]);
-    assert_eq!(told[1..], late, "{summary}");
+    assert_eq!(cells[1..], late, "{summary}");
     assert!(summary.contains("- missing: engines: no time was left"), "{summary}");
 }

@@ -1,55 +1,52 @@
-//! `rattlemap models`: the page says what the code does. Models of one's own, as `docs/models.md` has them.
+//! `rattlemap models`, and models from files as in `docs/models.md`.
 
 use std::fs;
-use std::path::Path;
 
-use assert_cmd::Command;
 use rattlemap::model::{GearPair, Model};
 use rattlemap::model_file::{BUILT_IN, FileModel};
 use rattlemap_dynamics::orbit::{Class, Status};
 use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::common::{empty, json, rattlemap, run};
 
 const TEXT: &str = include_str!("../../docs/models.md");
 
-/// A block of the page's TOML.
+/// A TOML block of the page.
 fn toml(nth: usize) -> &'static str {
     TEXT.split("```toml\n").nth(nth + 1).and_then(|rest| rest.split("```").next()).unwrap()
 }
 
-fn rattlemap(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    Command::cargo_bin("rattlemap").unwrap().current_dir(folder).args(arguments).assert()
-}
-
-fn stdout_in(folder: &Path, arguments: &[&str]) -> String {
-    let run = rattlemap(folder, arguments).code(0).stderr("");
+/// The output of a command that succeeds.
+fn stdout(folder: &TempDir, line: &str) -> String {
+    let run = run(folder, line).code(0).stderr("");
     String::from_utf8(run.get_output().stdout.clone()).unwrap()
 }
 
-fn stdout(arguments: &[&str]) -> String {
-    stdout_in(Path::new("."), arguments)
+/// The message of a command that is refused.
+fn refusal(folder: &TempDir, line: &str) -> String {
+    let run = run(folder, line).code(2).stdout("");
+    String::from_utf8(run.get_output().stderr.clone()).unwrap()
 }
 
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
-}
-
-/// The page's model and its scene in a folder.
-fn my_model() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("my-bilinear.toml"), toml(0)).unwrap();
-    fs::write(folder.path().join("my-map.toml"), toml(1)).unwrap();
-    fs::write(folder.path().join("my-basin.toml"), toml(2)).unwrap();
+/// A folder with the page's model and scenes.
+fn my_model() -> TempDir {
+    let folder = empty();
+    for (nth, name) in ["my-bilinear", "my-map", "my-basin"].into_iter().enumerate() {
+        fs::write(folder.path().join(format!("{name}.toml")), toml(nth)).unwrap();
+    }
     folder
 }
 
 #[test]
 fn every_model_has_a_line_and_a_page() {
-    let list = stdout(&["models"]);
+    let folder = empty();
+    let list = stdout(&folder, "models");
     assert_eq!(list.lines().count(), BUILT_IN.len(), "{list}");
     for (line, model) in list.lines().zip(FileModel::all_built_in()) {
         assert!(line.starts_with(&format!("{} ", model.name())), "{line}");
         assert!(line.ends_with(model.definition().summary.as_ref().unwrap()), "{line}");
-        let page = stdout(&["models", model.name()]);
+        let page = stdout(&folder, &format!("models {}", model.name()));
         let has = |words: &[&str]| {
             let found =
                 page.lines().any(|line| line.split_whitespace().collect::<Vec<_>>().starts_with(words));
@@ -69,11 +66,11 @@ fn every_model_has_a_line_and_a_page() {
             page.lines().find(|line| line.chars().count() > 130 && !line.contains(model.source().unwrap()));
         assert_eq!(wide, None, "too long for a terminal");
         assert_eq!(
-            stdout(&["models", model.name(), "--file"]).trim_end(),
+            stdout(&folder, &format!("models {} --file", model.name())).trim_end(),
             model.definition().text.trim_end()
         );
     }
-    let page = stdout(&["models", "gear-pair"]);
+    let page = stdout(&folder, "models gear-pair");
     assert_eq!(FileModel::built_in("gear-pair").unwrap().parameters(), GearPair::PARAMETERS);
     for part in [
         "F cos(omega t)",
@@ -86,7 +83,7 @@ fn every_model_has_a_line_and_a_page() {
     ] {
         assert!(page.contains(part), "{part}");
     }
-    let one_wall = stdout(&["models", "shaking-table"]);
+    let one_wall = stdout(&folder, "models shaking-table");
     assert!(
         one_wall.contains("5  free, from the left to the left") && !one_wall.contains("2  free"),
         "{one_wall}"
@@ -94,19 +91,16 @@ fn every_model_has_a_line_and_a_page() {
 }
 
 #[test]
-fn unknown_model_is_refused_with_the_names() {
-    let run = rattlemap(Path::new("."), &["models", "gears\u{1b}"]).code(2).stdout("");
-    let error = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+fn unknown_and_wrong_models_are_refused() {
+    let folder = my_model();
+    let error = refusal(&folder, "models gears\u{1b}");
     assert!(error.starts_with("error: no model is called `gears\\u{1b}`; there is gear-pair, "), "{error}");
     assert!(error.ends_with("or give the path of a model's file, such as my-model.toml\n"), "{error}");
-    let run = rattlemap(Path::new("."), &["orbit", "--model", "no/such.toml"]).code(2).stdout("");
-    let error = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+    let error = refusal(&folder, "orbit --model no/such.toml");
     assert!(error.contains("cannot be read at no/such.toml"), "{error}");
-    let folder = my_model();
     fs::write(folder.path().join("my-bilinear.toml"), toml(0).replace("[[0.1]]", "[[-0.1]]")).unwrap();
-    for arguments in [&["map", "my-map.toml"][..], &["models", "my-bilinear.toml"]] {
-        let run = rattlemap(folder.path(), arguments).code(2).stdout("");
-        let error = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+    for line in ["map my-map.toml", "models my-bilinear.toml"] {
+        let error = refusal(&folder, line);
         assert!(
             error.starts_with("error: my-bilinear.toml:5:18: `motion.damping = [[-0.1]]` does"),
             "{error}"
@@ -114,14 +108,14 @@ fn unknown_model_is_refused_with_the_names() {
     }
 }
 
-/// The page's commands, and what else can be asked of a map. The folder is enough once the model's file is gone.
+/// The page's commands. A map's folder can be repaired without the model's file.
 #[test]
-fn a_model_of_ones_own_has_maps_basins_diagrams_and_orbits() {
+fn a_model_from_a_file_has_maps_basins_diagrams_and_orbits() {
     let folder = my_model();
     let at = |name: &str| folder.path().join(name);
-    assert!(stdout_in(folder.path(), &["models", "my-bilinear.toml"]).contains("N = k (z - d)"));
-    let map = ["map", "my-map.toml", "--engine", "cpu", "--quiet"];
-    rattlemap(folder.path(), &map).code(0);
+    assert!(stdout(&folder, "models my-bilinear.toml").contains("N = k (z - d)"));
+    let map = "map my-map.toml --engine cpu --quiet";
+    run(&folder, map).code(0);
     let csv = fs::read_to_string(at("out/my-map/cells.csv")).unwrap();
     assert!(csv.starts_with("i,j,omega,d,class,period"), "{csv}");
     assert_eq!(csv.lines().count(), 1 + 96 * 72);
@@ -133,12 +127,11 @@ fn a_model_of_ones_own_has_maps_basins_diagrams_and_orbits() {
     let report = fs::read_to_string(at("out/my-map/report.html")).unwrap();
     assert!(report.contains(" --model model.toml"));
 
-    rattlemap(folder.path(), &["map", "my-basin.toml", "--engine", "cpu", "--quiet"]).code(0);
+    run(&folder, "map my-basin.toml --engine cpu --quiet").code(0);
     let attractors = fs::read_to_string(at("out/my-basin/attractors.csv")).unwrap();
     assert_eq!(attractors.lines().count(), 1 + 3, "{attractors}");
 
-    let line = ["bifurcation", "my-map.toml", "--along", "omega", "--at", "d=0.5", "--quiet"];
-    rattlemap(folder.path(), &line).code(0);
+    run(&folder, "bifurcation my-map.toml --along omega --at d=0.5 --quiet").code(0);
     let csv = fs::read_to_string(at("out/my-map.omega.d=0.5/bifurcation.csv")).unwrap();
     assert!(
         csv.starts_with("omega,class,period,status,side,kind,t_mod_period,x_before,v_before,x,v\n"),
@@ -147,9 +140,8 @@ fn a_model_of_ones_own_has_maps_basins_diagrams_and_orbits() {
     assert!(csv.contains(",1,mesh_start,") && !csv.contains(",impact,"), "{csv}");
 
     let orbit =
-        ["orbit", "--model", "my-bilinear.toml", "--set", "omega=0.8", "--json", "--out", "out/motion"];
-    let run = rattlemap(folder.path(), &orbit).code(0);
-    let orbit: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+        run(&folder, "orbit --model my-bilinear.toml --set omega=0.8 --json --out out/motion").code(0);
+    let orbit: Value = serde_json::from_slice(&orbit.get_output().stdout).unwrap();
     assert_eq!(orbit["omega"], 0.8);
     assert!(orbit.get("e").is_none());
     assert_eq!(orbit["strobe"].as_array().unwrap().len(), 2);
@@ -158,27 +150,25 @@ fn a_model_of_ones_own_has_maps_basins_diagrams_and_orbits() {
     assert!(table.starts_with("t,phase,z,w,x,v,domain,event,side,moment\n"), "{table}");
     assert_eq!(json(&at("out/motion/manifest.json"))["model"]["text"], toml(0));
 
-    // Another text is another model; without its file nothing is begun anew, and the folder stands by itself.
-    let resume = [&map[..], &["--resume"]].concat();
-    rattlemap(folder.path(), &resume).code(0);
+    // A changed model cannot be resumed.
+    let resume = format!("{map} --resume");
+    run(&folder, &resume).code(0);
     fs::write(at("my-bilinear.toml"), toml(0).replace("0.1", "0.2")).unwrap();
-    let run = rattlemap(folder.path(), &resume).code(2);
-    let error = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+    let error = refusal(&folder, &resume);
     assert!(error.contains("model.hash"), "{error}");
     fs::remove_file(at("my-bilinear.toml")).unwrap();
     fs::remove_file(at("out/my-map/model.toml")).unwrap();
     fs::remove_file(at("out/my-map/cells.csv")).unwrap();
-    rattlemap(folder.path(), &["check", "out/my-map"]).code(1);
-    rattlemap(folder.path(), &["check", "out/my-map", "--repair"]).code(0);
+    run(&folder, "check out/my-map").code(1);
+    run(&folder, "check out/my-map --repair").code(0);
     assert_eq!(fs::read_to_string(at("out/my-map/model.toml")).unwrap(), toml(0));
-    rattlemap(folder.path(), &["check", "out/my-map"]).code(0);
+    run(&folder, "check out/my-map").code(0);
 }
 
-/// The start has as many numbers as the model.
 #[test]
-fn a_start_has_the_models_components() {
+fn a_start_needs_as_many_numbers_as_the_models_state() {
     let start = |model: &str, start: &str| {
-        let run = rattlemap(Path::new("."), &["orbit", "--model", model, "--start", start, "--json"]);
+        let run = rattlemap(&empty()).args(["orbit", "--model", model, "--start", start, "--json"]).assert();
         let output = run.get_output();
         (output.status.code(), String::from_utf8(output.stderr.clone()).unwrap())
     };
@@ -193,15 +183,10 @@ fn a_start_has_the_models_components() {
     );
 }
 
-/// The defaults are fine, so the place is what was set.
 #[test]
-fn motion_that_is_set_out_of_its_limits_names_what_was_set() {
-    let folder = my_model();
-    let orbit = ["orbit", "--model", "my-bilinear.toml", "--set", "d=1", "--set", "k=-0.5"];
-    let run = rattlemap(folder.path(), &orbit).code(2);
-    let stderr = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+fn a_parameter_outside_its_limits_is_refused_with_the_set_arguments() {
     assert_eq!(
-        stderr,
+        refusal(&my_model(), "orbit --model my-bilinear.toml --set d=1 --set k=-0.5"),
         "error: --set d=1 --set k=-0.5: stiffness added in contact with the right wall = -0.5: it must be at least 0 \
          where the wall is elastic; change the parameters\n"
     );

@@ -1,34 +1,26 @@
-//! What `orbit --out` writes of a motion in time and by frequency.
+//! Tables of `orbit --out`: the trajectory and the spectrum.
 
 use std::fs;
-use std::path::Path;
 
-use assert_cmd::Command;
 use rattlemap::flow::Flow;
 use rattlemap::model::GearPair;
 use rattlemap::reference::Trajectory;
 
-use crate::common::rows;
-
-fn orbit(folder: &Path, arguments: &[&str]) {
-    let mut command = Command::cargo_bin("rattlemap").unwrap();
-    command.current_dir(folder).args(["orbit", "--out", "o", "--force"]).args(arguments).assert().code(0);
-}
+use crate::common::{empty, json, rows, run};
 
 fn numbers(row: &[String]) -> [f64; 8] {
     std::array::from_fn(|i| row[i].parse().unwrap())
 }
 
-/// Every event, where and when orbit.json has it, on its wall; samples on the flow, and the domain that events lead to.
+/// Events are those of orbit.json and lie on their walls; samples lie on the flow, in the domain after the last event.
 #[test]
-fn a_trajectory_has_its_events_and_what_lies_between() {
-    let folder = tempfile::tempdir().unwrap();
-    orbit(folder.path(), &["--set", "e=0.06"]);
-    let told: serde_json::Value =
-        serde_json::from_slice(&fs::read(folder.path().join("o/orbit.json")).unwrap()).unwrap();
+fn a_trajectory_contains_events_and_samples() {
+    let folder = empty();
+    run(&folder, "orbit --out o --set e=0.06").code(0);
+    let orbit = json(&folder.path().join("o/orbit.json"));
     let rows = rows(&folder.path().join("o/trajectory.csv")).1;
     let (events, samples): (Vec<_>, Vec<_>) = rows.iter().partition(|row| !row[9].is_empty());
-    let listed = told["events"].as_array().unwrap();
+    let listed = orbit["events"].as_array().unwrap();
     assert_eq!((events.len(), samples.len()), (2 * listed.len(), 2001));
     let list = |value: &serde_json::Value| -> Vec<f64> {
         value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
@@ -48,14 +40,14 @@ fn a_trajectory_has_its_events_and_what_lies_between() {
         };
         assert_eq!(pair[1][8], after);
     }
-    // Whatever lies between two events has the domain of the first.
+    // Samples between two events have the domain of the first.
     for pair in rows.windows(2).filter(|pair| pair[1][11] != "after") {
         assert_eq!(pair[0][8], pair[1][8], "{pair:?}");
         assert!(numbers(&pair[0])[0] <= numbers(&pair[1])[0]);
     }
     let pair = GearPair::paper(0.06);
     let flow = Flow::new(&pair.oscillator().unwrap());
-    let strobe: [f64; 4] = list(&told["strobe"]).try_into().unwrap();
+    let strobe: [f64; 4] = list(&orbit["strobe"]).try_into().unwrap();
     let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), strobe);
     for row in samples.iter().skip(1).step_by(77) {
         let [t, _, z, w, state @ ..] = numbers(row);
@@ -67,14 +59,13 @@ fn a_trajectory_has_its_events_and_what_lies_between() {
     }
 }
 
-/// Lines of a cycle of two forcing periods lie at halves; chaos has a table of its own kind, and both a figure.
+/// The lines of a cycle are multiples of one over its period; those of chaos of one over 128 periods.
 #[test]
-fn a_spectrum_has_the_lines_of_its_cycle() {
-    let folder = tempfile::tempdir().unwrap();
+fn a_spectrum_contains_the_lines_of_its_cycle() {
+    let folder = empty();
     let dir = folder.path().join("o");
-    orbit(folder.path(), &["--set", "e=0.62"]);
-    let told: serde_json::Value = serde_json::from_slice(&fs::read(dir.join("orbit.json")).unwrap()).unwrap();
-    let period = told["period"].as_f64();
+    run(&folder, "orbit --out o --set e=0.62").code(0);
+    let period = json(&dir.join("orbit.json"))["period"].as_f64();
     let lines = rows(&dir.join("spectrum.csv")).1;
     let frequency = |row: &[String]| row[0].parse::<f64>().unwrap();
     assert_eq!(1.0 / frequency(&lines[1]), period.unwrap_or(128.0));

@@ -1,4 +1,4 @@
-//! What the program makes of the machine that it is on.
+//! Machines without a display, or without the instructions that the program needs.
 
 use std::io::Write;
 use std::process::Command;
@@ -7,21 +7,21 @@ fn rattlemap() -> &'static str {
     env!("CARGO_BIN_EXE_rattlemap")
 }
 
-/// Mesa's drivers look for a screen; where there is none nobody is told.
+/// Mesa's drivers look for a display. The program keeps them from printing an error.
 #[test]
-fn nothing_is_said_of_screens_where_there_are_none() {
+fn a_missing_display_causes_no_message() {
     let mut command = Command::new(rattlemap());
     command.env_remove("XDG_RUNTIME_DIR").env_remove("WAYLAND_DISPLAY").arg("devices");
     let run = command.output().unwrap();
-    let [told, said] = [run.stdout, run.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
-    assert!(run.status.success() && told.contains("gpu: "), "{told}{said}");
-    assert_eq!(said, "");
+    let [stdout, stderr] = [run.stdout, run.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    assert!(run.status.success() && stdout.contains("gpu: "), "{stdout}{stderr}");
+    assert_eq!(stderr, "");
 }
 
-/// A processor of 2010, on which the first instruction that it lacks would end the process without a word.
+/// Emulates a processor of 2010. A missing instruction would end the process without a message.
 #[cfg(all(target_os = "linux", target_feature = "avx2"))]
 #[test]
-fn a_processor_without_the_instructions_is_told_of() {
+fn a_processor_without_the_instructions_gets_a_message() {
     let mut command = Command::new("qemu-x86_64");
     let Ok(run) = command.args(["-cpu", "Nehalem", rattlemap(), "models"]).output() else {
         let mut stderr = std::io::stderr();

@@ -1,4 +1,4 @@
-//! Text from outside never reaches the terminal raw, wherever it comes from.
+//! Text from outside is escaped before it reaches the terminal.
 
 use std::fs;
 use std::path::Path;
@@ -7,10 +7,10 @@ use assert_cmd::Command;
 use rattlemap::text::printable::is_printable;
 use tempfile::TempDir;
 
-/// Turns text red, sets a window's title, rings, turns the direction round, deletes.
+/// Control characters: colour, window title, bell, direction of text, deletion.
 const EVIL: &str = "a\u{1b}[31m\u{1b}]0;b\u{7}\u{9b}2J\u{202e}c\u{7f}\u{85}d";
 
-/// The same as a name of a file: some systems have no others than these.
+/// Control characters that all systems allow in names of files.
 const EVIL_NAME: &str = "a\u{1b}[31m\u{202e}\nfake line";
 
 const SCENE: &str = "[[axis]]\nparameter = 'e'\nmin = 0.5\nmax = 0.6\ncount = 2\n\n[[axis]]\nparameter = 'omega'\n\
@@ -33,7 +33,7 @@ impl Folder {
         fs::write(self.path().join(name), text).unwrap();
     }
 
-    /// Runs the program, which prints no character that a terminal does not show; what it says.
+    /// Runs the program, checks that it prints no control characters, and returns its output.
     #[track_caller]
     fn says(&self, code: i32, environment: &[(&str, &str)], arguments: &[&str]) -> String {
         let mut command = Command::cargo_bin("rattlemap").unwrap();
@@ -49,7 +49,7 @@ impl Folder {
     }
 }
 
-/// One line of an error, which quotes it.
+/// Checks that an output is one line, an error that quotes the control characters escaped.
 #[track_caller]
 fn quotes(said: &str) {
     assert_eq!(said.lines().count(), 1, "{said}");
@@ -57,7 +57,7 @@ fn quotes(said: &str) {
 }
 
 #[test]
-fn scenes_and_sets_are_quoted_without_controls() {
+fn scenes_and_sets_are_escaped() {
     let folder = Folder::new();
     let in_toml: String = EVIL.chars().map(|c| format!("\\U{:08X}", u32::from(c))).collect();
     for text in [
@@ -77,24 +77,24 @@ fn scenes_and_sets_are_quoted_without_controls() {
 
 #[cfg(unix)]
 #[test]
-fn names_of_files_and_folders_are_quoted_without_controls() {
+fn names_of_files_and_folders_are_escaped() {
     let folder = Folder::new();
     quotes(&folder.says(2, &[], &["map", EVIL_NAME]));
     quotes(&folder.says(2, &[], &["validate", EVIL_NAME]));
-    // A folder that is there, and what is said of it.
+    // A folder that exists.
     let map = ["map", "s.toml", "--engine", "cpu", "--out", EVIL_NAME];
     let done = folder.says(0, &[], &map);
     let last = done.lines().last().unwrap();
     assert!(last.starts_with("a\\u{1b}[31m\\u{202e}\\nfake line: ") && last.contains("cells.csv"), "{done}");
     quotes(&folder.says(2, &[], &map));
-    // No folder at all.
+    // A file in the place of a folder.
     folder.write("b\u{1b}", "");
     let said = folder.says(2, &[], &["map", "s.toml", "--engine", "cpu", "--out", "b\u{1b}"]);
     assert!(said.contains("b\\u{1b}") && said.lines().count() == 1, "{said}");
 }
 
 #[test]
-fn manifests_are_quoted_without_controls() {
+fn manifests_are_escaped() {
     let folder = Folder::new();
     folder.says(0, &[], &["map", "s.toml", "--engine", "cpu", "--out", "o", "--quiet"]);
     let manifest = fs::read_to_string(folder.path().join("o/manifest.json")).unwrap();
@@ -106,7 +106,7 @@ fn manifests_are_quoted_without_controls() {
         object[field] = serde_json::from_str(&evil).unwrap();
         folder.write("o/manifest.json", &object.to_string());
         let said = folder.says(code, &[], &["validate", "o"]);
-        // That the manifest is not what it was is told before.
+        // A warning that the manifest is damaged comes first.
         let error = said.lines().last().unwrap_or_default();
         assert!(error.starts_with("error: ") && said.lines().count() <= 2, "{field}: {said}");
     }
@@ -115,7 +115,7 @@ fn manifests_are_quoted_without_controls() {
 }
 
 #[test]
-fn arguments_and_the_environment_are_quoted_without_controls() {
+fn arguments_and_the_environment_are_escaped() {
     let folder = Folder::new();
     let evil = format!("{EVIL}\nfake line");
     for arguments in [
@@ -133,13 +133,12 @@ fn arguments_and_the_environment_are_quoted_without_controls() {
             "{said}"
         );
     }
-    // An adapter that was named is not replaced by another engine.
+    // If the environment names a missing adapter, `auto` fails.
     for (name, code) in [("WGPU_ADAPTER_NAME", 2), ("WGPU_BACKEND", 0)] {
         let said = folder.says(2, &[(name, &evil)], &["map", "s.toml", "--engine", "gpu"]);
         quotes(&said);
         folder.says(code, &[(name, &evil)], &["devices"]);
     }
-    // Help and version are the program's own.
     assert!(folder.says(0, &[], &["--help"]).contains("Usage: rattlemap"), "no help");
     let version = folder.says(0, &[], &["--version"]);
     assert!(version.starts_with(concat!("rattlemap ", env!("CARGO_PKG_VERSION"), " (")), "{version}");

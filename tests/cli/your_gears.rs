@@ -1,4 +1,4 @@
-//! The worked example of docs/your-gears.md: SI units, its scene, and what it says of the map.
+//! The example of docs/your-gears.md: SI units, the scene, and the classes that the page lists.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -14,7 +14,7 @@ fn toml() -> &'static str {
     block.split_once("```").expect("its end").0
 }
 
-/// The rows below a table's head.
+/// Rows of the table with this header.
 fn rows(head: &str) -> Vec<Vec<&'static str>> {
     let table = TEXT.split_once(head).unwrap_or_else(|| panic!("no table {head}")).1;
     let lines = table.lines().skip(2).take_while(|line| line.starts_with('|'));
@@ -23,7 +23,7 @@ fn rows(head: &str) -> Vec<Vec<&'static str>> {
 
 #[track_caller]
 fn close(name: &str, scene: f64, si: f64) {
-    // The scene's numbers are rounded to seven digits.
+    // The scene has seven digits.
     assert!((scene - si).abs() <= 1e-6 * si, "{name}: {scene} in the scene, {si} from SI units");
 }
 
@@ -54,7 +54,7 @@ fn the_scene_follows_from_si_units() {
     for (name, value) in expected {
         close(name, model.get(name).unwrap(), value);
     }
-    // Every parameter is checked or swept.
+    // No other parameter exists.
     assert_eq!(model.parameters().len(), expected.len() + scene.axes().len());
     let omega = |speed: f64| 2.0 * PI * si["z1"] * speed / 60.0 * time;
     close("omega", scene.axes()[1].min(), omega(si["n_min"]));
@@ -63,7 +63,7 @@ fn the_scene_follows_from_si_units() {
 }
 
 #[test]
-fn the_map_says_what_the_text_says() {
+fn the_map_has_the_classes_of_the_page() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("my-gears.toml"), toml()).unwrap();
     let run = Command::cargo_bin("rattlemap")
@@ -73,7 +73,7 @@ fn the_map_says_what_the_text_says() {
         .assert();
     run.code(0);
     let mut reader = csv::Reader::from_path(folder.path().join("out/my-gears/cells.csv")).unwrap();
-    // By rows of 100 per minute, from 1000 on.
+    // Classes by speed in 1/min.
     let mut column = BTreeMap::new();
     for cell in reader.deserialize() {
         let cell: BTreeMap<String, String> = cell.unwrap();
@@ -87,9 +87,9 @@ fn the_map_says_what_the_text_says() {
         }
     }
     assert_eq!(column.len(), 31);
-    let told = rows("| omega | n, 1/min | class |");
-    assert_eq!(told.len(), 5);
-    for row in told {
+    let listed = rows("| omega | n, 1/min | class |");
+    assert_eq!(listed.len(), 5);
+    for row in listed {
         let (omega, speed): (f64, u32) = (row[0].parse().unwrap(), row[1].parse().unwrap());
         assert_eq!((397.887 * omega).round() as u32, speed);
         assert_eq!(column[&speed], row[2], "at {speed} per minute");

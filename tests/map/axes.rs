@@ -2,7 +2,7 @@
 
 use rattlemap::findings::effect;
 use rattlemap::job;
-use rattlemap::job::run::Processor;
+use rattlemap::job::Processor;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Quantity, Scene, SceneBuilder};
 use rattlemap_dynamics::flow::Flow;

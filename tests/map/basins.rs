@@ -9,7 +9,7 @@ use crate::common::gpu;
 use rattlemap::findings::attractors::{self, Attractor, Basins, NONE};
 use rattlemap::gpu::Precision;
 use rattlemap::job;
-use rattlemap::job::run::Processor;
+use rattlemap::job::Processor;
 use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::random::Random;

@@ -1,7 +1,7 @@
 //! Maps of another model than the gear pair.
 
 use rattlemap::job;
-use rattlemap::job::run::Processor;
+use rattlemap::job::Processor;
 use rattlemap::map::scene::{Quantity, Scene, Start};
 use rattlemap::record::valid;
 use rattlemap_dynamics::model::Stops;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Context;
+use rattlemap::cli::failure::Failure;
 use rattlemap::cli::note;
-use rattlemap::job::error::Failure;
 use rattlemap::store::record_file::RECORDS;
 use rattlemap_bench::scale::{self, Ask, Size, Taken};
 use serde::Serialize;

@@ -10,8 +10,8 @@ use rattlemap_bench::stress::{self, Lanes, Part, Size, Verdict, Watch, output};
 
 use crate::arguments::Stress;
 use rattlemap::cli::Progress;
+use rattlemap::cli::failure::Failure;
 use rattlemap::cli::note;
-use rattlemap::job::error::Failure;
 
 /// Decides every random cell: whoever runs this meets the same ones.
 const SEED: u64 = 1;

@@ -10,7 +10,7 @@ use rattlemap_bench::work_precision::ratio::sentences;
 
 use crate::arguments::WorkPrecision;
 use rattlemap::cli::Progress;
-use rattlemap::job::error::{Failure, fail_if};
+use rattlemap::cli::failure::{Failure, fail_if};
 use rattlemap::job::processor::{cores, name};
 
 /// Cells of every kind.

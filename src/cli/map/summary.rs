@@ -1,49 +1,73 @@
-//! The lines printed when a map is done.
+//! Lines that are printed when a map or a shard is done.
 
-use crate::cli::say::quoted;
+use std::path::Path;
+
+use crate::cli::say::{path, quoted};
 use crate::map::engine::CardReport;
 use crate::map::plan::count_classes;
 use crate::map::schedule::{Deviation, Errors, Refined};
 use crate::show::cells::Cells;
-use crate::store;
+use crate::store::map::Run;
+use crate::store::shard::FinishedShard;
 
-/// What was done, how fast, and what came out.
-pub(super) fn summary(
-    cells: &Cells<'_>,
-    run: &store::map::Run<'_>,
-    lane_steps: Option<u64>,
-    seconds: f64,
-) -> String {
+/// Counts, speed and classes of a map. `finishing`: seconds from the last cell to the last file.
+pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, finishing: f64) -> String {
     let (count, [columns, rows]) = (cells.runs(), cells.counts());
     let unit = if count > columns * rows { "runs" } else { "cells" };
     let integrated = cells.refinement().map_or(count, |refined| refined.integrated);
-    let integrating = run.elapsed.as_secs_f64().max(1e-9);
+    let seconds = run.elapsed.as_secs_f64().max(1e-9);
     let here = (integrated - run.resumed_cells) as f64;
     let periods = cells.periods() as f64 * here / integrated as f64;
-    let [periodic, chaotic, undecided, failed] = count_classes(cells.classes());
-    let resumed = match run.resumed_cells {
-        0 => String::new(),
-        cells => format!(", {cells} of them kept before,"),
-    };
     let per_step = lane_steps.filter(|&steps| steps > 0).map_or(String::new(), |steps| {
-        format!(", {} ns per step", rounded(1e9 * integrating / steps as f64))
+        format!(", {} ns per step", three_digits(1e9 * seconds / steps as f64))
     });
-    let refined = cells.refinement().map_or(String::new(), |refined| refinement(refined, count));
-    let cards = by_card(&run.cards, unit);
     format!(
-        "{integrated} {unit}{resumed} in {integrating:.3} s on {} ({}): {:.0} {unit}/s, {:.0} forcing periods/s\
-         {per_step}; files written in {:.3} s\n{cards}{refined}\
-         {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
+        "{integrated} {unit}{} in {seconds:.3} s on {} ({}): {:.0} {unit}/s, {:.0} forcing periods/s{per_step}; files \
+         written in {finishing:.3} s\n{}{}{}",
+        resumed(run),
         run.made.engine,
         run.made.precision,
-        here / integrating,
-        periods / integrating,
-        seconds - integrating,
+        here / seconds,
+        periods / seconds,
+        cards(&run.cards, unit),
+        cells.refinement().map_or(String::new(), |refined| refinement(refined, count)),
+        classes(count_classes(cells.classes())),
     )
 }
 
-/// What each of several cards did, a line each.
-pub(super) fn by_card(cards: &[CardReport], unit: &str) -> String {
+/// Counts, speed and classes of a shard, its files, and how to go on.
+pub(super) fn shard(finished: &FinishedShard<'_>, folder: &Path, files: &[String]) -> String {
+    let FinishedShard { shard, plan, run, tally, .. } = finished;
+    let (count, unit, seconds) = (shard.run_count(plan), plan.unit(), run.elapsed.as_secs_f64().max(1e-9));
+    format!(
+        "shard {shard}: {count} of {} {unit}{} in {seconds:.3} s on {} ({}): {:.0} {unit}/s\n{}{}\n{}: {}; \
+         `rattlemap merge OUT PART...` makes the map of all {} shards",
+        plan.run_count(),
+        resumed(run),
+        run.made.engine,
+        run.made.precision,
+        (count - run.resumed_cells) as f64 / seconds,
+        cards(&run.cards, unit),
+        classes(tally.classes),
+        path(folder),
+        files.join(", "),
+        shard.count()
+    )
+}
+
+fn resumed(run: &Run<'_>) -> String {
+    match run.resumed_cells {
+        0 => String::new(),
+        cells => format!(", {cells} of them by earlier runs,"),
+    }
+}
+
+fn classes([periodic, chaotic, undecided, failed]: [usize; 4]) -> String {
+    format!("{periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed")
+}
+
+/// One line per card, if there are several.
+fn cards(cards: &[CardReport], unit: &str) -> String {
     let line = |CardReport { adapter, cells, lost }: &CardReport| {
         let lost = lost.as_ref().map_or(String::new(), |reason| format!(", then lost: {reason}"));
         quoted(format_args!("  adapter {adapter}: {cells} {unit}{lost}")) + "\n"
@@ -51,13 +75,12 @@ pub(super) fn by_card(cards: &[CardReport], unit: &str) -> String {
     cards.iter().map(line).collect()
 }
 
-/// Three significant digits.
-fn rounded(x: f64) -> String {
+fn three_digits(x: f64) -> String {
     let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{x:.digits$}")
 }
 
-/// A difference in few digits.
+/// Formats a difference with few digits.
 fn short(x: f64) -> String {
     if x == 0.0 || (1e-3..1e3).contains(&x) {
         format!("{}", (x * 1e4).round() / 1e4)
@@ -66,41 +89,43 @@ fn short(x: f64) -> String {
     }
 }
 
-/// How much an adaptive map left out, and what the audit says of it.
+/// Share of integrated cells of an adaptive map, and the result of its audit.
 fn refinement(refined: &Refined, count: usize) -> String {
     let share = 100.0 * refined.integrated as f64 / count as f64;
     let audit = refined.audits.last().map_or(String::new(), |audit| {
         let [low, high] = audit.interval().map(|rate| 100.0 * rate);
         let (wrong, sampled, rate) = (audit.wrong, audit.sampled, 100.0 * audit.rate());
-        let spelled = |wrong: usize, filled: usize, what: &str| match filled {
+        let words = |wrong: usize, filled: usize, what: &str| match filled {
             0 => String::new(),
             _ => format!(", {wrong} of {filled} filled {what}"),
         };
-        let words = spelled(audit.wrong_words, audit.words, "words")
-            + &spelled(audit.wrong_patterns, audit.patterns, "patterns");
-        let failed = if audit.rate() > refined.max_error {
+        let words = words(audit.wrong_words, audit.words, "words")
+            + &words(audit.wrong_patterns, audit.patterns, "patterns");
+        let exceeds = if audit.rate() > refined.max_error {
             let allowed = 100.0 * refined.max_error;
-            format!(", more than the {allowed:.2} % of refine.max_error, but refine.rounds lets no block be halved again")
+            format!(
+                ", more than refine.max_error allows ({allowed:.2} %): refine.rounds ended the refinement before it was reached"
+            )
         } else {
             String::new()
         };
         format!(
-            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}{failed}{}",
+            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}{exceeds}{}",
             errors(&audit.errors)
         )
     });
     format!("{share:.1} % of {count} cells integrated, the others filled{audit}\n")
 }
 
-/// By how much filled values are off, a line for each quantity.
+/// One line per quantity: how far filled values differ from integrated ones.
 fn errors(errors: &Errors) -> String {
     let line = |name: &str, deviation: Option<Deviation>, share: fn(&Deviation) -> String| {
         let Some(deviation) = deviation else { return String::new() };
         let Deviation { compared, empty, median, p95, worst, .. } = deviation;
-        let left = if empty > 0 { format!(", {empty} left empty") } else { String::new() };
+        let empty = if empty > 0 { format!(", {empty} left empty") } else { String::new() };
         let share = share(&deviation);
         format!(
-            "\n{name} of {compared} filled cells{left}: off by {} in the median, {} at 95 %, {} at worst{share}",
+            "\n{name} of {compared} filled cells{empty}: the error is {} in the median, {} at 95 %, {} at most{share}",
             short(median),
             short(p95),
             short(worst)
@@ -109,7 +134,7 @@ fn errors(errors: &Errors) -> String {
     let off_by_one = |impacts: &Deviation| {
         let (off, rate) = (impacts.off_by_one, 100.0 * impacts.off_by_one_rate());
         let [low, high] = impacts.off_by_one_interval().map(|rate| 100.0 * rate);
-        format!("; by 1 or more in {off}, {rate:.2} % (95 %: {low:.2} to {high:.2} %)")
+        format!("; 1 or more in {off} cells, {rate:.2} % (95 %: {low:.2} to {high:.2} %)")
     };
     [
         line("exponent", errors.lyapunov, |_| String::new()),

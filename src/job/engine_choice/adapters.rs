@@ -1,4 +1,4 @@
-//! Which adapters a map takes, by what was asked for and what there is.
+//! Selects the graphics adapters that compute a map.
 
 use std::convert::Infallible;
 use std::fmt;
@@ -8,132 +8,136 @@ use thiserror::Error;
 
 use crate::gpu::{self, AdapterChoice, AdapterReport, GpuError, Precision};
 
-/// The adapter that somebody asks for, in the place of the one that the environment names or of the best.
+/// A request for a graphics adapter. It takes precedence over the environment.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Wanted {
-    /// By its number, [`AdapterReport::number`].
+pub enum AdapterRequest {
+    /// The adapter with this number, see [`AdapterReport::number`].
     Number(usize),
-    /// By a part of its name, driver or PCI address that no other has, in any case of letters.
+    /// The only adapter whose name, driver or PCI address contains this text; case is ignored.
     Named(String),
-    /// All that are equal to the one that would be taken if none were asked for.
+    /// All adapters of the model and driver that would be selected without a request.
     All,
 }
 
-impl FromStr for Wanted {
+impl FromStr for AdapterRequest {
     type Err = Infallible;
 
-    fn from_str(text: &str) -> Result<Wanted, Infallible> {
+    fn from_str(text: &str) -> Result<AdapterRequest, Infallible> {
         Ok(match (text, text.parse()) {
-            ("all", _) => Wanted::All,
-            (_, Ok(number)) => Wanted::Number(number),
-            (name, Err(_)) => Wanted::Named(name.to_owned()),
+            ("all", _) => AdapterRequest::All,
+            (_, Ok(number)) => AdapterRequest::Number(number),
+            (name, Err(_)) => AdapterRequest::Named(name.to_owned()),
         })
     }
 }
 
-impl fmt::Display for Wanted {
+impl fmt::Display for AdapterRequest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Wanted::Number(number) => write!(f, "{number}"),
-            Wanted::Named(name) => f.write_str(name),
-            Wanted::All => f.write_str("all"),
+            AdapterRequest::Number(number) => write!(f, "{number}"),
+            AdapterRequest::Named(name) => f.write_str(name),
+            AdapterRequest::All => f.write_str("all"),
         }
     }
 }
 
-/// Adapters to open.
+/// Selected adapters.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Taken {
-    /// By number, one at least.
+pub(crate) struct Selection {
+    /// Their numbers; at least one.
     pub(crate) numbers: Vec<usize>,
-    /// Why others are left out, where all are asked for.
+    /// One line for each adapter that [`AdapterRequest::All`] does not include, with the reason.
     pub(crate) left_out: Vec<String>,
 }
 
-/// Why no adapter is taken.
+/// An error in selecting an adapter.
 #[derive(Debug, Error)]
 pub enum AdapterError {
     /// No adapter has this number.
-    #[error("--adapter {number}: no adapter has this number; there are: {list}")]
+    #[error("--adapter {number}: no adapter has this number; the adapters are: {list}")]
     NoSuchNumber {
         /// The number.
         number: usize,
-        /// Numbers and names of those that there are.
+        /// Numbers and names of all adapters.
         list: String,
     },
-    /// No adapter is called so.
-    #[error("--adapter {name}: no adapter's name, driver or PCI address has this part; there are: {list}")]
+    /// No adapter contains this text.
+    #[error(
+        "--adapter {name}: no adapter's name, driver or PCI address contains this text; the adapters are: {list}"
+    )]
     NoneCalled {
-        /// The part.
+        /// The text.
         name: String,
-        /// Numbers and names of those that there are.
+        /// Numbers and names of all adapters.
         list: String,
     },
-    /// Several adapters are called so.
-    #[error("--adapter {name}: more than one adapter has this part in its name; give a number: {list}")]
+    /// Several adapters contain this text.
+    #[error("--adapter {name}: more than one adapter contains this text; give a number: {list}")]
     Ambiguous {
-        /// The part.
+        /// The text.
         name: String,
-        /// Numbers and names of those that have it.
+        /// Numbers and names of the adapters that contain it.
         list: String,
     },
-    /// The adapter that was asked for lacks the precision.
-    #[error("adapter {adapter} has no {precision}; choose {remedies}")]
+    /// The requested adapter lacks the precision.
+    #[error("adapter {adapter} has no {precision}; give {remedies}")]
     Lacks {
         /// Its number and name.
         adapter: String,
-        /// What it lacks.
+        /// The precision.
         precision: &'static str,
-        /// What else may be asked for.
+        /// Requests that would succeed.
         remedies: String,
     },
-    /// Hardware is there, and none of it has the precision. A software driver is no stand-in that is taken in silence: it
-    /// may be slower by orders of magnitude.
-    #[error("no graphics card here has {precision}: {cards}; choose {remedies}")]
+    /// No hardware adapter has the precision. A software driver is not used instead without a request: it may be slower by
+    /// orders of magnitude.
+    #[error("no graphics card has {precision} ({cards}); give {remedies}")]
     NoCardHas {
-        /// What they lack.
+        /// The precision.
         precision: &'static str,
-        /// Numbers and names of the cards.
+        /// Numbers and names of the hardware adapters.
         cards: String,
-        /// What else may be asked for.
+        /// Requests that would succeed.
         remedies: String,
     },
-    /// There is none.
+    /// There is no adapter.
     #[error(transparent)]
     None(GpuError),
 }
 
-/// The adapters that somebody `wanted`; the best that the `environment` allows if nobody did.
+/// Selects the requested adapters, or without a request the best adapter that the environment allows.
 ///
 /// # Errors
 /// [`AdapterError`].
-pub(crate) fn take(
+pub(crate) fn select(
     all: &[AdapterReport],
-    wanted: Option<&Wanted>,
+    request: Option<&AdapterRequest>,
     environment: &AdapterChoice,
     precision: Precision,
-) -> Result<Taken, AdapterError> {
-    let only = |number| Taken { numbers: vec![number], left_out: Vec::new() };
-    match wanted {
+) -> Result<Selection, AdapterError> {
+    let only = |number| Selection { numbers: vec![number], left_out: Vec::new() };
+    match request {
         None => best(all, environment, precision).map(|best| only(best.number)),
-        Some(Wanted::All) => best(all, environment, precision).map(|best| equal_to(best, all)),
-        Some(Wanted::Number(number)) => {
+        Some(AdapterRequest::All) => best(all, environment, precision).map(|best| equal_to(best, all)),
+        Some(AdapterRequest::Number(number)) => {
             with(precision, numbered(*number, all)?, all).map(|found| only(found.number))
         }
-        Some(Wanted::Named(name)) => with(precision, called(name, all)?, all).map(|found| only(found.number)),
+        Some(AdapterRequest::Named(name)) => {
+            with(precision, called(name, all)?, all).map(|found| only(found.number))
+        }
     }
 }
 
-impl Wanted {
-    /// Those of a machine's adapters that are asked for, whatever they can do.
+impl AdapterRequest {
+    /// Returns the adapters of the list that match the request, whatever their precisions.
     ///
     /// # Errors
-    /// [`AdapterError`] if there is no such adapter, or a name that one alone should have is that of several.
+    /// [`AdapterError`] if no adapter matches, or if several match a name.
     pub fn among<'a>(&self, all: &'a [AdapterReport]) -> Result<&'a [AdapterReport], AdapterError> {
         match self {
-            Wanted::Number(number) => numbered(*number, all).map(std::slice::from_ref),
-            Wanted::Named(name) => called(name, all).map(std::slice::from_ref),
-            Wanted::All => Ok(all),
+            AdapterRequest::Number(number) => numbered(*number, all).map(std::slice::from_ref),
+            AdapterRequest::Named(name) => called(name, all).map(std::slice::from_ref),
+            AdapterRequest::All => Ok(all),
         }
     }
 }
@@ -143,7 +147,8 @@ fn numbered(number: usize, all: &[AdapterReport]) -> Result<&AdapterReport, Adap
     found.ok_or_else(|| AdapterError::NoSuchNumber { number, list: listed(all) })
 }
 
-/// The first that is allowed and has the precision, but no software driver beside hardware.
+/// Returns the first adapter that the environment allows and that has the precision. A software driver is returned only
+/// where no hardware adapter is allowed.
 fn best<'a>(
     all: &'a [AdapterReport],
     environment: &AdapterChoice,
@@ -165,7 +170,7 @@ fn best<'a>(
     }
 }
 
-/// The one whose name has this part. A card that several interfaces lead to is taken by the best of them.
+/// Returns the adapter that contains this text. If a card is listed by several interfaces, the first and best one counts.
 fn called<'a>(name: &str, all: &'a [AdapterReport]) -> Result<&'a AdapterReport, AdapterError> {
     let part = name.to_lowercase();
     let has = |adapter: &&AdapterReport| {
@@ -180,7 +185,7 @@ fn called<'a>(name: &str, all: &'a [AdapterReport]) -> Result<&'a AdapterReport,
     }
 }
 
-/// An adapter that was asked for, if it has the precision.
+/// Returns the adapter if it has the precision.
 fn with<'a>(
     precision: Precision,
     found: &'a AdapterReport,
@@ -196,18 +201,18 @@ fn with<'a>(
     })
 }
 
-/// All adapters of one model, by one interface and driver: their records are the same to the bit.
-fn equal_to(first: &AdapterReport, all: &[AdapterReport]) -> Taken {
+/// Selects all adapters of the model, interface and driver of the first one. Their records are identical.
+fn equal_to(first: &AdapterReport, all: &[AdapterReport]) -> Selection {
     let model =
         |adapter: &AdapterReport| (adapter.info.vendor, adapter.info.device, gpu::describe(&adapter.info));
-    let mut taken = vec![first];
+    let mut selected = vec![first];
     let mut left_out = Vec::new();
     for adapter in all {
-        if taken.iter().any(|taken| taken.number == adapter.number || is_same_card(taken, adapter)) {
+        if selected.iter().any(|one| one.number == adapter.number || is_same_card(one, adapter)) {
             continue;
         }
         if model(adapter) == model(first) {
-            taken.push(adapter);
+            selected.push(adapter);
             continue;
         }
         let why = match (is_hardware(first), is_hardware(adapter)) {
@@ -217,17 +222,17 @@ fn equal_to(first: &AdapterReport, all: &[AdapterReport]) -> Taken {
         };
         left_out.push(format!("adapter {} is left out: {why}", adapter.id()));
     }
-    Taken { numbers: taken.iter().map(|adapter| adapter.number).collect(), left_out }
+    Selection { numbers: selected.iter().map(|adapter| adapter.number).collect(), left_out }
 }
 
-/// Whether two adapters are one card: by two interfaces (some of which do not tell the model), or listed twice.
+/// Whether two adapters are one card, listed by two interfaces (some of which do not report the model) or twice by one.
 fn is_same_card(one: &AdapterReport, other: &AdapterReport) -> bool {
     let (one, other) = (&one.info, &other.info);
     if one.backend != other.backend {
         return one.vendor == other.vendor
             && (one.device == other.device || one.device.min(other.device) == 0);
     }
-    // By other interfaces equal cards have one address, too.
+    // Interfaces other than Vulkan report one address for several equal cards.
     let has_address = one.backend == wgpu::Backend::Vulkan && !one.device_pci_bus_id.is_empty();
     has_address && one.device_pci_bus_id == other.device_pci_bus_id
 }
@@ -236,7 +241,7 @@ fn is_hardware(adapter: &AdapterReport) -> bool {
     gpu::is_hardware(&adapter.info)
 }
 
-/// What to ask for instead of a precision that is lacking.
+/// Lists the requests that would succeed where a precision is missing.
 fn remedies(precision: Precision, all: &[AdapterReport]) -> String {
     let mut list = match precision {
         Precision::F64 => {
@@ -253,7 +258,7 @@ fn remedies(precision: Precision, all: &[AdapterReport]) -> String {
     if list.is_empty() { last } else { format!("{} or {last}", list.join(", ")) }
 }
 
-/// Numbers and names.
+/// Returns numbers and names, separated by commas.
 fn listed<'a>(adapters: impl IntoIterator<Item = &'a AdapterReport>) -> String {
     let list: Vec<String> = adapters.into_iter().map(|adapter| adapter.id().to_string()).collect();
     if list.is_empty() { "none".to_owned() } else { list.join(", ") }
@@ -266,7 +271,7 @@ mod tests {
     const BOTH: &[Precision] = &[Precision::F32, Precision::F64];
     const SINGLE: &[Precision] = &[Precision::F32];
 
-    /// Adapters of a machine: name, model, kind, interface, address, precisions.
+    /// One adapter: name, model, kind, interface, address, precisions.
     type Row = (&'static str, u32, wgpu::DeviceType, wgpu::Backend, &'static str, &'static [Precision]);
 
     const SOFTWARE: Row = ("llvmpipe", 0, wgpu::DeviceType::Cpu, wgpu::Backend::Vulkan, "", BOTH);
@@ -295,75 +300,79 @@ mod tests {
         rows.iter().enumerate().map(report).collect()
     }
 
-    fn taken(rows: &[Row], wanted: &str, environment: &str, precision: Precision) -> Result<Taken, String> {
-        let wanted = (!wanted.is_empty()).then(|| wanted.parse().unwrap());
+    fn selected(
+        rows: &[Row],
+        request: &str,
+        environment: &str,
+        precision: Precision,
+    ) -> Result<Selection, String> {
+        let request = (!request.is_empty()).then(|| request.parse().unwrap());
         let environment = match environment {
             "" => AdapterChoice::default(),
             name => AdapterChoice::named(name),
         };
-        take(&machine(rows), wanted.as_ref(), &environment, precision).map_err(|error| error.to_string())
+        select(&machine(rows), request.as_ref(), &environment, precision).map_err(|error| error.to_string())
     }
 
-    fn number(rows: &[Row], wanted: &str, environment: &str, precision: Precision) -> Result<usize, String> {
-        taken(rows, wanted, environment, precision).map(|taken| taken.numbers[0])
+    fn number(rows: &[Row], request: &str, environment: &str, precision: Precision) -> Result<usize, String> {
+        selected(rows, request, environment, precision).map(|selection| selection.numbers[0])
     }
 
     #[test]
-    fn a_software_driver_stands_in_for_no_card_in_silence() {
+    fn a_software_driver_beside_hardware_is_used_only_by_request() {
         let (here, double) = ([INTEL, SOFTWARE], Precision::F64);
         let error = number(&here, "", "", double).unwrap_err();
         assert_eq!(
             error,
-            "no graphics card here has f64: 0 (Arc A770, PCI 0000:03:00.0); choose --engine cpu, which computes in \
-             f64, --precision f32 or --adapter 1 (llvmpipe, a software driver)"
+            "no graphics card has f64 (0 (Arc A770, PCI 0000:03:00.0)); give --engine cpu, which computes in f64, --precision f32 or --adapter 1 (llvmpipe, a software driver)"
         );
-        // Without a driver that has it, too.
+        // The message is the same without a software driver.
         let error = number(&[INTEL], "", "", double).unwrap_err();
-        assert!(error.ends_with("choose --engine cpu, which computes in f64 or --precision f32"), "{error}");
-        // What is named is taken, and where there is no card there is nothing to be silent about.
+        assert!(error.ends_with("give --engine cpu, which computes in f64 or --precision f32"), "{error}");
+        // A software driver is used by name, and where there is no card.
         assert_eq!(number(&here, "1", "", double), Ok(1));
         assert_eq!(number(&here, "LLVM", "", double), Ok(1));
         assert_eq!(number(&here, "", "llvmpipe", double), Ok(1));
         assert_eq!(number(&[SOFTWARE], "", "", double), Ok(0));
-        // A name that a card has, too, names no software driver.
-        assert!(number(&here, "", "vulkan", double).unwrap_err().contains("no graphics card here"));
-        // Another card may have it.
+        // A name in the environment that also matches a card does not select the software driver.
+        assert!(number(&here, "", "vulkan", double).unwrap_err().contains("no graphics card has"));
+        // Another card has the precision.
         assert_eq!(number(&[INTEL, big("a"), SOFTWARE], "", "", double), Ok(1));
         assert_eq!(number(&here, "", "", Precision::F32), Ok(0));
         let error = number(&here, "0", "", double).unwrap_err();
-        assert!(error.starts_with("adapter 0 (Arc A770, PCI 0000:03:00.0) has no f64; choose "), "{error}");
+        assert!(error.starts_with("adapter 0 (Arc A770, PCI 0000:03:00.0) has no f64; give "), "{error}");
         let error = number(&here, "", "nothing", double).unwrap_err();
         assert!(error.starts_with("no graphics adapter called nothing with double"), "{error}");
     }
 
     #[test]
-    fn an_adapter_is_named_by_what_it_alone_has() {
+    fn a_name_must_match_one_adapter_only() {
         let here = [big("0000:17:00.0"), big("0000:65:00.0"), INTEL, SOFTWARE];
         let single = Precision::F32;
         assert_eq!(number(&here, "3", "", single), Ok(3));
         assert_eq!(number(&here, "arc", "", single), Ok(2));
-        assert_eq!(number(&here, "65:00.0", "", single), Ok(1), "a part of the address is no number");
-        // It goes before the environment.
+        assert_eq!(number(&here, "65:00.0", "", single), Ok(1), "a part of the address is not a number");
+        // The request takes precedence over the environment.
         assert_eq!(number(&here, "arc", "llvmpipe", single), Ok(2));
         let error = number(&here, "RTX", "", single).unwrap_err();
         assert!(error.contains("give a number: 0 (RTX 4090, PCI 0000:17:00.0), 1 (RTX 4090"), "{error}");
         let error = number(&here, "4", "", single).unwrap_err();
-        assert!(error.contains("no adapter has this number; there are: 0 (RTX 4090"), "{error}");
+        assert!(error.contains("no adapter has this number; the adapters are: 0 (RTX 4090"), "{error}");
         let error = number(&here, "radeon", "", single).unwrap_err();
-        assert!(error.contains("has this part; there are: 0 (RTX 4090"), "{error}");
-        assert!(number(&[], "0", "", single).unwrap_err().ends_with("there are: none"));
-        // One card by two interfaces is one card.
+        assert!(error.contains("contains this text; the adapters are: 0 (RTX 4090"), "{error}");
+        assert!(number(&[], "0", "", single).unwrap_err().ends_with("the adapters are: none"));
+        // A card that two interfaces list counts once.
         let second = (INTEL.0, INTEL.1, INTEL.2, wgpu::Backend::Dx12, "", SINGLE);
         assert_eq!(number(&[INTEL, second], "arc", "", single), Ok(0));
         assert_eq!(number(&[INTEL, second], "dx12", "", single), Ok(1));
     }
 
     #[test]
-    fn all_are_those_that_are_equal_to_the_first() {
+    fn all_selects_adapters_equal_to_the_first() {
         let other_interface = (INTEL.0, 7, INTEL.2, wgpu::Backend::Dx12, "", SINGLE);
         let twice = big("0000:17:00.0");
         let here = [big("0000:17:00.0"), twice, big("0000:65:00.0"), INTEL, other_interface, SOFTWARE];
-        let all = taken(&here, "all", "", Precision::F64).unwrap();
+        let all = selected(&here, "all", "", Precision::F64).unwrap();
         assert_eq!(all.numbers, [0, 2]);
         assert_eq!(
             all.left_out,
@@ -372,18 +381,18 @@ mod tests {
                 "adapter 5 (llvmpipe) is left out: it is a software driver"
             ]
         );
-        // The environment says which is the first.
-        assert_eq!(taken(&here, "all", "arc", Precision::F32).unwrap().numbers, [3]);
+        // The environment determines the first adapter.
+        assert_eq!(selected(&here, "all", "arc", Precision::F32).unwrap().numbers, [3]);
         // Software drivers have no address.
-        assert_eq!(taken(&[SOFTWARE, SOFTWARE], "all", "", Precision::F32).unwrap().numbers, [0, 1]);
-        assert!(taken(&[INTEL, SOFTWARE], "all", "", Precision::F64).is_err());
+        assert_eq!(selected(&[SOFTWARE, SOFTWARE], "all", "", Precision::F32).unwrap().numbers, [0, 1]);
+        assert!(selected(&[INTEL, SOFTWARE], "all", "", Precision::F64).is_err());
     }
 
     #[test]
-    fn what_is_asked_for_is_written_as_it_is_read() {
+    fn requests_survive_writing_and_reading() {
         for text in ["all", "12", "RTX 4090", "0000:65:00.0", "-1"] {
-            assert_eq!(text.parse::<Wanted>().unwrap().to_string(), text);
+            assert_eq!(text.parse::<AdapterRequest>().unwrap().to_string(), text);
         }
-        assert_eq!("007".parse(), Ok(Wanted::Number(7)));
+        assert_eq!("007".parse(), Ok(AdapterRequest::Number(7)));
     }
 }

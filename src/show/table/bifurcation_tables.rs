@@ -2,13 +2,11 @@
 
 use std::io;
 
-use crate::map::bifurcation::{Column, Direction, SectionPoint};
+use crate::map::bifurcation::{Column, SectionPoint};
 use crate::record::Spelling;
 use crate::show::error::WriteError;
 use crate::show::names::{self, float, optional};
-use crate::show::table::cell_columns::Values;
 use rattlemap_dynamics::model::State;
-use rattlemap_dynamics::orbit::EventKind;
 use rattlemap_dynamics::word::Word;
 
 /// Columns of a point before its states.
@@ -28,9 +26,6 @@ const COLUMN_FIELDS: [&str; 11] = [
     "status",
     "periods_run",
 ];
-
-/// Kinds of points. Their positions are their codes.
-const KINDS: [EventKind; 3] = [EventKind::Impact, EventKind::MeshStart, EventKind::MeshEnd];
 
 /// Writes `bifurcation.csv`: the section points, with the states before and after the event.
 pub fn write_points(
@@ -113,39 +108,6 @@ pub fn write_columns(out: impl io::Write, axis: &str, columns: &[Column]) -> Res
     Ok(table.flush()?)
 }
 
-/// Returns the section points by column, without class, period and status. Values of the axis without points are left out.
-/// Kinds and directions are codes; see [`point_codes`].
-pub fn points(axis: &str, names: &[&str], columns: &[Column]) -> Vec<(String, Values)> {
-    let all = || columns.iter().flat_map(|column| column.points.iter().map(move |point| (column, point)));
-    let floats = |of: &dyn Fn(&Column, &SectionPoint) -> f64| {
-        let finite = |x: f64| if x.is_finite() { x } else { f64::NAN };
-        Values::F64(all().map(|(column, point)| finite(of(column, point))).collect())
-    };
-    let codes = |of: &dyn Fn(&Column, &SectionPoint) -> i8| {
-        Values::I8(all().map(|(column, point)| of(column, point)).collect())
-    };
-    let direction = |column: &Column| Direction::BOTH.iter().position(|way| Some(*way) == column.direction);
-    let kind = |point: &SectionPoint| KINDS.iter().position(|kind| *kind == point.kind).unwrap_or_default();
-    let mut list = vec![(axis.to_owned(), floats(&|column, _| column.value))];
-    list.extend(
-        direction_field(columns)
-            .map(|name| (name.to_owned(), codes(&|column, _| direction(column).unwrap_or_default() as i8))),
-    );
-    let [side, kinds, time] = POINT_FIELDS.map(str::to_owned);
-    list.push((side, codes(&|_, point| names::side_code(point.side))));
-    list.push((kinds, codes(&|_, point| kind(point) as i8)));
-    list.push((time, floats(&|_, point| point.t_mod_period)));
-    let before = (0..names.len()).map(|i| floats(&|_, point| point.before[i]));
-    let after = (0..names.len()).map(|i| floats(&|_, point| point.after[i]));
-    list.extend(state_fields(names).zip(before.chain(after)));
-    list
-}
-
-/// Returns the names of kinds and directions, by code.
-pub fn point_codes() -> [Vec<&'static str>; 2] {
-    [KINDS.map(names::kind).to_vec(), Direction::BOTH.map(Direction::name).to_vec()]
-}
-
 /// Returns the name of the column of directions, which only diagrams with both passes have.
 fn direction_field(columns: &[Column]) -> Option<&'static str> {
     columns.iter().any(|column| column.direction.is_some()).then_some("direction")
@@ -174,8 +136,9 @@ fn spelling(word: Option<&Word>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::bifurcation::Direction;
     use rattlemap_dynamics::model::Side;
-    use rattlemap_dynamics::orbit::{Class, Status};
+    use rattlemap_dynamics::orbit::{Class, EventKind, Status};
 
     fn text(write: impl FnOnce(&mut Vec<u8>) -> Result<(), WriteError>) -> String {
         let mut bytes = Vec::new();

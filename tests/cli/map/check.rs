@@ -61,7 +61,7 @@ fn every_damaged_file_of_a_map_is_named_and_repaired() {
             continue;
         }
         fs::write(out.join(name), &bytes[1..]).unwrap();
-        succeeds(&folder, "check out/s --repair").stderr(says(&[&format!("{name} is made anew")]));
+        succeeds(&folder, "check out/s --repair").stderr(says(&[&format!("{name} was made again")]));
         assert!(files(&out) == good, "{name}");
         is_good(&folder, "out/s");
     }
@@ -82,7 +82,7 @@ fn damaged_records_are_repaired_by_resuming() {
     let bad = fs::read(&records).unwrap();
     fs::remove_file(out.join("cells.csv")).unwrap();
     let resume = format!("`rattlemap map SCENE --out out/s {FEW} --resume`");
-    let nothing = "records.bin is damaged or missing, and nothing can be made of it";
+    let nothing = "records.bin is damaged or missing, and cannot be made from other files";
     fails(&folder, "check out/s --repair", 1, &["cells.csv is missing", nothing, &resume]);
     assert!(!out.join("cells.csv").exists() && fs::read(&records).unwrap() == bad);
     map(&folder, &format!("{FEW} --quiet --out out/s --resume")).success();
@@ -118,7 +118,7 @@ fn the_files_of_a_validation_are_checked() {
     succeeds(&folder, "check out/s --repair --quiet");
     assert!(files(&out) == good);
     fs::remove_file(out.join("validation.json")).unwrap();
-    let anew = "`rattlemap validate` makes validation.json and its section of the report anew";
+    let anew = "`rattlemap validate` makes validation.json and its section of the report again";
     fails(&folder, "check out/s --repair", 1, &[anew]);
     // A validation reports damage to other files.
     fs::write(out.join("cells.npy"), "").unwrap();

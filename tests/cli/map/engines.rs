@@ -68,7 +68,7 @@ fn devices_says_what_there_is_and_what_auto_takes() {
     ]));
     let hardware = || says(&["a hardware GPU"]);
     let run = map(&folder, "--engine auto --out few");
-    run.success().stderr(says(&["cpu (f64): no hardware GPU, and soon done: "]).or(hardware()));
+    run.success().stderr(says(&["cpu (f64): no hardware GPU; using the processor"]).or(hardware()));
 }
 
 /// The manifest has both the requested number and the numbers in use.

@@ -61,7 +61,7 @@ fn incomplete_files_are_resumed_to_the_same_bytes() {
     // A finished run only writes its files again.
     fs::remove_file(cut.join("map.png")).unwrap();
     let run = map(&folder, "--out cut --resume").success();
-    run.stderr(says(&["320 cells, 320 of them kept before, in "]));
+    run.stderr(says(&["320 cells, 320 of them by earlier runs, in "]));
     assert!(bytes(&cut) == expected);
 }
 
@@ -206,7 +206,7 @@ fn resuming_without_records_begins_the_map() {
     let folder = folder();
     let resume = || {
         let run = map(&folder, &format!("{FEW} --resume")).success();
-        let begins = "out/s: nothing was kept there yet; the map is begun anew";
+        let begins = "out/s: no records are stored there; the map starts anew";
         run.stderr(says(&[begins, "12 of 12 cells"]));
     };
     resume();

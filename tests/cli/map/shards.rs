@@ -76,7 +76,7 @@ fn shards_make_the_map_of_one_run() {
     {
         succeeds(&folder, line);
     }
-    map(&folder, "--out merged --resume").success().stderr(says(&["320 cells, 320 of them kept before"]));
+    map(&folder, "--out merged --resume").success().stderr(says(&["320 cells, 320 of them by earlier runs"]));
     assert_same(&folder);
 }
 
@@ -276,7 +276,7 @@ fn resuming_a_finished_shard_changes_nothing() {
     let folder = folder();
     let resume = format!("{SMALL} --shard 2/3 --resume");
     let again = |parts: &[&str]| map(&folder, &resume).success().stderr(says(parts));
-    again(&["nothing was kept there yet", "shard 2/3: 8 of 24 cells in "]);
+    again(&["no records are stored there", "shard 2/3: 8 of 24 cells in "]);
     let dir = "out/s.shard-2-of-3";
     let out = path(&folder, dir);
     let (file, records) = (out.join("manifest.json"), out.join("records.bin"));

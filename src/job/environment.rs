@@ -1,20 +1,19 @@
-//! What the program's own environment lacks, before anything runs.
+//! Variables that the program sets in its own environment.
 
 use std::ffi::OsString;
 use std::path::Path;
 
-/// Where Wayland's library looks for a display.
+/// Variables that tell Wayland's library where its display is: the folder, and the name or path.
 const FOLDER: &str = "XDG_RUNTIME_DIR";
 const DISPLAY: &str = "WAYLAND_DISPLAY";
 
-/// A place at which no display can be.
+/// A path at which no display can be.
 const NOWHERE: &str = "/dev/null";
 
-/// A variable that the program should set for itself, first thing, and its value: none on a desktop.
+/// Returns a variable that the program should set before anything else, and its value. None on a desktop.
 ///
-/// A layer of Mesa's Vulkan drivers asks for a Wayland display to find the card of the screen, whether or not anybody wants
-/// one. Where there is no folder in which a display could be, Wayland's library complains of that on stderr. A name that is
-/// a path needs no folder.
+/// A layer of Mesa's Vulkan drivers opens a Wayland display to find the card of the screen. Without a folder for displays
+/// Wayland's library prints an error on stderr. It needs no folder if the name of the display is a path.
 pub fn missing_variable() -> Option<(&'static str, &'static str)> {
     if cfg!(all(unix, not(target_os = "macos"))) { no_display(|name| std::env::var_os(name)) } else { None }
 }
@@ -29,7 +28,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_desktop_keeps_its_display() {
+    fn a_display_that_exists_stays() {
         let with = |pairs: &'static [(&str, &str)]| {
             no_display(|name| pairs.iter().find(|pair| pair.0 == name).map(|pair| pair.1.into()))
         };

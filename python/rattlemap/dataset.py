@@ -1,0 +1,232 @@
+"""Datasets of columns: names, axes and attributes of variables, and the conversion of codes to text.
+
+Columns are those of ``cells.npy``: one-dimensional, one value per cell, the first axis changes fastest. They come from a finished
+folder (:mod:`rattlemap.folder`) or from the engine.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+import xarray as xr
+
+Array = npt.NDArray[Any]
+
+#: Columns that are row numbers of a table of texts.
+TEXT_COLUMNS = ("word", "pattern")
+#: Columns whose codes become text. Codes of ``symmetric`` stay: -1 absent, 0 false, 1 true.
+CODE_COLUMNS = ("class", "status", "source")
+#: Indices along the axes, which a Dataset does not need.
+INDICES = ("i", "j")
+#: Dimension of a list of cells.
+CELL = "cell"
+
+_LONG_NAMES = {
+    "class": "class",
+    "period": "forcing periods per cycle",
+    "lyapunov": "largest Lyapunov exponent",
+    "lyapunov_error": "standard error of the exponent",
+    "impacts_per_period": "impacts per forcing period",
+    "mesh_fraction": "share of the time spent meshing",
+    "symmetric": "whether a cycle is its own mirror image",
+    "word": "word of the cycle",
+    "pattern": "pattern of the cycle",
+    "status": "how the integration ended",
+    "periods_run": "forcing periods integrated",
+    "source": "integrated or filled",
+    "attractors": "attractors found",
+    "attractor": "label of the attractor",
+}
+
+#: Names of the results of a cell.
+RESULTS = frozenset(_LONG_NAMES)
+
+
+def code_names(codes: Mapping[str, int]) -> Array:
+    """Return the names of one-byte codes by code, shape (256,): text of fixed width, with the code -1 at the last place."""
+    width = max(map(len, codes), default=1)
+    names = np.full(256, "", dtype=f"<U{width}")
+    for name, code in codes.items():
+        names[code] = name
+    return names
+
+
+def text_array(texts: Iterable[str]) -> Array:
+    """Return texts as Python strings, dtype object, because lengths of words differ by a factor of 60."""
+    return np.array([*texts], dtype=object)
+
+
+def look_up(table: Array, rows: Array) -> Array:
+    """Return the entries of a table at these rows, in the shape of the rows. Raises IndexError if a row is not in the table."""
+    rows = np.asarray(rows)
+    found = np.empty(rows.shape, dtype=table.dtype)
+    found[...] = table[rows]
+    return found
+
+
+def attributes(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a manifest as attributes that any file format accepts: text and numbers unchanged, other values as JSON.
+
+    ``json.loads(ds.attrs["parameters"])`` restores such a value. Null values and the list of files are left out.
+    """
+
+    def plain(value: Any) -> Any:
+        return value if isinstance(value, (str, int, float)) and not isinstance(value, bool) else json.dumps(value)
+
+    left_out = ("files", "manifest_sha256")
+    return {name: plain(value) for name, value in manifest.items() if name not in left_out and value is not None}
+
+
+def variable_attributes(name: str, codes: Mapping[str, Mapping[str, int]]) -> dict[str, Any]:
+    """Return the attributes of a variable: a long name, which labels plots, and the meaning of integer codes."""
+    found: dict[str, Any] = {"long_name": _LONG_NAMES.get(name, name)}
+    if name == "symmetric":
+        ordered = sorted(codes[name].items(), key=lambda item: item[1])
+        found["flag_values"] = np.array([code for _, code in ordered], dtype=np.int8)
+        found["flag_meanings"] = " ".join(meaning for meaning, _ in ordered)
+    return found
+
+
+#: Returns the data of a variable from the name of the column, the shape, and the table that its codes refer to, or None.
+Reader = Callable[[str, tuple[int, ...], "str | None"], Any]
+
+
+def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable[[str], Array], read: Reader) -> xr.Dataset:
+    """Return the Dataset of a map: dimensions (second axis, first axis), or ``cell`` for a list.
+
+    ``fields`` names the columns. ``column`` returns the values of an axis, shape (cells,). ``read`` returns the data of a
+    variable. The manifest becomes the attributes.
+    """
+    axes = manifest.get("axes") or []
+    codes = manifest["codes"]
+    coords: dict[str, Any]
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    if axes:
+        first, second = (axis["parameter"] for axis in axes)
+        columns, rows = (int(axis["count"]) for axis in axes)
+        dims, shape = (second, first), (rows, columns)
+        coords = {
+            second: column(second)[::columns].copy(),
+            first: column(first)[:columns].copy(),
+        }
+    else:
+        dims, shape = (CELL,), (int(manifest["cells"]),)
+        coords = {name: ((CELL,), column(name)) for name in manifest["list"]["columns"]}
+    variables = {}
+    for name in fields:
+        if name in INDICES or name in coords:
+            continue
+        table = "words" if name in TEXT_COLUMNS else name if name in CODE_COLUMNS else None
+        variables[name] = xr.Variable(dims, read(name, shape, table), variable_attributes(name, codes))
+    return xr.Dataset(variables, coords, attributes(manifest))
+
+
+def from_columns(columns: Mapping[str, Array], manifest: Mapping[str, Any], texts: Iterable[str] = ("",)) -> xr.Dataset:
+    """Return the Dataset of a map whose columns are in memory. Numbers are not copied.
+
+    ``word`` and ``pattern`` are row numbers of ``texts``, of which the first is empty.
+    """
+    words = text_array(texts)
+
+    def read(name: str, shape: tuple[int, ...], table: str | None) -> Array:
+        values = columns[name].reshape(shape)
+        if table is None:
+            return values
+        return look_up(words if table == "words" else code_names(manifest["codes"][table]), values)
+
+    return arrange(columns, manifest, columns.__getitem__, read)
+
+
+#: Types of columns of tables. Absent values are 0, NaN or empty, as in ``cells.npy``.
+_TYPES: dict[str, Any] = {
+    "label": np.int32,
+    "period": np.uint16,
+    "period_a": np.uint16,
+    "period_b": np.uint16,
+    "periods_run": np.uint32,
+    "cells": np.int64,
+    "side": np.int8,
+    "i": np.int64,
+    "j": np.int64,
+}
+_NAMES = frozenset(("class", "class_a", "class_b", "status", "kind", "direction", "domain", "event", "moment"))
+
+
+def text_table(source: Path | StringIO) -> pd.DataFrame:
+    """Read a table of the program with every field as text."""
+    return pd.read_csv(source, dtype=str, keep_default_na=False)
+
+
+def table_column(name: str, values: pd.Series) -> Array:
+    """Convert a column of :func:`text_table` to the type that its variable has in a map."""
+    text = values.fillna("")
+    if name in TEXT_COLUMNS:
+        return text_array(text)
+    if name in _NAMES:
+        return np.asarray(text.to_numpy(), dtype=str)
+    if name == "symmetric":
+        return np.array([{"true": 1, "false": 0}.get(value, -1) for value in text], dtype=np.int8)
+    if name in _TYPES:
+        return np.array([int(value or 0) for value in text], dtype=_TYPES[name])
+    return np.array([float(value or "nan") for value in text], dtype=np.float64)
+
+
+def table_columns(table: pd.DataFrame) -> dict[str, Array]:
+    """Convert all columns of :func:`text_table`."""
+    return {str(name): table_column(str(name), table[name]) for name in table.columns}
+
+
+def with_attractors(ds: xr.Dataset, table: pd.DataFrame) -> xr.Dataset:
+    """Return a map with the table of its attractors, ``attractors.csv``.
+
+    Columns become ``attractor_class``, ``attractor_period`` and so on over the dimension ``label``, to which ``ds["attractor"]``
+    refers. The strobe state is ``attractor_strobe`` over (label, component).
+    """
+    columns = table_columns(table)
+    label = columns.pop("label")
+    states = [name for name in columns if name.startswith("strobe_")]
+    variables: dict[str, Any] = {
+        f"attractor_{name}": (("label",), values) for name, values in columns.items() if name not in states
+    }
+    strobe = np.stack([columns[name] for name in states], axis=-1) if states else np.empty((len(label), 0))
+    variables["attractor_strobe"] = (("label", "component"), strobe)
+    component = np.array([name.removeprefix("strobe_") for name in states], dtype=str)
+    return ds.assign(variables).assign_coords(label=label, component=component)
+
+
+def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, Any]) -> xr.Dataset:
+    """Return the Dataset of a bifurcation diagram from its two tables with every field as text.
+
+    Columns are over the swept parameter, or over (direction, parameter) if the attractor was followed in both directions. Section
+    points are over the dimension ``point``; ``point_<parameter>`` is the parameter's value there.
+    """
+    axis, data = manifest["axis"]["parameter"], table_columns(columns)
+    value, direction = data.pop(axis), data.pop("direction", None)
+    coords: dict[str, Any]
+    dims: tuple[str, ...]
+    if direction is None:
+        dims, place, coords = (axis,), np.argsort(value, kind="stable"), {axis: np.sort(value)}
+    else:
+        names = ("up", "down")
+        rows = [np.flatnonzero(direction == name) for name in names]
+        place = np.stack([of_name[np.argsort(value[of_name], kind="stable")] for of_name in rows])
+        dims, coords = ("direction", axis), {"direction": np.array(names), axis: value[place[0]]}
+    codes = {"symmetric": {"absent": -1, "false": 0, "true": 1}}
+    variables = {
+        name: xr.Variable(dims, values[place], variable_attributes(name, codes)) for name, values in data.items()
+    }
+    # A row without a side is a column without a point.
+    for name, values in table_columns(points[points["side"] != ""]).items():
+        if name in (axis, "direction"):
+            coords[f"point_{name}"] = (("point",), values)
+        elif name not in ("class", "period", "status"):
+            variables[name] = xr.Variable(("point",), values)
+    return xr.Dataset(variables, coords, attributes(manifest))

@@ -1,0 +1,93 @@
+//! Finished folders: manifests, checks, comparisons and validations. Python itself reads the tables.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use pyo3::prelude::*;
+use rattlemap::job::check;
+use rattlemap::job::compare::CompareJob;
+use rattlemap::job::observer::Observer;
+use rattlemap::job::validate::ValidateJob;
+use rattlemap::store::finished_map;
+use rattlemap::store::folder::Folder;
+use rattlemap::store::in_memory;
+use rattlemap::store::inventory::Fault;
+
+use crate::problem::Problem;
+use crate::worker::{self, Collector};
+
+/// Returns the manifest of the folder of a map or a diagram, as JSON.
+#[pyfunction]
+pub(crate) fn manifest(folder: PathBuf) -> PyResult<String> {
+    Ok(finished_map::read_tables(&folder).map_err(Problem::from)?.to_string())
+}
+
+/// The name of a file, its fault, and a description of the damage.
+type FileFault = (String, &'static str, String);
+
+/// Compares the files of a folder with its manifest. With `repair` it makes damaged and missing files of a map again. Returns the
+/// faults, the names of the repaired files, and warnings.
+#[pyfunction]
+#[pyo3(signature = (folder, repair=false))]
+pub(crate) fn check_folder(
+    py: Python<'_>,
+    folder: PathBuf,
+    repair: bool,
+) -> PyResult<(Vec<FileFault>, Vec<String>, Vec<String>)> {
+    worker::run(py, None, move |watch| {
+        // The lock comes first: another run must not replace the map between reading and writing.
+        let lock = if repair && folder.is_dir() { Some(Folder::open(&folder, true)?) } else { None };
+        let found = check::check(&folder)?;
+        let observer = Collector::new(watch);
+        let repaired = lock.map(|lock| found.repair(&lock, &observer)).transpose()?.unwrap_or_default();
+        let faults = found.findings().iter().map(|finding| {
+            let (kind, reason) = match &finding.fault {
+                Fault::Damaged(reason) => ("damaged", reason.clone()),
+                Fault::Missing => ("missing", String::new()),
+                Fault::Unknown => ("unknown", String::new()),
+            };
+            (finding.name.clone(), kind, reason)
+        });
+        Ok(Some((faults.collect(), repaired, observer.lines())))
+    })
+}
+
+/// Compares two finished maps. Returns the result as JSON, `compare.csv`, and warnings.
+#[pyfunction]
+pub(crate) fn compare(py: Python<'_>, a: PathBuf, b: PathBuf) -> PyResult<(String, String, Vec<String>)> {
+    worker::run(py, None, move |watch| {
+        let job = CompareJob::open([&a, &b])?;
+        let observer = Collector::new(watch);
+        let Some(result) = job.compare(&observer, watch.halt())? else { return Ok(None) };
+        let (json, table) = in_memory::comparison(&result.pair(&result.cells()))?;
+        Ok(Some((json, table, observer.lines())))
+    })
+}
+
+/// Validates a finished map, and writes `validation.json` and its section of the report. Returns the error that the program would
+/// report, if any, and warnings.
+#[pyfunction]
+#[pyo3(signature = (folder, samples, seed, progress=None))]
+pub(crate) fn validate(
+    py: Python<'_>,
+    folder: PathBuf,
+    samples: u32,
+    seed: u64,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Option<String>, Vec<String>)> {
+    worker::run(py, progress, move |watch| {
+        let clock = Instant::now();
+        let observer = Collector::new(watch);
+        let job = ValidateJob::open(&folder, samples as usize, seed, &observer)?;
+        let lanes = job.run_lanes(watch.halt());
+        if watch.is_halted() {
+            return Ok(None);
+        }
+        let (lanes, count) = (lanes?, job.sample_count());
+        let report = |done| observer.progress(done, count);
+        let Some(validation) = job.replay(&lanes, &report, watch.halt()) else { return Ok(None) };
+        let written = job.write(&lanes, &validation, clock.elapsed())?;
+        let failure = job.require_valid(&validation, &written).err().map(|error| error.to_string());
+        Ok(Some((failure, observer.lines())))
+    })
+}

@@ -1,0 +1,96 @@
+//! Messages of a run that stops before its end: what is stored, and the command that continues.
+
+use clap::ValueEnum;
+
+use crate::cli::arguments::{EngineChoice, EngineOptions, Map};
+use crate::cli::failure::Failure;
+use crate::job::error::JobError;
+use crate::job::map::MapJob;
+use crate::map::plan::Plan;
+use crate::store::folder::Folder;
+use crate::store::record_file::{Identity, Order, RECORDS, RecordFile};
+use crate::text::shell::quoted;
+
+/// A run that may stop before its end.
+pub(super) struct Restart<'a> {
+    pub(super) arguments: &'a Map,
+    pub(super) sets: &'a [String],
+    pub(super) job: &'a MapJob<'a>,
+    pub(super) plan: &'a Plan,
+}
+
+impl Restart<'_> {
+    /// Number of stored runs, and the command that computes the others.
+    pub(super) fn text(&self, stored: usize) -> String {
+        let (total, unit) = (self.job.run_count(self.plan), self.plan.unit());
+        let most = if self.plan.refine().is_some() { "at most " } else { "" };
+        format!("{stored} of {most}{total} {unit} are kept; go on with: {}", self.command("--resume"))
+    }
+
+    /// The message of a run that stops before it changes the folder.
+    pub(super) fn before_begin(&self) -> String {
+        let Map { run: options, resume, .. } = self.arguments;
+        if *resume {
+            format!("earlier records are kept; go on with: {}", self.command("--resume"))
+        } else if options.force {
+            let out = self.arguments.out();
+            format!("nothing in {} was changed; start again with: {}", out.display(), self.command("--force"))
+        } else {
+            self.text(0)
+        }
+    }
+
+    /// Adds to the error of an engine that cannot be opened what the folder contains. Errors of the request stay as they
+    /// are.
+    pub(super) fn engine_not_opened(&self, error: JobError, folder: &Folder) -> Failure {
+        if error.is_usage() {
+            return error.into();
+        }
+        let rest = if self.arguments.run.force {
+            self.before_begin()
+        } else {
+            let stored = || {
+                let path = folder.path().join(RECORDS);
+                let identity = Identity::read(&path).ok()??;
+                Some(RecordFile::read(&path, &identity, Order::Any, |_| true).ok()?.count)
+            };
+            self.text(stored().unwrap_or(0))
+        };
+        JobError::Failed(format!("{error}; {rest}{}", self.with_the_cpu())).into()
+    }
+
+    /// The command that computes the map with the CPU engine, if the request leaves the engine open. It cannot continue the
+    /// records of another engine.
+    pub(super) fn with_the_cpu(&self) -> String {
+        match self.arguments.engine.engine {
+            EngineChoice::Auto => {
+                let cpu = EngineOptions { engine: EngineChoice::Cpu, precision: None, adapter: None };
+                let command = self.command_with(&cpu, "--force");
+                format!("; the CPU engine can compute the map, too, from its first cell: {command}")
+            }
+            EngineChoice::Cpu | EngineChoice::Gpu => String::new(),
+        }
+    }
+
+    fn command(&self, last: &str) -> String {
+        self.command_with(&self.arguments.engine, last)
+    }
+
+    fn command_with(&self, engine: &EngineOptions, last: &str) -> String {
+        let Map { run: options, shard, json, .. } = self.arguments;
+        let mut words = vec!["rattlemap map".to_owned(), quoted(&options.scene.display().to_string())];
+        words.extend(options.out.as_ref().map(|out| format!("--out {}", quoted(&out.display().to_string()))));
+        if let Some(name) = engine.engine.to_possible_value().filter(|_| engine.engine != EngineChoice::Auto)
+        {
+            words.push(format!("--engine {}", name.get_name()));
+        }
+        words.extend(engine.precision.map(|precision| format!("--precision {}", precision.name())));
+        words.extend(shard.map(|shard| format!("--shard {shard}")));
+        let adapter = engine.adapter.as_ref();
+        words.extend(adapter.map(|adapter| format!("--adapter {}", quoted(&adapter.to_string()))));
+        words.extend(self.sets.iter().map(|set| format!("--set {}", quoted(set))));
+        words.extend(json.then(|| "--json".to_owned()));
+        words.push(last.to_owned());
+        words.join(" ")
+    }
+}

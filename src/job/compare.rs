@@ -1,0 +1,184 @@
+//! Compares two finished maps of the same cells.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::findings::coexistence;
+use crate::findings::compare::{self, Comparison, Side};
+use crate::job::error::JobError;
+use crate::job::finished::{self, LoadedMap};
+use crate::job::observer::Observer;
+use crate::map::plan::Plan;
+use crate::map::scene::{Points, Quantity, Scene};
+use crate::record::Record;
+use crate::show::cells::{Cells, Survey};
+use crate::show::map_pair::{MapPair, MapSide};
+use crate::store::finished_map::{FinishedMap, StoredManifest};
+use crate::store::map::Provenance;
+
+/// Two finished maps that can be compared.
+pub struct CompareJob<'a> {
+    dirs: [&'a Path; 2],
+    names: [String; 2],
+    maps: [FinishedMap; 2],
+    scenes: [Scene; 2],
+}
+
+impl<'a> CompareJob<'a> {
+    /// Reads the manifests and scenes of two folders, and checks that they have classes and the same cells.
+    ///
+    /// # Errors
+    /// [`JobError`] if a folder is not a finished map's, or the maps cannot be compared.
+    pub fn open(dirs: [&'a Path; 2]) -> Result<CompareJob<'a>, JobError> {
+        let maps = [FinishedMap::open(dirs[0])?, FinishedMap::open(dirs[1])?];
+        let scenes = [finished::scene(&maps[0])?, finished::scene(&maps[1])?];
+        require_classes(dirs, &scenes)?;
+        require_same_cells(dirs, &scenes)?;
+        Ok(CompareJob { dirs, names: dirs.map(folder_name), maps, scenes })
+    }
+
+    /// Names of the two folders.
+    pub fn names(&self) -> &[String; 2] {
+        &self.names
+    }
+
+    /// The scene of the first map.
+    pub fn scene(&self) -> &Scene {
+        &self.scenes[0]
+    }
+
+    /// Checks that the output folder is neither of the maps' own.
+    ///
+    /// # Errors
+    /// [`JobError::Usage`].
+    pub fn check_output(&self, out: &Path) -> Result<(), JobError> {
+        let Ok(whole) = out.canonicalize() else { return Ok(()) };
+        match self.dirs.into_iter().find(|dir| dir.canonicalize().is_ok_and(|dir| dir == whole)) {
+            Some(dir) => Err(JobError::Usage(format!(
+                "--out {}: this is the folder of {}, one of the compared maps; choose another one",
+                out.display(),
+                dir.display()
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Reads all records and compares them. Damage that cost no record is reported to the observer. Returns none if `halt` was
+    /// raised meanwhile.
+    ///
+    /// # Errors
+    /// [`JobError`] if the records of a map cannot be read.
+    pub fn compare(
+        &self,
+        observer: &dyn Observer,
+        halt: &AtomicBool,
+    ) -> Result<Option<MapComparison<'_>>, JobError> {
+        let is_halted = || halt.load(Ordering::Relaxed);
+        let read = |i: usize| LoadedMap::read(&self.maps[i], &self.scenes[i], observer);
+        let mut loaded = [read(0)?, read(1)?];
+        if is_halted() {
+            return Ok(None);
+        }
+        let has_starts = loaded.iter().all(|map| map.plan.start_count() > 1);
+        let attractors = |plan: &Plan, records: &[Record]| {
+            if has_starts && !is_halted() { coexistence::attractors(plan, records) } else { None }
+        };
+        let counts = loaded.each_ref().map(|map| attractors(&map.plan, &map.stored.records));
+        if is_halted() {
+            return Ok(None);
+        }
+        let [a, b] = [0, 1].map(|i| Side {
+            records: &loaded[i].stored.records[..loaded[i].plan.cell_count()],
+            attractors: counts[i].as_deref(),
+            has_exponents: self.scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
+        });
+        let comparison = compare::compare(a, b);
+        let surveys = loaded.each_mut().map(|map| Survey::of_refinement(map.stored.refined.take()));
+        Ok(Some(MapComparison { job: self, loaded, surveys, comparison }))
+    }
+}
+
+/// Two finished maps, and the cells in which they differ.
+pub struct MapComparison<'a> {
+    job: &'a CompareJob<'a>,
+    loaded: [LoadedMap; 2],
+    surveys: [Survey; 2],
+    /// Differences by cell.
+    pub comparison: Comparison,
+}
+
+impl MapComparison<'_> {
+    /// The cells of both maps, for [`MapComparison::pair`].
+    pub fn cells(&self) -> [Cells<'_>; 2] {
+        [0, 1].map(|i| self.loaded[i].cells(&self.job.scenes[i], &self.surveys[i]))
+    }
+
+    /// The comparison, for tables and figures.
+    pub fn pair<'a>(&'a self, cells: &'a [Cells<'a>; 2]) -> MapPair<'a> {
+        let sides = [0, 1].map(|i| {
+            let StoredManifest { engine, precision, device, crate_version, commit, .. } =
+                self.job.maps[i].manifest();
+            MapSide {
+                name: &self.job.names[i],
+                cells: &cells[i],
+                provenance: Provenance { engine, precision, device },
+                crate_version,
+                commit,
+            }
+        });
+        MapPair { sides, comparison: &self.comparison }
+    }
+}
+
+/// The name of a folder, whatever path leads to it.
+fn folder_name(dir: &Path) -> String {
+    let whole = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
+    whole.file_name().map_or("map".into(), |name| name.to_string_lossy()).into_owned()
+}
+
+fn require_classes(dirs: [&Path; 2], scenes: &[Scene; 2]) -> Result<(), JobError> {
+    let has_none = |scene: &Scene| !scene.outputs().quantities.contains(&Quantity::Class);
+    match dirs.into_iter().zip(scenes).find(|(_, scene)| has_none(scene)) {
+        Some((dir, _)) => Err(JobError::Usage(format!(
+            "{}: the map has no classes; make it again with \"class\" in outputs.quantities",
+            dir.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn require_same_cells(dirs: [&Path; 2], scenes: &[Scene; 2]) -> Result<(), JobError> {
+    let [dir_a, dir_b] = dirs.map(|dir| dir.display());
+    if scenes.iter().any(|scene| scene.list().is_some()) {
+        let [a, b] = scenes.each_ref().map(Scene::points);
+        let names = |points: &Points| points.swept().map(|p| p.name.to_string()).collect::<Vec<_>>();
+        let is_same = a.counts() == b.counts()
+            && names(a) == names(b)
+            && (0..a.counts()[0] * a.counts()[1]).all(|cell| a.values(cell) == b.values(cell));
+        return match is_same {
+            true => Ok(()),
+            false => Err(JobError::Usage(format!(
+                "maps of different cells cannot be compared: {dir_a} and {dir_b} have different lists, or one of them has \
+                 none; make one of them again with the cells of the other"
+            ))),
+        };
+    }
+    let [a, b] = scenes.each_ref().map(Scene::axes);
+    for (number, (a, b)) in a.iter().zip(b).enumerate() {
+        let is_same = a.parameter().name == b.parameter().name
+            && a.count() == b.count()
+            && a.values().zip(b.values()).all(|(a, b)| a == b);
+        if !is_same {
+            let [a, b] = [a, b].map(|axis| {
+                let (name, count) = (&axis.parameter().name, axis.count());
+                format!("{name} from {:?} to {:?} in {count} values", axis.min(), axis.max())
+            });
+            let values = if a == b { ", and the values between differ" } else { "" };
+            return Err(JobError::Usage(format!(
+                "maps of different grids cannot be compared: axis {number} of {dir_a} is {a}, of {dir_b} {b}{values}; make \
+                 one of them again with the axes of the other"
+            )));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,105 @@
+//! Estimates what a map takes, and writes nothing.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::job::engine_choice::EngineKind;
+use crate::job::error::JobError;
+use crate::job::forecast::Forecast;
+use crate::job::map::{MapJob, OpenMap};
+use crate::job::observer::Observer;
+use crate::job::size::{Free, Size};
+use crate::map::plan::Plan;
+use crate::map::sweep::SweepError;
+use crate::store::folder::Folder;
+use crate::store::map;
+use crate::store::record_file::{Identity, RECORDS, RecordFileError};
+use crate::store::run_records::Work;
+
+/// What a map takes.
+#[derive(Clone, Debug)]
+pub struct DryRun {
+    /// Number of runs of the map or shard.
+    pub runs: usize,
+    /// Number of them whose records are in the folder already.
+    pub stored: usize,
+    /// Name of the engine.
+    pub engine: &'static str,
+    /// Its precision.
+    pub precision: &'static str,
+    /// Its device, as manifests name it.
+    pub device: String,
+    /// Reason for the choice of the engine. Empty if the request left no choice.
+    pub reason: String,
+    /// Memory of the host, in bytes.
+    pub host_memory: u64,
+    /// Largest memory on graphics devices, in bytes. None for the CPU engine.
+    pub device_memory: Option<u64>,
+    /// Disk space, in bytes.
+    pub disk: u64,
+    /// Free memory and disk space.
+    pub free: Free,
+    /// Seconds that it took to open the engine.
+    pub open_seconds: f64,
+    /// Predicted time of integration.
+    pub forecast: Forecast,
+    /// Whether the map is adaptive: then fewer cells are integrated than are predicted.
+    pub is_adaptive: bool,
+}
+
+impl DryRun {
+    /// Opens the engine and computes a sample of the cells, whose records are discarded. Notes and warnings about the
+    /// engine go to the observer.
+    ///
+    /// # Errors
+    /// [`JobError`] if the folder cannot be used, or the engine cannot be opened or fails.
+    pub fn of(
+        job: &MapJob<'_>,
+        plan: &Plan,
+        out: &Path,
+        force: bool,
+        free: Free,
+        observer: Arc<dyn Observer>,
+    ) -> Result<DryRun, JobError> {
+        if job.resume && !out.join(RECORDS).is_file() && Folder::holds_results(out) {
+            return Err(RecordFileError::NothingToResume { folder: out.to_owned() }.into());
+        }
+        Folder::check(out, force || job.resume, map::names())?;
+        let job = MapJob { engine: job.engine_request(Some(out)), ..job.clone() };
+        let OpenMap { mut engine, reason, opening, .. } = job.open(plan, None, observer)?;
+        let stored = if job.resume {
+            let identity =
+                Identity::new(engine.name(), engine.precision(), &engine.device(), job.scene.identity())
+                    .of_shard(job.shard);
+            let path = out.join(RECORDS);
+            if path.is_file() { Work::new(plan, job.shard).read(&path, &identity)?.count } else { 0 }
+        } else {
+            0
+        };
+        let runs = job.run_count(plan);
+        let forecast =
+            Forecast::of(plan, &mut engine, runs.saturating_sub(stored)).map_err(SweepError::Engine)?;
+        let size = Size::of(job.scene, job.shard);
+        let kind = if engine.device_bytes().is_some() { EngineKind::Gpu } else { EngineKind::Cpu };
+        Ok(DryRun {
+            runs,
+            stored,
+            engine: engine.name(),
+            precision: engine.precision(),
+            device: engine.device(),
+            reason,
+            host_memory: size.memory(kind),
+            device_memory: engine.device_bytes(),
+            disk: size.disk,
+            free,
+            open_seconds: opening.as_secs_f64(),
+            forecast,
+            is_adaptive: plan.refine().is_some(),
+        })
+    }
+
+    /// Whether the map takes no longer than predicted: it is adaptive, and the whole sample ended in time.
+    pub fn is_upper_bound(&self) -> bool {
+        self.is_adaptive && self.forecast.interval.is_some()
+    }
+}

@@ -1,0 +1,146 @@
+//! Lists the built-in models, and describes a model on a page.
+
+use std::fmt::Write;
+
+use rattlemap_dynamics::model::{Contact, Model, Parameter, Side};
+use rattlemap_dynamics::orbit::Status;
+
+use crate::model_file::{FileModel, Wall, WallLaw, factor};
+
+/// Returns the name and a summary of every built-in model.
+pub fn list() -> Vec<(String, String)> {
+    let summary =
+        |model: &FileModel| model.definition().summary.clone().unwrap_or_else(|| model.title().to_owned());
+    FileModel::all_built_in().iter().map(|model| (model.name().to_owned(), summary(model))).collect()
+}
+
+/// Describes a model: equations, contact laws, parameters, words, classes, statuses and source.
+pub fn page(model: &FileModel) -> String {
+    let definition = model.definition();
+    let mut text = format!("{} ({})\n", model.title(), model.name());
+    if let Some(notes) = &definition.notes {
+        let _ = writeln!(text, "\n{}", notes.trim());
+    }
+    let _ = writeln!(text, "\nMotion\n");
+    model.equations().iter().for_each(|line| text += &format!("    {line}\n"));
+    let _ = writeln!(
+        text,
+        "\n    The state is {}; the forcing period is 2 pi over {}.",
+        model.state_names().join(", "),
+        definition.motion.frequency.text()
+    );
+    let _ = writeln!(text, "\nContact\n");
+    for side in Side::BOTH {
+        if let Some(wall) = definition.wall(side) {
+            text += &contact(side, wall);
+        }
+    }
+    let _ = writeln!(text, "\nParameters\n");
+    text += &format!("    {:<11} {:<9} {:<25} {}\n", "symbol", "default", "range", "meaning");
+    for parameter in model.parameters() {
+        text += &line(parameter);
+    }
+    text += &format!(
+        "\n{}\n{CLASSES}\n\nStatus: how the integration of a cell ended\n\n",
+        words(definition.walls.each_ref().map(Option::is_some))
+    );
+    for status in Status::ALL {
+        let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));
+    }
+    let source = model.source().map_or("not given".to_owned(), |title| format!("\"{title}\""));
+    text + &format!("\n{ERRORS}\n\nSource\n\n    {source}\n")
+}
+
+/// Describes a wall and its contact law.
+fn contact(side: Side, wall: &Wall) -> String {
+    let (name, at) = (if side == Side::Right { "right" } else { "left" }, wall.at.text());
+    let mut text = format!("    The {name} wall is at z = {at}. ");
+    match &wall.law {
+        WallLaw::Elastic => {
+            text += "There is no impact: the motion continues behind the wall until z returns.\n";
+        }
+        WallLaw::Impact { restitution, mesh_speed } => {
+            let lasts = match mesh_speed.as_number() {
+                Some(0.0) => "its rate is zero".to_owned(),
+                _ => format!("it separates at a rate of at most {}", mesh_speed.text()),
+            };
+            let _ = writeln!(
+                text,
+                "An impact multiplies the rate w by -{}, with an\n    impulse along the gap row. After the impact the contact is sustained if {lasts}\n    and the load \
+                 presses the gap to the wall; otherwise the motion is free again. w = 0 with the load\n    pulling away is \
+                 grazing: nothing happens.",
+                factor(restitution)
+            );
+            text += match wall.contact() {
+                Contact::Rigid => {
+                    "    In a sustained contact z and w are fixed until the load pulls the gap off the wall.\n"
+                }
+                _ => {
+                    "    In a sustained contact the motion continues behind the wall until z returns to it; the state \
+                     stays continuous.\n"
+                }
+            };
+        }
+    }
+    text
+}
+
+/// Explains the symbols of words that a model can have. `right` and `left`: whether it has these walls.
+fn words([right, left]: [bool; 2]) -> String {
+    let mut text = "Words\n\n    One symbol per flight, between two events:\n".to_owned();
+    let symbols = [
+        (right, "1  sustained contact on the right"),
+        (right, "2  free, from the right to the right"),
+        (left && right, "3  free, from the right to the left"),
+        (left, "4  sustained contact on the left"),
+        (left, "5  free, from the left to the left"),
+        (left && right, "6  free, from the left to the right"),
+    ];
+    symbols
+        .into_iter()
+        .filter(|(is_there, _)| *is_there)
+        .for_each(|(_, line)| text += &format!("        {line}\n"));
+    text + READING
+}
+
+fn line(parameter: &Parameter) -> String {
+    let default = parameter.default.map_or("-".to_owned(), |value| value.to_string());
+    let Parameter { name, meaning, range, .. } = parameter;
+    format!("    {name:<11} {default:<9} {:<25} {meaning}\n", range.requirement())
+}
+
+/// Explains a status.
+fn meaning(status: Status) -> &'static str {
+    match status {
+        Status::Ok => "nothing to remark",
+        Status::Slow => "the motion converges slowly: the class rests on Newton's method, or is undecided",
+        Status::NearGrazing => "a contact is nearly grazing: multipliers and exponent are inaccurate",
+        Status::StrobeOnEvent => "an event coincides with phase 0, at which states are compared",
+        Status::CapEvents => "failed: more events in one period than the engine allows",
+        Status::CapRoot => "failed: more steps or root iterations than the engine allows",
+        Status::TooStiff => "failed: too stiff for the engine",
+        Status::NonFinite => "failed: the state became infinite or not a number",
+        Status::BelowResolution => {
+            "points of the cycle are closer than the engine resolves: the period may be a divisor"
+        }
+    }
+}
+
+const READING: &str = "    A word is the cyclic sequence of a cycle's flights in order of time, rotated to the smallest number: 13554622.
+    The literature composes maps from right to left, with powers: P_{1 2^2 6 4 5^2 3} is the same cycle.
+    Its pattern, 135462, writes each run of one symbol once: it leaves out the number of bounces before a sustained contact.
+";
+
+const CLASSES: &str = "\
+Class
+
+    periodic    a stable cycle; the period is its number of forcing periods
+    chaotic     no cycle, and the Lyapunov exponent exceeds 0 by six standard errors
+    undecided   neither was found within the budget: long transients, bifurcations near by, tori
+    failed      the integration stopped; the status gives the reason";
+
+const ERRORS: &str = "\
+Errors
+
+    lyapunov_error is the standard error of an exponent that is an average of blocks. That of a cycle comes from its
+    multipliers and has none.";

@@ -1,0 +1,377 @@
+//! Estimates the memory and disk space of a map, and compares them with what the machine has free.
+
+use std::path::Path;
+
+use crate::gpu;
+use crate::job::engine_choice::EngineKind;
+use crate::job::error::JobError;
+use crate::job::processor;
+use crate::map::plan::{Parts, stores_flows};
+use crate::map::scene::{Format, Quantity, Scene, Steps};
+use crate::map::shard::Shard;
+use crate::record::Record;
+use crate::store::map;
+use crate::text::size::bytes;
+
+/// Memory per run besides its record, in bytes: its place in the order, and the rows of tables and figures.
+const RUN: u64 = 64;
+/// Memory per cell of a list, in bytes: values, their text, flow and law.
+const LIST_ROW: u64 = 200;
+/// Memory per forcing period of a cell that is being computed, in bytes: strobe state, growth of a tangent vector.
+const PERIOD: u64 = 40;
+/// Memory per flow that the CPU engine keeps, in bytes: an upper bound of the built-in models'.
+const FLOW: u64 = 100_000;
+/// Number of flows from which the size of all lane tables is estimated.
+const SAMPLED_FLOWS: u64 = 256;
+
+/// Estimated size of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Number of cells.
+    pub cells: u64,
+    /// Number of runs: cells times starts per cell.
+    pub runs: u64,
+    /// Memory with the CPU engine, in bytes.
+    pub cpu_memory: u64,
+    /// Memory of the host with the GPU engine, in bytes.
+    pub gpu_memory: u64,
+    /// Disk space, in bytes.
+    pub disk: u64,
+}
+
+impl Size {
+    /// Estimates the size of a map, or of a shard of it. A shard writes records alone, and keeps in memory a byte per run of
+    /// the map, and all records where cells follow their neighbours.
+    pub fn of(scene: &Scene, shard: Option<Shard>) -> Size {
+        let (cells, runs) = (scene.cell_count(), scene.run_count());
+        let record = size_of::<Record>() as u64;
+        let [record_on_disk, files] = disk(scene);
+        let (memory, disk) = match shard {
+            None => (runs.saturating_mul(record + RUN), runs.saturating_mul(record_on_disk) + cells * files),
+            Some(shard) => {
+                let own = runs.div_ceil(u64::from(shard.count()));
+                let kept = if scene.start().follows() { 1 + record } else { 1 };
+                (runs.saturating_mul(kept) + own * RUN, own * record_on_disk)
+            }
+        };
+        let settings = scene.orbit_settings();
+        let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
+        let flows = Parts::flows(scene.points());
+        let memory = memory + list_rows(scene);
+        Size {
+            cells,
+            runs,
+            cpu_memory: memory + kept_flows(&flows, runs) + periods * PERIOD * processor::cores() as u64,
+            gpu_memory: memory + lane_tables(scene, &flows, runs),
+            disk,
+        }
+    }
+
+    /// Estimates the size of a map that is merged from shards. Nothing is integrated, but flows are needed to compare cycles
+    /// where attractors are counted.
+    pub fn merged(scene: &Scene) -> Size {
+        let whole = Size::of(scene, None);
+        let flows = match whole.runs > whole.cells || scene.is_basin() {
+            true => kept_flows(&Parts::flows(scene.points()), whole.runs),
+            false => 0,
+        };
+        let memory = whole.runs.saturating_mul(stored_run(scene) + RUN) + list_rows(scene) + flows;
+        Size { cpu_memory: memory, gpu_memory: memory, ..whole }
+    }
+
+    /// Memory of the host that a kind of engine needs, in bytes; of `auto` the larger one.
+    pub fn memory(&self, kind: EngineKind) -> u64 {
+        match kind {
+            EngineKind::Cpu => self.cpu_memory,
+            EngineKind::Gpu => self.gpu_memory,
+            EngineKind::Auto => self.cpu_memory.max(self.gpu_memory),
+        }
+    }
+
+    /// Compares the size with what is free; `remedy` ends the message.
+    fn check(&self, scene: &Scene, kind: EngineKind, free: &Free, remedy: &str) -> Result<(), JobError> {
+        let counts: Vec<String> = scene.axes().iter().map(|axis| axis.count().to_string()).collect();
+        let starts = if self.runs > self.cells { format!(", {} runs,", self.runs) } else { String::new() };
+        let map = match scene.list() {
+            Some(_) => format!("a list of {} cells{starts}", self.cells),
+            None => format!("a map of {} = {} cells{starts}", counts.join(" x "), self.cells),
+        };
+        if u32::try_from(self.runs).is_err() {
+            let most = u32::MAX;
+            return Err(JobError::TooLarge(format!(
+                "{map} is too large: a map has at most {most} runs; {remedy}"
+            )));
+        }
+        let memory = self.memory(kind);
+        let (what, needed, free, other) = match *free {
+            Free { memory: Some(free), .. } if free < memory => {
+                let is_enough = self.cpu_memory < free;
+                let other = if is_enough { ", or give --engine cpu, which needs less" } else { "" };
+                ("memory", memory, free, other)
+            }
+            Free { disk: Some(free), .. } if free < self.disk => {
+                ("disk", self.disk, free, ", or give a folder on another disk with --out")
+            }
+            _ => return Ok(()),
+        };
+        let (needed, free) = (bytes(needed), bytes(free));
+        Err(JobError::TooLarge(format!(
+            "{map} needs about {needed} of {what}, and {free} are free; {remedy}{other}"
+        )))
+    }
+}
+
+/// Free memory and disk space, in bytes. None where the system does not report it; then it is taken to suffice.
+#[derive(Clone, Copy, Debug)]
+pub struct Free {
+    /// Memory, within the limits of a container.
+    pub memory: Option<u64>,
+    /// Space on the disk of the output folder, including the files of an earlier map, which are replaced.
+    pub disk: Option<u64>,
+}
+
+impl Free {
+    /// Asks the system; for disk space only if there is an output folder, which need not exist yet.
+    pub fn for_output(out: Option<&Path>) -> Free {
+        let mut system = sysinfo::System::new();
+        system.refresh_memory();
+        let memory = system.available_memory();
+        let limited = system.cgroup_limits().map_or(memory, |limits| memory.min(limits.free_memory));
+        let disk = out.and_then(|out| {
+            let absolute = std::path::absolute(out).ok()?;
+            let existing = absolute.ancestors().find(|folder| folder.is_dir())?;
+            Some(fs4::available_space(existing).ok()?.saturating_add(replaced(out)))
+        });
+        Free { memory: (limited > 0).then_some(limited), disk }
+    }
+}
+
+/// Size of a folder's files that a new map replaces, in bytes.
+fn replaced(out: &Path) -> u64 {
+    map::names().filter_map(|name| out.join(name).symlink_metadata().ok()).map(|data| data.len()).sum()
+}
+
+/// Checks that a map, or a shard of it, fits into free memory and disk space.
+///
+/// # Errors
+/// [`JobError::TooLarge`] with what the map needs and what is free.
+pub fn check_map(scene: &Scene, shard: Option<Shard>, kind: EngineKind, free: &Free) -> Result<(), JobError> {
+    let remedy = match scene.list() {
+        Some(_) => "shorten the list of cells",
+        None => "lower axis.0.count or axis.1.count",
+    };
+    Size::of(scene, shard).check(scene, kind, free, remedy)
+}
+
+/// Remedy for a map that exists already.
+const LARGER_MACHINE: &str = "use a larger machine";
+
+/// Checks that a map that is merged from shards fits this machine.
+///
+/// # Errors
+/// [`JobError::TooLarge`] with what the map needs and what is free.
+pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
+    Size::merged(scene).check(scene, EngineKind::Cpu, &Free::for_output(out), LARGER_MACHINE)
+}
+
+/// Checks that the records of a finished map fit this machine's memory.
+///
+/// # Errors
+/// [`JobError::TooLarge`] with what the map needs and what is free.
+pub fn check_finished(scene: &Scene) -> Result<(), JobError> {
+    Size::of(scene, None).check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
+}
+
+/// Bytes on disk: per run of a record, and per cell of all other files. They are the upper ends of measured maps.
+fn disk(scene: &Scene) -> [u64; 2] {
+    let quantities = &scene.outputs().quantities;
+    let columns = |words: u64, exponent: u64, flag: u64| -> u64 {
+        let column = |quantity: &Quantity| match quantity {
+            Quantity::Word | Quantity::Pattern => words,
+            Quantity::Lyapunov => exponent,
+            Quantity::Impacts | Quantity::Mesh => 8,
+            Quantity::Class | Quantity::Symmetric => flag,
+        };
+        quantities.iter().map(column).sum()
+    };
+    let file = |format: &Format| match format {
+        Format::Csv => 190,
+        // A word has a row of words.csv, too.
+        Format::Npy => 33 + columns(12, 16, 3),
+        // The starts of cells that follow their neighbours.
+        Format::Html if scene.start().follows() => 68,
+        Format::Html => 24,
+        // One figure per quantity, and one of attractors.
+        Format::Png | Format::Svg | Format::Pdf => 4 * (quantities.len() as u64 + 1),
+    };
+    // Every record has an exponent with its error: the class needs them.
+    [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
+}
+
+/// Bytes per run in a [`RecordStore`](crate::record::RecordStore), which has the requested columns alone.
+fn stored_run(scene: &Scene) -> u64 {
+    let quantities = &scene.outputs().quantities;
+    let column = |quantity: &Quantity| match quantity {
+        Quantity::Impacts | Quantity::Mesh => 8,
+        Quantity::Word | Quantity::Pattern => 4,
+        Quantity::Class | Quantity::Lyapunov | Quantity::Symmetric => 0,
+    };
+    let is_exponent = |quantity: &Quantity| matches!(quantity, Quantity::Class | Quantity::Lyapunov);
+    let exponent = if quantities.iter().any(is_exponent) || scene.is_basin() { 16 } else { 0 };
+    let has_starts = scene.run_count() > scene.cell_count();
+    let state = if has_starts || scene.is_basin() || scene.start().follows() { 32 } else { 0 };
+    8 + exponent + state + quantities.iter().map(column).sum::<u64>()
+}
+
+fn list_rows(scene: &Scene) -> u64 {
+    scene.list().map_or(0, |list| list.len() as u64 * LIST_ROW)
+}
+
+/// Bytes of the flows that the CPU engine keeps.
+fn kept_flows(flows: &Parts, runs: u64) -> u64 {
+    let count = flows.count() as u64;
+    if stores_flows(count, runs) { count * FLOW } else { 0 }
+}
+
+/// Bytes of the constants that are in memory for lanes at a time, estimated from flows spread over the map. If the flows
+/// are too many to be kept, those in memory are neighbours, and all of them may be as large as the largest.
+fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
+    let flows = parts.count() as u64;
+    let steps = match scene.integration().steps_per_period {
+        Steps::Auto => None,
+        Steps::PerPeriod(steps) => Some(steps),
+    };
+    let sampled = flows.min(SAMPLED_FLOWS);
+    let sizes = (0..sampled).map(|nth| {
+        // From the first flow to the last.
+        let flow = (flows - 1) * nth / (sampled - 1).max(1);
+        let model = scene.points().model(parts.cell(flow as u32));
+        model.oscillator().map_or(0, |oscillator| gpu::table_bytes(&oscillator, steps))
+    });
+    if stores_flows(flows, runs) {
+        (sizes.sum::<u64>() as f64 / sampled as f64 * flows as f64) as u64
+    } else {
+        let largest = sizes.max().unwrap_or(0);
+        (flows.min(gpu::MOST_FLOWS as u64) * largest).min(gpu::MOST_BYTES.max(largest))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::Constants;
+    use crate::map::plan::Plan;
+    use crate::map::scene::Purpose;
+    use crate::record::RecordStore;
+    use rattlemap_dynamics::flow::Flow;
+
+    fn scene(second: &str, min: f64, max: f64, counts: [usize; 2], sets: &[&str]) -> Scene {
+        let [columns, rows] = counts;
+        let text = format!(
+            "[[axis]]\nparameter = 'e'\nmin = 0.25\nmax = 0.75\ncount = {columns}\n\
+             [[axis]]\nparameter = '{second}'\nmin = {min:?}\nmax = {max:?}\ncount = {rows}\n"
+        );
+        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+        Scene::parse(&text, "s", &sets, Purpose::Map).unwrap()
+    }
+
+    #[test]
+    fn estimates_of_flows_and_constants_are_close_upper_bounds() {
+        for (second, min, max) in
+            [("omega", 1.0, 12.0), ("omega", 0.01, 0.02), ("k", 1e3, 1e7), ("r1", 0.0, 9.0)]
+        {
+            let scene = scene(second, min, max, [5, 400], &[]);
+            let (plan, parts) = (Plan::new(&scene), Parts::flows(scene.points()));
+            assert!(plan.stores_flows());
+            let oscillators: Vec<_> =
+                (0..plan.flow_count() as u32).map(|flow| plan.oscillator(flow)).collect();
+            let flows: usize = oscillators.iter().map(|oscillator| Flow::new(oscillator).bytes()).sum();
+            let ratio = kept_flows(&parts, scene.run_count()) as f64 / flows as f64;
+            assert!((1.0..2.0).contains(&ratio), "{second}: {ratio}");
+            let of = |constants: Constants| {
+                size_of::<Constants>() + size_of::<[f64; 2]>() * constants.phasors.capacity()
+            };
+            let one_copy: usize =
+                oscillators.iter().filter_map(|oscillator| Constants::new(oscillator, None)).map(of).sum();
+            let copies = lane_tables(&scene, &parts, scene.run_count()) as f64 / one_copy as f64;
+            assert!((4.5..5.5).contains(&copies), "{second}: {copies} copies");
+        }
+    }
+
+    #[test]
+    fn only_flows_in_memory_at_a_time_are_counted() {
+        let sizes = |scene: &Scene| {
+            let (parts, runs) = (Parts::flows(scene.points()), scene.run_count());
+            (lane_tables(scene, &parts, runs), kept_flows(&parts, runs))
+        };
+        let one = |scene: &Scene| gpu::table_bytes(&scene.base().oscillator().unwrap(), None);
+        // One flow: e and mesh_speed belong to the contact law.
+        let single = scene("mesh_speed", 0.001, 0.01, [300, 300], &[]);
+        assert_eq!(sizes(&single), (one(&single), FLOW));
+        let too_many = scene("k", 1e3, 1e4, [2, 100_000], &[]);
+        assert_eq!(sizes(&too_many), (gpu::MOST_FLOWS as u64 * one(&too_many), 0));
+        assert_eq!(sizes(&scene("omega", 0.002, 0.003, [2, 10_000], &[])).0, gpu::MOST_BYTES);
+    }
+
+    #[test]
+    fn the_estimate_for_a_merged_map_is_the_size_of_its_store() {
+        for (quantities, more, per_run) in [
+            ("['class','lyapunov']", None, 24),
+            ("['impacts']", None, 16),
+            ("['class','lyapunov','impacts','mesh','symmetric','word','pattern']", None, 48),
+            ("['class']", Some("start.count=3"), 56),
+            ("['class','mesh']", Some("start.policy='up'"), 64),
+        ] {
+            let quantities = format!("outputs.quantities={quantities}");
+            let sets: Vec<&str> = [&*quantities].into_iter().chain(more).collect();
+            let scene = scene("omega", 0.25, 0.75, [10, 10], &sets);
+            let plan = Plan::new(&scene);
+            let (needs, runs) = (plan.needs(), plan.run_count());
+            let number = |is_needed: bool| if is_needed { 0.5 } else { 0.0 };
+            let mut record = Record {
+                lyapunov: number(needs.exponent),
+                lyapunov_error: number(needs.exponent),
+                impacts_per_period: number(needs.impacts),
+                mesh_fraction: number(needs.mesh),
+                strobe: [1.0; 4],
+                period: 1,
+                periods_run: 100,
+                ..Record::default()
+            };
+            if needs.word {
+                let word = rattlemap_dynamics::word::Word::cyclic(b"13");
+                record.set_word(&word);
+                record.set_pattern(&word);
+            }
+            let mut store = RecordStore::new(runs, plan.reads_strobes());
+            (0..runs).for_each(|id| store.put(id, &record));
+            assert_eq!((store.bytes(), stored_run(&scene)), (per_run * runs, per_run as u64), "{more:?}");
+        }
+    }
+
+    #[test]
+    fn a_map_that_does_not_fit_is_refused_with_a_remedy() {
+        // So slow a forcing that the constants of each flow have 650 kB.
+        let scene =
+            |files: &str| scene("omega", 0.002, 0.003, [2, 8_000], &[&format!("outputs.files=[{files}]")]);
+        let [png, all] = [scene("'png'"), scene("'csv','npy','png','html'")];
+        let check = |kind, memory, disk| check_map(&all, None, kind, &Free { memory, disk });
+        assert!(check(EngineKind::Cpu, Some(2_000_000_000), None).is_ok());
+        for kind in [EngineKind::Gpu, EngineKind::Auto] {
+            let text = check(kind, Some(2_000_000_000), None).unwrap_err().to_string();
+            assert!(text.contains("GB of memory, and 2.0 GB are free"), "{text}");
+            assert!(text.contains("or give --engine cpu"), "{text}");
+        }
+        assert!(check(EngineKind::Gpu, None, None).is_ok(), "an unknown amount is enough");
+        let [png, disk] = [&png, &all].map(|scene| Size::of(scene, None).disk);
+        assert!(disk > 3 * png, "{disk} {png}");
+        assert!(check(EngineKind::Cpu, None, Some(disk)).is_ok());
+        let text = check(EngineKind::Cpu, None, Some(png)).unwrap_err().to_string();
+        assert!(text.contains("of disk, and") && text.contains("--out"), "{text}");
+        let out = tempfile::tempdir().unwrap();
+        for name in ["records.bin", "cells.csv", "report.html", "notes.txt"] {
+            std::fs::write(out.path().join(name), [0; 1000]).unwrap();
+        }
+        assert_eq!(replaced(out.path()), 3000);
+    }
+}

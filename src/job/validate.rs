@@ -1,0 +1,238 @@
+//! Validates a finished map: computes a sample of its cells again and compares.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use crate::gpu::{self, AdapterChoice, Gpu, Precision};
+use crate::job::check;
+use crate::job::error::JobError;
+use crate::job::finished::{self, LoadedMap, damage, repair_command};
+use crate::job::observer::Observer;
+use crate::map::plan::Plan;
+use crate::map::scene::Scene;
+use crate::show::cells::Survey;
+use crate::store::finished_map::{FinishedMap, StoredManifest};
+use crate::store::folder::Folder;
+use crate::store::inventory::Finding;
+use crate::store::map::{self, MANIFEST, Provenance, VALIDATION};
+use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
+
+/// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
+const NAMED_CELLS: usize = 8;
+
+/// A finished map whose sample is to be computed again.
+pub struct ValidateJob {
+    folder: Folder,
+    map: FinishedMap,
+    scene: Scene,
+    loaded: LoadedMap,
+    survey: Survey,
+    precision: Precision,
+    sample: Sample,
+    findings: Vec<Finding>,
+}
+
+/// Cells of the sample that were computed again as lanes.
+pub struct SampleLanes {
+    lanes: Lanes,
+    /// Remark on the device, if it is not the map's own.
+    pub note: Option<String>,
+}
+
+impl SampleLanes {
+    /// The device that computed them. None if no device did.
+    pub fn device(&self) -> Option<&str> {
+        self.lanes.device.as_deref()
+    }
+}
+
+impl ValidateJob {
+    /// Locks the folder, reads the map, and draws a sample of its cells with a seed. Damaged and unknown files are reported to
+    /// the observer.
+    ///
+    /// # Errors
+    /// [`JobError`] if the folder is not that of a finished map of this version, or the map cannot be read.
+    pub fn open(
+        dir: &Path,
+        samples: usize,
+        seed: u64,
+        observer: &dyn Observer,
+    ) -> Result<ValidateJob, JobError> {
+        finished::require_folder(dir)?;
+        // The lock comes first: another run must not replace the map between reading and writing.
+        let folder = Folder::open(dir, true)?;
+        folder.refuse_links(map::names())?;
+        let map = FinishedMap::open_own(dir)?;
+        let findings = check::findings(dir, &map.manifest().files)?;
+        for finding in &findings {
+            let text = format!("{}: {finding}", dir.display());
+            if finding.is_lost() { observer.warn(&text) } else { observer.note(&text) }
+        }
+        let scene = finished::scene(&map)?;
+        let mut loaded = LoadedMap::read(&map, &scene, observer)?;
+        let precision = precision(map.manifest())?;
+        let survey = loaded.survey();
+        let sample = validate::sample(&loaded.plan, &loaded.stored.records, samples, seed);
+        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, findings })
+    }
+
+    /// The locked folder.
+    pub fn folder(&self) -> &Folder {
+        &self.folder
+    }
+
+    /// Number of cells in the sample.
+    pub fn sample_count(&self) -> usize {
+        self.sample.ids().len()
+    }
+
+    fn subject(&self) -> Subject<'_> {
+        Subject {
+            plan: &self.loaded.plan,
+            records: &self.loaded.stored.records,
+            precision: self.precision,
+            is_lane: self.map.manifest().engine == "gpu",
+        }
+    }
+
+    /// Computes the sample's lanes again: on the device that made the map, else on the best adapter; and in f64 where an
+    /// adapter has it. Drivers may compile for a while without regard to `halt`.
+    ///
+    /// # Errors
+    /// [`JobError::Failed`] if a device fails.
+    pub fn run_lanes(&self, halt: &Arc<AtomicBool>) -> Result<SampleLanes, JobError> {
+        let subject = self.subject();
+        let open =
+            |precision: Precision, choice: &AdapterChoice| pollster::block_on(Gpu::open(precision, choice));
+        let (own, any) = (AdapterChoice::named(&self.map.manifest().device), AdapterChoice::default());
+        let (mut gpu, note) = match subject.is_lane.then(|| open(subject.precision, &own)) {
+            None => (None, None),
+            Some(Ok(gpu)) => (Some(gpu), None),
+            Some(Err(why)) => match open(subject.precision, &any) {
+                Ok(gpu) => {
+                    let device = gpu::describe(gpu.adapter());
+                    let note = format!("lanes ran again on {device}, not on the map's own device: {why}");
+                    (Some(gpu), Some(note))
+                }
+                Err(_) => (None, Some(format!("lanes did not run again: {why}"))),
+            },
+        };
+        let is_double = subject.is_lane && subject.precision == Precision::F64;
+        let mut double = match is_double {
+            true => None,
+            false => open(Precision::F64, &own).or_else(|_| open(Precision::F64, &any)).ok(),
+        };
+        gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.stop_on(halt));
+        let lanes = pollster::block_on(Lanes::run(&subject, &self.sample, gpu.as_mut(), double.as_mut()));
+        let lanes = lanes
+            .map_err(|error| JobError::Failed(format!("cannot compute the sample's lanes again: {error}")))?;
+        Ok(SampleLanes { lanes, note })
+    }
+
+    /// Replays the sample without early stops, and compares it with the map. `report` receives the number of replayed cells.
+    /// Returns none if `halt` was raised before the last one.
+    pub fn replay(
+        &self,
+        lanes: &SampleLanes,
+        report: &(impl Fn(usize) + Sync),
+        halt: &AtomicBool,
+    ) -> Option<Validation> {
+        let basins = self.survey.basins();
+        validate::replay_until(&self.subject(), basins, &self.sample, &lanes.lanes, report, halt)
+    }
+
+    /// Writes [`VALIDATION`] and its section of the report. Returns the files' names.
+    ///
+    /// # Errors
+    /// [`JobError::Output`] if a file cannot be written.
+    pub fn write(
+        &self,
+        lanes: &SampleLanes,
+        validation: &Validation,
+        elapsed: Duration,
+    ) -> Result<Vec<&'static str>, JobError> {
+        let cells = self.loaded.cells(&self.scene, &self.survey);
+        let StoredManifest { engine, precision, device, .. } = self.map.manifest();
+        let provenance = Provenance { engine, precision, device };
+        Ok(map::write_validation(&self.folder, &cells, &provenance, lanes.device(), validation, elapsed)?)
+    }
+
+    /// Checks that the map is valid, and that no file of the folder is damaged or missing but for the `written` ones.
+    ///
+    /// # Errors
+    /// [`JobError::Failed`].
+    pub fn require_valid(&self, validation: &Validation, written: &[&str]) -> Result<(), JobError> {
+        let dir = self.folder.path();
+        verdict(dir, &self.loaded.plan, validation)?;
+        let is_left = |finding: &&Finding| finding.is_lost() && !written.contains(&finding.name.as_str());
+        let left: Vec<&Finding> = self.findings.iter().filter(is_left).collect();
+        match left.is_empty() {
+            true => Ok(()),
+            false => Err(JobError::Failed(format!(
+                "{}; `{}` makes again what can be made from the records",
+                damage(dir, left),
+                repair_command(dir)
+            ))),
+        }
+    }
+}
+
+fn precision(manifest: &StoredManifest) -> Result<Precision, JobError> {
+    match (manifest.engine.as_str(), manifest.precision.as_str()) {
+        ("cpu" | "gpu", "f64") => Ok(Precision::F64),
+        ("gpu", "f32") => Ok(Precision::F32),
+        (engine, precision) => {
+            Err(JobError::Usage(format!("{MANIFEST}: no engine `{engine}` computes in `{precision}`")))
+        }
+    }
+}
+
+fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), JobError> {
+    let faults = validation.faults();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    let unexplained = validation.mismatches.iter().filter(|mismatch| mismatch.kind == Kind::Unexplained);
+    let mut ids: Vec<u32> =
+        unexplained.map(|mismatch| mismatch.id).chain(validation.not_finite.clone()).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    let more = if ids.len() > NAMED_CELLS { ", ..." } else { "" };
+    let name = |id: u32| {
+        let [i, j] = plan.indices(id);
+        if plan.is_list() { i.to_string() } else { format!("({i}, {j})") }
+    };
+    let named: Vec<String> = ids.into_iter().take(NAMED_CELLS).map(name).collect();
+    let cells = if named.is_empty() { String::new() } else { format!(": cells {}{more}", named.join(" ")) };
+    Err(JobError::Failed(format!(
+        "{}{cells}; {} lists them, each with the command that replays it",
+        faults.join("; "),
+        dir.join(VALIDATION).display()
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::scene::Purpose;
+    use crate::record::{Record, valid};
+
+    /// All cells of the map are filled, so none can be replayed.
+    #[test]
+    fn a_validation_without_replayed_cells_fails() {
+        let axis = |name: &str| format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1\ncount = 2\n");
+        let text = ["e", "omega"].map(axis).concat();
+        let plan = Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap());
+        let records = vec![Record { valid: valid::FILLED, ..Record::default() }; 4];
+        let subject = Subject { plan: &plan, records: &records, precision: Precision::F64, is_lane: true };
+        let sample = validate::sample(&plan, &records, 4, 1);
+        let validation = validate::replay(&subject, &sample, &Lanes::default(), &|_| {});
+        let error = verdict(Path::new("o"), &plan, &validation).unwrap_err();
+        assert!(
+            !error.is_usage() && error.to_string().starts_with("none of 4 cells was replayed"),
+            "{error}"
+        );
+    }
+}
