@@ -13,7 +13,10 @@ use serde::Serialize;
 ///
 /// # Errors
 /// If the table cannot be written.
-pub fn write_rows<R: Serialize>(out: impl Write, rows: impl IntoIterator<Item = R>) -> Result<(), WriteError> {
+pub fn write_rows<R: Serialize>(
+    out: impl Write,
+    rows: impl IntoIterator<Item = R>,
+) -> Result<(), WriteError> {
     let mut writer = csv::Writer::from_writer(out);
     rows.into_iter().try_for_each(|row| writer.serialize(row))?;
     Ok(writer.flush()?)

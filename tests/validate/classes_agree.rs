@@ -91,7 +91,10 @@ fn lanes_agree_with_every_row_of_the_independent_programs_table() {
             assert_eq!(classify(record), row.class(), "{at}");
             let exponent_error = (record.lyapunov - row.lyapunov).abs();
             if row.is_chaotic() {
-                assert!(exponent_error < 4.0 * record.lyapunov_error.hypot(row.lyapunov_error.unwrap()), "{at}");
+                assert!(
+                    exponent_error < 4.0 * record.lyapunov_error.hypot(row.lyapunov_error.unwrap()),
+                    "{at}"
+                );
                 assert!((record.impacts_per_period / row.impacts_per_period - 1.0).abs() < 0.05, "{at}");
                 continue;
             }

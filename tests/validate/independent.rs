@@ -171,7 +171,10 @@ fn no_event_is_missed() {
                 assert!(depth >= -STRAY, "{what}: meshing fell through its wall at {t} of {leg:#?}");
             } else if depth < -STRAY {
                 let pressing = s * motion.relative_acceleration(t, y);
-                assert!(pressing > -STRAY, "{what}: a change of sign of the contact force was missed at {t} of {leg:#?}");
+                assert!(
+                    pressing > -STRAY,
+                    "{what}: a change of sign of the contact force was missed at {t} of {leg:#?}"
+                );
             }
         }
     });

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use crate::common::gpu::{map, open};
 use crate::fixtures::{
-    cpu_identity, cpu_records, kind, kinds, read_records, sample_of, unexplained, validate_all, validate_first,
-    validate_runs,
+    cpu_identity, cpu_records, kind, kinds, read_records, sample_of, unexplained, validate_all,
+    validate_first,
 };
 use assert_cmd::Command;
 use rattlemap::gpu::Precision;
@@ -18,7 +18,9 @@ use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
 use rattlemap::store::inventory;
 use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
-use rattlemap::validate::{Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, independent, replay, sample};
+use rattlemap::validate::{
+    Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, independent, replay, sample,
+};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::{Class, Status};

@@ -37,12 +37,8 @@ pub(crate) fn first_plan(group: &str) -> Plan {
 
 /// Returns a plan of 64 periods whose first cell is this one. The swept parameters have no upper bound.
 pub(crate) fn plan(pair: GearPair, start: State) -> Plan {
-    let integration = Integration {
-        transient_periods: 32,
-        observed_periods: 32,
-        max_period: 16,
-        ..Integration::default()
-    };
+    let integration =
+        Integration { transient_periods: 32, observed_periods: 32, max_period: 16, ..Integration::default() };
     let scene = Scene::builder(pair)
         .axis("omega", pair.omega..=2.0 * pair.omega + 1.0, 2)
         .axis("mesh_speed", pair.mesh_speed..=2.0 * pair.mesh_speed + 1.0, 2)

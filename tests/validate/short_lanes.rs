@@ -151,7 +151,8 @@ fn damped_modes_are_summed_to_rounding() {
     // fraction, a sum of 484 phase differences, scatters in f32 by at most 6.2e-7 over 24 such starts.
     let expected = reference(&scattered);
     let [exponent, _] = expected.lyapunov.unwrap();
-    for (precision, scatter, mesh_scatter) in [(Precision::F32, 0.0089, 1e-6), (Precision::F64, 1e-9, 1e-10)] {
+    for (precision, scatter, mesh_scatter) in [(Precision::F32, 0.0089, 1e-6), (Precision::F64, 1e-9, 1e-10)]
+    {
         let record = lane(&scattered, precision);
         assert_eq!(classify(&record), Class::Periodic { period: 1 }, "{precision:?}: {record:?}");
         assert_eq!(record.impacts_per_period, 484.0, "{precision:?}: {record:?}");
@@ -164,7 +165,11 @@ fn damped_modes_are_summed_to_rounding() {
             [(exponent - 2.0 * 0.0089, expected.mesh_fraction), (exponent, expected.mesh_fraction + 2e-3)]
         {
             let wrong = Record { lyapunov, mesh_fraction, ..record };
-            assert_eq!(kind(&scattered, wrong, precision), Some(Kind::Unexplained), "{precision:?}: {wrong:?}");
+            assert_eq!(
+                kind(&scattered, wrong, precision),
+                Some(Kind::Unexplained),
+                "{precision:?}: {wrong:?}"
+            );
         }
     }
 }

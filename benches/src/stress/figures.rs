@@ -180,7 +180,9 @@ pub(super) fn stiffness(out: impl Write, device: &str, rows: &[stiffness::Row]) 
         lanes.map(errors).into_iter().chain([spread, scatter]).chain(lanes.map(rounding)).collect();
     let figure = Figure {
         title: "Error against meshing stiffness, 8 forcing periods from rest: level is good, lower is better",
-        subtitle: &format!("largest error of four motions with meshing; stiffness of the supports 30; {device}"),
+        subtitle: &format!(
+            "largest error of four motions with meshing; stiffness of the supports 30; {device}"
+        ),
         labels: ["meshing stiffness k", "largest difference of states"],
     };
     save(out, &figure, &groups)

@@ -193,8 +193,7 @@ fn measure_motions(
     rows: &mut Vec<Motion>,
 ) -> Result<(), GpuError> {
     let starts: Vec<Start> = motions.iter().map(|&(e, omega)| (paper(e, omega), REST)).collect();
-    let exact: Vec<_> =
-        starts.par_iter().map(|(pair, start)| run_reference(pair, *start, PERIODS)).collect();
+    let exact: Vec<_> = starts.par_iter().map(|(pair, start)| run_reference(pair, *start, PERIODS)).collect();
     for precision in lanes.precisions() {
         let engine = EngineName::from(precision);
         let sensitivities: Vec<f64> =

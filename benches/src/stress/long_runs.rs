@@ -175,8 +175,5 @@ pub fn judge(rows: &[Row]) -> Verdict {
         by_engine.push(format!("{} {:.1e} after {longest} periods", engine.name(), at(longest)));
     }
     let grows = if holds { "no error grows" } else { "an error GROWS" };
-    Verdict {
-        holds,
-        sentence: format!("{grows} on 8 stable cycles: largest {}", by_engine.join(", ")),
-    }
+    Verdict { holds, sentence: format!("{grows} on 8 stable cycles: largest {}", by_engine.join(", ")) }
 }
