@@ -64,14 +64,14 @@ since() { awk -v from="$1" -v to="$(now)" 'BEGIN { printf "%.3f", to - from }'; 
 
 # A run that is stopped has five seconds to write its results.
 deadline=$((${MEASURE_SECONDS:-480} - 7))
-left() { echo $((deadline - SECONDS)); }
+remaining() { echo $((deadline - SECONDS)); }
 longest_run=$((deadline / 8 > 20 ? deadline / 8 : 20))
 
 # limited SECONDS COMMAND...: stops the command after that time or at the deadline. Exit codes: 124 and 137 for a stopped
 # command, 125 for one that was not started.
 limited() {
     local seconds="$1" rest
-    rest="$(left)"
+    rest="$(remaining)"
     shift
     ((seconds <= rest)) || seconds="$rest"
     ((seconds >= 1)) || return 125
@@ -235,7 +235,7 @@ compile() {
 # Runs `bench engines`, which ends soon after its budget.
 engines() {
     local rest budget code=0
-    rest="$(left)"
+    rest="$(remaining)"
     budget="${ENGINES_SECONDS:-$((rest / 2))}"
     if ((budget < 20)); then
         missing "engines: no time was left"
@@ -254,7 +254,7 @@ again() {
     local run what precision wall
     for run in 2 3; do
         while IFS=, read -r what precision _ wall _; do
-            awk -v wall="$wall" -v rest="$(left)" 'BEGIN { exit !(wall != "" && 1.5 * wall + 1 < rest) }' || continue
+            awk -v wall="$wall" -v rest="$(remaining)" 'BEGIN { exit !(wall != "" && 1.5 * wall + 1 < rest) }' || continue
             settings "$what"
             timed "$what" "$precision" "$run" "${sets[@]}"
             summary

@@ -26,7 +26,7 @@ pub(crate) enum Instrument {
 /// Error of strobe states and event times against run time per period, for every method
 ///
 /// All methods integrate the same cells: lanes in f32 and f64, classical Runge-Kutta in WGSL and on one core,
-/// semi-implicit Euler, DOP853 and the reference. Methods run alternately. Writes work_precision.csv, figures for the worst
+/// DOP853 and the reference. Methods run alternately. Writes work_precision.csv, figures for the worst
 /// cell, the median cell and event times, cells.json for other programs (benches/peers) and manifest.json. Prints the
 /// ratios of run time at equal error. Takes minutes and needs an idle machine.
 #[derive(Debug, Args)]

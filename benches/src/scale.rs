@@ -9,25 +9,24 @@ mod stretched;
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Result;
 use rattlemap::gpu::Constants;
 use rattlemap::job;
-use rattlemap::job::run::{MapError, Processor};
+use rattlemap::job::run::Processor;
 use rattlemap::map::plan::Plan;
-use rattlemap::map::scene::{Quantity, Scene, SceneError};
+use rattlemap::map::scene::{Quantity, Scene};
 use rattlemap::map::schedule::Schedule;
 use rattlemap::map::shard::Shard;
 use rattlemap::model::GearPair;
 use rattlemap::record::Record;
-use rattlemap::store::error::OutputError;
-use rattlemap::store::folder::{Folder, FolderError};
+use rattlemap::store::folder::Folder;
 use rattlemap::store::map::{Provenance, Run};
-use rattlemap::store::merge::{MergeError, Parts};
-use rattlemap::store::record_file::{Identity, RECORDS, RecordFile, RecordFileError};
+use rattlemap::store::merge::Parts;
+use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
 use rattlemap::store::shard::{self, Finished, Tally};
 use rattlemap_dynamics::flow::Flow;
 use rayon::prelude::*;
 use serde::Serialize;
-use thiserror::Error;
 
 pub use phase::Cost;
 pub use stretched::Stretched;
@@ -48,24 +47,6 @@ pub struct Sizes {
     pub all: bool,
 }
 
-/// Why a measurement fails.
-#[derive(Debug, Error)]
-#[expect(missing_docs, reason = "each wraps another error")]
-pub enum ScaleError {
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    #[error(transparent)]
-    Map(#[from] MapError),
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    #[error(transparent)]
-    Records(#[from] RecordFileError),
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    #[error(transparent)]
-    Merge(#[from] MergeError),
-}
-
 /// The size of a file.
 #[derive(Clone, Debug, Serialize)]
 pub struct FileSize {
@@ -78,27 +59,27 @@ pub struct FileSize {
 }
 
 /// Returns a scene like `scenes/e_omega.toml`.
-fn scene(counts: [u32; 2], all: bool) -> Result<Scene, SceneError> {
+fn scene(counts: [u32; 2], all: bool) -> Result<Scene> {
     use Quantity::{Class, Impacts, Lyapunov, Mesh, Pattern, Symmetric, Word};
     let builder = Scene::builder(GearPair::paper(0.5));
     let builder = builder.axis("e", 0.0..=1.0, counts[0]).axis("omega", 1.0..=12.0, counts[1]);
     let everything = [Class, Lyapunov, Impacts, Mesh, Symmetric, Word, Pattern];
-    if all { builder.quantities(&everything).build() } else { builder.build() }
+    Ok(if all { builder.quantities(&everything) } else { builder }.build()?)
 }
 
 /// Writes the shards into folders in `dir`. Returns the folders and the cost of each phase, among them what a shard does
 /// before its first cell.
 ///
 /// # Errors
-/// [`ScaleError`].
-pub fn write_shards(sizes: Sizes, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Cost>), ScaleError> {
+/// If a file cannot be read or written.
+pub fn write_shards(sizes: Sizes, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Cost>)> {
     let small = job::run(&scene([sizes.small; 2], sizes.all)?, Processor::Cpu)?;
     let scene = scene(sizes.counts, sizes.all)?;
     let stretched = Stretched::new(&small, sizes.counts.map(|count| count as usize));
     let mut costs = Vec::new();
     let plan = phase::run("plan", &mut costs, || {
         let plan = Plan::new(&scene);
-        plan.check().map(|()| plan).map_err(MapError::from)
+        plan.check().map(|()| plan)
     })?;
     phase::run("schedule of a shard", &mut costs, || {
         drop(Schedule::of(&plan, Shard::all(sizes.shards).next()));
@@ -111,7 +92,7 @@ pub fn write_shards(sizes: Sizes, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Cost>
         all().map(|oscillator| Flow::new(&oscillator)).collect()
     }));
     let own = Identity::new("cpu", "f64", "event-driven reference", scene.identity());
-    let write = |of: Shard| -> Result<PathBuf, ScaleError> {
+    let write = |of: Shard| -> Result<PathBuf> {
         let folder = Folder::open(&dir.join(format!("shard-{}-of-{}", of.index(), of.count())), true)?;
         let mut file = RecordFile::create(&folder.path().join(RECORDS), &own.clone().of_shard(Some(of)))?;
         let mut tally = Tally::default();
@@ -125,7 +106,7 @@ pub fn write_shards(sizes: Sizes, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Cost>
         shard::write(&folder, &Finished { shard: of, scene: &scene, plan: &plan, run: &run, tally: &tally })?;
         Ok(folder.path().to_owned())
     };
-    let folders: Result<_, _> =
+    let folders: Result<_> =
         phase::run("shards", &mut costs, || Shard::all(sizes.shards).map(write).collect());
     Ok((folders?, costs))
 }
@@ -133,8 +114,8 @@ pub fn write_shards(sizes: Sizes, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Cost>
 /// Merges the shards. Returns the cost of each phase and the names of the files.
 ///
 /// # Errors
-/// [`ScaleError`].
-pub fn merge(shards: &[PathBuf], out: &Path) -> Result<(Vec<Cost>, Vec<String>), ScaleError> {
+/// If a file cannot be read or written.
+pub fn merge(shards: &[PathBuf], out: &Path) -> Result<(Vec<Cost>, Vec<String>)> {
     let folder = Folder::open(out, true)?;
     let mut costs = Vec::new();
     let parts = phase::run("look at shards", &mut costs, || Parts::open(shards))?;

@@ -11,7 +11,6 @@
 //! | lane, f32 and f64 ([`rattlemap::gpu`]) | 16 to 1024 per period, never fewer than one per radian of the fastest free mode | device | from a variant of the shader |
 //! | classical Runge-Kutta, f32 and f64, in WGSL: in one loop as in papers, and in the two phases of lanes | 64 to 8192 per period | device | from a variant of the shader |
 //! | classical Runge-Kutta ([`fixed_step`]) | 64 to 8192 per period | one core | yes |
-//! | semi-implicit Euler ([`fixed_step`]) | 64 to 8192 per period | one core | yes |
 //! | DOP853 of `ode_solvers` ([`adaptive`]) | tolerance 1e-4 to 1e-12 | one core | yes |
 //! | reference ([`mod@rattlemap_dynamics::reference`]) | none | one core | its errors are zero by definition |
 //!

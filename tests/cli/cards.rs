@@ -1,6 +1,6 @@
-//! Several cards: numbers and names, one map by all of them, one that is lost on the way.
+//! Several cards: their numbers and names, maps that all of them compute, and the loss of one.
 //!
-//! Where there is Mesa's software driver it is listed twice to the loader: two adapters of one name.
+//! The loader of Vulkan gets Mesa's software driver twice, which makes two adapters with equal names.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,9 +15,9 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::common::says;
-use crate::faults::{SCENE, build_layer};
+use crate::faults::{SCENE, build_layer, calls, use_layer};
 
-/// Folders in which loaders look for drivers.
+/// Folders in which the loader searches drivers.
 const DRIVERS: [&str; 3] = ["/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
 
 const GPU: [&str; 5] = ["map", "s.toml", "--quiet", "--engine", "gpu"];
@@ -29,12 +29,12 @@ struct Machine {
 }
 
 impl Machine {
-    /// None where there is no software driver to be listed twice, which is said.
+    /// Returns `None`, and prints it, if there is no software driver.
     fn new() -> Option<Machine> {
         let Some(driver) = software_driver() else {
-            // Past the harness, which keeps what passing tests print.
+            // The test harness hides the output of `println!` in passing tests.
             let mut stderr = std::io::stderr();
-            writeln!(stderr, "SKIPPED: no lavapipe that could be listed twice").unwrap();
+            writeln!(stderr, "SKIPPED: there is no lavapipe").unwrap();
             return None;
         };
         let folder = tempfile::tempdir().unwrap();
@@ -60,23 +60,16 @@ impl Machine {
         command
     }
 
-    /// A map in a folder of its own.
+    /// Returns the command of a map.
     fn map(&self, out: &str, arguments: &[&str]) -> Command {
         self.command(&[&GPU, arguments, &["--out", out]].concat())
     }
 
-    /// The same over a layer that lets calls fail; the layer writes how often each was made to `calls`.
+    /// Returns the command of a map whose calls of the driver fail. The layer counts the calls.
     fn failing_map(&self, out: &str, arguments: &[&str], fault: &str) -> Command {
-        let path = self.folder.path();
         let mut command = self.map(out, arguments);
-        command.env("VK_LAYER_PATH", path).env("VK_INSTANCE_LAYERS", "VK_LAYER_RATTLEMAP_faults");
-        command.env("RATTLEMAP_CALLS", path.join("calls")).env("RATTLEMAP_FAULT", fault);
+        use_layer(&mut command, self.folder.path()).env("RATTLEMAP_FAULT", fault);
         command
-    }
-
-    fn submissions(&self) -> u32 {
-        let text = fs::read_to_string(self.folder.path().join("calls")).unwrap();
-        text.lines().find_map(|line| line.strip_prefix("vkQueueSubmit ")?.parse().ok()).unwrap()
     }
 
     fn file(&self, out: &str, name: &str) -> PathBuf {
@@ -91,7 +84,7 @@ impl Machine {
         fs::read(self.file(out, "cells.csv")).unwrap()
     }
 
-    /// What was computed, by cell.
+    /// Returns the records by cell.
     fn records(&self, out: &str) -> BTreeMap<u32, String> {
         let path = self.file(out, "records.bin");
         let identity = Identity::read(&path).unwrap().unwrap();
@@ -104,7 +97,7 @@ impl Machine {
         all
     }
 
-    /// Cells that each card computed, by its number, and why those were lost that were.
+    /// Returns the number of cells that each card computed, and why it was lost if it was.
     fn cards(&self, out: &str) -> Vec<(u64, Option<String>)> {
         let manifest = self.manifest(out);
         let cards = manifest["cards"].as_array().unwrap();
@@ -125,7 +118,7 @@ fn software_driver() -> Option<PathBuf> {
 }
 
 #[test]
-fn equal_cards_are_told_apart_by_their_numbers() {
+fn equal_cards_differ_by_their_numbers() {
     let Some(machine) = Machine::new() else { return };
     machine
         .command(&["devices"])
@@ -145,7 +138,7 @@ fn equal_cards_are_told_apart_by_their_numbers() {
     refused(&["--adapter", " "], &["a number or part of a name that `rattlemap devices` lists, or all"]);
     let cpu = machine.command(&["map", "s.toml", "--engine", "cpu", "--adapter", "0"]).assert();
     cpu.code(2).stderr(says(&["--adapter 0: the CPU engine runs on no graphics adapter"]));
-    // It goes before the environment, and says which it is.
+    // --adapter has priority over the environment, and the manifest names the adapter.
     let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--json", "--adapter", "1"];
     let run = machine.map("one", &few).env("WGPU_ADAPTER_NAME", "no such thing").assert().success();
     let summary: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
@@ -157,14 +150,17 @@ fn equal_cards_are_told_apart_by_their_numbers() {
 }
 
 #[test]
-fn all_cards_make_the_map_that_one_makes() {
+fn all_cards_compute_the_map_of_one() {
     let Some(machine) = Machine::new() else { return };
     machine.map("one", &["--adapter", "1"]).assert().success();
-    // Where the engine is left open an adapter that is asked for is taken.
+    // Without --engine, --adapter selects the GPU engine.
     let auto = ["map", "s.toml", "--adapter", "all", "--out", "all", "--json"];
     let run = machine.command(&auto).assert().success();
-    let said = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
-    assert!(said.contains("gpu (f32): by --adapter") && said.contains("\n  adapter 1 (llvmpipe"), "{said}");
+    let message = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
+    assert!(
+        message.contains("gpu (f32): by --adapter") && message.contains("\n  adapter 1 (llvmpipe"),
+        "{message}"
+    );
     assert!(machine.table("all") == machine.table("one"));
     assert_eq!(machine.records("all"), machine.records("one"));
     let cards = machine.cards("all");
@@ -177,45 +173,50 @@ fn all_cards_make_the_map_that_one_makes() {
 }
 
 #[test]
-fn a_lost_card_leaves_its_cells_to_the_other() {
+fn another_card_computes_the_cells_of_a_lost_one() {
     let Some(machine) = Machine::new() else { return };
     if !build_layer(machine.folder.path()) {
         return;
     }
     let all = ["--adapter", "all"];
     machine.failing_map("whole", &all, "").assert().success();
-    let (whole, calls) = (machine.table("whole"), machine.submissions());
-    // Half of what one of the two submits.
-    let lost =
-        machine.failing_map("cut", &all, &format!("vkQueueSubmit:{}:-4:2", calls / 4)).assert().success();
-    let said = String::from_utf8_lossy(&lost.get_output().stderr).into_owned();
-    let warnings = said.lines().filter(|line| line.starts_with("warning: adapter ")).count();
+    let (whole, submissions) = (machine.table("whole"), calls(machine.folder.path())["vkQueueSubmit"]);
+    // The second card fails after about half of its submissions.
+    let lost = machine
+        .failing_map("cut", &all, &format!("vkQueueSubmit:{}:-4:2", submissions / 4))
+        .assert()
+        .success();
+    let message = String::from_utf8_lossy(&lost.get_output().stderr).into_owned();
+    let warnings = message.lines().filter(|line| line.starts_with("warning: adapter ")).count();
     assert!(
-        warnings == 1 && said.contains(" was lost (") && said.contains(" cells go back to the queue"),
-        "{said}"
+        warnings == 1 && message.contains(" was lost (") && message.contains(" cells go back to the queue"),
+        "{message}"
     );
-    assert!(machine.table("cut") == whole && !said.contains("panicked"), "{said}");
+    assert!(machine.table("cut") == whole && !message.contains("panicked"), "{message}");
     let cards = machine.cards("cut");
     assert_eq!(cards.iter().map(|(cells, _)| cells).sum::<u64>(), 576);
     assert_eq!(cards.iter().filter(|(_, lost)| lost.is_some()).count(), 1, "{cards:?}");
-    // The last one ends the run as a single card would; another can go on with it, and the other way round.
-    let fault = format!("vkQueueSubmit:{}:-4", calls / 2);
+    // If all cards are lost, the run ends as with a single card, and one card can resume it.
+    let fault = format!("vkQueueSubmit:{}:-4", submissions / 2);
     let gone = machine.failing_map("gone", &all, &fault).assert().code(1);
-    let said = String::from_utf8_lossy(&gone.get_output().stderr).into_owned();
+    let message = String::from_utf8_lossy(&gone.get_output().stderr).into_owned();
     let go_on = "of 576 cells are kept; go on with: rattlemap map s.toml --out gone --engine gpu --adapter all --resume";
-    assert!(said.contains("error: ") && said.contains(go_on) && !said.contains("panicked"), "{said}");
+    assert!(
+        message.contains("error: ") && message.contains(go_on) && !message.contains("panicked"),
+        "{message}"
+    );
     machine.map("gone", &["--adapter", "0", "--resume"]).assert().success();
     assert!(machine.table("gone") == whole);
-    // One of them opens no device: the other does it alone.
+    // If one card opens no device, the other computes the map alone.
     let alone = machine.failing_map("alone", &all, "vkCreateDevice:2:-3").assert().success();
-    let said = String::from_utf8_lossy(&alone.get_output().stderr).into_owned();
-    assert!(said.contains("warning: adapter ") && said.contains(" is left out: "), "{said}");
+    let message = String::from_utf8_lossy(&alone.get_output().stderr).into_owned();
+    assert!(message.contains("warning: adapter ") && message.contains(" is left out: "), "{message}");
     assert!(machine.manifest("alone").get("cards").is_none() && machine.table("alone") == whole);
 }
 
-/// On a machine with one card the script's step is left out.
+/// The script omits this step on a machine with one card.
 #[test]
-fn all_cards_are_measured_against_one() {
+fn the_script_measures_all_cards() {
     let Some(machine) = Machine::new() else { return };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/measure_gpu.sh");
     let mut run = Process::new(script);
@@ -231,7 +232,7 @@ fn all_cards_are_measured_against_one() {
 }
 
 #[test]
-fn cards_that_are_stopped_keep_what_has_ended() {
+fn an_interrupt_keeps_the_finished_cells_of_all_cards() {
     let Some(machine) = Machine::new() else { return };
     let slow = ["--set", "integration.early_stop=false"];
     let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"));
@@ -239,19 +240,19 @@ fn cards_that_are_stopped_keep_what_has_ended() {
     run.args(GPU).args(slow).args(["--adapter", "all", "--out", "cut"]).stderr(Stdio::piped());
     let run = run.spawn().unwrap();
     let clock = Instant::now();
-    let kept = || fs::metadata(machine.file("cut", "records.bin")).map_or(0, |data| data.len());
-    // A header, then records.
+    let length = || fs::metadata(machine.file("cut", "records.bin")).map_or(0, |data| data.len());
+    // First the header is written, then records.
     let mut header = 0;
-    while (header == 0 || kept() <= header) && clock.elapsed() < Duration::from_secs(60) {
-        header = if header == 0 { kept() } else { header };
+    while (header == 0 || length() <= header) && clock.elapsed() < Duration::from_secs(60) {
+        header = if header == 0 { length() } else { header };
         std::thread::sleep(Duration::from_millis(20));
     }
     let clock = Instant::now();
     Process::new("kill").args(["-INT", &run.id().to_string()]).status().unwrap();
     let ended = run.wait_with_output().unwrap();
-    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(130), "{said}");
-    assert!(clock.elapsed() < Duration::from_secs(3), "{:?}: {said}", clock.elapsed());
+    let message = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(130), "{message}");
+    assert!(clock.elapsed() < Duration::from_secs(3), "{:?}: {message}", clock.elapsed());
     assert!(!machine.records("cut").is_empty());
     machine.map("cut", &[&slow[..], &["--adapter", "1", "--resume"]].concat()).assert().success();
     machine.map("one", &slow).assert().success();

@@ -1,7 +1,7 @@
-//! Drivers that fail: what happened, what is kept, how to go on, exit code 1; never a panic.
+//! Drivers that fail: the message names the fault, the stored cells and how to go on; the exit code is 1, without a panic.
 //!
-//! A Vulkan layer between the loader and the driver lets the Nth call of a function fail, see `faults/layer.c`.
-//! `RATTLEMAP_TORTURE=N` tries N faults, spread over all calls that a run makes.
+//! A Vulkan layer between the loader and the driver makes the Nth call of a function fail, see `faults/layer.c`.
+//! `RATTLEMAP_TORTURE=N` tries N more faults, spread over all calls of a run.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,7 +13,7 @@ use std::time::Duration;
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-/// Short enough to be run often: one program without exponents, which Mesa compiles in half a second.
+/// A fast map: one shader without exponents, which Mesa compiles in half a second.
 pub(crate) const SCENE: &str = r#"
 [[axis]]
 parameter = "e"
@@ -34,17 +34,17 @@ files = ["csv"]
 
 const RUN: [&str; 5] = ["map", "s.toml", "--quiet", "--engine", "gpu"];
 
-/// A run that does not end is none that fails.
+/// Time limit of a run.
 const LONGEST: Duration = Duration::from_secs(120);
 
-// Of `VkResult`.
+// Values of `VkResult`.
 const NO_HOST_MEMORY: i32 = -1;
 const NO_MEMORY: i32 = -2;
 const NOT_INITIALIZED: i32 = -3;
 const LOST: i32 = -4;
 const NOT_MAPPED: i32 = -5;
 
-/// Which call fails from when on, and what it says.
+/// The call that fails, the number of its first failure, and its result.
 type Fault<'a> = (&'a str, u32, i32);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +53,7 @@ enum End {
     Failed,
 }
 
-/// Puts the layer into a folder. False where there is no compiler for it, which is said.
+/// Builds the layer in a folder. Returns false, and prints it, if there is no C compiler.
 pub(crate) fn build_layer(path: &Path) -> bool {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/faults/layer.c");
     let mut compiler = Process::new("cc");
@@ -61,9 +61,9 @@ pub(crate) fn build_layer(path: &Path) -> bool {
     match compiler.arg(path.join("layer.so")).arg(source).status() {
         Ok(status) => assert!(status.success(), "the layer does not compile"),
         Err(_) => {
-            // Past the harness, which keeps what passing tests print.
+            // The test harness hides the output of `println!` in passing tests.
             let mut stderr = std::io::stderr();
-            writeln!(stderr, "SKIPPED: no C compiler to build the layer of faults with").unwrap();
+            writeln!(stderr, "SKIPPED: there is no C compiler to build the layer of faults").unwrap();
             return false;
         }
     }
@@ -76,29 +76,36 @@ pub(crate) fn build_layer(path: &Path) -> bool {
     true
 }
 
+/// Makes a command use the layer of a folder.
+pub(crate) fn use_layer<'c>(command: &'c mut Command, path: &Path) -> &'c mut Command {
+    command.env("VK_LAYER_PATH", path).env("VK_INSTANCE_LAYERS", "VK_LAYER_RATTLEMAP_faults");
+    command.env("RATTLEMAP_CALLS", path.join("calls"))
+}
+
+/// Returns the number of calls of each function in the last run with the layer.
+pub(crate) fn calls(path: &Path) -> BTreeMap<String, u32> {
+    let text = fs::read_to_string(path.join("calls")).unwrap();
+    let of = |line: &str| line.split_once(' ').map(|(name, n)| (name.to_owned(), n.parse().unwrap()));
+    text.lines().filter_map(of).filter(|&(_, count)| count > 0).collect()
+}
+
 struct Bench {
     folder: TempDir,
 }
 
 impl Bench {
-    /// None where there is no compiler for the layer, which is said.
+    /// Returns `None` if there is no compiler for the layer.
     fn new() -> Option<Bench> {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path();
-        if !build_layer(path) {
-            return None;
-        }
-        fs::write(path.join("s.toml"), SCENE).unwrap();
-        Some(Bench { folder })
+        fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+        build_layer(folder.path()).then_some(Bench { folder })
     }
 
-    /// Runs the program, over the layer if there is a fault.
+    /// Runs the program with the layer.
     fn run(&self, arguments: &[&str], fault: Option<Fault<'_>>) -> Output {
-        let path = self.folder.path();
         let mut command = Command::cargo_bin("rattlemap").unwrap();
-        command.current_dir(path).args(arguments).timeout(LONGEST);
-        command.env("VK_LAYER_PATH", path).env("VK_INSTANCE_LAYERS", "VK_LAYER_RATTLEMAP_faults");
-        command.env("RATTLEMAP_CALLS", path.join("calls"));
+        command.current_dir(self.folder.path()).args(arguments).timeout(LONGEST);
+        use_layer(&mut command, self.folder.path());
         if let Some((call, from, result)) = fault {
             command.env("RATTLEMAP_FAULT", format!("{call}:{from}:{result}"));
         }
@@ -109,14 +116,8 @@ impl Bench {
         fs::read(self.folder.path().join(out).join("cells.csv")).unwrap()
     }
 
-    /// How often each call was made in the last run.
-    fn calls(&self) -> BTreeMap<String, u32> {
-        let text = fs::read_to_string(self.folder.path().join("calls")).unwrap();
-        let of = |line: &str| line.split_once(' ').map(|(name, n)| (name.to_owned(), n.parse().unwrap()));
-        text.lines().filter_map(of).filter(|&(_, count)| count > 0).collect()
-    }
-
-    /// A map whose runs meet one fault each, and its last run none. How they ended; a panic is told, and the rest left out.
+    /// Computes a map in several runs, one for each fault, and then one without a fault. Returns how the runs ended, or the
+    /// message of the first panic.
     fn map(&self, faults: &[Fault<'_>], whole: &[u8]) -> Result<Vec<End>, String> {
         let run = [&RUN[..], &["--out", "cut", "--resume"]].concat();
         let mut ends = Vec::new();
@@ -132,7 +133,7 @@ impl Bench {
                     assert!(text.starts_with("error: ") && text.contains(go_on), "{fault:?}: {text}");
                     ends.push(End::Failed);
                 }
-                // A signal, or no end.
+                // The run ended by a signal or by the time limit.
                 other => return Err(format!("{fault:?}: {other:?}: {text}")),
             }
         }
@@ -140,27 +141,27 @@ impl Bench {
             let rest = self.run(&run, None);
             assert!(rest.status.success(), "{faults:?}: {}", String::from_utf8_lossy(&rest.stderr));
         }
-        assert!(self.table("cut") == whole, "{faults:?}: other bytes");
+        assert!(self.table("cut") == whole, "{faults:?}: the table differs");
         fs::remove_dir_all(self.folder.path().join("cut")).unwrap();
         Ok(ends)
     }
 }
 
-/// What went to the terminal: no panic.
-fn said(output: &Output, fault: Fault<'_>) -> String {
+/// Returns the messages of a run, which must not contain a panic.
+fn messages(output: &Output, fault: Fault<'_>) -> String {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!text.contains("panicked"), "{fault:?}: {text}");
     text
 }
 
-/// Faults spread over all calls of a run: each call in turn, at places that no two rounds share, with every result.
+/// Returns faults spread over all calls of a run: of each function in turn, at different places, and with every result.
 fn spread(calls: &BTreeMap<String, u32>, count: usize) -> Vec<Fault<'_>> {
     let results = [LOST, NO_MEMORY, NOT_INITIALIZED, NO_HOST_MEMORY, NOT_MAPPED];
     let names: Vec<_> = calls.iter().collect();
     let fault = |n: usize| {
         let (name, &calls) = names[n % names.len()];
         let round = n / names.len();
-        // The golden section spreads any number of places evenly.
+        // Multiples of the golden ratio spread any number of places evenly.
         let place = (round as f64 * 0.618_033_988_75).fract();
         (name.as_str(), 1 + (place * f64::from(calls)) as u32, results[round % results.len()])
     };
@@ -168,13 +169,13 @@ fn spread(calls: &BTreeMap<String, u32>, count: usize) -> Vec<Fault<'_>> {
 }
 
 #[test]
-fn a_driver_that_fails_costs_no_cell_and_ends_no_run_in_a_panic() {
+fn a_driver_that_fails_causes_no_panic_and_loses_no_cell() {
     let Some(bench) = Bench::new() else { return };
     let whole = bench.run(&[&RUN[..], &["--out", "whole"]].concat(), None);
     assert!(whole.status.success(), "{}", String::from_utf8_lossy(&whole.stderr));
-    let (whole, calls) = (bench.table("whole"), bench.calls());
+    let (whole, calls) = (bench.table("whole"), calls(bench.folder.path()));
     let late = |call: &str| calls[call] * 4 / 5;
-    // Where a device is opened, where the first program is made, and while lanes are on their way.
+    // Faults while a device is opened, while the first shader is compiled, and while lanes run.
     let chains = [
         vec![
             ("vkCreateDevice", 1, NOT_INITIALIZED),
@@ -192,12 +193,12 @@ fn a_driver_that_fails_costs_no_cell_and_ends_no_run_in_a_panic() {
     for faults in &chains {
         assert_eq!(bench.map(faults, &whole), Ok(vec![End::Failed; faults.len()]), "{faults:?}");
     }
-    // What fails as the device is closed comes too late to matter.
+    // A fault while the device is closed has no effect.
     assert_eq!(bench.map(&[("vkQueueWaitIdle", 1, NO_MEMORY)], &whole), Ok(vec![End::Done]));
     let more = std::env::var("RATTLEMAP_TORTURE").ok().and_then(|n| n.parse().ok()).unwrap_or(0);
     let panics: Vec<String> =
         spread(&calls, more).into_iter().filter_map(|fault| bench.map(&[fault], &whole).err()).collect();
-    // Past the harness: a script reads it.
+    // scripts/torture.sh reads this line, which the test harness must not hide.
     let faults = chains.iter().map(Vec::len).sum::<usize>() + 1 + more;
     let mut stdout = std::io::stdout();
     writeln!(stdout, "torture: faults {faults}, panics {}", panics.len()).unwrap();
@@ -207,24 +208,24 @@ fn a_driver_that_fails_costs_no_cell_and_ends_no_run_in_a_panic() {
 #[test]
 fn every_command_survives_a_lost_device() {
     let Some(bench) = Bench::new() else { return };
-    let made = bench.run(&[&RUN[..], &["--set", "axis.1.count=4"]].concat(), None);
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    // Where the engine is left open, another can do it. A precision that it does not have asks for lanes.
-    let fault = ("vkQueueSubmit", bench.calls()["vkQueueSubmit"] * 4 / 5, LOST);
+    let map = bench.run(&[&RUN[..], &["--set", "axis.1.count=4"]].concat(), None);
+    assert!(map.status.success(), "{}", String::from_utf8_lossy(&map.stderr));
+    // --precision f32 selects lanes. Without --engine the message proposes the CPU engine.
+    let fault = ("vkQueueSubmit", calls(bench.folder.path())["vkQueueSubmit"] * 4 / 5, LOST);
     let auto = ["map", "s.toml", "--out", "auto", "--set", "axis.1.count=4", "--precision", "f32"];
     let lost = bench.run(&auto, Some(fault));
-    let text = said(&lost, fault);
+    let text = messages(&lost, fault);
     let anew = "the CPU engine can compute the map, too, from its first cell: rattlemap map s.toml --out auto \
                 --engine cpu --set axis.1.count=4 --force";
     assert!(lost.status.code() == Some(1) && text.contains("was lost") && text.contains(anew), "{text}");
     let fault = ("vkQueueSubmit", 2, LOST);
     let validated = bench.run(&["validate", "out/s", "--samples", "8"], Some(fault));
-    let text = said(&validated, fault);
+    let text = messages(&validated, fault);
     assert!(validated.status.code() == Some(1) && text.contains("lost"), "{text}");
     let devices = bench.run(&["devices"], Some(("vkCreateDevice", 1, NOT_INITIALIZED)));
-    assert!(devices.status.success(), "{}", said(&devices, fault));
+    assert!(devices.status.success(), "{}", messages(&devices, fault));
     let fault = ("vkCreateComputePipelines", 3, LOST);
     let measured = bench.run(&["bench", "engines", "--quick"], Some(fault));
-    let text = said(&measured, fault);
+    let text = messages(&measured, fault);
     assert!(measured.status.success() && text.contains("is left out: ") && text.contains("lost"), "{text}");
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::cells::flow_of;
 use super::{Size, Verdict, Watch};
 use rattlemap::map::random::Random;
-use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::model::{GearPair, Model};
 use rattlemap_dynamics::orbit::{Budget, Settings, Status, measure};
 
 /// Longest allowed time of a cell, in seconds of one core.
@@ -89,23 +89,11 @@ fn time(seed: u64, n: u64) -> (Status, f64) {
 
 /// Draws a random cell.
 fn cell(random: &mut Random) -> (GearPair, [f64; 4]) {
-    let paper = GearPair::paper(random.unit());
-    let mut about = |value: f64| value * 10f64.powf(4.0 * random.unit() - 2.0);
-    let pair = GearPair {
-        m1: about(paper.m1),
-        m2: about(paper.m2),
-        r1: about(paper.r1),
-        r2: about(paper.r2),
-        k1: about(paper.k1),
-        k2: about(paper.k2),
-        r: about(paper.r),
-        k: about(paper.k),
-        force: about(paper.force),
-        omega: about(paper.omega),
-        b: about(paper.b),
-        mesh_speed: about(paper.mesh_speed),
-        ..paper
-    };
+    let mut pair = GearPair::paper(random.unit());
+    for (index, parameter) in GearPair::PARAMETERS.iter().enumerate().filter(|(_, it)| it.name != "e") {
+        let value = parameter.default.expect("only the restitution has no default");
+        pair.assign(index, value * 10f64.powf(4.0 * random.unit() - 2.0));
+    }
     // Undamped, elastic pairs keep the speed of their start.
     let undamped = GearPair { r1: 0.0, r2: 0.0, r: 0.0, e: 1.0 - 1e-3 * random.unit(), ..pair };
     let pair = if random.unit() < 0.1 { undamped } else { pair };

@@ -1,5 +1,7 @@
 //! The cells, their starts, and the reference's results.
 
+use serde::Serialize;
+
 use super::outcome::Outcome;
 use super::{EVENTS, PERIODS};
 use rattlemap::validate::independent::flight::Flight;
@@ -17,8 +19,9 @@ pub const RESTITUTION_STEP: f64 = 1.0 / 4096.0;
 /// Forcing periods from rest to the measured motion.
 const SETTLING_PERIODS: u32 = 200;
 
-/// Kinds of motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Kinds of motion, in the order of tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// Periodic, with impacts but no meshing.
     Impacts,
@@ -30,22 +33,6 @@ pub enum Kind {
     Grazing,
     /// Chaotic.
     Chaos,
-}
-
-impl Kind {
-    /// All kinds, in the order of tables.
-    pub const ALL: [Kind; 5] = [Kind::Impacts, Kind::Meshing, Kind::Chatter, Kind::Grazing, Kind::Chaos];
-
-    /// Returns the name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Impacts => "impacts",
-            Kind::Meshing => "meshing",
-            Kind::Chatter => "chatter",
-            Kind::Grazing => "grazing",
-            Kind::Chaos => "chaos",
-        }
-    }
 }
 
 /// Cells with the parameters of Table 1: kind, restitution, frequency.
@@ -124,9 +111,8 @@ pub fn subjects(cells_per_kind: usize) -> Vec<Subject> {
 
 fn table() -> Vec<(Kind, f64, f64)> {
     let grazing = BEYOND.map(|_| (Kind::Grazing, 0.5, 5.6));
-    let all = SETTLED.into_iter().chain(grazing);
-    let mut all: Vec<_> = all.collect();
-    all.sort_by_key(|(kind, ..)| Kind::ALL.iter().position(|k| k == kind));
+    let mut all: Vec<_> = SETTLED.into_iter().chain(grazing).collect();
+    all.sort_by_key(|(kind, ..)| *kind);
     all
 }
 

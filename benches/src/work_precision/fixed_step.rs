@@ -1,5 +1,4 @@
-//! Integrators of fixed step that studies of such systems use: classical Runge-Kutta and semi-implicit Euler, in f64 on one
-//! core.
+//! The classical Runge-Kutta method of order 4 with fixed steps, in f64 on one core.
 
 use super::PERIODS;
 use super::cells::{Latest, Subject};
@@ -11,20 +10,7 @@ use rattlemap_dynamics::flow::Gap;
 /// Number of events in one period above which a lane fails.
 const ENDINGS_PER_PERIOD: u32 = 10_000;
 
-/// The formula of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scheme {
-    /// The classical Runge-Kutta method of order 4.
-    RungeKutta,
-    /// Semi-implicit (symplectic) Euler of order 1: velocities first, positions with the new ones.
-    SemiImplicitEuler,
-}
-
-/// Returns the state a step after `y`, from the cosines of the phase at its start, middle and end.
-trait Step: Fn(&Field, &Gap, f64, [f64; 3]) -> Gap + Copy {}
-
-impl<F: Fn(&Field, &Gap, f64, [f64; 3]) -> Gap + Copy> Step for F {}
-
+/// Returns the state a step of length `h` after `y`, from the cosines of the phase at its start, middle and end.
 #[inline(always)]
 fn runge_kutta(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
     let slope = |y: &Gap, cos: f64| {
@@ -39,26 +25,12 @@ fn runge_kutta(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
     std::array::from_fn(|i| y[i] + h / 6.0 * ((k1[i] + k4[i]) + 2.0 * (k2[i] + k3[i])))
 }
 
-#[inline(always)]
-fn semi_implicit_euler(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
-    let [a, b] = field.accelerations(y, cos[0]);
-    let (v1, v2) = (y[1] + h * a, y[3] + h * b);
-    [y[0] + h * v1, v1, y[2] + h * v2, v2]
-}
-
 /// Integrates a subject with `steps` >= 1 steps per forcing period.
-pub fn integrate(scheme: Scheme, subject: &Subject, steps: u32) -> Outcome {
-    match scheme {
-        Scheme::RungeKutta => run(runge_kutta, subject, steps),
-        Scheme::SemiImplicitEuler => run(semi_implicit_euler, subject, steps),
-    }
-}
-
-fn run(step: impl Step, subject: &Subject, steps: u32) -> Outcome {
+pub fn integrate(subject: &Subject, steps: u32) -> Outcome {
     let grid = Grid::new(subject.oscillator.omega, steps);
     let mut flight = Flight::new(&subject.oscillator, subject.law, subject.start);
     for _ in 0..PERIODS {
-        if grid.period(step, &mut flight).is_none() {
+        if grid.period(&mut flight).is_none() {
             return Outcome::lost();
         }
     }
@@ -81,7 +53,7 @@ impl Grid {
     }
 
     /// Integrates one forcing period. Returns `None` if the lane fails.
-    fn period(&self, step: impl Step, flight: &mut Flight) -> Option<()> {
+    fn period(&self, flight: &mut Flight) -> Option<()> {
         let mut endings = 0;
         for (n, cosines) in self.cosines.windows(3).step_by(2).enumerate() {
             let start = self.h * n as f64;
@@ -92,10 +64,10 @@ impl Grid {
                 let (field, y) = (*flight.field(), flight.q);
                 let after = |tau: f64| {
                     let cos = [t, t + 0.5 * tau, t + tau].map(|t| (self.omega * t).cos());
-                    step(&field, &y, tau, cos)
+                    runge_kutta(&field, &y, tau, cos)
                 };
                 let end = if offset == 0.0 {
-                    step(&field, &y, rest, [cosines[0], cosines[1], cosines[2]])
+                    runge_kutta(&field, &y, rest, [cosines[0], cosines[1], cosines[2]])
                 } else {
                     after(rest)
                 };

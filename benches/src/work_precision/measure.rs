@@ -4,7 +4,6 @@ use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use super::cells::{Subject, by_reference};
-use super::fixed_step::Scheme;
 use super::lanes::{Device, Form};
 use super::outcome::{Error, Outcome, median_and_worst};
 use super::points::Point;
@@ -19,36 +18,39 @@ use rattlemap_dynamics::model::Law;
 pub enum Method {
     /// Lanes of a graphics device.
     Lanes(Form, Precision),
-    /// An integrator of fixed step on one core.
-    FixedStep(Scheme),
+    /// Classical Runge-Kutta on one core.
+    FixedStep,
     /// DOP853 on one core.
     Dop853,
     /// The event-driven reference on one core.
     Reference,
 }
 
-/// The setting that decides the accuracy of a method.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Setting {
+/// The setting that decides the accuracy of a method. Each method has at most one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Setting {
     /// Steps per forcing period.
-    Steps(u32),
+    pub steps: Option<u32>,
     /// Relative and absolute tolerance.
-    Tolerance(f64),
-    /// The method has no setting.
-    None,
+    pub tolerance: Option<f64>,
+}
+
+impl Setting {
+    fn steps(self) -> u32 {
+        self.steps.expect("a method with a grid")
+    }
 }
 
 impl Method {
     /// All methods with their names in tables.
-    pub const ALL: [(Method, &'static str); 10] = [
+    pub const ALL: [(Method, &'static str); 9] = [
         (Method::Lanes(Form::Exact, Precision::F32), "lane-f32"),
         (Method::Lanes(Form::Exact, Precision::F64), "lane-f64"),
         (Method::Lanes(Form::RungeKutta, Precision::F32), "rk4-wgsl-f32"),
         (Method::Lanes(Form::RungeKutta, Precision::F64), "rk4-wgsl-f64"),
         (Method::Lanes(Form::RungeKuttaPhased, Precision::F32), "rk4-phased-f32"),
         (Method::Lanes(Form::RungeKuttaPhased, Precision::F64), "rk4-phased-f64"),
-        (Method::FixedStep(Scheme::RungeKutta), "rk4-core"),
-        (Method::FixedStep(Scheme::SemiImplicitEuler), "euler-core"),
+        (Method::FixedStep, "rk4-core"),
         (Method::Dop853, "dop853-core"),
         (Method::Reference, "reference"),
     ];
@@ -64,13 +66,15 @@ impl Method {
         let doubled = |from: u32, to: u32| {
             std::iter::successors(Some(from), |n| Some(2 * n))
                 .take_while(move |&n| n <= to)
-                .map(Setting::Steps)
+                .map(|steps| Setting { steps: Some(steps), tolerance: None })
         };
         let all: Vec<Setting> = match self {
             Method::Lanes(Form::Exact, _) => doubled(16, 1024).collect(),
-            Method::Lanes(..) | Method::FixedStep(_) => doubled(64, 8192).collect(),
-            Method::Dop853 => [1e-4, 1e-6, 1e-8, 1e-10, 1e-12].map(Setting::Tolerance).to_vec(),
-            Method::Reference => vec![Setting::None],
+            Method::Lanes(..) | Method::FixedStep => doubled(64, 8192).collect(),
+            Method::Dop853 => [1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
+                .map(|tolerance| Setting { steps: None, tolerance: Some(tolerance) })
+                .to_vec(),
+            Method::Reference => vec![Setting::default()],
         };
         if quick { all.into_iter().step_by(2).take(2).collect() } else { all }
     }
@@ -185,11 +189,8 @@ impl Runner {
             if how.copies.is_none() && opened.is_hardware() {
                 opened = open(HARDWARE_COPIES)?;
             }
-            let load = |setting: &Setting| match setting {
-                Setting::Steps(steps) => opened.load(*steps),
-                _ => unreachable!("lanes have a grid"),
-            };
-            let tables = settings.iter().map(load).collect::<Result<_, _>>()?;
+            let tables = settings.iter().map(|setting| opened.load(setting.steps()));
+            let tables = tables.collect::<Result<_, _>>()?;
             device = Some((opened, tables));
         }
         let flows = match method {
@@ -222,16 +223,15 @@ impl Runner {
 
     fn one(&self, i: usize, subjects: &[Subject], n: usize) -> Outcome {
         let subject = &subjects[n];
-        match (self.method, self.settings[i]) {
-            (Method::FixedStep(scheme), Setting::Steps(steps)) => {
-                fixed_step::integrate(scheme, subject, steps)
-            }
-            (Method::Dop853, Setting::Tolerance(tolerance)) => adaptive::integrate(subject, tolerance),
-            (Method::Reference, _) => {
+        let setting = self.settings[i];
+        match self.method {
+            Method::FixedStep => fixed_step::integrate(subject, setting.steps()),
+            Method::Dop853 => adaptive::integrate(subject, setting.tolerance.expect("a tolerance")),
+            Method::Reference => {
                 let (flow, law) = &self.flows[n];
                 by_reference(flow, *law, subject.start)
             }
-            other => unreachable!("no method takes this setting: {other:?}"),
+            Method::Lanes(..) => unreachable!("devices run lanes"),
         }
     }
 
@@ -259,8 +259,8 @@ impl Runner {
             method: self.method.name().to_owned(),
             device,
             precision: self.method.precision().name().to_owned(),
-            steps: if let Setting::Steps(steps) = self.settings[i] { Some(steps) } else { None },
-            tolerance: if let Setting::Tolerance(t) = self.settings[i] { Some(t) } else { None },
+            steps: self.settings[i].steps,
+            tolerance: self.settings[i].tolerance,
             cores,
             lanes,
             periods: PERIODS,

@@ -5,7 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 
 use super::PERIODS;
-use super::cells::Subject;
+use super::cells::{Kind, Subject};
 use super::figure::{self, View};
 use super::measure::Curve;
 use super::points::Point;
@@ -93,7 +93,7 @@ struct Manifest<'a> {
 /// A cell with the parameters of its first variant and the largest amplification of all variants.
 #[derive(Serialize)]
 struct CellObject {
-    kind: &'static str,
+    kind: Kind,
     e: f64,
     omega: f64,
     #[serde(rename = "F")]
@@ -106,7 +106,7 @@ struct CellObject {
 /// A subject for other programs.
 #[derive(Serialize)]
 struct SubjectObject {
-    kind: &'static str,
+    kind: Kind,
     parameters: Parameters,
     periods: u32,
     start: State,
@@ -119,7 +119,7 @@ struct CellRow<'a> {
     method: &'a str,
     steps: Option<u32>,
     tolerance: Option<f64>,
-    kind: &'static str,
+    kind: Kind,
     e: f64,
     omega: f64,
     #[serde(rename = "F")]
@@ -162,7 +162,7 @@ pub fn write(
 fn cell(variants: &[Subject]) -> CellObject {
     let first = &variants[0];
     CellObject {
-        kind: first.kind.name(),
+        kind: first.kind,
         e: first.pair.e,
         omega: first.pair.omega,
         force: first.pair.force,
@@ -174,7 +174,7 @@ fn cell(variants: &[Subject]) -> CellObject {
 
 fn subject(subject: &Subject) -> SubjectObject {
     SubjectObject {
-        kind: subject.kind.name(),
+        kind: subject.kind,
         parameters: Parameters::of(&subject.pair),
         periods: PERIODS,
         start: subject.start,
@@ -197,7 +197,7 @@ fn write_cells(out: impl Write, subjects: &[Subject], curves: &[Curve]) -> Resul
                 method: &point.method,
                 steps: point.steps,
                 tolerance: point.tolerance,
-                kind: first.kind.name(),
+                kind: first.kind,
                 e: first.pair.e,
                 omega: first.pair.omega,
                 force: first.pair.force,

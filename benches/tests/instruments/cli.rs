@@ -64,7 +64,8 @@ fn work_precision_measures_every_method() {
     }
     let out = folder.path().join("out/bench/work-precision");
     let points = rows(&out.join("work_precision.csv"));
-    let methods = "lane-f32 lane-f64 rk4-wgsl-f32 rk4-wgsl-f64 rk4-phased-f32 rk4-phased-f64 rk4-core euler-core dop853-core";
+    let methods =
+        "lane-f32 lane-f64 rk4-wgsl-f32 rk4-wgsl-f64 rk4-phased-f32 rk4-phased-f64 rk4-core dop853-core";
     for method in methods.split(' ') {
         let own: Vec<_> = points.iter().filter(|row| row["method"] == method).collect();
         assert_eq!(own.len(), 2, "{method}");

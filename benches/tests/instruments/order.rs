@@ -3,7 +3,7 @@
 
 use rattlemap::gpu::Precision;
 use rattlemap_bench::work_precision::cells::{Kind, Subject, subjects};
-use rattlemap_bench::work_precision::fixed_step::{Scheme, integrate};
+use rattlemap_bench::work_precision::fixed_step::integrate;
 use rattlemap_bench::work_precision::lanes::{Device, Form};
 use rattlemap_bench::work_precision::outcome::Outcome;
 use rattlemap_bench::work_precision::{PERIODS, adaptive};
@@ -34,20 +34,20 @@ fn slopes(errors: &[f64], floor: f64) -> Vec<f64> {
     errors.windows(2).filter(|pair| pair[1] > floor).map(|pair| (pair[0] / pair[1]).log2()).collect()
 }
 
-/// Largest difference between the order and the slope of the finest doubling above rounding.
+/// Largest difference between the order 4 and the slope of the finest doubling above rounding.
 const TOLERANCE: f64 = 0.15;
 
-/// Checks that errors fall by the order with each of `count` doublings of the steps, at the end. At least three doublings
+/// Checks that errors fall by order 4 with each of `count` doublings of the steps, at the end. At least three doublings
 /// must lie above rounding. Returns the errors of event times.
 #[track_caller]
-fn check_order(scheme: Scheme, subject: &Subject, order: f64, first: u32, count: u32) -> Vec<f64> {
-    let results = (0..count).map(|i| errors(subject, &integrate(scheme, subject, first << i)));
+fn check_order(subject: &Subject, first: u32, count: u32) -> Vec<f64> {
+    let results = (0..count).map(|i| errors(subject, &integrate(subject, first << i)));
     let (states, events): (Vec<f64>, Vec<f64>) = results.map(|[state, event]| (state, event)).unzip();
     let slopes = slopes(&states, FLOOR * subject.amplification.max(1.0));
-    let at = format!("{scheme:?} at e = {}, omega = {}", subject.pair.e, subject.pair.omega);
+    let at = format!("e = {}, omega = {}", subject.pair.e, subject.pair.omega);
     assert!(slopes.len() >= 3, "{at}: too few errors above rounding: {states:?}");
     let last = slopes[slopes.len() - 1];
-    assert!((last - order).abs() < TOLERANCE, "{at}: order {last:.2} instead of {order}: {states:?}");
+    assert!((last - 4.0).abs() < TOLERANCE, "{at}: order {last:.2} instead of 4: {states:?}");
     events
 }
 
@@ -56,14 +56,14 @@ fn runge_kutta_is_of_order_4_on_smooth_motion() {
     let smooth: Vec<_> = first_variants().into_iter().filter(is_smooth).collect();
     assert_eq!(smooth.len(), 2);
     for subject in &smooth {
-        check_order(Scheme::RungeKutta, subject, 4.0, 128, 5);
+        check_order(subject, 128, 5);
     }
 }
 
 #[test]
 fn runge_kutta_is_of_order_4_across_impacts() {
     for subject in first_variants().iter().filter(|s| matches!(s.kind, Kind::Impacts | Kind::Chaos)) {
-        check_order(Scheme::RungeKutta, subject, 4.0, 64, 5);
+        check_order(subject, 64, 5);
     }
 }
 
@@ -71,19 +71,8 @@ fn runge_kutta_is_of_order_4_across_impacts() {
 #[test]
 fn runge_kutta_is_of_order_4_across_meshing_and_chatter() {
     for subject in first_variants().iter().filter(|s| matches!(s.kind, Kind::Meshing | Kind::Chatter)) {
-        let events = check_order(Scheme::RungeKutta, subject, 4.0, 512, 6);
+        let events = check_order(subject, 512, 6);
         assert!(events[5] < 1e-3 * events[0], "{:?}: event times do not converge: {events:?}", subject.pair);
-    }
-}
-
-#[test]
-fn semi_implicit_euler_is_of_order_1() {
-    for subject in first_variants().iter() {
-        if is_smooth(subject) && subject.beyond < Some(-1e-4) {
-            check_order(Scheme::SemiImplicitEuler, subject, 1.0, 2048, 5);
-        } else if subject.kind == Kind::Impacts {
-            check_order(Scheme::SemiImplicitEuler, subject, 1.0, 4096, 5);
-        }
     }
 }
 
@@ -143,7 +132,7 @@ fn runge_kutta_in_wgsl_and_in_rust_agree() {
             let tables = device.load(steps).unwrap();
             let (_, lanes) = device.run(&tables).unwrap();
             for (subject, lane) in subjects.iter().zip(&lanes) {
-                let core = integrate(Scheme::RungeKutta, subject, steps);
+                let core = integrate(subject, steps);
                 let difference = lane.error(&core, subject.oscillator.period());
                 let bound = 1e-11 * subject.amplification.max(1.0);
                 let at = format!("{form:?}, {steps} steps, {:?}", subject.pair);
