@@ -23,7 +23,7 @@ use rattlemap::store::folder::Folder;
 use rattlemap::store::map::{Provenance, Run};
 use rattlemap::store::merge::Parts;
 use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
-use rattlemap::store::shard::{self, Finished, Tally};
+use rattlemap::store::shard::{self, FinishedShard, Tally};
 use rattlemap_dynamics::flow::Flow;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -103,7 +103,10 @@ pub fn write_shards(sizes: Sizes, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Cost>
         }
         let engine = Provenance { engine: "cpu", precision: "f64", device: "event-driven reference" };
         let run = Run::new(engine, &[], "none: the records are invented");
-        shard::write(&folder, &Finished { shard: of, scene: &scene, plan: &plan, run: &run, tally: &tally })?;
+        shard::write(
+            &folder,
+            &FinishedShard { shard: of, scene: &scene, plan: &plan, run: &run, tally: &tally },
+        )?;
         Ok(folder.path().to_owned())
     };
     let folders: Result<_> =

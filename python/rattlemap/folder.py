@@ -16,11 +16,8 @@ import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
-from . import decode
+from . import _native, decode
 from .errors import FolderError
-
-#: The format of folders that is read here: ``format`` of their manifests.
-FORMAT = 2
 
 _MANIFEST, _CELLS, _WORDS, _RECORDS = "manifest.json", "cells.npy", "words.csv", "records.bin"
 _ATTRACTORS, _POINTS, _COLUMNS = "attractors.csv", "bifurcation.csv", "bifurcation_columns.csv"
@@ -29,36 +26,37 @@ _ATTRACTORS, _POINTS, _COLUMNS = "attractors.csv", "bifurcation.csv", "bifurcati
 def open(folder: str | os.PathLike[str]) -> xr.Dataset:  # noqa: A001
     """Open the folder of a finished map, basin map, list of cells or bifurcation diagram.
 
-    Nothing but the manifest and the axes is read at first. Numbers are views of the mapped file ``cells.npy``; codes and
-    rows of words become text when they are looked at, for those cells that are looked at.
+    Only the manifest and the axes are read at first. Numbers are views of the memory-mapped file ``cells.npy``. Codes and
+    words are converted to text on access, for the accessed cells only.
 
     Parameters
     ----------
     folder
-        What ``rattlemap map`` or ``rattlemap bifurcation`` wrote.
+        Folder that ``rattlemap map`` or ``rattlemap bifurcation`` wrote.
 
     Returns
     -------
     xarray.Dataset
-        A map has the dimensions (second axis, first axis), its coordinates are the axes' values. Variables are the
-        columns of ``cells.npy``: ``class``, ``status`` and ``source`` text of fixed width; ``word`` and ``pattern``
-        Python strings that begin with ``w``, empty where there is none; ``period`` 0 and ``symmetric`` -1 where absent;
-        floats NaN where absent. All quantities are dimensionless, as in the model.
+        A map has the dimensions (second axis, first axis) and the values of the axes as coordinates. Its variables are
+        the columns of ``cells.npy``. ``class``, ``status`` and ``source`` are text of fixed width. ``word`` and
+        ``pattern`` are Python strings that begin with ``w``. Absent values are NaN for floats, 0 for ``period``, -1 for
+        ``symmetric`` and the empty string for words. All quantities are dimensionless.
 
-        A list of cells has the one dimension ``cell``, its parameters are coordinates. Basins have ``attractor``, the
-        label of the attractor (-1 without one), and the attractors' table over the dimension ``label``. A diagram has
-        the dimension of its parameter, and its section points over ``point``.
+        A list of cells has the dimension ``cell``, with its parameters as coordinates. A basin map has the variable
+        ``attractor``, the label of the attractor (-1 without one), and the table of attractors over the dimension
+        ``label``. A diagram has the dimension of its parameter, and its section points over ``point``.
 
-        The manifest is in ``attrs``: text and numbers as they are, lists and objects as JSON.
+        ``attrs`` contains the manifest: text and numbers unchanged, lists and objects as JSON.
 
     Raises
     ------
     FolderError
-        If the folder is not there, not finished, a shard's, of another format, without ``cells.npy``, or damaged.
+        If the folder does not exist, is not finished, is a shard's, has another format, has no ``cells.npy``, or is
+        damaged.
 
     Notes
     -----
-    Arrays are read-only views until xarray copies them; Windows lets nobody remove a folder whose Dataset is in use.
+    Arrays are read-only views until xarray copies them. Windows cannot remove a folder whose Dataset is in use.
     ``xarray.open_dataset(folder, engine="rattlemap", chunks={})`` opens maps with dask arrays.
 
     Examples
@@ -71,7 +69,7 @@ def open(folder: str | os.PathLike[str]) -> xr.Dataset:  # noqa: A001
 
 
 class FolderBackend(BackendEntrypoint):
-    """The same for ``xarray.open_dataset(folder, engine="rattlemap")``."""
+    """The backend of ``xarray.open_dataset(folder, engine="rattlemap")``."""
 
     description = "Finished folders of rattlemap"
     open_dataset_parameters = ("filename_or_obj", "drop_variables")
@@ -80,7 +78,7 @@ class FolderBackend(BackendEntrypoint):
         self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
     ) -> xr.Dataset:
         folder = Path(os.fspath(filename_or_obj))
-        manifest = _manifest(folder)
+        manifest = json.loads(_native.manifest(os.fspath(folder)))
         ds = _diagram(folder, manifest) if manifest["command"] == "bifurcation" else _map(folder, manifest)
         ds.encoding["source"] = str(folder)
         left_out = [drop_variables] if isinstance(drop_variables, str) else [*(drop_variables or ())]
@@ -96,39 +94,8 @@ class FolderBackend(BackendEntrypoint):
             return False
 
 
-def _manifest(folder: Path) -> dict[str, Any]:
-    """The manifest of a finished map or diagram."""
-    path = folder / _MANIFEST
-    if not folder.is_dir():
-        raise FolderError(f"{folder}: there is no such folder; name the folder of a finished map")
-    if not path.is_file():
-        advice = (
-            "the run is unfinished: go on with `rattlemap map SCENE --resume`"
-            if (folder / _RECORDS).is_file()
-            else "it is not the folder of a map: `rattlemap map SCENE` makes one"
-        )
-        raise FolderError(f"{folder}: there is no {_MANIFEST}; {advice}")
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-        command = manifest["command"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise FolderError(f"{path}: this is not the manifest of a map ({error!r})") from error
-    if command not in ("map", "bifurcation"):
-        raise FolderError(f"{folder}: this is the folder of `{command}`, not of a map or a diagram; pandas reads its tables")
-    if manifest.get("format") != FORMAT:
-        raise FolderError(
-            f"{path}: the folder is of format {manifest.get('format', 'unknown')}, and this version reads format {FORMAT}; "
-            "make it again with --force"
-        )
-    if manifest.get("shard") is not None:
-        raise FolderError(
-            f"{folder}: this is a part of a map, a shard's records; `rattlemap merge OUT PART...` makes the map of all parts"
-        )
-    return dict(manifest)
-
-
 def _require(folder: Path, manifest: dict[str, Any], name: str, kind: str) -> Path:
-    """A file of the folder; else how it is made."""
+    """Return the path of a file in the folder; if it is missing, the error says how to make it."""
     path = folder / name
     if path.is_file():
         return path
@@ -139,13 +106,13 @@ def _require(folder: Path, manifest: dict[str, Any], name: str, kind: str) -> Pa
         raise FolderError(f"{folder}: {name} is missing; `{again}` makes it anew")
     again = "--resume" if command == "map" else "--force"
     raise FolderError(
-        f"{folder}: there is no {name}, for the scene's outputs.files do not have {kind!r}; add it and write the files anew: "
+        f"{folder}: there is no {name}, because outputs.files of the scene lacks {kind!r}; add it and write the files anew: "
         f"`rattlemap {command} SCENE --out {folder} {again}`"
     )
 
 
 def _table(path: Path) -> pd.DataFrame:
-    """A table, every field as text: decode gives types."""
+    """Read a table with every field as text; :mod:`decode` converts them."""
     return pd.read_csv(path, dtype=str, keep_default_na=False)
 
 
@@ -163,7 +130,7 @@ def _map(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
 
     ds = decode.arrange(fields, manifest, array.__getitem__, read)
     if "attractor" in fields:
-        # Written with cells.csv.
+        # The table is written together with cells.csv.
         attractors = folder / _ATTRACTORS
         if attractors.is_file() or any(entry["name"] == _ATTRACTORS for entry in manifest["files"]):
             ds = decode.with_attractors(ds, _table(_require(folder, manifest, _ATTRACTORS, "csv")))
@@ -176,7 +143,7 @@ def _diagram(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
 
 
 class _Cells:
-    """``cells.npy``, mapped, and the texts of its words; a copy in another process maps the file itself."""
+    """The memory-mapped ``cells.npy`` and the texts of its words. A copy in another process maps the file again."""
 
     def __init__(self, path: Path, count: int) -> None:
         self.path = path.absolute()
@@ -211,7 +178,7 @@ class _Cells:
 
 
 class _Column(BackendArray):
-    """A column of ``cells.npy`` over its axes; text once it is looked at."""
+    """A column of ``cells.npy`` over its axes, converted to text on access."""
 
     def __init__(
         self, cells: _Cells, name: str, shape: tuple[int, ...], table: str | None, codes: dict[str, int] | None

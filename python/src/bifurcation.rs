@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rattlemap::map::scene::Scene as Read;
 use rattlemap::map::{bifurcation as diagram, plan};
-use rattlemap::store::bifurcation::Asked;
+use rattlemap::store::bifurcation::DiagramArguments;
 use rattlemap::store::in_memory;
 
 use crate::arrays::columns;
@@ -49,6 +49,6 @@ fn compute(
     let report = |done| watch.tell(ended.fetch_max(done, Ordering::Relaxed).max(done), count);
     let columns = diagram::run_until(&cells, scene.start(), &scene.orbit_settings(), &report, watch.halt())?;
     let Some(columns) = columns else { return Ok(None) };
-    let asked = Asked { sets, along: read_for.along.as_ref() };
+    let asked = DiagramArguments { sets, along: read_for.along.as_ref() };
     Ok(Some(in_memory::diagram(scene, asked, &columns, clock.elapsed())?))
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use rattlemap::gpu::Precision;
 use rattlemap::job;
 use rattlemap::job::engine_choice::{self, Ask, Chosen};
-use rattlemap::job::kept::{self, Kept, KeptError, Work};
+use rattlemap::job::resumed_engine;
 use rattlemap::map::engine::{Engine, Loss};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::Scene;
@@ -17,6 +17,7 @@ use rattlemap::map::sweep;
 use rattlemap::record::Record;
 use rattlemap::store::folder::{Folder, FolderError};
 use rattlemap::store::map::{Provenance, Run};
+use rattlemap::store::run_records::{RunRecords, RunRecordsError, Work, open_folder};
 
 use crate::problem::Problem;
 use crate::waiting::{self, Watch};
@@ -63,8 +64,8 @@ impl Out {
     /// Opens it; waits where a computation of this process, which was left to itself, may still have it.
     pub(crate) fn open(&self, watch: &Watch) -> Result<Folder, Problem> {
         loop {
-            match kept::open_folder(&self.path, self.force, self.resume) {
-                Err(KeptError::Folder(FolderError::InUse { .. }))
+            match open_folder(&self.path, self.force, self.resume) {
+                Err(RunRecordsError::Folder(FolderError::InUse { .. }))
                     if waiting::is_anything_left() && !watch.is_halted() =>
                 {
                     thread::sleep(waiting::TICK);
@@ -119,7 +120,7 @@ impl Task {
     ) -> Result<Option<Integrated<'p>>, Problem> {
         let clock = Instant::now();
         let ask = match &self.out {
-            Some(out) if out.resume => kept::engine_of(self.ask.clone(), &out.path),
+            Some(out) if out.resume => resumed_engine::engine_of(self.ask.clone(), &out.path),
             _ => self.ask.clone(),
         };
         let chosen = pollster::block_on(engine_choice::open(plan, &ask))?;
@@ -138,13 +139,14 @@ impl Task {
         }
         let mut work = Work::new(plan, self.shard);
         let resumes = self.out.as_ref().is_some_and(|out| out.resume);
-        let opened =
-            folder.map(|folder| Kept::open(folder, &self.scene, &engine, resumes, &mut work)).transpose();
+        let opened = folder
+            .map(|folder| RunRecords::open(folder, &self.scene, &engine, resumes, &mut work))
+            .transpose();
         let mut kept = opened?;
         let damage = kept.as_ref().and_then(|kept| kept.damage());
         warnings.lock().unwrap_or_else(PoisonError::into_inner).extend(damage);
-        let resumed = kept.as_ref().map_or(0, Kept::resumed);
-        let elapsed_before = kept.as_ref().map_or(Duration::ZERO, Kept::elapsed_before);
+        let resumed = kept.as_ref().map_or(0, RunRecords::resumed);
+        let elapsed_before = kept.as_ref().map_or(Duration::ZERO, RunRecords::elapsed_before);
         let clock = Instant::now();
         let mut done = resumed;
         let Work { schedule, records, tally, .. } = &mut work;
@@ -152,7 +154,7 @@ impl Task {
         let keep = |batch: &[(u32, Record)], expected| {
             tally.take(plan, batch);
             if let Some(kept) = &mut kept {
-                kept.keep(batch)?;
+                kept.store(batch)?;
             }
             done += batch.len();
             watch.tell(done, expected);

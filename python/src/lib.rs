@@ -6,6 +6,7 @@
 mod arrays;
 mod bifurcation;
 mod engines;
+mod folder;
 mod map;
 mod model;
 mod orbit;
@@ -23,6 +24,7 @@ mod _native {
     #[pymodule_export]
     use super::{
         bifurcation::bifurcation,
+        folder::manifest,
         map::{colors, map},
         model::Model,
         orbit::{Orbit, orbit},

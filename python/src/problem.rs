@@ -6,15 +6,16 @@ use pyo3::prelude::*;
 use pyo3::types::PyType;
 use rattlemap::job::engine_choice::ChoiceError;
 use rattlemap::job::error::Failure;
-use rattlemap::job::kept::KeptError;
 use rattlemap::map::plan::NoMotion;
 use rattlemap::map::scene::SceneError;
 use rattlemap::map::sweep::SweepError;
 use rattlemap::model::ModelError;
 use rattlemap::store::error::OutputError;
+use rattlemap::store::finished_map::FinishedMapError;
 use rattlemap::store::folder::FolderError;
 use rattlemap::store::merge::MergeError;
 use rattlemap::store::record_file::RecordFileError;
+use rattlemap::store::run_records::RunRecordsError;
 
 /// An exception of the package that is to be raised, and its text.
 #[derive(Debug)]
@@ -62,10 +63,11 @@ told! {
     NoMotion => model,
     ChoiceError => engine,
     SweepError => engine,
+    FinishedMapError => folder,
     FolderError => folder,
     OutputError => folder,
     RecordFileError => folder,
-    KeptError => folder,
+    RunRecordsError => folder,
     MergeError => folder,
     // The request, unless somebody says better.
     Failure => scene,

@@ -13,7 +13,7 @@ use rattlemap::map::shard::Shard;
 use rattlemap::store;
 use rattlemap::store::folder::Folder;
 use rattlemap::store::merge::{MergeError, Parts, Progress};
-use rattlemap::store::shard::{self, Finished};
+use rattlemap::store::shard::{self, FinishedShard};
 use rayon::ThreadPoolBuilder;
 
 use crate::engines::{Out, Task, ask};
@@ -109,7 +109,7 @@ fn compute(task: &Task, shard: Shard, watch: &Watch) -> Result<Option<Vec<String
     let (device, processor) = (integrated.engine.device(), job::processor::described());
     let run = integrated.run(task, &device, &processor);
     let finished =
-        Finished { shard, scene: &task.scene, plan: &plan, run: &run, tally: &integrated.work.tally };
+        FinishedShard { shard, scene: &task.scene, plan: &plan, run: &run, tally: &integrated.work.tally };
     Ok(Some(shard::write(&folder, &finished)?))
 }
 
@@ -144,7 +144,7 @@ fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Op
         Err(MergeError::Stopped) => return Ok(None),
         gathered => gathered?,
     };
-    let map = gathered.told()?;
+    let map = gathered.in_memory()?;
     let files = if writes { gathered.write(&folder)?.files } else { Vec::new() };
     Ok(Some(Made { map, why: String::new(), warnings: Vec::new(), files }))
 }

@@ -179,12 +179,12 @@ def keep_manifest_alone(folder: Path) -> None:
 
 SPOILT: list[tuple[Callable[[Path], object], str]] = [
     (shutil.rmtree, "there is no such folder"),
-    (lambda folder: (folder / "manifest.json").unlink(), "the run is unfinished: go on with `rattlemap map SCENE --resume`"),
+    (lambda folder: (folder / "manifest.json").unlink(), "the run is unfinished: resume it with `rattlemap map SCENE --out "),
     (lambda folder: (folder / "manifest.json").write_text("{}"), "this is not the manifest of a map"),
     (lambda folder: edit_manifest(folder, format=1), "of format 1, and this version reads format 2"),
-    (lambda folder: edit_manifest(folder, command="orbit"), "this is the folder of `orbit`"),
-    (lambda folder: edit_manifest(folder, shard="3/16"), "`rattlemap merge OUT PART...` makes the map"),
-    (mark_unlisted, "outputs.files do not have 'npy'"),
+    (lambda folder: edit_manifest(folder, command="orbit"), "not the manifest of a map, but of `orbit`"),
+    (lambda folder: edit_manifest(folder, shard={"index": 3, "count": 16}), "`rattlemap merge OUT PART...` makes the map"),
+    (mark_unlisted, "outputs.files of the scene lacks 'npy'"),
     (lambda folder: (folder / "cells.npy").unlink(), "cells.npy is missing; `rattlemap check"),
     (keep_manifest_alone, "cells.npy is missing; `rattlemap map SCENE --out "),
     (lambda folder: (folder / "words.csv").unlink(), "words.csv is missing; `rattlemap check"),

@@ -45,7 +45,7 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
         );
         return Err(interrupt.failure(words));
     };
-    let asked = store::bifurcation::Asked { sets: &ask.set, along };
+    let asked = store::bifurcation::DiagramArguments { sets: &ask.set, along };
     let elapsed = clock.elapsed();
     let files = store::bifurcation::write(&folder, &scene, asked, &columns, elapsed)?;
     let [periodic, chaotic, undecided, failed] =

@@ -2,21 +2,23 @@
 
 use std::path::Path;
 
+use crate::map::plan::Plan;
 use crate::show::cells::Cells;
 use crate::show::cells::Survey;
 use crate::store;
+use crate::store::finished_map::{self, FinishedMap, FinishedMapError, StoredRecords};
 use crate::store::folder::Folder;
-use crate::store::inventory::{FileEntry, Finding};
+use crate::store::inventory::{self, FileEntry, Finding};
 use crate::store::manifest::MANIFEST;
 use crate::store::map::{LIST, VALIDATION, repair};
 use crate::store::record_file::RECORDS;
 use anyhow::{Context, anyhow};
-use serde_json::Value;
 
 use crate::cli::arguments::Check;
 use crate::cli::say;
+use crate::job::capacity;
 use crate::job::error::Failure;
-use crate::job::finished_map::{self, Manifest, check_files, told};
+use crate::text::shell::quoted;
 
 /// The command whose folders can be mended.
 const MAP: &str = "map";
@@ -24,7 +26,7 @@ const MAP: &str = "map";
 /// Looks, names, and with `--repair` mends.
 pub(crate) fn run(ask: &Check) -> Result<(), Failure> {
     let dir = &ask.folder;
-    finished_map::require_folder(dir)?;
+    require_folder(dir)?;
     let folder = ask.repair.then(|| Folder::open(dir, true)).transpose()?;
     let (command, listed) = listed(dir)?;
     let findings = check_files(dir, &listed, ask.quiet)?;
@@ -48,23 +50,23 @@ pub(crate) fn run(ask: &Check) -> Result<(), Failure> {
     let remedy = if left.iter().any(|finding| finding.name == VALIDATION) {
         format!("; `rattlemap validate` makes {VALIDATION} and its section of the report anew")
     } else if !ask.repair && command == MAP {
-        format!("; `{}` makes anew what can be made of the records", finished_map::repair_command(dir))
+        format!("; `{}` makes anew what can be made of the records", repair_command(dir))
     } else {
         String::new()
     };
-    Err(Failure::Run(anyhow!("{}{remedy}", told(dir, &left))))
+    Err(Failure::Run(anyhow!("{}{remedy}", named(dir, &left))))
 }
 
 /// The command that made a folder, and the files that its manifest lists.
 fn listed(dir: &Path) -> Result<(String, Vec<FileEntry>), Failure> {
-    if !dir.join(MANIFEST).is_file() {
-        return finished_map::read_json(dir).map(|_| Default::default()).map_err(Failure::Usage);
-    }
-    let damaged = || {
-        format!("{} is damaged; the command that made the folder makes it anew", dir.join(MANIFEST).display())
-    };
-    let manifest: Value = finished_map::read_json(dir).with_context(damaged).map_err(Failure::Run)?;
-    finished_map::require_format(dir, &manifest).map_err(Failure::Usage)?;
+    let manifest = finished_map::read_manifest(dir).map_err(|error| match error {
+        FinishedMapError::Unreadable { manifest, reason } => Failure::Run(anyhow!(
+            "{} is damaged ({reason}); the command that made the folder makes it anew",
+            manifest.display()
+        )),
+        other => other.into(),
+    })?;
+    finished_map::require_format(dir, &manifest)?;
     let command = manifest["command"].as_str().unwrap_or_default().to_owned();
     let files = serde_json::from_value(manifest["files"].clone());
     let files = files.with_context(|| format!("{} lists no hashes of files", dir.join(MANIFEST).display()));
@@ -78,28 +80,28 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
         return Err(Failure::Run(anyhow!(
             "{}: only the files of a map can be made from its records; the command that made the folder (`{}`) makes them \
              again with --force",
-            told(dir, &findings.iter().filter(|finding| finding.is_lost()).collect::<Vec<_>>()),
+            named(dir, &findings.iter().filter(|finding| finding.is_lost()).collect::<Vec<_>>()),
             command.escape_debug()
         )));
     }
     folder.refuse_links(store::map::names())?;
-    let part = Manifest::read_part(dir)?;
-    if let Some(shard) = part.shard() {
+    let part = FinishedMap::open_part(dir)?;
+    if let Some(shard) = part.manifest().shard {
         return Err(Failure::Run(anyhow!(
             "{}: nothing of shard {shard} can be made of the rest; `{}` keeps what is good of its records, computes \
              the others and writes its files anew",
-            told(dir, &findings.iter().filter(|finding| finding.is_lost()).collect::<Vec<_>>()),
-            part.remake_command(dir)
+            named(dir, &findings.iter().filter(|finding| finding.is_lost()).collect::<Vec<_>>()),
+            part.remake_command()
         )));
     }
-    let manifest = Manifest::read(dir)?;
+    let map = FinishedMap::open_own(dir)?;
     let lost: Vec<&str> =
         findings.iter().filter(|finding| finding.is_lost()).map(|finding| finding.name.as_str()).collect();
     if lost.contains(&MANIFEST) {
         return Err(Failure::Run(anyhow!(
             "{}: {MANIFEST} is damaged, and cannot be believed; `{}` makes it and every file anew",
             dir.display(),
-            manifest.remake_command(dir)
+            map.remake_command()
         )));
     }
     if lost.contains(&RECORDS) {
@@ -107,7 +109,7 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
             "{}: {RECORDS} is damaged or missing, and nothing can be made of it; `{}` keeps what is good of it, if anything \
              is, computes the rest and makes every file anew",
             dir.display(),
-            manifest.remake_command(dir)
+            map.remake_command()
         )));
     }
     if lost.contains(&LIST) {
@@ -115,16 +117,20 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
             "{}: {LIST} is damaged or missing, and nothing tells which cells it listed; with the scene's own table `{}` \
              makes every file anew",
             dir.display(),
-            manifest.remake_command(dir)
+            map.remake_command()
         )));
     }
-    let finished = manifest.scene(dir)?;
-    let plan = finished.plan()?;
-    let (records, refined) = finished.records(&plan)?;
+    let scene = map.scene()?;
+    capacity::check_finished(&scene)?;
+    let plan = Plan::new(&scene);
+    plan.check()?;
+    let stored = map.records(&scene, &plan)?;
+    warn(&stored);
+    let StoredRecords { records, refined, .. } = stored;
     let survey = Survey::of(&plan, &records, refined);
-    let cells = Cells::new(&finished.scene, &plan, &records).surveyed(&survey);
+    let cells = Cells::new(&scene, &plan, &records).surveyed(&survey);
     let has_validation =
-        manifest.files.iter().any(|file| file.name == VALIDATION) && !lost.contains(&VALIDATION);
+        map.manifest().files.iter().any(|file| file.name == VALIDATION) && !lost.contains(&VALIDATION);
     let made = repair(folder, &cells, &lost, has_validation)?;
     if !ask.quiet {
         for name in &made {
@@ -132,4 +138,38 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
         }
     }
     Ok(made)
+}
+
+/// Refuses a path that is not a folder, before anything is written there.
+pub(super) fn require_folder(dir: &Path) -> Result<(), Failure> {
+    if dir.is_dir() { Ok(()) } else { Err(FinishedMapError::NoFolder { folder: dir.to_owned() }.into()) }
+}
+
+/// Reports damage in a record file that costs no record.
+pub(super) fn warn(stored: &StoredRecords) {
+    if let Some(warning) = &stored.warning {
+        say::note(format_args!("warning: {warning}"));
+    }
+}
+
+/// Compares a folder's files with their list, and reports each difference.
+pub(super) fn check_files(dir: &Path, listed: &[FileEntry], quiet: bool) -> Result<Vec<Finding>, Failure> {
+    let findings = inventory::check(dir, listed);
+    let findings =
+        findings.with_context(|| format!("cannot read {}", dir.display())).map_err(Failure::Run)?;
+    for finding in findings.iter().filter(|finding| finding.is_lost() || !quiet) {
+        say::note(format_args!("{}: {finding}", dir.display()));
+    }
+    Ok(findings)
+}
+
+/// Names the damaged or missing files of a folder.
+pub(super) fn named(dir: &Path, lost: &[&Finding]) -> String {
+    let names: Vec<String> = lost.iter().map(|finding| finding.name.escape_debug().to_string()).collect();
+    format!("{}: damaged or missing: {}", dir.display(), names.join(", "))
+}
+
+/// Returns the command that repairs a folder.
+pub(super) fn repair_command(dir: &Path) -> String {
+    format!("rattlemap check {} --repair", quoted(&dir.display().to_string()))
 }

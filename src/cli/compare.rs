@@ -6,17 +6,20 @@ use std::time::Instant;
 use anyhow::anyhow;
 
 use super::arguments::{Compare, FigureFormat};
+use super::check;
 use super::interrupt::Interrupt;
 use super::say;
+use super::stdout::print_json;
 use crate::findings::coexistence;
 use crate::findings::compare::{Comparison, Kind, Side, Tally, compare};
+use crate::job::capacity;
 use crate::job::error::Failure;
-use crate::job::finished_map::{self, Manifest};
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
 use crate::show::cells::{Cells, Survey};
 use crate::show::map_pair::{MapPair, MapSide};
 use crate::store;
+use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::map::Provenance;
 
@@ -25,22 +28,22 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
     let clock = Instant::now();
     let interrupt = Interrupt::listen(ask.quiet)?;
     let (dirs, formats) = ([&ask.a, &ask.b], FigureFormat::scene(&ask.format));
-    for dir in dirs {
-        finished_map::require_folder(dir)?;
-    }
     let names = dirs.map(|dir| name_of(dir));
-    let manifests = [Manifest::read_of_any_version(dirs[0])?, Manifest::read_of_any_version(dirs[1])?];
-    let finished = [manifests[0].scene(dirs[0])?, manifests[1].scene(dirs[1])?];
-    let scenes = [&finished[0].scene, &finished[1].scene];
+    let maps = [FinishedMap::open(dirs[0])?, FinishedMap::open(dirs[1])?];
+    let scenes = [&maps[0].scene()?, &maps[1].scene()?];
+    scenes.into_iter().try_for_each(capacity::check_finished)?;
     require_classes(dirs, scenes)?;
     require_one_grid(dirs, scenes)?;
     let out = ask.out(&names);
     refuse_own_folder(&out, dirs)?;
     let folder = Folder::open(&out, ask.force)?;
     folder.refuse_links(store::compare::names())?;
-    let plans = [finished[0].plan()?, finished[1].plan()?];
+    let plans = scenes.map(Plan::new);
+    plans.iter().try_for_each(Plan::check)?;
     interrupt.wait_for(Some("the maps are read"));
-    let [(a, refined_a), (b, refined_b)] = [finished[0].records(&plans[0])?, finished[1].records(&plans[1])?];
+    let [a, b] = [maps[0].records(scenes[0], &plans[0])?, maps[1].records(scenes[1], &plans[1])?];
+    [&a, &b].into_iter().for_each(check::warn);
+    let [(a, refined_a), (b, refined_b)] = [a, b].map(|stored| (stored.records, stored.refined));
     let counted =
         plans.iter().all(|plan| plan.start_count() > 1) && interrupt.wait_for(Some("attractors are counted"));
     let attractors =
@@ -63,7 +66,7 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         Cells::new(scenes[1], &plans[1], &b).surveyed(&surveys[1]),
     ];
     let side = |i: usize| {
-        let Manifest { engine, precision, device, crate_version, commit, .. } = &manifests[i];
+        let StoredManifest { engine, precision, device, crate_version, commit, .. } = maps[i].manifest();
         MapSide {
             name: &names[i],
             cells: &cells[i],
@@ -82,7 +85,7 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         say::notes(format_args!("{}\n{files}", summary(&compared, scenes[0])));
     }
     if ask.json {
-        store::compare::print(folder.path(), &files, &compared)?;
+        print_json(&store::compare::object(folder.path(), &files, &compared))?;
     }
     match comparison.differing() {
         differing if ask.fail && differing > 0 => Err(Failure::Run(anyhow!(

@@ -6,8 +6,8 @@ use clap::CommandFactory;
 use clap_mangen::Man;
 
 use super::arguments::{Cli, Completions};
+use super::stdout::print;
 use crate::job::error::Failure;
-use crate::store;
 
 /// Prints a script for a shell, or the page for `man`.
 pub(crate) fn run(ask: &Completions) -> Result<(), Failure> {
@@ -20,7 +20,7 @@ pub(crate) fn run(ask: &Completions) -> Result<(), Failure> {
             page(&command, &mut text).map_err(anyhow::Error::from)?;
         }
     }
-    Ok(store::stdout::print(&String::from_utf8_lossy(&text))?)
+    print(&String::from_utf8_lossy(&text))
 }
 
 /// One page for the program and all of its commands.

@@ -1,11 +1,10 @@
 //! `rattlemap devices`: what there is to compute on, and what a map would take.
 
+use crate::cli::stdout::print;
 use crate::gpu::{self, AdapterChoice, AdapterReport};
 use crate::job::engine_choice::{self, Ask};
 use crate::map::plan::Plan;
 use crate::map::scene::{Purpose, Scene};
-use crate::store::error::OutputError;
-use crate::store::stdout::print;
 
 use crate::cli::say;
 use crate::job::error::Failure;
@@ -37,7 +36,7 @@ pub(crate) fn run() -> Result<(), Failure> {
     Ok(())
 }
 
-fn print_adapter(adapter: &AdapterReport) -> Result<(), OutputError> {
+fn print_adapter(adapter: &AdapterReport) -> Result<(), Failure> {
     let AdapterReport { number, info, precisions, largest_binding, most_lanes } = adapter;
     let names: Vec<&str> = precisions.iter().map(|precision| precision.name()).collect();
     let kind = if gpu::is_hardware(info) { "hardware" } else { "software" };

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use crate::findings::effect;
 use crate::job::engine_choice::{self, Ask, Chosen};
-use crate::job::kept::{self, Kept, Work};
+use crate::job::resumed_engine;
 use crate::map::engine::{Engine, Loss};
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
@@ -22,6 +22,7 @@ use crate::show::cells::{Cells, Survey};
 use crate::store;
 use crate::store::folder::Folder;
 use crate::store::map::{LIST, Provenance, Run};
+use crate::store::run_records::{RunRecords, Work, open_folder};
 use anyhow::anyhow;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -29,6 +30,7 @@ use crate::cli::arguments::Map;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::say;
+use crate::cli::stdout::print_json;
 use crate::job::capacity;
 use crate::job::error::{Failure, fail_if};
 use crate::job::{processor, scene_file};
@@ -56,7 +58,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         return shard::say_done(ask, &plan);
     }
     let interrupt = Interrupt::listen(ask.run.quiet)?;
-    let folder = kept::open_folder(&ask.out(), ask.run.force, ask.resume)?;
+    let folder = open_folder(&ask.out(), ask.run.force, ask.resume)?;
     interrupt.ends_at_once(stopped::before_anything(ask, &plan), folder.leaver());
     let clock = Instant::now();
     let asked = engine_of(ask, folder.path());
@@ -125,7 +127,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         files.join(", ")
     ));
     if ask.json {
-        store::map_json::print(folder.path(), &files, &cells, &run, writing)?;
+        print_json(&store::map_json::object(folder.path(), &files, &cells, &run, writing))?;
     }
     let all_failed = cells.classes().all(|class| class == Class::Failed);
     fail_if(all_failed, "every cell failed; the status column says why")
@@ -134,7 +136,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
 /// The engine that was asked for; where that is left open, an interrupted run goes on with its own.
 fn engine_of(ask: &Map, folder: &Path) -> Ask {
     let asked = ask.engine.ask();
-    if ask.resume { kept::engine_of(asked, folder) } else { asked }
+    if ask.resume { resumed_engine::engine_of(asked, folder) } else { asked }
 }
 
 /// The record file, and what it holds already, by run.
@@ -144,8 +146,8 @@ fn open_records<'f>(
     scene: &Scene,
     work: &mut Work<'_>,
     engine: &Engine<'_>,
-) -> Result<Kept<'f>, Failure> {
-    let kept = Kept::open(folder, scene, engine, ask.resume, work)?;
+) -> Result<RunRecords<'f>, Failure> {
+    let kept = RunRecords::open(folder, scene, engine, ask.resume, work)?;
     if let Some(damage) = kept.damage() {
         say::note(format_args!("warning: {damage}"));
     } else if ask.resume && kept.count() == 0 && !ask.run.quiet {
@@ -162,14 +164,14 @@ fn integrate(
     ask: &Map,
     work: &mut Work<'_>,
     engine: &mut Engine<'_>,
-    kept: &mut Kept<'_>,
+    kept: &mut RunRecords<'_>,
     progress: &Progress,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
     let Work { plan, schedule, records, tally, .. } = work;
     let mut warning = Warning::new(kept.count(), ask.run.quiet);
     let keep = |batch: &[(u32, Record)], known| {
-        kept.keep(batch)?;
+        kept.store(batch)?;
         tally.take(plan, batch);
         warning.heed(batch, plan.unit());
         progress.report(kept.count(), known);

@@ -9,18 +9,18 @@ use super::arguments::Merge;
 use super::interrupt::Interrupt;
 use super::progress;
 use super::say;
+use super::stdout::print_json;
 use crate::job::capacity;
 use crate::job::error::{Failure, fail_if};
 use crate::store;
 use crate::store::folder::Folder;
-use crate::store::merge::{MergeError, Merged, Parts, Progress};
-use crate::store::record_file::RecordFileError;
+use crate::store::merge::{MergeError, MergedMap, Parts, Progress};
 
 /// Looks at all shards, gathers their records, writes the map.
 pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(ask.quiet)?;
-    let parts = Parts::open(&ask.parts).map_err(refused)?;
-    parts.refuse(&ask.out).map_err(refused)?;
+    let parts = Parts::open(&ask.parts)?;
+    parts.refuse(&ask.out)?;
     capacity::fits_merged(parts.scene(), Some(&ask.out))?;
     // A run that ended before it kept anything has left nothing else.
     let folder = Folder::open(&ask.out, ask.force || !Folder::holds_results(&ask.out))?;
@@ -34,36 +34,24 @@ pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
     interrupt.wait_for(Some("a batch is read"));
     let gathered = parts.gather(&folder, go_on).map_err(|error| match error {
         MergeError::Stopped => interrupt.failure(anyhow!("interrupted, and nothing was written to {out}")),
-        error => refused(error),
+        error => error.into(),
     })?;
     let (runs, again) = (gathered.run_count(), ask.again());
     interrupt.ends_at_once(format!("all {runs} runs are in {out}; make its files with: {again}"), || {});
-    let merged = gathered.write(&folder).map_err(refused)?;
+    let merged = gathered.write(&folder)?;
     for warning in &merged.warnings {
         say::note(format_args!("warning: {warning}"));
     }
     progress.finish(&told(&merged, shards, runs, folder.path()));
     if ask.json {
-        let text = serde_json::to_string_pretty(&merged.object).map_err(store::error::OutputError::from)?;
-        store::stdout::print(&text)?;
+        print_json(&merged.object)?;
     }
     let [periodic, chaotic, undecided, failed] = merged.classes;
     let all_failed = failed > 0 && periodic + chaotic + undecided == 0;
     fail_if(all_failed, "every cell failed; the status column says why")
 }
 
-/// Who asked wrongly, or what failed.
-fn refused(error: MergeError) -> Failure {
-    match error {
-        MergeError::Damaged { .. }
-        | MergeError::Output(_)
-        | MergeError::Stopped
-        | MergeError::Records(RecordFileError::Io { .. }) => Failure::Run(error.into()),
-        _ => Failure::Usage(error.into()),
-    }
-}
-
-fn told(merged: &Merged, shards: usize, runs: usize, folder: &Path) -> String {
+fn told(merged: &MergedMap, shards: usize, runs: usize, folder: &Path) -> String {
     let [periodic, chaotic, undecided, failed] = merged.classes;
     let [reading, writing] = merged.times.map(|time| time.as_secs_f64());
     format!(

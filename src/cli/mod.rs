@@ -15,6 +15,7 @@ mod models;
 mod orbit;
 mod progress;
 pub(crate) mod say;
+pub(crate) mod stdout;
 mod validate;
 
 use std::ffi::OsString;

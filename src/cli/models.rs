@@ -6,10 +6,10 @@ use rattlemap_dynamics::model::{Contact, Model, Parameter, Side};
 use rattlemap_dynamics::orbit::Status;
 
 use crate::cli::arguments::Models;
+use crate::cli::stdout::print;
 use crate::job::error::Failure;
 use crate::job::model_choice;
 use crate::model_file::{BUILT_IN, FileModel, Wall, WallLaw, factor};
-use crate::store::stdout::print;
 
 /// Prints the list of models, or one of them on a page.
 pub(crate) fn run(ask: &Models) -> Result<(), Failure> {

@@ -10,12 +10,14 @@ use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 use super::arguments::{FigureFormat, Orbit};
 use super::interrupt::Interrupt;
 use crate::cli::say;
+use crate::cli::stdout::print;
 use crate::job::error::{Failure, fail_if};
 use crate::job::model_choice;
 use crate::map::scene;
+use crate::show::orbit_summary::summary;
 use crate::store;
 use crate::store::folder::Folder;
-use crate::store::orbit::{Asked, Instant as At};
+use crate::store::orbit::{Instant as At, OrbitRequest};
 
 pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     let model = model_choice::find(&ask.model)?;
@@ -38,8 +40,11 @@ pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     let instant = ask.time.map(|time| at(time).map(|state| At { time, state })).transpose()?;
     let (shown, halt) = (orbit::EVENT_PERIODS, interrupt.raised());
     let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(interrupted)?;
-    let asked = Asked { start, settings, elapsed: clock.elapsed(), instant };
-    store::orbit::print(&*model, &orbit, &asked, ask.json)?;
+    let asked = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
+    print(&match ask.json {
+        true => store::orbit::json(&*model, &orbit, instant),
+        false => summary(&*model, &orbit, instant),
+    })?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
         let files = store::orbit::write(&folder, &*model, &orbit, &asked, &FigureFormat::scene(&ask.format))?;

@@ -10,6 +10,7 @@ use crate::map::plan::Plan;
 use crate::show::cells::Cells;
 use crate::show::cells::Survey;
 use crate::store;
+use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::inventory::Finding;
 use crate::store::map::{MANIFEST, Provenance, write_validation};
@@ -19,31 +20,36 @@ use crate::validate::{
 use anyhow::{Context, anyhow};
 
 use crate::cli::arguments::Validate;
+use crate::cli::check;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::say;
+use crate::job::capacity;
 use crate::job::error::Failure;
-use crate::job::finished_map::{self, Manifest};
 
 /// Reads, replays, writes.
 pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let clock = Instant::now();
     let interrupt = Interrupt::listen(ask.quiet)?;
     let dir = &ask.folder;
-    finished_map::require_folder(dir)?;
+    check::require_folder(dir)?;
     // From here on: what is read must not be another map's by the time that something is written.
     let folder = Folder::open(dir, true)?;
     folder.refuse_links(store::map::names())?;
-    let manifest = Manifest::read(dir)?;
-    let findings = finished_map::check_files(dir, &manifest.files, ask.quiet)?;
-    let finished = manifest.scene(dir)?;
-    let plan = finished.plan()?;
-    let (records, refined) = finished.records(&plan)?;
-    let scene = &finished.scene;
+    let map = FinishedMap::open_own(dir)?;
+    let manifest = map.manifest();
+    let findings = check::check_files(dir, &manifest.files, ask.quiet)?;
+    let scene = &map.scene()?;
+    capacity::check_finished(scene)?;
+    let plan = Plan::new(scene);
+    plan.check()?;
+    let stored = map.records(scene, &plan)?;
+    check::warn(&stored);
+    let (records, refined) = (stored.records, stored.refined);
     let subject = Subject {
         plan: &plan,
         records: &records,
-        precision: precision(&manifest).map_err(Failure::Usage)?,
+        precision: precision(manifest).map_err(Failure::Usage)?,
         is_lane: manifest.engine == "gpu",
     };
     let survey = Survey::of(&plan, &records, refined);
@@ -89,13 +95,13 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         true => Ok(()),
         false => Err(Failure::Run(anyhow!(
             "{}; `{}` makes anew what can be made of the records",
-            finished_map::told(dir, &left),
-            finished_map::repair_command(dir)
+            check::named(dir, &left),
+            check::repair_command(dir)
         ))),
     }
 }
 
-fn precision(manifest: &Manifest) -> anyhow::Result<Precision> {
+fn precision(manifest: &StoredManifest) -> anyhow::Result<Precision> {
     match (manifest.engine.as_str(), manifest.precision.as_str()) {
         ("cpu" | "gpu", "f64") => Ok(Precision::F64),
         ("gpu", "f32") => Ok(Precision::F32),

@@ -7,6 +7,7 @@ use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::map::size::Size;
 use crate::store::map;
+pub(crate) use crate::text::size::bytes;
 use anyhow::anyhow;
 
 use crate::cli::arguments::EngineChoice;
@@ -140,13 +141,6 @@ fn free_disk(out: &Path) -> Option<u64> {
     let absolute = std::path::absolute(out).ok()?;
     let existing = absolute.ancestors().find(|folder| folder.is_dir())?;
     fs4::available_space(existing).ok()
-}
-
-/// A size in words.
-pub(crate) fn bytes(count: u64) -> String {
-    let (unit, name) =
-        [(1e9, "GB"), (1e6, "MB")].into_iter().find(|&(unit, _)| count as f64 >= unit).unwrap_or((1e3, "kB"));
-    format!("{:.1} {name}", count as f64 / unit)
 }
 
 #[cfg(test)]

@@ -3,12 +3,14 @@
 use std::process::ExitCode;
 
 use crate::job::engine_choice::ChoiceError;
-use crate::job::kept::KeptError;
 use crate::map::plan::NoMotion;
 use crate::map::scene::SceneError;
 use crate::store::error::OutputError;
+use crate::store::finished_map::FinishedMapError;
 use crate::store::folder::FolderError;
+use crate::store::merge::MergeError;
 use crate::store::record_file::RecordFileError;
+use crate::store::run_records::RunRecordsError;
 use anyhow::anyhow;
 use rattlemap_dynamics::model::ModelError;
 
@@ -105,12 +107,24 @@ impl From<RecordFileError> for Failure {
     }
 }
 
-impl From<KeptError> for Failure {
-    fn from(error: KeptError) -> Self {
+impl From<FinishedMapError> for Failure {
+    fn from(error: FinishedMapError) -> Self {
+        if error.is_usage() { Failure::Usage(error.into()) } else { Failure::Run(error.into()) }
+    }
+}
+
+impl From<MergeError> for Failure {
+    fn from(error: MergeError) -> Self {
+        if error.is_usage() { Failure::Usage(error.into()) } else { Failure::Run(error.into()) }
+    }
+}
+
+impl From<RunRecordsError> for Failure {
+    fn from(error: RunRecordsError) -> Self {
         match error {
-            KeptError::Folder(error) => error.into(),
-            KeptError::Records(error) => error.into(),
-            KeptError::Output(error) => error.into(),
+            RunRecordsError::Folder(error) => error.into(),
+            RunRecordsError::Records(error) => error.into(),
+            RunRecordsError::Output(error) => error.into(),
         }
     }
 }

@@ -8,15 +8,13 @@ pub mod engine_choice;
 #[cfg(feature = "cli")]
 pub mod error;
 #[cfg(feature = "cli")]
-pub mod finished_map;
-#[cfg(feature = "cli")]
 pub mod forecast;
-#[cfg(feature = "files")]
-pub mod kept;
 #[cfg(feature = "cli")]
 pub mod model_choice;
 #[cfg(feature = "cli")]
 pub mod processor;
+#[cfg(feature = "files")]
+pub mod resumed_engine;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod run;
 #[cfg(feature = "cli")]

@@ -1,21 +1,18 @@
 //! A scene from its file.
 
 use std::fs;
-use std::io;
 use std::path::Path;
 
 use crate::cli::arguments::{FigureFormat, SceneOptions};
-use crate::job::capacity::bytes;
 use crate::map::scene::{Along, CompanionFile, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+use crate::store::finished_map::MOST_LIST_BYTES;
+use crate::store::plain_file::read_text;
 
 /// The most bytes that a table of cells may have.
 const MOST: u64 = 256_000_000;
 
 /// The most bytes that a model may have.
 const MOST_OF_MODEL: u64 = 1_000_000;
-
-/// Of the folder's own copy, whose numbers are written out: 1e15 has 18 characters there.
-pub(crate) const MOST_OF_COPY: u64 = 4 * MOST;
 
 /// The `--set` that says what is written.
 const FILES: &str = "outputs.files=";
@@ -61,7 +58,7 @@ fn load_from(
             return find_model(&beside);
         }
         match kept.filter(|kept| !beside.exists() && kept.exists()) {
-            Some(kept) => find(kept, MOST_OF_COPY),
+            Some(kept) => find(kept, MOST_LIST_BYTES),
             None => find(&beside, MOST),
         }
     };
@@ -82,36 +79,12 @@ pub(crate) fn find_model(path: &Path) -> Result<FileText, String> {
 /// Reads a table of cells.
 fn find(path: &Path, most: u64) -> Result<FileText, String> {
     let name = path.display().to_string();
-    match read_table(path, most) {
+    match read_text(path, most, "list fewer cells") {
         Ok(text) => Ok(FileText { name, text }),
         Err(error) => Err(format!(
             "cannot be read at {name} ({error}); give the path of a CSV table, relative to the scene's folder"
         )),
     }
-}
-
-/// The text of a table of cells that has `most` bytes at most.
-///
-/// # Errors
-/// As [`read_text`].
-pub(crate) fn read_table(path: &Path, most: u64) -> io::Result<String> {
-    read_text(path, most, "list fewer cells")
-}
-
-/// A text that has `most` bytes at most. A pipe would be waited for, and a device may never end.
-///
-/// # Errors
-/// If it is no regular file, is larger, or cannot be read.
-fn read_text(path: &Path, most: u64, remedy: &str) -> io::Result<String> {
-    let data = fs::metadata(path)?;
-    if !data.is_file() {
-        return Err(io::Error::other("it is no regular file"));
-    }
-    if data.len() > most {
-        let (size, most) = (bytes(data.len()), bytes(most));
-        return Err(io::Error::other(format!("it has {size}, and at most {most} are read: {remedy}")));
-    }
-    fs::read_to_string(path)
 }
 
 /// The options with `--format` told as one more `--set`: that is what a manifest keeps and what resuming compares.

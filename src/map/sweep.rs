@@ -126,7 +126,7 @@ struct Pace {
 }
 
 impl Pace {
-    /// Lowers the limit to half of `tried` cells. Returns false if that is none.
+    /// Halves the number of cells for good, after `tried` cells did not fit into the memory. Returns false for one cell.
     fn halve(&mut self, tried: usize) -> bool {
         self.most = tried / 2;
         self.cells = self.most;

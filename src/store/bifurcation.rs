@@ -11,47 +11,38 @@ use crate::show::figure::bifurcation::Panels;
 use crate::show::symbols::{axis_label, symbol};
 use crate::show::table::bifurcation_tables;
 use crate::show::{caption, names};
-use crate::store::bifurcation_manifest::Manifest;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::MANIFEST;
+pub use crate::store::manifest::bifurcation::DiagramArguments;
+use crate::store::manifest::bifurcation::bifurcation;
 
 const CSV: &str = "bifurcation.csv";
 const COLUMNS_CSV: &str = "bifurcation_columns.csv";
-/// Of models whose walls fix a displacement.
+/// Strobe states, for models with walls that fix a displacement.
 const STROBE_CSV: &str = "bifurcation_strobe.csv";
-/// The figure, by format.
+/// Names of the figure, by format.
 static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("bifurcation"));
 
-/// Every file that a bifurcation diagram may write.
+/// Names of all files that a bifurcation diagram may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
     [MANIFEST, CSV, COLUMNS_CSV, STROBE_CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
 }
 
-/// How a diagram was asked for, beside its scene.
-#[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
-    /// The `--set` arguments.
-    pub sets: &'a [String],
-    /// The line of a scene of several axes.
-    pub along: Option<&'a Along>,
-}
-
-/// Writes the files that the scene asks for, and the manifest last: a folder that has one
-/// is complete. Returns the files' names.
+/// Writes the files that the scene asks for, and the manifest last. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
 pub fn write(
     folder: &Folder,
     scene: &Scene,
-    asked: Asked<'_>,
+    arguments: DiagramArguments<'_>,
     columns: &[Column],
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
-    // Files of an earlier run must not stand beside a manifest that does not know them.
+    // The manifest does not list files of an earlier run.
     folder.remove(&names().collect::<Vec<_>>())?;
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
@@ -72,7 +63,7 @@ pub fn write(
     for (format, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
         let subtitle =
-            format!("{}{}; {}", line(asked.along), scene.start().in_words(), caption::of_scene(scene));
+            format!("{}{}; {}", line(arguments.along), scene.start().in_words(), caption::of_scene(scene));
         let scale = match scene.axes()[0].scale() {
             scene::Scale::Log => Scale::Logarithmic,
             scene::Scale::Linear => Scale::Linear,
@@ -86,12 +77,12 @@ pub fn write(
     }
     let listed = inventory::entries(folder, &files)?;
     let times = [elapsed, clock.elapsed()];
-    inventory::write_manifest(folder, &Manifest::new(scene, asked, columns, times, &listed))?;
+    inventory::write_manifest(folder, &bifurcation(scene, arguments, columns, times, &listed))?;
     files.push(MANIFEST);
     Ok(files)
 }
 
-/// Of a line of a plane, which one it is: the scene's title is that of a map.
+/// Describes a line through a plane; the title of such a scene describes the plane.
 fn line(along: Option<&Along>) -> String {
     let Some(Along { parameter, at }) = along.filter(|along| !along.at.is_empty()) else {
         return String::new();

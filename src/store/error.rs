@@ -1,4 +1,4 @@
-//! Why results were not written down.
+//! Why results cannot be written.
 
 use std::io;
 use std::path::PathBuf;
@@ -6,32 +6,29 @@ use std::path::PathBuf;
 use crate::show::error::WriteError;
 use rattlemap_dynamics::model::ModelError;
 
-/// A result that was not written; its text is one line with the file and the reason.
+/// Why a result cannot be written. The text is one line with the file and the reason.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// A file could not be written.
+    /// A file cannot be written.
     #[error("cannot write {}: {reason}", .path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// What went wrong with it.
+        /// The reason.
         reason: WriteError,
     },
-    /// A file of an earlier run could not be removed.
+    /// A file of an earlier run cannot be removed.
     #[error("cannot replace {}: {reason}", .path.display())]
     Replace {
         /// The file.
         path: PathBuf,
-        /// The operating system's words.
+        /// The system's error.
         reason: io::Error,
     },
-    /// Text could not be printed.
-    #[error("cannot write to stdout: {0}")]
-    Stdout(io::Error),
-    /// A result could not be put into JSON.
+    /// A result cannot be put into JSON.
     #[error("cannot put the result into JSON: {0}")]
     Json(#[from] serde_json::Error),
-    /// What was to be shown has no motion.
+    /// The model has no motion.
     #[error(transparent)]
     Model(#[from] ModelError),
 }

@@ -1,9 +1,8 @@
-//! The output folder: proved writable before anything is computed, written by one command at a time, and guarded
-//! against overwriting an earlier run by accident.
+//! The output folder. It is checked before a computation, has one writer at a time, and files of an earlier run are only
+//! replaced on request.
 
 mod lock;
 
-use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -13,113 +12,95 @@ use thiserror::Error;
 
 use crate::show::error::WriteError;
 use crate::store::error::OutputError;
+use crate::store::plain_file::{partial, refuse_link};
 pub(crate) use lock::LOCK;
 use lock::Lock;
 
 /// Why a folder cannot be used.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "`path` is the folder, and `reason` the system's error")]
 pub enum FolderError {
-    /// Something other than a folder has the name.
+    /// A file has the name of the folder.
     #[error("{}: there is a file of this name; choose another folder", .path.display())]
-    NotAFolder {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// The folder holds files already.
+    NotAFolder { path: PathBuf },
+    /// The folder contains files.
     #[error(
         "--out {}: the folder is not empty; choose another one with --out, or give --force to replace \
          the files of an earlier run",
         .path.display()
     )]
-    NotEmpty {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// Another command has the folder.
+    NotEmpty { path: PathBuf },
+    /// Another command writes into the folder.
     #[error("{}: another run is writing to this folder; wait for it, or choose another one", .path.display())]
-    InUse {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// A file that is to be written is a symbolic link.
+    InUse { path: PathBuf },
+    /// A file to be written is a symbolic link.
     #[error("{}: {reason}", .path.display())]
-    Link {
-        /// The folder asked for.
-        path: PathBuf,
-        /// Which file.
-        reason: io::Error,
-    },
-    /// The folder cannot be made, read or written.
+    Link { path: PathBuf, reason: io::Error },
+    /// The folder cannot be created, read or written.
     #[error("{}: cannot write there ({reason}); choose another folder", .path.display())]
-    NotWritable {
-        /// The folder asked for.
-        path: PathBuf,
-        /// The operating system's words.
-        reason: io::Error,
-    },
+    NotWritable { path: PathBuf, reason: io::Error },
 }
 
-/// A folder that exists and can be written, by nobody else while this lives.
+/// A folder that can be written. While this value lives, no other command can write into the folder.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
     lock: Lock,
-    // Dropped after the lock, whose file lies in it.
-    made: Made,
+    // Dropped after the lock, whose file is in the folder.
+    created: NewFolders,
 }
 
-/// Folders that were made for a run, outermost first; those that hold nothing in the end go again.
+/// Folders that were created for a run, the outermost first. Empty ones are removed in the end.
 #[derive(Debug)]
-struct Made(Vec<PathBuf>);
+struct NewFolders(Vec<PathBuf>);
 
-impl Made {
-    /// Makes a folder and those around it.
-    fn folders(path: &Path) -> io::Result<Made> {
+impl NewFolders {
+    /// Creates a folder and its missing parents.
+    fn create(path: &Path) -> io::Result<NewFolders> {
         let is_missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
         let mut missing: Vec<PathBuf> = path.ancestors().take_while(is_missing).map(Path::to_owned).collect();
         missing.reverse();
-        let made = Made(missing);
-        fs::create_dir_all(path).map(|()| made)
+        let created = NewFolders(missing);
+        fs::create_dir_all(path).map(|()| created)
     }
 }
 
-impl Drop for Made {
+impl Drop for NewFolders {
     fn drop(&mut self) {
-        // The operating system removes no folder that holds anything.
+        // The system removes only empty folders.
         let _ = self.0.iter().rev().try_for_each(fs::remove_dir);
     }
 }
 
 impl Folder {
-    /// Makes the folder if need be and takes its lock. A folder that was made here and holds nothing in the end goes
-    /// again.
+    /// Creates the folder if it does not exist and takes its lock. A folder that was created here and stays empty is removed
+    /// in the end.
     ///
     /// # Errors
-    /// [`FolderError`] if it cannot be written, another command has it, or it has something in it and `force` is not
-    /// set.
+    /// [`FolderError`] if the folder cannot be written, another command writes into it, or it contains files and `force`
+    /// is false.
     pub fn open(path: &Path, force: bool) -> Result<Folder, FolderError> {
         let path = path.to_owned();
         if path.exists() && !path.is_dir() {
             return Err(FolderError::NotAFolder { path });
         }
-        // The lock's file shows that others can be written, too.
-        let taken = Made::folders(&path).and_then(|made| Ok((Lock::take(&path)?, made)));
+        // If the file of the lock can be written, others can be, too.
+        let taken = NewFolders::create(&path).and_then(|created| Ok((Lock::take(&path)?, created)));
         match taken {
             Err(reason) => Err(FolderError::NotWritable { path, reason }),
             Ok((None, _)) => Err(FolderError::InUse { path }),
-            Ok((Some(lock), made)) => match is_empty(&path) {
+            Ok((Some(lock), created)) => match is_empty(&path) {
                 Err(reason) => Err(FolderError::NotWritable { path, reason }),
                 Ok(false) if !force => Err(FolderError::NotEmpty { path }),
-                Ok(_) => Ok(Folder { path, lock, made }),
+                Ok(_) => Ok(Folder { path, lock, created }),
             },
         }
     }
 
-    /// Looks whether a folder can be opened and the files `names` written there, and touches nothing: neither makes it
-    /// nor locks it.
+    /// Checks whether a folder can be opened and the files `names` be written there, without creating or locking anything.
     ///
     /// # Errors
-    /// As [`Folder::open`] and [`Folder::refuse_links`], as far as it can be seen.
+    /// As [`Folder::open`] and [`Folder::refuse_links`], as far as can be known without writing.
     pub fn check<'n>(
         path: &Path,
         force: bool,
@@ -148,7 +129,7 @@ impl Folder {
         refuse_links_in(path, names)
     }
 
-    /// Looks whether one of the files `names` is a symbolic link, before there is something to write to it.
+    /// Checks that none of the files `names` is a symbolic link.
     ///
     /// # Errors
     /// [`FolderError::Link`] for the first one.
@@ -156,24 +137,23 @@ impl Folder {
         refuse_links_in(&self.path, names)
     }
 
-    /// Whether a folder has anything in it but what a run leaves that was killed before it kept anything.
+    /// Whether a folder contains other files than those of a run that was killed before it wrote any result.
     pub fn holds_results(path: &Path) -> bool {
         let is_leftover =
             |entry: &fs::DirEntry| LEFTOVERS.into_iter().any(|leftover| entry.file_name() == leftover);
         fs::read_dir(path).is_ok_and(|entries| entries.flatten().any(|entry| !is_leftover(&entry)))
     }
 
-    /// What leaves the folder as it was, as far as nothing was written to it, where the process is about to end without
-    /// dropping this.
+    /// Returns a function that removes the lock and empty new folders, for a process that ends without dropping this value.
     pub fn leaver(&self) -> impl FnOnce() + Send + use<> {
-        let (lock, made) = (self.lock.path().to_owned(), Made(self.made.0.clone()));
+        let (lock, created) = (self.lock.path().to_owned(), NewFolders(self.created.0.clone()));
         move || {
             let _ = fs::remove_file(lock);
-            drop(made);
+            drop(created);
         }
     }
 
-    /// Where it is, as the user named it.
+    /// The path that the user named.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -222,7 +202,7 @@ impl Folder {
         })
     }
 
-    /// Removes the files `names` of an earlier run, as far as they exist.
+    /// Removes those of the files `names` that exist.
     ///
     /// # Errors
     /// [`OutputError::Replace`] if one exists and cannot be removed.
@@ -249,37 +229,10 @@ fn refuse_links_in<'n>(folder: &Path, names: impl IntoIterator<Item = &'n str>) 
     checked.map_err(|reason| FolderError::Link { path: folder.to_owned(), reason })
 }
 
-/// What a run that was killed at once may leave in a folder: nothing of value. Earlier versions left a probe.
-const LEFTOVERS: [&str; 4] = [LOCK, ".rattlemap-probe", "partial-records.bin", "partial-unfinished.json"];
+/// Files that a run leaves if it is killed before it has written any result.
+const LEFTOVERS: [&str; 3] = [LOCK, "partial-records.bin", "partial-unfinished.json"];
 
-/// What the name begins with under which a file is written before it is whole.
-pub(crate) const PARTIAL: &str = "partial-";
-
-/// The name under which a file is written before it is whole.
-pub(crate) fn partial(path: &Path) -> PathBuf {
-    path.with_file_name(format!("{PARTIAL}{}", path.file_name().unwrap_or_default().to_string_lossy()))
-}
-
-/// Refuses to write to what is no plain file: a symbolic link leads anywhere.
-pub(crate) fn refuse_link(path: &Path) -> io::Result<()> {
-    match fs::symlink_metadata(path) {
-        Ok(data) if data.is_symlink() => Err(io::Error::other(format!(
-            "{} is a symbolic link, and no file is written through one; remove it",
-            name_of(path)
-        ))),
-        // A pipe would be waited for until somebody reads it.
-        Ok(data) if !data.is_file() => {
-            Err(io::Error::other(format!("{} is no plain file; remove it", name_of(path))))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn name_of(path: &Path) -> Cow<'_, str> {
-    path.file_name().unwrap_or_default().to_string_lossy()
-}
-
-/// Whether a folder has nothing in it but its lock.
+/// Whether a folder contains nothing but its lock.
 fn is_empty(path: &Path) -> io::Result<bool> {
     for entry in fs::read_dir(path)? {
         if entry?.file_name() != LOCK {
@@ -307,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_that_hold_nothing_go_again() {
+    fn empty_new_folders_are_removed() {
         let root = tempfile::tempdir().unwrap();
         let [outer, inner] = ["a", "a/b/c"].map(|name| root.path().join(name));
         drop(Folder::open(&inner, false).unwrap());
@@ -321,9 +274,8 @@ mod tests {
         assert!(root.path().join("a/b/x").exists() && !inner.exists());
     }
 
-    /// As a process does that ends without dropping anything.
     #[test]
-    fn a_folder_can_be_left_as_it_was() {
+    fn a_process_that_drops_nothing_can_remove_the_lock_and_new_folders() {
         let root = tempfile::tempdir().unwrap();
         let folder = Folder::open(&root.path().join("a/b"), false).unwrap();
         let leave = folder.leaver();
@@ -345,7 +297,7 @@ mod tests {
         assert!(matches!(Folder::open(&file.join("below"), true), Err(FolderError::NotWritable { .. })));
     }
 
-    /// However many try at the same time, while locks come and go.
+    /// Several threads open and close the folder at the same time.
     #[test]
     fn a_folder_has_one_writer_at_a_time() {
         let root = tempfile::tempdir().unwrap();
@@ -369,14 +321,13 @@ mod tests {
             threads.into_iter().map(|thread| thread.join().unwrap()).sum()
         });
         assert!(opened > 100, "{opened} of 2000");
-        // What a killed process leaves is no lock.
+        // The file that a killed process leaves is not locked.
         fs::write(root.path().join(LOCK), "").unwrap();
         Folder::open(root.path(), false).unwrap();
     }
 
-    /// It says what opening says, and leaves no trace.
     #[test]
-    fn a_folder_is_checked_without_being_touched() {
+    fn checking_a_folder_reports_the_same_and_writes_nothing() {
         let root = tempfile::tempdir().unwrap();
         let [new, file] = ["a/b", "file"].map(|name| root.path().join(name));
         Folder::check(&new, false, ["x.txt"]).unwrap();
@@ -415,7 +366,7 @@ mod tests {
             assert!(link.is_symlink() && fs::read_to_string(&outside).unwrap() == "precious", "{name}");
             fs::remove_file(link).unwrap();
         }
-        // A pipe would be waited for.
+        // Opening a pipe would block.
         let pipe = inside.join("x.txt");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         let folder = Folder::open(&inside, true).unwrap();
@@ -431,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_writes_leave_what_was_there() {
+    fn a_failed_write_keeps_the_old_file() {
         let root = tempfile::tempdir().unwrap();
         let folder = Folder::open(root.path(), false).unwrap();
         folder.replace("x.txt", |out| Ok(out.write_all(b"one")?)).unwrap();

@@ -1,4 +1,4 @@
-//! Which files belong to a folder, and are they still what they were? The list `files` of its manifest.
+//! The list `files` of a manifest: name, size and hash of each file, and the comparison with the folder.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -11,45 +11,45 @@ use sha2::{Digest, Sha256};
 
 use crate::show::error::WriteError;
 use crate::store::error::OutputError;
+use crate::store::file_names::MANIFEST;
 use crate::store::folder::{Folder, LOCK};
-use crate::store::manifest::MANIFEST;
 
-/// The field of a manifest that has its own hash.
+/// Field of the manifest's own hash.
 const SEAL: &str = "manifest_sha256";
 
-/// A file as a manifest lists it.
+/// A file in the list of a manifest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileEntry {
-    /// Its name in the folder.
+    /// Name in the folder.
     pub name: String,
-    /// Its size.
+    /// Size in bytes.
     pub bytes: u64,
-    /// Its hash, as `sha256sum` prints it.
+    /// SHA-256 in hexadecimal digits, as `sha256sum` prints it.
     pub sha256: String,
 }
 
-/// What is not as the manifest says.
+/// A difference between the folder and its manifest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
-    /// The file's name.
+    /// Name of the file.
     pub name: String,
-    /// What is wrong with it.
+    /// What is wrong with the file.
     pub fault: Fault,
 }
 
 /// What is wrong with a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// It is there, and not what it was; why one knows.
+    /// The file has changed; the text says in what.
     Damaged(String),
-    /// It is listed and not there.
+    /// The file is listed and does not exist.
     Missing,
-    /// It is there and not listed.
+    /// The file exists and is not listed.
     Unknown,
 }
 
 impl Finding {
-    /// Whether the file could be made anew: one that is unknown is somebody's own.
+    /// Whether a listed file is damaged or missing. Unknown files may be the user's own.
     pub fn is_lost(&self) -> bool {
         self.fault != Fault::Unknown
     }
@@ -66,7 +66,7 @@ impl std::fmt::Display for Finding {
     }
 }
 
-/// The entry of a file as it is.
+/// Computes the entry of a file.
 ///
 /// # Errors
 /// If it cannot be read.
@@ -85,7 +85,7 @@ pub fn entry(folder: &Path, name: &str) -> io::Result<FileEntry> {
     Ok(FileEntry { name: name.to_owned(), bytes, sha256: hex(hasher.finalize()) })
 }
 
-/// The entries of these files, in their order.
+/// Computes the entries of these files, in their order.
 ///
 /// # Errors
 /// If one cannot be read.
@@ -100,7 +100,7 @@ pub fn entries<N: AsRef<str> + Sync>(folder: &Folder, names: &[N]) -> Result<Vec
     names.par_iter().map(of).collect()
 }
 
-/// Whether a folder has a manifest that lists a file.
+/// Whether the manifest of a folder lists a file.
 pub(crate) fn lists(folder: &Folder, name: &str) -> bool {
     let text = fs::read_to_string(folder.path().join(MANIFEST)).unwrap_or_default();
     let mut manifest: Value = serde_json::from_str(&text).unwrap_or_default();
@@ -109,7 +109,7 @@ pub(crate) fn lists(folder: &Folder, name: &str) -> bool {
     listed.iter().any(|entry| entry.name == name)
 }
 
-/// Compares a folder's files with the list in its manifest: what is wrong, the manifest and listed files first.
+/// Compares a folder's files with the list in its manifest. Differences are sorted: the manifest, listed files, others.
 ///
 /// # Errors
 /// If the folder cannot be read.
@@ -137,9 +137,9 @@ pub fn check(folder: &Path, listed: &[FileEntry]) -> io::Result<Vec<Finding>> {
         .collect())
 }
 
-/// What is wrong with a listed file, if anything is.
+/// Compares a file with its entry.
 fn fault(folder: &Path, listed: &FileEntry) -> Option<Fault> {
-    // A manifest may come from anywhere; its folder's files are all that it may name.
+    // A manifest may come from an unknown source; only names of files in its folder are accepted.
     if listed.name.contains(['/', '\\']) || [".", "..", ""].contains(&listed.name.as_str()) {
         return Some(Fault::Damaged("this is no name of a file in the folder".to_owned()));
     }
@@ -162,8 +162,7 @@ fn fault(folder: &Path, listed: &FileEntry) -> Option<Fault> {
     }
 }
 
-/// Replaces the manifest by one that lists these files as they are now, the others as before; `timing` is a phase
-/// with its seconds.
+/// Updates the entries of these files in the manifest and adds the seconds of a phase to its timings.
 pub(crate) fn update(folder: &Folder, names: &[&str], timing: (&str, f64)) -> Result<(), OutputError> {
     let path = folder.path().join(MANIFEST);
     let text = fs::read_to_string(&path)
@@ -182,11 +181,11 @@ pub(crate) fn update(folder: &Folder, names: &[&str], timing: (&str, f64)) -> Re
         manifest["timings"] = serde_json::json!({});
     }
     manifest["timings"][phase] = seconds.into();
-    // One that was damaged stays so.
+    // The seal of a damaged manifest is not renewed.
     if is_sealed(&text) { write_manifest(folder, &manifest) } else { folder.write_json(MANIFEST, &manifest) }
 }
 
-/// Writes a manifest, sealed.
+/// Writes a manifest with its seal.
 ///
 /// # Errors
 /// As [`Folder::replace`].
@@ -195,7 +194,7 @@ pub fn write_manifest(folder: &Folder, manifest: &impl Serialize) -> Result<(), 
     folder.replace(MANIFEST, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
-/// The text of a manifest with its own hash in it: that of the same text with an empty one.
+/// Returns the text of a manifest with a seal: the hash of the text with an empty seal.
 ///
 /// # Errors
 /// If it is no JSON object.
@@ -206,7 +205,7 @@ pub fn sealed(mut manifest: Value) -> serde_json::Result<String> {
     pretty(&manifest)
 }
 
-/// Whether a manifest's text is as it was written.
+/// Whether the seal of a manifest's text is right.
 pub fn is_sealed(text: &str) -> bool {
     let manifest = serde_json::from_str::<Value>(text);
     manifest.is_ok_and(|manifest| manifest.is_object() && sealed(manifest).is_ok_and(|sealed| sealed == text))

@@ -19,50 +19,44 @@ use crate::show::table::{attractors_csv, cells_csv, cells_npy};
 use crate::show::words::{self, MapWords};
 use crate::show::{layers, names, report};
 use crate::store::error::OutputError;
+use crate::store::file_names::{RECORDS, UNFINISHED};
 use crate::store::folder::Folder;
-use crate::store::folder::PARTIAL;
-use crate::store::record_file::RECORDS;
-use crate::store::unfinished::UNFINISHED;
-use crate::store::validation_json::ValidationObject;
-use crate::store::{inventory, map_manifest, unfinished};
+use crate::store::plain_file::PARTIAL;
+use crate::store::{inventory, manifest, unfinished, validation_json};
 use crate::validate::Validation;
 
 pub use crate::show::provenance::Provenance;
 pub use crate::show::replay::MODEL;
-pub use crate::store::manifest::MANIFEST;
-pub use crate::store::map_manifest::{Merged, Run};
+pub use crate::store::file_names::{LIST, MANIFEST, VALIDATION};
+pub use crate::store::manifest::map::{Run, ShardOrigin};
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const WORDS: &str = "words.csv";
 const HTML: &str = "report.html";
 const ATTRACTORS: &str = "attractors.csv";
-/// The cells of a map that has a list in the place of axes: a copy, lest the folder depend on a file elsewhere.
-pub const LIST: &str = "list.csv";
-/// What a validation found.
-pub const VALIDATION: &str = "validation.json";
 
-/// The layers of which there are figures, in every format of figures.
+/// Layers that have figures.
 const LAYERS: [&str; 8] =
     ["map", layers::CLASS, "lyapunov", "impacts", "mesh", "pattern", "word", "attractors"];
 
-/// Cells of a map at most whose figures are drawn side by side.
+/// Largest number of cells of a map whose figures are drawn in parallel: each figure holds its pixels twice.
 const SIDE_BY_SIDE: usize = 1 << 22;
 
-/// Every file that a map may have beside its records, but for its list, which is not made of them.
+/// Names of all files that are made from a map's records.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
     let tables = [MANIFEST, CSV, NPY, WORDS, ATTRACTORS, HTML, VALIDATION].map(str::to_owned);
     let figures = LAYERS.into_iter().flat_map(|layer| names::figures(layer).map(|(_, name)| name));
     tables.into_iter().chain(figures).collect()
 });
 
-/// Every file that a map may write, records included.
+/// Names of all files that a map may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
     ALL.iter().map(String::as_str).chain([LIST, MODEL, RECORDS, UNFINISHED])
 }
 
-/// Removes what an earlier run left, but for its records: files must not stand beside a
-/// manifest that does not know them. A list and a model go if a manifest has them; any other may be the user's own.
+/// Removes the files of an earlier run except its records. A list and a model are removed if the manifest lists them;
+/// otherwise they may be the user's own.
 ///
 /// # Errors
 /// If a file cannot be removed.
@@ -73,21 +67,21 @@ pub fn clear(folder: &Folder) -> Result<(), OutputError> {
     clear_made(folder)
 }
 
-/// The same without the list.
+/// Removes the files that are made from records, and incomplete files.
 fn clear_made(folder: &Folder) -> Result<(), OutputError> {
     folder.remove(&ALL)?;
     let names = ALL.iter().map(String::as_str).chain([LIST, MODEL]);
     folder.remove(&names.map(|name| format!("{PARTIAL}{name}")).collect::<Vec<_>>())
 }
 
-/// Clears the folder for a run that has its records there, and writes the list of its cells, if it has one: an
-/// interrupted run can be gone on with without the scene's own table, which may be this very file.
+/// Prepares the folder for a run: removes the files of an earlier one except its records, and writes the copy of the list
+/// of cells. An interrupted run can then resume without the scene's own table, which may be this very file.
 ///
 /// # Errors
 /// If a file cannot be removed or written.
 pub fn begin(folder: &Folder, scene: &Scene) -> Result<(), OutputError> {
     match scene.list() {
-        // First, lest there be a moment without either.
+        // The copy is replaced, never removed, so that a list exists at any time.
         Some(list) => {
             write_list(folder, list)?;
             clear_made(folder)
@@ -100,8 +94,7 @@ fn write_list(folder: &Folder, list: &List) -> Result<(), OutputError> {
     folder.replace(LIST, |out| Ok(out.write_all(list.to_csv().as_bytes())?))
 }
 
-/// Writes the files that the scene asks for, and the manifest last: a folder that has one is
-/// complete. Returns the files' names.
+/// Writes the files that the scene asks for, and the manifest last. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -112,15 +105,14 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<St
     let has_records = folder.path().join(RECORDS).is_file();
     let listed: Vec<&str> = files.iter().map(String::as_str).chain(has_records.then_some(RECORDS)).collect();
     let listed = inventory::entries(folder, &listed)?;
-    inventory::write_manifest(folder, &map_manifest::map(cells, run, clock.elapsed(), &listed))?;
+    inventory::write_manifest(folder, &manifest::map::map(cells, run, clock.elapsed(), &listed))?;
     files.push(MANIFEST.to_owned());
     unfinished::clear(folder)?;
     Ok(files)
 }
 
-/// Writes `validation.json` and, where the map has a report, the report again with a section
-/// on it; then the manifest that lists them. `again` is the device that ran the sample's lanes again, if one did,
-/// `elapsed` how long the validation took. Returns the files' names.
+/// Writes `validation.json`, the report with a section on the validation if the map has one, and the manifest. `again` is
+/// the device that ran the sample's lanes again, and `elapsed` the time of the validation. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -132,7 +124,7 @@ pub fn write_validation(
     validation: &Validation,
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
-    let object = serde_json::to_value(ValidationObject::new(cells, made, again, validation))?;
+    let object = validation_json::object(cells, made, again, validation);
     folder.write_json(VALIDATION, &object)?;
     let mut files = vec![VALIDATION];
     if folder.path().join(HTML).is_file() {
@@ -143,8 +135,8 @@ pub fn write_validation(
     Ok(files)
 }
 
-/// Writes those of the files `lost` anew that are made of records alone, then the manifest that lists them. The report
-/// gets its section on the validation where `has_validation` says that this is good. Returns the files' names.
+/// Writes those of the files `lost` that are made from records, and the manifest. The report gets its section on the
+/// validation if `has_validation` says that `validation.json` is undamaged. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -169,10 +161,10 @@ pub fn repair(
     Ok(files)
 }
 
-/// Whether a name is wanted.
+/// Whether to write the file of a name.
 pub(crate) type Wanted<'w> = &'w (dyn Fn(&str) -> bool + Sync);
 
-/// Writes the files that the scene asks for, as far as they are wanted.
+/// Writes those wanted files that the scene asks for.
 fn write_files(
     folder: &Folder,
     cells: &Cells<'_>,
@@ -180,7 +172,7 @@ fn write_files(
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
     let words = words::read(cells);
-    // Side by side, for each of them has parts that one core must do alone.
+    // In parallel, because both have parts that run on one core.
     let (tables, pictures) = rayon::join(
         || write_tables(folder, cells, &words, wanted),
         || write_pictures(folder, cells, &words, validation, wanted),
@@ -191,7 +183,7 @@ fn write_files(
     Ok(files)
 }
 
-/// Writes the list and the model of a scene that has them, as far as they are wanted.
+/// Writes the wanted copies of the scene's list and of its model, if it has these.
 pub(crate) fn write_copies(
     folder: &Folder,
     scene: &Scene,
@@ -265,7 +257,6 @@ fn write_pictures(
         let draw = |(layer, format, name): &(&Layer, Format, String)| {
             folder.replace(name, |out| figure::map::write(out, *format, cells, layer))
         };
-        // Each holds its pixels, twice.
         match cells.count() > SIDE_BY_SIDE {
             true => figures.iter().try_for_each(draw)?,
             false => figures.par_iter().try_for_each(draw)?,

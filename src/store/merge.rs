@@ -1,35 +1,30 @@
-//! Shards, computed apart, as the one map that they are parts of.
+//! Merges the shards of a map into the map.
 //!
-//! Parts are looked at first, all of them: which runs they are of, and whether they are finished. Their records are read
-//! once, batch by batch, and go to the map's own `records.bin`, which gets its name when all are there. Tables and figures
-//! are made of them as of any map's, the manifest last. Up to then a map that was in the folder stays as it was.
+//! [`Parts::open`] checks that the folders contain all shards of one map, each once and finished. [`Parts::gather`] reads
+//! the records once, batch by batch, and writes them to a new `records.bin`, which replaces that of the folder when it is
+//! complete. [`MapRecords::write`] then writes tables, figures and the manifest as for any map. An existing map in the
+//! folder is unchanged until all records are there.
 //!
 //! ```no_run
-//! use std::path::{Path, PathBuf};
-//!
 //! use rattlemap::store::folder::Folder;
 //! use rattlemap::store::merge::{Parts, Progress};
 //!
 //! // The shards of a map, in any order.
-//! let shards: Vec<PathBuf> = (1..=4).map(|i| format!("out/s.shard-{i}-of-4").into()).collect();
-//! let parts = Parts::open(&shards)?;
-//! let out = Path::new("out/s");
-//! parts.refuse(out)?;
-//! let folder = Folder::open(out, false)?;
-//! // False ends it, with the folder as it was.
-//! let gathered = parts.gather(&folder, |Progress { done, of }| {
+//! let parts = Parts::open(&["s.shard-1-of-2".into(), "s.shard-2-of-2".into()])?;
+//! parts.refuse("out/s".as_ref())?;
+//! let folder = Folder::open("out/s".as_ref(), false)?;
+//! // Returning false stops the merge and leaves the folder as it was.
+//! let records = parts.gather(&folder, |Progress { done, of }| {
 //!     println!("{done} of {of} runs");
 //!     true
 //! })?;
-//! let merged = gathered.write(&folder)?;
-//! println!("{}", merged.files.join(", "));
+//! println!("{}", records.write(&folder)?.files.join(", "));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod error;
-mod part;
 
-pub use error::{MergeError, Missing, Unfinished};
+pub use error::MergeError;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -40,32 +35,35 @@ use crate::findings::effect;
 use crate::map::plan::{Plan, count_classes};
 use crate::map::scene::{Scene, Start};
 use crate::map::shard::Shard;
-use crate::record::{Record, RecordStore, Records};
+use crate::record::{RecordStore, Records};
 use crate::show::cells::{Cells, Survey};
 use crate::show::provenance::Provenance;
 use crate::store::error::OutputError;
+use crate::store::finished_map::{FinishedMap, StoredManifest, UnfinishedRun};
 use crate::store::folder::Folder;
-use crate::store::map::{self, Merged as Origin, Run};
-use crate::store::record_file::{Identity, RECORDS, RecordFile};
+use crate::store::inventory::{self, FileEntry, Finding};
+use crate::store::map::{self, Run, ShardOrigin};
+use crate::store::record_file::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
+use crate::store::run_records::Work;
 use crate::store::{in_memory, map_json, unfinished};
-use part::{Begun, Part, Seen};
+use crate::text::shell::quoted;
 
-/// Records that are written together: as many as a batch of the file has at most.
+/// Number of records that are written together: the largest batch of a record file.
 const BATCH: usize = 1 << 16;
 
-/// Most batches that wait to be written: each has 12 MB.
+/// Largest number of batches in memory that wait to be written; each takes 12 MB.
 const MOST_BATCHES: usize = 8;
 
-/// How far the merging is.
+/// Progress of a merge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Runs whose records have been read.
+    /// Number of runs whose records have been read.
     pub done: usize,
-    /// All of them.
+    /// Number of all runs.
     pub of: usize,
 }
 
-/// All shards of one map, each finished, none of their records read yet.
+/// The finished shards of one map.
 #[derive(Debug)]
 pub struct Parts {
     /// In the order of the shards.
@@ -74,21 +72,33 @@ pub struct Parts {
     identity: Identity,
 }
 
+/// The folder of a finished shard.
+#[derive(Debug)]
+struct Part {
+    map: FinishedMap,
+    shard: Shard,
+    /// Identity in the record file.
+    identity: Identity,
+}
+
 impl Parts {
-    /// Looks at the folders of shards, in any order.
+    /// Checks the folders of shards, in any order, and reads their manifests.
     ///
     /// # Errors
-    /// [`MergeError`] if they are not all shards of one map, each once and finished.
+    /// [`MergeError`] unless they are all shards of one map, each once and finished.
     pub fn open(folders: &[PathBuf]) -> Result<Parts, MergeError> {
         let (mut parts, mut begun) = (Vec::new(), Vec::new());
         for folder in folders {
-            match Seen::at(folder)? {
-                Seen::Finished(part) => parts.push(*part),
-                Seen::Unfinished(part) => begun.push(part),
+            match UnfinishedRun::at(folder) {
+                Some(UnfinishedRun { identity: Some(identity), .. }) if identity.shard().is_none() => {
+                    return Err(MergeError::WholeMap { part: folder.clone() });
+                }
+                Some(run) => begun.push(run),
+                None => parts.push(Part::open(folder)?),
             }
         }
         require_one_run(&parts, &begun)?;
-        let scene = parts.first().map(|part| part.manifest.scene(&part.folder)).transpose()?;
+        let scene = parts.first().map(|part| part.map.scene()).transpose()?;
         require_all(&parts, &begun, scene.as_ref())?;
         let (Some(first), Some(scene)) = (parts.first(), scene) else { return Err(MergeError::Nothing) };
         let identity = first.identity.clone().of_shard(None);
@@ -99,38 +109,39 @@ impl Parts {
         Ok(Parts { parts, scene, identity })
     }
 
-    /// The map's scene; of title and files, in which shards may differ, those of the part that was named first.
+    /// The map's scene. Shards may differ in title and files; the scene has those of the part that was named first.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// How many shards there are.
+    /// Number of shards.
     pub fn count(&self) -> usize {
         self.parts.len()
     }
 
-    /// Refuses to write the map over one of its shards.
+    /// Refuses to write the map into the folder of one of its shards.
     ///
     /// # Errors
     /// [`MergeError::IsPart`].
     pub fn refuse(&self, out: &Path) -> Result<(), MergeError> {
         let Ok(whole) = out.canonicalize() else { return Ok(()) };
-        let is_same = |part: &&Part| part.folder.canonicalize().is_ok_and(|part| part == whole);
-        match self.parts.iter().find(is_same) {
-            Some(part) => Err(MergeError::IsPart { part: part.folder.clone() }),
+        let is_same = |part: &&Path| part.canonicalize().is_ok_and(|part| part == whole);
+        match self.parts.iter().map(|part| part.map.folder()).find(is_same) {
+            Some(part) => Err(MergeError::IsPart { part: part.to_owned() }),
             None => Ok(()),
         }
     }
 
-    /// Reads all records and writes them to a folder; `go_on` is told of progress, and false ends it.
+    /// Reads all records and writes them to a folder. `go_on` is called with the progress; the merge stops if it returns
+    /// false.
     ///
     /// # Errors
-    /// [`MergeError`], with the folder as it was.
+    /// [`MergeError`]; the folder is unchanged.
     pub fn gather(
         self,
         folder: &Folder,
         go_on: impl FnMut(Progress) -> bool,
-    ) -> Result<Gathered, MergeError> {
+    ) -> Result<MapRecords, MergeError> {
         let clock = Instant::now();
         let runs = self.scene.run_count();
         if u32::try_from(runs).is_err() {
@@ -139,279 +150,96 @@ impl Parts {
         let plan = Plan::new(&self.scene);
         plan.check()?;
         let path = folder.path().join(RECORDS);
-        let mut gathering = Gathering::new(&plan, RecordFile::create_aside(&path, &self.identity)?, go_on);
-        let read = gathering.read(&self.parts).and_then(|()| gathering.finish());
-        let Gathering { file, records, warnings, .. } = gathering;
-        if let Err(error) = read {
-            file.discard();
-            return Err(error);
-        }
+        let mut file = RecordFile::create_aside(&path, &self.identity)?;
+        let (records, warnings) = match self.copy_records(&plan, &mut file, go_on) {
+            Ok(copied) => copied,
+            Err(error) => {
+                file.discard();
+                return Err(error);
+            }
+        };
         map::begin(folder, &self.scene)?;
         file.put_in_place(&path)?;
-        unfinished::keep_elapsed(folder, self.elapsed())?;
-        Ok(Gathered { parts: self, plan, records, warnings, reading: clock.elapsed() })
+        unfinished::store_elapsed(folder, self.elapsed())?;
+        Ok(MapRecords { parts: self, plan, records, warnings, reading: clock.elapsed() })
     }
 
-    /// How long all parts were integrated, one after the other.
-    fn elapsed(&self) -> Duration {
-        self.sum(|part| part.manifest.elapsed_seconds)
-    }
-
-    fn sum(&self, seconds: impl Fn(&Part) -> f64) -> Duration {
-        Duration::try_from_secs_f64(self.parts.iter().map(seconds).sum()).unwrap_or_default()
-    }
-}
-
-/// Refuses parts of different runs.
-fn require_one_run(parts: &[Part], begun: &[Begun]) -> Result<(), MergeError> {
-    let finished = parts.iter().map(|part| (&part.folder, &part.identity));
-    let begun = begun.iter().filter_map(|begun| Some((&begun.folder, begun.identity.as_ref()?)));
-    let all: Vec<(&PathBuf, &Identity, Shard)> =
-        finished.chain(begun).filter_map(|(at, identity)| Some((at, identity, identity.shard()?))).collect();
-    let Some(&(first, identity, of_first)) = all.first() else { return Ok(()) };
-    let own = || first.clone();
-    let whole = identity.clone().of_shard(None);
-    for (nth, &(part, identity, shard)) in all.iter().enumerate() {
-        let tell = |mine: &str, theirs: &str| format!("is {mine} in the first and {theirs} in the other");
-        let differences = whole.differing(&identity.clone().of_shard(None), tell);
-        if !differences.is_empty() {
-            return Err(MergeError::OtherRun { first: own(), part: part.clone(), differences });
-        }
-        if shard.count() != of_first.count() {
-            return Err(MergeError::OtherCount { first: own(), of_first, part: part.clone(), shard });
-        }
-        if let Some(&(first, ..)) = all[..nth].iter().find(|(_, _, other)| *other == shard) {
-            return Err(MergeError::Twice { shard, first: first.clone(), part: part.clone() });
-        }
-    }
-    Ok(())
-}
-
-/// Refuses to go on where shards are missing or unfinished.
-fn require_all(parts: &[Part], begun: &[Begun], scene: Option<&Scene>) -> Result<(), MergeError> {
-    let of_begun = |begun: &Begun| begun.identity.as_ref().and_then(Identity::shard);
-    let there: Vec<Shard> =
-        parts.iter().map(|part| part.shard).chain(begun.iter().filter_map(of_begun)).collect();
-    let Some(first) = parts.first() else {
-        let unfinished: Vec<Unfinished> = begun.iter().map(|begun| begun.unfinished(None)).collect();
-        return match unfinished.is_empty() {
-            true => Err(MergeError::Nothing),
-            false => Err(MergeError::Incomplete { missing: Vec::new(), unfinished }),
-        };
-    };
-    let missing: Vec<Missing> = Shard::all(first.shard.count())
-        .filter(|shard| !there.contains(shard))
-        .map(|shard| Missing { shard, command: first.manifest.command(shard, None) })
-        .collect();
-    if missing.is_empty() && begun.is_empty() {
-        return Ok(());
-    }
-    let countable = scene.filter(|scene| !begun.is_empty() && u32::try_from(scene.run_count()).is_ok());
-    let plan = countable.map(Plan::new);
-    let of = plan.as_ref().map(|plan| (first, plan));
-    let unfinished = begun.iter().map(|begun| begun.unfinished(of)).collect();
-    Err(MergeError::Incomplete { missing, unfinished })
-}
-
-/// Records on their way from the parts to the map.
-struct Gathering<'p, G> {
-    plan: &'p Plan,
-    file: RecordFile,
-    go_on: G,
-    /// By run: the one place where all are.
-    records: RecordStore,
-    /// A bit for each run that has come.
-    come: Vec<u64>,
-    done: usize,
-    /// What is to be written next.
-    waiting: Vec<(u32, Record)>,
-    warnings: Vec<String>,
-}
-
-impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
-    fn new(plan: &'p Plan, file: RecordFile, go_on: G) -> Self {
-        let runs = plan.run_count();
-        Gathering {
-            plan,
-            file,
-            go_on,
-            records: RecordStore::new(runs, plan.reads_strobes()),
-            come: vec![0; runs.div_ceil(64)],
-            done: 0,
-            waiting: Vec::new(),
-            warnings: Vec::new(),
-        }
-    }
-
-    fn read(&mut self, parts: &[Part]) -> Result<(), MergeError> {
-        for part in parts {
-            let before = self.done;
+    /// Copies the records of all parts to a file. Returns them, and warnings about damage behind the last record of a part.
+    fn copy_records(
+        &self,
+        plan: &Plan,
+        file: &mut RecordFile,
+        mut go_on: impl FnMut(Progress) -> bool,
+    ) -> Result<(RecordStore, Vec<String>), MergeError> {
+        let mut records = RecordStore::new(plan.run_count(), plan.reads_strobes());
+        let (mut warnings, mut waiting, mut done) = (Vec::new(), Vec::new(), 0);
+        let follows = plan.policy().follows();
+        // A batch for each core, because the cores compress them in parallel.
+        let enough = BATCH * rayon::current_num_threads().min(MOST_BATCHES);
+        for part in &self.parts {
+            let mut work = Work::without_records(plan, Some(part.shard));
             let mut failed = None;
-            let read = part.read(|batch| match self.take(batch) {
-                Ok(is_good) => is_good,
-                Err(error) => {
-                    failed = Some(error);
-                    false
+            let read = RecordFile::read(&part.records(), &part.identity, work.order(), |batch| {
+                if !go_on(Progress { done, of: records.count() }) {
+                    failed = Some(MergeError::Stopped);
+                    return false;
                 }
+                if !work.replay(batch) {
+                    return false;
+                }
+                batch.iter().for_each(|(id, record)| records.put(*id as usize, record));
+                done += batch.len();
+                if !follows {
+                    waiting.extend_from_slice(batch);
+                }
+                if waiting.len() >= enough {
+                    failed = file.append(&std::mem::take(&mut waiting)).err().map(MergeError::from);
+                }
+                failed.is_none()
             });
             if let Some(error) = failed {
                 return Err(error);
             }
-            let damage = read?;
-            let (count, expected) = (self.done - before, part.shard.run_count(self.plan));
-            if count != expected {
-                let told = damage.map_or(String::new(), |damage| format!("{damage}: "));
-                return Err(part.damaged(format!("{told}{count} of {expected} runs are there")));
+            let Extent { count, damage, .. } = read.map_err(|error| part.damaged(fault(error)))?;
+            if !work.schedule.is_finished() {
+                let damage = damage.map_or(String::new(), |damage| format!("{damage}: "));
+                let expected = part.shard.run_count(plan);
+                return Err(part.damaged(format!("{damage}{count} of {expected} runs are there")));
             }
-            // Nothing is missing: it stands behind the last batch.
-            let warning = |damage| format!("{}: {damage}; all {count} runs are there", part.folder.display());
-            self.warnings.extend(damage.map(warning));
+            let folder = part.map.folder().display();
+            warnings.extend(damage.map(|damage| format!("{folder}: {damage}; all {count} runs are there")));
         }
-        Ok(())
-    }
-
-    /// Takes up a batch; false if it is not of this map, or has what came before.
-    fn take(&mut self, batch: &[(u32, Record)]) -> Result<bool, MergeError> {
-        if !(self.go_on)(Progress { done: self.done, of: self.records.count() }) {
-            return Err(MergeError::Stopped);
-        }
-        if !self.plan.admits(batch) {
-            return Ok(false);
-        }
-        for &(id, record) in batch {
-            let (place, bit) = (id as usize, 1 << (id % 64));
-            let Some(bits) = self.come.get_mut(place / 64).filter(|bits| **bits & bit == 0) else {
-                return Ok(false);
-            };
-            if place >= self.records.count() {
-                return Ok(false);
-            }
-            *bits |= bit;
-            self.records.put(place, &record);
-        }
-        self.done += batch.len();
-        if self.plan.policy().follows() {
-            // They are written row by row, in the end: who goes on takes up each row after the one before.
-            return Ok(true);
-        }
-        self.waiting.extend_from_slice(batch);
-        // Those of a core each are compressed side by side.
-        if self.waiting.len() >= BATCH * rayon::current_num_threads().min(MOST_BATCHES) {
-            self.file.append(&std::mem::take(&mut self.waiting))?;
-        }
-        Ok(true)
-    }
-
-    /// Writes what is left.
-    fn finish(&mut self) -> Result<(), MergeError> {
-        if self.plan.policy().follows() {
-            let [columns, rows] = self.plan.counts();
-            let is_down = self.plan.policy() == Start::Down;
+        if follows {
+            // A resumed run takes up each row after the one before, so rows are written in order.
+            let [columns, rows] = plan.counts();
+            let is_down = plan.policy() == Start::Down;
             let row = |nth: usize| if is_down { rows - 1 - nth } else { nth };
-            let mut ids = (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns);
-            loop {
+            let mut ids = (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns).peekable();
+            while ids.peek().is_some() {
                 let next = ids.by_ref().take(BATCH);
-                let batch: Vec<(u32, Record)> = next.map(|id| (id as u32, self.records.record(id))).collect();
-                if batch.is_empty() {
-                    break;
-                }
-                self.file.append(&batch)?;
+                file.append(&next.map(|id| (id as u32, records.record(id))).collect::<Vec<_>>())?;
             }
-        } else if !self.waiting.is_empty() {
-            self.file.append(&std::mem::take(&mut self.waiting))?;
+        } else if !waiting.is_empty() {
+            file.append(&waiting)?;
         }
-        Ok(())
-    }
-}
-
-/// A map whose records are all there: in its folder, and here.
-#[derive(Debug)]
-pub struct Gathered {
-    parts: Parts,
-    plan: Plan,
-    records: RecordStore,
-    warnings: Vec<String>,
-    reading: Duration,
-}
-
-/// A map that was merged.
-#[derive(Clone, Debug)]
-pub struct Merged {
-    /// The files in its folder.
-    pub files: Vec<String>,
-    /// Cells that are periodic, chaotic, undecided, failed.
-    pub classes: [usize; 4],
-    /// What `map --json` prints of the map, with the number of `shards`.
-    pub object: Value,
-    /// Damage in shards that cost no record.
-    pub warnings: Vec<String>,
-    /// Time to read and keep the records, and to write the files.
-    pub times: [Duration; 2],
-}
-
-impl Gathered {
-    /// How many runs the map has.
-    pub fn run_count(&self) -> usize {
-        self.plan.run_count()
+        Ok((records, warnings))
     }
 
-    /// The map as its folder would tell it.
-    ///
-    /// # Errors
-    /// [`MergeError::Output`] if something cannot be put into its form.
-    pub fn told(&self) -> Result<in_memory::Map, MergeError> {
-        self.with_cells(in_memory::map)
+    /// Sum of the times that the parts were integrated.
+    fn elapsed(&self) -> Duration {
+        self.sum(|manifest| manifest.elapsed_seconds)
     }
 
-    /// Writes tables, figures and report, and the manifest last, into the folder that has the records.
-    ///
-    /// # Errors
-    /// [`MergeError::Output`] if a file cannot be written; the records are there then.
-    pub fn write(self, folder: &Folder) -> Result<Merged, MergeError> {
-        let clock = Instant::now();
-        let (files, object, classes, writing) = self.with_cells(|cells, run| {
-            let files = map::write(folder, cells, run)?;
-            let writing = clock.elapsed();
-            let object = map_json::object(folder.path(), &files, cells, run, writing)?;
-            Ok((files, object, count_classes(cells.classes()), writing))
-        })?;
-        Ok(Merged { files, classes, object, warnings: self.warnings, times: [self.reading, writing] })
+    fn sum(&self, seconds: impl Fn(&StoredManifest) -> f64) -> Duration {
+        let sum = self.parts.iter().map(|part| seconds(part.map.manifest())).sum();
+        Duration::try_from_secs_f64(sum).unwrap_or_default()
     }
 
-    /// Hands over the finished map: its cells, and who computed them.
-    fn with_cells<T>(
-        &self,
-        take: impl FnOnce(&Cells<'_>, &Run<'_>) -> Result<T, OutputError>,
-    ) -> Result<T, MergeError> {
-        let Gathered { parts, plan, records, .. } = self;
-        let first = &parts.parts[0].manifest;
-        let survey = Survey::of(plan, records, None);
-        let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey);
-        let processor = parts.processors();
-        let made = Provenance { engine: &first.engine, precision: &first.precision, device: &first.device };
-        // Adapters and cards are told by each part's own manifest.
-        let run = Run {
-            opening: parts.sum(|part| part.manifest.timings.open),
-            elapsed: parts.elapsed(),
-            lane_grid: parts.lane_grid(),
-            without_effect: effect::names(plan, records, made.precision),
-            merged: Some(Origin {
-                shards: parts.parts[0].shard.count(),
-                sources: &first.sources,
-                target: &first.target,
-            }),
-            ..Run::new(made, &first.set, &processor)
-        };
-        Ok(take(&cells, &run)?)
-    }
-}
-
-impl Parts {
-    /// The host's processors of all parts, each once.
+    /// Names of the processors of all parts, each once.
     fn processors(&self) -> String {
         let mut names: Vec<&str> = Vec::new();
         for part in &self.parts {
-            let name = part.manifest.processor.as_str();
+            let name = part.map.manifest().processor.as_str();
             if !names.contains(&name) {
                 names.push(name);
             }
@@ -419,9 +247,205 @@ impl Parts {
         names.join("; ")
     }
 
-    /// The least and the most steps of lanes over all parts.
+    /// The smallest and the largest number of steps of lanes over all parts.
     fn lane_grid(&self) -> Option<[u32; 2]> {
-        let grids = self.parts.iter().filter_map(|part| part.manifest.lane_grid());
+        let grids = self.parts.iter().filter_map(|part| part.map.manifest().lane_grid());
         grids.reduce(|[least, most], [low, high]| [least.min(low), most.max(high)])
+    }
+}
+
+impl Part {
+    /// Reads the manifest of a finished shard and checks its files. Records have checksums of their own and are read
+    /// later.
+    fn open(folder: &Path) -> Result<Part, MergeError> {
+        let map = FinishedMap::open_part(folder)?;
+        let Some(shard) = map.manifest().shard else {
+            return Err(MergeError::WholeMap { part: folder.to_owned() });
+        };
+        let damaged = |what| Err(damaged(&map, shard, what));
+        let identity = match Identity::read(&folder.join(RECORDS)) {
+            Ok(Some(identity)) => identity,
+            Ok(None) => return damaged(format!("{RECORDS} is empty")),
+            Err(error) => return damaged(fault(error)),
+        };
+        let StoredManifest { engine, precision, device, sources, target, files, .. } = map.manifest();
+        let in_manifest = [engine, precision, device, sources, target].map(String::as_str);
+        if identity.shard() != Some(shard) || identity.in_manifest() != in_manifest {
+            return damaged(format!("{RECORDS} does not belong to the manifest in its folder"));
+        }
+        let copies: Vec<FileEntry> = files.iter().filter(|file| file.name != RECORDS).cloned().collect();
+        match inventory::check(folder, &copies).map(|found| found.into_iter().find(Finding::is_lost)) {
+            Ok(None) => Ok(Part { shard, identity, map }),
+            Ok(Some(finding)) => damaged(finding.to_string()),
+            Err(error) => damaged(format!("it cannot be read ({error})")),
+        }
+    }
+
+    fn records(&self) -> PathBuf {
+        self.map.folder().join(RECORDS)
+    }
+
+    fn damaged(&self, what: String) -> MergeError {
+        damaged(&self.map, self.shard, what)
+    }
+}
+
+fn damaged(map: &FinishedMap, shard: Shard, what: String) -> MergeError {
+    let command = map.manifest().shard_command(shard, Some(map.folder()));
+    MergeError::Damaged { part: map.folder().to_owned(), what, command }
+}
+
+/// Describes what is wrong with a part's record file.
+fn fault(error: RecordFileError) -> String {
+    match error {
+        RecordFileError::Damaged { at, what, .. } => format!("{RECORDS} is damaged at byte {at}: {what}"),
+        other => other.to_string(),
+    }
+}
+
+/// Refuses parts of different runs.
+fn require_one_run(parts: &[Part], begun: &[UnfinishedRun]) -> Result<(), MergeError> {
+    let finished = parts.iter().map(|part| (part.map.folder(), &part.identity));
+    let begun = begun.iter().filter_map(|begun| Some((&*begun.folder, begun.identity.as_ref()?)));
+    let all: Vec<(&Path, &Identity, Shard)> =
+        finished.chain(begun).filter_map(|(at, identity)| Some((at, identity, identity.shard()?))).collect();
+    let Some(&(first, identity, of_first)) = all.first() else { return Ok(()) };
+    let whole = identity.clone().of_shard(None);
+    for (nth, &(part, identity, shard)) in all.iter().enumerate() {
+        let describe = |mine: &str, theirs: &str| format!("is {mine} in the first and {theirs} in the other");
+        let differences = whole.differing(&identity.clone().of_shard(None), describe);
+        let [first, part] = [first, part].map(Path::to_owned);
+        if !differences.is_empty() {
+            return Err(MergeError::OtherRun { first, part, differences });
+        }
+        if shard.count() != of_first.count() {
+            return Err(MergeError::OtherCount { first, of_first, part, shard });
+        }
+        if let Some(&(first, ..)) = all[..nth].iter().find(|(_, _, other)| *other == shard) {
+            return Err(MergeError::Twice { shard, first: first.to_owned(), part });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses to merge if shards are missing or unfinished, with the commands that compute them.
+fn require_all(parts: &[Part], begun: &[UnfinishedRun], scene: Option<&Scene>) -> Result<(), MergeError> {
+    let first = parts.first();
+    let present: Vec<Shard> =
+        parts.iter().map(|part| part.shard).chain(begun.iter().filter_map(UnfinishedRun::shard)).collect();
+    let mut incomplete = Vec::new();
+    if let Some(first) = first {
+        let count = first.shard.count();
+        let missing: Vec<String> = Shard::all(count)
+            .filter(|shard| !present.contains(shard))
+            .map(|shard| format!("{shard} (`{}`)", first.map.manifest().shard_command(shard, None)))
+            .collect();
+        let are = if missing.len() == 1 { "is" } else { "are" };
+        if !missing.is_empty() {
+            let list = missing.join(", ");
+            incomplete.push(format!("{} of {count} shards {are} missing: {list}", missing.len()));
+        }
+    }
+    let countable = scene.filter(|scene| !begun.is_empty() && u32::try_from(scene.run_count()).is_ok());
+    let plan = countable.map(Plan::new);
+    let sets = first.map_or(&[][..], |first| &first.map.manifest().set);
+    for run in begun {
+        let (part, count) = (run.folder.display(), run.count());
+        let of = plan.as_ref().zip(run.shard()).map(|(plan, shard)| shard.run_count(plan));
+        let of = of.map_or(String::new(), |of| format!(" of {of}"));
+        incomplete.push(match run.shard() {
+            Some(shard) => {
+                let command = run.command(sets);
+                format!("shard {shard} in {part} is unfinished: {count}{of} runs are there (`{command}`)")
+            }
+            None => format!(
+                "{part} is an unfinished run: {count} runs are there (`rattlemap map SCENE --out {} --engine E --shard I/N \
+                 --resume`)",
+                quoted(&part.to_string())
+            ),
+        });
+    }
+    if incomplete.is_empty() { Ok(()) } else { Err(MergeError::Incomplete(incomplete.join("; "))) }
+}
+
+/// All records of a map, in its folder and in memory.
+#[derive(Debug)]
+pub struct MapRecords {
+    parts: Parts,
+    plan: Plan,
+    records: RecordStore,
+    warnings: Vec<String>,
+    reading: Duration,
+}
+
+/// Result of a merge.
+#[derive(Clone, Debug)]
+pub struct MergedMap {
+    /// Names of the files in the folder.
+    pub files: Vec<String>,
+    /// Number of cells that are periodic, chaotic, undecided, failed.
+    pub classes: [usize; 4],
+    /// The object that `map --json` prints, with the number of `shards`.
+    pub object: Value,
+    /// Damage in record files behind the last record.
+    pub warnings: Vec<String>,
+    /// Time spent on records, and on tables and figures.
+    pub times: [Duration; 2],
+}
+
+impl MapRecords {
+    /// Number of runs of the map.
+    pub fn run_count(&self) -> usize {
+        self.plan.run_count()
+    }
+
+    /// Builds the manifest and the tables of the map in memory.
+    ///
+    /// # Errors
+    /// [`MergeError::Output`] if a result cannot be formatted.
+    pub fn in_memory(&self) -> Result<in_memory::Map, MergeError> {
+        self.with_cells(in_memory::map)
+    }
+
+    /// Writes tables, figures, report and manifest into the folder of the records.
+    ///
+    /// # Errors
+    /// [`MergeError::Output`] if a file cannot be written. The records stay in the folder.
+    pub fn write(self, folder: &Folder) -> Result<MergedMap, MergeError> {
+        let clock = Instant::now();
+        let (files, object, classes, writing) = self.with_cells(|cells, run| {
+            let files = map::write(folder, cells, run)?;
+            let writing = clock.elapsed();
+            let object = map_json::object(folder.path(), &files, cells, run, writing);
+            Ok((files, object, count_classes(cells.classes()), writing))
+        })?;
+        Ok(MergedMap { files, classes, object, warnings: self.warnings, times: [self.reading, writing] })
+    }
+
+    /// Calls `take` with the cells and the computation of the map.
+    fn with_cells<T>(
+        &self,
+        take: impl FnOnce(&Cells<'_>, &Run<'_>) -> Result<T, OutputError>,
+    ) -> Result<T, MergeError> {
+        let MapRecords { parts, plan, records, .. } = self;
+        let first = parts.parts[0].map.manifest();
+        let survey = Survey::of(plan, records, None);
+        let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey);
+        let processor = parts.processors();
+        let made = Provenance { engine: &first.engine, precision: &first.precision, device: &first.device };
+        // Adapters and cards are in the manifests of the parts.
+        let run = Run {
+            opening: parts.sum(StoredManifest::opening_seconds),
+            elapsed: parts.elapsed(),
+            lane_grid: parts.lane_grid(),
+            without_effect: effect::names(plan, records, made.precision),
+            shards: Some(ShardOrigin {
+                count: parts.parts[0].shard.count(),
+                sources: &first.sources,
+                target: &first.target,
+            }),
+            ..Run::new(made, &first.set, &processor)
+        };
+        Ok(take(&cells, &run)?)
     }
 }

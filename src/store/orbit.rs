@@ -1,10 +1,10 @@
-//! One orbit on the terminal and in its folder: `orbit.json`, tables and figures.
+//! The folder of an orbit: `orbit.json`, tables, figures and manifest.
 
 use std::io::Write;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant as Clock};
 
-use serde::Serialize;
+use serde_json::json;
 
 use crate::map::scene::Format;
 use crate::show::figure::orbit::{OrbitFigure, OrbitPlot, spectrum};
@@ -12,14 +12,13 @@ pub use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_json::to_json;
 use crate::show::orbit_spectrum::{Spectrum, samples_per_period};
-use crate::show::orbit_summary::summary;
 use crate::show::parameters::Parameters;
 use crate::show::table::orbit_tables;
 pub use crate::show::table::orbit_tables::Moment;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
-use crate::store::inventory::{self, FileEntry};
-use crate::store::manifest::{Head, MANIFEST, ModelObject, TimingsObject};
+use crate::store::inventory;
+use crate::store::manifest::{self, Head, MANIFEST, joined};
 use rattlemap_dynamics::model::{Model, ModelError, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
@@ -27,36 +26,20 @@ const JSON: &str = "orbit.json";
 const TRAJECTORY: &str = "trajectory.csv";
 const SPECTRUM: &str = "spectrum.csv";
 
-/// Samples in the table of the motion, and in a forcing period at least.
+/// Number of samples in the table of the motion, and smallest number of samples per forcing period.
 const TABLED: usize = 2000;
 const LEAST_TABLED: usize = 50;
 
-/// What makes the folder again, and what is in it.
-#[derive(Serialize)]
-struct Manifest<'a> {
-    #[serde(flatten)]
-    head: Head,
-    engine: &'static str,
-    model: ModelObject,
-    parameters: Parameters,
-    start: Vec<f64>,
-    transient_periods: u32,
-    observed_periods: u32,
-    max_period: u32,
-    timings: TimingsObject,
-    files: &'a [FileEntry],
-}
-
-/// How an orbit was asked for, and how long that took.
+/// Settings of an orbit, and the time of its computation.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked {
-    /// The state at phase 0 to start from.
+pub struct OrbitRequest {
+    /// Initial state, at phase 0.
     pub start: State,
-    /// How long to integrate.
+    /// Length of the integration.
     pub settings: Settings,
-    /// How long it took.
+    /// Time of the computation.
     pub elapsed: Duration,
-    /// Where the motion is at the time that was asked for.
+    /// State at a requested time.
     pub instant: Option<Instant>,
 }
 
@@ -69,23 +52,13 @@ static FIGURES: LazyLock<Vec<(OrbitFigure, Format, String)>> = LazyLock::new(|| 
 /// Files of the figure of the spectrum.
 static SPECTRUM_FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures(spectrum::NAME));
 
-/// Every file that an orbit may write.
+/// Names of all files that an orbit may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
     let figures = FIGURES.iter().map(|(.., name)| name).chain(SPECTRUM_FIGURES.iter().map(|(_, name)| name));
     [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures.map(String::as_str))
 }
 
-/// Prints the orbit to stdout, as JSON or as a summary for the eye.
-///
-/// # Errors
-/// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
-pub fn print(model: &dyn Model, orbit: &Orbit, asked: &Asked, json: bool) -> Result<(), OutputError> {
-    let text = if json { to_json(model, orbit, asked.instant) } else { summary(model, orbit, asked.instant) };
-    crate::store::stdout::print(&text)
-}
-
-/// Writes the orbit and, unless it failed, its tables, and its figures in these formats; the manifest last. Returns their
-/// names.
+/// Writes the orbit, its tables and figures unless it failed, and the manifest last. Returns the names of the files.
 ///
 /// # Errors
 /// [`OutputError`] if a file cannot be written.
@@ -93,13 +66,13 @@ pub fn write(
     folder: &Folder,
     model: &dyn Model,
     orbit: &Orbit,
-    asked: &Asked,
+    request: &OrbitRequest,
     formats: &[Format],
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Clock::now();
-    // Figures of an earlier orbit must not stand beside this one.
+    // The manifest does not list files of an earlier orbit.
     folder.remove(&names().collect::<Vec<_>>())?;
-    let json = to_json(model, orbit, asked.instant);
+    let json = to_json(model, orbit, request.instant);
     folder.replace(JSON, |out| Ok(writeln!(out, "{json}")?))?;
     let mut files = vec![JSON];
     if orbit.class != Class::Failed {
@@ -122,22 +95,22 @@ pub fn write(
         }
     }
     let listed = inventory::entries(folder, &files)?;
-    let Settings { transient_periods, observed_periods, max_period } = asked.settings;
-    let manifest = Manifest {
-        head: Head::of("orbit"),
-        engine: "reference f64",
-        model: ModelObject::of(model),
-        parameters: Parameters::of(model),
-        start: asked.start[..model.state_names().len()].to_vec(),
-        transient_periods,
-        observed_periods,
-        max_period,
-        timings: TimingsObject {
-            integrate: asked.elapsed.as_secs_f64(),
-            write: clock.elapsed().as_secs_f64(),
-        },
-        files: &listed,
-    };
+    let Settings { transient_periods, observed_periods, max_period } = request.settings;
+    let (elapsed, writing) = (request.elapsed.as_secs_f64(), clock.elapsed().as_secs_f64());
+    let manifest = joined([
+        json!(Head::of("orbit")),
+        json!({
+            "engine": "reference f64",
+            "model": manifest::model(model),
+            "parameters": Parameters::of(model),
+            "start": request.start[..model.state_names().len()],
+            "transient_periods": transient_periods,
+            "observed_periods": observed_periods,
+            "max_period": max_period,
+            "timings": { "integrate": elapsed, "write": writing },
+            "files": listed,
+        }),
+    ]);
     inventory::write_manifest(folder, &manifest)?;
     files.push(MANIFEST);
     Ok(files)
@@ -149,7 +122,7 @@ fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result
     folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, &model.state_names(), &moments))
 }
 
-/// An orbit's motion over the periods that its events span: so many samples in a forcing period, and every event.
+/// Samples the motion over the periods of the orbit's events, and adds every event.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -162,7 +135,7 @@ pub fn moments(
     Ok(orbit_tables::moments(&model.oscillator()?, orbit, &trace, samples_per_period))
 }
 
-/// Returns what `orbit --json` prints.
+/// Returns the object that `orbit --json` prints.
 pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
     to_json(model, orbit, instant)
 }

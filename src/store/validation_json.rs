@@ -1,271 +1,146 @@
-//! `validation.json`: what the replay of a sample of a map's cells showed.
-//!
-//! The report shows the same object.
+//! `validation.json`: the result of validating a map. The report shows the same object.
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::show::cells::Cells;
 use crate::show::provenance::Provenance;
 use crate::show::replay;
-use crate::store::manifest::Head;
+use crate::store::manifest::{Head, joined};
 use crate::validate::{
     ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult, Validation,
-    Value,
 };
 
-#[derive(Serialize)]
-pub(crate) struct ValidationObject {
-    #[serde(flatten)]
-    head: Head,
-    engine: String,
-    precision: String,
-    device: String,
-    /// What ran lanes again, if anything did, and whether that is what made the map.
-    again_on: Option<String>,
-    same_device: bool,
-    judge: &'static str,
-    seed: u64,
-    cells: usize,
-    /// What all numbers but `cells` count: runs if cells have several starts.
-    counted: &'static str,
-    runs: usize,
-    /// Only these are replayed: the others were filled from their neighbours.
-    integrated: usize,
-    filled: usize,
-    samples: usize,
-    /// Why the map is not to be trusted; none if it is.
-    faults: Vec<String>,
-    strata: Vec<StratumObject>,
-    kinds: BTreeMap<&'static str, &'static str>,
-    agreement: BTreeMap<&'static str, AgreementObject>,
-    /// Records that their engine gave again to the bit.
-    identical: usize,
-    computed_again: usize,
-    chaos: Vec<ChaosObject>,
-    /// What changes where cells of the uniform stratum mesh at half the speed; null where none meshes.
-    half_mesh_speed: Option<HalfMeshObject>,
-    states: Option<StatesObject>,
-    /// Runs of the whole map whose record holds a number that is not finite.
-    not_finite: Vec<u32>,
-    mismatches: Vec<MismatchObject>,
-}
-
-#[derive(Serialize)]
-struct RateObject {
-    count: usize,
-    /// Ends of the 95 % interval.
-    interval: [f64; 2],
-    text: String,
-}
-
-#[derive(Serialize)]
-struct StratumObject {
-    name: &'static str,
-    runs: usize,
-    sampled: usize,
-    differing: RateObject,
-    kinds: BTreeMap<&'static str, RateObject>,
-}
-
-#[derive(Serialize)]
-struct AgreementObject {
-    compared: usize,
-    agreeing: usize,
-}
-
-#[derive(Serialize)]
-struct ChaosObject {
-    name: &'static str,
-    cells: usize,
-    distance: f64,
-    bar: Option<f64>,
-    means: [f64; 2],
-    fails: bool,
-}
-
-/// Periods, words and patterns of cycles, the latter two up to mirror image.
-#[derive(Serialize)]
-struct HalfMeshObject {
-    class: ChangedObject,
-    period: ChangedObject,
-    word: ChangedObject,
-    pattern: ChangedObject,
-}
-
-#[derive(Serialize)]
-struct ChangedObject {
-    compared: usize,
-    changed: usize,
-    interval: [f64; 2],
-    text: String,
-}
-
-#[derive(Serialize)]
-struct StatesObject {
-    horizon_periods: u32,
-    compared: usize,
-    off: RateObject,
-    median: f64,
-    worst: f64,
-    lanes: Vec<OffObject>,
-}
-
-#[derive(Serialize)]
-struct OffObject {
-    id: u32,
-    /// Not a number in JSON where it is infinite: null.
-    distance: f64,
-    bar: f64,
-}
-
-#[derive(Serialize)]
-struct MismatchObject {
-    id: u32,
-    i: usize,
-    j: usize,
-    values: BTreeMap<String, f64>,
-    differences: Vec<DifferenceObject>,
-    kind: &'static str,
-    replay: String,
-}
-
-#[derive(Serialize)]
-struct DifferenceObject {
-    field: &'static str,
-    map: Value,
-    judge: Value,
-}
-
-impl ValidationObject {
-    /// `again_on` is the device that ran lanes again, if one did.
-    pub(crate) fn new(
-        cells: &Cells<'_>,
-        made: &Provenance<'_>,
-        again_on: Option<&str>,
-        validation: &Validation,
-    ) -> ValidationObject {
-        let agreement = validation.agreement.iter().map(|field| {
-            let counts = AgreementObject { compared: field.compared, agreeing: field.agreeing };
-            (field.field.name(), counts)
-        });
-        ValidationObject {
-            head: Head::of("validate"),
-            engine: made.engine.to_owned(),
-            precision: made.precision.to_owned(),
-            device: made.device.to_owned(),
-            again_on: again_on.map(str::to_owned),
-            same_device: again_on.is_none_or(|again| again == made.device),
-            judge: match validation.judge {
+/// Describes a validation.
+///
+/// `again_on` is the device that ran lanes again, if any. `counted` is the unit of all numbers but `cells`, `integrated`
+/// the number of runs from which the sample was drawn, and `identical` the number of records that the same engine
+/// reproduced bit for bit.
+pub(crate) fn object(
+    cells: &Cells<'_>,
+    made: &Provenance<'_>,
+    again_on: Option<&str>,
+    validation: &Validation,
+) -> Value {
+    let agreement = validation
+        .agreement
+        .iter()
+        .map(|field| (field.field.name(), json!({ "compared": field.compared, "agreeing": field.agreeing })));
+    let kinds = Kind::ALL.into_iter().map(|kind| (kind.name(), meaning(kind)));
+    joined([
+        json!(Head::of("validate")),
+        json!({
+            "engine": made.engine,
+            "precision": made.precision,
+            "device": made.device,
+            "again_on": again_on,
+            "same_device": again_on.is_none_or(|again| again == made.device),
+            "judge": match validation.judge {
                 Judge::Reference => "reference",
                 Judge::Lanes => "lanes_f64",
                 Judge::Independent => "dop853",
             },
-            seed: validation.seed,
-            cells: cells.count(),
-            counted: validation.counted(),
-            runs: validation.runs,
-            integrated: validation.runs - validation.filled,
-            filled: validation.filled,
-            samples: validation.replayed,
-            faults: validation.faults(),
-            strata: validation.strata.iter().map(StratumObject::from).collect(),
-            kinds: Kind::ALL.into_iter().map(|kind| (kind.name(), meaning(kind))).collect(),
-            agreement: agreement.collect(),
-            identical: validation.again[0],
-            computed_again: validation.again[1],
-            chaos: validation.chaos.iter().map(ChaosObject::from).collect(),
-            half_mesh_speed: validation.half_mesh.as_ref().map(HalfMeshObject::from),
-            states: validation.states.as_ref().map(StatesObject::from),
-            not_finite: validation.not_finite.clone(),
-            mismatches: validation.mismatches.iter().map(|mismatch| mismatched(cells, mismatch)).collect(),
-        }
-    }
+            "seed": validation.seed,
+            "cells": cells.count(),
+            "counted": validation.counted(),
+            "runs": validation.runs,
+            "integrated": validation.runs - validation.filled,
+            "filled": validation.filled,
+            "samples": validation.replayed,
+            "faults": validation.faults(),
+            "strata": validation.strata.iter().map(stratum).collect::<Vec<_>>(),
+            "kinds": kinds.collect::<BTreeMap<_, _>>(),
+            "agreement": agreement.collect::<BTreeMap<_, _>>(),
+            "identical": validation.again[0],
+            "computed_again": validation.again[1],
+            "chaos": validation.chaos.iter().map(chaos).collect::<Vec<_>>(),
+            "half_mesh_speed": validation.half_mesh.as_ref().map(half_mesh),
+            "states": validation.states.as_ref().map(states),
+            "not_finite": validation.not_finite,
+            "mismatches": validation.mismatches.iter().map(|m| mismatch(cells, m)).collect::<Vec<_>>(),
+        }),
+    ])
 }
 
-fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
-    let row = cells.row(mismatch.id as usize);
+/// A rate with its 95 % interval.
+fn rate(rate: Rate) -> Value {
+    json!({ "count": rate.count, "interval": rate.interval, "text": rate.text() })
+}
+
+fn stratum(result: &StratumResult) -> Value {
+    let kinds = Kind::ALL.into_iter().map(|kind| (kind.name(), rate(result.rate(kind))));
+    json!({
+        "name": result.stratum.name(),
+        "runs": result.runs,
+        "sampled": result.sampled,
+        "differing": rate(result.differing()),
+        "kinds": kinds.collect::<BTreeMap<_, _>>(),
+    })
+}
+
+fn chaos(test: &ChaosTest) -> Value {
+    let &ChaosTest { name, cells, distance, bar, means } = test;
+    json!({
+        "name": name,
+        "cells": cells,
+        "distance": distance,
+        "bar": bar,
+        "means": means,
+        "fails": test.fails(),
+    })
+}
+
+/// Changes at half the meshing speed. Words and patterns of mirror images count as equal.
+fn half_mesh(half: &HalfMesh) -> Value {
+    let changed = |rate: Rate| {
+        let text = rate.text();
+        json!({ "compared": rate.among, "changed": rate.count, "interval": rate.interval, "text": text })
+    };
+    json!({
+        "class": changed(half.classes),
+        "period": changed(half.periods),
+        "word": changed(half.words),
+        "pattern": changed(half.patterns),
+    })
+}
+
+/// Distances of final states. An infinite distance is null.
+fn states(states: &StateCheck) -> Value {
+    let lane = |&Off { id, distance, bar }: &Off| json!({ "id": id, "distance": distance, "bar": bar });
+    json!({
+        "horizon_periods": HORIZON,
+        "compared": states.compared,
+        "off": rate(states.rate()),
+        "median": states.distances[0],
+        "worst": states.distances[1],
+        "lanes": states.off.iter().map(lane).collect::<Vec<_>>(),
+    })
+}
+
+fn mismatch(cells: &Cells<'_>, mismatch: &Mismatch) -> Value {
+    let id = mismatch.id as usize;
+    let [i, j] = cells.row(id).indices;
     let swept = cells.scene().swept().map(|parameter| parameter.name.to_string());
-    let differences = mismatch.differences.iter().map(|difference| DifferenceObject {
-        field: difference.field.name(),
-        map: difference.record.clone(),
-        judge: difference.judge.clone(),
+    let differences = mismatch.differences.iter().map(|difference| {
+        json!({
+            "field": difference.field.name(),
+            "map": difference.record,
+            "judge": difference.judge,
+        })
     });
-    MismatchObject {
-        id: mismatch.id,
-        i: row.indices[0],
-        j: row.indices[1],
-        values: swept.zip(cells.values(mismatch.id as usize)).collect(),
-        differences: differences.collect(),
-        kind: mismatch.kind.name(),
-        replay: replay::command(cells, mismatch.id as usize),
-    }
+    json!({
+        "id": mismatch.id,
+        "i": i,
+        "j": j,
+        "values": swept.zip(cells.values(id)).collect::<BTreeMap<_, _>>(),
+        "differences": differences.collect::<Vec<_>>(),
+        "kind": mismatch.kind.name(),
+        "replay": replay::command(cells, id),
+    })
 }
 
-impl From<Rate> for RateObject {
-    fn from(rate: Rate) -> RateObject {
-        RateObject { count: rate.count, interval: rate.interval, text: rate.text() }
-    }
-}
-
-impl From<&StratumResult> for StratumObject {
-    fn from(stratum: &StratumResult) -> StratumObject {
-        let kinds = Kind::ALL.into_iter().map(|kind| (kind.name(), stratum.rate(kind).into()));
-        StratumObject {
-            name: stratum.stratum.name(),
-            runs: stratum.runs,
-            sampled: stratum.sampled,
-            differing: stratum.differing().into(),
-            kinds: kinds.collect(),
-        }
-    }
-}
-
-impl From<&ChaosTest> for ChaosObject {
-    fn from(test: &ChaosTest) -> ChaosObject {
-        let &ChaosTest { name, cells, distance, bar, means } = test;
-        ChaosObject { name, cells, distance, bar, means, fails: test.fails() }
-    }
-}
-
-impl From<Rate> for ChangedObject {
-    fn from(rate: Rate) -> ChangedObject {
-        ChangedObject {
-            compared: rate.among,
-            changed: rate.count,
-            interval: rate.interval,
-            text: rate.text(),
-        }
-    }
-}
-
-impl From<&HalfMesh> for HalfMeshObject {
-    fn from(half: &HalfMesh) -> HalfMeshObject {
-        HalfMeshObject {
-            class: half.classes.into(),
-            period: half.periods.into(),
-            word: half.words.into(),
-            pattern: half.patterns.into(),
-        }
-    }
-}
-
-impl From<&StateCheck> for StatesObject {
-    fn from(states: &StateCheck) -> StatesObject {
-        let lane = |&Off { id, distance, bar }: &Off| OffObject { id, distance, bar };
-        StatesObject {
-            horizon_periods: HORIZON,
-            compared: states.compared,
-            off: states.rate().into(),
-            median: states.distances[0],
-            worst: states.distances[1],
-            lanes: states.off.iter().map(lane).collect(),
-        }
-    }
-}
-
-/// A kind for a reader who has not read the code.
+/// Explains a kind of mismatch.
 fn meaning(kind: Kind) -> &'static str {
     match kind {
         Kind::Attractor => {

@@ -8,6 +8,8 @@ pub mod expression;
 pub mod printable;
 pub(crate) mod section;
 pub mod shell;
+#[cfg(feature = "files")]
+pub(crate) mod size;
 
 /// Splits a table of test cases: one case per line, fields separated by `|`, with `\n` for a line break within a field.
 #[cfg(test)]

@@ -9,21 +9,21 @@ use serde_json::{Value, json};
 use super::{engine_of, shard};
 use crate::cli::arguments::Map;
 use crate::cli::say;
+use crate::cli::stdout::{print, print_json};
 use crate::job::capacity::{Free, bytes};
 use crate::job::engine_choice::{self, Chosen};
 use crate::job::error::Failure;
 use crate::job::forecast::Forecast;
-use crate::job::kept;
 use crate::job::processor;
 use crate::map::engine::Engine;
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
-use crate::map::schedule::Schedule;
 use crate::map::shard::Shard;
 use crate::map::size::Size;
 use crate::store;
 use crate::store::folder::Folder;
-use crate::store::record_file::{Identity, RECORDS, RecordFile, RecordFileError};
+use crate::store::record_file::{Identity, RECORDS, RecordFileError};
+use crate::store::run_records::Work;
 
 /// What is foreseen.
 struct Foreseen<'a> {
@@ -74,12 +74,7 @@ pub(super) fn run(ask: &Map, scene: &Scene, plan: &Plan, free: Free) -> Result<(
         opening,
         forecast,
     };
-    let text = if ask.json {
-        serde_json::to_string_pretty(&foreseen.object(&out)).map_err(store::error::OutputError::from)?
-    } else {
-        foreseen.text(&out)
-    };
-    Ok(store::stdout::print(&text)?)
+    if ask.json { print_json(&foreseen.object(&out)) } else { print(&foreseen.text(&out)) }
 }
 
 /// Refuses a folder that a run would refuse, as far as that can be seen without making it.
@@ -104,8 +99,7 @@ fn kept_runs(
     }
     let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
         .of_shard(ask.shard);
-    let order = kept::order(&Schedule::of(plan, ask.shard));
-    Ok(RecordFile::read(&path, &identity, order, |batch| plan.admits(batch))?.count)
+    Ok(Work::new(plan, ask.shard).read(&path, &identity)?.count)
 }
 
 impl Foreseen<'_> {

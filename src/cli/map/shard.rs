@@ -9,21 +9,20 @@ use super::summary;
 use crate::cli::arguments::{EngineChoice, Map};
 use crate::cli::progress::Progress;
 use crate::cli::say;
+use crate::cli::stdout::print_json;
 use crate::gpu::Precision;
 use crate::job::error::Failure;
-use crate::job::finished_map::Manifest;
-use crate::job::kept::{Kept, Work, order};
 use crate::job::processor;
 use crate::map::engine::Engine;
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::map::shard::Shard;
-use crate::map::sweep;
-use crate::record::Record;
+use crate::store::finished_map::FinishedMap;
 use crate::store::inventory::{self, Finding};
 use crate::store::map::{Provenance, Run};
-use crate::store::record_file::{Identity, RECORDS, RecordFile};
-use crate::store::shard::{self, Finished, Tally};
+use crate::store::record_file::{Identity, RECORDS};
+use crate::store::run_records::{RunRecords, Work};
+use crate::store::shard::{self, FinishedShard, Tally};
 
 /// Refuses to leave the engine open: two machines could choose two, whose parts make no map.
 pub(super) fn require_engine(ask: &Map) -> Result<(), Failure> {
@@ -68,9 +67,9 @@ fn is_same(ask: &Map, scene: &Scene, out: &Path) -> bool {
 }
 
 fn is_good(ask: &Map, scene: &Scene, out: &Path) -> bool {
-    let Ok(manifest) = Manifest::read_part(out) else { return false };
-    let findings = inventory::check(out, &manifest.files);
-    manifest.is_of(scene, &ask.run.set) && findings.is_ok_and(|list| !list.iter().any(Finding::is_lost))
+    let Ok(map) = FinishedMap::open_part(out) else { return false };
+    let findings = inventory::check(out, &map.manifest().files);
+    map.is_of(scene, &ask.run.set) && findings.is_ok_and(|list| !list.iter().any(Finding::is_lost))
 }
 
 /// By the records themselves: where a network disk has no locks, a second run may have spoilt them before the first one
@@ -78,10 +77,8 @@ fn is_good(ask: &Map, scene: &Scene, out: &Path) -> bool {
 fn has_all(ask: &Map, plan: &Plan, out: &Path) -> bool {
     let path = out.join(RECORDS);
     let Ok(Some(identity)) = Identity::read(&path) else { return false };
-    let Work { schedule, records, .. } = &mut Work::new(plan, ask.shard);
-    let order = order(schedule);
-    let take = |batch: &[(u32, Record)]| plan.admits(batch) && sweep::replay(schedule, records, batch);
-    RecordFile::read(&path, &identity, order, take).is_ok_and(|extent| extent.count == runs(ask, plan))
+    let mut work = Work::new(plan, ask.shard);
+    work.read(&path, &identity).is_ok_and(|extent| extent.count == runs(ask, plan))
 }
 
 pub(super) fn say_done(ask: &Map, plan: &Plan) -> Result<(), Failure> {
@@ -97,7 +94,7 @@ pub(super) struct Ended<'a> {
     pub(super) shard: Shard,
     /// Time until the engine was ready.
     pub(super) opening: Duration,
-    pub(super) kept: &'a Kept<'a>,
+    pub(super) kept: &'a RunRecords<'a>,
     pub(super) tally: &'a Tally,
 }
 
@@ -120,11 +117,11 @@ pub(super) fn finish(
         resumed_cells: kept.resumed(),
         ..Run::new(made, &ask.run.set, &processor).on(engine)
     };
-    let finished = Finished { shard, scene, plan, run: &run, tally };
+    let finished = FinishedShard { shard, scene, plan, run: &run, tally };
     let files = shard::write(kept.folder(), &finished)?;
     progress.finish(&told(&finished, kept.folder().path(), &files));
     if ask.json {
-        shard::print(kept.folder().path(), &files, &finished)?;
+        print_json(&shard::object(kept.folder().path(), &files, &finished))?;
     }
     if tally.all_failed() && !ask.run.quiet {
         say::note(
@@ -135,8 +132,8 @@ pub(super) fn finish(
 }
 
 /// What was done, how fast, and what came out.
-fn told(finished: &Finished<'_>, folder: &Path, files: &[String]) -> String {
-    let Finished { shard, plan, run, tally, .. } = finished;
+fn told(finished: &FinishedShard<'_>, folder: &Path, files: &[String]) -> String {
+    let FinishedShard { shard, plan, run, tally, .. } = finished;
     let (count, unit, seconds) = (shard.run_count(plan), plan.unit(), run.elapsed.as_secs_f64().max(1e-9));
     let before = match run.resumed_cells {
         0 => String::new(),

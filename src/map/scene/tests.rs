@@ -55,12 +55,16 @@ fn refusal(old: &str, new: &str) -> String {
     parse(&GOOD.replacen(old, new, 1), &[]).expect_err(new).to_string()
 }
 
+/// Splits the parts of a message that are joined by `&&`.
+fn parts(expected: &str) -> Vec<&str> {
+    expected.split("&&").map(str::trim).collect()
+}
+
 /// Checks the messages for changes of GOOD, from lines of the form `old | new | parts of the message, joined by &&`.
 #[track_caller]
 fn check_refusals(cases: &str) {
     for [old, new, expected] in test_cases(cases) {
-        let parts: Vec<&str> = expected.split(" && ").chain(["s.toml:"]).collect();
-        assert_says(&refusal(&old, &new), &parts);
+        assert_says(&refusal(&old, &new), &[&parts(&expected)[..], &["s.toml:"]].concat());
     }
 }
 

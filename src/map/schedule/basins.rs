@@ -9,9 +9,9 @@ use crate::record::Record;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
 
-/// Smallest kind of a start that leads to a cycle of the catalogue.
+/// Kind of a start that leads to the first cycle of the catalogue. Further cycles have the following numbers.
 const FIRST_CYCLE: u32 = 4;
-/// Smallest kind of a start that leads to a cycle that is not in the catalogue.
+/// Added to the period: kind of a start that leads to a cycle outside of the catalogue.
 const FIRST_UNRESOLVED: u32 = 1 << 24;
 
 /// Known attractors. They belong to one oscillator, because an adaptive map of basins sweeps only starts.

@@ -1,4 +1,4 @@
-//! One writer at a time: a file in the folder that the operating system locks for as long as its process lives.
+//! The lock of a folder: a file that the operating system locks while its process lives.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -7,15 +7,15 @@ use std::path::{Path, PathBuf};
 use fs4::fs_std::FileExt;
 use same_file::Handle;
 
-use crate::store::folder::refuse_link;
+use crate::store::plain_file::refuse_link;
 
-/// Its name. It is there while a folder is written, and after a kill; then nobody holds it.
+/// Name of the file. After a kill it exists, but is not locked.
 pub(crate) const LOCK: &str = ".rattlemap.lock";
 
-/// How often a lock is tried for whose file goes away under it.
+/// Largest number of attempts to lock a file that other processes remove meanwhile.
 const TRIES: usize = 100;
 
-/// A lock that is held until it is dropped.
+/// A lock, released when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Lock {
     path: PathBuf,
@@ -23,19 +23,19 @@ pub(crate) struct Lock {
 }
 
 impl Lock {
-    /// Takes the lock of a folder; none if somebody else holds it.
+    /// Takes the lock of a folder; returns none if another process has it.
     pub(crate) fn take(folder: &Path) -> io::Result<Option<Lock>> {
         let path = folder.join(LOCK);
         refuse_link(&path)?;
         for _ in 0..TRIES {
             let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path)?;
-            // Some network disks have no locks; that is no reason not to run there.
+            // On network disks without locks the folder is used without one.
             let has_locks = match FileExt::try_lock_exclusive(&file) {
                 Ok(false) => return Ok(None),
                 Ok(true) => true,
                 Err(_) => false,
             };
-            // Who held it before has removed the file, and somebody may have made another.
+            // Another process may have removed the file and created a new one.
             if !has_locks || is_at(&file, &path)? {
                 return Ok(Some(Lock { path, _file: file }));
             }
@@ -45,13 +45,13 @@ impl Lock {
 }
 
 impl Lock {
-    /// Whether somebody holds the lock of a folder; takes none that lasts, and makes no file.
+    /// Whether another process has the lock of a folder; creates no file.
     pub(crate) fn is_held(folder: &Path) -> bool {
         let file = OpenOptions::new().write(true).open(folder.join(LOCK));
         file.is_ok_and(|file| matches!(FileExt::try_lock_exclusive(&file), Ok(false)))
     }
 
-    /// Its file.
+    /// Path of the file.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
@@ -59,12 +59,12 @@ impl Lock {
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // A file that stays is in nobody's way.
+        // An error is ignored: a file that is not locked does no harm.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// Whether a file is still the one of its name.
+/// Whether a path still names this open file.
 fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     match Handle::from_path(path) {
         Ok(named) => Ok(named == Handle::from_file(file.try_clone()?)?),

@@ -1,173 +1,74 @@
-//! Why shards make no map.
+//! Why shards cannot be merged.
 
-use std::fmt;
 use std::path::PathBuf;
 
 use thiserror::Error;
 
 use crate::map::plan::NoMotion;
-use crate::map::scene::SceneError;
 use crate::map::shard::Shard;
 use crate::store::error::OutputError;
-use crate::store::folder::FolderError;
+use crate::store::finished_map::FinishedMapError;
 use crate::store::record_file::RecordFileError;
 
-/// Why shards make no map. But for the last three nothing was written, and a map that was there before is as it was.
+/// Why shards cannot be merged. Except for the last two, nothing was written.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the fields")]
 pub enum MergeError {
-    /// There are none.
+    /// No folder was named.
     #[error("there are no shards to merge; name the folder of each")]
     Nothing,
-    /// There is no such folder.
-    #[error("{}: there is no such folder; name the folders of shards", .part.display())]
-    NoFolder {
-        /// The folder.
-        part: PathBuf,
-    },
-    /// Something else is in it.
-    #[error("{}: this is no shard of a map ({why}); `rattlemap map SCENE --shard I/N` makes one", .part.display())]
-    NoShard {
-        /// The folder.
-        part: PathBuf,
-        /// What is not as in a shard.
-        why: String,
-    },
-    /// A map is in it.
-    #[error("{}: this is a whole map, not a shard of one: there is nothing to merge it with", .part.display())]
-    WholeMap {
-        /// The folder.
-        part: PathBuf,
-    },
-    /// Its files are not what they were.
+    /// A folder is not that of a finished shard.
+    #[error(transparent)]
+    Part(#[from] FinishedMapError),
+    /// A folder contains a whole map.
+    #[error("{}: this is a whole map, not a shard of one; name the folders of shards", .part.display())]
+    WholeMap { part: PathBuf },
+    /// Files of a shard are damaged.
     #[error("{}: {what}; `{command}` keeps what is good and computes the rest", .part.display())]
-    Damaged {
-        /// The folder.
-        part: PathBuf,
-        /// What is wrong.
-        what: String,
-        /// What makes it anew.
-        command: String,
-    },
-    /// Two parts are of two runs.
+    Damaged { part: PathBuf, what: String, command: String },
+    /// Two parts belong to different runs.
     #[error("{} and {} are of two runs, and make no map: {differences}; make the shards of one map with one scene, \
              engine, precision and version, on cards of one model and driver", .first.display(), .part.display())]
-    OtherRun {
-        /// The folder of the first part.
-        first: PathBuf,
-        /// The folder of the one that differs.
-        part: PathBuf,
-        /// In what, with both values.
-        differences: String,
-    },
-    /// Two parts are of maps that were dealt out to different numbers.
-    #[error("{} is shard {of_first}, and {} is shard {shard}: all must be of one number of shards", .first.display(), .part.display())]
-    OtherCount {
-        /// The folder of the first part.
-        first: PathBuf,
-        /// Which it is.
-        of_first: Shard,
-        /// The folder of the one that differs.
-        part: PathBuf,
-        /// Which it is.
-        shard: Shard,
-    },
-    /// One shard twice.
+    OtherRun { first: PathBuf, part: PathBuf, differences: String },
+    /// Two parts belong to maps with different numbers of shards.
+    #[error("{} is shard {of_first}, and {} is shard {shard}: the number of shards must be the same", .first.display(), .part.display())]
+    OtherCount { first: PathBuf, of_first: Shard, part: PathBuf, shard: Shard },
+    /// Two parts are the same shard.
     #[error("{} and {} are both shard {shard}; name one of them", .first.display(), .part.display())]
-    Twice {
-        /// Which it is.
-        shard: Shard,
-        /// One folder.
-        first: PathBuf,
-        /// The other, or the same.
-        part: PathBuf,
-    },
+    Twice { shard: Shard, first: PathBuf, part: PathBuf },
     /// Shards are missing or unfinished.
-    #[error("{}", told(.missing, .unfinished))]
-    Incomplete {
-        /// Shards that no part is.
-        missing: Vec<Missing>,
-        /// Parts that have not all of their runs.
-        unfinished: Vec<Unfinished>,
-    },
-    /// The map would be written over one of its shards.
+    #[error("{0}")]
+    Incomplete(String),
+    /// The map would be written into the folder of one of its shards.
     #[error("{}: this is the folder of a shard; name another one for the map", .part.display())]
-    IsPart {
-        /// The folder.
-        part: PathBuf,
-    },
+    IsPart { part: PathBuf },
     /// The map is too large.
     #[error("{runs} runs are more than the {} that can be numbered", u32::MAX)]
-    TooLarge {
-        /// Cells times starts per cell.
-        runs: u64,
-    },
-    /// The scene of the shards is not one of this version.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The model has no motion somewhere.
+    TooLarge { runs: u64 },
+    /// The model has no motion in a cell.
     #[error(transparent)]
     NoMotion(#[from] NoMotion),
-    /// Whoever was told of progress asked to stop.
+    /// The caller stopped the merge.
     #[error("interrupted")]
     Stopped,
-    /// The folder of the map cannot be used.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// Records cannot be read or written.
+    /// The records of the map cannot be written.
     #[error(transparent)]
     Records(#[from] RecordFileError),
-    /// A file of the map cannot be written.
+    /// Another file of the map cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
 }
 
-/// A shard that no part is.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Missing {
-    /// Which.
-    pub shard: Shard,
-    /// What makes it.
-    pub command: String,
-}
-
-/// A part that has not all of its runs.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Unfinished {
-    /// Its folder.
-    pub part: PathBuf,
-    /// Which shard it is; none where nothing was kept yet.
-    pub shard: Option<Shard>,
-    /// Runs that it has.
-    pub kept: usize,
-    /// Runs that it should have; none where no finished part tells the scene.
-    pub of: Option<usize>,
-    /// What goes on with it.
-    pub command: String,
-}
-
-impl fmt::Display for Unfinished {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Unfinished { part, shard, kept, of, command } = self;
-        let part = part.display();
-        match shard {
-            Some(shard) => write!(f, "shard {shard} in {part} is unfinished: {kept} ")?,
-            None => write!(f, "{part} is an unfinished run: {kept} ")?,
-        }
-        match of {
-            Some(of) => write!(f, "of {of} runs are there (`{command}`)"),
-            None => write!(f, "runs are there (`{command}`)"),
+impl MergeError {
+    /// Whether the caller named wrong folders; otherwise a part is damaged, or a file cannot be written.
+    pub fn is_usage(&self) -> bool {
+        match self {
+            MergeError::Part(error) => error.is_usage(),
+            MergeError::Damaged { .. }
+            | MergeError::Output(_)
+            | MergeError::Stopped
+            | MergeError::Records(RecordFileError::Io { .. }) => false,
+            _ => true,
         }
     }
-}
-
-/// What is not there, and how to make it.
-fn told(missing: &[Missing], unfinished: &[Unfinished]) -> String {
-    let count = missing.first().map_or(0, |first| first.shard.count());
-    let each: Vec<String> =
-        missing.iter().map(|Missing { shard, command }| format!("{shard} (`{command}`)")).collect();
-    let are = if missing.len() == 1 { "is" } else { "are" };
-    let missing = (!each.is_empty())
-        .then(|| format!("{} of {count} shards {are} missing: {}", each.len(), each.join(", ")));
-    let unfinished = unfinished.iter().map(ToString::to_string);
-    missing.into_iter().chain(unfinished).collect::<Vec<_>>().join("; ")
 }

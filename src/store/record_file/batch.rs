@@ -1,43 +1,38 @@
-//! A batch of records in the file: a head that can be found again behind damage, and columns.
+//! A batch of records in the file: a head that a reader can find again behind damage, and compressed columns.
 
 use crate::record::Record;
 use crate::store::record_file::columns;
 
-/// What every batch begins with.
+/// First bytes of every batch.
 const MARK: [u8; 8] = *b"\x93RTLBAT\n";
-/// Bytes before the columns.
+/// Number of bytes before the columns.
 pub(crate) const HEAD: usize = 32;
-/// Most cells of a batch: what one damaged byte costs, and what a reader must have room for.
+/// Largest number of cells in a batch. It bounds the loss by one damaged byte and the memory of a reader.
 pub(crate) const MOST_CELLS: usize = 1 << 16;
 
-/// What the head of a batch tells.
+/// BatchHead of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Head {
-    /// Raised from batch to batch.
+pub(crate) struct BatchHead {
+    /// Number of the batch; it increases along the file.
     pub(crate) number: u32,
     cells: u32,
-    /// Which columns follow, a bit for each.
+    /// A bit for each column that follows.
     columns: u32,
-    /// Bytes that follow.
+    /// Number of bytes that follow.
     pub(crate) bytes: u32,
-    /// Checksum of these.
+    /// Checksum of these bytes.
     sum: u32,
 }
 
-/// A batch as it is written.
+/// Returns the bytes of a batch.
 pub(crate) fn encode(number: u32, batch: &[(u32, Record)]) -> std::io::Result<Vec<u8>> {
     let (columns, body) = columns::encode(batch)?;
-    Ok(framed(number, batch.len(), columns, &body))
+    let (cells, bytes) = (batch.len() as u32, body.len() as u32);
+    let head = BatchHead { number, cells, columns, bytes, sum: crc32fast::hash(&body) };
+    Ok([&head.bytes()[..], &body].concat())
 }
 
-/// These columns of so many cells behind their head.
-pub(crate) fn framed(number: u32, cells: usize, columns: u32, body: &[u8]) -> Vec<u8> {
-    let (cells, bytes) = (cells as u32, body.len() as u32);
-    let head = Head { number, cells, columns, bytes, sum: crc32fast::hash(body) };
-    [&head.bytes()[..], body].concat()
-}
-
-impl Head {
+impl BatchHead {
     fn bytes(&self) -> [u8; HEAD] {
         let mut bytes = [0; HEAD];
         bytes[..8].copy_from_slice(&MARK);
@@ -50,22 +45,22 @@ impl Head {
         bytes
     }
 
-    /// The head that these bytes are, if they are a good one.
-    pub(crate) fn read(bytes: &[u8; HEAD]) -> Option<Head> {
+    /// Returns the head that these bytes encode, or none if they are damaged.
+    pub(crate) fn read(bytes: &[u8; HEAD]) -> Option<BatchHead> {
         let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
         let head =
-            Head { number: word(8), cells: word(12), columns: word(16), bytes: word(20), sum: word(24) };
+            BatchHead { number: word(8), cells: word(12), columns: word(16), bytes: word(20), sum: word(24) };
         (head.bytes() == *bytes && head.cells as usize <= MOST_CELLS).then_some(head)
     }
 
-    /// The batch whose columns these are, in a file of so many; none if they are not.
-    pub(crate) fn decode(&self, columns: usize, body: &[u8]) -> Option<Vec<(u32, Record)>> {
+    /// Returns the records that these bytes encode, or none if they are damaged.
+    pub(crate) fn decode(&self, body: &[u8]) -> Option<Vec<(u32, Record)>> {
         let is_good = crc32fast::hash(body) == self.sum;
-        is_good.then(|| columns::decode(columns, self.columns, self.cells as usize, body)).flatten()
+        is_good.then(|| columns::decode(self.columns, self.cells as usize, body)).flatten()
     }
 }
 
-/// Where the first batch begins in these bytes, by its mark alone.
+/// Returns the place of the first mark of a batch in these bytes.
 pub(crate) fn find(bytes: &[u8]) -> Option<usize> {
     bytes.windows(MARK.len()).position(|place| place == MARK)
 }

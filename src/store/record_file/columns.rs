@@ -1,7 +1,6 @@
-//! Records as columns: bytes of one significance side by side, compressed.
+//! Records as compressed columns: the first bytes of all numbers of a column, then the second bytes, and so on.
 //!
-//! A column that is zero in every cell is left out, as are all that no output asks for. What is read back is what
-//! was written, to the bit.
+//! A column that is zero in every cell is left out. Decoding returns the encoded records bit for bit.
 
 use std::io::{self, Read, Write};
 use std::mem::offset_of;
@@ -12,12 +11,15 @@ use flate2::write::DeflateEncoder;
 
 use crate::record::Record;
 
-/// An id and its record.
+/// Number of bytes of an id and its record.
 const ROW: usize = ID + size_of::<Record>();
 const ID: usize = size_of::<u32>();
 
+/// Number of columns.
+const COUNT: usize = 17;
+
 /// Names of the columns, in the order of their bits.
-pub(crate) const NAMES: [&str; 17] = [
+pub(crate) const NAMES: [&str; COUNT] = [
     "id",
     "lyapunov",
     "lyapunov_error",
@@ -37,14 +39,8 @@ pub(crate) const NAMES: [&str; 17] = [
     "pattern_length",
 ];
 
-/// How many of them files have from before there were patterns: the first ones.
-pub(crate) const BEFORE_PATTERNS: usize = 14;
-
-/// The row of those files: what was reserved then, 32 bytes, is where patterns begin now.
-const ROW_BEFORE_PATTERNS: usize = ID + offset_of!(Record, pattern) + 32;
-
-/// Where each begins in a row, in their order there, and how many bytes its numbers have. What is reserved goes with the last.
-const PLACES: [(usize, usize); 17] = [
+/// Offset of each column in a row and the size of its numbers in bytes. The last column includes the reserved bytes.
+const PLACES: [(usize, usize); COUNT] = [
     (0, 4),
     (ID + offset_of!(Record, lyapunov), 8),
     (ID + offset_of!(Record, lyapunov_error), 8),
@@ -64,48 +60,41 @@ const PLACES: [(usize, usize); 17] = [
     (ID + offset_of!(Record, pattern_length), 4),
 ];
 
-/// Places in a row of a column's bytes, the most significant of each number first, in a file of so many columns.
-fn bytes_of(column: usize, columns: usize) -> impl Iterator<Item = usize> {
+/// Returns the places of a column's bytes in a row, the most significant byte of each number first.
+fn bytes_of(column: usize) -> impl Iterator<Item = usize> {
     let (from, width) = PLACES[column];
-    let to = match PLACES[..columns].get(column + 1) {
-        Some(&(next, _)) => next,
-        None if columns == BEFORE_PATTERNS => ROW_BEFORE_PATTERNS,
-        None => ROW,
-    };
+    let to = PLACES.get(column + 1).map_or(ROW, |&(next, _)| next);
     (from..to).step_by(width).flat_map(move |number| (number..number + width).rev())
 }
 
 type Row = [u8; ROW];
 
-/// Which columns there are, a bit for each, and the columns.
+/// Returns a bit for each column that is stored, and the compressed columns.
 pub(crate) fn encode(batch: &[(u32, Record)]) -> io::Result<(u32, Vec<u8>)> {
     let rows = rows(batch);
     let mut mask = 0;
     let mut output = DeflateEncoder::new(Vec::new(), Compression::fast());
-    for column in 0..NAMES.len() {
-        if bytes_of(column, NAMES.len()).all(|at| rows.iter().all(|row| row[at] == 0)) {
+    for column in 0..COUNT {
+        if bytes_of(column).all(|at| rows.iter().all(|row| row[at] == 0)) {
             continue;
         }
         mask |= 1 << column;
-        for at in bytes_of(column, NAMES.len()) {
+        for at in bytes_of(column) {
             output.write_all(&rows.iter().map(|row| row[at]).collect::<Vec<_>>())?;
         }
     }
     Ok((mask, output.finish()?))
 }
 
-/// The batch of so many cells that was written, in a file of so many columns; none if these are no columns of one.
-pub(crate) fn decode(columns: usize, mask: u32, cells: usize, bytes: &[u8]) -> Option<Vec<(u32, Record)>> {
-    if mask >> columns != 0 {
+/// Returns the records of a batch of `cells` cells, or none if the bytes do not encode so many.
+pub(crate) fn decode(mask: u32, cells: usize, bytes: &[u8]) -> Option<Vec<(u32, Record)>> {
+    if mask >> COUNT != 0 {
         return None;
     }
-    let places: Vec<usize> = (0..columns)
-        .filter(|column| mask >> column & 1 == 1)
-        .flat_map(|column| bytes_of(column, columns))
-        .collect();
+    let places: Vec<usize> = (0..COUNT).filter(|column| mask >> column & 1 == 1).flat_map(bytes_of).collect();
     let whole = places.len() * cells;
     let mut planes = Vec::with_capacity(whole);
-    // One more byte than there should be, lest a wrong one go unseen.
+    // One byte more than expected, so that data that is too long is noticed.
     DeflateDecoder::new(bytes).take(whole as u64 + 1).read_to_end(&mut planes).ok()?;
     if planes.len() != whole {
         return None;
@@ -121,7 +110,7 @@ fn rows(batch: &[(u32, Record)]) -> Vec<Row> {
     let mut before = 0;
     let row = |&(id, record): &(u32, Record)| {
         let mut row = [0; ROW];
-        // Neighbours come one after the other.
+        // Differences of ids compress better than ids.
         row[..ID].copy_from_slice(&u32::wrapping_sub(id, before).to_le_bytes());
         row[ID..].copy_from_slice(bytemuck::bytes_of(&record));
         before = id;

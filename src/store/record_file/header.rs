@@ -1,109 +1,86 @@
-//! What a record file begins with: whose records follow and in which columns, twice, each copy with its checksum.
+//! The header of a record file: the format, the columns, the identity of the run, and a checksum of these.
 
 use serde::{Deserialize, Serialize};
 
 use crate::store::record_file::batch;
-use crate::store::record_file::columns::{BEFORE_PATTERNS, NAMES};
+use crate::store::record_file::columns::NAMES;
 use crate::store::record_file::identity::Identity;
 
-/// Raised whenever a file of the one before cannot be read any more.
+/// Version of the file format. It is raised when files of the version before become unreadable.
 const FORMAT: u32 = 2;
 
-/// What both copies begin with.
+/// First bytes of a record file.
 const MAGIC: [u8; 8] = *b"RTLMAP2\0";
-/// What files of format 1 begin with.
-const OLD_MAGIC: [u8; 8] = *b"RTLMAP\0\x02";
-/// Magic, length and checksum.
+/// Number of bytes of magic, length and checksum.
 const HEAD: usize = 16;
 
-/// Bytes of a file in which its header is looked for: far more than any takes.
-pub(crate) const SEARCHED: usize = 1 << 20;
+/// Number of bytes at the beginning of a file in which the header must lie. Headers are far shorter.
+pub(crate) const MOST_BYTES: usize = 1 << 20;
 
 #[derive(Serialize, Deserialize)]
 struct Body {
     format: u32,
-    /// Names of the columns, in the order of the bits that batches have for them.
+    /// Names of the columns, in the order of the bits that stand for them in batches.
     columns: Vec<String>,
     #[serde(flatten)]
     identity: Identity,
 }
 
-/// What stands where a header should.
+/// What the first bytes of a file contain.
 pub(crate) enum Found {
-    /// One.
+    /// A header.
     Header {
         identity: Identity,
-        /// How many columns it names: fewer in files from before there were patterns.
-        columns: usize,
-        /// Where batches begin.
+        /// Offset of the first batch.
         end: u64,
-        /// Whether both copies are good.
-        is_whole: bool,
     },
-    /// The beginning of one, or nothing at all, and no batch: the run ended before it kept anything.
+    /// No header and no batch: the run ended before it wrote anything.
     Nothing,
-    /// A file of format 1.
-    OldFormat,
-    /// One of this format whose records have fields that this version does not know.
+    /// A header of this format whose columns this version does not have.
     OtherFields,
-    /// What no run leaves.
+    /// Bytes that no run leaves; the text says what is wrong.
     Damaged(&'static str),
 }
 
-/// Both copies.
+/// Returns the header of a run's record file.
 pub(crate) fn bytes(identity: &Identity) -> serde_json::Result<Vec<u8>> {
     bytes_of(identity, &NAMES)
 }
 
-/// Both copies, in a file of these columns.
-pub(crate) fn bytes_of(identity: &Identity, columns: &[&str]) -> serde_json::Result<Vec<u8>> {
+fn bytes_of(identity: &Identity, columns: &[&str]) -> serde_json::Result<Vec<u8>> {
     let columns = columns.iter().map(|&name| name.to_owned()).collect();
     let body = serde_json::to_vec(&Body { format: FORMAT, columns, identity: identity.clone() })?;
     let length = (body.len() as u32).to_le_bytes();
-    Ok([&MAGIC[..], &length, &checksum(length, &body).to_le_bytes(), &body].concat().repeat(2))
+    Ok([&MAGIC[..], &length, &checksum(length, &body).to_le_bytes(), &body].concat())
 }
 
-/// Looks for a header in the first bytes of a file, `whole` if these are all.
-pub(crate) fn find(bytes: &[u8], whole: bool) -> Found {
-    let copy = copy_at(bytes, 0).map(|(body, end)| (body, end, copy_at(bytes, end).is_some(), 2 * end));
-    let copy = copy.or_else(|| second_copy(bytes).map(|(body, end)| (body, end, false, end)));
-    if let Some((body, _, is_whole, end)) = copy {
+/// Reads the header from the first bytes of a file; `is_all` says whether the file has no more bytes than these.
+pub(crate) fn find(bytes: &[u8], is_all: bool) -> Found {
+    if let Some((body, end)) = body(bytes) {
         return match serde_json::from_slice::<Body>(body) {
-            Ok(Body { format: FORMAT, columns, identity })
-                if columns == NAMES || columns == NAMES[..BEFORE_PATTERNS] =>
-            {
-                Found::Header { identity, columns: columns.len(), end: end as u64, is_whole }
+            Ok(Body { format: FORMAT, columns, identity }) if columns == NAMES => {
+                Found::Header { identity, end: end as u64 }
             }
             Ok(Body { format: FORMAT, .. }) => Found::OtherFields,
             _ => Found::Damaged("its header is not one of this version"),
         };
     }
     let length = bytes.len().min(MAGIC.len());
-    if bytes.starts_with(&OLD_MAGIC) {
-        return Found::OldFormat;
-    }
-    let begins = bytes[..length] == MAGIC[..length] || bytes.iter().all(|&byte| byte == 0);
-    match begins {
-        true if whole && batch::find(bytes).is_none() => Found::Nothing,
-        true => Found::Damaged("neither copy of its header matches its checksum"),
+    let is_begun = bytes[..length] == MAGIC[..length] || bytes.iter().all(|&byte| byte == 0);
+    match is_begun {
+        true if is_all && batch::find(bytes).is_none() => Found::Nothing,
+        true => Found::Damaged("its header does not match its checksum"),
         false => Found::Damaged("it is no record file of this version"),
     }
 }
 
-/// The body of the good copy that begins there, and where it ends.
-fn copy_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
-    let head = bytes.get(at..at + HEAD)?;
+/// Returns the body of an undamaged header and the offset of its end.
+fn body(bytes: &[u8]) -> Option<(&[u8], usize)> {
+    let (head, rest) = bytes.split_first_chunk::<HEAD>()?;
     let word = |at: usize| [head[at], head[at + 1], head[at + 2], head[at + 3]];
-    let end = (at + HEAD).checked_add(u32::from_le_bytes(word(8)) as usize)?;
-    let body = bytes.get(at + HEAD..end)?;
+    let body = rest.get(..u32::from_le_bytes(word(8)) as usize)?;
     let is_good = head[..8] == MAGIC && checksum(word(8), body) == u32::from_le_bytes(word(12));
-    is_good.then_some((body, end))
-}
-
-/// The second copy, where the first does not tell its length.
-fn second_copy(bytes: &[u8]) -> Option<(&[u8], usize)> {
-    let places = bytes.windows(MAGIC.len()).enumerate().skip(1).filter(|(_, place)| *place == MAGIC);
-    places.map(|(at, _)| at).find_map(|at| copy_at(bytes, at))
+    is_good.then_some((body, HEAD + body.len()))
 }
 
 fn checksum(length: [u8; 4], body: &[u8]) -> u32 {
@@ -117,12 +94,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_of_other_fields_is_not_taken_for_a_damaged_one() {
+    fn a_header_with_other_columns_is_not_reported_as_damaged() {
         let identity = Identity::new("cpu", "f64", "d", Vec::new());
         let found = |columns: &[&str]| find(&bytes_of(&identity, columns).unwrap(), true);
-        assert!(matches!(found(&NAMES), Found::Header { columns: 17, is_whole: true, .. }));
-        // As versions wrote them whose records had no patterns.
-        assert!(matches!(found(&NAMES[..14]), Found::Header { columns: 14, is_whole: true, .. }));
+        assert!(matches!(found(&NAMES), Found::Header { .. }));
         assert!(matches!(found(&NAMES[..13]), Found::OtherFields));
         assert!(matches!(found(&[&NAMES[..], &["later"]].concat()), Found::OtherFields));
     }

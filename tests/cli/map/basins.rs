@@ -1,10 +1,10 @@
-//! Maps of basins: their files, and that a run which goes on gives the same bytes.
+//! Maps of basins: their files, and that a resumed run gives the same bytes.
 
-use rattlemap::store::record_file::{Identity, Order, RecordFile};
+use rattlemap::store::record_file::{Identity, RecordFile};
 
 use super::*;
 
-/// Contact-free motion beside rattling, most of it filled.
+/// Attractors without contact and with rattling; most cells are filled.
 const BASIN: &str = r#"[parameters]
 e = 0.98
 omega = 9.2
@@ -32,7 +32,7 @@ max_error = 0.05
 quantities = ["class", "lyapunov"]
 "#;
 
-/// Files that a run gives to the byte.
+/// Files that a resumed run must write byte for byte.
 const FILES: [&str; 7] =
     ["cells.csv", "cells.npy", "attractors.csv", "map.png", "class.png", "lyapunov.png", "report.html"];
 
@@ -40,16 +40,10 @@ fn bytes(out: &Path) -> Vec<Vec<u8>> {
     FILES.iter().map(|name| fs::read(out.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))).collect()
 }
 
-fn basin() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("s.toml"), BASIN).unwrap();
-    folder
-}
-
 #[test]
 fn basins_have_their_files_and_are_confirmed() {
-    let folder = basin();
-    map(&folder, &["--quiet"]).success();
+    let folder = with(BASIN);
+    map(&folder, "--quiet").success();
     let out = folder.path().join("out/s");
     let (header, cells) = rows(&out.join("cells.csv"));
     assert!(header.starts_with("i,j,x1,v1,class,") && header.ends_with(",source,attractor"), "{header}");
@@ -70,73 +64,62 @@ fn basins_have_their_files_and_are_confirmed() {
     let unlabelled = cells.iter().filter(|cell| cell.last().is_some_and(String::is_empty)).count();
     assert_eq!(left, unlabelled);
     assert!(cells.iter().filter(|cell| cell[14] == "filled").count() > 1000);
-    let manifest: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
+    let manifest = json(&out.join("manifest.json"));
     assert_eq!(manifest["basins"].as_array().unwrap().len(), attractors.len());
     assert_eq!(
         (&manifest["axes"][0]["parameter"], &manifest["axes"][0]["is_start"]),
         (&"x1".into(), &true.into())
     );
     assert_eq!(manifest["without_effect"], serde_json::json!([]));
-    // Labels are confirmed, and a file of them is made anew.
-    command(&folder, &["validate", "out/s", "--samples", "60", "--quiet"]).assert().success();
-    let validation: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("validation.json")).unwrap()).unwrap();
+    // A validation confirms labels, and their table can be repaired.
+    succeeds(&folder, "validate out/s --samples 60 --quiet");
+    let validation = json(&out.join("validation.json"));
     assert!(validation.to_string().contains("\"attractor\""), "{validation}");
     let table = fs::read(out.join("attractors.csv")).unwrap();
     fs::remove_file(out.join("attractors.csv")).unwrap();
-    command(&folder, &["check", "out/s", "--repair", "--quiet"]).assert().success();
+    succeeds(&folder, "check out/s --repair --quiet");
     assert!(fs::read(out.join("attractors.csv")).unwrap() == table);
 }
 
-/// Of all that an adaptive run has kept a part is enough.
 #[test]
-fn basins_that_go_on_are_the_same_to_the_byte() {
-    let folder = basin();
-    map(&folder, &["--quiet", "--out", "whole"]).success();
+fn an_adaptive_map_resumes_from_any_of_its_records() {
+    let folder = with(BASIN);
+    map(&folder, "--quiet --out whole").success();
     let whole = folder.path().join("whole");
     let path = whole.join("records.bin");
     let identity = Identity::read(&path).unwrap().unwrap();
-    let mut all = Vec::new();
-    RecordFile::read(&path, &identity, Order::AsKept, |batch| {
-        all.extend_from_slice(batch);
-        true
-    })
-    .unwrap();
+    let (all, _) = records::stored(&path);
     let cut = folder.path().join("cut");
-    for kept in [1, all.len() / 3, all.len() - 1] {
+    for count in [1, all.len() / 3, all.len() - 1] {
         fs::create_dir(&cut).unwrap();
         let mut file = RecordFile::create(&cut.join("records.bin"), &identity).unwrap();
-        // In two batches, for what is known at the second depends on the first.
-        let (first, second) = all[..kept].split_at(kept / 2);
+        // Two batches: the schedule at the second one depends on the first.
+        let (first, second) = all[..count].split_at(count / 2);
         [first, second]
             .into_iter()
             .filter(|batch| !batch.is_empty())
             .for_each(|batch| file.append(batch).unwrap());
         drop(file);
-        map(&folder, &["--out", "cut", "--resume", "--quiet"]).success();
-        assert!(bytes(&cut) == bytes(&whole), "{kept} of {}", all.len());
+        map(&folder, "--out cut --resume --quiet").success();
+        assert!(bytes(&cut) == bytes(&whole), "{count} of {}", all.len());
         fs::remove_dir_all(&cut).unwrap();
     }
 }
 
 #[test]
-fn a_command_replays_a_start() {
-    let folder = basin();
-    map(&folder, &["--quiet", "--set", "axis.0.count=3", "--set", "axis.1.count=2"]).success();
+fn the_report_has_the_start_of_each_cell() {
+    let folder = with(BASIN);
+    map(&folder, "--quiet --set axis.0.count=3 --set axis.1.count=2").success();
     let page = fs::read_to_string(folder.path().join("out/s/report.html")).unwrap();
     assert!(page.contains("\"start\":[-0.6,-2.0,0.0,0.1]"), "the first cell's own start");
     assert!(page.contains("\"parameter\":\"v1\"") && page.contains("\"start\":1"));
 }
 
-/// Twins have one class and one period: that no cell differs must not pass for equal basins.
+/// Different attractors may have the same class and period.
 #[test]
-fn comparing_basins_says_what_is_not_compared() {
-    let folder = basin();
-    let sizes = ["--set", "axis.0.count=5", "--set", "axis.1.count=4", "--engine", "cpu", "--quiet"];
-    map(&folder, &sizes).success();
-    let compare = ["compare", "out/s", "out/s"];
-    let run = Command::cargo_bin("rattlemap").unwrap().current_dir(&folder).args(compare).assert().success();
-    let said = String::from_utf8(run.get_output().stderr.clone()).unwrap();
-    assert!(said.contains("no cell of 20 differs") && said.contains("is not compared"), "{said}");
+fn comparing_basins_says_that_attractors_are_not_compared() {
+    let folder = with(BASIN);
+    map(&folder, "--set axis.0.count=5 --set axis.1.count=4 --quiet").success();
+    let run = succeeds(&folder, "compare out/s out/s");
+    run.stderr(says(&["no cell of 20 differs", "is not compared"]));
 }

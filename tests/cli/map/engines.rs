@@ -5,11 +5,11 @@ use super::*;
 #[test]
 fn lanes_give_the_same_files_and_classes() {
     let folder = folder();
-    map(&folder, &["--quiet", "--out", "cpu"]).success();
+    map(&folder, "--quiet --out cpu").success();
     let (header, expected) = rows(&folder.path().join("cpu/cells.csv"));
     for precision in ["f32", "f64"] {
         let out = folder.path().join(precision);
-        let run = map(&folder, &["--engine", "gpu", "--precision", precision, "--out", precision]);
+        let run = map(&folder, &format!("--engine gpu --precision {precision} --out {precision}"));
         run.success().stdout("").stderr(says(&[
             "320 cells in ",
             &format!(" s on gpu ({precision}): "),
@@ -23,10 +23,8 @@ fn lanes_give_the_same_files_and_classes() {
         // Class and period; the few that differ are explained elsewhere, cell by cell.
         let differing = lanes.iter().zip(&expected).filter(|(a, b)| a[4..6] != b[4..6]).count();
         assert!(differing <= 6, "{precision}: {differing} cells differ");
-        let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
-        let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
-        assert_eq!(manifest["engine"], "gpu");
-        assert_eq!(manifest["precision"], precision);
+        let manifest = json(&out.join("manifest.json"));
+        assert_eq!((&manifest["engine"], &manifest["precision"]), (&"gpu".into(), &precision.into()));
         let integration = &manifest["integration"];
         let [least, most] =
             ["least_steps_used", "most_steps_used"].map(|name| integration[name].as_u64().unwrap());
@@ -34,26 +32,23 @@ fn lanes_give_the_same_files_and_classes() {
         let device = manifest["device"].as_str().unwrap();
         assert!(device.contains('(') && device.contains(';'), "no driver in {device}");
     }
-    // Records of one precision are not continued in another.
-    let run = map(&folder, &["--engine", "gpu", "--precision", "f64", "--out", "f32", "--resume"]);
-    run.code(2).stderr(says(&["`precision` was f32, now f64", "--force"]));
-    let run = map(&folder, &["--engine", "cpu", "--out", "f32", "--resume"]);
-    run.code(2).stderr(says(&["`engine` was gpu, now cpu"]));
+    // A run does not resume with another engine or precision.
+    let other = |engine: &str, parts: &[&str]| {
+        fails(&folder, &format!("map s.toml --engine {engine} --out f32 --resume"), 2, parts);
+    };
+    other("gpu --precision f64", &["`precision` was f32, now f64", "--force"]);
+    other("cpu", &["`engine` was gpu, now cpu"]);
 }
 
 #[test]
 fn engines_that_are_not_there_are_refused() {
     let folder = folder();
-    let run = map(&folder, &["--engine", "cpu", "--precision", "f32"]);
-    run.code(2).stdout("").stderr(says(&[
-        "--precision f32",
-        "the CPU engine computes in f64",
-        "--engine gpu",
-    ]));
-    let run = map(&folder, &["--engine", "gpu", "--precision", "f16"]);
-    run.code(2).stdout("").stderr(says(&["--precision", "it must be f32 or f64"]));
+    let parts = ["--precision f32", "the CPU engine computes in f64", "--engine gpu"];
+    fails(&folder, "map s.toml --engine cpu --precision f32", 2, &parts);
+    let parts = ["--precision", "it must be f32 or f64"];
+    fails(&folder, "map s.toml --engine gpu --precision f16", 2, &parts);
     for precision in ["f32", "f64"] {
-        let mut run = command(&folder, &["map", "s.toml", "--engine", "gpu", "--precision", precision]);
+        let mut run = command(&folder, &format!("map s.toml --engine gpu --precision {precision}"));
         let run = run.env("WGPU_ADAPTER_NAME", "no such thing").assert();
         let list = "Found: ";
         run.code(2).stdout("").stderr(says(&["no graphics adapter called no such thing", "(f32", list]));
@@ -63,8 +58,7 @@ fn engines_that_are_not_there_are_refused() {
 #[test]
 fn devices_says_what_there_is_and_what_auto_takes() {
     let folder = folder();
-    let run = command(&folder, &["devices"]).assert().success();
-    run.stdout(says(&[
+    succeeds(&folder, "devices").stdout(says(&[
         "cpu: event-driven reference",
         "gpu: ",
         "interface   ",
@@ -73,20 +67,18 @@ fn devices_says_what_there_is_and_what_auto_takes() {
         "auto takes ",
     ]));
     let hardware = || says(&["a hardware GPU"]);
-    let run = map(&folder, &["--engine", "auto", "--out", "few"]);
+    let run = map(&folder, "--engine auto --out few");
     run.success().stderr(says(&["cpu (f64): no hardware GPU, and soon done: "]).or(hardware()));
 }
 
-/// What was asked for stays; what was done is said beside it.
+/// The manifest has both the requested number and the numbers in use.
 #[test]
-fn steps_that_are_too_few_are_raised_aloud() {
+fn too_few_steps_are_raised_with_a_message() {
     let folder = folder();
     let steps = |engine: &str, steps: u32, out: &str| {
-        let set = format!("integration.steps_per_period={steps}");
-        let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--set", &set];
-        let run = map(&folder, &[&["--engine", engine, "--out", out], &few[..]].concat()).success();
-        let manifest = fs::read_to_string(folder.path().join(out).join("manifest.json")).unwrap();
-        let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+        let sets = format!("{FEW} --set integration.steps_per_period={steps}");
+        let run = map(&folder, &format!("--engine {engine} --out {out} {sets}")).success();
+        let manifest = json(&folder.path().join(out).join("manifest.json"));
         (String::from_utf8_lossy(&run.get_output().stderr).into_owned(), manifest["integration"].clone())
     };
     let (said, integration) = steps("gpu", 1, "few");
@@ -106,19 +98,18 @@ fn steps_that_are_too_few_are_raised_aloud() {
     assert!(integration["most_steps_used"].is_null() && !said.contains("raised"), "{integration} {said}");
 }
 
-/// The environment is named where it is what leaves no adapter.
 #[test]
 fn an_environment_that_leaves_no_adapter_is_named() {
     let folder = folder();
     let refused = |variable: &str, value: &str, remedy: &str| {
-        let mut run = command(&folder, &["map", "s.toml", "--engine", "gpu"]);
+        let mut run = command(&folder, "map s.toml --engine gpu");
         let set = format!("the environment has {variable}={value}: unset it, or give {remedy}");
         run.env(variable, value).assert().code(2).stderr(says(&[&set]));
     };
     refused("WGPU_BACKEND", "foo", "vulkan, metal or dx12");
     refused("WGPU_BACKEND", "gl", "vulkan, metal or dx12");
     refused("WGPU_ADAPTER_NAME", "no such thing", "part of a name");
-    let mut devices = command(&folder, &["devices"]);
+    let mut devices = command(&folder, "devices");
     devices
         .env("WGPU_BACKEND", "foo")
         .assert()

@@ -2,7 +2,6 @@
 
 use super::*;
 
-const FEW: [&str; 5] = ["--quiet", "--set", "axis.0.count=4", "--set", "axis.1.count=3"];
 const LAYERS: [&str; 6] = ["impacts", "lyapunov", "map", "mesh", "pattern", "word"];
 
 /// What a folder has beside tables and records.
@@ -18,37 +17,36 @@ fn of_layers(ends: &[&str]) -> Vec<String> {
 #[test]
 fn figures_of_a_map_come_in_each_format() {
     let folder = folder();
-    map(&folder, &[&FEW[..], &["--format", "svg,pdf"]].concat()).success();
+    map(&folder, &format!("{FEW} --quiet --format svg,pdf")).success();
     let out = folder.path().join("out/s");
     assert_eq!(figures(&out), of_layers(&["pdf", "svg"]));
     assert!(["cells.csv", "cells.npy", "report.html"].iter().all(|name| out.join(name).is_file()));
-    let manifest: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
+    let manifest = json(&out.join("manifest.json"));
     assert_eq!(manifest["set"][2], r#"outputs.files=["csv","npy","html","svg","pdf"]"#);
     let good = ["map.svg", "word.pdf"].map(|name| fs::read(out.join(name)).unwrap());
     fs::remove_file(out.join("map.svg")).unwrap();
     fs::write(out.join("word.pdf"), "%PDF").unwrap();
-    let check = |arguments: &[&str]| command(&folder, &[&["check", "out/s"], arguments].concat()).assert();
-    check(&["--quiet"]).code(1).stderr(says(&["map.svg is missing", "word.pdf is damaged"]));
-    check(&["--repair"]).success().stderr(says(&["map.svg is made anew", "word.pdf is made anew"]));
+    fails(&folder, "check out/s --quiet", 1, &["map.svg is missing", "word.pdf is damaged"]);
+    let run = succeeds(&folder, "check out/s --repair");
+    run.stderr(says(&["map.svg is made anew", "word.pdf is made anew"]));
     assert_eq!(["map.svg", "word.pdf"].map(|name| fs::read(out.join(name)).unwrap()), good);
-    // A finished map resumes to other figures of the same records; those before go.
-    map(&folder, &[&FEW[..], &["--format", "png", "--resume"]].concat()).success();
+    // Resuming with other formats replaces the figures.
+    map(&folder, &format!("{FEW} --quiet --format png --resume")).success();
     assert_eq!(figures(&out), of_layers(&["png"]));
-    map(&folder, &[&FEW[..], &["--set", r#"outputs.files=["svg"]"#, "--force"]].concat()).success();
+    map(&folder, &format!("{FEW} --quiet --set outputs.files=[\"svg\"] --force")).success();
     assert_eq!(figures(&out), of_layers(&["svg"]));
     assert!(!out.join("cells.csv").exists());
 }
 
-/// Of one wall nobody asks whether motion is symmetric, and the legend does not say so.
+/// A model with one wall has no symmetric motion.
 #[test]
-fn a_legend_claims_no_symmetry_that_was_not_asked_for() {
+fn a_legend_does_not_mention_symmetry_that_was_not_requested() {
     let folder = folder();
     let scene = "model = 'impact-oscillator'\n[parameters]\nsigma = 0.5\n\
                  [[axis]]\nparameter = 'omega'\nvalues = [1.4, 3.0]\n[[axis]]\nparameter = 'e'\nvalues = [0.7, 0.8]\n\
                  [outputs]\nquantities = ['class', 'impacts', 'mesh']\nfiles = ['svg']\n";
     fs::write(folder.path().join("one.toml"), scene).unwrap();
-    command(&folder, &["map", "one.toml", "--engine", "cpu", "--out", "o", "--quiet"]).assert().success();
+    succeeds(&folder, "map one.toml --engine cpu --out o --quiet");
     let figure = fs::read_to_string(folder.path().join("o/map.svg")).unwrap();
     let has = |text: &str| figure.contains(text);
     assert!(has("period 1, no contact") && has("period 1, contact") && !has("symmetric"), "{figure}");
@@ -59,19 +57,19 @@ fn figures_of_diagrams_and_orbits_come_in_each_format() {
     let folder = folder();
     let line = "[[axis]]\nparameter = 'e'\nmin = 0.4\nmax = 0.5\ncount = 2\n";
     fs::write(folder.path().join("line.toml"), line).unwrap();
-    let run = |arguments: &[&str]| command(&folder, arguments).assert();
-    run(&["bifurcation", "line.toml", "--out", "b", "--quiet", "--format", "pdf,png"]).success();
+    let run = |line: &str| succeeds(&folder, line);
+    run("bifurcation line.toml --out b --quiet --format pdf,png");
     let b = folder.path().join("b");
     assert_eq!(figures(&b), ["bifurcation.pdf", "bifurcation.png"]);
-    run(&["bifurcation", "line.toml", "--out", "b", "--quiet", "--format", "svg", "--force"]).success();
+    run("bifurcation line.toml --out b --quiet --format svg --force");
     assert_eq!(figures(&b), ["bifurcation.svg"]);
     assert!(["bifurcation.csv", "bifurcation_columns.csv"].iter().all(|name| b.join(name).is_file()));
-    run(&["orbit", "--out", "o", "--format", "svg"]).success();
+    run("orbit --out o --format svg");
     let o = folder.path().join("o");
     assert_eq!(figures(&o), ["gap.svg", "phase_plane.svg", "spectrum.svg", "time_history.svg"]);
-    run(&["check", "o", "--quiet"]).success();
-    run(&["orbit", "--out", "o", "--force"]).success();
+    run("check o --quiet");
+    run("orbit --out o --force");
     assert_eq!(figures(&o), ["gap.png", "phase_plane.png", "spectrum.png", "time_history.png"]);
-    run(&["orbit", "--format", "svg"]).code(2).stderr(says(&["--out"]));
-    run(&["map", "s.toml", "--format", "eps"]).code(2).stderr(says(&["eps", "png, svg, pdf"]));
+    fails(&folder, "orbit --format svg", 2, &["--out"]);
+    fails(&folder, "map s.toml --format eps", 2, &["eps", "png, svg, pdf"]);
 }

@@ -45,52 +45,110 @@ count = 16
 quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]
 "#;
 
-/// Files that a resumed run must give byte for byte.
-const SAME: [&str; 10] = [
-    "cells.csv",
-    "cells.npy",
-    "words.csv",
-    "map.png",
-    "lyapunov.png",
-    "impacts.png",
-    "mesh.png",
-    "pattern.png",
-    "word.png",
-    "report.html",
-];
+/// Settings of a map of 12 cells.
+const FEW: &str = "--set axis.0.count=4 --set axis.1.count=3";
+
+/// Settings of a map with two rows whose cells all fail.
+const STIFF: &str = "--set parameters.m1=2e-6 --set axis.1.min=0.003 --set axis.1.max=0.004 --set axis.1.count=2 \
+     --set integration.transient_periods=20 --set integration.observed_periods=4 --set integration.max_period=1";
+
+/// Files that a resumed run must write byte for byte.
+const SAME: &str = "cells.csv cells.npy words.csv map.png lyapunov.png impacts.png mesh.png pattern.png word.png report.html";
 
 fn folder() -> TempDir {
+    with(SCENE)
+}
+
+/// A folder with a scene `s.toml`.
+fn with(scene: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    fs::write(folder.path().join("s.toml"), scene).unwrap();
     folder
 }
 
-fn command(folder: &TempDir, arguments: &[&str]) -> Command {
+/// The words of a line of arguments.
+fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
+fn command(folder: &TempDir, arguments: &str) -> Command {
     let mut command = rattlemap(folder);
-    command.args(arguments);
+    command.args(words(arguments));
     command
 }
 
-/// A map on the CPU, unless the arguments say otherwise.
-fn map(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    let engine: &[&str] = if arguments.contains(&"--engine") { &[] } else { &["--engine", "cpu"] };
-    command(folder, &[&["map", "s.toml"], engine, arguments].concat()).assert()
+/// Runs a map on the CPU, unless the arguments say otherwise.
+fn map(folder: &TempDir, arguments: &str) -> assert_cmd::assert::Assert {
+    let engine = if arguments.contains("--engine") { "" } else { "--engine cpu " };
+    command(folder, &format!("map s.toml {engine}{arguments}")).assert()
+}
+
+/// Runs a command that must succeed.
+fn succeeds(folder: &TempDir, arguments: &str) -> assert_cmd::assert::Assert {
+    command(folder, arguments).assert().success()
+}
+
+/// Runs a command that must fail with an exit code and these parts of a message.
+fn fails(folder: &TempDir, arguments: &str, code: i32, parts: &[&str]) {
+    command(folder, arguments).assert().code(code).stdout("").stderr(says(parts));
+}
+
+/// Runs a command and returns the object that it prints.
+fn printed(folder: &TempDir, arguments: &str) -> serde_json::Value {
+    let run = succeeds(folder, arguments);
+    serde_json::from_slice(&run.get_output().stdout).expect("one JSON object and nothing else")
+}
+
+/// Starts the program in a folder.
+fn begin(folder: &TempDir, arguments: &str) -> std::process::Child {
+    let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"));
+    run.current_dir(folder.path()).args(words(arguments)).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Sends a signal to a run and waits for its end; returns the exit code and the text of stderr.
+#[cfg(unix)]
+fn stop(mut run: std::process::Child, signal: &str) -> (Option<i32>, String) {
+    Process::new("kill").args([signal, &run.id().to_string()]).status().unwrap();
+    let mut text = String::new();
+    std::io::Read::read_to_string(run.stderr.as_mut().unwrap(), &mut text).unwrap();
+    (run.wait().unwrap().code(), text)
+}
+
+/// Waits until a condition holds.
+fn wait_until(holds: impl Fn() -> bool) {
+    let clock = std::time::Instant::now();
+    while !holds() {
+        assert!(clock.elapsed().as_secs() < 60, "the condition does not hold after a minute");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+/// Flips a bit of the byte that lies `from_end` bytes before the end of a file.
+fn damage(path: &Path, from_end: usize) {
+    let mut bytes = fs::read(path).unwrap();
+    let at = bytes.len() - from_end;
+    bytes[at] ^= 1;
+    fs::write(path, bytes).unwrap();
+}
+
+/// Names and contents of the files in a folder.
+fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    names(folder).into_iter().map(|name| (name.clone(), fs::read(folder.join(name)).unwrap())).collect()
 }
 
 fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> = folder
-        .read_dir()
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
+    let names = folder.read_dir().unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    names.collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 #[test]
 fn a_map_writes_the_files_of_the_contract() {
     let folder = folder();
-    map(&folder, &["--engine", "cpu"]).success().stdout("").stderr(says(&[
+    map(&folder, "--engine cpu").success().stdout("").stderr(says(&[
         "320 cells in ",
         " s on cpu (f64): ",
         "cells/s",
@@ -111,7 +169,7 @@ fn a_map_writes_the_files_of_the_contract() {
     let texts = check_words(&out.join("words.csv"), &rows);
     check_npy(&fs::read(out.join("cells.npy")).unwrap(), &rows, &texts);
     check_manifest(&out, &rows);
-    for name in SAME.iter().filter(|name| name.ends_with("png")) {
+    for name in words(SAME).into_iter().filter(|name| name.ends_with("png")) {
         let picture = image::open(out.join(name)).unwrap().to_rgb8();
         let colors: std::collections::HashSet<_> = picture.pixels().collect();
         assert!(picture.width() > 1400 && colors.len() > 30, "{name}");
@@ -202,9 +260,8 @@ fn check_npy(bytes: &[u8], rows: &[Vec<String>], texts: &[String]) {
 }
 
 fn check_manifest(out: &Path, rows: &[Vec<String>]) {
-    let text = fs::read_to_string(out.join("manifest.json")).unwrap();
-    assert!(!text.contains(env!("CARGO_MANIFEST_DIR")), "a path of this machine: {text}");
-    let manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let manifest = json(&out.join("manifest.json"));
+    assert!(!manifest.to_string().contains(env!("CARGO_MANIFEST_DIR")), "a path of this machine: {manifest}");
     assert_eq!(manifest["command"], "map");
     assert_eq!(manifest["scene"], SCENE);
     assert_eq!((&manifest["engine"], &manifest["precision"]), (&"cpu".into(), &"f64".into()));
@@ -234,20 +291,18 @@ fn check_manifest(out: &Path, rows: &[Vec<String>]) {
 }
 
 #[test]
-fn what_is_not_asked_for_is_empty_and_not_written() {
+fn quantities_that_are_not_requested_are_empty_and_have_no_files() {
     let folder = folder();
-    let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--quiet"];
-    let sets = ["--set", "outputs.quantities=[\"mesh\"]", "--set", "outputs.files=[\"csv\",\"png\"]"];
-    map(&folder, &[&few[..], &sets].concat()).success().stderr("");
+    let mesh = format!("{FEW} --quiet --set outputs.quantities=[\"mesh\"]");
+    map(&folder, &format!("{mesh} --set outputs.files=[\"csv\",\"png\"]")).success().stderr("");
     let out = folder.path().join("out/s");
     assert_eq!(names(&out), ["cells.csv", "manifest.json", "mesh.png", "records.bin"]);
     for row in rows(&out.join("cells.csv")).1 {
         assert!([4, 5, 6, 7, 8, 10, 11].iter().all(|&field| row[field].is_empty()), "{row:?}");
         assert!(!row[9].is_empty() && row[14] == "integrated", "{row:?}");
     }
-    // The array has no column of it, and no table of words stands beside it.
-    map(&folder, &[&few[..], &sets[..2], &["--set", "outputs.files=[\"npy\"]", "--force"]].concat())
-        .success();
+    // The array has no column for them, and there is no table of words.
+    map(&folder, &format!("{mesh} --set outputs.files=[\"npy\"] --force")).success();
     assert_eq!(names(&out), ["cells.npy", "manifest.json", "records.bin"]);
     let array = fs::read(out.join("cells.npy")).unwrap();
     let header =
@@ -256,16 +311,13 @@ fn what_is_not_asked_for_is_empty_and_not_written() {
     assert_eq!(names, ["i", "j", "e", "omega", "mesh_fraction", "status", "periods_run", "source"]);
 }
 
-/// Patterns alone: no word is computed for their sake.
 #[test]
 fn patterns_need_no_words() {
     let folder = folder();
-    let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--quiet"];
-    let sets =
-        ["--set", "outputs.quantities=[\"pattern\"]", "--set", "outputs.files=[\"csv\",\"npy\",\"png\"]"];
+    let sets = r#"--set outputs.quantities=["pattern"] --set outputs.files=["csv","npy","png"]"#;
     let out = folder.path().join("out/s");
     for engine in ["cpu", "gpu"] {
-        map(&folder, &[&few[..], &sets, &["--engine", engine, "--force"]].concat()).success();
+        map(&folder, &format!("{FEW} {sets} --quiet --engine {engine} --force")).success();
         let files = ["cells.csv", "cells.npy", "manifest.json", "pattern.png", "records.bin", "words.csv"];
         assert_eq!(names(&out), files);
         let rows = rows(&out.join("cells.csv")).1;
@@ -275,36 +327,30 @@ fn patterns_need_no_words() {
 }
 
 #[test]
-fn folders_are_guarded() {
+fn files_of_another_run_are_overwritten_only_with_force() {
     let folder = folder();
-    let few = ["--quiet", "--set", "axis.0.count=2", "--set", "axis.1.count=2"];
-    // Nothing there yet: --resume begins, so that scripts may always give it.
-    map(&folder, &[&few[..], &["--resume"]].concat()).success();
-    map(&folder, &few).code(2).stdout("").stderr(says(&["out/s: the folder is not empty", "--force"]));
-    map(&folder, &["--resume", "--force"]).code(2).stderr(says(&["cannot be used with"]));
+    // Scripts may always give --resume: without a folder it begins a map.
+    map(&folder, &format!("{FEW} --quiet --resume")).success();
+    fails(&folder, &format!("map s.toml {FEW} --quiet"), 2, &["out/s: the folder is not empty", "--force"]);
+    fails(&folder, "map s.toml --resume --force", 2, &["cannot be used with"]);
     let other = folder.path().join("other");
     fs::create_dir(&other).unwrap();
     fs::write(other.join("notes.txt"), "precious").unwrap();
-    let run = map(&folder, &[&few[..], &["--out", "other", "--resume"]].concat());
-    run.code(2).stderr(says(&["there is no records.bin in other", "leave --resume out"]));
-    map(&folder, &[&few[..], &["--out", "other", "--force"]].concat()).success();
+    let resume = format!("map s.toml {FEW} --quiet --out other --resume");
+    fails(&folder, &resume, 2, &["there is no records.bin in other", "leave --resume out"]);
+    map(&folder, &format!("{FEW} --quiet --out other --force")).success();
     assert_eq!(fs::read_to_string(other.join("notes.txt")).unwrap(), "precious");
 }
 
 #[test]
 fn maps_that_do_not_fit_are_refused_with_figures() {
     let folder = folder();
-    let count = |count: &str| [format!("axis.0.count={count}"), format!("axis.1.count={count}")];
-    let [a, b] = count("1000000");
-    let run = map(&folder, &["--set", &a, "--set", &b]);
-    run.code(2).stdout("").stderr(says(&["1000000 x 1000000 = 1000000000000 cells is too large"]));
-    let [a, b] = count("65000");
-    let run = map(&folder, &["--set", &a, "--set", &b]);
-    run.code(2).stdout("").stderr(says(&[
-        "4225000000 cells needs about 10",
-        "GB of memory, and",
-        "are free",
-    ]));
+    let refused = |count: &str, parts: &[&str]| {
+        let map = format!("map s.toml --engine cpu --set axis.0.count={count} --set axis.1.count={count}");
+        fails(&folder, &map, 2, parts);
+    };
+    refused("1000000", &["1000000 x 1000000 = 1000000000000 cells is too large"]);
+    refused("65000", &["4225000000 cells needs about 10", "GB of memory, and", "are free"]);
     assert!(!folder.path().join("out").exists(), "an output folder was made");
 }
 
@@ -316,8 +362,7 @@ fn scenes_that_maps_cannot_do_are_refused() {
         ("refine.max_error=0", "`refine.max_error = 0` is out of range"),
         ("e=0.5", "`parameters.e = 0.5` does not fit: axis 0 sweeps `e`"),
     ] {
-        let run = map(&folder, &["--set", set]);
-        run.code(2).stdout("").stderr(says(&[&format!("--set {set}: "), part]));
+        fails(&folder, &format!("map s.toml --set {set}"), 2, &[&format!("--set {set}: "), part]);
     }
     assert!(!folder.path().join("out").exists());
 }

@@ -1,8 +1,8 @@
-//! Where nobody listens: closed and full stderr and stdout.
+//! Closed and full stderr and stdout.
 
 use super::*;
 
-/// A command that says more than one line, with its streams where the shell puts them; its exit code.
+/// Runs a line of shell commands, in which `R` is the program, and returns the exit code.
 fn in_shell(folder: &TempDir, line: &str) -> Option<i32> {
     let program = assert_cmd::cargo::cargo_bin("rattlemap");
     let status = Process::new("bash")
@@ -16,7 +16,7 @@ fn in_shell(folder: &TempDir, line: &str) -> Option<i32> {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_cannot_be_said_is_dropped() {
+fn messages_that_cannot_be_written_are_dropped() {
     let folder = folder();
     let map = "R map s.toml --engine cpu --force";
     for line in [
@@ -31,7 +31,7 @@ fn what_cannot_be_said_is_dropped() {
         } else {
             "validation.json"
         });
-        // A validation that is damaged is told of: the manifest has not listed it yet, or it is removed with it.
+        // Otherwise a validation would report its own file as damaged.
         fs::remove_file(&made).ok();
         assert_eq!(in_shell(&folder, &line), Some(0), "{line}");
         assert!(made.is_file(), "{line}");
@@ -41,7 +41,7 @@ fn what_cannot_be_said_is_dropped() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_reader_that_has_seen_enough_is_no_failure_and_a_full_disk_is_one() {
+fn a_closed_stdout_is_no_failure_and_a_full_disk_is_one() {
     let folder = folder();
     for command in ["R devices", "R orbit"] {
         assert_eq!(in_shell(&folder, &format!("{command} | true")), Some(0), "{command}");

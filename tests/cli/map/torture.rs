@@ -1,4 +1,4 @@
-//! Flipped bits, cut ends and kills, at random. `RATTLEMAP_TORTURE=N` in the environment makes them N of each kind.
+//! Flipped bits, cut ends and kills, at random. `RATTLEMAP_TORTURE=N` in the environment sets the number of each kind.
 
 use std::fmt::Debug;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,24 +11,24 @@ use rattlemap::store::record_file::{Damage, Identity, Order, RecordFile};
 
 use super::*;
 
-/// How many attacks of a kind are made.
+/// Returns the number of attacks of a kind.
 fn count(default: usize) -> usize {
     let asked = std::env::var("RATTLEMAP_TORTURE");
     asked.map_or(default, |n| n.parse().expect("RATTLEMAP_TORTURE is a number of attacks"))
 }
 
-/// What came of a campaign, in a line that scripts read.
+/// Prints the result of the attacks in a line that scripts read.
 fn report(kind: &str, count: usize, faults: &[String]) {
     println!("torture: {kind} {count}, faults {}", faults.len());
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Another stream every time; what it did is in the text of a fault.
+/// A generator with another seed each time. The message of a fault contains its numbers.
 fn random() -> Random {
     Random::new(interrupts::moment() << 20 ^ u64::from(std::process::id()))
 }
 
-/// A file of batches of records of any bits, and what may be done to it.
+/// A file with records of arbitrary bits.
 struct Victim {
     path: PathBuf,
     identity: Identity,
@@ -62,7 +62,12 @@ impl Victim {
         Victim { path, identity, cells, good }
     }
 
-    /// Whether these are the same to the bit; records of NaN are not equal otherwise.
+    /// Number of bytes of the header, without which nothing can be read.
+    fn header(&self) -> usize {
+        16 + u32::from_le_bytes(self.good[8..12].try_into().unwrap()) as usize
+    }
+
+    /// Compares records bit for bit; NaN would differ otherwise.
     fn is_same(a: &[(u32, Record)], b: &[(u32, Record)]) -> bool {
         let same = |(a, b): (&(u32, Record), &(u32, Record))| {
             a.0 == b.0 && bytemuck::bytes_of(&a.1) == bytemuck::bytes_of(&b.1)
@@ -70,30 +75,29 @@ impl Victim {
         a.len() == b.len() && a.iter().zip(b).all(same)
     }
 
-    /// Resumes a file of these bytes, computes what is missing and reads all; how many cells were kept.
+    /// Resumes a file of these bytes, adds the missing records and reads all. Returns the number of resumed records.
     fn resume(&self, bytes: &[u8], order: Order) -> Result<(usize, Option<Damage>), String> {
         fs::write(&self.path, bytes).unwrap();
-        let told = |what: &dyn Debug| format!("{what:?}");
-        let mut kept = Vec::new();
+        let text = |what: &dyn Debug| format!("{what:?}");
+        let (mut resumed, mut all) = (Vec::new(), Vec::new());
         let take = |batch: &[(u32, Record)]| {
-            kept.extend_from_slice(batch);
+            resumed.extend_from_slice(batch);
             true
         };
         let mut file =
             RecordFile::resume(&self.path, &self.identity, order, take).map_err(|error| error.to_string())?;
-        let (count, damage) = (kept.len(), file.damage().cloned());
-        let is_kept = |id: u32| kept.iter().any(|cell| cell.0 == id);
-        let missing: Vec<_> = self.cells.iter().filter(|(id, _)| !is_kept(*id)).copied().collect();
+        let (count, damage) = (resumed.len(), file.damage().cloned());
+        let is_there = |id: u32| resumed.iter().any(|cell| cell.0 == id);
+        let missing: Vec<_> = self.cells.iter().filter(|(id, _)| !is_there(*id)).copied().collect();
         if !missing.is_empty() {
-            file.append(&missing).map_err(|error| told(&error))?;
+            file.append(&missing).map_err(|error| text(&error))?;
         }
-        let mut all = Vec::new();
         let take = |batch: &[(u32, Record)]| {
             all.extend_from_slice(batch);
             true
         };
         let extent =
-            RecordFile::read(&self.path, &self.identity, order, take).map_err(|error| told(&error))?;
+            RecordFile::read(&self.path, &self.identity, order, take).map_err(|error| text(&error))?;
         all.sort_by_key(|cell| cell.0);
         let mut expected = self.cells.clone();
         expected.sort_by_key(|cell| cell.0);
@@ -103,7 +107,7 @@ impl Victim {
         }
     }
 
-    /// The same, with a panic as one more fault.
+    /// Resumes a file of these bytes; a panic counts as a fault.
     fn survives(&self, bytes: &[u8], order: Order) -> Result<(usize, Option<Damage>), String> {
         catch_unwind(AssertUnwindSafe(|| self.resume(bytes, order)))
             .unwrap_or_else(|_| Err("a panic".to_owned()))
@@ -111,22 +115,21 @@ impl Victim {
 }
 
 #[test]
-fn what_is_written_is_read_back_to_the_bit() {
+fn records_are_read_back_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let victim = Victim::new(&folder);
-    assert_eq!(victim.resume(&victim.good, Order::AsKept), Ok((1009, None)));
+    assert_eq!(victim.resume(&victim.good, Order::Sequential), Ok((1009, None)));
 }
 
 #[test]
-fn flipped_bits_cost_their_batch_alone() {
+fn flipped_bits_damage_only_their_batch() {
     let folder = tempfile::tempdir().unwrap();
     let (victim, mut random, attacks) = (Victim::new(&folder), random(), count(300));
     let mut faults = Vec::new();
     for nth in 0..attacks {
         let mut bad = victim.good.clone();
         let flips = 1 + nth % 2;
-        // Two in the header would be one too many.
-        let first = if flips == 1 { 0 } else { victim.good.len() / 8 };
+        let first = victim.header();
         let places: Vec<usize> =
             (0..flips).map(|_| 8 * first + random.below(8 * (bad.len() - first))).collect();
         places.iter().for_each(|&bit| bad[bit / 8] ^= 1 << (bit % 8));
@@ -135,7 +138,7 @@ fn flipped_bits_cost_their_batch_alone() {
                 if kept + flips * BATCH >= 1009 && (damage.is_some() || bad == victim.good) => {}
             other => faults.push(format!("bits {places:?}: {other:?}")),
         }
-        if let (0, Err(fault)) = (nth % 5, victim.survives(&bad, Order::AsKept)) {
+        if let (0, Err(fault)) = (nth % 5, victim.survives(&bad, Order::Sequential)) {
             faults.push(format!("bits {places:?}, in order: {fault}"));
         }
     }
@@ -146,7 +149,7 @@ fn flipped_bits_cost_their_batch_alone() {
 fn a_file_may_end_anywhere() {
     let folder = tempfile::tempdir().unwrap();
     let (victim, mut random, attacks) = (Victim::new(&folder), random(), count(50));
-    let head = 2 * (16 + u32::from_le_bytes(victim.good[8..12].try_into().unwrap()) as usize);
+    let head = victim.header();
     let anywhere = (0..attacks).map(|_| random.below(victim.good.len()));
     let mut faults = Vec::new();
     for length in (0..=head).step_by(if attacks > 50 { 1 } else { 31 }).chain(anywhere) {
@@ -157,30 +160,23 @@ fn a_file_may_end_anywhere() {
     report("cuts", attacks, &faults);
 }
 
-/// At any time, in the first milliseconds above all.
+/// Runs are killed at random times, most of them in the first milliseconds.
 #[cfg(unix)]
 #[test]
 fn killed_runs_can_be_resumed_whenever_it_was() {
     let folder = folder();
-    let arguments = ["--engine", "cpu", "--set", "axis.0.count=8", "--set", "integration.early_stop=false"];
-    map(&folder, &[&arguments[..], &["--quiet", "--out", "whole"]].concat()).success();
+    let arguments = "--engine cpu --set axis.0.count=8 --set integration.early_stop=false";
+    map(&folder, &format!("{arguments} --quiet --out whole")).success();
     let expected = records::bytes(&folder.path().join("whole"));
     let (mut random, attacks) = (random(), count(6));
     let mut faults = Vec::new();
     for nth in 0..attacks {
-        let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"))
-            .current_dir(folder.path())
-            .args(["map", "s.toml", "--out", "cut"])
-            .args(arguments)
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let run = begin(&folder, &format!("map s.toml --out cut {arguments}"));
         let delay = Duration::from_micros(random.below(if nth % 3 == 2 { 1_000_000 } else { 40_000 }) as u64);
         std::thread::sleep(delay);
-        run.kill().unwrap();
-        run.wait().unwrap();
-        let resume = ["map", "s.toml", "--out", "cut", "--resume", "--quiet"];
-        let resumed = command(&folder, &[&resume[..], &arguments].concat()).output().unwrap();
+        stop(run, "-KILL");
+        let resume = format!("map s.toml --out cut --resume --quiet {arguments}");
+        let resumed = command(&folder, &resume).output().unwrap();
         if !resumed.status.success() {
             faults.push(format!("{delay:?}: {}", String::from_utf8_lossy(&resumed.stderr)));
         } else if records::bytes(&folder.path().join("cut")) != expected {

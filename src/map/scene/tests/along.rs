@@ -46,25 +46,28 @@ fn the_other_axis_gets_exactly_the_given_value() {
 
 #[test]
 fn names_that_do_not_fit_the_axes_are_refused() {
-    for (parameter, at, parts) in [
-        ("F", &[][..], &["--along F: ", "the scene does not sweep it; its axes: e, omega"][..]),
-        ("e", &[], &["--along e: ", "`--at omega=VALUE` is missing", "give the value of omega on the line"]),
-        ("e", &["k=800"], &["--at k=800: ", "no axis to fix; its axes: e, omega", "--set k=800"]),
-        ("e", &["e=0.5"], &["--at e=0.5: ", "--along sweeps it"]),
-        ("e", &["omega=5", "omega=6"], &["--at omega=6: ", "names it twice"]),
-        ("e", &["omega"], &["--at omega: ", "expected NAME=VALUE"]),
-        ("e", &["omega=fast"], &["--at omega=fast: ", "has the wrong type: it must be a number"]),
-        ("e", &["omega=-1"], &["--at omega=-1: `parameters.omega = -1` is out of range"]),
-        ("omega", &["e=nan"], &["--at e=nan: ", "between 0 and 1"]),
-    ] {
-        assert_says(&along(PLANE, &[], parameter, at).unwrap_err().to_string(), parts);
+    for [parameter, at, expected] in test_cases(
+        r#"
+F | | --along F:  && the scene does not sweep it; its axes: e, omega
+e | | --along e:  && `--at omega=VALUE` is missing && give the value of omega on the line
+e | k=800 | --at k=800:  && no axis to fix; its axes: e, omega && --set k=800
+e | e=0.5 | --at e=0.5:  && --along sweeps it
+e | omega=5 omega=6 | --at omega=6:  && names it twice
+e | omega | --at omega:  && expected NAME=VALUE
+e | omega=fast | --at omega=fast:  && has the wrong type: it must be a number
+e | omega=-1 | --at omega=-1: `parameters.omega = -1` is out of range
+omega | e=nan | --at e=nan:  && between 0 and 1
+"#,
+    ) {
+        let at: Vec<&str> = at.split_whitespace().collect();
+        assert_says(&along(PLANE, &[], &parameter, &at).unwrap_err().to_string(), &parts(&expected));
     }
-    let said = along(PLANE, &["omega=6"], "e", &["omega=5"]).unwrap_err().to_string();
-    assert_says(&said, &["--set omega=6: ", "--at gives `omega` its value"]);
+    let message = along(PLANE, &["omega=6"], "e", &["omega=5"]).unwrap_err().to_string();
+    assert_says(&message, &["--set omega=6: ", "--at gives `omega` its value"]);
     // The text sets the parameter of the other axis.
     let both = PLANE.replace("F = 40.0", "F = 40.0, omega = 6.0");
-    let said = along(&both, &[], "e", &["omega=5"]).unwrap_err().to_string();
-    assert_says(&said, &["s.toml:1:34: `parameters.omega = 6.0`", "--at gives `omega` its value"]);
+    let message = along(&both, &[], "e", &["omega=5"]).unwrap_err().to_string();
+    assert_says(&message, &["s.toml:1:34: `parameters.omega = 6.0`", "--at gives `omega` its value"]);
     // The other axis is checked, too.
     let bad = PLANE.replace("max = 12.0", "max = 0.5");
     assert_says(&along(&bad, &[], "e", &["omega=5"]).unwrap_err().to_string(), &["`axis.1.max = 0.5`"]);
@@ -72,8 +75,11 @@ fn names_that_do_not_fit_the_axes_are_refused() {
 
 #[test]
 fn the_error_for_a_plane_shows_the_option_along() {
-    let said = Scene::parse(PLANE, "s.toml", &[], Purpose::Bifurcation).unwrap_err().to_string();
-    assert_says(&said, &["s.toml:7:1: ", "`axis = 2 tables`", "needs 1 axis", "--along e --at omega=VALUE"]);
+    let message = Scene::parse(PLANE, "s.toml", &[], Purpose::Bifurcation).unwrap_err().to_string();
+    assert_says(
+        &message,
+        &["s.toml:7:1: ", "`axis = 2 tables`", "needs 1 axis", "--along e --at omega=VALUE"],
+    );
 }
 
 #[test]

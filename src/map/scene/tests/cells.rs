@@ -87,35 +87,21 @@ e,omega\n | dir/points.csv:1:1: it has no cells
 
 #[test]
 fn settings_that_contradict_a_list_are_refused() {
-    let with = |more: &str, sets: &[&str]| refused(&format!("{SCENE}{more}"), TABLE, sets);
-    assert_says(
-        &with("[[axis]]\nparameter = \"k\"\nmin = 1.0\nmax = 2.0\ncount = 2\n", &[]),
-        &["s.toml:6:1: `axis = [[axis]]`", "does not fit: [cells] lists the cells instead of axes"],
-    );
-    assert_says(
-        &with("[refine]\n", &[]),
-        &["`refine = { ... }` does not fit: cells of a list have no neighbours"],
-    );
-    for policy in ["up", "down"] {
-        assert_says(
-            &with(&format!("[start]\npolicy = \"{policy}\"\n"), &[]),
-            &["s.toml:7:10: `start.policy = ", "no neighbours to start from"],
-        );
+    for [more, sets, expected] in test_cases(
+        r#"
+[[axis]]\nparameter = "k"\nmin = 1.0\nmax = 2.0\ncount = 2\n | | s.toml:6:1: `axis = [[axis]]` && does not fit: [cells] lists the cells instead of axes
+[refine]\n | | `refine = { ... }` does not fit: cells of a list have no neighbours
+[start]\npolicy = "up"\n | | s.toml:7:10: `start.policy =  && no neighbours to start from
+[start]\npolicy = "down"\n | | s.toml:7:10: `start.policy =  && no neighbours to start from
+[outputs]\nfiles = ["csv", "png"]\n | | a list of cells has no figures && remove "png"
+[outputs]\nfiles = ["csv", "html"]\n | | a list of cells has no figures && remove "html"
+ | e=0.5 | --set e=0.5: `parameters.e = 0.5` does not fit: a column of `points.csv`
+[derived]\nomega = "e"\n | | `derived.omega = "e"` does not fit: it is also swept
+"#,
+    ) {
+        let sets: Vec<&str> = sets.split_whitespace().collect();
+        assert_says(&refused(&format!("{SCENE}{more}"), TABLE, &sets), &parts(&expected));
     }
-    for file in ["png", "html"] {
-        assert_says(
-            &with(&format!("[outputs]\nfiles = [\"csv\", \"{file}\"]\n"), &[]),
-            &["a list of cells has no figures", &format!("remove \"{file}\"")],
-        );
-    }
-    assert_says(
-        &with("", &["e=0.5"]),
-        &["--set e=0.5: `parameters.e = 0.5` does not fit: a column of `points.csv`"],
-    );
-    assert_says(
-        &with("[derived]\nomega = \"e\"\n", &[]),
-        &["`derived.omega = \"e\"` does not fit: it is also swept"],
-    );
     assert_says(&refused(SCENE, "omega\n5.6\n", &[]), &["`parameters.e` is missing"]);
     assert_says(&refused("[cells]\n", TABLE, &[]), &["s.toml:1:2: `cells.file` is missing; name a table"]);
     assert_says(

@@ -53,33 +53,20 @@ fn one_axis_may_be_a_parameter() {
 
 #[test]
 fn settings_that_contradict_axes_of_the_start_are_refused() {
-    for (sets, expected) in [
-        (
-            &["axis.0.start=w1"][..],
-            &["--set axis.0.start=w1: `axis.0.start = w1` is not known", "x1, v1, x2, v2"][..],
-        ),
-        (&["axis.1.start=v1"], &["`axis.1.start = v1`", "axis 0 sweeps it already; name another component"]),
-        (
-            &["axis.0.min=nan"],
-            &["`axis.0.min = nan` is out of range: it must be a finite number, as `v1` is"],
-        ),
-        (
-            &["start.policy=up"],
-            &["`start.policy = up`", "give each cell its start", "use \"rest\" or \"state\""],
-        ),
-        (&["start.policy=down"], &["`start.policy = down`", "give each cell its start"]),
-        (&["start.policy=both"], &["`start.policy = both`"]),
-        (&["start.count=3"], &["`start.count = 3`", "give each cell its start; remove the count"]),
-        (
-            &["axis.0.start=v1", "axis.0.parameter=e"],
-            &["`axis.0.start = v1`", "`axis.0.parameter` is given, too"],
-        ),
-        (
-            &["axis.1.parameter=omega", "axis.1.values=[2,4]", "refine.rounds=2"],
-            &["`refine", "can be matched only after all cells are known", "or remove [refine]"],
-        ),
-    ] {
-        assert_says(&refused(sets), expected);
+    for [sets, expected] in test_cases(
+        r#"
+axis.0.start=w1 | --set axis.0.start=w1: `axis.0.start = w1` is not known && x1, v1, x2, v2
+axis.1.start=v1 | `axis.1.start = v1` && axis 0 sweeps it already; name another component
+axis.0.min=nan | `axis.0.min = nan` is out of range: it must be a finite number, as `v1` is
+start.policy=up | `start.policy = up` && give each cell its start && use "rest" or "state"
+start.policy=down | `start.policy = down` && give each cell its start
+start.policy=both | `start.policy = both`
+start.count=3 | `start.count = 3` && give each cell its start; remove the count
+axis.0.start=v1 axis.0.parameter=e | `axis.0.start = v1` && `axis.0.parameter` is given, too
+axis.1.parameter=omega axis.1.values=[2,4] refine.rounds=2 | `refine && can be matched only after all cells are known && or remove [refine]
+"#,
+    ) {
+        assert_says(&refused(&sets.split(' ').collect::<Vec<_>>()), &parts(&expected));
     }
     let both = START_PLANE.replacen("start = 'v1'", "start = 'v1'\nparameter = 'omega'", 1);
     assert_says(&map(&both, &[]).unwrap_err().to_string(), &["s.toml:5:9:", "remove one of the two"]);

@@ -1,0 +1,185 @@
+//! Records of a run that may be interrupted: stored as cells end, and taken up again when the run resumes.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use thiserror::Error;
+
+use crate::map::engine::Engine;
+use crate::map::plan::Plan;
+use crate::map::scene::Scene;
+use crate::map::schedule::Schedule;
+use crate::map::shard::Shard;
+use crate::map::sweep;
+use crate::record::Record;
+use crate::store::error::OutputError;
+use crate::store::folder::{Folder, FolderError};
+use crate::store::record_file::{Extent, Identity, Order, RECORDS, RecordFile, RecordFileError};
+use crate::store::shard::Tally;
+use crate::store::{map, unfinished};
+
+/// Why records cannot be stored in a folder.
+#[derive(Debug, Error)]
+pub enum RunRecordsError {
+    /// The folder cannot be used.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The record file belongs to another run, or cannot be read or written.
+    #[error(transparent)]
+    Records(#[from] RecordFileError),
+    /// Another file of the folder cannot be written or removed.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// A map or a shard that is being computed.
+pub struct Work<'p> {
+    /// All cells of the map.
+    pub plan: &'p Plan,
+    /// The cells to integrate, and their order.
+    pub schedule: Schedule,
+    /// Records by run. Empty for a shard whose cells do not depend on each other.
+    pub records: Vec<Record>,
+    /// Counts over the records so far.
+    pub tally: Tally,
+    shard: Option<Shard>,
+}
+
+impl<'p> Work<'p> {
+    /// Returns the work on a map, or on a shard of it, before its first cell.
+    pub fn new(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
+        let mut work = Work::without_records(plan, shard);
+        if shard.is_none() || work.schedule.reads_records() {
+            work.records = vec![Record::default(); plan.run_count()];
+        }
+        work
+    }
+
+    /// Returns work that keeps no records, for checking those of a shard.
+    pub(crate) fn without_records(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
+        let (schedule, tally) = (Schedule::of(plan, shard), Tally::default());
+        Work { plan, schedule, records: Vec::new(), tally, shard }
+    }
+
+    /// Whether records behind damage can be taken up.
+    pub(crate) fn order(&self) -> Order {
+        if self.schedule.takes_any_order() { Order::Any } else { Order::Sequential }
+    }
+
+    /// Takes up a stored batch. Returns false if the plan has no such records or the schedule does not wait for them.
+    pub(crate) fn replay(&mut self, batch: &[(u32, Record)]) -> bool {
+        self.plan.admits(batch) && sweep::replay(&mut self.schedule, &mut self.records, batch)
+    }
+
+    /// Takes up all records of a file.
+    ///
+    /// # Errors
+    /// [`RecordFileError`] if the file belongs to another run, cannot be read, or has records of other cells.
+    pub fn read(&mut self, path: &Path, identity: &Identity) -> Result<Extent, RecordFileError> {
+        RecordFile::read(path, identity, self.order(), |batch| self.replay(batch))
+    }
+}
+
+/// Opens a new folder; with `force` or `resume` also the folder of an earlier run.
+///
+/// # Errors
+/// [`RunRecordsError`] if the folder cannot be used, or if there is nothing in it to resume but other files.
+pub fn open_folder(out: &Path, force: bool, resume: bool) -> Result<Folder, RunRecordsError> {
+    if resume && !out.join(RECORDS).is_file() && Folder::holds_results(out) {
+        return Err(RecordFileError::NothingToResume { folder: out.to_owned() }.into());
+    }
+    let folder = Folder::open(out, force || resume)?;
+    folder.refuse_links(map::names())?;
+    Ok(folder)
+}
+
+/// The record file of a run under way, and the time spent on it.
+pub struct RunRecords<'f> {
+    file: RecordFile,
+    folder: &'f Folder,
+    resumed: usize,
+    /// What the records count: cells or runs.
+    unit: &'static str,
+    elapsed_before: Duration,
+    clock: Instant,
+}
+
+impl<'f> RunRecords<'f> {
+    /// Creates the record file of a run; with `resume` takes up the records of an existing one. Tables and figures of an
+    /// earlier run are removed.
+    ///
+    /// # Errors
+    /// [`RunRecordsError`] if the records belong to another run, or a file cannot be read or written.
+    pub fn open(
+        folder: &'f Folder,
+        scene: &Scene,
+        engine: &Engine<'_>,
+        resume: bool,
+        work: &mut Work<'_>,
+    ) -> Result<RunRecords<'f>, RunRecordsError> {
+        let path = folder.path().join(RECORDS);
+        let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
+            .of_shard(work.shard);
+        let (file, elapsed_before) = if resume && path.is_file() {
+            let order = work.order();
+            let take = |batch: &[(u32, Record)]| {
+                work.tally.take(work.plan, batch);
+                work.replay(batch)
+            };
+            (RecordFile::resume(&path, &identity, order, take)?, unfinished::elapsed(folder))
+        } else {
+            (RecordFile::create(&path, &identity)?, Duration::ZERO)
+        };
+        // The time is stored before the manifest, which may contain it, is removed.
+        if elapsed_before.is_zero() {
+            unfinished::clear(folder)?;
+        } else {
+            unfinished::store_elapsed(folder, elapsed_before)?;
+        }
+        map::begin(folder, scene)?;
+        let resumed = file.count();
+        let unit = work.plan.unit();
+        Ok(RunRecords { file, folder, resumed, unit, elapsed_before, clock: Instant::now() })
+    }
+
+    /// Stores a batch and waits until it is on the disk.
+    ///
+    /// # Errors
+    /// [`RunRecordsError`], for instance if the disk is full.
+    pub fn store(&mut self, batch: &[(u32, Record)]) -> Result<(), RunRecordsError> {
+        self.file.append(batch)?;
+        Ok(unfinished::store_elapsed(self.folder, self.elapsed_before + self.elapsed())?)
+    }
+
+    /// Number of records in the file.
+    pub fn count(&self) -> usize {
+        self.file.count()
+    }
+
+    /// Number of records of earlier runs.
+    pub fn resumed(&self) -> usize {
+        self.resumed
+    }
+
+    /// Describes damage to the records of earlier runs, if there is any.
+    pub fn damage(&self) -> Option<String> {
+        let unit = self.unit;
+        let (path, count, damage) = (self.folder.path().join(RECORDS), self.resumed, self.file.damage()?);
+        Some(format!("{}: {damage}; {count} {unit} are kept, the others are computed again", path.display()))
+    }
+
+    /// The folder of the record file.
+    pub fn folder(&self) -> &'f Folder {
+        self.folder
+    }
+
+    /// Time that earlier runs spent.
+    pub fn elapsed_before(&self) -> Duration {
+        self.elapsed_before
+    }
+
+    /// Time since this run began.
+    pub fn elapsed(&self) -> Duration {
+        self.clock.elapsed()
+    }
+}
