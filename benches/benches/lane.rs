@@ -20,7 +20,7 @@ fn naive(source: String) -> String {
     let one_step = replace(
         &source,
         "        if iterations >= settings.iterations {\n            verdict = SCAN_BUDGET;",
-        "        if taken > 0u {\n            verdict = 2u;\n            break;\n        }\n        \
+        "        if step_count > 0u {\n            verdict = 2u;\n            break;\n        }\n        \
          if iterations >= settings.iterations {\n            verdict = SCAN_BUDGET;",
     );
     replace(

@@ -190,7 +190,7 @@ fn scan_steps() -> u32 {
     var q = vec4<Real>(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
     var n = tally.step;
     var leaves = tally.order > 0u;
-    var taken = 0u;
+    var step_count = 0u;
     var verdict = SCAN_MARK;
     var going = true;
     while going {
@@ -228,13 +228,13 @@ fn scan_steps() -> u32 {
             c = c2;
             s = s2;
             n += 1u;
-            taken += 1u;
+            step_count += 1u;
             leaves = false;
         }
     }
     motion.q = array<Real, 4>(q.x, q.y, q.z, q.w);
     tally.step = n;
-    tally.passes_in_period += taken;
+    tally.passes_in_period += step_count;
     tally.order = select(0u, 1u, leaves);
     return verdict;
 }

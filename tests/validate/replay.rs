@@ -285,11 +285,11 @@ fn validate_lanes(plan: &Plan, precision: Precision, rewrite: Option<fn(String) 
     rewrite.into_iter().for_each(|rewrite| gpu.rewrite_shaders(rewrite));
     let records = map(plan, &mut gpu);
     let subject = Subject { plan, records: &records, precision, is_lane: true };
-    let mut drawn = sample(plan, &records, usize::MAX, 1);
-    drawn.states = (0..records.len() as u32).collect();
+    let mut selection = sample(plan, &records, usize::MAX, 1);
+    selection.states = (0..records.len() as u32).collect();
     let mut double = (precision == Precision::F32 && rewrite.is_none()).then(|| open(Precision::F64));
-    let lanes = Lanes::run(&subject, &drawn, Some(&mut *gpu), double.as_deref_mut());
-    replay(&subject, &drawn, &pollster::block_on(lanes).unwrap(), &|_| {})
+    let lanes = Lanes::run(&subject, &selection, Some(&mut *gpu), double.as_deref_mut());
+    replay(&subject, &selection, &pollster::block_on(lanes).unwrap(), &|_| {})
 }
 
 #[test]
@@ -324,9 +324,9 @@ fn a_lane_that_misses_one_impact_in_ten_thousand_is_found() {
         let ids: Vec<u32> = (0..plan.cell_count() as u32).collect();
         let records = vec![Record::default(); ids.len()];
         let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
-        let drawn = Sample { states: ids, ..sample_of(Vec::new()) };
-        let lanes = pollster::block_on(Lanes::run(&subject, &drawn, Some(&mut gpu), None)).unwrap();
-        let states = replay(&subject, &drawn, &lanes, &|_| {}).states.unwrap();
+        let selection = Sample { states: ids, ..sample_of(Vec::new()) };
+        let lanes = pollster::block_on(Lanes::run(&subject, &selection, Some(&mut gpu), None)).unwrap();
+        let states = replay(&subject, &selection, &lanes, &|_| {}).states.unwrap();
         assert!(states.rate().is_too_many(), "{precision:?}: {states:?}");
     }
 }
@@ -356,9 +356,9 @@ fn an_undecided_judge_does_not_contradict_a_record() {
     assert!(matches!(classify(&records[0]), Class::Periodic { .. }), "{:?}", records[0]);
     let subject = Subject { plan: &plan, records: &records, precision: Precision::F64, is_lane: false };
     let mut double = open(Precision::F64);
-    let drawn = sample_of(vec![0]);
-    let lanes = pollster::block_on(Lanes::run(&subject, &drawn, None, Some(&mut *double))).unwrap();
-    let found = replay(&subject, &drawn, &lanes, &|_| {});
+    let selection = sample_of(vec![0]);
+    let lanes = pollster::block_on(Lanes::run(&subject, &selection, None, Some(&mut *double))).unwrap();
+    let found = replay(&subject, &selection, &lanes, &|_| {});
     assert_eq!((found.judge, kinds(&found)), (Judge::Lanes, vec![Kind::Budget]), "{:?}", found.mismatches);
 }
 
@@ -406,15 +406,19 @@ fn samples_have_their_strata_and_repeat() {
         Record { status: status.code(), period, valid: valid::PERIOD, ..Record::default() }
     };
     let records: Vec<Record> = (0..1600).map(record).collect();
-    let drawn = sample(&plan, &records, 400, 7);
-    assert_eq!(drawn, sample(&plan, &records, 400, 7));
-    assert_ne!(drawn.draws, sample(&plan, &records, 400, 8).draws);
-    let counts: Vec<_> = drawn.draws.iter().map(|draw| (draw.stratum, draw.runs, draw.ids.len())).collect();
+    let selection = sample(&plan, &records, 400, 7);
+    assert_eq!(selection, sample(&plan, &records, 400, 7));
+    assert_ne!(selection.draws, sample(&plan, &records, 400, 8).draws);
+    let counts: Vec<_> =
+        selection.draws.iter().map(|draw| (draw.stratum, draw.runs, draw.ids.len())).collect();
     // There are fewer cells with a status than wanted, so the uniform stratum gets the rest.
     let expected = [(Stratum::Uniform, 1600, 260), (Stratum::Border, 160, 100), (Stratum::Status, 40, 40)];
     assert_eq!(counts, expected);
-    assert!(drawn.draws[1].ids.iter().all(|id| [9, 10, 24, 25].contains(&(id % 40))));
-    assert!(drawn.draws.iter().all(|draw| draw.ids.is_sorted_by(|a, b| a < b)), "a cell was drawn twice");
+    assert!(selection.draws[1].ids.iter().all(|id| [9, 10, 24, 25].contains(&(id % 40))));
+    assert!(
+        selection.draws.iter().all(|draw| draw.ids.is_sorted_by(|a, b| a < b)),
+        "a cell was selected twice"
+    );
     assert_eq!(sample(&plan, &records, 5000, 7).ids().len(), 1600);
 }
 
@@ -525,9 +529,9 @@ fn planted_records_fail_the_validation_by_name() {
 fn a_validation_without_a_recomputed_cell_fails() {
     let plan = Plan::new(&scene(3, 3));
     let filled = vec![Record { valid: valid::FILLED, ..Record::default() }; 9];
-    let drawn = sample(&plan, &filled, 400, 1);
+    let selection = sample(&plan, &filled, 400, 1);
     let subject = Subject { plan: &plan, records: &filled, precision: Precision::F64, is_lane: true };
-    let found = replay(&subject, &drawn, &Lanes::default(), &|_| {});
+    let found = replay(&subject, &selection, &Lanes::default(), &|_| {});
     assert_eq!((found.replayed, found.filled), (0, 9));
     assert_eq!(found.faults(), ["none of 9 cells was replayed"]);
 }
@@ -544,11 +548,11 @@ fn the_result_names_a_device_other_than_the_maps() {
     let text = validated();
     assert!(!text.contains("not on the map's own device"), "{text}");
     let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
-    let made: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    let original: serde_json::Value = serde_json::from_str(&manifest).unwrap();
     let found = json(&out);
-    assert_eq!((&found["same_device"], &found["again_on"]), (&true.into(), &made["device"]));
+    assert_eq!((&found["same_device"], &found["again_on"]), (&true.into(), &original["device"]));
     // The map as if another device had computed it.
-    let device = made["device"].as_str().unwrap();
+    let device = original["device"].as_str().unwrap();
     let scene = scene(4, 3);
     let identity = |device| Identity::new("gpu", "f32", device, scene.identity());
     let records = read_records(&out.join(RECORDS), &identity(device));

@@ -83,7 +83,7 @@ pub(super) fn state_after(pair: &GearPair, start: State, periods: u32) -> Result
 }
 
 /// Returns the largest difference of two states; infinite if one is not finite.
-pub(super) fn apart(a: &State, b: &State) -> f64 {
+pub(super) fn state_distance(a: &State, b: &State) -> f64 {
     a.iter().zip(b).map(|(&a, &b)| distance::apart(a, b)).fold(0.0, farther)
 }
 
@@ -113,7 +113,8 @@ pub(super) fn sensitivity_to(amount: f64, pair: &GearPair, start: State, periods
     };
     let ends = (0..8).map(moved_start).chain((0..2 * GearPair::PARAMETERS.len()).filter_map(moved_pair));
     let size = end.iter().fold(pair.b, |m, x| m.max(x.abs()));
-    ends.map(|moved| moved.map_or(f64::INFINITY, |moved| apart(&moved, &end))).fold(amount * size, farther)
+    ends.map(|moved| moved.map_or(f64::INFINITY, |moved| state_distance(&moved, &end)))
+        .fold(amount * size, farther)
 }
 
 /// Returns the error that rounding may cause in so many steps. The sensitivity belongs to four roundings at once, every

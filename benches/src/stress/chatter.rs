@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::{
-    EngineName, UNPREDICTABLE, apart, paper, run_reference, sensitivity, sensitivity_to, state_after,
+    EngineName, UNPREDICTABLE, paper, run_reference, sensitivity, sensitivity_to, state_after, state_distance,
 };
 use super::lanes::{Lanes, Start};
 use super::{Size, Verdict};
@@ -114,7 +114,7 @@ fn on_reference(case: &Case) -> Row {
 
 fn row(case: &Case, engine: EngineName, status: Status, state: Option<[f64; 4]>) -> Row {
     let (pair, start) = case.start;
-    let error = state.zip(case.expected.ok()).map(|(state, expected)| apart(&state, &expected));
+    let error = state.zip(case.expected.ok()).map(|(state, expected)| state_distance(&state, &expected));
     let bar = || {
         let tiny = if pair.mesh_speed < TINY { sensitivity_to(TINY, &pair, start, 1) } else { 0.0 };
         FACTOR * sensitivity(&pair, start, 1, engine).max(tiny)

@@ -11,7 +11,9 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::cells::{EngineName, REST, apart, flow_of, oscillator_of, paper, run_reference, sensitivity};
+use super::cells::{
+    EngineName, REST, flow_of, oscillator_of, paper, run_reference, sensitivity, state_distance,
+};
 use super::grazing::{contact_speed, swing};
 use super::lanes::{Lanes, Start};
 use super::perturbed::{Perturbed, perturbed};
@@ -219,7 +221,7 @@ fn measure_motions(
                     impacts_of_reference: work.impacts,
                     impacts_least,
                     impacts_most,
-                    error: apart(&records[i].strobe, state.as_ref().expect("an ordinary cell")),
+                    error: state_distance(&records[i].strobe, state.as_ref().expect("an ordinary cell")),
                     bar: FACTOR * sensitivities[i] + SCATTER * perturbed[i].distance,
                 });
             }

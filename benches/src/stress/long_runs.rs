@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::cells::{EngineName, apart, flow_of, paper, state_after};
+use super::cells::{EngineName, flow_of, paper, state_after, state_distance};
 use super::lanes::{Lanes, Start};
 use super::{Size, Verdict, Watch};
 use rattlemap::gpu::{GpuError, LaneSettings};
@@ -89,7 +89,7 @@ pub fn measure(size: Size, lanes: &mut Lanes, watch: &dyn Watch) -> Result<Vec<R
             for (i, cell) in cells.iter().enumerate() {
                 let of_cell = i * per_cell..(i + 1) * per_cell;
                 let error = of_cell.map(|k| match status(&records[k]) {
-                    Status::Ok => apart(&records[k].strobe, &exact[k]),
+                    Status::Ok => state_distance(&records[k].strobe, &exact[k]),
                     _ => f64::INFINITY,
                 });
                 rows.push(row(cell, precision.into(), horizon, error.fold(0.0, farther)));
@@ -116,8 +116,9 @@ fn settled(pair: GearPair) -> Settled {
         trajectory.advance_period(&mut ()).expect("a stable cell");
     }
     let map = [1, 2].map(StrobeMap::Periods);
-    let near =
-        |cycle: &Cycle| apart(&cycle.state, &trajectory.state()) < 1e-6 && cycle.spectral_radius() < 1.0;
+    let near = |cycle: &Cycle| {
+        state_distance(&cycle.state, &trajectory.state()) < 1e-6 && cycle.spectral_radius() < 1.0
+    };
     let cycle = map.into_iter().filter_map(|map| refine(&trajectory, map)).find(near);
     let cycle = cycle.expect("the cell has a stable cycle of one or two periods");
     let starts = (0..8).map(|k| {
@@ -146,7 +147,7 @@ fn on_reference(cell: &Settled, longest: u32) -> Vec<Row> {
                 cell,
                 EngineName::Reference,
                 period,
-                apart(&trajectory.state(), &cell.cycle.state),
+                state_distance(&trajectory.state(), &cell.cycle.state),
             ));
         }
     }

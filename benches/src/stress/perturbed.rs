@@ -5,7 +5,7 @@
 //! or remove an impact where chatter ends. The sensitivity to the start does not show this: a motion forgets its start, but
 //! not its latest roundings.
 
-use super::cells::{EngineName, apart};
+use super::cells::{EngineName, state_distance};
 use super::lanes::Start;
 use rattlemap::map::random::Random;
 use rattlemap_dynamics::flow::Flow;
@@ -46,7 +46,7 @@ pub(super) fn perturbed(
             moved.advance_period(&mut ())?;
         }
         let impacts = moved.work().impacts;
-        found.distance = found.distance.max(apart(&moved.state(), &exact.state()));
+        found.distance = found.distance.max(state_distance(&moved.state(), &exact.state()));
         found.impacts = [found.impacts[0].min(impacts), found.impacts[1].max(impacts)];
     }
     Ok(found)

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::{
-    EngineName, REST, UNPREDICTABLE, apart, bar, oscillator_of, paper, run_reference, sensitivity,
+    EngineName, REST, UNPREDICTABLE, bar, oscillator_of, paper, run_reference, sensitivity, state_distance,
 };
 use super::lanes::{Lanes, Start};
 use super::{Size, Verdict};
@@ -106,8 +106,8 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
             });
             let exact = exact[i].0.as_ref().ok().filter(|_| status == Status::Ok);
             rows.push(Row {
-                error: exact.map(|exact| apart(&records[i].strobe, exact)),
-                spread: exact.map(|_| apart(&records[i].strobe, &finer[i].strobe)),
+                error: exact.map(|exact| state_distance(&records[i].strobe, exact)),
+                spread: exact.map(|_| state_distance(&records[i].strobe, &finer[i].strobe)),
                 ..row(i, precision.into(), status, steps)
             });
         }

@@ -16,7 +16,7 @@ const LEFT: f64 = 160.0;
 /// Size of the text at the end of a curve.
 const SMALLEST: f64 = 18.0;
 const RADIUS: f64 = 7.0;
-/// Range of errors. Errors outside are drawn at its ends.
+/// Range of errors. Figures show errors outside at its ends.
 const ERRORS: (f64, f64) = (1e-16, 10.0);
 
 /// Label and marker of a method.

@@ -61,7 +61,7 @@ pub(super) fn all_bounded(count: usize, seed: u64, watch: &dyn Watch) -> Vec<Sta
         let bounded = each(&candidates, is_bounded);
         cells.extend(candidates.into_iter().zip(bounded).filter_map(|(cell, fits)| fits.then_some(cell)));
         cells.truncate(count);
-        watch.progress("cells drawn", cells.len(), count);
+        watch.progress("bounded cells", cells.len(), count);
     }
     cells
 }
