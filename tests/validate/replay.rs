@@ -69,7 +69,7 @@ fn chaotic(record: &Record) -> bool {
 
 // ---- single records
 
-/// Name of the field that differs, which records can be made wrong in this way, and how.
+/// Name of the wrong field, whether a record can be wrong in this way, and the function that makes it wrong.
 type Planted = (&'static str, fn(&Record) -> bool, fn(&mut Record));
 
 const PLANTED: [Planted; 20] = [
@@ -220,7 +220,7 @@ fn a_cycle_after_period_doubling_has_its_own_word() {
 /// The approach is slow and the strobe map is curved. Where the lane computes the multiplier, it differs from that of the
 /// cycle by a tenth.
 #[test]
-fn a_multiplier_is_compared_at_the_state_where_it_was_cpu_records() {
+fn a_multiplier_is_compared_at_the_state_where_it_was_computed() {
     let (e, omega, period, run) = (0.7240704500978473, 2.0978473581213306, 4, 64);
     let plan = plan_at(e, omega, &[]);
     let pair = GearPair { omega, ..GearPair::paper(e) };

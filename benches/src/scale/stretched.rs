@@ -1,4 +1,4 @@
-//! Records of a large map, made from those of a small one.
+//! Records of a large map, derived from those of a small one.
 
 use rattlemap::job::run::Map;
 use rattlemap::record::Record;
