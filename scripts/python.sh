@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The Python package as people get it: installs it in a fresh environment, away from the sources, and runs its tests there,
-# among them the README's lines and the notebook. With a wheel as argument that is installed, else what `pip install
-# ./python` makes. With --notebook the notebook is run and written again, with its figures.
+# Tests the Python package as users install it: in a new environment, away from the sources. The tests include the lines of the
+# README and the notebook. Installs the given wheel, else ./python. With --notebook, runs the notebook and writes it with its
+# figures instead.
 #
 #     scripts/python.sh [WHEEL]
 #     scripts/python.sh --notebook
@@ -47,7 +47,7 @@ from nbclient import NotebookClient
 notebook = nbformat.read(sys.argv[1], as_version=4)
 NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
 for cell in notebook.cells:
-    # When it ran is nobody's concern.
+    # Removes the times of execution.
     cell.metadata.pop("execution", None)
 nbformat.write(notebook, sys.argv[1])
 PYTHON
@@ -56,7 +56,7 @@ fi
 began=$SECONDS
 "$bin/rattlemap" --version
 "$bin/python" -m pytest -q -rs -p no:cacheprovider --durations=10 --durations-min=1 "$root/python/tests"
-# What is not installed as a wheel has no entry points.
+# Only an installed package has entry points, which xarray uses.
 "$bin/rattlemap" map "$root/scenes/e_omega.toml" --set axis.0.count=8 --set axis.1.count=8 --engine cpu --quiet --out map
 "$bin/python" -c 'import xarray; print(xarray.open_dataset("map", engine="rattlemap").sizes)'
 printf '== tested in %d s\n' $((SECONDS - began))

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
-# Attacks of every kind for some ten minutes on two cores, and what came of them:
+# Attacks the program in every way for about ten minutes on two cores:
 #
 #     scripts/torture.sh [SCALE]
 #
-# kills        a running map is killed at any moment; resumed, it is the same map to the byte
-# corruptions  bits of records.bin are flipped; a batch is lost at most, and nothing wrong is read
-# cuts         records.bin ends anywhere
-# scenes       scenes are mutated, or made up; each is refused with a remedy, or valid
-# faults       calls into the graphics driver fail; no panic, and the next run goes on
-# cells        cells of random parameters, each within a second of one core (`rattlemap-bench stress --part work`)
+# kills        kills a running map at random moments; after resuming, the map must be equal to the byte
+# corruptions  flips bits of records.bin; at most one batch may be lost, and no wrong record may be read
+# cuts         truncates records.bin at random places
+# scenes       mutates and generates scenes; each must be valid or refused with a remedy
+# faults       makes calls of the graphics driver fail; there must be no panic, and the next run must go on
+# cells        computes cells of random parameters; each must take at most a second of one core (`rattlemap-bench stress --part work`)
 #
-# SCALE, 1 unless given, multiplies every number but the last. The short forms of all of them are among the tests that
-# scripts/test.sh runs. Prints a table at the end; the exit code is 1 if there is a fault.
+# SCALE (1 by default) multiplies all numbers but the last. scripts/test.sh runs short forms of all attacks. A table is printed
+# at the end. The exit code is 1 if there is a fault.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export LC_ALL=C CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-0}" GALLIVM_PERF="${GALLIVM_PERF:-nopt}"
@@ -24,7 +24,7 @@ trap 'rm -rf "$log" "$work"' EXIT
 table=()
 failed=0
 
-# What the tests of a filter count and find: a row for each line `torture: KIND N, faults M`.
+# attack COUNT BINARY FILTER: runs tests and adds a row to the table for each line `torture: KIND N, faults M`.
 attack() {
     local count="$1" binary="$2" began=$SECONDS code=0
     shift 2

@@ -1,4 +1,4 @@
-//! Time per forcing period of a lane, and of two other forms of its shader. See `README.md`.
+//! Forcing periods per second of lanes, and of two other variants of their shader. See `README.md`.
 
 use std::time::Instant;
 
@@ -6,29 +6,58 @@ use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator};
 
-#[path = "lane/rewrite.rs"]
-mod rewrite;
-
 use rattlemap::cli::bench::spread::Spread;
-use rewrite::{CHECKS, Rewrite};
+
+/// Returns a variant of the shader.
+type Rewrite = fn(String) -> String;
+
+/// Variants that must give equal results: the shader as it is, one that searches events inside the loop over steps, and one
+/// that leaves constants in storage.
+const VARIANTS: [(&str, Rewrite); 3] = [("as it is", |source| source), ("naive", naive), ("stored", stored)];
+
+/// Searches events at each step.
+fn naive(source: String) -> String {
+    let one_step = replace(
+        &source,
+        "        if iterations >= settings.iterations {\n            verdict = SCAN_BUDGET;",
+        "        if step_count > 0u {\n            verdict = 2u;\n            break;\n        }\n        \
+         if iterations >= settings.iterations {\n            verdict = SCAN_BUDGET;",
+    );
+    replace(
+        &one_step,
+        "        if scan() == SCAN_BUDGET {\n            break;\n        }\n",
+        "        let verdict = scan();\n        if verdict == SCAN_BUDGET {\n            break;\n        }\n        \
+         if verdict == 2u {\n            continue;\n        }\n",
+    )
+}
+
+/// Reads constants from storage, without a copy in the lane.
+fn stored(source: String) -> String {
+    replace(&source, "const KEEP: bool = true;", "const KEEP: bool = false;")
+}
+
+fn replace(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "the shader has no {from}");
+    text.replace(from, to)
+}
 
 /// Sizes of one run.
 struct Size {
-    /// Cells along each axis.
+    /// Number of cells along each axis.
     side: u32,
     /// Periods per cell.
     periods: u32,
-    /// Runs of each form; the median is given.
+    /// Number of runs of each variant. The median is printed.
     runs: usize,
 }
 
-/// The full size to measure; a tiny one where the program is only shown to run.
+/// Returns the full size for measurements, and a tiny one for tests.
 fn size() -> Size {
     let measured = std::env::args().any(|a| a == "--bench") && !std::env::args().any(|a| a == "--test");
     if measured { Size { side: 48, periods: 100, runs: 5 } } else { Size { side: 3, periods: 3, runs: 1 } }
 }
 
-/// The plane of restitution in `[0, 1]` and frequency in `[1, 12]`, from rest.
+/// Cells over restitution in `[0, 1]` and frequency in `[1, 12]`, from rest.
 struct Plane {
     flows: Vec<Oscillator>,
     laws: Vec<Law>,
@@ -41,14 +70,14 @@ impl Plane {
         let pair = |e: f64, omega: f64| GearPair { omega, ..GearPair::paper(e) };
         let flows = (0..side).map(|i| pair(0.0, at(i, 1.0, 12.0)).oscillator().expect("valid parameters"));
         let laws = (0..side).map(|i| pair(at(i, 0.0, 1.0), 1.0).law());
-        // Rows of 8 x 8 cells: neighbours on the device are neighbours in the plane.
+        // Blocks of 8 x 8 cells, so that neighbours on the device are neighbours in the plane.
         let mut places: Vec<_> = (0..side * side).map(|i| (i / side, i % side)).collect();
         places.sort_by_key(|&(flow, law)| (flow / 8, law / 8, flow, law));
         let lanes = places.into_iter().map(|(flow, law)| Lane { flow, law, start: [0.0; 4] }).collect();
         Plane { flows: flows.collect(), laws: laws.collect(), lanes }
     }
 
-    /// Integrates every cell; the seconds that it took, and what came of it.
+    /// Integrates every cell. Returns the seconds and the records.
     fn run(&self, gpu: &mut Gpu, size: &Size, exponent: bool) -> (f64, Vec<Record>) {
         let settings = LaneSettings { exponent, ..LaneSettings::only(size.periods) };
         let start = Instant::now();
@@ -64,10 +93,10 @@ fn open(precision: Precision, rewrite: Rewrite) -> Gpu {
     gpu
 }
 
-/// Seconds of every form, run in alternation: the machine's moods fall on all alike.
+/// Returns the seconds of each variant. They run alternately, so that changes of the machine's speed affect all of them.
 fn seconds(plane: &Plane, size: &Size, gpus: &mut [Gpu], exponent: bool) -> Vec<f64> {
     for gpu in gpus.iter_mut() {
-        // Compiles.
+        // Compiles the shader.
         plane.run(gpu, &Size { periods: 1, ..*size }, exponent);
     }
     let mut times = vec![Vec::new(); gpus.len()];
@@ -86,18 +115,18 @@ fn main() {
     println!("{0} x {0} cells, {1} periods from rest, median of {2}", size.side, size.periods, size.runs);
     for precision in Precision::ALL {
         for exponent in [false, true] {
-            println!("{precision:?}, exponent {exponent}: forms in one run");
-            let mut gpus: Vec<_> = CHECKS.iter().map(|&(_, rewrite)| open(precision, rewrite)).collect();
+            println!("{precision:?}, exponent {exponent}");
+            let mut gpus: Vec<_> = VARIANTS.iter().map(|&(_, rewrite)| open(precision, rewrite)).collect();
             let times = seconds(&plane, &size, &mut gpus, exponent);
-            for (time, (name, _)) in times.iter().zip(CHECKS) {
+            for (time, (name, _)) in times.iter().zip(VARIANTS) {
                 println!(
-                    "  {name:<9} {:8.0} lane-periods/s, {:.2} of the first's time",
+                    "  {name:<9} {:8.0} lane-periods/s, {:.2} times the time of the first",
                     lane_periods / time,
                     time / times[0],
                 );
             }
             let results: Vec<_> = gpus.iter_mut().map(|gpu| plane.run(gpu, &size, exponent).1).collect();
-            assert!(results.iter().all(|other| *other == results[0]), "the forms differ in their results");
+            assert!(results.iter().all(|other| *other == results[0]), "the results of the variants differ");
         }
     }
 }

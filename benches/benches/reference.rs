@@ -1,6 +1,6 @@
-//! What the reference costs: per forcing period, per event, per period of a map, per flow. See `README.md`.
+//! Time of the reference per forcing period, per event, per period of a map and per flow. See `README.md`.
 
-#![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
+#![allow(missing_docs, reason = "criterion's macros generate undocumented functions")]
 
 use std::hint::black_box;
 
@@ -13,15 +13,15 @@ use rattlemap_dynamics::reference::Trajectory;
 /// Sizes of one run.
 #[derive(Clone, Copy)]
 struct Size {
-    /// Cells along each axis.
+    /// Number of cells along each axis.
     side: usize,
-    /// Periods that a cell is given to settle, once and outside the clock.
+    /// Periods before the measurement.
     transient: u64,
-    /// Periods timed, per cell and iteration.
+    /// Timed periods per cell and iteration.
     periods: u64,
 }
 
-/// The full size to measure; a tiny one where the benchmark is only shown to run.
+/// Returns the full size for measurements, and a tiny one for tests.
 fn size() -> Size {
     if std::env::args().any(|argument| argument == "--test") || !std::env::args().any(|a| a == "--bench") {
         Size { side: 2, transient: 5, periods: 2 }
@@ -35,7 +35,7 @@ struct Cell {
     flow: Flow,
 }
 
-/// A grid over restitution in `[0, 1]` and a band of frequencies.
+/// Returns cells over restitution in `[0, 1]` and a range of frequencies.
 fn grid(side: usize, [low, high]: [f64; 2]) -> Vec<Cell> {
     let at = |i: usize, low: f64, high: f64| low + (high - low) * i as f64 / (side - 1) as f64;
     (0..side * side)
@@ -46,8 +46,12 @@ fn grid(side: usize, [low, high]: [f64; 2]) -> Vec<Cell> {
         .collect()
 }
 
-/// All cells, settled.
-fn settled<const N: usize>(cells: &[Cell], transient: u64, tangents: [State; N]) -> Vec<Trajectory<'_, N>> {
+/// Returns trajectories of all cells after the transient.
+fn trajectories_of<const N: usize>(
+    cells: &[Cell],
+    transient: u64,
+    tangents: [State; N],
+) -> Vec<Trajectory<'_, N>> {
     let settle = |cell: &'_ Cell| -> State {
         let mut trajectory = Trajectory::new(&cell.flow, cell.pair.law(), [0.0; 4]);
         advance(&mut trajectory, transient);
@@ -65,7 +69,7 @@ fn advance<const N: usize>(trajectory: &mut Trajectory<'_, N>, periods: u64) {
     }
 }
 
-/// Times `periods` periods of all cells.
+/// Times the periods of all cells.
 fn run<const N: usize>(
     c: &mut Criterion,
     group: &str,
@@ -75,16 +79,16 @@ fn run<const N: usize>(
 ) {
     let size = size();
     let cells = grid(size.side, band);
-    let start = settled(&cells, size.transient, tangents);
+    let start = trajectories_of(&cells, size.transient, tangents);
     let work = |trajectories: &mut Vec<Trajectory<'_, N>>| {
         for trajectory in trajectories {
             advance(trajectory, size.periods);
             black_box(trajectory.state());
         }
     };
-    let mut counted = start.clone();
-    work(&mut counted);
-    let events: u64 = counted.iter().map(|trajectory| trajectory.work().events).sum();
+    let mut first = start.clone();
+    work(&mut first);
+    let events: u64 = first.iter().map(|trajectory| trajectory.work().events).sum();
     let periods = cells.len() as u64 * size.periods;
     println!("{group}: {} cells, {periods} periods, {events} events", cells.len());
     let mut group = c.benchmark_group(group);
@@ -108,7 +112,7 @@ fn per_event(c: &mut Criterion) {
     run(c, "per event", [1.0, 4.5], [], true);
 }
 
-/// Cells of a map that shows their class alone, from rest until they are decided.
+/// Times cells of a map of classes, from rest until they are decided.
 fn per_period_of_a_map(c: &mut Criterion) {
     let cells = grid(size().side, [1.0, 12.0]);
     let budget = Budget {
@@ -138,7 +142,7 @@ fn flow(c: &mut Criterion) {
 
 criterion_group! {
     name = benches;
-    // Its plots want fonts of the system, which the figures do without.
+    // Plots would need fonts of the system.
     config = Criterion::default().without_plots();
     targets = per_period, per_period_with_tangent, per_event, per_period_of_a_map, flow
 }

@@ -1,4 +1,4 @@
-"""Cells as `rattlemap-bench work-precision` exports them, and how far off an answer is."""
+"""Cells that `rattlemap-bench work-precision` exports, and errors of results."""
 
 import json
 import math
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Cell:
-    """One lane: parameters of Table 1, the start at phase 0, and the reference's answer."""
+    """One lane: parameters of Table 1, the start at phase 0, and the reference's result."""
 
     parameters: dict
     periods: int
@@ -30,7 +30,7 @@ def read(path):
 
 
 def to_gap(state):
-    """(z, w, x2, v2) of (x1, v1, x2, v2)."""
+    """Converts (x1, v1, x2, v2) to (z, w, x2, v2)."""
     x1, v1, x2, v2 = state
     return [x1 - x2, v1 - v2, x2, v2]
 
@@ -41,20 +41,20 @@ def from_gap(q):
 
 
 def state_error(cell, q):
-    """Largest difference of the four numbers; infinite if one is not finite."""
+    """Returns the largest difference of a component of the state; infinite if one is not finite."""
     error = max(abs(a - b) for a, b in zip(from_gap(q), cell.state))
     return error if math.isfinite(error) else math.inf
 
 
 def event_error(cell, latest):
-    """Largest difference of the times of the last events, the latest first; None without events.
+    """Returns the largest difference of the times of the last events, the latest first; None without events.
 
-    An event at phase 0 may be counted to either period.
+    An event at phase 0 may belong to either period.
     """
     if not cell.events:
         return None
     if len(latest) < len(cell.events):
         return math.inf
-    apart = [abs(a - b) % cell.period for a, b in zip(latest, cell.events)]
-    error = max(min(d, cell.period - d) for d in apart)
+    differences = [abs(a - b) % cell.period for a, b in zip(latest, cell.events)]
+    error = max(min(d, cell.period - d) for d in differences)
     return error if math.isfinite(error) else math.inf

@@ -1,8 +1,8 @@
 """Frequency response of `z'' + 2 zeta z' + g(z) = F_m + F_a omega^2 cos(omega t)` by harmonic balance.
 
-g is elastic backlash: 0 within +-1, of slope 1 beyond (Kahraman and Singh 1990). The balance is written in time samples
-(alternating frequency and time), continued in omega by pseudo-arclength; folds are where the tangent turns. Nothing here knows
-events, flights or strobes. Usage: python harmonic_balance.py > ../../tests/gallery/data/backlash.csv
+g is elastic backlash: 0 within +-1, with slope 1 outside (Kahraman and Singh 1990). The balance uses time samples (alternating
+frequency and time) and is continued in omega by pseudo-arclength. At a fold the tangent's component in omega changes sign. The
+method has no events, flights or strobes, so it is independent of rattlemap. Usage: python harmonic_balance.py > ../../tests/gallery/data/backlash.csv
 """
 
 import numpy as np
@@ -19,16 +19,16 @@ weights[0] = 1.0 / SAMPLES
 
 
 def balance(u, omega):
-    """What is left over, and its derivatives by the coefficients and by omega."""
+    """Returns the residual and its derivatives with respect to the coefficients and omega."""
     z = basis @ u
     restoring = np.where(z > 1, z - 1, np.where(z < -1, z + 1, 0.0))
     slope = (np.abs(z) > 1).astype(float)
     cosines, sines = u[1 : HARMONICS + 1], u[HARMONICS + 1 :]
     w = orders * omega
     linear = np.concatenate([[0.0], -(w**2) * cosines + 2 * ZETA * w * sines, -(w**2) * sines - 2 * ZETA * w * cosines])
-    left = linear + weights * (basis.T @ restoring)
-    left[0] -= MEAN
-    left[1] -= ALTERNATING * omega**2
+    residual = linear + weights * (basis.T @ restoring)
+    residual[0] -= MEAN
+    residual[1] -= ALTERNATING * omega**2
     by_u = weights[:, None] * (basis.T @ (slope[:, None] * basis))
     i, c, s = np.arange(HARMONICS), 1 + np.arange(HARMONICS), 1 + HARMONICS + np.arange(HARMONICS)
     by_u[c, c] -= w[i] ** 2
@@ -39,17 +39,17 @@ def balance(u, omega):
         [[0.0], -2 * omega * orders**2 * cosines + 2 * ZETA * orders * sines, -2 * omega * orders**2 * sines - 2 * ZETA * orders * cosines]
     )
     by_omega[1] -= 2 * ALTERNATING * omega
-    return left, by_u, by_omega
+    return residual, by_u, by_omega
 
 
 def solve(point, tangent, length):
-    """Newton's method at an arclength from a point."""
+    """Finds the solution at an arclength from a point by Newton's method."""
     start = point + length * tangent
     x = start.copy()
     for _ in range(12):
-        left, by_u, by_omega = balance(x[:-1], x[-1])
+        residual, by_u, by_omega = balance(x[:-1], x[-1])
         system = np.vstack([np.hstack([by_u, by_omega[:, None]]), tangent])
-        step = np.linalg.solve(system, -np.append(left, tangent @ (x - start)))
+        step = np.linalg.solve(system, -np.append(residual, tangent @ (x - start)))
         x += step
         if np.abs(step).max() < 1e-12:
             return x
@@ -57,6 +57,7 @@ def solve(point, tangent, length):
 
 
 def tangent_at(x, before):
+    """Returns the unit tangent at a solution, in the direction of the tangent before."""
     _, by_u, by_omega = balance(x[:-1], x[-1])
     system = np.vstack([np.hstack([by_u, by_omega[:, None]]), before])
     tangent = np.linalg.solve(system, np.append(np.zeros(len(x) - 1), 1.0))
@@ -72,7 +73,7 @@ def main():
     tangent = tangent_at(point, tangent)
     print("kind,omega,x0,v0,largest")
 
-    def tell(kind, x):
+    def write(kind, x):
         u, w = x[:-1], x[-1]
         z = basis @ u
         position = u[0] + u[1 : HARMONICS + 1].sum()
@@ -86,8 +87,8 @@ def main():
             length /= 2
             assert length > 1e-7, point[-1]
             continue
-        turned = tangent_at(next_point, tangent)
-        if turned[-1] * tangent[-1] < 0:
+        next_tangent = tangent_at(next_point, tangent)
+        if next_tangent[-1] * tangent[-1] < 0:
             low, high, fold = 0.0, length, next_point
             for _ in range(40):
                 middle = 0.5 * (low + high)
@@ -96,10 +97,10 @@ def main():
                     high = middle
                 else:
                     low = middle
-            tell("fold", fold)
-        point, tangent, count = next_point, turned, count + 1
+            write("fold", fold)
+        point, tangent, count = next_point, next_tangent, count + 1
         if count % 2 == 0:
-            tell("stable" if tangent[-1] > 0 else "unstable", point)
+            write("stable" if tangent[-1] > 0 else "unstable", point)
         length = min(1.5 * length, 0.02)
 
 

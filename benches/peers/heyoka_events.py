@@ -1,12 +1,12 @@
 """heyoka's adaptive Taylor integrator with terminal events.
 
-One integrator carries all three domains: two parameters switch the contact force on and say on
-which side. The walls are terminal events whose callback applies the contact law and goes on,
-so that heyoka's own cool-down keeps an event from being found twice. (Pressing that ceases
-during contact onset ends meshing, too; the cells never do that, a unit test says.)
+One integrator has all three domains: two parameters switch the contact force on and select its wall. The walls are terminal
+events whose callback applies the contact law and continues, so heyoka's own cool-down prevents that an event is found twice.
+(A contact force that changes sign during contact onset ends meshing, too. This never happens in these cells, as a unit test
+checks.)
 
-Callbacks are Python. `Steps` has none: it takes as many steps with its walls out of reach, so that
-what is left is compiled code, one lane at a time or several in the processor's wide registers.
+Callbacks are Python. `Steps` has no callbacks: it takes as many steps with its walls out of reach, so only compiled code runs,
+for one lane at a time or for several in the processor's wide registers.
 """
 
 import math
@@ -17,8 +17,8 @@ import numpy as np
 NAMES = ("m1", "m2", "r1", "r2", "k1", "k2", "r", "k", "F", "omega", "b", "e", "mesh_speed")
 MESH, SIDE = len(NAMES), len(NAMES) + 1
 
-# What callbacks work on: heyoka copies them into the integrator, but functions by reference.
-# Views of its memory and plain floats, since attributes and numpy scalars cost more than the law.
+# Data of the callbacks: heyoka copies callable objects into the integrator, but not functions. These are views of its memory
+# and plain floats, because attributes and numpy scalars would cost more time than the contact law.
 events = []
 now = {}
 
@@ -41,13 +41,13 @@ def contact_law(wall, t):
 
 
 def mesh(wall):
-    """The teeth mesh on a side, +1 or -1, or not at all: 0."""
+    """Sets the wall on which the teeth mesh, +1 or -1, or 0 for free motion."""
     now["mesh"] = wall
     now["pars"][MESH], now["pars"][SIDE] = abs(wall), wall
 
 
 def at_wall(ta, wall, into):
-    """A wall is crossed, into it or out of it."""
+    """Handles a crossing of a wall, into it or out of it."""
     if now["mesh"] == 0.0:
         if into:
             t = ta.time
@@ -69,7 +69,7 @@ def at_left(ta, sign):
 
 
 def motion():
-    """The equations in gap coordinates, and what is zero on the right and on the left wall."""
+    """Returns the equations in gap coordinates, and functions that are zero on the right and on the left wall."""
     z, w, x, v = hy.make_vars("z", "w", "x", "v")
     m1, m2, r1, r2, k1, k2, r, k, force, omega, b = (hy.par[i] for i in range(11))
     contact = hy.par[MESH] * (r * w + k * (z - hy.par[SIDE] * b))
@@ -79,7 +79,7 @@ def motion():
 
 
 class Integrator:
-    """Compiled once per tolerance."""
+    """An integrator with events, compiled once per tolerance."""
 
     def __init__(self, tolerance):
         equations, (right, left) = motion()
@@ -92,7 +92,7 @@ class Integrator:
         )
 
     def integrate(self, parameters, start, until):
-        """The last state in gap coordinates; event times are in `events`, the count of steps in `self.steps`."""
+        """Returns the last state in gap coordinates. Writes event times to `events` and the count of steps to `self.steps`."""
         events.clear()
         ta = self.ta
         now.update(parameters=parameters, state=ta.state, pars=ta.pars)
@@ -107,13 +107,13 @@ class Integrator:
 
 
 class Steps:
-    """As many compiled steps of free motion, walls out of reach but watched all the same: no callback runs."""
+    """Compiled steps of free motion. The walls are checked but out of reach, so no callback runs."""
 
-    # Half the backlash, and a time, far beyond what any lane comes to.
+    # Half the backlash and the end time, far larger than any lane needs.
     BACKLASH, LATE = 1e3, 1e6
 
     def __init__(self, tolerance, batch):
-        """`batch` lanes side by side; 1 for the scalar integrator."""
+        """`batch` lanes run together; 1 selects the scalar integrator."""
         equations, walls = motion()
         shape, self.batch = (batch,) if batch > 1 else (), batch
         event = hy.t_event_batch if batch > 1 else hy.t_event
@@ -126,7 +126,7 @@ class Steps:
         )
 
     def integrate(self, parameters, starts, steps):
-        """Whether all lanes take so many steps; of parameters and starts each lane has a column, or a number."""
+        """Takes `steps` steps of all lanes and returns whether all took them. Each lane has a column of parameters and starts."""
         ta = self.ta
         ta.pars[: len(NAMES)] = parameters
         ta.pars[NAMES.index("b")] = self.BACKLASH

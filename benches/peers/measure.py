@@ -1,10 +1,10 @@
-"""Peers on the cells of `rattlemap-bench work-precision`, in turns with its one-core engine.
+"""Times peers on the cells of `rattlemap-bench work-precision`, alternately with its one-core engine.
 
 usage: measure.py BINARY FOLDER [--rounds N] [--quick]
 
-Asks BINARY for the cells, times every method once per round, one after the other on one core,
-and writes FOLDER/peers.csv: rows for the command's `--peers`. heyoka's compiled steps alone, as many with
-walls out of reach, go to FOLDER/steps.csv: they find no event, so they have a time and no error.
+Gets the cells from BINARY, times every method once per round on one core, and writes FOLDER/peers.csv for the command's
+option `--peers`. Also times heyoka's compiled steps with walls out of reach, and writes FOLDER/steps.csv. Those find no event,
+so they have a time but no error.
 """
 
 import argparse
@@ -25,10 +25,10 @@ import rk4_numba
 
 NUMBA_STEPS = (128, 256, 512, 1024, 2048)
 HEYOKA_TOLERANCES = (1e-9, 1e-12)
-# Lanes side by side in heyoka's compiled steps.
+# Numbers of lanes that heyoka's compiled steps run together.
 BATCHES = (1, 4, 8)
-# Least time of a measurement, in seconds: the cells are run again until it has passed.
-LEAST = 0.2
+# Shortest time of a measurement, in seconds. The cells run repeatedly until it has passed.
+SHORTEST = 0.2
 
 COLUMNS = (
     "method device precision steps tolerance cores lanes periods rounds seconds_per_lane_period fastest slowest "
@@ -77,7 +77,7 @@ class Heyoka:
         return results
 
     def step_counts(self):
-        """Steps that each lane takes."""
+        """Returns the number of steps of each lane."""
         counts = []
         for parameters, start, until, _ in self.work:
             self.integrator.integrate(parameters, start, until)
@@ -86,7 +86,7 @@ class Heyoka:
 
 
 class Steps:
-    """heyoka without events, and so without Python callbacks: as many steps as each lane takes with them."""
+    """heyoka without events, so without Python callbacks. Each lane takes as many steps as with events."""
 
     def __init__(self, heyoka_with_events, batch):
         self.tolerance, self.batch = heyoka_with_events.tolerance, batch
@@ -94,7 +94,7 @@ class Steps:
         lanes = list(zip(heyoka_with_events.work, heyoka_with_events.step_counts()))
         self.work = []
         for at in range(0, len(lanes), batch):
-            # A batch that is not full repeats its last lane, which counts as nothing; all take the most steps.
+            # An incomplete batch repeats its last lane, which is not counted. All lanes take the largest number of steps.
             group = lanes[at : at + batch]
             group += group[-1:] * (batch - len(group))
             parameters, starts = (np.array([work[i] for work, _ in group]).T for i in (0, 1))
@@ -104,11 +104,11 @@ class Steps:
 
     def run(self):
         if not all([self.integrator.integrate(*work) for work in self.work]):
-            raise RuntimeError("heyoka's steps met a wall that is out of reach")
+            raise RuntimeError("heyoka reached a wall that should be out of reach")
 
 
 class Reference:
-    """Our one-core engine, which times itself without its start."""
+    """The one-core engine of rattlemap. It measures its own time, without the start of the program."""
 
     def __init__(self, binary, folder):
         self.folder = Path(folder) / "reference"
@@ -122,13 +122,13 @@ class Reference:
         return float(self.row["seconds_per_lane_period"])
 
 
-def seconds_per_lane_period(method, lane_periods, least):
+def seconds_per_lane_period(method, lane_periods, shortest):
     runs, start = 0, time.perf_counter()
     while True:
         method.run()
         runs += 1
         elapsed = time.perf_counter() - start
-        if elapsed >= least:
+        if elapsed >= shortest:
             return elapsed / (runs * lane_periods)
 
 
@@ -163,14 +163,14 @@ def main():
     parser.add_argument("binary")
     parser.add_argument("folder")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--quick", action="store_true", help="one round of one setting each: does it work?")
-    ask = parser.parse_args()
+    parser.add_argument("--quick", action="store_true", help="one round of one setting each, to check that it works")
+    arguments = parser.parse_args()
 
-    Path(ask.folder).mkdir(parents=True, exist_ok=True)
-    reference = Reference(ask.binary, ask.folder)
+    Path(arguments.folder).mkdir(parents=True, exist_ok=True)
+    reference = Reference(arguments.binary, arguments.folder)
     reference.seconds()
     cells = cell_files.read(reference.folder / "cells.json")
-    steps, tolerances = (NUMBA_STEPS, HEYOKA_TOLERANCES) if not ask.quick else (NUMBA_STEPS[:1], HEYOKA_TOLERANCES[:1])
+    steps, tolerances = (NUMBA_STEPS, HEYOKA_TOLERANCES) if not arguments.quick else (NUMBA_STEPS[:1], HEYOKA_TOLERANCES[:1])
     with_events = [Heyoka(tolerance, cells) for tolerance in tolerances]
     methods = [Numba(n, cells) for n in steps] + with_events
     steps_alone = [Steps(method, batch) for method in with_events for batch in BATCHES]
@@ -180,21 +180,21 @@ def main():
 
     times = {method: [] for method in methods + steps_alone}
     own = []
-    for _ in range(1 if ask.quick else ask.rounds):
+    for _ in range(1 if arguments.quick else arguments.rounds):
         own.append(reference.seconds())
         for method in methods + steps_alone:
-            times[method].append(seconds_per_lane_period(method, lane_periods, 0.0 if ask.quick else LEAST))
+            times[method].append(seconds_per_lane_period(method, lane_periods, 0.0 if arguments.quick else SHORTEST))
 
-    # Our engine as it was beside them: ratios are taken against this.
-    beside = dict(reference.row, method="reference-beside-peers", rounds=len(own))
-    beside |= {"seconds_per_lane_period": statistics.median(own), "fastest": min(own), "slowest": max(own)}
+    # Ratios use this measurement of the reference, because it alternated with the peers.
+    reference_row = dict(reference.row, method="reference-beside-peers", rounds=len(own))
+    reference_row |= {"seconds_per_lane_period": statistics.median(own), "fastest": min(own), "slowest": max(own)}
     rows = [row(method, times[method], cells) for method in methods]
-    path = Path(ask.folder) / "peers.csv"
+    path = Path(arguments.folder) / "peers.csv"
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
-        writer.writerows([beside, *rows])
-    for r in [beside, *rows]:
+        writer.writerows([reference_row, *rows])
+    for r in [reference_row, *rows]:
         setting = r["steps"] or r["tolerance"] or "-"
         print(
             f"{r['method']:<24} {setting!s:>8} {1e6 * float(r['seconds_per_lane_period']):10.3f} us per lane-period, "
@@ -202,7 +202,7 @@ def main():
         )
     print(path)
 
-    path = Path(ask.folder) / "steps.csv"
+    path = Path(arguments.folder) / "steps.csv"
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["tolerance", "batch", "seconds_per_lane_period", "fastest", "slowest"])
@@ -210,7 +210,7 @@ def main():
             median = statistics.median(times[method])
             writer.writerow([method.tolerance, method.batch, median, min(times[method]), max(times[method])])
             print(
-                f"heyoka, no event within reach  {method.tolerance!s:>8}, {method.batch} at a time "
+                f"heyoka, walls out of reach  {method.tolerance!s:>8}, {method.batch} lanes together "
                 f"{1e6 * median:10.3f} us per lane-period"
             )
     print(path)

@@ -1,11 +1,10 @@
 """Classical Runge-Kutta of fixed step with event location, compiled by numba.
 
-A step that ends beyond a wall is cut there: Newton's method on the step's length, each trial
-integrated anew from the start of the step, with bisection behind it; the rest of the step
-follows, so that strobes stay on the grid. A turning point inside a step is checked on the
-step's cubic Hermite polynomial. After an event the root at the start is divided out.
-(Pressing that ceases during contact onset ends meshing, too; the cells never do that, a unit
-test says.)
+A step that ends behind a wall is divided there. Newton's method, with bisection as a fallback, finds the length of the first
+part; each iteration integrates from the start of the step. Then the rest of the step follows, so strobes stay on the grid. A
+turning point inside a step is checked on the step's cubic Hermite polynomial. After an event the root at the start is divided
+out. (A contact force that changes sign during contact onset ends meshing, too. This never happens in these cells, as a unit
+test checks.)
 """
 
 import math
@@ -52,7 +51,7 @@ def part(p, mesh, side, z, w, x, v, t, h):
 
 @njit(cache=True, inline="always")
 def distance(mode, side, wall, b, z, w):
-    """What is left until a flight ends at a wall, and its rate."""
+    """Returns the distance from the wall that ends the flight, and its rate."""
     if mode == FREE:
         return b - wall * z, -wall * w
     if mode == SUSTAINED:
@@ -62,7 +61,7 @@ def distance(mode, side, wall, b, z, w):
 
 @njit(cache=True)
 def find_ending(p, mode, side, wall, order, z, w, x, v, t, h, z1, w1):
-    """How far into the step the distance is negative (nan: nowhere), and a first guess."""
+    """Returns a part of the step after which the distance is negative (nan: there is none), and a first guess of the root."""
     b = p[10]
     f0, s0 = distance(mode, side, wall, b, z, w)
     f1, s1 = distance(mode, side, wall, b, z1, w1)
@@ -80,7 +79,7 @@ def find_ending(p, mode, side, wall, order, z, w, x, v, t, h, z1, w1):
         return h, h * min(max(share, 0.01), 0.99)
     if s1 <= 0.0 or (s0 > 0.0 and order == 0):
         return math.nan, 0.0
-    # Where the cubic turns up; the same number, written without cancellation.
+    # The minimum of the cubic, in a form without cancellation.
     start = f0 if order == 0 else 0.0
     root = math.sqrt(max(quadratic**2 - 3 * cubic * s0, 0.0))
     if quadratic > 0.0:
@@ -128,7 +127,7 @@ def locate(p, mode, side, wall, order, z, w, x, v, t, within, guess):
 
 @njit(cache=True)
 def integrate(p, start, periods, steps):
-    """The last state in gap coordinates, and the last two event times, the latest first."""
+    """Returns the last state in gap coordinates and the last two event times, the latest first."""
     m1, m2, r1, r2, k1, k2, r, k, force, omega, b, e, mesh_speed = p
     h = 2 * math.pi / omega / steps
     cosines = np.cos(2 * math.pi * np.arange(2 * steps + 1) / (2 * steps))
@@ -136,7 +135,7 @@ def integrate(p, start, periods, steps):
     mode, side = FREE, 1.0
     if abs(z) > b:
         mode, side = SUSTAINED, math.copysign(1.0, z)
-    # Wall and order of the root that the present step starts on.
+    # Wall and order of the root at the start of the step.
     origin, order = 0.0, 0
     latest, before = math.nan, math.nan
     lost = (math.nan, math.nan, math.nan, math.nan)
@@ -183,7 +182,7 @@ def integrate(p, start, periods, steps):
                     mode = FREE
                     latest, before = now, latest
                     continue
-                # The impact law, then meshing or not: (5), (6), (22), (37).
+                # The impact law (5), (6), (22), and the rule of meshing (37).
                 closing = wall * w
                 cos = math.cos(omega * now)
                 if tau == 0.0 and closing <= 0.0:

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Peers beside the one-core engine on the same cells: a virtual environment with numba and
-# heyoka, then alternating rounds. Writes out/bench/peers/peers.csv, for
-# `rattlemap-bench work-precision --peers`, and steps.csv. Arguments go to measure.py: --rounds N, --quick.
+# Times peers and the one-core engine alternately on the same cells. Installs numba and heyoka in a virtual environment.
+# Writes out/bench/peers/peers.csv, for `rattlemap-bench work-precision --peers`, and steps.csv. Arguments go to
+# measure.py: --rounds N, --quick.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -15,7 +15,7 @@ if ! cmp -s benches/peers/requirements.txt "$environment/installed.txt"; then
     "$environment/bin/pip" install --quiet --requirement benches/peers/requirements.txt
     cp benches/peers/requirements.txt "$environment/installed.txt"
 fi
-# One core for everybody.
+# Every program gets one core.
 export NUMBA_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=1
 export NUMBA_CACHE_DIR="$PWD/out/peers-venv/cache"
 exec "$environment/bin/python" benches/peers/measure.py "$binary" out/bench/peers "$@"

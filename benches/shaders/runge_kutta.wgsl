@@ -1,15 +1,14 @@
-// The usual way, for comparison: classical Runge-Kutta steps of fixed length, with event
-// location. It stands in place of the lane's exact propagator and certificate; model, contact
-// law, forcing phase, strobes and dispatches are the lane's own.
+// Classical Runge-Kutta steps of fixed length with event location, for comparison. It replaces the exact propagator of lanes
+// and its bounds. Model, contact law, forcing phase, strobes and dispatches are those of lanes.
 //
-// Events are searched at both ends of a step, and at the turning point of the step's cubic
-// Hermite polynomial. They are located by Newton's method, each trial integrated anew from the
-// start of the step; then the rest of the step is integrated, so that strobes stay on the grid.
+// Events are searched at both ends of a step and at the turning point of its cubic Hermite polynomial. Newton's method
+// locates them; each iteration integrates from the start of the step. Then the rest of the step is integrated, so that
+// strobes stay on the grid.
 
-// Accelerations per free step: on gap, rate, x, rate, cos, 1.
+// Coefficients of the accelerations per free step: for gap, rate, x, rate, cos and 1.
 var<private> gap_pull: array<Real, 6>;
 var<private> x_pull: array<Real, 6>;
-// Forcing angle of a free step; cos - 1 and sin of its half.
+// Forcing angle of a free step, and cos - 1 and sin of its half.
 var<private> step_angle: Real;
 var<private> half_turn: vec2<Real>;
 
@@ -35,7 +34,7 @@ fn derivative(q: vec4<Real>, c: Real) -> vec4<Real> {
     return vec4<Real>(q.y, pull_on_gap(q, c), q.w, v);
 }
 
-// One step of length `part`, from cos of the phase at its start, middle and end.
+// One step of length `part`. c0, c1, c2: cos of the phase at its start, middle and end.
 fn runge_kutta(q: vec4<Real>, part: Real, c0: Real, c1: Real, c2: Real) -> vec4<Real> {
     let half = 0.5 * part;
     let k1 = derivative(q, c0);
@@ -56,14 +55,14 @@ fn after(q: vec4<Real>, part: Real) -> vec4<Real> {
     return runge_kutta(q, part, motion.phasor[0], cos_after(middle), cos_after(end));
 }
 
-// The state after a whole step: the same from constants.
+// The state after a whole step, from constants.
 fn after_whole(q: vec4<Real>) -> vec4<Real> {
     let c = cos_after(half_turn);
     let s = motion.phasor[1] + (half_turn.x * motion.phasor[1] + half_turn.y * motion.phasor[0]);
     return runge_kutta(q, 1.0, motion.phasor[0], c, c + (half_turn.x * c - half_turn.y * s));
 }
 
-// The distance that may end the flight, positive inside, and its rate. `c`: cos of the phase.
+// The distance from an event, positive before it, and its rate. `c`: cos of the phase.
 fn distance_left(q: vec4<Real>, second: bool, c: Real) -> vec2<Real> {
     if tally.mode == MODE_FREE {
         return select(vec2<Real>(walls[0] - q.x, -q.y), vec2<Real>(q.x - walls[1], q.y), second);
@@ -72,21 +71,22 @@ fn distance_left(q: vec4<Real>, second: bool, c: Real) -> vec2<Real> {
     if tally.mode < MODE_ONSET {
         return select(sign * q.xy, vec2<Real>(1.0, 0.0), second);
     }
-    // In the contact onset: below the wall, and pressed. No slope of pressing: its root is bisected.
+    // Contact onset: the distance from the wall, or the contact force. The slope of the force is not computed, so its root
+    // is bisected.
     return select(-sign * q.xy, vec2<Real>(sign * pull_on_gap(q, c), 0.0), second);
 }
 
-// What ends a flight within a step.
+// The event that ends a flight within a step.
 struct Ending {
     event: bool,
     second: bool,
-    // The distance is negative this far into the step.
+    // Part of the step after which the distance is negative.
     within: Real,
-    // Where the search for its root begins.
+    // First guess of its root.
     guess: Real,
 }
 
-// Whether a distance is seen to pass zero on a step of length `part`.
+// Checks whether a distance becomes negative within a step of length `part`.
 fn find_ending(q0: vec4<Real>, q1: vec4<Real>, part: Real, second: bool, starts_there: bool) -> Ending {
     let none = Ending(false, second, part, part);
     let left = distance_left(q0, second, motion.phasor[0]);
@@ -102,7 +102,7 @@ fn find_ending(q0: vec4<Real>, q1: vec4<Real>, part: Real, second: bool, starts_
     if right.x < 0.0 {
         var share = left.x / (left.x - right.x);
         if starts_there {
-            // The cubic with its root at the start divided out.
+            // The cubic without its root at the start.
             let b = 3.0 * right.x - 2.0 * s0 - s1;
             let a = s0 + s1 - 2.0 * right.x;
             share = select(Real(0.5), 2.0 * s0 / (sqrt(max(b * b - 4.0 * a * s0, Real(0.0))) - b), s0 > 0.0);
@@ -112,7 +112,7 @@ fn find_ending(q0: vec4<Real>, q1: vec4<Real>, part: Real, second: bool, starts_
     if s1 <= 0.0 || (s0 > 0.0 && !starts_there) {
         return none;
     }
-    // Where the cubic turns up; the same number, written without cancellation.
+    // The minimum of the cubic, in a form without cancellation.
     let start = select(left.x, Real(0.0), starts_there);
     let rise = right.x - start;
     let b = 3.0 * rise - 2.0 * s0 - s1;
@@ -123,7 +123,7 @@ fn find_ending(q0: vec4<Real>, q1: vec4<Real>, part: Real, second: bool, starts_
     if !(u > 0.0 && u < 1.0) || least >= 0.0 {
         return none;
     }
-    // The polynomial is no proof: the equations decide.
+    // The polynomial is an approximation. The equations decide.
     let low = after(q0, u * part);
     if distance_left(low, second, 0.0).x >= 0.0 {
         return none;
@@ -131,7 +131,7 @@ fn find_ending(q0: vec4<Real>, q1: vec4<Real>, part: Real, second: bool, starts_
     return Ending(true, second, u * part, 0.5 * u * part);
 }
 
-// Where a distance passes zero in (0, within]; with the root at the start divided out.
+// Locates the zero of a distance in (0, within], without the root at the start.
 fn locate(q0: vec4<Real>, ending: Ending, order: u32) -> Real {
     let second = ending.second;
     let within = ending.within;
@@ -152,9 +152,9 @@ fn locate(q0: vec4<Real>, ending: Ending, order: u32) -> Real {
         if slope < 0.0 && i < BASELINE_NEWTON_CAP {
             let move_by = -f.x / slope;
             let next = t + move_by;
-            // What a Newton step leaves over is of second order in it.
-            let left_over = abs(pull_on_gap(q, c)) * move_by * move_by;
-            if next >= 0.0 && next <= within && (left_over <= ULP * t * abs(f.y) || abs(move_by) <= 4.0 * ULP * t) {
+            // The error after a Newton step is of second order in the step.
+            let newton_error = abs(pull_on_gap(q, c)) * move_by * move_by;
+            if next >= 0.0 && next <= within && (newton_error <= ULP * t * abs(f.y) || abs(move_by) <= 4.0 * ULP * t) {
                 return next;
             }
             if next > lo && next < hi {
@@ -171,18 +171,18 @@ fn locate(q0: vec4<Real>, ending: Ending, order: u32) -> Real {
     return t;
 }
 
-// Steps between two readings of the table of phasors.
+// Number of steps between two reads of the table of phasors.
 const SYNC: u32 = 64u;
 
-// The scan has come to the stop phase.
+// The scan has reached the stop phase.
 const SCAN_MARK: u32 = 2u;
 
-// Whole steps, as long as the Bernstein coefficients of their cubics lie between the walls.
+// Takes whole steps as long as the Bernstein coefficients of their cubics lie between the walls.
 fn scan_steps() -> u32 {
     if motion.theta != 0.0 || tally.order > 1u || tally.mode >= MODE_ONSET {
         return SCAN_CAREFUL;
     }
-    // Meshing measures from its wall and has but one.
+    // In meshing the gap is measured from its wall, and there is no other wall.
     let d = domain_of(tally.mode);
     let low = select(select(Real(0.0), -HUGE, d == 2u), walls[1], d == 0u);
     let high = select(select(Real(0.0), HUGE, d == 1u), walls[0], d == 0u);
@@ -190,7 +190,7 @@ fn scan_steps() -> u32 {
     var q = vec4<Real>(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
     var n = tally.step;
     var leaves = tally.order > 0u;
-    var taken = 0u;
+    var step_count = 0u;
     var verdict = SCAN_MARK;
     var going = true;
     while going {
@@ -215,7 +215,7 @@ fn scan_steps() -> u32 {
             let q1 = runge_kutta(q, 1.0, c, c1, c2);
             let b1 = q.x + q.y * (1.0 / 3.0);
             let b2 = q1.x - q1.y * (1.0 / 3.0);
-            // A start on the wall is a root that is divided out.
+            // At a start on the wall the root there is ignored.
             let b0 = select(q.x, b1, leaves);
             let top = max(max(b0, b1), max(b2, q1.x));
             let bottom = min(min(b0, b1), min(b2, q1.x));
@@ -228,18 +228,18 @@ fn scan_steps() -> u32 {
             c = c2;
             s = s2;
             n += 1u;
-            taken += 1u;
+            step_count += 1u;
             leaves = false;
         }
     }
     motion.q = array<Real, 4>(q.x, q.y, q.z, q.w);
     tally.step = n;
-    tally.passes_in_period += taken;
+    tally.passes_in_period += step_count;
     tally.order = select(0u, 1u, leaves);
     return verdict;
 }
 
-// One step, or what events have left of it, up to the next event.
+// Takes one step, or the rest of a step after an event, up to the next event.
 fn careful_step() {
     iterations += 1u;
     motion.phasor = phasors[shape.phasors + tally.step];
@@ -281,9 +281,8 @@ fn careful_step() {
     fetch_pull();
 }
 
-// From event to event to the next stop phase; false if the lane or its share of this dispatch ends
-// before. As in the lane, scanning and acting are separate: a driver that runs lanes in step
-// pays for events on every step otherwise.
+// Integrates to the next stop phase. Returns false if the lane or its iterations in this dispatch end before. As in lanes,
+// steps and events are separate: otherwise hardware that runs lanes in lockstep pays for events at every step.
 fn fly_to_stop_phase() -> bool {
     fetch_pull();
     while has_work() && iterations < settings.iterations {

@@ -1,4 +1,4 @@
-//! The instruments' command line.
+//! The command line of the instruments.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use rattlemap_bench::stress::Part;
 use rattlemap_bench::work_precision::measure::Method;
 
-/// Instruments of rattlemap: numerical stress, run time against error.
+/// Instruments of rattlemap: numerical stress, run time against error, scale.
 ///
 /// Each writes tables (CSV), figures (PNG) and manifest.json to a folder of its own.
 #[derive(Debug, Parser)]
@@ -16,7 +16,6 @@ pub(crate) struct Cli {
     pub(crate) instrument: Instrument,
 }
 
-/// What is measured.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Instrument {
     WorkPrecision(WorkPrecision),
@@ -26,37 +25,30 @@ pub(crate) enum Instrument {
 
 /// Error of strobe states and event times against run time per period, for every method
 ///
-/// Lanes in f32 and f64, classical Runge-Kutta in WGSL and on one core, semi-implicit Euler,
-/// DOP853 and the reference integrate the same cells; methods take turns. Writes
-/// work_precision.csv, a figure each for the worst and the median cell and for event times,
-/// cells.json for programs outside (benches/peers) and manifest.json, and prints the ratios of
-/// run time at equal error. Takes minutes, and wants an idle machine.
+/// All methods integrate the same cells: lanes in f32 and f64, classical Runge-Kutta in WGSL and on one core,
+/// DOP853 and the reference. Methods run alternately. Writes work_precision.csv, figures for the worst
+/// cell, the median cell and event times, cells.json for other programs (benches/peers) and manifest.json. Prints the
+/// ratios of run time at equal error. Takes minutes and needs an idle machine.
 #[derive(Debug, Args)]
 pub(crate) struct WorkPrecision {
     #[command(flatten)]
     pub(crate) run: Options,
 
-    /// Methods to measure, comma-separated, such as lane-f64,rk4-core; all unless given
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = method)]
+    /// Methods to measure, comma-separated, such as lane-f64,rk4-core [default: all]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = |text: &str| named(&Method::ALL, text))]
     pub(crate) methods: Vec<Method>,
 
-    /// Times that everything is measured
+    /// Number of rounds that are timed
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) rounds: u32,
 
-    /// Copies of each cell's lanes on a device; as many as fill it unless given
+    /// Copies of each cell's lanes on a device [default: as many as fill it]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) copies: Option<u32>,
 
-    /// Results of other programs on the same cells, made by benches/peers/run.sh, to draw and compare
+    /// Results of other programs for the same cells, written by benches/peers/run.sh, to draw and compare
     #[arg(long, value_name = "CSV")]
     pub(crate) peers: Option<PathBuf>,
-}
-
-fn method(text: &str) -> Result<Method, String> {
-    let names = Method::ALL.map(Method::name);
-    let named = Method::ALL.into_iter().find(|method| method.name() == text);
-    named.ok_or_else(|| format!("it must be one of {}", names.join(", ")))
 }
 
 /// Long runs, impacts, grazing, chatter, stiff meshing, coarse grids and random parameters on every engine
@@ -65,52 +57,52 @@ pub(crate) struct Stress {
     #[command(flatten)]
     pub(crate) run: Options,
 
-    /// Run this part, and others named so; all unless given. fuzz, random parameters, takes longest
-    #[arg(long = "part", value_name = "NAME", value_parser = part)]
+    /// Part to run; can be repeated [default: all]. fuzz, random parameters, takes longest
+    #[arg(long = "part", value_name = "NAME", value_parser = |text: &str| named(&Part::ALL, text))]
     pub(crate) parts: Vec<Part>,
 }
 
-fn part(text: &str) -> Result<Part, String> {
-    let names = Part::ALL.map(Part::name);
-    let named = Part::ALL.into_iter().find(|part| part.name() == text);
-    named.ok_or_else(|| format!("it must be one of {}", names.join(", ")))
+fn named<T: Copy>(all: &[(T, &'static str)], text: &str) -> Result<T, String> {
+    let found = all.iter().find(|(_, name)| *name == text).map(|(item, _)| *item);
+    let names: Vec<&str> = all.iter().map(|(_, name)| *name).collect();
+    found.ok_or_else(|| format!("it must be one of {}", names.join(", ")))
 }
 
-/// Seconds, memory and disk that a large map takes beside its motions, in shards that are merged
+/// Seconds, memory and disk space of a large map in merged shards, without its integration
 ///
-/// A small map is integrated on the processor; its records, stretched and changed a little, are those of the large one.
-/// Writes the shards, merges them, and writes seconds and largest memory by phase to scale.csv, sizes of files to
-/// files.csv. 10^7 cells take a minute or two, and some 3 GB of disk.
+/// Integrates a small map on the processor and makes the records of the large map from it, with small changes. Writes the
+/// shards and merges them. scale.csv has the seconds and the largest memory of each phase, files.csv the sizes of files.
+/// 10^7 cells take one or two minutes and about 3 GB of disk space.
 #[derive(Debug, Args)]
 pub(crate) struct Scale {
     #[command(flatten)]
     pub(crate) run: Options,
 
-    /// Cells along the first axis
+    /// Number of cells along the first axis
     #[arg(long, value_name = "N", default_value_t = 3162, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub(crate) columns: u32,
 
-    /// And along the second
+    /// Number of cells along the second axis
     #[arg(long, value_name = "N", default_value_t = 3163, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub(crate) rows: u32,
 
-    /// Shards that it is dealt out to
+    /// Number of shards
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) shards: u32,
 
-    /// Times that they are put together
+    /// Number of merges
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub(crate) rounds: u32,
 
-    /// Ask for every quantity; class and exponent alone unless given
+    /// Request every quantity instead of class and exponent
     #[arg(long)]
     pub(crate) all: bool,
 }
 
-/// Where measurements go, and how thorough they are.
+/// Options of all instruments.
 #[derive(Debug, Args)]
 pub(crate) struct Options {
-    /// Where to write [default: out/bench/<what is measured>]
+    /// Folder for the results [default: out/bench/<instrument>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
@@ -118,19 +110,19 @@ pub(crate) struct Options {
     #[arg(long)]
     pub(crate) force: bool,
 
-    /// Tiny sizes: does everything work? The figures mean nothing
+    /// Use tiny sizes, to check that everything works; the figures mean nothing
     #[arg(long)]
     pub(crate) quick: bool,
 
-    /// Say nothing unless something is wrong
+    /// Print only errors
     #[arg(long)]
     pub(crate) quiet: bool,
 }
 
 impl Options {
-    /// The folder to write to.
-    pub(crate) fn out(&self, what: &str) -> PathBuf {
-        self.out.clone().unwrap_or_else(|| Path::new("out/bench").join(what))
+    /// Returns the folder for the results.
+    pub(crate) fn out(&self, instrument: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("out/bench").join(instrument))
     }
 }
 

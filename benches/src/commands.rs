@@ -1,4 +1,4 @@
-//! The instruments: ask, measure, write, judge.
+//! The instruments' commands.
 
 pub(crate) mod scale;
 pub(crate) mod stress;

@@ -1,4 +1,4 @@
-//! The instruments' program: `cargo run --release -p rattlemap-bench -- --help`.
+//! The program `rattlemap-bench`: `cargo run --release -p rattlemap-bench -- --help`.
 
 mod arguments;
 mod commands;
@@ -13,10 +13,10 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    let done = match cli.instrument {
-        Instrument::WorkPrecision(ask) => work_precision::run(&ask),
-        Instrument::Stress(ask) => stress::run(&ask),
-        Instrument::Scale(ask) => scale::run(&ask),
+    let result = match cli.instrument {
+        Instrument::WorkPrecision(arguments) => work_precision::run(&arguments),
+        Instrument::Stress(arguments) => stress::run(&arguments),
+        Instrument::Scale(arguments) => scale::run(&arguments),
     };
-    done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
+    result.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
 }

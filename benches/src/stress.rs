@@ -1,11 +1,10 @@
-//! Numerical stress: where computations of this kind go wrong, and whether these do.
+//! Numerical stress: tests of both engines where computations of this kind tend to fail.
 //!
-//! Eight parts, each with rows for a table and a verdict that can fail: long runs
-//! ([`long_runs`]), the laws of impact ([`impacts`]), the approach to grazing ([`grazing`]),
-//! chatter as restitution goes to one ([`chatter`]), stiff meshing ([`stiffness`]), coarse grids
-//! ([`grid`]), the work of single cells ([`work`]) and random parameters ([`fuzz`]). Truth comes from closed forms where there are any,
-//! else from the reference, and what an error may be from how far the reference itself moves
-//! when starts and parameters move within rounding.
+//! Each of the eight parts writes a table and ends with a verdict that can fail: long runs ([`long_runs`]), the laws of
+//! impact ([`impacts`]), the approach to grazing ([`grazing`]), chatter as restitution goes to one ([`chatter`]), stiff
+//! meshing ([`stiffness`]), coarse grids ([`grid`]), the work of single cells ([`work`]) and random parameters
+//! ([`fuzz`]). The correct answer is a closed form if there is one, else the reference's result. The allowed error follows
+//! from how far the reference itself moves when starts and parameters move within rounding.
 
 mod cells;
 pub mod chatter;
@@ -25,70 +24,50 @@ pub mod work;
 pub use cells::EngineName;
 pub use lanes::Lanes;
 
-use rattlemap::gpu::GpuError;
+use anyhow::{Context, Result};
+use output::Files;
 
-/// One of the eight.
+/// One of the eight parts. Each is described in its module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the modules describe the parts")]
 pub enum Part {
-    /// [`long_runs`].
     LongRuns,
-    /// [`impacts`].
     Impacts,
-    /// [`grazing`].
     Grazing,
-    /// [`chatter`].
     Chatter,
-    /// [`stiffness`].
     Stiffness,
-    /// [`grid`].
     Grid,
-    /// [`work`].
     Work,
-    /// [`fuzz`].
     Fuzz,
 }
 
 impl Part {
-    /// Every part, in the order in which they run.
-    pub const ALL: [Part; 8] = [
-        Part::LongRuns,
-        Part::Impacts,
-        Part::Grazing,
-        Part::Chatter,
-        Part::Stiffness,
-        Part::Grid,
-        Part::Work,
-        Part::Fuzz,
+    /// Every part in the order in which they run, with its name on the command line and in file names.
+    pub const ALL: [(Part, &'static str); 8] = [
+        (Part::LongRuns, "long_runs"),
+        (Part::Impacts, "impacts"),
+        (Part::Grazing, "grazing"),
+        (Part::Chatter, "chatter"),
+        (Part::Stiffness, "stiffness"),
+        (Part::Grid, "grid"),
+        (Part::Work, "work"),
+        (Part::Fuzz, "fuzz"),
     ];
-
-    /// Its name on the command line and in file names.
-    pub fn name(self) -> &'static str {
-        match self {
-            Part::LongRuns => "long_runs",
-            Part::Impacts => "impacts",
-            Part::Grazing => "grazing",
-            Part::Chatter => "chatter",
-            Part::Stiffness => "stiffness",
-            Part::Grid => "grid",
-            Part::Work => "work",
-            Part::Fuzz => "fuzz",
-        }
-    }
 }
 
-/// How much of everything.
+/// How many cells, starts and periods are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
-    /// Seconds: shows that everything works.
+    /// Runs for seconds and shows that everything works.
     Quick,
-    /// A minute or two on two cores: what the tests run.
+    /// Runs for a minute or two on two cores, in the tests.
     Small,
-    /// What is published.
+    /// Gives the published results.
     Full,
 }
 
 impl Size {
-    /// One of three values.
+    /// Returns the value for this size.
     fn pick<T>(self, quick: T, small: T, full: T) -> T {
         match self {
             Size::Quick => quick,
@@ -98,90 +77,104 @@ impl Size {
     }
 }
 
-/// Whether a part holds, and the sentence that says so with its figures.
+/// Whether a part passes, and a sentence with its figures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Verdict {
-    /// Name of the part, as in file names.
-    pub part: &'static str,
-    /// Whether everything that was asked of it held.
+    /// Whether all requirements of the part hold.
     pub holds: bool,
-    /// What was found.
+    /// The figures.
     pub sentence: String,
 }
 
-/// The rows of the parts that ran and what they come to.
-#[derive(Clone, Debug, Default)]
-pub struct Report {
-    /// Errors over many periods.
-    pub long_runs: Option<Vec<long_runs::Row>>,
-    /// Momentum and energy at impacts.
-    pub impacts: Option<Vec<impacts::Row>>,
-    /// Approach speeds near grazing.
-    pub grazing: Option<Vec<grazing::Row>>,
-    /// Endless series of impacts.
-    pub chatter: Option<Vec<chatter::Row>>,
-    /// Stiff meshing.
-    pub stiffness: Option<Vec<stiffness::Row>>,
-    /// Coarse grids.
-    pub grid: Option<grid::Rows>,
-    /// Times of random cells.
-    pub work: Option<Vec<work::Row>>,
-    /// Random parameters.
-    pub fuzz: Option<fuzz::Rows>,
-    /// One verdict per part that ran, in this order.
-    pub verdicts: Vec<Verdict>,
-}
-
-/// Who hears how a run goes.
+/// Receives the progress of a run.
 pub trait Watch: Sync {
-    /// Of some work, such as cells on the reference, `done` of `total` units are done; from any
+    /// Called when `done` of `total` units of some work are done, such as cells on the reference. Calls come from any
     /// thread, in any order.
     fn progress(&self, work: &'static str, done: usize, total: usize);
 
-    /// Something was found that makes a part fail, long before its end.
+    /// Called when something is found that makes a part fail, long before the part ends.
     fn found(&self, what: &str);
 
-    /// A part has ended.
-    fn judged(&self, verdict: &Verdict);
+    /// Called when a part has ended.
+    fn judged(&self, part: &'static str, verdict: &Verdict);
 }
 
-/// Nobody.
+/// Ignores the progress.
 impl Watch for () {
     fn progress(&self, _: &'static str, _: usize, _: usize) {}
 
     fn found(&self, _: &str) {}
 
-    fn judged(&self, _: &Verdict) {}
+    fn judged(&self, _: &'static str, _: &Verdict) {}
 }
 
-/// Runs the parts in `asked`.
+/// Runs these parts and writes their tables and figures. Returns the verdicts.
 ///
 /// # Errors
-/// A [`GpuError`] if a device gives up.
+/// If a device fails or a file cannot be written.
 pub fn run(
-    asked: &[Part],
+    parts: &[Part],
     size: Size,
     seed: u64,
     lanes: &mut Lanes,
+    files: &mut Files<'_>,
     watch: &dyn Watch,
-) -> Result<Report, GpuError> {
-    let mut report = Report::default();
-    for part in Part::ALL.into_iter().filter(|part| asked.contains(part)) {
+) -> Result<Vec<(&'static str, Verdict)>> {
+    let mut verdicts = Vec::new();
+    let device = lanes.device();
+    let device = &*device;
+    for (part, name) in Part::ALL.into_iter().filter(|(part, _)| parts.contains(part)) {
+        let context = || format!("{name}: the device failed");
         let verdict = match part {
             Part::LongRuns => {
-                let rows = report.long_runs.insert(long_runs::measure(size, lanes, watch)?);
-                long_runs::judge(rows)
+                let rows = long_runs::measure(size, lanes, watch).with_context(context)?;
+                files.table("long_runs.csv", &rows)?;
+                files.write("long_runs.png", &|out| figures::long_runs(out, device, &rows))?;
+                long_runs::judge(&rows)
             }
-            Part::Impacts => impacts::judge(report.impacts.insert(impacts::measure(size, seed, lanes)?)),
-            Part::Grazing => grazing::judge(report.grazing.insert(grazing::measure(size, seed, lanes)?)),
-            Part::Chatter => chatter::judge(report.chatter.insert(chatter::measure(size, lanes)?)),
-            Part::Stiffness => stiffness::judge(report.stiffness.insert(stiffness::measure(size, lanes)?)),
-            Part::Grid => grid::judge(report.grid.insert(grid::measure(size, seed, lanes, watch)?)),
-            Part::Work => work::judge(report.work.insert(work::measure_cells(size, seed, watch))),
-            Part::Fuzz => fuzz::judge(report.fuzz.insert(fuzz::measure(size, seed, lanes, watch)?)),
+            Part::Impacts => {
+                let rows = impacts::measure(size, seed, lanes).with_context(context)?;
+                files.table("impacts.csv", &rows)?;
+                impacts::judge(&rows)
+            }
+            Part::Grazing => {
+                let rows = grazing::measure(size, seed, lanes).with_context(context)?;
+                files.table("grazing.csv", &rows)?;
+                files.write("grazing.png", &|out| figures::grazing(out, device, &rows))?;
+                grazing::judge(&rows)
+            }
+            Part::Chatter => {
+                let rows = chatter::measure(size, lanes).with_context(context)?;
+                files.table("chatter.csv", &rows)?;
+                chatter::judge(&rows)
+            }
+            Part::Stiffness => {
+                let rows = stiffness::measure(size, lanes).with_context(context)?;
+                files.table("stiffness.csv", &rows)?;
+                files.write("stiffness.png", &|out| figures::stiffness(out, device, &rows))?;
+                stiffness::judge(&rows)
+            }
+            Part::Grid => {
+                let rows = grid::measure(size, seed, lanes, watch).with_context(context)?;
+                files.table("grid_swings.csv", &rows.swings)?;
+                files.table("grid_motions.csv", &rows.motions)?;
+                files.write("grid.png", &|out| figures::grid(out, device, &rows.swings))?;
+                grid::judge(&rows)
+            }
+            Part::Work => {
+                let rows = work::measure_cells(size, seed, watch);
+                files.table("work.csv", &rows)?;
+                work::judge(&rows)
+            }
+            Part::Fuzz => {
+                let rows = fuzz::measure(size, seed, lanes, watch).with_context(context)?;
+                files.table("fuzz.csv", &rows.counts)?;
+                files.write("fuzz_mismatches.csv", &|out| output::mismatches(out, &rows.mismatches))?;
+                fuzz::judge(&rows)
+            }
         };
-        watch.judged(&verdict);
-        report.verdicts.push(verdict);
+        watch.judged(name, &verdict);
+        verdicts.push((name, verdict));
     }
-    Ok(report)
+    Ok(verdicts)
 }

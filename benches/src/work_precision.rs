@@ -1,28 +1,24 @@
-//! Run time against error, for this project's engines and for what one would use instead.
+//! Run time against error of this project's engines and of alternatives.
 //!
-//! Every method integrates the same [`cells`] over [`PERIODS`] forcing periods, from states
-//! that are exact in f32. Its error is the largest difference of the four numbers of the last
-//! strobe state, and of the times of the last [`EVENTS`] events, from the event-driven f64
-//! reference; its cost is wall time per forcing period of one lane. Lanes on a device run
-//! many copies of the cells at once, methods on a core one lane after the other; methods take
-//! turns, so that a change of the machine's speed meets all of them alike.
+//! Every method integrates the same [`cells`] over [`PERIODS`] forcing periods, from states that are exact in f32. Two errors
+//! are measured against the event-driven reference in f64: the largest difference of the components of the last strobe
+//! state, and that of the times of the last [`EVENTS`] events. The cost is the wall time per forcing period of one lane.
+//! Devices run many copies of the cells at once; methods on a core run one lane after the other. Methods run alternately, so
+//! that changes of the machine's speed affect all of them.
 //!
 //! | method | steps, or tolerance | where | event times |
 //! | --- | --- | --- | --- |
-//! | lane, f32 and f64 ([`rattlemap::gpu`]) | 16 to 1024 per period, never fewer than one per radian of the fastest free mode | device | reported by a variant of the shader |
-//! | classical Runge-Kutta, f32 and f64, in WGSL: in one loop as papers write it, and in the lane's two phases | 64 to 8192 per period | device | the same |
+//! | lane, f32 and f64 ([`rattlemap::gpu`]) | 16 to 1024 per period, never fewer than one per radian of the fastest free mode | device | from a variant of the shader |
+//! | classical Runge-Kutta, f32 and f64, in WGSL: in one loop as in papers, and in the two phases of lanes | 64 to 8192 per period | device | from a variant of the shader |
 //! | classical Runge-Kutta ([`fixed_step`]) | 64 to 8192 per period | one core | yes |
-//! | semi-implicit Euler ([`fixed_step`]) | 64 to 8192 per period | one core | yes |
 //! | DOP853 of `ode_solvers` ([`adaptive`]) | tolerance 1e-4 to 1e-12 | one core | yes |
-//! | reference ([`mod@rattlemap_dynamics::reference`]) | none | one core | it is the measure |
+//! | reference ([`mod@rattlemap_dynamics::reference`]) | none | one core | its errors are zero by definition |
 //!
-//! The baselines are written as a careful author would: events are located by Newton's method
-//! on the integrator itself, restarts on a wall divide out the root there, turning points
-//! inside a step are checked, strobes stay on the grid. In WGSL they share the lane's model,
-//! contact law, phase and dispatches (`benches/shaders`).
+//! The baselines are implemented with care: Newton's method on the integrator itself locates events, a start on a wall
+//! divides out the root there, turning points inside a step are checked, and strobes stay on the grid. In WGSL they share the
+//! model, contact law, phase and dispatches of lanes (`benches/shaders`).
 //!
-//! Programs outside of this crate join by a table in the same columns
-//! ([`points::Point`]); see `benches/peers`.
+//! Results of other programs are read from a table with the columns of [`points::Point`]; see `benches/peers`.
 
 pub mod adaptive;
 pub mod cells;
@@ -36,8 +32,8 @@ pub mod points;
 pub mod ratio;
 mod shaders;
 
-/// Forcing periods that every lane integrates: few enough for chaos to keep its digits.
+/// Forcing periods of every lane, few enough to predict chaos.
 pub const PERIODS: u32 = 8;
 
-/// Events at the end of the horizon whose times are compared.
+/// Number of last events whose times are compared.
 pub const EVENTS: usize = 2;

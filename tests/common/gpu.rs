@@ -69,6 +69,26 @@ pub(crate) fn fresh(precision: Precision) -> Gpu {
     pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap()
 }
 
+/// Returns the records of a plan, by cell, and leaves the device as it was.
+pub(crate) fn map(plan: &Plan, device: &mut Device) -> Vec<Record> {
+    let gpu = device.gpu.take().expect("a device until it is dropped");
+    let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, gpu)).unwrap()));
+    let records = all_records(plan, &mut engine);
+    let Engine::Gpu(engine) = engine else { unreachable!("the engine has lanes") };
+    device.gpu = Some(engine.into_device());
+    records
+}
+
+/// Runs an engine over all cells of a plan. Returns the records by cell.
+pub(crate) fn all_records(plan: &Plan, engine: &mut Engine<'_>) -> Vec<Record> {
+    let cells = plan.cells(0..plan.cell_count());
+    let mut records = vec![Record::default(); plan.cell_count()];
+    for (cell, record) in cells.iter().zip(pollster::block_on(engine.run(&cells)).unwrap()) {
+        records[cell.id as usize] = record;
+    }
+    records
+}
+
 /// Returns the engine of a plan's lanes.
 pub(crate) fn engine(plan: &Plan, precision: Precision) -> Engine<'_> {
     Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, fresh(precision))).unwrap()))

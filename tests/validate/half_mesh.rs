@@ -1,21 +1,22 @@
-//! Half the meshing speed: what a validation says of it is what two maps say.
+//! The rates that a validation reports at half the meshing speed must equal those that two maps give.
 
-use crate::computed::computed;
-use crate::judged::validated;
+use crate::fixtures::{cpu_records, validate_all};
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
-use rattlemap::map::scene::{Purpose, Scene};
+use rattlemap::map::scene::{Quantity, Scene};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, Spelling};
+use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::Class;
 
-/// Impacts pile up into meshing almost everywhere.
+/// Returns the plan of a map in which chatter ends in meshing almost everywhere.
 fn plan(mesh_speed: f64) -> Plan {
-    let text = "[[axis]]\nparameter = 'e'\nmin = 0.05\nmax = 0.4\ncount = 8\n\
-                [[axis]]\nparameter = 'omega'\nmin = 1.2\nmax = 6.2\ncount = 9\n\
-                [outputs]\nquantities = ['class', 'lyapunov', 'mesh', 'word', 'pattern']\n";
-    let sets = [format!("mesh_speed={mesh_speed:?}")];
-    Plan::new(&Scene::parse(text, "s", &sets, Purpose::Map).unwrap())
+    use Quantity::{Class, Lyapunov, Mesh, Pattern, Word};
+    let scene = Scene::builder(GearPair { mesh_speed, ..GearPair::paper(0.5) })
+        .axis("e", 0.05..=0.4, 8)
+        .axis("omega", 1.2..=6.2, 9)
+        .quantities(&[Class, Lyapunov, Mesh, Word, Pattern]);
+    Plan::new(&scene.build().unwrap())
 }
 
 fn is_same(ours: Option<Spelling>, theirs: Option<Spelling>) -> bool {
@@ -28,10 +29,10 @@ fn is_same(ours: Option<Spelling>, theirs: Option<Spelling>) -> bool {
 }
 
 #[test]
-fn it_changes_words_and_hardly_patterns() {
+fn half_the_meshing_speed_changes_words_and_few_patterns() {
     let [whole, half] = [0.01, 0.005].map(plan);
-    let [before, after] = [&whole, &half].map(computed);
-    let found = validated(&whole, &before, Precision::F64, true).half_mesh.unwrap();
+    let [before, after] = [&whole, &half].map(cpu_records);
+    let found = validate_all(&whole, &before, Precision::F64, true).half_mesh.unwrap();
     let meshing = || before.iter().zip(&after).filter(|(record, _)| record.mesh_fraction > 0.0);
     let is_cycle = |record: &Record| matches!(classify(record), Class::Periodic { .. });
     let cycles = || meshing().filter(|(before, after)| is_cycle(before) && is_cycle(after));
@@ -44,11 +45,9 @@ fn it_changes_words_and_hardly_patterns() {
     let [words, patterns] = [changed(Record::spelling), changed(Record::pattern)];
     let periods = cycles().filter(|(before, after)| before.period != after.period).count();
     assert_eq!(rates.map(|rate| rate.count)[1..], [periods, words, patterns]);
-    assert!(
-        words > among[1] / 3 && patterns < among[1] / 10,
-        "{words} words, {patterns} patterns of {among:?}"
-    );
-    // At a speed of none there is no half.
+    let few = words > among[1] / 3 && patterns < among[1] / 10;
+    assert!(few, "{words} words and {patterns} patterns of {among:?} change");
+    // A meshing speed of zero has no half.
     let never = plan(0.0);
-    assert_eq!(validated(&never, &computed(&never), Precision::F64, true).half_mesh, None);
+    assert_eq!(validate_all(&never, &cpu_records(&never), Precision::F64, true).half_mesh, None);
 }

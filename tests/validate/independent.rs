@@ -1,8 +1,8 @@
-//! The reference against a Runge-Kutta code that shares nothing with it: the equations of
-//! motion (11) to (13), written down anew here and integrated by the DOP853 that judges maps, too.
+//! Compares the reference with a Runge-Kutta code that shares nothing with it. The equations of motion (11) to (13) are
+//! written again here and integrated by DOP853, which also judges maps.
 //!
-//! Orbits are compared leg by leg, from the state after an event (or at a strobe) to the
-//! state before the next, so that chaos does not amplify what the two leave behind.
+//! Orbits are compared leg by leg: from the state after an event (or at a strobe) to the state before the next. So chaos
+//! does not amplify differences of rounding.
 
 use crate::common::{Leg, REST, departure, flow_of, legs, paper, sign};
 use rattlemap::validate::independent::dop853::Integration;
@@ -10,24 +10,24 @@ use rattlemap_dynamics::flow::DomainKind;
 use rattlemap_dynamics::model::{GearPair, State};
 use rattlemap_dynamics::reference::{EventKind, GapEvent};
 
-/// Relative and absolute tolerance of DOP853. At `1e-13` its error estimate is rounding and
-/// the step collapses, so the last digits come from a cap on the step instead.
+/// Relative and absolute tolerance of DOP853. At `1e-13` its error estimate is mere rounding and the step collapses, so a
+/// cap on the step provides the last digits.
 const TOLERANCE: f64 = 1e-12;
 
-/// Longest step, in units of the fastest rate: `0.1^9` leaves nothing at order 8.
+/// Longest step, times the fastest rate. At order 8 its error `0.1^9` is negligible.
 const LONGEST_STEP: f64 = 0.1;
 
-/// Agreement asked of every leg, relative to the larger of 1 and the largest entry. What
-/// limits it is rounding in the hundreds of steps of DOP853: the worst leg is off by `3.1e-13`.
+/// Largest difference at the end of a leg, relative to the larger of 1 and the largest entry. Rounding in the hundreds of
+/// steps of DOP853 limits it: the worst leg is off by `3.1e-13`.
 const AGREEMENT: f64 = 1e-12;
 
-/// How far a sampled solution may stray beyond a wall: accuracy of the dense output.
+/// Distance behind a wall that a sampled solution may have: the accuracy of the dense output.
 const STRAY: f64 = 1e-9;
 
-/// Samples of the solution on one leg.
+/// Number of samples of the solution on one leg.
 const SAMPLES: usize = 100;
 
-/// Cells of every kind: `(e, omega, what it shows)`.
+/// Cells of every kind: restitution, frequency and the motion.
 const CELLS: &[(f64, f64, &str)] = &[
     (0.0, 1.5, "meshing on both sides"),
     (0.2, 1.5, "chatter into meshing"),
@@ -46,21 +46,21 @@ const CELLS: &[(f64, f64, &str)] = &[
     (0.56, 5.6, "one impact per side"),
     (0.72, 5.6, "chaos"),
     (1.0, 5.6, "elastic impacts"),
-    (0.2, 9.2, "impacts, beside contact-free motion"),
+    (0.2, 9.2, "impacts; a contact-free motion also exists"),
     (0.56, 11.0, "contact-free"),
 ];
 
-/// The equations of motion of one domain, from a forcing phase on.
+/// The equations of motion of one domain, starting at a forcing phase.
 #[derive(Clone, Copy)]
 struct Motion {
     pair: GearPair,
-    /// The wall the teeth mesh on, `+1` or `-1`; none in free motion.
+    /// Wall on which the teeth mesh, `+1` or `-1`; `None` in free motion.
     wall: Option<f64>,
     phase: f64,
 }
 
 impl Motion {
-    /// Accelerations of both gears, (11) or (12) and (13).
+    /// Returns the accelerations of both gears, (11) or (12) and (13).
     fn accelerations(&self, t: f64, [x1, v1, x2, v2]: State) -> [f64; 2] {
         let p = &self.pair;
         let contact = self.wall.map_or(0.0, |s| p.r * (v1 - v2) + p.k * (x1 - x2 - s * p.b));
@@ -68,7 +68,7 @@ impl Motion {
         [(drive - p.r1 * v1 - p.k1 * x1 - contact) / p.m1, (contact - p.r2 * v2 - p.k2 * x2) / p.m2]
     }
 
-    /// Of the undamped oscillators and of the forcing.
+    /// Returns the fastest rate of the undamped oscillators and of the forcing.
     fn fastest_rate(&self) -> f64 {
         let p = &self.pair;
         let supports = (p.k1 / p.m1).max(p.k2 / p.m2);
@@ -90,9 +90,9 @@ fn motion(pair: &GearPair, leg: &Leg) -> Motion {
     Motion { pair: *pair, wall, phase: pair.omega * leg.t }
 }
 
-/// The solution on a leg, at samples or at its ends.
+/// Returns the solution on a leg, at samples or at both ends.
 fn integrate(motion: Motion, leg: &Leg, is_sampled: bool) -> Vec<(f64, State)> {
-    // No sample near the end: the solver would extrapolate to it from an earlier step.
+    // There is no sample near the end, because the solver would extrapolate to it from an earlier step.
     let samples = is_sampled.then_some(leg.duration / (SAMPLES as f64 - 0.5));
     let integration =
         Integration { tolerance: TOLERANCE, longest: LONGEST_STEP / motion.fastest_rate(), samples };
@@ -101,13 +101,13 @@ fn integrate(motion: Motion, leg: &Leg, is_sampled: bool) -> Vec<(f64, State)> {
     solution.expect("an ordinary leg")
 }
 
-/// The end of a leg, by DOP853.
+/// Returns the end of a leg by DOP853.
 fn end_of(motion: Motion, leg: &Leg) -> State {
     integrate(motion, leg, false).last().expect("at least the start").1
 }
 
-/// Pairs far from Table 1.
-fn strangers() -> Vec<(GearPair, &'static str)> {
+/// Returns pairs with parameters far from those of Table 1.
+fn unusual_pairs() -> Vec<(GearPair, &'static str)> {
     let p = paper(0.3, 5.6);
     vec![
         (GearPair { m1: 10.0, m2: 0.1, ..p }, "heavy against light"),
@@ -122,10 +122,10 @@ fn strangers() -> Vec<(GearPair, &'static str)> {
     ]
 }
 
-/// All cells, from rest: the first periods and those after a transient.
+/// Checks the legs of every cell from rest, in the first periods and after a transient.
 fn every_leg(mut check: impl FnMut(&GearPair, &Leg, &str)) {
     let cells = CELLS.iter().map(|&(e, omega, what)| (paper(e, omega), what));
-    for (pair, what) in cells.chain(strangers()) {
+    for (pair, what) in cells.chain(unusual_pairs()) {
         let flow = flow_of(&pair);
         let (e, omega) = (pair.e, pair.omega);
         for skip in [0, 20] {
@@ -147,7 +147,7 @@ fn every_leg_ends_where_dop853_does() {
         assert!(off < AGREEMENT, "{what}: off by {off:.2e} in {leg:#?}");
     });
     println!("{count} legs, worst departure {worst:.2e}");
-    // Of 2,824: rounding decides how many impacts chaos has.
+    // There are 2,824 legs. In chaos, rounding may change this number.
     assert!(count > 2700, "only {count} legs");
 }
 
@@ -171,15 +171,17 @@ fn no_event_is_missed() {
                 assert!(depth >= -STRAY, "{what}: meshing fell through its wall at {t} of {leg:#?}");
             } else if depth < -STRAY {
                 let pressing = s * motion.relative_acceleration(t, y);
-                assert!(pressing > -STRAY, "{what}: pressing ceased unnoticed at {t} of {leg:#?}");
+                assert!(
+                    pressing > -STRAY,
+                    "{what}: a change of sign of the contact force was missed at {t} of {leg:#?}"
+                );
             }
         }
     });
 }
 
 #[test]
-fn dips_are_as_shallow_as_the_leaving_speed_allows() {
-    let mut deepest = 0.0f64;
+fn contact_onsets_are_as_short_as_the_leaving_speed_allows() {
     every_leg(|pair, leg, what| {
         let Some(begin) = leg.begins.filter(|event| event.kind == EventKind::MeshStart) else { return };
         if leg.duration < 1e-9 {
@@ -187,7 +189,7 @@ fn dips_are_as_shallow_as_the_leaving_speed_allows() {
         }
         let motion = motion(pair, leg);
         let s = motion.wall.expect("meshing");
-        // `w^2 / (2 a)` with the least pressing on the way down; it need not be the first.
+        // The gap opens by at most `w^2 / (2 a)` with the least closing acceleration on the way, which need not be the first.
         let mut least = f64::INFINITY;
         for (t, y) in integrate(motion, leg, true) {
             let leaving = s * (y[1] - y[3]) < 0.0;
@@ -196,14 +198,12 @@ fn dips_are_as_shallow_as_the_leaving_speed_allows() {
             }
             least = least.min(s * motion.relative_acceleration(t, y));
             let (depth, bound) = (pair.b - s * (y[0] - y[2]), begin.after[1].powi(2) / (2.0 * least));
-            deepest = deepest.max(depth);
             assert!(depth <= bound + STRAY, "{what}: opens by {depth:.3e} > {bound:.3e} at {t} of {leg:#?}");
         }
     });
-    println!("widest contact onset {deepest:.2e}");
 }
 
-/// The impact law (5), (6), (22) as the paper prints it.
+/// Applies the impact law (5), (6), (22) as the paper prints it.
 fn impact_law(pair: &GearPair, [x1, v1, x2, v2]: State) -> State {
     let GearPair { m1, m2, e, .. } = *pair;
     let total = m1 + m2;
@@ -217,7 +217,7 @@ fn impact_law(pair: &GearPair, [x1, v1, x2, v2]: State) -> State {
 
 #[test]
 fn events_obey_the_laws_of_contact() {
-    let mut seen = [0usize; 3];
+    let mut counts = [0usize; 3];
     every_leg(|pair, leg, what| {
         let Some(event) = leg.ends else { return };
         let s = sign(event.side);
@@ -228,25 +228,25 @@ fn events_obey_the_laws_of_contact() {
         let meshing = Motion { pair: *pair, wall: Some(s), phase };
         let rounding = 4.0 * f64::EPSILON * before.iter().fold(1.0f64, |m, x| m.max(x.abs()));
         let on_the_wall = (s * (before[0] - before[2]) - pair.b).abs() <= rounding;
-        seen[event.kind as usize] += 1;
+        counts[event.kind as usize] += 1;
         if event.kind == EventKind::MeshEnd {
             assert_eq!(event.before, event.after, "{what}: {event:?}");
             if on_the_wall {
                 assert!(s * event.before[1] <= 0.0, "{what}: {event:?}");
             } else {
-                // Pressing ceased inside the contact onset.
+                // The contact force changed sign during the contact onset.
                 let pressing = meshing.relative_acceleration(0.0, before);
                 assert!(s * event.before[0] < pair.b && pressing.abs() < 1e-9, "{what}: {event:?}");
             }
             return;
         }
         assert!(on_the_wall, "{what}: {event:?}");
-        assert_eq!(event.before[0], s * pair.b, "{what}: the gap itself is on the wall exactly");
+        assert_eq!(event.before[0], s * pair.b, "{what}: the gap is not exactly on the wall");
         assert!(s * event.before[1] >= 0.0, "{what}: not closing, {event:?}");
         let law = departure(impact_law(pair, before), after);
         assert!(law < 4.0 * f64::EPSILON, "{what}: off the impact law by {law:.2e}, {event:?}");
 
-        // Rule (37), with room for rounding on both sides.
+        // Rule (37), with a tolerance for rounding on both sides.
         let leaving = pair.e * event.before[1].abs();
         let pressing = [free, meshing]
             .map(|m| s * m.relative_acceleration(0.0, after))
@@ -258,8 +258,7 @@ fn events_obey_the_laws_of_contact() {
             assert!(leaving > pair.mesh_speed || pressing < 1e-10, "{what}: should mesh, {event:?}");
         }
     });
-    println!("impacts, starts, ends of meshing: {seen:?}");
-    assert!(seen.iter().all(|&count| count > 50), "too few events of some kind: {seen:?}");
+    assert!(counts.iter().all(|&count| count > 50), "too few events of some kind: {counts:?}");
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! The independent integrator on every kind of oscillator: one wall, contact without impact, sticking, a full mass matrix,
-//! any gap row, each against what is known of it in closed form.
+//! Compares the independent integrator with closed forms on every kind of oscillator: one wall, contact without impact,
+//! sticking, full mass matrices and gaps of several coordinates.
 
 use crate::common::closed_form::{Linear, Wall, Walled};
 use crate::common::{REST, apart, paper};
@@ -8,45 +8,45 @@ use rattlemap::validate::independent::flight::{Ended, Flight};
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State};
 use rattlemap_dynamics::reference::EventKind;
 
-/// Times since phase 0 of the first period, kinds and walls.
-type Told = Vec<(f64, EventKind, usize)>;
+/// Time since phase 0 of the first period, kind and wall of each event.
+type Events = Vec<(f64, EventKind, usize)>;
 
-/// Periods from a start, by the integrator that judges maps.
-fn run(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> (State, Told) {
+/// Integrates some periods with the integrator that judges maps.
+fn run(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> (State, Events) {
     let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
     let mut flight = Flight::new(oscillator, law, start);
-    let mut told = Vec::new();
+    let mut events = Vec::new();
     for n in 0..periods {
         solver.advance(&mut flight, 0.0, oscillator.period()).expect("an ordinary motion");
         let begun = f64::from(n) * oscillator.period();
-        told.extend(
+        events.extend(
             flight.events.drain(..).map(|Ended { t, kind, side, .. }| (begun + t, kind, side.index())),
         );
     }
-    (flight.state(), told)
+    (flight.state(), events)
 }
 
-/// The worst distance of instants, where the events are the same.
-fn apart_in_time(ours: &Told, theirs: &Told) -> f64 {
-    let names = |told: &Told| told.iter().map(|&(_, kind, side)| (kind, side)).collect::<Vec<_>>();
+/// Returns the largest difference of event times. Kinds and walls must be equal.
+fn time_error(ours: &Events, theirs: &Events) -> f64 {
+    let names = |events: &Events| events.iter().map(|&(_, kind, side)| (kind, side)).collect::<Vec<_>>();
     assert_eq!(names(ours), names(theirs), "{ours:?} {theirs:?}");
     ours.iter().zip(theirs).map(|(ours, theirs)| (ours.0 - theirs.0).abs()).fold(0.0, f64::max)
 }
 
-fn agrees(walled: &Walled, start: [f64; 2], periods: u32, what: &str) -> Told {
+/// Checks a motion against its closed form. Returns its events.
+fn check(walled: &Walled, start: [f64; 2], periods: u32, what: &str) -> Events {
     let (oscillator, law) = walled.oscillator();
-    let (theirs, events) = walled.run(start, periods);
-    let (ours, told) = run(&oscillator, law, [start[0], start[1], 0.0, 0.0], periods);
-    let off = apart(ours, [theirs[0], theirs[1], 0.0, 0.0]).max(apart_in_time(&told, &events));
-    println!("{what}: {} events, off by {off:.1e}", events.len());
-    assert!(off < 1e-10, "{what}: {off:e}");
-    told
+    let (exact, exact_events) = walled.run(start, periods);
+    let (state, events) = run(&oscillator, law, [start[0], start[1], 0.0, 0.0], periods);
+    let error = apart(state, [exact[0], exact[1], 0.0, 0.0]).max(time_error(&events, &exact_events));
+    assert!(error < 1e-10, "{what}: {error:e}");
+    events
 }
 
 const FREE: Linear = Linear { m: 1.0, c: 0.1, k: 1.0, force: 1.0, omega: 0.8, load: 0.0 };
 
 #[test]
-fn one_wall_and_two_unlike_ones() {
+fn one_wall_and_two_different_walls() {
     let stop = Some(Wall::Rigid { at: 0.3, e: 0.0 });
     let spring = Some(Wall::Elastic { at: -0.2, k: 29.0, c: 0.5 });
     for (walls, what) in [
@@ -60,39 +60,39 @@ fn one_wall_and_two_unlike_ones() {
         let at = walls[0].map_or(0.0, |wall| match wall {
             Wall::Rigid { at, .. } | Wall::Elastic { at, .. } => at,
         });
-        let told = agrees(&Walled { free: FREE, walls }, [at.min(0.0) - 0.1, 0.3], 6, what);
-        assert!(told.len() > 4, "{what}: {told:?}");
+        let events = check(&Walled { free: FREE, walls }, [at.min(0.0) - 0.1, 0.3], 6, what);
+        assert!(events.len() > 4, "{what}: {events:?}");
     }
 }
 
-/// A plastic ball on a table that shakes with 1.5 g: it sticks until the table falls faster than it, and then flies.
+/// A plastic ball on a table that shakes with 1.5 g sticks until the table falls faster than the ball.
 #[test]
-fn a_load_holds_on_a_rigid_wall_until_it_pulls_off() {
+fn a_mass_sticks_to_a_rigid_wall_until_its_load_changes_sign() {
     let ball = Linear { m: 1.0, c: 0.0, k: 0.0, force: 1.5, omega: 1.0, load: -1.0 };
     let table = Walled { free: ball, walls: [None, Some(Wall::Rigid { at: 0.0, e: 0.0 })] };
-    let told = agrees(&table, [0.0, 0.0], 3, "a plastic ball");
-    // At phase 0 the table throws it off; later its own acceleration of 1 g does.
-    let off = told.iter().filter(|(t, kind, _)| *kind == EventKind::MeshEnd && *t > 1.0).map(|(t, ..)| t);
+    let events = check(&table, [0.0, 0.0], 3, "a plastic ball");
+    // At phase 0 the table throws the ball off. Later the ball leaves when the table falls with 1 g.
+    let off = events.iter().filter(|(t, kind, _)| *kind == EventKind::MeshEnd && *t > 1.0).map(|(t, ..)| t);
     let phases: Vec<f64> = off.map(|t| (1.5 * t.cos() - 1.0).abs()).collect();
     assert!(phases.len() >= 2 && phases.iter().all(|off| *off < 1e-10), "{phases:?}");
 }
 
-/// On a table at rest a ball comes to rest after `2 v / (g (1 - e))`, and infinitely many impacts.
+/// On a table at rest a ball comes to rest after infinitely many impacts, which take `2 v / (g (1 - e))`.
 #[test]
 fn a_ball_bounces_infinitely_often_in_finite_time() {
     let ball = Linear { m: 1.0, c: 0.0, k: 0.0, force: 0.0, omega: 1.0, load: -1.0 };
     let table = Walled { free: ball, walls: [None, Some(Wall::Rigid { at: 0.0, e: 0.6 })] };
     let (oscillator, law) = table.oscillator();
-    let (state, told) = run(&oscillator, law, [0.0, 0.9, 0.0, 0.0], 2);
-    let (t, kind, _) = *told.last().unwrap();
+    let (state, events) = run(&oscillator, law, [0.0, 0.9, 0.0, 0.0], 2);
+    let (t, kind, _) = *events.last().unwrap();
     let rest = 2.0 * 0.9 / (1.0 - 0.6);
     assert!(kind == EventKind::MeshStart && (t - rest).abs() < 1e-6 * rest, "{t} {rest}");
     assert_eq!(state, REST);
-    assert!(told.len() > 20);
+    assert!(events.len() > 20);
 }
 
-/// New displacements `x = T u`: the gap, its events and its walls stay what they are.
-fn turned(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
+/// Returns the oscillator in coordinates `u` with `x = T u`. The gap, its walls and its events do not change.
+fn in_coordinates(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
     let [[a, b], [c, d]] = t;
     let congruent = |m: [[f64; 2]; 2]| {
         let of = |u: [f64; 2], v: [f64; 2]| {
@@ -117,9 +117,9 @@ fn turned(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
     }
 }
 
-/// Gear pairs in other coordinates, with which their mass matrix is full and their gap any row.
+/// In the other coordinates the mass matrix is full, and the gap depends on both coordinates.
 #[test]
-fn coordinates_make_no_difference() {
+fn motions_do_not_depend_on_the_coordinates() {
     let matrices = [[[1.0, 0.3], [0.0, 1.0]], [[0.4, 2.0], [1.0, 0.7]], [[1.0, 1.0], [1.0, 0.0]]];
     for (e, contacts, what) in [
         (0.6, [Contact::Impact; 2], "impacts"),
@@ -130,21 +130,20 @@ fn coordinates_make_no_difference() {
     ] {
         let pair = paper(e, 5.6);
         let oscillator = Oscillator { contacts, ..pair.oscillator().unwrap() };
-        let (state, told) = run(&oscillator, pair.law(), REST, 3);
-        assert!(told.len() > 5, "{what}: {told:?}");
+        let (state, events) = run(&oscillator, pair.law(), REST, 3);
+        assert!(events.len() > 5, "{what}: {events:?}");
         for t in matrices {
-            let (other, theirs) = run(&turned(&oscillator, t), pair.law(), REST, 3);
+            let (other, other_events) = run(&in_coordinates(&oscillator, t), pair.law(), REST, 3);
             let back = [0, 1].map(|i| [0, 1].map(|rate| t[i][0] * other[rate] + t[i][1] * other[2 + rate]));
-            let off = apart(state, [back[0][0], back[0][1], back[1][0], back[1][1]]);
-            let off = off.max(apart_in_time(&told, &theirs));
-            println!("{what}, {t:?}: off by {off:.1e}");
-            assert!(off < 1e-9, "{what}, {t:?}: {off:e}");
+            let error = apart(state, [back[0][0], back[0][1], back[1][0], back[1][1]]);
+            let error = error.max(time_error(&events, &other_events));
+            assert!(error < 1e-9, "{what}, {t:?}: {error:e}");
         }
     }
 }
 
 #[test]
-fn a_start_beyond_a_rigid_wall_begins_on_it() {
+fn a_start_behind_a_rigid_wall_begins_on_the_wall() {
     let oscillator = Oscillator { contacts: [Contact::Rigid; 2], ..paper(0.0, 5.6).oscillator().unwrap() };
     let flight = Flight::new(&oscillator, Law::both(0.0, 0.0), [0.9, 0.0, 0.1, 0.0]);
     assert_eq!((flight.q, flight.meshing()), ([0.5, 0.0, 0.1, 0.0], None));

@@ -1,9 +1,8 @@
-//! How right is a finished map: maps that are right, and maps with planted errors.
+//! Tests of the validation of finished maps, of correct maps and of maps with planted errors.
 
 #[path = "../common/mod.rs"]
 mod common;
-mod computed;
-mod judged;
+mod fixtures;
 mod short_cells;
 
 mod classes_agree;

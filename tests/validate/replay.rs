@@ -1,29 +1,35 @@
-//! `rattlemap validate`: what agrees, what is told apart, and that planted errors are found.
+//! `rattlemap validate`: what agrees, how differences are explained, and that planted errors are found.
 //!
-//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+//! The lanes need an adapter; the tests fail without one: see `scripts/test.sh`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::gpu::{fresh, open};
-use crate::computed::computed;
-use crate::judged::{first, only, unexplained, validated};
+use crate::common::gpu::{map, open};
+use crate::fixtures::{
+    cpu_identity, cpu_records, kind, kinds, read_records, sample_of, unexplained, validate_all,
+    validate_first,
+};
 use assert_cmd::Command;
 use rattlemap::gpu::Precision;
-use rattlemap::map::engine::{self, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
 use rattlemap::store::inventory;
-use rattlemap::store::record_file::{Identity, Order, RECORDS, RecordFile};
-use rattlemap::validate::{Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, replay, sample};
+use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
+use rattlemap::validate::{
+    Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, independent, replay, sample,
+};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::{Class, Status};
 use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::{StrobeMap, multipliers};
 use rattlemap_dynamics::word::Word;
+
+/// Allows undecided cells as many periods as scenes/e_omega.toml.
+const EXTENDED: &str = "integration.undecided_periods=1584";
 
 fn scene_text(columns: usize, rows: usize) -> String {
     format!(
@@ -38,18 +44,16 @@ fn scene(columns: usize, rows: usize) -> Scene {
     Scene::parse(&scene_text(columns, rows), "s", &[], Purpose::Map).unwrap()
 }
 
-/// Restitution against frequency, between these.
-fn planned([least, most]: [f64; 2], [slow, fast]: [f64; 2], count: usize, sets: &[&str]) -> Plan {
-    let sets: Vec<String> = [
-        format!("axis.0.min={least:?}"),
-        format!("axis.0.max={most:?}"),
-        format!("axis.1.min={slow:?}"),
-        format!("axis.1.max={fast:?}"),
-    ]
-    .into_iter()
-    .chain(sets.iter().map(ToString::to_string))
-    .collect();
+/// Returns the plan of a map between these restitutions and frequencies.
+fn plan_between([least, most]: [f64; 2], [slow, fast]: [f64; 2], count: usize, sets: &[&str]) -> Plan {
+    let ranges = format!("axis.0.min={least:?} axis.0.max={most:?} axis.1.min={slow:?} axis.1.max={fast:?}");
+    let sets: Vec<String> = ranges.split(' ').chain(sets.iter().copied()).map(str::to_owned).collect();
     Plan::new(&Scene::parse(&scene_text(count, count), "s", &sets, Purpose::Map).unwrap())
+}
+
+/// Returns a plan whose first cell is this one.
+fn plan_at(e: f64, omega: f64, sets: &[&str]) -> Plan {
+    plan_between([e, 1.0], [omega, 20.0], 2, sets)
 }
 
 fn settled(record: &Record) -> bool {
@@ -65,133 +69,110 @@ fn chaotic(record: &Record) -> bool {
 
 // ---- single records
 
-/// Wrong records of a map that is right otherwise.
-struct Planted {
-    what: &'static str,
-    /// Whether a record can be made wrong in this way.
-    fits: fn(&Record) -> bool,
-    spoil: fn(&mut Record),
-}
+/// Name of the wrong field, whether a record can be wrong in this way, and the function that makes it wrong.
+type Planted = (&'static str, fn(&Record) -> bool, fn(&mut Record));
 
 const PLANTED: [Planted; 20] = [
-    Planted { what: "period", fits: settled, spoil: |record| record.period += 1 },
-    Planted {
-        what: "class",
-        fits: settled,
-        spoil: |record| (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01),
-    },
-    Planted { what: "word", fits: settled, spoil: |record| record.set_word(&Word::cyclic(b"1435")) },
-    Planted { what: "pattern", fits: settled, spoil: |record| record.set_pattern(&Word::cyclic(b"1435")) },
-    Planted { what: "lyapunov", fits: settled, spoil: |record| record.lyapunov *= 1.3 },
-    Planted { what: "lyapunov", fits: settled, spoil: |record| record.lyapunov = f64::NAN },
-    Planted { what: "impacts_per_period", fits: settled, spoil: |record| record.impacts_per_period += 1.0 },
-    Planted { what: "mesh_fraction", fits: settled, spoil: |record| record.mesh_fraction = f64::NAN },
-    Planted { what: "symmetric", fits: settled, spoil: |record| record.symmetric ^= 1 },
-    Planted { what: "status", fits: settled, spoil: |record| record.status = Status::NearGrazing.code() },
-    Planted { what: "status", fits: settled, spoil: |record| record.status = Status::StrobeOnEvent.code() },
-    Planted { what: "class", fits: settled, spoil: |record| record.status = Status::CapEvents.code() },
-    Planted { what: "status", fits: settled, spoil: |record| record.status = Status::BelowResolution.code() },
-    Planted { what: "periods_run", fits: settled, spoil: |record| record.periods_run = 529 },
-    Planted { what: "lyapunov", fits: chaotic, spoil: |record| record.lyapunov *= 5.0 },
-    Planted { what: "impacts_per_period", fits: chaotic, spoil: |record| record.impacts_per_period *= 3.0 },
-    Planted { what: "mesh_fraction", fits: chaotic, spoil: |record| record.mesh_fraction += 0.5 },
-    // What a record says of itself excuses nothing.
-    Planted {
-        what: "class",
-        fits: settled,
-        spoil: |record| {
-            (record.period, record.periods_run, record.status) = (0, 528, Status::Slow.code());
-        },
-    },
-    Planted {
-        what: "class",
-        fits: chaotic,
-        spoil: |record| (record.status, record.periods_run) = (Status::Slow.code(), 528),
-    },
-    Planted {
-        what: "class",
-        fits: settled,
-        spoil: |record| {
-            (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01);
-            (record.periods_run, record.strobe) = (400, [0.0; 4]);
-        },
-    },
+    ("period", settled, |record| record.period += 1),
+    ("class", settled, |record| (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01)),
+    ("word", settled, |record| record.set_word(&Word::cyclic(b"1435"))),
+    ("pattern", settled, |record| record.set_pattern(&Word::cyclic(b"1435"))),
+    ("lyapunov", settled, |record| record.lyapunov *= 1.3),
+    ("lyapunov", settled, |record| record.lyapunov = f64::NAN),
+    ("impacts_per_period", settled, |record| record.impacts_per_period += 1.0),
+    ("mesh_fraction", settled, |record| record.mesh_fraction = f64::NAN),
+    ("symmetric", settled, |record| record.symmetric ^= 1),
+    ("status", settled, |record| record.status = Status::NearGrazing.code()),
+    ("status", settled, |record| record.status = Status::StrobeOnEvent.code()),
+    ("class", settled, |record| record.status = Status::CapEvents.code()),
+    ("status", settled, |record| record.status = Status::BelowResolution.code()),
+    ("periods_run", settled, |record| record.periods_run = 529),
+    ("lyapunov", chaotic, |record| record.lyapunov *= 5.0),
+    ("impacts_per_period", chaotic, |record| record.impacts_per_period *= 3.0),
+    ("mesh_fraction", chaotic, |record| record.mesh_fraction += 0.5),
+    // A record's own status does not excuse its error.
+    ("class", settled, |record| {
+        (record.period, record.periods_run, record.status) = (0, 528, Status::Slow.code());
+    }),
+    ("class", chaotic, |record| (record.status, record.periods_run) = (Status::Slow.code(), 528)),
+    ("class", settled, |record| {
+        (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01);
+        (record.periods_run, record.strobe) = (400, [0.0; 4]);
+    }),
 ];
 
-/// Spoils one record in each way, none of those that `differ` anyway; the ids, and what is wrong there.
+/// Spoils one record in each way, except for those that `differ` anyway. Returns their cells and the wrong fields.
 fn plant(records: &mut [Record], differ: &[u32]) -> Vec<(u32, &'static str)> {
     let mut wrong: Vec<(u32, &'static str)> = Vec::new();
-    for (k, planted) in PLANTED.iter().enumerate() {
+    for (k, (field, fits, spoil)) in PLANTED.iter().enumerate() {
         let from = k * records.len() / PLANTED.len();
-        let ids = (0..records.len()).map(|n| (from + n) % records.len());
-        let taken =
-            |id: usize| wrong.iter().map(|(other, _)| other).chain(differ).any(|&other| other as usize == id);
-        let id = ids.into_iter().find(|&id| !taken(id) && (planted.fits)(&records[id])).unwrap();
-        (planted.spoil)(&mut records[id]);
-        wrong.push((id as u32, planted.what));
+        let mut ids = (0..records.len()).map(|n| ((from + n) % records.len()) as u32);
+        let is_free = |id: &u32| !differ.contains(id) && wrong.iter().all(|(other, _)| other != id);
+        let id = ids.find(|id| is_free(id) && fits(&records[*id as usize])).unwrap();
+        spoil(&mut records[id as usize]);
+        wrong.push((id, *field));
     }
     wrong.sort_unstable();
     wrong
 }
 
-/// Without a device that could tell that they are not its own.
+/// No device recomputes the records.
 #[test]
 fn wrong_records_are_found_whatever_the_engine() {
     let plan = Plan::new(&scene(12, 12));
-    let mut records = computed(&plan);
-    let right = validated(&plan, &records, Precision::F64, true);
+    let mut records = cpu_records(&plan);
+    let right = validate_all(&plan, &records, Precision::F64, true);
     assert!(unexplained(&right).is_empty() && right.mismatches.len() < 3, "{:?}", right.mismatches);
     let differ: Vec<u32> = right.mismatches.iter().map(|mismatch| mismatch.id).collect();
     let wrong = plant(&mut records, &differ);
     let ids: Vec<u32> = wrong.iter().map(|&(id, _)| id).collect();
     for precision in Precision::ALL {
-        let found = validated(&plan, &records, precision, true);
+        let found = validate_all(&plan, &records, precision, true);
         assert_eq!(unexplained(&found), ids, "{precision:?}: {wrong:?} {:?}", found.mismatches);
-        for &(id, what) in &wrong {
+        for &(id, field) in &wrong {
             let mismatch = found.mismatches.iter().find(|mismatch| mismatch.id == id).unwrap();
-            assert!(mismatch.differences.iter().any(|d| d.field.name() == what), "{what}: {mismatch:?}");
+            assert!(mismatch.differences.iter().any(|d| d.field.name() == field), "{field}: {mismatch:?}");
         }
         assert!(!found.faults().is_empty());
     }
 }
 
-/// Cells that trade places, and a map from another start.
+/// Exchanges records of cells, and computes a map from another start.
 #[test]
-fn another_cells_record_is_found() {
+fn records_of_other_cells_and_of_another_start_are_found() {
     let plan = Plan::new(&scene(14, 14));
-    let mut records = computed(&plan);
-    // Those of few impacts trade places with those of many.
+    let mut records = cpu_records(&plan);
+    // A cell with few impacts gets the record of one with many, and vice versa.
     let mut settled: Vec<usize> = (0..records.len()).filter(|&id| settled(&records[id])).collect();
     settled.sort_by(|&a, &b| records[a].impacts_per_period.total_cmp(&records[b].impacts_per_period));
     let moved: Vec<usize> = (0..6).flat_map(|k| [settled[7 * k], settled[settled.len() - 1 - k]]).collect();
     for pair in moved.chunks_exact(2) {
         records.swap(pair[0], pair[1]);
     }
-    let found = unexplained(&validated(&plan, &records, Precision::F32, true));
+    let found = unexplained(&validate_all(&plan, &records, Precision::F32, true));
     assert!(moved.iter().all(|&id| found.contains(&(id as u32))), "{moved:?} {found:?}");
     let start = ["start.policy=state", "start.state=[0.4, 1.0, -0.2, -3.0]"];
-    let elsewhere = computed(&planned([0.0, 1.0], [1.0, 12.0], 14, &start));
-    let found = validated(&plan, &elsewhere, Precision::F64, true);
+    let elsewhere = cpu_records(&plan_between([0.0, 1.0], [1.0, 12.0], 14, &start));
+    let found = validate_all(&plan, &elsewhere, Precision::F64, true);
     let without = unexplained(&found).len();
-    println!("wrong start: {} differ, {without} without a reason", found.mismatches.len());
     assert!(found.mismatches.len() > 20 && 10 * without > 9 * found.mismatches.len());
 }
 
-/// What early stops once named, status ok, and what the start reaches by an independent program in 80 bit.
+/// Early stops once reported these cycles with status ok. An independent program in 80 bit shows what the start reaches.
 #[test]
 fn cycles_that_the_start_never_reaches_are_found() {
-    // e, omega; period and impacts as they were named; what validation says of it in single precision.
-    let named = [
-        // Period 2 with 8.5 impacts, and chaos, of which the reference said period 1.
+    // e, omega, the reported period and impacts, and the explanation in single precision.
+    let reported = [
+        // Period 2 with 8.5 impacts, and chaos. The reference reported period 1.
         (0.5949119373776908, 3.7984344422700587, 1, Some(8.0), Kind::Unexplained),
         (0.5610367892976589, 3.8959866220735786, 1, None, Kind::Unexplained),
-        // Period 2, of which lanes said 3; 16 impacts, symmetric, of which they said 15, unsymmetric: both are stable,
-        // and what is the same within single precision reaches one or the other.
+        // Period 2; lanes reported 3. A symmetric cycle of 16 impacts; lanes reported an asymmetric one of 15: both are
+        // stable, and starts that are equal in single precision reach either.
         (0.8, 5.745098039215686, 3, None, Kind::Unexplained),
         (0.3254901960784314, 3.2, 1, Some(15.0), Kind::Border),
     ];
-    for (e, omega, period, impacts, single) in named {
-        let plan = planned([e, 1.0], [omega, 20.0], 2, &["integration.undecided_periods=1584"]);
+    for (e, omega, period, impacts, single) in reported {
+        let plan = plan_at(e, omega, &[EXTENDED]);
         let record = Record {
             period,
             impacts_per_period: impacts.unwrap_or(0.0),
@@ -201,35 +182,27 @@ fn cycles_that_the_start_never_reaches_are_found() {
         };
         for precision in Precision::ALL {
             let expected = if precision == Precision::F32 { single } else { Kind::Unexplained };
-            let found = first(&plan, record, precision);
-            let kinds: Vec<Kind> = found.mismatches.iter().map(|mismatch| mismatch.kind).collect();
-            assert_eq!(kinds, [expected], "{precision:?}: {e} {omega}: {:?}", found.mismatches);
+            let found = validate_first(&plan, record, precision);
+            assert_eq!(kinds(&found), [expected], "{precision:?}: {e} {omega}: {:?}", found.mismatches);
             assert_eq!(found.faults().is_empty(), expected == Kind::Border, "{precision:?}: {e} {omega}");
         }
     }
 }
 
-/// Approached so slowly that one is near it by the end of the budget, and then left.
+/// The motion is near the cycle at the end of the budget, because it passes it slowly, and leaves it later.
 #[test]
-fn to_be_near_a_cycle_is_not_to_reach_it() {
-    let plan = planned([0.4637964774951076, 1.0], [1.7749510763209393, 20.0], 2, &[]);
-    let record = Record {
-        period: 1,
-        status: Status::Slow.code(),
-        periods_run: 528,
-        valid: valid::PERIOD,
-        ..Record::default()
-    };
-    let subject = Subject { plan: &plan, records: &[record; 4], precision: Precision::F64, is_lane: true };
-    let found = replay(&subject, &only(vec![0]), &Lanes::default(), &|_| {});
+fn a_motion_near_a_cycle_need_not_reach_it() {
+    let plan = plan_at(0.4637964774951076, 1.7749510763209393, &[]);
+    let (status, valid) = (Status::Slow.code(), valid::PERIOD);
+    let record = Record { period: 1, status, periods_run: 528, valid, ..Record::default() };
+    let found = validate_first(&plan, record, Precision::F64);
     assert_eq!(found.mismatches.len(), 1, "{:?}", found.agreement);
 }
 
-/// A cycle that has just split off another repeats it, and has neither its word nor its pattern.
+/// Just after a period doubling the new cycle almost repeats the old one, but its word and pattern differ.
 #[test]
-fn a_cycle_of_twice_the_period_has_words_of_its_own() {
-    let (e, omega) = (0.8336594911937377, 3.045009784735812);
-    let plan = planned([e, 1.0], [omega, 20.0], 2, &["integration.undecided_periods=1584"]);
+fn a_cycle_after_period_doubling_has_its_own_word() {
+    let plan = plan_at(0.8336594911937377, 3.045009784735812, &[EXTENDED]);
     let mut record = Record {
         period: 2,
         status: Status::Slow.code(),
@@ -241,16 +214,15 @@ fn a_cycle_of_twice_the_period_has_words_of_its_own() {
     };
     record.set_word(&Word::cyclic(b"223556223556"));
     record.set_pattern(&Word::cyclic(b"23562356"));
-    let found = first(&plan, record, Precision::F32);
-    let kinds: Vec<Kind> = found.mismatches.iter().map(|mismatch| mismatch.kind).collect();
-    assert_eq!(kinds, [Kind::Budget], "{:?}", found.mismatches);
+    assert_eq!(kind(&plan, record, Precision::F32), Some(Kind::Budget));
 }
 
-/// A slow approach over a bent strobe map: the multiplier is a tenth off the cycle's where the lane reads it.
+/// The approach is slow and the strobe map is curved. Where the lane computes the multiplier, it differs from that of the
+/// cycle by a tenth.
 #[test]
-fn a_multiplier_is_compared_where_it_was_read() {
+fn a_multiplier_is_compared_at_the_state_where_it_was_computed() {
     let (e, omega, period, run) = (0.7240704500978473, 2.0978473581213306, 4, 64);
-    let plan = planned([e, 1.0], [omega, 20.0], 2, &[]);
+    let plan = plan_at(e, omega, &[]);
     let pair = GearPair { omega, ..GearPair::paper(e) };
     let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), [0.0; 4]);
@@ -268,32 +240,27 @@ fn a_multiplier_is_compared_where_it_was_read() {
         valid: valid::PERIOD | valid::LYAPUNOV | valid::STROBE,
         ..Record::default()
     };
-    let kind_of = |record| {
-        let found = first(&plan, record, Precision::F32);
-        println!("{:?}", found.mismatches);
-        found.mismatches.first().map(|mismatch| mismatch.kind)
-    };
-    println!("{record:?}");
-    assert_eq!(kind_of(record), Some(Kind::Budget));
+    let kind_of = |record| kind(&plan, record, Precision::F32);
+    assert_eq!(kind_of(record), Some(Kind::Budget), "{record:?}");
     let steeper = Record { lyapunov: 4.0 * record.lyapunov, ..record };
-    assert_eq!(kind_of(steeper), Some(Kind::Unexplained), "the reference reads something else there");
+    assert_eq!(kind_of(steeper), Some(Kind::Unexplained), "the reference has another multiplier there");
     let elsewhere = Record { strobe: strobe.map(|x| 1.3 * x), ..record };
-    assert_eq!(kind_of(elsewhere), Some(Kind::Unexplained), "no cycle is there");
+    assert_eq!(kind_of(elsewhere), Some(Kind::Unexplained), "there is no cycle near this state");
     let near = Record { status: Status::Ok.code(), strobe: strobe.map(|x| 1.01 * x), ..record };
-    assert_eq!(kind_of(near), Some(Kind::Unexplained), "it has not settled");
+    assert_eq!(kind_of(near), Some(Kind::Unexplained), "the motion has not settled");
 }
 
 // ---- a whole map
 
-/// Averages over chaos that are wrong in every cell, by less than one cell would show.
+/// Makes averages of all chaotic cells wrong by less than a single cell would show.
 #[test]
-fn averages_over_chaos_are_compared_over_the_class() {
-    let plan = planned([0.62, 0.98], [3.4, 6.2], 9, &[]);
-    let right = computed(&plan);
+fn averages_of_chaotic_cells_are_compared_over_the_whole_class() {
+    let plan = plan_between([0.62, 0.98], [3.4, 6.2], 9, &[]);
+    let right = cpu_records(&plan);
     let failing = |spoil: fn(&mut Record)| -> Vec<&'static str> {
         let mut records = right.clone();
         records.iter_mut().filter(|record| classify(record) == Class::Chaotic).for_each(spoil);
-        let found = validated(&plan, &records, Precision::F64, true);
+        let found = validate_all(&plan, &records, Precision::F64, true);
         found.chaos.iter().filter(|test| test.fails()).map(|test| test.name).collect()
     };
     assert_eq!(failing(|_| {}), Vec::<&str>::new());
@@ -312,43 +279,35 @@ fn averages_over_chaos_are_compared_over_the_class() {
     }
 }
 
-/// Lanes of a map, validated with the very device that made it.
-fn by_lanes(plan: &Plan, precision: Precision, rewrite: Option<fn(String) -> String>) -> (Validation, usize) {
-    let mut gpu = fresh(precision);
-    gpu.rewrite_shaders(rewrite.unwrap_or(|source| source));
-    let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, gpu)).unwrap()));
-    let cells = plan.cells(0..plan.cell_count());
-    let mut records = vec![Record::default(); plan.cell_count()];
-    for (cell, record) in cells.iter().zip(pollster::block_on(engine.run(&cells)).unwrap()) {
-        records[cell.id as usize] = record;
-    }
-    let Engine::Gpu(gpu) = engine else { unreachable!() };
-    let mut gpu = gpu.into_device();
+/// Computes a map by lanes and validates it with the same device.
+fn validate_lanes(plan: &Plan, precision: Precision, rewrite: Option<fn(String) -> String>) -> Validation {
+    let mut gpu = open(precision);
+    rewrite.into_iter().for_each(|rewrite| gpu.rewrite_shaders(rewrite));
+    let records = map(plan, &mut gpu);
     let subject = Subject { plan, records: &records, precision, is_lane: true };
-    let mut drawn = sample(plan, &records, usize::MAX, 1);
-    drawn.states = (0..records.len() as u32).collect();
+    let mut selection = sample(plan, &records, usize::MAX, 1);
+    selection.states = (0..records.len() as u32).collect();
     let mut double = (precision == Precision::F32 && rewrite.is_none()).then(|| open(Precision::F64));
-    let lanes =
-        pollster::block_on(Lanes::run(&subject, &drawn, Some(&mut gpu), double.as_deref_mut())).unwrap();
-    (replay(&subject, &drawn, &lanes, &|_| {}), records.len())
+    let lanes = Lanes::run(&subject, &selection, Some(&mut *gpu), double.as_deref_mut());
+    replay(&subject, &selection, &pollster::block_on(lanes).unwrap(), &|_| {})
 }
 
 #[test]
-fn lanes_that_are_right_pass() {
+fn a_correct_map_of_lanes_passes() {
     let plan = Plan::new(&scene(20, 20));
     for precision in Precision::ALL {
-        let (found, cells) = by_lanes(&plan, precision, None);
-        println!("{precision:?}: {:?} {:?}", found.strata, found.mismatches);
+        let (found, cells) = (validate_lanes(&plan, precision, None), plan.cell_count());
         assert_eq!(found.faults(), Vec::<String>::new(), "{:?}", found.mismatches);
         assert!(found.mismatches.len() * 20 < cells, "{precision:?}: many differ");
         let states = found.states.unwrap();
-        // Most of them are foreseen, and not all exact: a bar that no error comes near would find nothing.
+        // Most states can be compared, and not all are exact: a bound that no error comes near would find nothing.
         assert!(states.compared * 10 > 9 * cells && states.off.is_empty() && states.distances[1] > 0.0);
         assert_eq!(found.again, [cells, cells]);
     }
 }
 
-/// The law of one contact in ten thousand is not applied. Lanes come to the same attractors, and most records are right.
+/// The shader skips the contact law at one contact in ten thousand. Lanes reach the same attractors, and most records
+/// are right.
 #[test]
 fn a_lane_that_misses_one_impact_in_ten_thousand_is_found() {
     let rewrite = |source: String| {
@@ -358,99 +317,88 @@ fn a_lane_that_misses_one_impact_in_ten_thousand_is_found() {
         assert!(source.contains(law));
         source.replace(law, &format!("{miss}{law}"))
     };
-    let plan = planned([0.1, 0.9], [1.0, 8.0], 96, &["integration.transient_periods=60"]);
+    let plan = plan_between([0.1, 0.9], [1.0, 8.0], 96, &["integration.transient_periods=60"]);
     for precision in Precision::ALL {
         let mut gpu = open(precision);
         gpu.rewrite_shaders(rewrite);
         let ids: Vec<u32> = (0..plan.cell_count() as u32).collect();
         let records = vec![Record::default(); ids.len()];
         let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
-        let drawn = Sample { states: ids, ..only(Vec::new()) };
-        let lanes = pollster::block_on(Lanes::run(&subject, &drawn, Some(&mut gpu), None)).unwrap();
-        let states = replay(&subject, &drawn, &lanes, &|_| {}).states.unwrap();
-        println!("{precision:?}: {} of {} are off", states.off.len(), states.compared);
+        let selection = Sample { states: ids, ..sample_of(Vec::new()) };
+        let lanes = pollster::block_on(Lanes::run(&subject, &selection, Some(&mut gpu), None)).unwrap();
+        let states = replay(&subject, &selection, &lanes, &|_| {}).states.unwrap();
         assert!(states.rate().is_too_many(), "{precision:?}: {states:?}");
     }
 }
 
-/// Cells that early stops make cheap enough for their allowance, which their judge, without them, has not.
+/// With early stops the cells stay within their allowance of work. The judge has no early stops and exceeds it.
 #[test]
-fn a_judge_without_an_allowance_says_so() {
+fn a_judge_that_exceeds_its_work_reports_a_short_budget() {
     let light =
         ["parameters.m1=2e-5", "integration.transient_periods=200", "integration.observed_periods=12"];
-    let plan = planned([0.1, 0.4], [0.4, 0.5], 2, &[&light[..], &["integration.max_period=4"]].concat());
-    let records = computed(&plan);
-    println!("{:?}", records.iter().map(|r| (classify(r), r.status, r.periods_run)).collect::<Vec<_>>());
-    let found = validated(&plan, &records, Precision::F64, false);
-    let kinds: Vec<Kind> = found.mismatches.iter().map(|mismatch| mismatch.kind).collect();
+    let plan = plan_between([0.1, 0.4], [0.4, 0.5], 2, &[&light[..], &["integration.max_period=4"]].concat());
+    let records = cpu_records(&plan);
+    let found = validate_all(&plan, &records, Precision::F64, false);
+    let kinds = kinds(&found);
     assert!(!kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Budget), "{:?}", found.mismatches);
-    // Another's record is still none of this engine's.
+    // A wrong record has no such excuse: this engine does not reproduce it.
     let mut wrong = records;
     wrong.iter_mut().for_each(|record| record.impacts_per_period += 1.0);
-    assert_eq!(unexplained(&validated(&plan, &wrong, Precision::F64, false)).len(), wrong.len());
+    assert_eq!(unexplained(&validate_all(&plan, &wrong, Precision::F64, false)).len(), wrong.len());
 }
 
-/// Lanes that leave open within 528 periods what the map's engine decides with more of them.
+/// The map's engine decides the cell after more than the 528 periods that the judging lanes run.
 #[test]
-fn a_judge_that_decides_nothing_contradicts_nothing() {
+fn an_undecided_judge_does_not_contradict_a_record() {
     let (e, omega) = (0.6217008797653959, 2.247311827956989);
-    let sets = ["integration.undecided_periods=1584"];
-    let plan = planned([e, e + 1e-6], [omega, omega + 1e-6], 2, &sets);
-    let records = computed(&plan);
+    let plan = plan_between([e, e + 1e-6], [omega, omega + 1e-6], 2, &[EXTENDED]);
+    let records = cpu_records(&plan);
     assert!(matches!(classify(&records[0]), Class::Periodic { .. }), "{:?}", records[0]);
     let subject = Subject { plan: &plan, records: &records, precision: Precision::F64, is_lane: false };
     let mut double = open(Precision::F64);
-    let lanes = pollster::block_on(Lanes::run(&subject, &only(vec![0]), None, Some(&mut *double))).unwrap();
-    let found = replay(&subject, &only(vec![0]), &lanes, &|_| {});
-    assert_eq!(found.judge, Judge::Lanes);
-    let kinds: Vec<Kind> = found.mismatches.iter().map(|mismatch| mismatch.kind).collect();
-    assert_eq!(kinds, [Kind::Budget], "{:?}", found.mismatches);
+    let selection = sample_of(vec![0]);
+    let lanes = pollster::block_on(Lanes::run(&subject, &selection, None, Some(&mut *double))).unwrap();
+    let found = replay(&subject, &selection, &lanes, &|_| {});
+    assert_eq!((found.judge, kinds(&found)), (Judge::Lanes, vec![Kind::Budget]), "{:?}", found.mismatches);
 }
 
-/// In the rule of a contact that lasts.
+/// The shader's condition for meshing after an impact.
 const MESHES: &str = "leaving <= mesh_speed(side) &&";
 
-/// Chatter meshes one impact sooner in one series of a hundred.
+/// Chatter ends one impact earlier in one series of a hundred.
 #[test]
 fn a_threshold_that_is_off_by_a_hundredth_is_found() {
-    let plan = planned([0.2, 0.6], [1.0, 2.5], 20, &[]);
+    let plan = plan_between([0.2, 0.6], [1.0, 2.5], 20, &[]);
     let rewrite = |source: String| {
         assert!(source.contains(MESHES));
         source.replace(MESHES, "leaving <= Real(1.01) * mesh_speed(side) &&")
     };
     for precision in Precision::ALL {
-        let (found, _) = by_lanes(&plan, precision, Some(rewrite));
-        println!(
-            "{precision:?}: {:?}, {} lanes off",
-            found.faults(),
-            found.states.as_ref().unwrap().off.len()
-        );
+        let found = validate_lanes(&plan, precision, Some(rewrite));
         assert!(!found.faults().is_empty(), "{precision:?}: {:?}", found.mismatches);
     }
-    // Of the reference, too.
-    let other = computed(&planned([0.2, 0.6], [1.0, 2.5], 20, &["mesh_speed=0.0101"]));
-    let found = validated(&plan, &other, Precision::F64, false);
+    // A map of the reference with this threshold fails, too.
+    let other = cpu_records(&plan_between([0.2, 0.6], [1.0, 2.5], 20, &["mesh_speed=0.0101"]));
+    let found = validate_all(&plan, &other, Precision::F64, false);
     assert!(!found.faults().is_empty(), "{:?}", found.mismatches);
 }
 
-/// A map of the reference, judged by an ODE library that shares nothing with it.
+/// An ODE library that shares no code with the reference judges a map of the reference.
 #[test]
 fn a_map_of_the_reference_is_judged_by_an_independent_program() {
-    use rattlemap::validate::{Judge, independent};
-    let plan = planned([0.05, 0.95], [1.2, 11.0], 7, &["integration.transient_periods=150"]);
-    let records = computed(&plan);
-    let found = validated(&plan, &records, Precision::F64, false);
+    let plan = plan_between([0.05, 0.95], [1.2, 11.0], 7, &["integration.transient_periods=150"]);
+    let records = cpu_records(&plan);
+    let found = validate_all(&plan, &records, Precision::F64, false);
     assert_eq!((found.judge, found.faults()), (Judge::Independent, Vec::new()), "{:?}", found.mismatches);
     let judged = (0..49).filter_map(|id| independent::record(&plan, id, &records)).collect::<Vec<_>>();
     let claims = |class: fn(&Record) -> bool| judged.iter().filter(|record| class(record)).count();
-    println!("judged: {} cycles, {} chaotic", claims(|r| r.period > 0), claims(|r| r.period == 0));
     assert!(claims(|r| r.period > 0) > 30 && claims(|r| r.period == 0) > 2, "{judged:?}");
 }
 
 #[test]
 fn samples_have_their_strata_and_repeat() {
     let plan = Plan::new(&scene(40, 40));
-    // Three stripes of period 1, 2, 1; one column is slow.
+    // Three stripes of period 1, 2 and 1. One column has status `slow`.
     let record = |id: usize| {
         let i = id % 40;
         let status = if i == 5 { Status::Slow } else { Status::Ok };
@@ -458,15 +406,19 @@ fn samples_have_their_strata_and_repeat() {
         Record { status: status.code(), period, valid: valid::PERIOD, ..Record::default() }
     };
     let records: Vec<Record> = (0..1600).map(record).collect();
-    let drawn = sample(&plan, &records, 400, 7);
-    assert_eq!(drawn, sample(&plan, &records, 400, 7));
-    assert_ne!(drawn.draws, sample(&plan, &records, 400, 8).draws);
-    let counts: Vec<_> = drawn.draws.iter().map(|draw| (draw.stratum, draw.runs, draw.ids.len())).collect();
-    // What statuses are short of is drawn from all.
+    let selection = sample(&plan, &records, 400, 7);
+    assert_eq!(selection, sample(&plan, &records, 400, 7));
+    assert_ne!(selection.draws, sample(&plan, &records, 400, 8).draws);
+    let counts: Vec<_> =
+        selection.draws.iter().map(|draw| (draw.stratum, draw.runs, draw.ids.len())).collect();
+    // There are fewer cells with a status than wanted, so the uniform stratum gets the rest.
     let expected = [(Stratum::Uniform, 1600, 260), (Stratum::Border, 160, 100), (Stratum::Status, 40, 40)];
     assert_eq!(counts, expected);
-    assert!(drawn.draws[1].ids.iter().all(|id| [9, 10, 24, 25].contains(&(id % 40))));
-    assert!(drawn.draws.iter().all(|draw| draw.ids.is_sorted_by(|a, b| a < b)), "a cell was drawn twice");
+    assert!(selection.draws[1].ids.iter().all(|id| [9, 10, 24, 25].contains(&(id % 40))));
+    assert!(
+        selection.draws.iter().all(|draw| draw.ids.is_sorted_by(|a, b| a < b)),
+        "a cell was selected twice"
+    );
     assert_eq!(sample(&plan, &records, 5000, 7).ids().len(), 1600);
 }
 
@@ -483,7 +435,7 @@ fn rattlemap(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
     command.current_dir(folder).args(arguments).assert()
 }
 
-/// A folder with a finished map `o` of 24 x 24 cells.
+/// Returns a folder with a finished map `o` of 24 x 24 cells, and the map's folder.
 fn finished() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("s.toml"), scene_text(24, 24)).unwrap();
@@ -525,13 +477,13 @@ fn a_map_is_validated_and_its_report_says_so() {
     assert_eq!(found["states"]["off"]["count"], 0);
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("\"validation\":{\"format\":2,\"command\":\"validate\""), "no section");
-    // The same seed, the same bytes.
+    // An equal seed gives equal bytes.
     let first = fs::read(out.join("validation.json")).unwrap();
     run(&["--samples", "150", "--seed", "3", "--quiet"]).success().stderr("");
     assert!(fs::read(out.join("validation.json")).unwrap() == first);
     run(&["--samples", "150", "--seed", "4", "--quiet"]).success();
     assert!(fs::read(out.join("validation.json")).unwrap() != first);
-    // A map that is written again has not been validated.
+    // Writing the map again removes the validation.
     rattlemap(folder.path(), &["map", "s.toml", "--out", "o", "--quiet", "--resume"]).success();
     assert!(!out.join("validation.json").exists());
     assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("\"validation\":null"));
@@ -540,16 +492,13 @@ fn a_map_is_validated_and_its_report_says_so() {
 #[test]
 fn planted_records_fail_the_validation_by_name() {
     let (folder, out) = finished();
-    let plan = Plan::new(&scene(24, 24));
     let scene = scene(24, 24);
-    let identity = Identity::new("cpu", "f64", "event-driven reference", scene.identity());
-    let path = out.join(RECORDS);
+    let plan = Plan::new(&scene);
+    let (path, identity) = (out.join(RECORDS), cpu_identity(&scene));
     let mut records = vec![Record::default(); plan.cell_count()];
-    let count = RecordFile::read(&path, &identity, Order::Any, |batch| {
-        batch.iter().for_each(|&(id, record)| records[id as usize] = record);
-        true
-    });
-    assert_eq!(count.unwrap().count, 576);
+    let stored = read_records(&path, &identity);
+    assert_eq!(stored.len(), 576);
+    stored.into_iter().for_each(|(id, record)| records[id as usize] = record);
     let wrong = plant(&mut records, &[]);
     let spoilt: Vec<(u32, Record)> = (0..).zip(records).collect();
     RecordFile::create(&path, &identity).unwrap().append(&spoilt).unwrap();
@@ -560,7 +509,7 @@ fn planted_records_fail_the_validation_by_name() {
         text.contains(&format!("{} of 576 cells (uniform) differ, unexplained", PLANTED.len())),
         "{text}"
     );
-    // The message names the first ones.
+    // The message names the first cells.
     for &(id, _) in &wrong[..8] {
         let [i, j] = plan.indices(id);
         assert!(text.contains(&format!("({i}, {j})")), "{text}");
@@ -575,21 +524,21 @@ fn planted_records_fail_the_validation_by_name() {
     rattlemap(folder.path(), &arguments).success();
 }
 
-/// A validation that looked at nothing, as of a map whose cells were all filled, is none.
+/// All cells of an adaptive map may be filled. Then there is no cell to recompute.
 #[test]
-fn nothing_replayed_is_a_failure() {
+fn a_validation_without_a_recomputed_cell_fails() {
     let plan = Plan::new(&scene(3, 3));
     let filled = vec![Record { valid: valid::FILLED, ..Record::default() }; 9];
-    let drawn = sample(&plan, &filled, 400, 1);
+    let selection = sample(&plan, &filled, 400, 1);
     let subject = Subject { plan: &plan, records: &filled, precision: Precision::F64, is_lane: true };
-    let found = replay(&subject, &drawn, &Lanes::default(), &|_| {});
+    let found = replay(&subject, &selection, &Lanes::default(), &|_| {});
     assert_eq!((found.replayed, found.filled), (0, 9));
     assert_eq!(found.faults(), ["none of 9 cells was replayed"]);
 }
 
-/// Another device than the map's may round differently: whoever reads the result is told.
+/// Another device than the map's may round differently, so the result names it.
 #[test]
-fn lanes_of_another_device_are_named() {
+fn the_result_names_a_device_other_than_the_maps() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("o");
     fs::write(folder.path().join("s.toml"), scene_text(4, 3)).unwrap();
@@ -599,29 +548,22 @@ fn lanes_of_another_device_are_named() {
     let text = validated();
     assert!(!text.contains("not on the map's own device"), "{text}");
     let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
-    let made: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    let original: serde_json::Value = serde_json::from_str(&manifest).unwrap();
     let found = json(&out);
-    assert_eq!((&found["same_device"], &found["again_on"]), (&true.into(), &made["device"]));
-    // The same map, as if it came from elsewhere.
-    let device = made["device"].as_str().unwrap();
+    assert_eq!((&found["same_device"], &found["again_on"]), (&true.into(), &original["device"]));
+    // The map as if another device had computed it.
+    let device = original["device"].as_str().unwrap();
     let scene = scene(4, 3);
     let identity = |device| Identity::new("gpu", "f32", device, scene.identity());
-    let mut records = Vec::new();
-    let take = |batch: &[(u32, Record)]| {
-        records.extend_from_slice(batch);
-        true
-    };
-    RecordFile::read(&out.join(RECORDS), &identity(device), Order::Any, take).unwrap();
+    let records = read_records(&out.join(RECORDS), &identity(device));
     RecordFile::create(&out.join(RECORDS), &identity("Faraway card")).unwrap().append(&records).unwrap();
     let mut faraway: serde_json::Value =
         serde_json::from_str(&manifest.replace(device, "Faraway card")).unwrap();
+    let changed = [RECORDS, "report.html", "validation.json"];
     let files = faraway["files"].as_array_mut().unwrap();
-    files.retain(|file| {
-        !["records.bin", "report.html", "validation.json"].contains(&file["name"].as_str().unwrap())
-    });
-    let listed =
-        ["records.bin", "report.html", "validation.json"].map(|name| inventory::entry(&out, name).unwrap());
-    files.extend(listed.map(|entry| serde_json::to_value(entry).unwrap()));
+    files.retain(|file| !changed.contains(&file["name"].as_str().unwrap()));
+    let entries = changed.map(|name| inventory::entry(&out, name).unwrap());
+    files.extend(entries.map(|entry| serde_json::to_value(entry).unwrap()));
     fs::write(out.join("manifest.json"), inventory::sealed(faraway).unwrap()).unwrap();
     let text = validated();
     assert!(
@@ -635,7 +577,7 @@ fn lanes_of_another_device_are_named() {
 }
 
 #[test]
-fn what_is_no_finished_map_is_refused() {
+fn a_folder_without_a_finished_map_is_refused() {
     let (folder, out) = finished();
     let ends = |code: i32, arguments: &[&str], parts: &[&str]| {
         let run = rattlemap(folder.path(), &[&["validate"], arguments].concat()).code(code).stdout("");

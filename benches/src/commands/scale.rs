@@ -1,80 +1,68 @@
-//! `scale`: shards of a large map, written and merged.
+//! `scale`: writes and merges shards of a large map.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Context;
 use rattlemap::cli::failure::Failure;
 use rattlemap::cli::note;
 use rattlemap::store::record_file::RECORDS;
-use rattlemap_bench::scale::{self, Ask, Size, Taken};
-use serde::Serialize;
+use rattlemap_bench::scale::{self, Cost, FileSize, Sizes};
+use rattlemap_bench::write_rows;
 
 use crate::arguments::Scale;
 
-/// Cells along each axis of the map that is integrated.
+/// Number of cells along each axis of the map that is integrated.
 const SMALL: u32 = 192;
 
-pub(crate) fn run(ask: &Scale) -> Result<(), Failure> {
-    let quick = ask.run.quick;
-    let measured = Ask {
-        counts: if quick { [50, 40] } else { [ask.columns, ask.rows] },
+pub(crate) fn run(arguments: &Scale) -> Result<(), Failure> {
+    let quick = arguments.run.quick;
+    let sizes = Sizes {
+        counts: if quick { [50, 40] } else { [arguments.columns, arguments.rows] },
         small: if quick { 5 } else { SMALL },
-        shards: if quick { 3 } else { ask.shards },
-        all: ask.all,
+        shards: if quick { 3 } else { arguments.shards },
+        all: arguments.all,
     };
-    let dir = ask.run.out("scale");
-    let cells: u64 = measured.counts.iter().map(|&count| u64::from(count)).product();
-    let outer = rattlemap::store::folder::Folder::open(&dir, ask.run.force)?;
-    let (shards, mut taken) = scale::write_shards(measured, &dir).context("the shards")?;
+    let dir = arguments.run.out("scale");
+    let cells: u64 = sizes.counts.iter().map(|&count| u64::from(count)).product();
+    let outer = rattlemap::store::folder::Folder::open(&dir, arguments.run.force)?;
+    let (shards, mut costs) = scale::write_shards(sizes, &dir).context("the shards")?;
     let (mut rounds, out) = (Vec::new(), dir.join("map"));
-    let mut files = Vec::new();
-    for _ in 0..ask.rounds {
-        let (phases, names) = scale::merge(&shards, &out).context("the merge")?;
+    let mut names = Vec::new();
+    for _ in 0..arguments.rounds {
+        let (phases, merged) = scale::merge(&shards, &out).context("the merge")?;
         rounds.push(phases);
-        files = names;
+        names = merged;
     }
-    taken.extend(medians(&rounds));
-    let size = |file: String, bytes: u64| Size { file, bytes, per_cell: bytes as f64 / cells as f64 };
+    costs.extend(medians(&rounds));
+    let size = |file: String, bytes: u64| FileSize { file, bytes, per_cell: bytes as f64 / cells as f64 };
     let bytes = |path: &Path| path.metadata().map_or(0, |data| data.len());
     let of_shards = shards.iter().map(|shard| bytes(&shard.join(RECORDS))).sum();
-    let mut sizes = vec![size(format!("{RECORDS} of {} shards", shards.len()), of_shards)];
-    sizes.extend(files.iter().map(|name| size(name.clone(), bytes(&out.join(name)))));
-    sizes.push(size(RECORDS.to_owned(), bytes(&out.join(RECORDS))));
-    write(&outer.path().join("scale.csv"), &taken)?;
-    write(&outer.path().join("files.csv"), &sizes)?;
-    if !ask.run.quiet {
-        for Taken { phase, seconds, processor_seconds, peak_bytes } in &taken {
+    let mut files = vec![size(format!("{RECORDS} of {} shards", shards.len()), of_shards)];
+    files.extend(names.iter().map(|name| size(name.clone(), bytes(&out.join(name)))));
+    files.push(size(RECORDS.to_owned(), bytes(&out.join(RECORDS))));
+    outer.replace("scale.csv", |out| write_rows(out, &costs))?;
+    outer.replace("files.csv", |out| write_rows(out, &files))?;
+    if !arguments.run.quiet {
+        for Cost { phase, seconds, processor_seconds, peak_bytes } in &costs {
             let peak = peak_bytes.map_or(String::new(), |bytes| format!("{:>9.1} MB", bytes as f64 / 1e6));
             note(format_args!(
-                "{phase:<24} {seconds:>8.2} s, on processors {processor_seconds:>8.2} s {peak}"
+                "{phase:<24} {seconds:>8.2} s, processor time {processor_seconds:>8.2} s {peak}"
             ));
         }
-        for Size { file, bytes, per_cell } in &sizes {
+        for FileSize { file, bytes, per_cell } in &files {
             note(format_args!("{file:<24} {:>8.1} MB {per_cell:>7.2} bytes per cell", *bytes as f64 / 1e6));
         }
     }
     Ok(())
 }
 
-/// By phase the round of the median time on processors, with the largest memory of all rounds.
-fn medians(rounds: &[Vec<Taken>]) -> Vec<Taken> {
-    let mut by_phase: BTreeMap<usize, Vec<&Taken>> = BTreeMap::new();
-    for round in rounds {
-        round.iter().enumerate().for_each(|(nth, taken)| by_phase.entry(nth).or_default().push(taken));
-    }
-    let median = |mut all: Vec<&Taken>| {
+/// Returns for each phase the cost of the round with the median processor time, and the largest memory of all rounds.
+fn medians(rounds: &[Vec<Cost>]) -> Vec<Cost> {
+    let median = |phase: usize| {
+        let mut all: Vec<&Cost> = rounds.iter().map(|round| &round[phase]).collect();
         all.sort_by(|a, b| a.processor_seconds.total_cmp(&b.processor_seconds));
-        let peak_bytes = all.iter().filter_map(|taken| taken.peak_bytes).max();
-        Taken { peak_bytes, ..all[all.len() / 2].clone() }
+        let peak_bytes = all.iter().filter_map(|cost| cost.peak_bytes).max();
+        Cost { peak_bytes, ..all[all.len() / 2].clone() }
     };
-    by_phase.into_values().map(median).collect()
-}
-
-fn write<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), Failure> {
-    let written = csv::Writer::from_path(path).and_then(|mut table| {
-        rows.iter().try_for_each(|row| table.serialize(row))?;
-        Ok(table.flush()?)
-    });
-    Ok(written.with_context(|| format!("{}", path.display()))?)
+    (0..rounds[0].len()).map(median).collect()
 }

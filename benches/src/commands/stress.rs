@@ -1,4 +1,4 @@
-//! `stress`: the parts asked for, each verdict as it falls, and the folder.
+//! `stress`: runs the requested parts, prints each verdict when its part ends, and writes the folder.
 
 use std::sync::Mutex;
 use std::time::Instant;
@@ -6,47 +6,49 @@ use std::time::Instant;
 use anyhow::{Context, anyhow};
 use rattlemap::gpu::AdapterChoice;
 use rattlemap::store::folder::Folder;
-use rattlemap_bench::stress::{self, Lanes, Part, Size, Verdict, Watch, output};
+use rattlemap_bench::stress::output::Files;
+use rattlemap_bench::stress::{self, Lanes, Part, Size, Verdict, Watch};
 
 use crate::arguments::Stress;
 use rattlemap::cli::Progress;
 use rattlemap::cli::failure::Failure;
 use rattlemap::cli::note;
 
-/// Decides every random cell: whoever runs this meets the same ones.
+/// Seed of all random cells. It is constant, so every run computes the same cells.
 const SEED: u64 = 1;
 
-pub(crate) fn run(ask: &Stress) -> Result<(), Failure> {
-    let folder = Folder::open(&ask.run.out("stress"), ask.run.force)?;
-    let (size, name) = if ask.run.quick { (Size::Quick, "quick") } else { (Size::Full, "full") };
-    let parts = if ask.parts.is_empty() { &Part::ALL[..] } else { &ask.parts };
+pub(crate) fn run(arguments: &Stress) -> Result<(), Failure> {
+    let options = &arguments.run;
+    let folder = Folder::open(&options.out("stress"), options.force)?;
+    let (size, name) = if options.quick { (Size::Quick, "quick") } else { (Size::Full, "full") };
+    let all = Part::ALL.map(|(part, _)| part);
+    let parts = if arguments.parts.is_empty() { &all[..] } else { &arguments.parts };
     let mut lanes =
-        pollster::block_on(Lanes::open(&AdapterChoice::default())).context("no lanes to examine")?;
+        pollster::block_on(Lanes::open(&AdapterChoice::default())).context("no device for lanes")?;
     let clock = Instant::now();
-    let teller = Teller { quiet: ask.run.quiet, work: Mutex::default() };
-    let report = stress::run(parts, size, SEED, &mut lanes, &teller).context("a device gave up")?;
-    let device = lanes.device();
-    let made = output::Made { size: name, seed: SEED, device: &device, elapsed: clock.elapsed() };
-    let files = output::write(&folder, &report, &made)?;
-    if !ask.run.quiet {
-        note(format_args!("{}: {}", folder.path().display(), files.join(", ")));
+    let printer = Printer { quiet: options.quiet, work: Mutex::default() };
+    let mut files = Files::new(&folder)?;
+    let verdicts = stress::run(parts, size, SEED, &mut lanes, &mut files, &printer)?;
+    let names = files.finish((name, SEED), &lanes.device(), clock.elapsed(), &verdicts)?;
+    if !options.quiet {
+        note(format_args!("{}: {}", folder.path().display(), names.join(", ")));
     }
-    match report.verdicts.iter().filter(|verdict| !verdict.holds).count() {
+    match verdicts.iter().filter(|(_, verdict)| !verdict.holds).count() {
         0 => Ok(()),
-        failed => Err(anyhow!("{failed} of {} parts fail", report.verdicts.len()).into()),
+        failed => Err(anyhow!("{failed} of {} parts fail", verdicts.len()).into()),
     }
 }
 
-/// Says how far a part has come, and what came of it.
-struct Teller {
+/// Prints progress and verdicts.
+struct Printer {
     quiet: bool,
-    /// What is being done.
+    /// The current work.
     work: Mutex<Option<(&'static str, Progress)>>,
 }
 
-impl Watch for Teller {
+impl Watch for Printer {
     fn progress(&self, work: &'static str, done: usize, total: usize) {
-        let mut current = self.work.lock().expect("nobody panics while telling");
+        let mut current = self.work.lock().expect("no thread panics while it prints");
         if current.as_ref().is_none_or(|(of, _)| *of != work) {
             *current = Some((work, Progress::new(total, 0, work, self.quiet)));
         }
@@ -56,18 +58,18 @@ impl Watch for Teller {
     }
 
     fn found(&self, what: &str) {
-        // Held, so that lines do not mix with progress.
-        let work = self.work.lock().expect("nobody panics while telling");
+        // The lock prevents this line from mixing with progress.
+        let work = self.work.lock().expect("no thread panics while it prints");
         match &*work {
             Some((_, progress)) if !self.quiet => progress.suspend(|| note(what)),
             _ => note(what),
         }
     }
 
-    fn judged(&self, verdict: &Verdict) {
-        let done = self.work.lock().expect("nobody panics while telling").take();
+    fn judged(&self, part: &'static str, verdict: &Verdict) {
+        let done = self.work.lock().expect("no thread panics while it prints").take();
         let mark = if verdict.holds { "holds" } else { "FAILS" };
-        let line = format!("{:<10} {mark}: {}", verdict.part, verdict.sentence);
+        let line = format!("{part:<10} {mark}: {}", verdict.sentence);
         match done {
             Some((_, progress)) if !self.quiet => progress.finish(&line),
             _ if !self.quiet || !verdict.holds => note(line),

@@ -1,4 +1,4 @@
-//! `work-precision`: cells, methods in turns, files, ratios.
+//! `work-precision`: measures the methods, writes the files and prints the ratios.
 
 use anyhow::Context;
 use rattlemap::store::folder::Folder;
@@ -13,37 +13,38 @@ use rattlemap::cli::Progress;
 use rattlemap::cli::failure::{Failure, fail_if};
 use rattlemap::job::processor::{cores, name};
 
-/// Cells of every kind.
+/// Number of cells of each kind.
 const CELLS: usize = 5;
 
-/// Least time, in seconds, that a method on a core is timed for in one round.
+/// Shortest time, in seconds, that a method on a core runs in one round.
 const LEAST_SECONDS: f64 = 0.1;
 
-pub(crate) fn run(ask: &WorkPrecision) -> Result<(), Failure> {
-    let peers = match &ask.peers {
+pub(crate) fn run(arguments: &WorkPrecision) -> Result<(), Failure> {
+    let peers = match &arguments.peers {
         Some(path) => points::read(path).map_err(Failure::Usage)?,
         None => Vec::new(),
     };
-    let dir = ask.run.out("work-precision");
-    let folder = Folder::open(&dir, ask.run.force)?;
+    let dir = arguments.run.out("work-precision");
+    let folder = Folder::open(&dir, arguments.run.force)?;
     folder.remove(&FILES)?;
-    let quick = ask.run.quick;
+    let quick = arguments.run.quick;
     let subjects = subjects(if quick { 1 } else { CELLS });
-    let methods = if ask.methods.is_empty() { &Method::ALL[..] } else { &ask.methods[..] };
+    let all = Method::ALL.map(|(method, _)| method);
+    let methods = if arguments.methods.is_empty() { &all[..] } else { &arguments.methods[..] };
     let how = Thoroughness {
-        rounds: if quick { 1 } else { ask.rounds as usize },
-        copies: if quick { Some(1) } else { ask.copies.map(|copies| copies as usize) },
+        rounds: if quick { 1 } else { arguments.rounds as usize },
+        copies: if quick { Some(1) } else { arguments.copies.map(|copies| copies as usize) },
         quick,
         least_seconds: if quick { 0.0 } else { LEAST_SECONDS },
     };
-    let progress = Progress::new(1, 0, "runs", ask.run.quiet);
+    let progress = Progress::new(1, 0, "runs", arguments.run.quiet);
     let curves = measure(&subjects, methods, how, &|done, all| progress.report(done, all))
-        .context("cannot measure lanes")?;
+        .context("the device for lanes failed")?;
     let ours: Vec<Point> = curves.iter().map(|curve: &Curve| curve.point.clone()).collect();
     let all: Vec<Point> = ours.iter().chain(&peers).cloned().collect();
     let ratios = sentences(&all);
-    let measured = |method: &&Method| ours.iter().any(|point| point.method == method.name());
-    let left_out: Vec<&str> = methods.iter().filter(|m| !measured(m)).map(|m| m.name()).collect();
+    let is_measured = |name: &&str| ours.iter().any(|point| point.method == *name);
+    let omitted: Vec<&str> = methods.iter().map(|m| m.name()).filter(|name| !is_measured(name)).collect();
     let adapter = ours.iter().find(|point| point.device != ONE_CORE);
     let run = Run {
         processor: &name().unwrap_or_else(|| "processor".to_owned()),
@@ -54,12 +55,12 @@ pub(crate) fn run(ask: &WorkPrecision) -> Result<(), Failure> {
         ratios: &ratios,
     };
     write(&folder, &run, &subjects, &curves, &peers)?;
-    let mut said = summary(&all, &ratios);
-    if !left_out.is_empty() {
-        said += &format!("\nleft out, no adapter has double precision: {}", left_out.join(", "));
+    let mut text = summary(&all, &ratios);
+    if !omitted.is_empty() {
+        text += &format!("\nnot measured, because no adapter has double precision: {}", omitted.join(", "));
     }
-    progress.finish(&format!("{said}\n{}: {}", dir.display(), FILES.join(", ")));
-    fail_if(ours.is_empty(), "nothing was measured: no adapter has double precision")
+    progress.finish(&format!("{text}\n{}: {}", dir.display(), FILES.join(", ")));
+    fail_if(ours.is_empty(), "nothing was measured, because no adapter has double precision")
 }
 
 fn summary(points: &[Point], ratios: &[String]) -> String {

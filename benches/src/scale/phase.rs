@@ -1,4 +1,4 @@
-//! How long a phase takes, and how much memory at most.
+//! Time and memory of a phase.
 
 use std::fs;
 use std::time::Instant;
@@ -6,44 +6,32 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use serde::Serialize;
 
-/// A phase that has begun.
-#[derive(Clone, Copy, Debug)]
-pub struct Phase {
-    name: &'static str,
-    clock: Instant,
-    processor: ProcessTime,
-}
-
-/// What a phase took.
+/// Time and memory of a finished phase.
 #[derive(Clone, Debug, Serialize)]
-pub struct Taken {
-    /// Which it is.
+pub struct Cost {
+    /// Name of the phase.
     pub phase: &'static str,
     /// Wall time.
     pub seconds: f64,
-    /// Time of all threads on a processor: it says more where the machine does other things, too.
+    /// Processor time of all threads, which depends less on other programs.
     pub processor_seconds: f64,
-    /// The largest resident size of this process in it, in bytes; none where the system does not tell.
+    /// Largest resident size of this process in bytes; `None` if the system does not report it.
     pub peak_bytes: Option<u64>,
 }
 
-impl Phase {
-    /// Begins one.
-    pub fn begin(name: &'static str) -> Phase {
-        // Where there is no such file, or it may not be written, peaks are those of the whole run.
-        let _ = fs::write("/proc/self/clear_refs", "5");
-        Phase { name, clock: Instant::now(), processor: ProcessTime::now() }
-    }
-
-    /// Ends it.
-    pub fn end(self) -> Taken {
-        Taken {
-            phase: self.name,
-            seconds: self.clock.elapsed().as_secs_f64(),
-            processor_seconds: self.processor.elapsed().as_secs_f64(),
-            peak_bytes: peak(),
-        }
-    }
+/// Runs a phase and adds its cost.
+pub(super) fn run<T>(phase: &'static str, costs: &mut Vec<Cost>, work: impl FnOnce() -> T) -> T {
+    // Resets the largest resident size. If the file cannot be written, later phases report that of the whole run.
+    let _ = fs::write("/proc/self/clear_refs", "5");
+    let (clock, processor) = (Instant::now(), ProcessTime::now());
+    let result = work();
+    costs.push(Cost {
+        phase,
+        seconds: clock.elapsed().as_secs_f64(),
+        processor_seconds: processor.elapsed().as_secs_f64(),
+        peak_bytes: peak(),
+    });
+    result
 }
 
 fn peak() -> Option<u64> {

@@ -1,16 +1,17 @@
-//! A small map, stretched.
+//! Records of a large map, derived from those of a small one.
 
 use rattlemap::job::run::Map;
 use rattlemap::record::Record;
 
-/// Numbers differ from those of the small map by this much of themselves: no more than the first digit is left.
+/// Largest relative change of numbers of the small map. Only the first digit remains.
 const CHANGE: f64 = 0.1;
 
-/// One cell in so many is like another cell of the small map, at most so many of its cells away.
+/// One cell in this many gets the record of another cell of the small map.
 const STRAY: f64 = 16.0;
+/// Largest distance of that cell, in cells of the small map.
 const AWAY: f64 = 3.0;
 
-/// Records of a map of `counts` cells, made of those of a small one.
+/// Records of a map of `counts` cells along its axes.
 #[derive(Clone, Debug)]
 pub struct Stretched<'m> {
     small: &'m Map,
@@ -18,12 +19,12 @@ pub struct Stretched<'m> {
 }
 
 impl<'m> Stretched<'m> {
-    /// One start per cell.
+    /// Stretches a map with one start per cell.
     pub fn new(small: &'m Map, counts: [usize; 2]) -> Stretched<'m> {
         Stretched { small, counts }
     }
 
-    /// The record of a cell.
+    /// Returns the record of a cell.
     pub fn record(&self, id: u32) -> Record {
         let small = self.small.counts();
         let mut random = u64::from(id);
@@ -42,13 +43,13 @@ impl<'m> Stretched<'m> {
         if record.period == 0 {
             record.impacts_per_period = changed(record.impacts_per_period);
         }
-        // In single precision, as of most lanes.
+        // Most lanes have single precision.
         record.strobe = record.strobe.map(|x| f64::from(changed(x) as f32));
         record
     }
 }
 
-/// A number from 0 to 1 (SplitMix64).
+/// Returns a random number from 0 to 1 (SplitMix64).
 fn unit(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut x = *state;

@@ -1,4 +1,4 @@
-//! Shared by the parts: engines by name, the reference's answers, and bounds on what rounding may do.
+//! Items that several parts use: engines, results of the reference, and bounds on the effect of rounding.
 
 use serde::Serialize;
 
@@ -6,10 +6,10 @@ use rattlemap::gpu::Precision;
 use rattlemap::record::distance::{self, farther};
 use rattlemap_dynamics::flow::Flow;
 pub(super) use rattlemap_dynamics::model::REST;
-use rattlemap_dynamics::model::{GearPair, Model, State};
-use rattlemap_dynamics::reference::{Stop, Trajectory};
+use rattlemap_dynamics::model::{GearPair, Model, Oscillator, State};
+use rattlemap_dynamics::reference::{Stop, Trajectory, Work};
 
-/// Who computed a row.
+/// The engine that computed a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum EngineName {
     /// Lanes in single precision.
@@ -18,16 +18,16 @@ pub enum EngineName {
     /// Lanes in double precision.
     #[serde(rename = "lanes f64")]
     LanesF64,
-    /// The event-driven reference, f64.
+    /// The event-driven reference, in double precision.
     #[serde(rename = "reference")]
     Reference,
 }
 
 impl EngineName {
-    /// Every engine, in the order in which they are told.
+    /// Every engine, in the order of verdicts and legends.
     pub const ALL: [EngineName; 3] = [EngineName::LanesF32, EngineName::LanesF64, EngineName::Reference];
 
-    /// The name in tables and legends.
+    /// Returns the name in tables and legends.
     pub fn name(self) -> &'static str {
         match self {
             EngineName::LanesF32 => "lanes f32",
@@ -36,7 +36,7 @@ impl EngineName {
         }
     }
 
-    /// Half a unit in the last place of 1.
+    /// Returns half a unit in the last place of 1.
     pub(super) fn unit_roundoff(self) -> f64 {
         match self {
             EngineName::LanesF32 => 0.5 * f64::from(f32::EPSILON),
@@ -54,66 +54,75 @@ impl From<Precision> for EngineName {
     }
 }
 
-/// Table 1 with a restitution and an excitation frequency.
+/// Returns the pair of Table 1 with this restitution and excitation frequency.
 pub(super) fn paper(e: f64, omega: f64) -> GearPair {
     GearPair { omega, ..GearPair::paper(e) }
 }
 
-/// The flow of a cell; cells are made valid.
-pub(super) fn flow_of(pair: &GearPair) -> Box<Flow> {
-    Box::new(Flow::new(&pair.oscillator().expect("cells are made valid")))
+/// Returns the oscillator of a cell. All cells of these tests are valid.
+pub(super) fn oscillator_of(pair: &GearPair) -> Oscillator {
+    pair.oscillator().expect("a valid cell")
 }
 
-/// The reference, some periods after a start.
-pub(super) fn after(pair: &GearPair, start: State, periods: u32) -> Result<State, Stop> {
+/// Returns the flow of a cell.
+pub(super) fn flow_of(pair: &GearPair) -> Box<Flow> {
+    Box::new(Flow::new(&oscillator_of(pair)))
+}
+
+/// Runs the reference for some periods. Returns its state, or why it stopped, and its work.
+pub(super) fn run_reference(pair: &GearPair, start: State, periods: u32) -> (Result<State, Stop>, Work) {
     let flow = flow_of(pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), start);
-    for _ in 0..periods {
-        trajectory.advance_period(&mut ())?;
-    }
-    Ok(trajectory.state())
+    let end = (0..periods).try_for_each(|_| trajectory.advance_period(&mut ()));
+    (end.map(|()| trajectory.state()), trajectory.work())
 }
 
-/// Largest difference of two states; infinite if one is not finite.
-pub(super) fn apart(a: &State, b: &State) -> f64 {
+/// Returns the reference's state some periods after a start.
+pub(super) fn state_after(pair: &GearPair, start: State, periods: u32) -> Result<State, Stop> {
+    run_reference(pair, start, periods).0
+}
+
+/// Returns the largest difference of two states; infinite if one is not finite.
+pub(super) fn state_distance(a: &State, b: &State) -> f64 {
     a.iter().zip(b).map(|(&a, &b)| distance::apart(a, b)).fold(0.0, farther)
 }
 
-/// Roundings by which starts and parameters are moved to see what rounding may do.
+/// Number of unit roundoffs by which starts and parameters are moved to measure the effect of rounding.
 const ROUNDINGS: f64 = 4.0;
 
-/// How far the reference ends from where it does when its start or a parameter moves within
-/// the engine's rounding: the largest of all such moves, and the state's own rounding.
+/// Returns how far the reference's end moves when its start or a parameter moves within the engine's rounding: the largest
+/// of all such moves, and of the state's own rounding.
 pub(super) fn sensitivity(pair: &GearPair, start: State, periods: u32, engine: EngineName) -> f64 {
     sensitivity_to(ROUNDINGS * engine.unit_roundoff(), pair, start, periods)
 }
 
-/// The same for moves by a share `amount` of every number.
+/// Returns the sensitivity to relative changes by `amount` of the start and of each parameter.
 pub(super) fn sensitivity_to(amount: f64, pair: &GearPair, start: State, periods: u32) -> f64 {
-    let Ok(end) = after(pair, start, periods) else { return f64::INFINITY };
+    let Ok(end) = state_after(pair, start, periods) else { return f64::INFINITY };
     let moved_start = |k: usize| {
         let mut moved = start;
         moved[k % 4] += if k < 4 { amount } else { -amount } * start[k % 4].abs().max(pair.b);
-        after(pair, moved, periods)
+        state_after(pair, moved, periods)
     };
     let moved_pair = |k: usize| {
         let sign = if k.is_multiple_of(2) { amount } else { -amount };
         let mut moved = *pair;
         let value = pair.value(k / 2) * (1.0 + sign);
-        // A restitution of 1 has but one side.
-        moved.set_at(k / 2, value).ok().map(|()| after(&moved, start, periods))
+        // A restitution of 1 can only decrease.
+        moved.set_at(k / 2, value).ok().map(|()| state_after(&moved, start, periods))
     };
     let ends = (0..8).map(moved_start).chain((0..2 * GearPair::PARAMETERS.len()).filter_map(moved_pair));
     let size = end.iter().fold(pair.b, |m, x| m.max(x.abs()));
-    ends.map(|moved| moved.map_or(f64::INFINITY, |moved| apart(&moved, &end))).fold(amount * size, farther)
+    ends.map(|moved| moved.map_or(f64::INFINITY, |moved| state_distance(&moved, &end)))
+        .fold(amount * size, farther)
 }
 
-/// What rounding may make of an error after so many steps: the reference is moved by four
-/// roundings at once, every step rounds, and roundings add up like a random walk.
+/// Returns the error that rounding may cause in so many steps. The sensitivity belongs to four roundings at once, every
+/// step rounds, and roundings add up like a random walk.
 pub(super) fn bar(sensitivity: f64, steps: f64) -> f64 {
     const FACTOR: f64 = 4.0;
     (FACTOR + steps.sqrt() / ROUNDINGS) * sensitivity
 }
 
-/// Where rounding may do more than this, an error says nothing.
-pub(super) const UNFORESEEN: f64 = 0.1;
+/// Largest bound with which errors are compared. Where rounding may cause more, an error shows nothing.
+pub(super) const UNPREDICTABLE: f64 = 0.1;

@@ -1,34 +1,36 @@
 //! Chatter as restitution goes to one: infinitely many impacts in finite time.
 //!
-//! A pair starts on the right wall, pressed by the force `G = F / m1` and leaving at
-//! `u = T0 G (1 - e) / 2`, so that its series of impacts, each `e` times slower than the last, takes
-//! about `T0` whatever `e` is; the number of impacts down to any speed grows like `1 / (1 - e)`.
-//! Without a meshing speed the series is closed by its limit. The truth for that is the reference
-//! with a meshing speed of `1e-9`, which takes impact after impact; for other rows it is the
-//! reference itself.
+//! A pair starts on the right wall, to which the force `G = F / m1` presses it, and leaves at `u = T0 G (1 - e) / 2`. Each
+//! impact is `e` times slower than the last, so the series takes about `T0` for every `e`, and the number of impacts down
+//! to any speed grows like `1 / (1 - e)`. If the meshing speed is zero, engines replace the series by its limit. The
+//! correct answer is then that of the reference with a meshing speed of `1e-9`, which computes each impact; for other rows
+//! it is that of the reference itself.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::cells::{EngineName, UNFORESEEN, after, apart, flow_of, paper, sensitivity, sensitivity_to};
+use super::cells::{
+    EngineName, UNPREDICTABLE, paper, run_reference, sensitivity, sensitivity_to, state_after, state_distance,
+};
 use super::lanes::{Lanes, Start};
-use super::{Part, Size, Verdict};
+use super::{Size, Verdict};
 use rattlemap::gpu::{GpuError, LaneSettings};
+use rattlemap::record::classify::status;
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::{Status, status_of};
-use rattlemap_dynamics::reference::{Stop, Trajectory};
+use rattlemap_dynamics::reference::Stop;
 
-/// Duration of the series; the force presses for five units of time.
+/// Duration of the series. The force presses for five units of time.
 const DURATION: f64 = 0.2;
 
-/// Frequency: the force hardly changes meanwhile.
+/// Excitation frequency, so low that the force hardly changes during the series.
 const OMEGA: f64 = 0.3;
 
-/// A meshing speed this small is as good as none, and yet met by impacts one by one. That truth
-/// itself is known to no more than what a share of this size does to the motion.
+/// Meshing speed that is practically zero but still makes the reference compute each impact. Its result is as uncertain as
+/// a relative change of this size makes it.
 const TINY: f64 = 1e-9;
 
-/// Errors may be this many times what rounding of starts and parameters does.
+/// Factor by which errors may exceed the effect of rounding of starts and parameters.
 const FACTOR: f64 = 8.0;
 
 /// One restitution on one engine.
@@ -38,26 +40,26 @@ pub struct Row {
     pub e: f64,
     /// Leaving speed at which meshing starts.
     pub mesh_speed: f64,
-    /// Who computed it.
+    /// The engine.
     pub engine: EngineName,
-    /// How it ended: a status's name.
+    /// Name of the status.
     pub status: &'static str,
-    /// Impacts in the forcing period, taken one by one on the reference.
+    /// Number of impacts in the forcing period when the reference computes each.
     pub impacts: u64,
-    /// Largest difference of the state's entries after the forcing period.
+    /// Largest difference of the state's components after the forcing period.
     pub error: Option<f64>,
-    /// What it may be; beyond 0.1 anything.
+    /// Largest allowed error. Above 0.1 any error is allowed.
     pub bar: Option<f64>,
 }
 
 struct Case {
     start: Start,
-    /// How the truth ends, and its impacts.
-    truth: Result<[f64; 4], Stop>,
+    /// Final state of the correct answer, or why the reference stopped.
+    expected: Result<[f64; 4], Stop>,
     impacts: u64,
 }
 
-/// Runs every restitution on every engine.
+/// Computes every restitution on every engine.
 ///
 /// # Errors
 /// A [`GpuError`].
@@ -78,9 +80,8 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
                 .par_iter()
                 .zip(records)
                 .map(|(case, record)| {
-                    let status = Status::from_code(record.status).unwrap_or(Status::NonFinite);
-                    let state = (status == Status::Ok).then_some(record.strobe);
-                    row(case, precision.into(), status, state)
+                    let state = (status(&record) == Status::Ok).then_some(record.strobe);
+                    row(case, precision.into(), status(&record), state)
                 })
                 .collect::<Vec<_>>(),
         );
@@ -88,10 +89,10 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
     Ok(rows)
 }
 
-/// `1 - e` is `less`.
+/// Returns the cell with restitution `1 - less`.
 fn cell(less: f64, mesh_speed: f64) -> Start {
     let pair = GearPair { mesh_speed, ..paper(1.0 - less, OMEGA) };
-    // An elastic series never slows down: any speed does.
+    // An elastic series never slows down, so any speed will do.
     let share = if less > 0.0 { less } else { 1e-2 };
     let leaving = 0.5 * DURATION * (pair.force / pair.m1) * share;
     (pair, [pair.b, -leaving, 0.0, 0.0])
@@ -99,16 +100,13 @@ fn cell(less: f64, mesh_speed: f64) -> Start {
 
 fn case((pair, start): Start) -> Case {
     let one_by_one = GearPair { mesh_speed: pair.mesh_speed.max(TINY), ..pair };
-    let flow = flow_of(&one_by_one);
-    let mut trajectory = Trajectory::new(&flow, one_by_one.law(), start);
-    let ended = trajectory.advance_period(&mut ());
-    let truth = ended.map(|()| trajectory.state());
-    Case { start: (pair, start), truth, impacts: trajectory.work().impacts }
+    let (expected, work) = run_reference(&one_by_one, start, 1);
+    Case { start: (pair, start), expected, impacts: work.impacts }
 }
 
 fn on_reference(case: &Case) -> Row {
     let (pair, start) = case.start;
-    match after(&pair, start, 1) {
+    match state_after(&pair, start, 1) {
         Ok(state) => row(case, EngineName::Reference, Status::Ok, Some(state)),
         Err(stop) => row(case, EngineName::Reference, status_of(stop), None),
     }
@@ -116,10 +114,10 @@ fn on_reference(case: &Case) -> Row {
 
 fn row(case: &Case, engine: EngineName, status: Status, state: Option<[f64; 4]>) -> Row {
     let (pair, start) = case.start;
-    let error = state.zip(case.truth.ok()).map(|(state, truth)| apart(&state, &truth));
+    let error = state.zip(case.expected.ok()).map(|(state, expected)| state_distance(&state, &expected));
     let bar = || {
-        let truth = if pair.mesh_speed < TINY { sensitivity_to(TINY, &pair, start, 1) } else { 0.0 };
-        FACTOR * sensitivity(&pair, start, 1, engine).max(truth)
+        let tiny = if pair.mesh_speed < TINY { sensitivity_to(TINY, &pair, start, 1) } else { 0.0 };
+        FACTOR * sensitivity(&pair, start, 1, engine).max(tiny)
     };
     Row {
         e: pair.e,
@@ -128,13 +126,12 @@ fn row(case: &Case, engine: EngineName, status: Status, state: Option<[f64; 4]>)
         status: status.name(),
         impacts: case.impacts,
         error,
-        // Where nothing ended, nothing is compared.
         bar: error.map(|_| bar()),
     }
 }
 
-/// Every series ends: on its meshing, within what rounding does, or in `cap_events` where there
-/// are more impacts than the engine's cap.
+/// Requires that every series ends in meshing, with an error within rounding, or in `cap_events` if it has more impacts
+/// than the engine's cap.
 pub fn judge(rows: &[Row]) -> Verdict {
     let cap = |engine: EngineName| match engine {
         EngineName::Reference => rattlemap_dynamics::reference::EVENTS_PER_PERIOD_CAP,
@@ -142,35 +139,32 @@ pub fn judge(rows: &[Row]) -> Verdict {
     };
     let good = |row: &&Row| match (row.status, row.error) {
         ("ok", Some(error)) => {
-            error.is_finite() && row.bar.is_none_or(|bar| bar > UNFORESEEN || error <= bar)
+            error.is_finite() && row.bar.is_none_or(|bar| bar > UNPREDICTABLE || error <= bar)
         }
-        // The truth itself has no end below its cap, but this series was closed.
+        // The reference reaches its cap when it computes each impact. This engine replaced the series by its limit.
         ("ok", None) => row.mesh_speed < TINY,
         ("cap_events", _) => row.impacts > cap(row.engine),
         _ => false,
     };
     let bad = rows.iter().filter(|row| !good(row)).count();
     let ok = rows.iter().filter(|row| row.status == "ok").count();
-    let foreseen = rows.iter().filter(|row| row.bar.is_some_and(|bar| bar <= UNFORESEEN)).count();
-    let nearest = |rows: &mut dyn Iterator<Item = &Row>| {
-        rows.filter(|row| row.status == "ok" && row.e < 1.0).map(|row| row.e).fold(0.0, f64::max)
+    let comparable = rows.iter().filter(|row| row.bar.is_some_and(|bar| bar <= UNPREDICTABLE)).count();
+    let nearest = |engine: EngineName| {
+        let of_engine = rows.iter().filter(|row| row.engine == engine);
+        of_engine.filter(|row| row.status == "ok" && row.e < 1.0).map(|row| row.e).reduce(f64::max)
     };
-    let told: Vec<String> = EngineName::ALL
+    let by_engine: Vec<String> = EngineName::ALL
         .into_iter()
-        .filter(|&engine| rows.iter().any(|row| row.engine == engine))
-        .map(|engine| {
-            let e = nearest(&mut rows.iter().filter(|row| row.engine == engine));
-            format!("{} up to 1 - e = {:.0e}", engine.name(), 1.0 - e)
-        })
+        .filter_map(|engine| Some((engine, nearest(engine)?)))
+        .map(|(engine, e)| format!("{} up to 1 - e = {:.0e}", engine.name(), 1.0 - e))
         .collect();
     Verdict {
-        part: Part::Chatter.name(),
-        holds: bad == 0 && foreseen > rows.len() / 3,
+        holds: bad == 0 && comparable > rows.len() / 3,
         sentence: format!(
-            "{} series of impacts, {ok} followed to their ends ({}), the others ended by cap_events; {foreseen} \
+            "{} series of impacts, {ok} computed to their ends ({}), the others stopped by cap_events; {comparable} \
              could be compared, {bad} are wrong",
             rows.len(),
-            told.join(", ")
+            by_engine.join(", ")
         ),
     }
 }

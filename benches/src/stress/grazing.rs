@@ -1,24 +1,22 @@
-//! The approach to grazing: what an error in the gap makes of the speed of contact.
+//! The approach to grazing: how an error in the gap changes the contact speed.
 //!
-//! Gear 1 swings in its steady state `x1 = A cos(omega t - phi)` and gear 2 rests until they meet.
-//! With the amplitude a distance `d b` beyond the wall, `A = b (1 + d)`, the first contact has the
-//! speed
+//! Gear 1 swings in its steady state `x1 = A cos(omega t - phi)`, and gear 2 rests until they meet. If the amplitude exceeds
+//! the wall's distance by `d b`, so that `A = b (1 + d)`, the first contact has the speed
 //!
 //! ```text
 //! w = omega b s(d),   s(d) = sqrt(d (2 + d)),
 //! ```
 //!
-//! so an error `eps` in the gap becomes one of `s(d + eps) - s(d)` in the speed: it grows like
-//! `eps / sqrt(2 d)` and ends as the square root `sqrt(2 eps)` at the graze itself. That is the
-//! conditioning of the problem; no method in the same precision does better. Short of the wall, d
-//! below zero, there is no contact at all.
+//! so an error `eps` in the gap changes `s(d)` to `s(d + eps)`. The error of the speed grows like `eps / sqrt(2 d)` and
+//! reaches `sqrt(2 eps)` at grazing itself. This is the conditioning of the problem; no method of the same precision does
+//! better. If `d` is negative, there is no contact.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::{EngineName, flow_of, paper};
 use super::lanes::{Lanes, Start};
-use super::{Part, Size, Verdict, readout};
+use super::{Size, Verdict, readout};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::map::random::Random;
 use rattlemap::record::Record;
@@ -26,52 +24,50 @@ use rattlemap::record::distance::farther;
 use rattlemap_dynamics::model::{GearPair, Side};
 use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
-/// Roundings of the gap that an engine is allowed: a dozen steps come before the contact, and a
-/// step rounds eight times.
+/// Allowed error of the gap in unit roundoffs: about a dozen steps precede the contact, and each rounds eight times.
 pub const ROUNDINGS: f64 = 96.0;
 
 /// One distance on one engine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Who computed it.
+    /// The engine.
     pub engine: EngineName,
-    /// How far the amplitude reaches beyond the wall, in units of half the backlash; negative
-    /// where it ends short of it.
+    /// Distance of the amplitude behind the wall, in units of half the backlash; negative if the swing misses the wall.
     pub distance: f64,
-    /// Cells examined.
+    /// Number of cells.
     pub cells: usize,
-    /// Cells in which there was a contact.
+    /// Number of cells with a contact.
     pub contacts: usize,
-    /// Largest error of the speed of contact, in units of `omega b`.
+    /// Largest error of the contact speed, in units of `omega b`.
     pub speed_error: f64,
-    /// What an error of [`ROUNDINGS`] roundings of the gap makes of it.
+    /// Change of the contact speed if the gap has an error of [`ROUNDINGS`] unit roundoffs.
     pub law: f64,
 }
 
-/// A swing whose amplitude is `b (1 + distance)`.
+/// Returns a swing with amplitude `b (1 + distance)`.
 pub(super) fn swing(distance: f64, random: &mut Random) -> Start {
     let mut number = |low: f64, high: f64| low + (high - low) * random.unit();
     let base = GearPair { r1: number(4.0, 8.0), ..paper(number(0.0, 1.0), number(2.0, 6.0)) };
     let GearPair { m1, r1, k1, omega, b, .. } = base;
-    // F / A as a complex number: the phase lag keeps the start away from both walls.
+    // F / A as a complex number. Its phase keeps the start away from both walls.
     let [re, im] = [k1 - m1 * omega * omega, r1 * omega];
     let [size, amplitude] = [re.hypot(im), b * (1.0 + distance)];
     let pair = GearPair { force: amplitude * size, ..base };
     (pair, [amplitude * re / size, amplitude * omega * im / size, 0.0, 0.0])
 }
 
-/// The speed of contact in units of `omega b`.
+/// Returns the contact speed in units of `omega b`.
 fn speed(distance: f64) -> f64 {
     let distance = distance.max(0.0);
     (distance * (2.0 + distance)).sqrt()
 }
 
-/// What an error `eps` of the gap may do to it.
+/// Returns the largest change of the contact speed for an error `eps` of the gap.
 fn law(distance: f64, eps: f64) -> f64 {
     (speed(distance + eps) - speed(distance)).max(speed(distance) - speed(distance - eps))
 }
 
-/// Tries every distance on every engine.
+/// Computes every distance on every engine.
 ///
 /// # Errors
 /// A [`GpuError`].
@@ -100,7 +96,7 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Vec<Row>, Gpu
     Ok(rows)
 }
 
-/// The speed of the first contact if it is with the right wall: the swing goes there first.
+/// Returns the speed of the reference's first contact, which must be with the right wall.
 fn on_reference((pair, start): &Start) -> Option<f64> {
     let flow = flow_of(pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), *start);
@@ -109,7 +105,7 @@ fn on_reference((pair, start): &Start) -> Option<f64> {
     events.first().filter(|event| event.side == Side::Right).map(|event| event.before[1])
 }
 
-/// The same of a lane that ends at its first contact.
+/// Returns the speed of a lane's first contact. The lane ends there.
 pub(super) fn contact_speed(start: &Start, record: &Record, steps: Option<u32>) -> Option<f64> {
     readout::contact(start, record, steps).map(|contact| contact.w[0]).filter(|&w| w > 0.0)
 }
@@ -135,8 +131,8 @@ fn tabulate(engine: EngineName, distances: &[f64], starts: &[Start], speeds: &[O
     distances.iter().enumerate().map(row).collect()
 }
 
-/// Errors obey the square-root law, no graze that is more than rounding deep is missed and
-/// none that ends short of the wall is made up.
+/// Requires that errors obey the square-root law, and that beyond rounding no contact is missed and none is reported for a
+/// swing that misses the wall.
 pub fn judge(rows: &[Row]) -> Verdict {
     let resolved = |row: &Row| row.distance.abs() > ROUNDINGS * row.engine.unit_roundoff();
     let missed: usize = rows
@@ -144,19 +140,16 @@ pub fn judge(rows: &[Row]) -> Verdict {
         .filter(|row| resolved(row) && row.distance > 0.0)
         .map(|row| row.cells - row.contacts)
         .sum();
-    let made_up: usize =
+    let invented: usize =
         rows.iter().filter(|row| resolved(row) && row.distance < 0.0).map(|row| row.contacts).sum();
-    // Where nothing met the wall there is no speed.
-    let met = rows.iter().filter(|row| row.contacts > 0);
-    let worst = met.map(|row| row.speed_error / row.law).fold(0.0, farther);
-    let holds = missed == 0 && made_up == 0 && worst <= 1.0;
+    let with_contact = rows.iter().filter(|row| row.contacts > 0);
+    let worst = with_contact.map(|row| row.speed_error / row.law).fold(0.0, farther);
     let cells: usize = rows.iter().map(|row| row.cells).sum();
     Verdict {
-        part: Part::Grazing.name(),
-        holds,
+        holds: missed == 0 && invented == 0 && worst <= 1.0,
         sentence: format!(
-            "{cells} swings up to a wall: {missed} contacts missed, {made_up} made up beyond rounding; errors of \
-             the contact speed at most {worst:.2} of the square-root law of {ROUNDINGS} roundings"
+            "{cells} swings up to a wall: {missed} contacts missed, {invented} invented beyond rounding; errors of \
+             the contact speed at most {worst:.2} of the square-root law for {ROUNDINGS} roundings"
         ),
     }
 }

@@ -1,12 +1,11 @@
-//! Momentum and energy at impacts: equation (22) as it is kept in rounded numbers.
+//! Momentum and energy at impacts: how well rounded numbers obey equation (22).
 //!
-//! A contact keeps the momentum `m1 v1 + m2 v2` and takes the energy
-//! `(1 - e^2) m1 m2 / (m1 + m2) w^2 / 2`. Engines carry the rates `w = v1 - v2` and `v2`, so the
-//! velocity of gear 1 is known to a rounding of `|w| + |v2|`: less than of itself where a heavy gear 1
-//! hardly moves. Deviations are given in unit roundoffs of the engine relative to
-//! `m1 (|w| + |v2|) + m2 |v2|` and `m1 (|w| + |v2|)^2 + m2 v2^2`. The reference reports the states of
-//! every event; lanes are ended at their first contact by a form of the shader that shows the
-//! velocities before and after.
+//! A contact conserves the momentum `m1 v1 + m2 v2` and dissipates the energy `(1 - e^2) m1 m2 / (m1 + m2) w^2 / 2`. Engines
+//! store the rates `w = v1 - v2` and `v2`, so they know the velocity of gear 1 to a rounding of `|w| + |v2|`. For a heavy
+//! gear 1 that hardly moves this is less precise than a rounding of its own velocity. Deviations are given in unit
+//! roundoffs of the engine, relative to `m1 (|w| + |v2|) + m2 |v2|` and `m1 (|w| + |v2|)^2 + m2 v2^2`. The reference reports
+//! the states at every event. Lanes run a variant of the shader that ends at the first contact and returns the velocities
+//! before and after.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -14,7 +13,7 @@ use serde::Serialize;
 use super::cells::{EngineName, flow_of, paper};
 use super::lanes::{Lanes, Start};
 use super::readout::{self, Contact};
-use super::{Part, Size, Verdict};
+use super::{Size, Verdict};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::map::random::Random;
 use rattlemap::record::distance::farther;
@@ -22,17 +21,17 @@ use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{GearPair, State};
 use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
 
-/// Restitutions, and masses of the two gears.
+/// Restitutions and masses of the two gears.
 const RESTITUTIONS: [f64; 7] = [0.0, 0.06, 0.3, 0.605, 0.9, 0.999, 1.0];
 const MASSES: [[f64; 2]; 5] = [[2.0, 1.0], [1.0, 1.0], [0.3, 7.0], [1e-3, 1e3], [1e3, 1e-3]];
 
-/// Roundings that the law itself takes: a state is four numbers, the law some ten operations.
+/// Largest allowed deviation in unit roundoffs. A state has four numbers, and the law takes about ten operations.
 const ROUNDINGS: f64 = 16.0;
 
-/// The worst of all impacts of one pair on one engine.
+/// The largest deviations of one pair on one engine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Who computed it.
+    /// The engine.
     pub engine: EngineName,
     /// Restitution.
     pub e: f64,
@@ -40,15 +39,15 @@ pub struct Row {
     pub m1: f64,
     /// Mass of gear 2.
     pub m2: f64,
-    /// Contacts examined.
+    /// Number of contacts.
     pub contacts: u64,
     /// Largest change of momentum, in unit roundoffs.
     pub momentum_error: f64,
-    /// Largest deviation of the energy taken from that of the law, in unit roundoffs.
+    /// Largest deviation of the dissipated energy, in unit roundoffs.
     pub energy_error: f64,
 }
 
-/// Takes the worst of what it is shown.
+/// Collects the largest deviations of a pair.
 struct Worst<'p> {
     pair: &'p GearPair,
     row: Row,
@@ -60,12 +59,12 @@ impl Worst<'_> {
         Worst { pair, row: Row { engine, e, m1, m2, contacts: 0, momentum_error: 0.0, energy_error: 0.0 } }
     }
 
-    /// A contact, by the rates `[w, v2]` before and after.
-    fn take(&mut self, before: [f64; 2], after: [f64; 2]) {
+    /// Adds a contact with these rates `[w, v2]` before and after.
+    fn add(&mut self, before: [f64; 2], after: [f64; 2]) {
         let GearPair { e, m1, m2, .. } = *self.pair;
         let unit = self.row.engine.unit_roundoff();
-        // Twice the energy.
         let momentum = |[w, v2]: [f64; 2]| m1 * (w + v2) + m2 * v2;
+        // The functions below return twice the energy.
         let energy = |[w, v2]: [f64; 2]| m1 * (w + v2) * (w + v2) + m2 * v2 * v2;
         let moduli = |rates: [f64; 2]| rates.map(f64::abs);
         let law = (1.0 - e * e) * (m1 * m2 / (m1 + m2)) * before[0] * before[0];
@@ -79,20 +78,17 @@ impl Worst<'_> {
     }
 }
 
-/// Contacts among events.
-struct Contacts<'w, 'p>(&'w mut Worst<'p>);
-
-impl Observer for Contacts<'_, '_> {
-    fn event(&mut self, happening: &GapEvent) {
+impl Observer for Worst<'_> {
+    fn event(&mut self, event: &GapEvent) {
         let rates = |q: &Gap| [q[1], q[3]];
-        // An end of meshing leaves the state as it is.
-        if happening.before[1] != happening.after[1] {
-            self.0.take(rates(&happening.before), rates(&happening.after));
+        // The end of meshing does not change the state.
+        if event.before[1] != event.after[1] {
+            self.add(rates(&event.before), rates(&event.after));
         }
     }
 }
 
-/// Examines contacts of every pair on every engine.
+/// Computes contacts of every pair on every engine.
 ///
 /// # Errors
 /// A [`GpuError`].
@@ -117,7 +113,7 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Vec<Row>, Gpu
             let mut worst = Worst::new(pair, precision.into());
             for k in i * starts_per_pair..(i + 1) * starts_per_pair {
                 if let Some(Contact { w, v2 }) = readout::contact(&starts[k], &records[k], None) {
-                    worst.take([w[0], v2[0]], [w[1], v2[1]]);
+                    worst.add([w[0], v2[0]], [w[1], v2[1]]);
                 }
             }
             rows.push(worst.row);
@@ -132,8 +128,8 @@ fn on_reference(pair: &GearPair, horizon: u32) -> Row {
     let mut worst = Worst::new(pair, EngineName::Reference);
     let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, 1.0, 0.0, -1.0]);
     for _ in 0..horizon {
-        if trajectory.advance_period(&mut Contacts(&mut worst)).is_err() {
-            // Says so by having met nothing.
+        if trajectory.advance_period(&mut worst).is_err() {
+            // Zero contacts make the verdict fail.
             worst.row.contacts = 0;
             break;
         }
@@ -141,7 +137,7 @@ fn on_reference(pair: &GearPair, horizon: u32) -> Row {
     worst.row
 }
 
-/// A start between the walls that reaches one of them soon.
+/// Returns a start between the walls that soon reaches one of them.
 fn closing(pair: &GearPair, random: &mut Random) -> State {
     let mut number = |low: f64, high: f64| low + (high - low) * random.unit();
     let (gap, speed) = (number(-0.9, 0.9) * pair.b, number(1.0, 6.0));
@@ -150,12 +146,12 @@ fn closing(pair: &GearPair, random: &mut Random) -> State {
     [gap + x2, w + v2, x2, v2]
 }
 
-/// Both laws hold to rounding, and there were contacts to see it at.
+/// Requires that there are contacts and that both laws hold to rounding.
 pub fn judge(rows: &[Row]) -> Verdict {
     let holds = rows
         .iter()
         .all(|row| row.contacts > 0 && row.momentum_error <= ROUNDINGS && row.energy_error <= ROUNDINGS);
-    let told = EngineName::ALL.into_iter().filter_map(|engine| {
+    let by_engine = EngineName::ALL.into_iter().filter_map(|engine| {
         let of_engine = || rows.iter().filter(move |row| row.engine == engine);
         of_engine().next()?;
         let worst = |of: fn(&Row) -> f64| of_engine().map(of).fold(0.0, farther);
@@ -163,14 +159,13 @@ pub fn judge(rows: &[Row]) -> Verdict {
         let (momentum, energy) = (worst(|row| row.momentum_error), worst(|row| row.energy_error));
         Some(format!("{} {momentum:.1} and {energy:.1} at {contacts} contacts", engine.name()))
     });
-    let told: Vec<String> = told.collect();
-    let kept = if holds { "kept" } else { "NOT kept" };
+    let by_engine: Vec<String> = by_engine.collect();
+    let hold = if holds { "hold" } else { "do NOT hold" };
     Verdict {
-        part: Part::Impacts.name(),
         holds,
         sentence: format!(
-            "momentum and the law of energy are {kept} to rounding; largest deviations in unit roundoffs: {}",
-            told.join(", ")
+            "the laws of momentum and energy {hold} to rounding; largest deviations in unit roundoffs: {}",
+            by_engine.join(", ")
         ),
     }
 }

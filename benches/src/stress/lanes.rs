@@ -1,15 +1,16 @@
-//! Lanes in every precision that the device has.
+//! Runs cells in lanes, in every precision that the device has.
 
+use super::cells::oscillator_of;
 use rattlemap::gpu::{self, AdapterChoice, Gpu, GpuError, Lane, LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, State};
 
-/// Cells are handed to a device so many at a time: every one has its own flow,
+/// Largest number of cells in one run of a device. Each has its own flow.
 pub(super) const CHUNK: usize = 4096;
-/// and its own phasors, one per step: fewer cells where there are more steps than this.
+/// Above this number of steps per period a run has fewer cells, because each cell has a phasor per step.
 const STEPS_OF_CHUNK: usize = 1024;
 
-/// A cell and where it starts.
+/// A cell and its start.
 pub(super) type Start = (GearPair, State);
 
 /// Open devices, one per precision.
@@ -18,37 +19,36 @@ pub struct Lanes {
 }
 
 impl Lanes {
-    /// Opens the adapter that `map` would take, in f32 and, where it can, in f64.
+    /// Opens the adapter that `map` would use, in f32 and, if the adapter can, in f64.
     ///
     /// # Errors
-    /// [`GpuError`] if there is no adapter, or it computes wrongly.
+    /// [`GpuError`] if there is no adapter, or if it computes wrong results.
     pub async fn open(choice: &AdapterChoice) -> Result<Lanes, GpuError> {
         let mut devices = vec![Gpu::open(Precision::F32, choice).await?];
         match Gpu::open(Precision::F64, choice).await {
             Ok(device) => devices.push(device),
-            // Not every device has double precision.
             Err(GpuError::NoAdapter { .. }) => {}
             Err(error) => return Err(error),
         }
         Ok(Lanes { devices })
     }
 
-    /// The precisions there are.
+    /// Returns the precisions of the adapter.
     pub fn precisions(&self) -> Vec<Precision> {
         self.devices.iter().map(Gpu::precision).collect()
     }
 
-    /// What the lanes run on, in words.
+    /// Returns the name of the adapter.
     pub fn device(&self) -> String {
         gpu::describe(self.devices[0].adapter())
     }
 
-    /// Compiles shaders from here on as `rewrite` turns them.
+    /// Makes the following runs use shaders that `rewrite` returns.
     pub(super) fn rewrite(&mut self, rewrite: fn(String) -> String) {
         self.devices.iter_mut().for_each(|gpu| gpu.rewrite_shaders(rewrite));
     }
 
-    /// One record per cell.
+    /// Returns one record per cell.
     pub(super) fn run(
         &mut self,
         precision: Precision,
@@ -59,19 +59,14 @@ impl Lanes {
         let steps = settings.steps_per_period.map_or(0, |steps| steps as usize);
         let most = CHUNK * STEPS_OF_CHUNK / steps.max(STEPS_OF_CHUNK);
         for chunk in cells.chunks(most.max(1)) {
-            let flows: Vec<_> =
-                chunk.iter().map(|(pair, _)| pair.oscillator().expect("cells are made valid")).collect();
+            let flows: Vec<_> = chunk.iter().map(|(pair, _)| oscillator_of(pair)).collect();
             let laws: Vec<_> = chunk.iter().map(|(pair, _)| pair.law()).collect();
             let lanes: Vec<_> =
                 (0..).zip(chunk).map(|(i, &(_, start))| Lane { flow: i, law: i, start }).collect();
-            let gpu = self.device_mut(precision);
+            let gpu = self.devices.iter_mut().find(|gpu| gpu.precision() == precision);
+            let gpu = gpu.expect("the precision is one of `precisions`");
             records.extend(pollster::block_on(gpu.run(&flows, &laws, &lanes, settings))?);
         }
         Ok(records)
-    }
-
-    fn device_mut(&mut self, precision: Precision) -> &mut Gpu {
-        let found = self.devices.iter_mut().find(|gpu| gpu.precision() == precision);
-        found.expect("the precision is one of `precisions`")
     }
 }

@@ -1,4 +1,4 @@
-//! The folder of `stress`: a table per part, figures, and the manifest.
+//! The folder of `stress`: tables, figures, and the manifest.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::{Report, Verdict, figures, fuzz};
+use super::{Verdict, fuzz};
 use rattlemap::show::error::WriteError;
 use rattlemap::store::error::OutputError;
 use rattlemap::store::folder::Folder;
@@ -14,7 +14,7 @@ use rattlemap::store::inventory::{self, FileEntry};
 use rattlemap::store::manifest::{Head, MANIFEST};
 use rattlemap_dynamics::model::{GearPair, Model};
 
-/// All that a folder may hold: what an earlier run left goes before anything is written.
+/// All files that a run may write. Those of an earlier run are removed before anything is written.
 const FILES: [&str; 15] = [
     MANIFEST,
     "long_runs.csv",
@@ -32,19 +32,6 @@ const FILES: [&str; 15] = [
     "fuzz.csv",
     "fuzz_mismatches.csv",
 ];
-
-/// How a report was made.
-#[derive(Clone, Copy, Debug)]
-pub struct Made<'a> {
-    /// `quick` or `full`.
-    pub size: &'a str,
-    /// Seed of everything random.
-    pub seed: u64,
-    /// What the lanes ran on.
-    pub device: &'a str,
-    /// How long it took.
-    pub elapsed: Duration,
-}
 
 #[derive(Serialize)]
 struct Manifest<'a> {
@@ -66,80 +53,73 @@ struct VerdictObject<'a> {
     sentence: &'a str,
 }
 
-impl<'a> From<&'a Verdict> for VerdictObject<'a> {
-    fn from(Verdict { part, holds, sentence }: &'a Verdict) -> Self {
+impl<'a> From<&'a (&'static str, Verdict)> for VerdictObject<'a> {
+    fn from((part, Verdict { holds, sentence }): &'a (&'static str, Verdict)) -> Self {
         VerdictObject { part, holds: *holds, sentence }
     }
 }
 
-/// Writes tables and figures, and the manifest last: a folder that has one is complete.
-/// Returns the files' names.
-///
-/// # Errors
-/// If a file cannot be written.
-pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> Result<Vec<&'static str>, OutputError> {
-    folder.remove(&FILES)?;
-    let mut files = Vec::new();
-    let mut file = |name: &'static str, write: &dyn Fn(&mut BufWriter<File>) -> Result<(), WriteError>| {
-        files.push(name);
-        folder.replace(name, write)
-    };
-    let device = made.device;
-    if let Some(found) = &report.long_runs {
-        file("long_runs.csv", &|out| rows(out, found))?;
-        file("long_runs.png", &|out| figures::long_runs(out, device, found))?;
-    }
-    if let Some(found) = &report.impacts {
-        file("impacts.csv", &|out| rows(out, found))?;
-    }
-    if let Some(found) = &report.grazing {
-        file("grazing.csv", &|out| rows(out, found))?;
-        file("grazing.png", &|out| figures::grazing(out, device, found))?;
-    }
-    if let Some(found) = &report.chatter {
-        file("chatter.csv", &|out| rows(out, found))?;
-    }
-    if let Some(found) = &report.stiffness {
-        file("stiffness.csv", &|out| rows(out, found))?;
-        file("stiffness.png", &|out| figures::stiffness(out, device, found))?;
-    }
-    if let Some(found) = &report.grid {
-        file("grid_swings.csv", &|out| rows(out, &found.swings))?;
-        file("grid_motions.csv", &|out| rows(out, &found.motions))?;
-        file("grid.png", &|out| figures::grid(out, device, &found.swings))?;
-    }
-    if let Some(found) = &report.work {
-        file("work.csv", &|out| rows(out, found))?;
-    }
-    if let Some(found) = &report.fuzz {
-        file("fuzz.csv", &|out| rows(out, &found.counts))?;
-        file("fuzz_mismatches.csv", &|out| mismatches(out, &found.mismatches))?;
-    }
-    let listed = inventory::entries(folder, &files)?;
-    files.push(MANIFEST);
-    let manifest = Manifest {
-        head: Head::of("stress"),
-        size: made.size,
-        seed: made.seed,
-        device: made.device,
-        threads: rayon::current_num_threads(),
-        elapsed_seconds: made.elapsed.as_secs_f64(),
-        verdicts: report.verdicts.iter().map(VerdictObject::from).collect(),
-        files: &listed,
-    };
-    inventory::write_manifest(folder, &manifest)?;
-    Ok(files)
+/// The files of a run.
+#[derive(Debug)]
+pub struct Files<'a> {
+    folder: &'a Folder,
+    names: Vec<&'static str>,
 }
 
-/// One line per row, under the names of its fields.
-fn rows<R: Serialize>(out: impl Write, rows: &[R]) -> Result<(), WriteError> {
-    let mut writer = csv::Writer::from_writer(out);
-    rows.iter().try_for_each(|row| writer.serialize(row))?;
-    Ok(writer.flush()?)
+impl<'a> Files<'a> {
+    /// Removes the files of an earlier run.
+    ///
+    /// # Errors
+    /// If a file cannot be removed.
+    pub fn new(folder: &'a Folder) -> Result<Files<'a>, OutputError> {
+        folder.remove(&FILES)?;
+        Ok(Files { folder, names: Vec::new() })
+    }
+
+    pub(super) fn write(
+        &mut self,
+        name: &'static str,
+        write: &dyn Fn(&mut BufWriter<File>) -> Result<(), WriteError>,
+    ) -> Result<(), OutputError> {
+        self.names.push(name);
+        self.folder.replace(name, write)
+    }
+
+    /// Writes a table with one line per row. Its columns have the names of the rows' fields.
+    pub(super) fn table<R: Serialize>(&mut self, name: &'static str, rows: &[R]) -> Result<(), OutputError> {
+        self.write(name, &|out| crate::write_rows(out, rows))
+    }
+
+    /// Writes the manifest, the last file: a folder that has one is complete. Returns the names of all files.
+    ///
+    /// # Errors
+    /// If the manifest cannot be written.
+    pub fn finish(
+        mut self,
+        (size, seed): (&str, u64),
+        device: &str,
+        elapsed: Duration,
+        verdicts: &[(&'static str, Verdict)],
+    ) -> Result<Vec<&'static str>, OutputError> {
+        let files = &inventory::entries(self.folder, &self.names)?;
+        let manifest = Manifest {
+            head: Head::of("stress"),
+            size,
+            seed,
+            device,
+            threads: rayon::current_num_threads(),
+            elapsed_seconds: elapsed.as_secs_f64(),
+            verdicts: verdicts.iter().map(VerdictObject::from).collect(),
+            files,
+        };
+        inventory::write_manifest(self.folder, &manifest)?;
+        self.names.push(MANIFEST);
+        Ok(self.names)
+    }
 }
 
-/// Cells that differ from the reference: what they are, in what, and why.
-fn mismatches(out: impl Write, mismatches: &[fuzz::Mismatch]) -> Result<(), WriteError> {
+/// Writes the cells that differ from the reference: engine, parameters, start, differences and explanation.
+pub(super) fn mismatches(out: impl Write, mismatches: &[fuzz::Mismatch]) -> Result<(), WriteError> {
     let mut writer = csv::Writer::from_writer(out);
     let names = GearPair::PARAMETERS.iter().map(|parameter| &*parameter.name);
     let header = std::iter::once("engine").chain(names);
@@ -147,17 +127,14 @@ fn mismatches(out: impl Write, mismatches: &[fuzz::Mismatch]) -> Result<(), Writ
     for mismatch in mismatches {
         let values = (0..GearPair::PARAMETERS.len()).map(|index| mismatch.pair.value(index));
         let numbers = values.chain(mismatch.start).map(|number| format!("{number:?}"));
-        let told = mismatch.differences.iter().map(|difference| {
+        let difference = |difference: &rattlemap::validate::Difference| {
             let side = |value| serde_json::to_string(value).unwrap_or_default().replace('"', "");
             let field = difference.field.name();
             format!("{field}: {} for {}", side(&difference.record), side(&difference.judge))
-        });
-        let told: Vec<String> = told.collect();
-        writer.write_record(
-            std::iter::once(mismatch.engine.name().to_owned())
-                .chain(numbers)
-                .chain([told.join("; "), mismatch.kind.name().to_owned()]),
-        )?;
+        };
+        let differences: Vec<String> = mismatch.differences.iter().map(difference).collect();
+        let last = [differences.join("; "), mismatch.kind.name().to_owned()];
+        writer.write_record([mismatch.engine.name().to_owned()].into_iter().chain(numbers).chain(last))?;
     }
     Ok(writer.flush()?)
 }

@@ -1,4 +1,4 @@
-//! DOP853 of the crate `ode_solvers` with event location: the adaptive library that also judges the reference
+//! DOP853 of the crate `ode_solvers` with event location. It also judges maps of the reference
 //! ([`rattlemap::validate::independent`]).
 
 use super::PERIODS;
@@ -7,7 +7,7 @@ use super::outcome::Outcome;
 use rattlemap::validate::independent::dop853::Solver;
 use rattlemap::validate::independent::flight::Flight;
 
-/// Integrates a subject at a relative and absolute tolerance.
+/// Integrates a subject with this relative and absolute tolerance.
 pub fn integrate(subject: &Subject, tolerance: f64) -> Outcome {
     let oscillator = &subject.oscillator;
     let solver = Solver { omega: oscillator.omega, tolerance };

@@ -1,4 +1,6 @@
-//! Which cells are integrated, from where, and what the reference makes of them.
+//! The cells, their starts, and the reference's results.
+
+use serde::Serialize;
 
 use super::outcome::Outcome;
 use super::{EVENTS, PERIODS};
@@ -7,48 +9,33 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
 use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
 
-/// Variants of a cell, side by side as on a map: their restitution grows by [`RESTITUTION_STEP`], the
+/// Number of variants of a cell, next to each other as in a map. Their restitution grows by [`RESTITUTION_STEP`], or their
 /// distance from grazing by an eighth.
 pub const VARIANTS: u32 = 8;
 
-/// A quarter of a column of a map of 1024.
+/// Difference of restitution: a quarter of that between columns of a map of 1024 columns.
 pub const RESTITUTION_STEP: f64 = 1.0 / 4096.0;
 
-/// Periods from rest to the motion that is measured.
+/// Forcing periods from rest to the measured motion.
 const SETTLING_PERIODS: u32 = 200;
 
-/// What a cell's motion is like.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Kinds of motion, in the order of tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// Periodic, with impacts alone.
+    /// Periodic, with impacts but no meshing.
     Impacts,
     /// Periodic, meshing on both sides.
     Meshing,
     /// Periodic, with series of impacts that end in meshing.
     Chatter,
-    /// Symmetric steady motion that passes the walls, or reaches beyond them, by a stated distance.
+    /// Symmetric steady motion that misses the walls, or reaches behind them, by a given distance.
     Grazing,
     /// Chaotic.
     Chaos,
 }
 
-impl Kind {
-    /// All kinds.
-    pub const ALL: [Kind; 5] = [Kind::Impacts, Kind::Meshing, Kind::Chatter, Kind::Grazing, Kind::Chaos];
-
-    /// The name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Impacts => "impacts",
-            Kind::Meshing => "meshing",
-            Kind::Chatter => "chatter",
-            Kind::Grazing => "grazing",
-            Kind::Chaos => "chaos",
-        }
-    }
-}
-
-/// Settled cells of Table 1: kind, restitution, frequency.
+/// Cells with the parameters of Table 1: kind, restitution, frequency.
 const SETTLED: [(Kind, f64, f64); 20] = [
     (Kind::Impacts, 0.45, 5.6),
     (Kind::Impacts, 0.56, 5.6),
@@ -72,18 +59,18 @@ const SETTLED: [(Kind, f64, f64); 20] = [
     (Kind::Chaos, 0.62, 5.6),
 ];
 
-/// How far the contact-free steady motion at e = 0.5, omega = 5.6 would reach beyond the walls:
-/// the force amplitude is set so. Negative distances miss.
+/// Distances that the contact-free steady motion at e = 0.5, omega = 5.6 would reach behind the walls; negative ones miss
+/// them. The amplitude of the force is set accordingly.
 const BEYOND: [f64; 5] = [-1e-3, -1e-5, 1e-2, 1e-3, 1e-4];
 
-/// One lane that every method integrates, and the answer.
+/// One lane that every method integrates, and the reference's result.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// Number of its cell, the same for all variants.
+    /// Number of the cell, equal for all variants.
     pub cell: u32,
-    /// What the motion is like.
+    /// The kind of motion.
     pub kind: Kind,
-    /// Distance beyond the walls, of grazing cells.
+    /// Distance behind the walls; `None` for cells that do not graze.
     pub beyond: Option<f64>,
     /// The parameters.
     pub pair: GearPair,
@@ -93,16 +80,13 @@ pub struct Subject {
     pub law: Law,
     /// State at phase 0, exact in f32.
     pub start: State,
-    /// What the reference ends with.
-    pub truth: Outcome,
-    /// Frobenius norm of the derivative of the last state by the start.
+    /// The reference's result.
+    pub exact: Outcome,
+    /// Frobenius norm of the derivative of the last state with respect to the start.
     pub amplification: f64,
 }
 
-/// The subjects, variants of a cell side by side: `cells` of every kind, [`VARIANTS`] of each.
-///
-/// # Panics
-/// If the reference cannot carry a cell, which none of the table does.
+/// Returns the subjects of `cells_per_kind` cells of each kind, with [`VARIANTS`] of each cell next to each other.
 pub fn subjects(cells_per_kind: usize) -> Vec<Subject> {
     let mut all = Vec::new();
     for (n, (kind, e, omega)) in table().into_iter().enumerate() {
@@ -127,18 +111,17 @@ pub fn subjects(cells_per_kind: usize) -> Vec<Subject> {
 
 fn table() -> Vec<(Kind, f64, f64)> {
     let grazing = BEYOND.map(|_| (Kind::Grazing, 0.5, 5.6));
-    let all = SETTLED.into_iter().chain(grazing);
-    let mut all: Vec<_> = all.collect();
-    all.sort_by_key(|(kind, ..)| Kind::ALL.iter().position(|k| k == kind));
+    let mut all: Vec<_> = SETTLED.into_iter().chain(grazing).collect();
+    all.sort_by_key(|(kind, ..)| *kind);
     all
 }
 
-/// The pair with the force at which gear 1 alone swings by `b + beyond`.
+/// Returns the pair with the force at which gear 1 alone swings by `b + beyond`.
 fn grazing(pair: GearPair, beyond: f64) -> GearPair {
     GearPair { force: (pair.b + beyond) / compliance(&pair), ..pair }
 }
 
-/// Amplitude of gear 1 per unit of force, contact-free.
+/// Returns the amplitude of gear 1 per unit of force, without contact.
 fn compliance(pair: &GearPair) -> f64 {
     (pair.k1 - pair.m1 * pair.omega * pair.omega).hypot(pair.r1 * pair.omega).recip()
 }
@@ -158,18 +141,18 @@ fn subject(cell: u32, kind: Kind, beyond: Option<f64>, pair: GearPair) -> Subjec
         }
     };
     let start = start.map(|x| f64::from(x as f32));
-    let (truth, amplification) = reference(&flow, law, start);
-    Subject { cell, kind, beyond, pair, oscillator, law, start, truth, amplification }
+    let (exact, amplification) = (by_reference(&flow, law, start), amplification(&flow, law, start));
+    Subject { cell, kind, beyond, pair, oscillator, law, start, exact, amplification }
 }
 
-/// Contact-free steady motion at phase 0: `x1 = Re(F exp(i omega t) / (k1 - m1 omega^2 + i r1 omega))`.
+/// Returns the contact-free steady motion at phase 0: `x1 = Re(F exp(i omega t) / (k1 - m1 omega^2 + i r1 omega))`.
 fn steady(pair: &GearPair) -> State {
     let amplitude = pair.force * compliance(pair);
     let lag = (pair.r1 * pair.omega).atan2(pair.k1 - pair.m1 * pair.omega * pair.omega);
     [amplitude * lag.cos(), amplitude * pair.omega * lag.sin(), 0.0, 0.0]
 }
 
-/// The latest events.
+/// Times of the latest events, the last one first; NaN if there is none.
 #[derive(Clone, Copy, Debug)]
 pub struct Latest(pub [f64; EVENTS]);
 
@@ -180,16 +163,16 @@ impl Default for Latest {
 }
 
 impl Latest {
-    /// Those of a flight.
+    /// Returns the latest events of a flight.
     pub fn of(flight: &Flight) -> Latest {
         let mut latest = Latest::default();
-        flight.events.iter().for_each(|ended| latest.note(ended.t));
+        flight.events.iter().for_each(|event| latest.add(event.t));
         latest
     }
 
-    /// Notes an event at a time since phase 0.
+    /// Adds an event at a time since phase 0.
     #[inline]
-    pub fn note(&mut self, t: f64) {
+    fn add(&mut self, t: f64) {
         self.0.rotate_right(1);
         self.0[0] = t;
     }
@@ -197,12 +180,12 @@ impl Latest {
 
 impl Observer for Latest {
     #[inline]
-    fn event(&mut self, happening: &GapEvent) {
-        self.note(happening.t);
+    fn event(&mut self, event: &GapEvent) {
+        self.add(event.t);
     }
 }
 
-/// The reference's answer.
+/// Integrates with the reference.
 pub fn by_reference(flow: &Flow, law: Law, start: State) -> Outcome {
     let mut latest = Latest::default();
     let mut trajectory = Trajectory::new(flow, law, start);
@@ -214,14 +197,14 @@ pub fn by_reference(flow: &Flow, law: Law, start: State) -> Outcome {
     Outcome { state: trajectory.state(), events: latest.0 }
 }
 
-fn reference(flow: &Flow, law: Law, start: State) -> (Outcome, f64) {
+fn amplification(flow: &Flow, law: Law, start: State) -> f64 {
     let columns = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
     let mut trajectory: Trajectory<'_, 4> = Trajectory::with_tangents(flow, law, start, columns);
     for _ in 0..PERIODS {
         trajectory.advance_period(&mut ()).expect("an ordinary cell");
     }
     let squares: f64 = trajectory.tangents().iter().flatten().map(|x| x * x).sum();
-    (by_reference(flow, law, start), squares.sqrt() * trajectory.log_scale().exp())
+    squares.sqrt() * trajectory.log_scale().exp()
 }
 
 #[cfg(test)]
@@ -231,7 +214,7 @@ mod tests {
     use rattlemap_dynamics::reference::EventKind::{Impact, MeshEnd, MeshStart};
 
     #[test]
-    fn cells_are_what_their_kind_says() {
+    fn cells_have_the_motion_of_their_kind() {
         for subject in subjects(5) {
             let flow = Flow::new(&subject.oscillator);
             let mut events: Vec<GapEvent> = Vec::new();
@@ -239,7 +222,7 @@ mod tests {
             for _ in 0..PERIODS {
                 trajectory.advance_period(&mut events).unwrap();
             }
-            // Peers need not know the rarest of the rules: pressing that ceases during contact onset.
+            // Peers need not implement the rarest rule: a contact force that changes sign during contact onset.
             let ends_off_the_wall = |e: &GapEvent| e.kind == MeshEnd && e.before[0] != flow.wall(e.side);
             assert!(!events.iter().any(ends_off_the_wall), "{:?}", subject.pair);
             let count = |kind| events.iter().filter(|event| event.kind == kind).count();
@@ -255,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn grazing_cells_pass_the_wall_at_the_stated_distance() {
+    fn grazing_cells_reach_the_given_distance() {
         for subject in subjects(5).iter().filter(|subject| subject.kind == Kind::Grazing) {
             let flow = Flow::new(&subject.oscillator);
             let samples = 10_000;
@@ -266,7 +249,7 @@ mod tests {
             };
             let widest = (0..samples).map(gap).fold(0.0f64, |m, z| m.max(z.abs()));
             let beyond = subject.beyond.unwrap();
-            // Half a sample off the turning point, and the start's rounding.
+            // The tolerance covers half a sample of distance from the turning point, and rounding of the start.
             assert!((widest - subject.pair.b - beyond).abs() < 2e-7, "{widest} {beyond}");
         }
     }

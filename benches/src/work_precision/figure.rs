@@ -1,4 +1,4 @@
-//! Run time against error, one curve per method.
+//! Figure of run time against error, with one curve per method.
 
 use std::io::Write;
 
@@ -13,13 +13,13 @@ use rattlemap::show::error::WriteError;
 
 const SIZE: (u32, u32) = (1500, 1280);
 const LEFT: f64 = 160.0;
-/// The setting at the end of a curve.
+/// Size of the text at the end of a curve.
 const SMALLEST: f64 = 18.0;
 const RADIUS: f64 = 7.0;
-/// Errors outside of this are drawn on its ends.
+/// Range of errors. Figures show errors outside at its ends.
 const ERRORS: (f64, f64) = (1e-16, 10.0);
 
-/// How a method is drawn.
+/// Label and marker of a method.
 struct Style {
     method: &'static str,
     label: &'static str,
@@ -27,48 +27,68 @@ struct Style {
     shape: Shape,
 }
 
-const fn style(method: &'static str, label: &'static str, color: Color, shape: Shape) -> Style {
-    Style { method, label, color, shape }
-}
-
-/// Methods in the order of the legend: circles for this project's.
-const STYLES: [Style; 12] = [
-    style("lane-f32", "lane, f32", [0xd5, 0x5e, 0x00], Shape::Circle),
-    style("lane-f64", "lane, f64", [0x00, 0x72, 0xb2], Shape::Circle),
-    style("reference", "reference (the measure)", [0x26, 0x26, 0x26], Shape::Circle),
-    style("rk4-wgsl-f32", "RK4 in WGSL, one loop, f32", [0xe6, 0x9f, 0x00], Shape::Triangle),
-    style("rk4-wgsl-f64", "RK4 in WGSL, one loop, f64", [0x56, 0xb4, 0xe9], Shape::Triangle),
-    style("rk4-phased-f32", "the same in two phases, f32", [0x9a, 0x6a, 0x00], Shape::Triangle),
-    style("rk4-phased-f64", "the same in two phases, f64", [0x1b, 0x6f, 0x8f], Shape::Triangle),
-    style("rk4-core", "RK4 in Rust", [0x60, 0x60, 0x60], Shape::Triangle),
-    style("rk4-numba", "RK4 in numba", [0xcc, 0x79, 0xa7], Shape::Triangle),
-    style("euler-core", "semi-implicit Euler in Rust", [0xaa, 0xaa, 0xaa], Shape::Square),
-    style("dop853-core", "DOP853 (ode_solvers)", [0x00, 0x9e, 0x73], Shape::Square),
-    style("heyoka", "heyoka", [0x6a, 0x3d, 0x9a], Shape::Square),
+/// Methods in the order of the legend. Those of this project have circles.
+const STYLES: [Style; 11] = [
+    Style { method: "lane-f32", label: "lane, f32", color: [0xd5, 0x5e, 0x00], shape: Shape::Circle },
+    Style { method: "lane-f64", label: "lane, f64", color: [0x00, 0x72, 0xb2], shape: Shape::Circle },
+    Style {
+        method: "reference",
+        label: "reference (error zero by definition)",
+        color: [0x26, 0x26, 0x26],
+        shape: Shape::Circle,
+    },
+    Style {
+        method: "rk4-wgsl-f32",
+        label: "RK4 in WGSL, one loop, f32",
+        color: [0xe6, 0x9f, 0x00],
+        shape: Shape::Triangle,
+    },
+    Style {
+        method: "rk4-wgsl-f64",
+        label: "RK4 in WGSL, one loop, f64",
+        color: [0x56, 0xb4, 0xe9],
+        shape: Shape::Triangle,
+    },
+    Style {
+        method: "rk4-phased-f32",
+        label: "RK4 in WGSL, two phases, f32",
+        color: [0x9a, 0x6a, 0x00],
+        shape: Shape::Triangle,
+    },
+    Style {
+        method: "rk4-phased-f64",
+        label: "RK4 in WGSL, two phases, f64",
+        color: [0x1b, 0x6f, 0x8f],
+        shape: Shape::Triangle,
+    },
+    Style { method: "rk4-core", label: "RK4 in Rust", color: [0x60, 0x60, 0x60], shape: Shape::Triangle },
+    Style { method: "rk4-numba", label: "RK4 in numba", color: [0xcc, 0x79, 0xa7], shape: Shape::Triangle },
+    Style {
+        method: "dop853-core",
+        label: "DOP853 (ode_solvers)",
+        color: [0x00, 0x9e, 0x73],
+        shape: Shape::Square,
+    },
+    Style { method: "heyoka", label: "heyoka", color: [0x6a, 0x3d, 0x9a], shape: Shape::Square },
 ];
 
-/// Which error is shown.
+/// Title, axis label and error of a figure.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shown {
+pub(super) struct View {
     pub(super) title: &'static str,
     pub(super) axis: &'static str,
     pub(super) error: fn(&Point) -> f64,
 }
 
-/// Draws the points as a PNG; `subtitle` names the hardware.
+/// Draws the points as a PNG. `subtitle` names the hardware.
 ///
 /// # Errors
 /// If the figure cannot be written.
-pub(super) fn write(
-    out: impl Write,
-    subtitle: &str,
-    shown: Shown,
-    points: &[Point],
-) -> Result<(), WriteError> {
-    write_figure(out, Format::Png, SIZE, |canvas| draw(canvas, subtitle, shown, points))
+pub(super) fn write(out: impl Write, subtitle: &str, view: View, points: &[Point]) -> Result<(), WriteError> {
+    write_figure(out, Format::Png, SIZE, |canvas| draw(canvas, subtitle, view, points))
 }
 
-fn draw(canvas: &Canvas, subtitle: &str, shown: Shown, points: &[Point]) {
+fn draw(canvas: &Canvas, subtitle: &str, view: View, points: &[Point]) {
     let present: Vec<(&Style, Vec<&Point>)> = STYLES
         .iter()
         .map(|style| (style, points.iter().filter(|point| point.method == style.method).collect()))
@@ -76,33 +96,34 @@ fn draw(canvas: &Canvas, subtitle: &str, shown: Shown, points: &[Point]) {
         .collect();
     let mut entries: Vec<Entry> = present.iter().map(|(style, _)| entry(style)).collect();
     if let Some((style, _)) =
-        present.iter().find(|(_, points)| points.iter().any(|point| is_lost(shown, point)))
+        present.iter().find(|(_, points)| points.iter().any(|point| is_lost(view, point)))
     {
         let marker = Marker { hollow: true, ..marker(style) };
-        entries.push(Entry::new(Key::Marker(marker), "hollow: a lane was lost"));
+        entries.push(Entry::new(Key::Marker(marker), "hollow: a lane failed"));
     }
     entries.push(Entry::new(
         Key::Mark { color: FAINT },
         "number: finest setting (steps per period, or tolerance)",
     ));
-    let top = draw_head(canvas, shown.title, subtitle, &entries) + 10.0;
-    let error = |point: &Point| (shown.error)(point).clamp(ERRORS.0, ERRORS.1);
-    let drawn = || present.iter().flat_map(|(style, points)| points.iter().map(move |point| (style, *point)));
+    let top = draw_head(canvas, view.title, subtitle, &entries) + 10.0;
+    let error = |point: &Point| (view.error)(point).clamp(ERRORS.0, ERRORS.1);
+    let points =
+        || present.iter().flat_map(|(style, points)| points.iter().map(move |point| (style, *point)));
     let frame = Frame {
         rect: canvas.panel(LEFT, top),
         x: Axis::decades(
             "microseconds per lane and forcing period (processor: times cores; graphics card: as a whole)",
-            drawn().map(|(_, point)| microseconds(point)),
+            points().map(|(_, point)| microseconds(point)),
         ),
         y: Axis::decades(
-            shown.axis,
-            drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
+            view.axis,
+            points().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
         ),
     };
     frame.draw_grid(canvas);
     let place = |point: &Point| frame.at(microseconds(point), error(point));
     let markers: Vec<_> =
-        drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| place(point)).collect();
+        points().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| place(point)).collect();
     let mut labels = Labels::new(&markers, RADIUS, frame.rect, SMALLEST);
     for (style, points) in &present {
         if style.method == MEASURE {
@@ -113,7 +134,7 @@ fn draw(canvas: &Canvas, subtitle: &str, shown: Shown, points: &[Point]) {
         let path: Vec<_> = points.iter().map(|point| place(point)).collect();
         canvas.stroke(&path, 2.0, style.color);
         for (point, at) in points.iter().zip(&path) {
-            canvas.marker(*at, Marker { hollow: is_lost(shown, point), ..marker(style) });
+            canvas.marker(*at, Marker { hollow: is_lost(view, point), ..marker(style) });
         }
         if let (Some(point), Some(at)) = (points.last(), path.last()) {
             let before = path.iter().rev().nth(1).copied();
@@ -124,7 +145,7 @@ fn draw(canvas: &Canvas, subtitle: &str, shown: Shown, points: &[Point]) {
     frame.draw_axes(canvas, true);
 }
 
-/// The steps per period or the tolerance of a point.
+/// Returns the steps per period or the tolerance of a point.
 fn setting(point: &Point) -> String {
     match (point.steps, point.tolerance) {
         (Some(steps), _) => steps.to_string(),
@@ -133,12 +154,12 @@ fn setting(point: &Point) -> String {
     }
 }
 
-/// A lane that was lost, or might as well have been.
-fn is_lost(shown: Shown, point: &Point) -> bool {
-    (shown.error)(point) > ERRORS.1
+/// Whether a lane failed or its error is as large as if it had.
+fn is_lost(view: View, point: &Point) -> bool {
+    (view.error)(point) > ERRORS.1
 }
 
-/// Its error is zero by definition: it is a line, not a curve.
+/// The method that is a vertical line, because its error is zero by definition.
 const MEASURE: &str = "reference";
 
 fn entry(style: &Style) -> Entry {

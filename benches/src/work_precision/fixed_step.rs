@@ -1,5 +1,4 @@
-//! Integrators of fixed step, as studies of such systems use them: classical Runge-Kutta and
-//! semi-implicit Euler, in f64 on one core.
+//! The classical Runge-Kutta method of order 4 with fixed steps, in f64 on one core.
 
 use super::PERIODS;
 use super::cells::{Latest, Subject};
@@ -8,64 +7,30 @@ use rattlemap::validate::independent::field::Field;
 use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Gap;
 
-/// Endings in one period beyond which a lane is given up.
+/// Number of events in one period above which a lane fails.
 const ENDINGS_PER_PERIOD: u32 = 10_000;
 
-/// How a step is made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scheme {
-    /// The classical Runge-Kutta method of order 4.
-    RungeKutta,
-    /// Semi-implicit (symplectic) Euler of order 1: velocities first, positions with the new ones.
-    SemiImplicitEuler,
+/// Returns the state a step of length `h` after `y`, from the cosines of the phase at its start, middle and end.
+#[inline(always)]
+fn runge_kutta(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
+    let slope = |y: &Gap, cos: f64| {
+        let [a, b] = field.accelerations(y, cos);
+        [y[1], a, y[3], b]
+    };
+    let moved = |by: f64, k: &Gap| -> Gap { std::array::from_fn(|i| y[i] + by * k[i]) };
+    let k1 = slope(y, cos[0]);
+    let k2 = slope(&moved(0.5 * h, &k1), cos[1]);
+    let k3 = slope(&moved(0.5 * h, &k2), cos[1]);
+    let k4 = slope(&moved(h, &k3), cos[2]);
+    std::array::from_fn(|i| y[i] + h / 6.0 * ((k1[i] + k4[i]) + 2.0 * (k2[i] + k3[i])))
 }
 
-/// One step from `y`, with cos of the phase at its start, middle and end.
-trait Step {
-    fn step(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap;
-}
-
-struct RungeKutta;
-struct SemiImplicitEuler;
-
-impl Step for RungeKutta {
-    #[inline(always)]
-    fn step(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
-        let slope = |y: &Gap, cos: f64| {
-            let [a, b] = field.accelerations(y, cos);
-            [y[1], a, y[3], b]
-        };
-        let moved = |by: f64, k: &Gap| -> Gap { std::array::from_fn(|i| y[i] + by * k[i]) };
-        let k1 = slope(y, cos[0]);
-        let k2 = slope(&moved(0.5 * h, &k1), cos[1]);
-        let k3 = slope(&moved(0.5 * h, &k2), cos[1]);
-        let k4 = slope(&moved(h, &k3), cos[2]);
-        std::array::from_fn(|i| y[i] + h / 6.0 * ((k1[i] + k4[i]) + 2.0 * (k2[i] + k3[i])))
-    }
-}
-
-impl Step for SemiImplicitEuler {
-    #[inline(always)]
-    fn step(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
-        let [a, b] = field.accelerations(y, cos[0]);
-        let (v1, v2) = (y[1] + h * a, y[3] + h * b);
-        [y[0] + h * v1, v1, y[2] + h * v2, v2]
-    }
-}
-
-/// Integrates a subject with `steps` steps per forcing period, at least 1.
-pub fn integrate(scheme: Scheme, subject: &Subject, steps: u32) -> Outcome {
-    match scheme {
-        Scheme::RungeKutta => run::<RungeKutta>(subject, steps),
-        Scheme::SemiImplicitEuler => run::<SemiImplicitEuler>(subject, steps),
-    }
-}
-
-fn run<S: Step>(subject: &Subject, steps: u32) -> Outcome {
+/// Integrates a subject with `steps` >= 1 steps per forcing period.
+pub fn integrate(subject: &Subject, steps: u32) -> Outcome {
     let grid = Grid::new(subject.oscillator.omega, steps);
     let mut flight = Flight::new(&subject.oscillator, subject.law, subject.start);
     for _ in 0..PERIODS {
-        if grid.period::<S>(&mut flight).is_none() {
+        if grid.period(&mut flight).is_none() {
             return Outcome::lost();
         }
     }
@@ -76,7 +41,7 @@ fn run<S: Step>(subject: &Subject, steps: u32) -> Outcome {
 struct Grid {
     omega: f64,
     h: f64,
-    /// cos of the phase at every half step.
+    /// Cosine of the phase at every half step.
     cosines: Vec<f64>,
 }
 
@@ -87,22 +52,22 @@ impl Grid {
         Grid { omega, h, cosines: (0..=2 * steps).map(turn).collect() }
     }
 
-    /// One forcing period; none for a lane that is lost.
-    fn period<S: Step>(&self, flight: &mut Flight) -> Option<()> {
+    /// Integrates one forcing period. Returns `None` if the lane fails.
+    fn period(&self, flight: &mut Flight) -> Option<()> {
         let mut endings = 0;
         for (n, cosines) in self.cosines.windows(3).step_by(2).enumerate() {
             let start = self.h * n as f64;
             let mut offset = 0.0;
-            // Whole, or cut by events into parts.
+            // One whole step, or parts between events.
             while offset < self.h {
                 let (t, rest) = (start + offset, self.h - offset);
                 let (field, y) = (*flight.field(), flight.q);
                 let after = |tau: f64| {
                     let cos = [t, t + 0.5 * tau, t + tau].map(|t| (self.omega * t).cos());
-                    S::step(&field, &y, tau, cos)
+                    runge_kutta(&field, &y, tau, cos)
                 };
                 let end = if offset == 0.0 {
-                    S::step(&field, &y, rest, [cosines[0], cosines[1], cosines[2]])
+                    runge_kutta(&field, &y, rest, [cosines[0], cosines[1], cosines[2]])
                 } else {
                     after(rest)
                 };

@@ -1,4 +1,4 @@
-//! The subjects on a graphics device: this project's lane, and Runge-Kutta in its place.
+//! Runs the subjects on a graphics device, in lanes of this project or of Runge-Kutta.
 
 use std::time::{Duration, Instant};
 
@@ -11,14 +11,14 @@ use rattlemap::gpu::{
 use rattlemap::record::{Record, valid};
 use rattlemap_dynamics::model::{Law, Oscillator};
 
-/// How lanes move.
+/// The integrator of lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// By the exact propagator: the lane of the maps.
+    /// The exact propagator of maps.
     Exact,
-    /// By classical Runge-Kutta steps, events within the loop over steps.
+    /// Classical Runge-Kutta, with events inside the loop over steps.
     RungeKutta,
-    /// By classical Runge-Kutta steps in the lane's two phases.
+    /// Classical Runge-Kutta in the two phases of lanes.
     RungeKuttaPhased,
 }
 
@@ -28,16 +28,15 @@ pub struct Device {
     flows: Vec<Oscillator>,
     laws: Vec<Law>,
     lanes: Vec<Lane>,
-    /// Copies of each subject.
+    /// Number of copies of each subject.
     copies: usize,
 }
 
 impl Device {
-    /// Opens the adapter that the environment asks for, else the best, for `copies` copies of
-    /// each of the subjects, at least one.
+    /// Opens the adapter that the environment names, else the best one, for `copies` >= 1 copies of each subject.
     ///
     /// # Errors
-    /// As [`Gpu::open`].
+    /// See [`Gpu::open`].
     pub fn open(
         precision: Precision,
         form: Form,
@@ -59,42 +58,40 @@ impl Device {
                 start: subject.start,
             })
             .collect();
-        // Variants of a cell stay together: neighbours on the device are neighbours of a map.
+        // Variants of a cell stay together, as neighbours in a map do on the device.
         let copied = lanes.chunks(VARIANTS as usize).flat_map(|cell| cell.repeat(copies)).collect();
         Ok(Device { gpu, flows, laws, lanes: copied, copies })
     }
 
-    /// The adapter in words.
+    /// Returns the name of the adapter.
     pub fn adapter(&self) -> String {
         describe(self.gpu.adapter())
     }
 
-    /// Whether it is more than a program on the processor.
+    /// Whether the adapter is hardware, not a program on the processor.
     pub fn is_hardware(&self) -> bool {
         is_hardware(self.gpu.adapter())
     }
 
-    /// Lanes of one run.
+    /// Returns the number of lanes in one run.
     pub fn lane_count(&self) -> usize {
         self.lanes.len()
     }
 
-    /// Derives and uploads the constants for so many steps per forcing period, or more where
-    /// the motion needs them.
+    /// Computes and uploads the constants for `steps` steps per forcing period, or more if the motion needs them.
     ///
     /// # Errors
-    /// As [`Gpu::load`].
+    /// See [`Gpu::load`].
     pub fn load(&self, steps: u32) -> Result<Tables, GpuError> {
         pollster::block_on(self.gpu.load(&self.flows, &self.laws, Some(steps)))
     }
 
-    /// Integrates every copy; the time from lanes to records, and what one copy of each
-    /// subject came to.
+    /// Integrates every copy. Returns the time, and the result of one copy of each subject.
     ///
     /// # Errors
-    /// As [`Gpu::run_on`].
+    /// See [`Gpu::run_on`].
     pub fn run(&mut self, tables: &Tables) -> Result<(Duration, Vec<Outcome>), GpuError> {
-        // The time that meshing takes is not asked for; its place is taken by events.
+        // Times of events replace the mesh fraction.
         let settings = LaneSettings { mesh: false, kinds: false, ..LaneSettings::only(PERIODS) };
         let clock = Instant::now();
         let records = pollster::block_on(self.gpu.run_on(tables, &self.lanes, &settings))?;
@@ -116,7 +113,7 @@ impl Device {
         let period = self.flows[lane.flow as usize].period();
         let steps = f64::from(tables.steps_per_period(lane.flow));
         let packed = (record.impacts_per_period * f64::from(record.periods_run)).round() as u32;
-        // The record divides what it takes for exponents by the period.
+        // The record divides exponents by the period.
         let fractions = [record.lyapunov, record.lyapunov_error].map(|x| x * period);
         let time = |i: usize| {
             let step = (packed >> (16 * i)) & 0xffff;

@@ -1,10 +1,9 @@
-//! Every method at every setting, in turns.
+//! Measures every method at every setting, alternately.
 
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use super::cells::{Subject, by_reference};
-use super::fixed_step::Scheme;
 use super::lanes::{Device, Form};
 use super::outcome::{Error, Outcome, median_and_worst};
 use super::points::Point;
@@ -14,73 +13,68 @@ use rattlemap::gpu::{GpuError, Precision, Tables};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
 
-/// Who integrates.
+/// An integrator and its precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Lanes of a graphics device.
     Lanes(Form, Precision),
-    /// A fixed step on one core.
-    FixedStep(Scheme),
+    /// Classical Runge-Kutta on one core.
+    FixedStep,
     /// DOP853 on one core.
     Dop853,
     /// The event-driven reference on one core.
     Reference,
 }
 
-/// What a method is told.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Setting {
+/// The setting that decides the accuracy of a method. Each method has at most one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Setting {
     /// Steps per forcing period.
-    Steps(u32),
+    pub steps: Option<u32>,
     /// Relative and absolute tolerance.
-    Tolerance(f64),
-    /// Nothing.
-    None,
+    pub tolerance: Option<f64>,
+}
+
+impl Setting {
+    fn steps(self) -> u32 {
+        self.steps.expect("a method with a grid")
+    }
 }
 
 impl Method {
-    /// All methods.
-    pub const ALL: [Method; 10] = [
-        Method::Lanes(Form::Exact, Precision::F32),
-        Method::Lanes(Form::Exact, Precision::F64),
-        Method::Lanes(Form::RungeKutta, Precision::F32),
-        Method::Lanes(Form::RungeKutta, Precision::F64),
-        Method::Lanes(Form::RungeKuttaPhased, Precision::F32),
-        Method::Lanes(Form::RungeKuttaPhased, Precision::F64),
-        Method::FixedStep(Scheme::RungeKutta),
-        Method::FixedStep(Scheme::SemiImplicitEuler),
-        Method::Dop853,
-        Method::Reference,
+    /// All methods with their names in tables.
+    pub const ALL: [(Method, &'static str); 9] = [
+        (Method::Lanes(Form::Exact, Precision::F32), "lane-f32"),
+        (Method::Lanes(Form::Exact, Precision::F64), "lane-f64"),
+        (Method::Lanes(Form::RungeKutta, Precision::F32), "rk4-wgsl-f32"),
+        (Method::Lanes(Form::RungeKutta, Precision::F64), "rk4-wgsl-f64"),
+        (Method::Lanes(Form::RungeKuttaPhased, Precision::F32), "rk4-phased-f32"),
+        (Method::Lanes(Form::RungeKuttaPhased, Precision::F64), "rk4-phased-f64"),
+        (Method::FixedStep, "rk4-core"),
+        (Method::Dop853, "dop853-core"),
+        (Method::Reference, "reference"),
     ];
 
-    /// The name in tables.
+    /// Returns the name in tables.
     pub fn name(self) -> &'static str {
-        match self {
-            Method::Lanes(Form::Exact, Precision::F32) => "lane-f32",
-            Method::Lanes(Form::Exact, Precision::F64) => "lane-f64",
-            Method::Lanes(Form::RungeKutta, Precision::F32) => "rk4-wgsl-f32",
-            Method::Lanes(Form::RungeKutta, Precision::F64) => "rk4-wgsl-f64",
-            Method::Lanes(Form::RungeKuttaPhased, Precision::F32) => "rk4-phased-f32",
-            Method::Lanes(Form::RungeKuttaPhased, Precision::F64) => "rk4-phased-f64",
-            Method::FixedStep(Scheme::RungeKutta) => "rk4-core",
-            Method::FixedStep(Scheme::SemiImplicitEuler) => "euler-core",
-            Method::Dop853 => "dop853-core",
-            Method::Reference => "reference",
-        }
+        let found = Method::ALL.iter().find(|(method, _)| *method == self);
+        found.expect("`ALL` has every method").1
     }
 
-    /// The settings that are measured; `quick` takes the first and the third.
+    /// Returns the measured settings. `quick` selects the first and the third.
     pub fn settings(self, quick: bool) -> Vec<Setting> {
         let doubled = |from: u32, to: u32| {
             std::iter::successors(Some(from), |n| Some(2 * n))
                 .take_while(move |&n| n <= to)
-                .map(Setting::Steps)
+                .map(|steps| Setting { steps: Some(steps), tolerance: None })
         };
         let all: Vec<Setting> = match self {
             Method::Lanes(Form::Exact, _) => doubled(16, 1024).collect(),
-            Method::Lanes(..) | Method::FixedStep(_) => doubled(64, 8192).collect(),
-            Method::Dop853 => [1e-4, 1e-6, 1e-8, 1e-10, 1e-12].map(Setting::Tolerance).to_vec(),
-            Method::Reference => vec![Setting::None],
+            Method::Lanes(..) | Method::FixedStep => doubled(64, 8192).collect(),
+            Method::Dop853 => [1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
+                .map(|tolerance| Setting { steps: None, tolerance: Some(tolerance) })
+                .to_vec(),
+            Method::Reference => vec![Setting::default()],
         };
         if quick { all.into_iter().step_by(2).take(2).collect() } else { all }
     }
@@ -93,32 +87,32 @@ impl Method {
     }
 }
 
-/// How thorough a measurement is.
+/// Extent of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct Thoroughness {
-    /// Timed runs of everything.
+    /// Number of timed runs of every method and setting.
     pub rounds: usize,
-    /// Copies of each subject on a device; none for as many as fill it.
+    /// Number of copies of each subject on a device; `None` for as many as fill it.
     pub copies: Option<usize>,
-    /// Few settings.
+    /// Whether only two settings of each method are measured.
     pub quick: bool,
-    /// The least time, in seconds, that a method on a core is timed for in one round.
+    /// Shortest time, in seconds, that a method on a core runs in one round.
     pub least_seconds: f64,
 }
 
-/// Errors of one method and setting, subject by subject.
+/// Results of one method and setting.
 #[derive(Clone, Debug)]
 pub struct Curve {
     /// The row of the table.
     pub point: Point,
-    /// One per subject.
+    /// Errors of each subject.
     pub errors: Vec<Error>,
 }
 
-/// Measures the methods; `report` is told after each run how many of how many are done.
+/// Measures the methods. After each run, `report` gets the numbers of finished and of all runs.
 ///
 /// # Errors
-/// What a device refuses. A method in f64 is left out where the device has none.
+/// If a device fails. Methods in f64 are omitted if the device has no f64.
 pub fn measure(
     subjects: &[Subject],
     methods: &[Method],
@@ -135,7 +129,7 @@ pub fn measure(
     }
     let all: usize = runners.iter().map(|runner| runner.settings.len()).sum::<usize>() * (how.rounds + 1);
     let mut done = 0;
-    // The first round warms up, and its outcomes are judged.
+    // The first round is not timed. Its results give the errors.
     for round in 0..=how.rounds {
         for runner in &mut runners {
             for i in 0..runner.settings.len() {
@@ -154,7 +148,7 @@ pub fn measure(
     Ok(runners.iter().flat_map(|runner| runner.curves(subjects)).collect())
 }
 
-/// The flow and law of each subject; neighbours of one oscillator share its flow.
+/// Returns the flow and law of each subject. Neighbours with equal oscillators share a flow.
 fn flows(subjects: &[Subject]) -> Vec<(Rc<Flow>, Law)> {
     let mut flows: Vec<(Rc<Flow>, Law)> = Vec::new();
     for (n, subject) in subjects.iter().enumerate() {
@@ -167,21 +161,21 @@ fn flows(subjects: &[Subject]) -> Vec<(Rc<Flow>, Law)> {
     flows
 }
 
-/// A method ready to run, and what it has done.
+/// A method, its settings and its results.
 struct Runner {
     method: Method,
     settings: Vec<Setting>,
     device: Option<(Device, Vec<Tables>)>,
-    /// Solved outside the clock, and shared by the cells of an oscillator, as a map does.
+    /// Flows of the reference. As in a map, cells with equal oscillators share one, and its computation is not timed.
     flows: Vec<(Rc<Flow>, Law)>,
     outcomes: Vec<Vec<Outcome>>,
     times: Vec<Vec<f64>>,
 }
 
-/// What methods without a device run on, as tables have it.
+/// Device of methods that run on the processor, in tables.
 pub const ONE_CORE: &str = "one core";
 
-/// Copies of each subject that fill a device.
+/// Number of copies of each subject that fill a device.
 const HARDWARE_COPIES: usize = 1024;
 const SOFTWARE_COPIES: usize = 16;
 
@@ -195,11 +189,8 @@ impl Runner {
             if how.copies.is_none() && opened.is_hardware() {
                 opened = open(HARDWARE_COPIES)?;
             }
-            let load = |setting: &Setting| match setting {
-                Setting::Steps(steps) => opened.load(*steps),
-                _ => unreachable!("lanes have a grid"),
-            };
-            let tables = settings.iter().map(load).collect::<Result<_, _>>()?;
+            let tables = settings.iter().map(|setting| opened.load(setting.steps()));
+            let tables = tables.collect::<Result<_, _>>()?;
             device = Some((opened, tables));
         }
         let flows = match method {
@@ -210,7 +201,7 @@ impl Runner {
         Ok(Runner { method, settings, device, flows, outcomes: Vec::new(), times })
     }
 
-    /// Seconds per lane-period, and what came of each subject.
+    /// Returns the seconds per lane-period, and the result of each subject.
     fn run(&mut self, i: usize, subjects: &[Subject], least: f64) -> Result<(f64, Vec<Outcome>), GpuError> {
         if let Some((device, tables)) = &mut self.device {
             let (elapsed, outcomes) = device.run(&tables[i])?;
@@ -232,16 +223,15 @@ impl Runner {
 
     fn one(&self, i: usize, subjects: &[Subject], n: usize) -> Outcome {
         let subject = &subjects[n];
-        match (self.method, self.settings[i]) {
-            (Method::FixedStep(scheme), Setting::Steps(steps)) => {
-                fixed_step::integrate(scheme, subject, steps)
-            }
-            (Method::Dop853, Setting::Tolerance(tolerance)) => adaptive::integrate(subject, tolerance),
-            (Method::Reference, _) => {
+        let setting = self.settings[i];
+        match self.method {
+            Method::FixedStep => fixed_step::integrate(subject, setting.steps()),
+            Method::Dop853 => adaptive::integrate(subject, setting.tolerance.expect("a tolerance")),
+            Method::Reference => {
                 let (flow, law) = &self.flows[n];
                 by_reference(flow, *law, subject.start)
             }
-            other => unreachable!("no method takes this setting: {other:?}"),
+            Method::Lanes(..) => unreachable!("devices run lanes"),
         }
     }
 
@@ -253,7 +243,7 @@ impl Runner {
         let errors: Vec<Error> = subjects
             .iter()
             .zip(&self.outcomes[i])
-            .map(|(subject, outcome)| outcome.error(&subject.truth, subject.oscillator.period()))
+            .map(|(subject, outcome)| outcome.error(&subject.exact, subject.oscillator.period()))
             .collect();
         let [state_median, state_worst] = median_and_worst(errors.iter().map(|e| e.state).collect());
         let [event_median, event_worst] = median_and_worst(errors.iter().filter_map(|e| e.event).collect());
@@ -269,8 +259,8 @@ impl Runner {
             method: self.method.name().to_owned(),
             device,
             precision: self.method.precision().name().to_owned(),
-            steps: if let Setting::Steps(steps) = self.settings[i] { Some(steps) } else { None },
-            tolerance: if let Setting::Tolerance(t) = self.settings[i] { Some(t) } else { None },
+            steps: self.settings[i].steps,
+            tolerance: self.settings[i].tolerance,
             cores,
             lanes,
             periods: PERIODS,

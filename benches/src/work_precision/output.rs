@@ -1,14 +1,15 @@
-//! Files of `work-precision`: tables, figures, the cells for other programs, a manifest.
+//! The files of `work-precision`: tables, figures, cells for other programs, and the manifest.
 
 use std::io::Write;
 
 use serde::Serialize;
 
 use super::PERIODS;
-use super::cells::Subject;
-use super::figure::{self, Shown};
+use super::cells::{Kind, Subject};
+use super::figure::{self, View};
 use super::measure::Curve;
-use super::points::{self, Point};
+use super::points::Point;
+use crate::write_rows;
 use rattlemap::record::distance::farther;
 use rattlemap::show::error::WriteError;
 use rattlemap::show::parameters::Parameters;
@@ -34,10 +35,10 @@ pub const FILES: [&str; 7] = [
 ];
 
 /// The figures.
-const FIGURES: [(&str, Shown); 3] = [
+const FIGURES: [(&str, View); 3] = [
     (
         "work_precision.png",
-        Shown {
+        View {
             title: "Run time against error, the worst cell of all: lower left is better",
             axis: "error of the state after 8 forcing periods, worst cell",
             error: |point| point.state_error_worst,
@@ -45,7 +46,7 @@ const FIGURES: [(&str, Shown); 3] = [
     ),
     (
         "work_precision_median.png",
-        Shown {
+        View {
             title: "Run time against error, the median cell: lower left is better",
             axis: "error of the state after 8 forcing periods, median cell",
             error: |point| point.state_error_median,
@@ -53,7 +54,7 @@ const FIGURES: [(&str, Shown); 3] = [
     ),
     (
         "work_precision_events.png",
-        Shown {
+        View {
             title: "Run time against error of event times, the worst cell of all: lower left is better",
             axis: "error of the times of the last two events, worst cell",
             error: |point| point.event_error_worst,
@@ -61,20 +62,20 @@ const FIGURES: [(&str, Shown); 3] = [
     ),
 ];
 
-/// What a run was.
+/// Facts about a run, for the manifest.
 #[derive(Clone, Debug, Serialize)]
 pub struct Run<'a> {
-    /// The processor.
+    /// Name of the processor.
     pub processor: &'a str,
-    /// Its cores.
+    /// Number of its cores.
     pub cores: usize,
-    /// The graphics adapter, in words.
+    /// Name of the graphics adapter.
     pub adapter: &'a str,
-    /// Timed rounds.
+    /// Number of timed rounds.
     pub rounds: usize,
-    /// Whether sizes were tiny: then the figures mean nothing.
+    /// Whether sizes were tiny, so that the figures mean nothing.
     pub quick: bool,
-    /// Time against time at equal error, in sentences.
+    /// Sentences with ratios of time at equal error.
     pub ratios: &'a [String],
 }
 
@@ -89,10 +90,10 @@ struct Manifest<'a> {
     files: Vec<FileEntry>,
 }
 
-/// A cell, by its first variant; amplification is the largest over the variants.
+/// A cell with the parameters of its first variant and the largest amplification of all variants.
 #[derive(Serialize)]
 struct CellObject {
-    kind: &'static str,
+    kind: Kind,
     e: f64,
     omega: f64,
     #[serde(rename = "F")]
@@ -102,10 +103,10 @@ struct CellObject {
     variants: usize,
 }
 
-/// A subject, as other programs integrate it.
+/// A subject for other programs.
 #[derive(Serialize)]
 struct SubjectObject {
-    kind: &'static str,
+    kind: Kind,
     parameters: Parameters,
     periods: u32,
     start: State,
@@ -118,7 +119,7 @@ struct CellRow<'a> {
     method: &'a str,
     steps: Option<u32>,
     tolerance: Option<f64>,
-    kind: &'static str,
+    kind: Kind,
     e: f64,
     omega: f64,
     #[serde(rename = "F")]
@@ -127,10 +128,10 @@ struct CellRow<'a> {
     event_error: Option<f64>,
 }
 
-/// Writes everything; `peers` are points of other programs, which join table and figures.
+/// Writes all files. `peers` are points of other programs, which tables and figures include.
 ///
 /// # Errors
-/// A file that cannot be written, by name.
+/// If a file cannot be written.
 pub fn write(
     folder: &Folder,
     run: &Run<'_>,
@@ -140,13 +141,13 @@ pub fn write(
 ) -> Result<(), OutputError> {
     let all: Vec<Point> =
         curves.iter().map(|curve| curve.point.clone()).chain(peers.iter().cloned()).collect();
-    folder.replace(TABLE, |out| points::write(out, &all))?;
+    folder.replace(TABLE, |out| write_rows(out, &all))?;
     folder.replace(CELLS_TABLE, |out| write_cells(out, subjects, curves))?;
     let objects: Vec<_> = subjects.iter().map(subject).collect();
     folder.write_json(CELLS, &objects)?;
     let subtitle = format!("{} cores: {}; lanes on {}", run.cores, run.processor, run.adapter);
-    for (name, shown) in FIGURES {
-        folder.replace(name, |out| figure::write(out, &subtitle, shown, &all))?;
+    for (name, view) in FIGURES {
+        folder.replace(name, |out| figure::write(out, &subtitle, view, &all))?;
     }
     let manifest = Manifest {
         head: Head::of("work-precision"),
@@ -161,7 +162,7 @@ pub fn write(
 fn cell(variants: &[Subject]) -> CellObject {
     let first = &variants[0];
     CellObject {
-        kind: first.kind.name(),
+        kind: first.kind,
         e: first.pair.e,
         omega: first.pair.omega,
         force: first.pair.force,
@@ -173,37 +174,37 @@ fn cell(variants: &[Subject]) -> CellObject {
 
 fn subject(subject: &Subject) -> SubjectObject {
     SubjectObject {
-        kind: subject.kind.name(),
+        kind: subject.kind,
         parameters: Parameters::of(&subject.pair),
         periods: PERIODS,
         start: subject.start,
-        state: subject.truth.state,
-        events: subject.truth.events.iter().copied().filter(|t| !t.is_nan()).collect(),
+        state: subject.exact.state,
+        events: subject.exact.events.iter().copied().filter(|t| !t.is_nan()).collect(),
     }
 }
 
-/// One row per method, setting and cell: the largest errors over the cell's variants.
+/// Writes one row per method, setting and cell, with the largest errors of the cell's variants.
 fn write_cells(out: impl Write, subjects: &[Subject], curves: &[Curve]) -> Result<(), WriteError> {
-    let mut writer = csv::Writer::from_writer(out);
+    let mut rows = Vec::new();
     for Curve { point, errors } in curves {
         let mut errors = errors.iter();
         for variants in subjects.chunk_by(|a, b| a.cell == b.cell) {
             let (first, own) = (&variants[0], errors.by_ref().take(variants.len()));
-            let largest = own.fold((0.0f64, None::<f64>), |(state, event), error| {
+            let (state_error, event_error) = own.fold((0.0f64, None::<f64>), |(state, event), error| {
                 (farther(state, error.state), event.into_iter().chain(error.event).reduce(farther))
             });
-            writer.serialize(CellRow {
+            rows.push(CellRow {
                 method: &point.method,
                 steps: point.steps,
                 tolerance: point.tolerance,
-                kind: first.kind.name(),
+                kind: first.kind,
                 e: first.pair.e,
                 omega: first.pair.omega,
                 force: first.pair.force,
-                state_error: largest.0,
-                event_error: largest.1,
-            })?;
+                state_error,
+                event_error,
+            });
         }
     }
-    Ok(writer.flush()?)
+    write_rows(out, rows)
 }

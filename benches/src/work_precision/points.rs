@@ -1,40 +1,37 @@
-//! One row per method and setting: the table that figures are drawn from, and that programs
-//! outside of this crate join by.
+//! The table of results, with one row per method and setting. Figures show it, and other programs write such tables.
 
-use std::io::Write;
 use std::path::Path;
 
 use anyhow::Context;
-use rattlemap::show::error::WriteError;
 use serde::{Deserialize, Serialize};
 
-/// A point of the work-precision diagram. Times are seconds of wall time per forcing period of
-/// one lane, errors those of [`super::outcome::Error`]; infinite where a lane was lost.
+/// A point of the work-precision diagram. Times are seconds of wall time per forcing period of one lane. Errors are those of
+/// [`super::outcome::Error`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// The method's name in tables, such as `lane-f64`.
+    /// Name of the method, such as `lane-f64`.
     pub method: String,
-    /// What it ran on.
+    /// The processor or adapter.
     pub device: String,
     /// `f32` or `f64`.
     pub precision: String,
-    /// Steps per forcing period that were asked for, of methods with a grid.
+    /// Requested steps per forcing period, of methods with a grid.
     pub steps: Option<u32>,
     /// Tolerance, of adaptive methods.
     pub tolerance: Option<f64>,
-    /// Processor cores in use; none on a graphics card.
+    /// Number of processor cores in use; `None` on a graphics card.
     pub cores: Option<u32>,
-    /// Lanes of one run.
+    /// Number of lanes in one run.
     pub lanes: usize,
-    /// Forcing periods of each.
+    /// Forcing periods of each lane.
     pub periods: u32,
-    /// Runs that were timed.
+    /// Number of timed runs.
     pub rounds: usize,
-    /// Median over the rounds.
+    /// Median time of the rounds.
     pub seconds_per_lane_period: f64,
-    /// The fastest round.
+    /// Time of the fastest round.
     pub fastest: f64,
-    /// The slowest round.
+    /// Time of the slowest round.
     pub slowest: f64,
     /// Median state error over the subjects.
     pub state_error_median: f64,
@@ -44,12 +41,12 @@ pub struct Point {
     pub event_error_median: f64,
     /// Largest error of event times.
     pub event_error_worst: f64,
-    /// Subjects that did not come to an end.
+    /// Number of subjects that failed.
     pub lost: usize,
 }
 
 impl Point {
-    /// Seconds per lane-period, multiplied by the cores in use; of a graphics card as a whole.
+    /// Returns seconds per lane-period times the cores in use. A graphics card counts as one.
     pub fn cost(&self) -> f64 {
         self.seconds_per_lane_period * f64::from(self.cores.unwrap_or(1))
     }
@@ -58,21 +55,9 @@ impl Point {
 /// Reads a table of points.
 ///
 /// # Errors
-/// A file that cannot be read, or a row that is no point, by name.
+/// If the file cannot be read or a row is not a point.
 pub fn read(path: &Path) -> anyhow::Result<Vec<Point>> {
-    let context = || format!("{}: this is no table of points", path.display());
+    let context = || format!("{}: this is not a table of results of work-precision", path.display());
     let mut reader = csv::Reader::from_path(path).with_context(context)?;
     reader.deserialize().collect::<Result<_, _>>().with_context(context)
-}
-
-/// Writes a table of points.
-///
-/// # Errors
-/// If the table cannot be written.
-pub fn write(out: impl Write, points: &[Point]) -> Result<(), WriteError> {
-    let mut writer = csv::Writer::from_writer(out);
-    for point in points {
-        writer.serialize(point)?;
-    }
-    Ok(writer.flush()?)
 }

@@ -1,36 +1,36 @@
-//! Time against time at equal error.
+//! Ratios of run time at equal error.
 
 use super::points::Point;
 
-/// Which of the two errors of a state.
+/// The statistic of the errors of states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judged {
+pub enum Statistic {
     /// The median over the subjects.
     Median,
     /// The worst subject.
     Worst,
 }
 
-impl Judged {
-    /// The state error of a point.
+impl Statistic {
+    /// Returns the state error of a point.
     pub fn error(self, point: &Point) -> f64 {
         match self {
-            Judged::Median => point.state_error_median,
-            Judged::Worst => point.state_error_worst,
+            Statistic::Median => point.state_error_median,
+            Statistic::Worst => point.state_error_worst,
         }
     }
 }
 
-/// What a method costs to be off by no more than `error`, in seconds per lane-period
-/// ([`Point::cost`]); none if it never is. Between two settings the curve is a straight line
-/// in logarithms; below its cheapest setting that is good enough it costs no less.
-pub fn cost_at(points: &[&Point], judged: Judged, error: f64) -> Option<f64> {
+/// Returns the cost of a method with at most this error, in seconds per lane-period ([`Point::cost`]); `None` if its error is
+/// larger at every setting. Between two settings the logarithm of the cost is interpolated. The cost is never less than that
+/// of the cheapest setting.
+pub fn cost_at(points: &[&Point], statistic: Statistic, error: f64) -> Option<f64> {
     let mut sorted: Vec<&&Point> = points.iter().collect();
     sorted.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-    let good = sorted.iter().position(|point| judged.error(point) <= error)?;
+    let good = sorted.iter().position(|point| statistic.error(point) <= error)?;
     let here = sorted[good];
     let Some(before) = good.checked_sub(1).map(|i| sorted[i]) else { return Some(here.cost()) };
-    let (from, to) = (judged.error(before), judged.error(here));
+    let (from, to) = (statistic.error(before), statistic.error(here));
     if !from.is_finite() || to <= 0.0 {
         return Some(here.cost());
     }
@@ -38,29 +38,29 @@ pub fn cost_at(points: &[&Point], judged: Judged, error: f64) -> Option<f64> {
     Some(before.cost() * (here.cost() / before.cost()).powf(share))
 }
 
-/// The smallest error of a method at any setting.
-pub fn best_error(points: &[&Point], judged: Judged) -> f64 {
-    points.iter().map(|point| judged.error(point)).fold(f64::INFINITY, f64::min)
+/// Returns the smallest error of a method at any setting.
+pub fn best_error(points: &[&Point], statistic: Statistic) -> f64 {
+    points.iter().map(|point| statistic.error(point)).fold(f64::INFINITY, f64::min)
 }
 
-/// The error at which fixed steps and lanes are compared.
+/// The error at which methods are compared.
 const EQUAL_ERROR: f64 = 1e-5;
 
-/// Who is compared with whom at [`EQUAL_ERROR`]: ours, theirs, and theirs in words.
+/// Methods that are compared at [`EQUAL_ERROR`]: ours, the other one, and a description of the other one.
 const PAIRS: [(&str, &str, &str); 7] = [
     ("lane-f32", "rk4-wgsl-f32", "RK4 in WGSL, f32"),
     ("lane-f64", "rk4-wgsl-f64", "RK4 in WGSL, f64"),
-    ("lane-f32", "rk4-phased-f32", "RK4 in WGSL in the lane's two phases, f32"),
-    ("lane-f64", "rk4-phased-f64", "RK4 in WGSL in the lane's two phases, f64"),
+    ("lane-f32", "rk4-phased-f32", "RK4 in WGSL in two phases, f32"),
+    ("lane-f64", "rk4-phased-f64", "RK4 in WGSL in two phases, f64"),
     ("reference", "rk4-core", "RK4 in Rust on one core"),
     ("reference", "dop853-core", "DOP853 on one core"),
-    (BESIDE_PEERS, "rk4-numba", "RK4 in numba on one core"),
+    (REFERENCE_WITH_PEERS, "rk4-numba", "RK4 in numba on one core"),
 ];
 
-/// The reference as it was timed in turns with peers.
-const BESIDE_PEERS: &str = "reference-beside-peers";
+/// The reference, timed alternately with peers.
+const REFERENCE_WITH_PEERS: &str = "reference-beside-peers";
 
-/// The ratios of a table of points, in sentences.
+/// Returns sentences with the ratios of a table of points.
 pub fn sentences(points: &[Point]) -> Vec<String> {
     let curve = |name: &str| points.iter().filter(|point| point.method == name).collect::<Vec<_>>();
     let mut all = Vec::new();
@@ -69,39 +69,45 @@ pub fn sentences(points: &[Point]) -> Vec<String> {
         if own.is_empty() || other.is_empty() {
             continue;
         }
-        for (judged, of) in [(Judged::Worst, "worst"), (Judged::Median, "median")] {
-            all.push(match (cost_at(&own, judged, EQUAL_ERROR), cost_at(&other, judged, EQUAL_ERROR)) {
-                (Some(a), Some(b)) => format!(
-                    "{ours}: {} {words} at a {of} error of {EQUAL_ERROR:e} ({:.3} against {:.3} us)",
-                    compared(a, b),
-                    1e6 * a,
-                    1e6 * b
-                ),
-                (Some(_), None) => {
-                    let best = best_error(&other, judged);
-                    format!("{words} comes to no {of} error below {best:.1e}; {ours} does")
-                }
-                (None, _) => {
-                    let best = best_error(&own, judged);
-                    format!("{ours} comes to no {of} error below {best:.1e}")
-                }
-            });
+        for (statistic, of) in [(Statistic::Worst, "worst"), (Statistic::Median, "median")] {
+            all.push(
+                match (cost_at(&own, statistic, EQUAL_ERROR), cost_at(&other, statistic, EQUAL_ERROR)) {
+                    (Some(a), Some(b)) => format!(
+                        "{ours}: {} {words} at a {of} error of {EQUAL_ERROR:e} ({:.3} against {:.3} us)",
+                        comparison(a, b),
+                        1e6 * a,
+                        1e6 * b
+                    ),
+                    (Some(_), None) => {
+                        let best = best_error(&other, statistic);
+                        format!("{words} reaches no {of} error below {best:.1e}; {ours} does")
+                    }
+                    (None, _) => {
+                        let best = best_error(&own, statistic);
+                        format!("{ours} reaches no {of} error below {best:.1e}")
+                    }
+                },
+            );
         }
     }
     let (lane, rk4) = (curve("lane-f64"), curve("rk4-wgsl-f64"));
     if !lane.is_empty() && !rk4.is_empty() {
-        let [a, b, c, d] =
-            [(&lane, Judged::Worst), (&rk4, Judged::Worst), (&lane, Judged::Median), (&rk4, Judged::Median)]
-                .map(|(curve, judged)| best_error(curve, judged));
+        let [a, b, c, d] = [
+            (&lane, Statistic::Worst),
+            (&rk4, Statistic::Worst),
+            (&lane, Statistic::Median),
+            (&rk4, Statistic::Median),
+        ]
+        .map(|(curve, statistic)| best_error(curve, statistic));
         all.push(format!(
             "smallest error at any setting in f64, lane against RK4 in WGSL: worst {a:.1e} against {b:.1e}, median \
              {c:.1e} against {d:.1e}"
         ));
     }
-    if let [reference] = curve(BESIDE_PEERS)[..] {
+    if let [reference] = curve(REFERENCE_WITH_PEERS)[..] {
         for heyoka in curve("heyoka") {
             all.push(format!(
-                "reference: {:.1} times less time than heyoka at tolerance {:e}, whose worst error is {:.1e}, median \
+                "reference: {:.1} times less time than heyoka at tolerance {:e} with a worst error of {:.1e}, median \
                  {:.1e} ({:.3} against {:.3} us on one core)",
                 heyoka.cost() / reference.cost(),
                 heyoka.tolerance.unwrap_or(f64::NAN),
@@ -115,7 +121,8 @@ pub fn sentences(points: &[Point]) -> Vec<String> {
     all
 }
 
-fn compared(ours: f64, theirs: f64) -> String {
+/// Compares two times in words.
+fn comparison(ours: f64, theirs: f64) -> String {
     if ours <= theirs {
         format!("{:.1} times less time than", theirs / ours)
     } else {
@@ -150,16 +157,23 @@ mod tests {
     }
 
     #[test]
-    fn costs_lie_on_the_line_between_settings() {
+    fn costs_are_interpolated_between_settings() {
         let (coarse, fine) = (point(1.0, 1e-4, Some(2)), point(2.0, 1e-6, Some(2)));
         let curve = [&fine, &coarse];
-        let cost = |error| cost_at(&curve, Judged::Median, error);
-        assert!((cost(1e-5).unwrap() - 2.0 * 2f64.sqrt()).abs() < 1e-12, "half way, on two cores");
-        assert_eq!(cost(1e-3), Some(2.0), "never below the cheapest");
+        let cost = |error| cost_at(&curve, Statistic::Median, error);
+        assert!(
+            (cost(1e-5).unwrap() - 2.0 * 2f64.sqrt()).abs() < 1e-12,
+            "the middle of the line, on two cores"
+        );
+        assert_eq!(cost(1e-3), Some(2.0), "never below the cheapest setting");
         assert_eq!(cost(1e-7), None);
-        assert_eq!(cost_at(&curve, Judged::Worst, 1e-3), Some(2.0));
-        assert!((best_error(&curve, Judged::Worst) - 1e-5).abs() < 1e-18);
+        assert_eq!(cost_at(&curve, Statistic::Worst, 1e-3), Some(2.0));
+        assert!((best_error(&curve, Statistic::Worst) - 1e-5).abs() < 1e-18);
         let lost = point(0.5, f64::INFINITY, Some(2));
-        assert_eq!(cost_at(&[&lost, &coarse], Judged::Median, 1e-3), Some(2.0), "no line from nowhere");
+        assert_eq!(
+            cost_at(&[&lost, &coarse], Statistic::Median, 1e-3),
+            Some(2.0),
+            "no interpolation from a lost lane"
+        );
     }
 }

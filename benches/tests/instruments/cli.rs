@@ -1,4 +1,4 @@
-//! The instruments at tiny sizes: they must not rot.
+//! Tests of the instruments' commands at tiny sizes.
 
 use std::collections::HashMap;
 use std::fs;
@@ -18,11 +18,11 @@ fn stress_judges_every_part_and_writes_its_folder() {
         let mut command = Command::cargo_bin("rattlemap-bench").unwrap();
         command.current_dir(folder.path()).args(["stress", "--quick"]).args(arguments).assert()
     };
-    let said = run(&[]).success().stdout("").get_output().stderr.clone();
-    let said = String::from_utf8(said).unwrap();
+    let message = run(&[]).success().stdout("").get_output().stderr.clone();
+    let message = String::from_utf8(message).unwrap();
     for part in ["long_runs", "impacts", "grazing", "chatter", "stiffness", "grid", "work", "fuzz"] {
-        let line = said.lines().find(|line| line.starts_with(part));
-        assert!(line.is_some_and(|line| line.contains("holds: ")), "{part}: {said}");
+        let line = message.lines().find(|line| line.starts_with(part));
+        assert!(line.is_some_and(|line| line.contains("holds: ")), "{part}: {message}");
     }
     let out = folder.path().join("out/bench/stress");
     let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
@@ -33,12 +33,12 @@ fn stress_judges_every_part_and_writes_its_folder() {
         assert!(size > 0, "{file} is empty");
     }
 
-    // Parts on their own leave nothing of the other ones behind.
-    let said =
+    // A run of some parts removes the files of the others.
+    let message =
         run(&["--part", "grazing", "--part", "chatter", "--force"]).success().get_output().stderr.clone();
-    let said = String::from_utf8(said).unwrap();
-    let judged: Vec<&str> = said.lines().filter(|line| line.contains("holds: ")).collect();
-    assert!(judged.len() == 2 && judged[0].starts_with("grazing"), "{said}");
+    let message = String::from_utf8(message).unwrap();
+    let judged: Vec<&str> = message.lines().filter(|line| line.contains("holds: ")).collect();
+    assert!(judged.len() == 2 && judged[0].starts_with("grazing"), "{message}");
     let mut names: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["chatter.csv", "grazing.csv", "grazing.png", "manifest.json"]);
@@ -58,13 +58,14 @@ fn work_precision_measures_every_method() {
             .assert()
     };
     let output = run(&[]).success().get_output().clone();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
     for part in ["lane-f32", "rk4-wgsl-f64", "dop853-core", "times less time than", "smallest error"] {
-        assert!(said.contains(part), "{part}: {said}");
+        assert!(message.contains(part), "{part}: {message}");
     }
     let out = folder.path().join("out/bench/work-precision");
     let points = rows(&out.join("work_precision.csv"));
-    let methods = "lane-f32 lane-f64 rk4-wgsl-f32 rk4-wgsl-f64 rk4-phased-f32 rk4-phased-f64 rk4-core euler-core dop853-core";
+    let methods =
+        "lane-f32 lane-f64 rk4-wgsl-f32 rk4-wgsl-f64 rk4-phased-f32 rk4-phased-f64 rk4-core dop853-core";
     for method in methods.split(' ') {
         let own: Vec<_> = points.iter().filter(|row| row["method"] == method).collect();
         assert_eq!(own.len(), 2, "{method}");
@@ -92,7 +93,7 @@ fn work_precision_measures_every_method() {
     assert_eq!(cells.as_array().unwrap().len(), 5 * 8);
     assert_eq!(cells[0]["parameters"]["omega"], 5.6);
 
-    // A table of points, such as this one, joins as peers.
+    // A table of points, such as this one, can be read as peers.
     let peers = folder.path().join("peers.csv");
     let foreign =
         fs::read_to_string(out.join("work_precision.csv")).unwrap().replace("rk4-core", "rk4-numba");

@@ -1,6 +1,6 @@
-//! The instruments, one test binary.
+//! Tests of the instruments.
 //!
-//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+//! The lanes need an adapter; the tests fail without one: see `scripts/test.sh`.
 
 mod cli;
 mod order;

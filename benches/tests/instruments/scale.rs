@@ -1,4 +1,4 @@
-//! Shards of a map that is large only in earnest.
+//! Tests of `scale` with a tiny map.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use assert_cmd::Command;
 use super::cli::rows;
 
 #[test]
-fn scale_merges_its_shards_and_writes_what_that_took() {
+fn scale_merges_its_shards_and_writes_costs() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::cargo_bin("rattlemap-bench").unwrap();
     command.current_dir(folder.path()).args(["scale", "--quick", "--all", "--rounds", "2"]);
@@ -22,7 +22,7 @@ fn scale_merges_its_shards_and_writes_what_that_took() {
     let bytes =
         |name: &str| files.iter().find(|row| row["file"] == name).unwrap()["bytes"].parse::<u64>().unwrap();
     assert_eq!(bytes("cells.csv"), out.join("map/cells.csv").metadata().unwrap().len());
-    // A map as any other: it has every cell, and each is like one of the small map.
+    // The map has every cell.
     let table = fs::read_to_string(out.join("map/cells.csv")).unwrap();
     assert!(table.lines().count() == 1 + 50 * 40 && table.contains("periodic"), "{table}");
 }

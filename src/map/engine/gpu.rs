@@ -63,7 +63,7 @@ impl<'p> Gpu<'p> {
     async fn open(plan: Cow<'p, Plan>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         // Each oscillator is derived once: if the flows are stored, together with its constants.
         let (constants, survey) = if plan.stores_flows() {
-            let derived = survey_flows(&plan, |oscillator, steps| Constants::new(oscillator, steps));
+            let derived = survey_flows(&plan, Constants::new);
             let (constants, surveys): (Vec<_>, Vec<_>) = derived.unzip();
             (Some(constants), surveys.into_iter().fold(Survey::default(), Survey::and))
         } else {

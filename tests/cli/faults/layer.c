@@ -1,13 +1,13 @@
 /*
- * A Vulkan layer that lets calls fail, as drivers do when a card falls off the bus or resets.
+ * A Vulkan layer that makes calls fail, as drivers do when a card resets or loses its connection.
  *
- *     RATTLEMAP_FAULT=CALL:N:RESULT[:DEVICE]   from the Nth call of CALL on it returns RESULT (a VkResult, below zero); on
- *                                              the DEVICE-th device that is made alone, of whose calls the Nth is meant
- *     RATTLEMAP_CALLS=FILE                     at the end "CALL COUNT" lines are written to FILE
+ *     RATTLEMAP_FAULT=CALL:N:RESULT[:DEVICE]   from its Nth call, CALL returns RESULT (a negative VkResult). With DEVICE, only
+ *                                              calls on the DEVICE-th device that was created count and fail
+ *     RATTLEMAP_CALLS=FILE                     at the end the layer writes lines "CALL COUNT" to FILE
  *
- * A device that has been lost once (-4) stays so: every call that may say so does from then on; without DEVICE all are. The few types that a
- * layer needs are declared here, so that no headers have to be installed. Calls are handed on with six words: the calling
- * conventions of 64-bit systems pass them alike, whatever their types.
+ * After the first result -4 the device stays lost: every call that can report a lost device does so. Without DEVICE this holds
+ * for all devices. The few types that a layer needs are declared here, so no headers have to be installed. Calls are forwarded
+ * with six words, because 64-bit calling conventions pass integers and pointers in equal ways.
  */
 #include <pthread.h>
 #include <stdint.h>
@@ -22,7 +22,7 @@ typedef int32_t (*call)(void *handle, word, word, word, word, word);
 
 enum { DEVICE_LOST = -4, INITIALIZATION_FAILED = -3, INSTANCE_LINK = 47, DEVICE_LINK = 48 };
 
-/* VkLayerInstanceCreateInfo and VkLayerDeviceCreateInfo, of function VK_LAYER_LINK_INFO (0); any other create info. */
+/* VkLayerInstanceCreateInfo and VkLayerDeviceCreateInfo with function VK_LAYER_LINK_INFO (0), or another create info. */
 struct info {
     int32_t type;
     const struct info *next;
@@ -30,7 +30,7 @@ struct info {
     struct link *link;
 };
 
-/* VkLayerInstanceLink, VkLayerDeviceLink: the second function is the physical devices', or the device's. */
+/* VkLayerInstanceLink and VkLayerDeviceLink. `other` is for physical devices, or for the device. */
 struct link {
     struct link *next;
     get_function instance;
@@ -45,12 +45,12 @@ struct interface {
     get_function instance, device, physical_device;
 };
 
-/* What comes next, of the instance and the device made last: those of one driver share their functions. */
+/* Functions of the next layer for the latest instance and device. All of one driver share their functions. */
 static get_function next_instance, next_device;
-static void *instance_made, *device_made;
+static void *latest_instance, *latest_device;
 
-/* Devices in the order in which they were made, those that are gone left out. What belongs to a device begins with the same
- * pointer, its table of functions. */
+/* Devices in the order of creation; NULL for destroyed ones. Objects of a device begin with the device's pointer to its table
+ * of functions. */
 enum { MOST_DEVICES = 64 };
 static void *devices[MOST_DEVICES];
 static int device_count;
@@ -58,12 +58,12 @@ static int device_count;
 static void *device_of(void *handle) {
     for (int n = 0; n < device_count && n < MOST_DEVICES; n++)
         if (devices[n] && *(void **)devices[n] == *(void **)handle) return devices[n];
-    return device_made;
+    return latest_device;
 }
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 
-/* Calls that may fail; the second says whether they tell of a lost device. */
+/* Calls that may fail, and whether they can report a lost device. */
 #define CALLS(X) \
     X(QueueSubmit, 1) X(WaitForFences, 1) X(GetFenceStatus, 1) X(WaitSemaphores, 1) X(WaitSemaphoresKHR, 1) \
     X(GetSemaphoreCounterValue, 1) X(GetSemaphoreCounterValueKHR, 1) X(QueueWaitIdle, 1) X(DeviceWaitIdle, 1) \
@@ -74,26 +74,26 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
     X(CreateQueryPool, 0)
 
 enum {
-#define NUMBER(name, tells) name,
+#define NUMBER(name, reports_loss) name,
     CALLS(NUMBER) CreateDevice, CALL_COUNT
 };
 
 static const struct {
     const char *name;
-    int tells;
+    int reports_loss;
 } calls[] = {
-#define ROW(name, tells) {"vk" #name, tells},
+#define ROW(name, reports_loss) {"vk" #name, reports_loss},
     CALLS(ROW){"vkCreateDevice", 0},
 };
 
 static int counts[CALL_COUNT], counts_on_one[CALL_COUNT];
 static int is_lost;
 
-/* What a call returns in place of the driver's answer; 0 if it may go on. */
+/* Returns the result of a failing call; 0 if the call may proceed. */
 static int32_t fault(int which, void *handle) {
     pthread_mutex_lock(&lock);
     int count = ++counts[which], one = 0;
-    const char *asked = getenv("RATTLEMAP_FAULT"), *colon = asked ? strchr(asked, ':') : NULL;
+    const char *request = getenv("RATTLEMAP_FAULT"), *colon = request ? strchr(request, ':') : NULL;
     if (colon && sscanf(colon, ":%*d:%*d:%d", &one) == 1 && which != CreateDevice) {
         if (one < 1 || one > device_count || devices[one - 1] != device_of(handle)) {
             pthread_mutex_unlock(&lock);
@@ -101,10 +101,10 @@ static int32_t fault(int which, void *handle) {
         }
         count = ++counts_on_one[which];
     }
-    int32_t result = is_lost && calls[which].tells ? DEVICE_LOST : 0;
-    size_t length = colon ? (size_t)(colon - asked) : 0;
+    int32_t result = is_lost && calls[which].reports_loss ? DEVICE_LOST : 0;
+    size_t length = colon ? (size_t)(colon - request) : 0;
     int from, code;
-    if (colon && strlen(calls[which].name) == length && !strncmp(asked, calls[which].name, length) &&
+    if (colon && strlen(calls[which].name) == length && !strncmp(request, calls[which].name, length) &&
         sscanf(colon, ":%d:%d", &from, &code) == 2 && count >= from) {
         result = code;
         is_lost |= code == DEVICE_LOST;
@@ -113,19 +113,19 @@ static int32_t fault(int which, void *handle) {
     return result;
 }
 
-/* The driver does not know that its device is lost: what is destroyed next must not be in use. */
-static void settle(void *handle) {
+/* Waits until the device is idle. The driver does not know that it is lost, and objects in use must not be destroyed. */
+static void wait_idle(void *handle) {
     pthread_mutex_lock(&lock);
     void *device = device_of(handle);
     pthread_mutex_unlock(&lock);
     if (device) ((call)next_device(device, "vkDeviceWaitIdle"))(device, 0, 0, 0, 0, 0);
 }
 
-#define WRAPPER(name, tells) \
+#define WRAPPER(name, reports_loss) \
     static int32_t wrapped_##name(void *handle, word a, word b, word c, word d, word e) { \
         int32_t result = fault(name, handle); \
-        if (result == DEVICE_LOST) settle(handle); \
-        return result ? result : ((call)next_device(device_made, "vk" #name))(handle, a, b, c, d, e); \
+        if (result == DEVICE_LOST) wait_idle(handle); \
+        return result ? result : ((call)next_device(latest_device, "vk" #name))(handle, a, b, c, d, e); \
     }
 CALLS(WRAPPER)
 
@@ -140,9 +140,9 @@ static int32_t create_instance(const struct info *create, const void *allocator,
     if (!link) return INITIALIZATION_FAILED;
     get_function next = link->link->instance;
     link->link = link->link->next;
-    int32_t (*made)(const void *, const void *, void **) = (void *)next(NULL, "vkCreateInstance");
-    int32_t result = made(create, allocator, instance);
-    if (!result) next_instance = next, instance_made = *instance;
+    int32_t (*create_next)(const void *, const void *, void **) = (void *)next(NULL, "vkCreateInstance");
+    int32_t result = create_next(create, allocator, instance);
+    if (!result) next_instance = next, latest_instance = *instance;
     return result;
 }
 
@@ -153,11 +153,11 @@ static int32_t create_device(void *physical, const struct info *create, const vo
     if (result) return result;
     get_function instance = link->link->instance, next = link->link->other;
     link->link = link->link->next;
-    int32_t (*made)(void *, const void *, const void *, void **) = (void *)instance(instance_made, "vkCreateDevice");
-    result = made(physical, create, allocator, device);
+    int32_t (*create_next)(void *, const void *, const void *, void **) = (void *)instance(latest_instance, "vkCreateDevice");
+    result = create_next(physical, create, allocator, device);
     if (result) return result;
     pthread_mutex_lock(&lock);
-    next_device = next, device_made = *device;
+    next_device = next, latest_device = *device;
     if (device_count < MOST_DEVICES) devices[device_count++] = *device;
     pthread_mutex_unlock(&lock);
     return 0;
@@ -176,7 +176,7 @@ static function device_function(void *device, const char *name);
 static function instance_function(void *instance, const char *name);
 
 static function own(const char *name) {
-#define MATCH(call, tells) \
+#define MATCH(call, reports_loss) \
     if (!strcmp(name, "vk" #call)) return (function)wrapped_##call;
     CALLS(MATCH)
     if (!strcmp(name, "vkCreateInstance")) return (function)create_instance;
@@ -187,7 +187,7 @@ static function own(const char *name) {
     return NULL;
 }
 
-/* A function that the driver does not have is not there with this layer either. */
+/* The layer has no function that the driver does not have. */
 static function device_function(void *device, const char *name) {
     function next = next_device(device, name), mine = own(name);
     return next && mine ? mine : next;
@@ -207,7 +207,7 @@ __attribute__((visibility("default"))) int32_t vkNegotiateLoaderLayerInterfaceVe
     return 0;
 }
 
-__attribute__((destructor)) static void tell(void) {
+__attribute__((destructor)) static void write_calls(void) {
     const char *path = getenv("RATTLEMAP_CALLS");
     FILE *file = path ? fopen(path, "w") : NULL;
     if (!file) return;

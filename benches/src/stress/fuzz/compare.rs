@@ -1,161 +1,114 @@
-//! Lanes against the reference, cell by cell, with the machinery of [`rattlemap::validate`].
+//! Compares lanes with the reference, cell by cell, by means of [`rattlemap::validate`].
 
 use super::super::cells::EngineName;
 use super::super::lanes::Start;
-use super::{SETTINGS, Told, budget, each, lane_settings};
+use super::{Counter, Rows, SETTINGS, budget, each, lane_settings};
 use crate::stress::Watch;
 use rattlemap::gpu::Precision;
-use rattlemap::map::engine::measured_record;
-use rattlemap::map::plan::{Needs, Plan};
+use rattlemap::map::plan::Plan;
 use rattlemap::map::random::Random;
-use rattlemap::map::scene::{Purpose, Scene};
+use rattlemap::map::scene::{self, Integration, Quantity, Scene};
 use rattlemap::record::Record;
 use rattlemap::record::classify::{classify, status};
 use rattlemap::validate::{Difference, Draw, Kind, Lanes, Sample, Stratum, Subject, differences, replay};
-use rattlemap_dynamics::model::{GearPair, Model, State};
-use rattlemap_dynamics::orbit::{Class, Measurement, Status};
+use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::orbit::{Class, Status};
 
-/// How lanes say that they could not go on.
+/// Statuses of lanes that reached a cap.
 const CAPS: [Status; 3] = [Status::CapEvents, Status::CapRoot, Status::TooStiff];
 
-/// A lane whose record is not what the reference says.
+/// A lane whose record differs from the reference's.
 #[derive(Clone, Debug)]
 pub struct Mismatch {
-    /// Who computed it.
+    /// The engine.
     pub engine: EngineName,
     /// The cell.
     pub pair: GearPair,
-    /// Where it starts.
+    /// The cell's start.
     pub start: State,
-    /// What differs.
+    /// The fields that differ.
     pub differences: Vec<Difference>,
-    /// Why.
+    /// The explanation.
     pub kind: Kind,
 }
 
-/// Lanes against the reference.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Comparison {
-    /// Lanes that decide nothing within their periods, or that a cap ended, where the reference decides: they claim
-    /// nothing that could be wrong.
-    pub(super) silent: usize,
-    /// Lanes that say something else than the reference and were examined.
-    pub(super) mismatches: Vec<Mismatch>,
-    /// Those that were not, beyond the number asked for.
-    pub(super) left: usize,
-}
-
-/// Compares every lane with what was measured on the reference, and examines at most so many of
-/// those that differ, which `seed` chooses.
+/// Compares every lane with the reference and adds the results to `rows`. It looks for an explanation of at most `most` of
+/// the lanes that differ, which `seed` chooses.
 pub(super) fn all(
     precision: Precision,
     cells: &[Start],
-    truth: &[Measurement],
+    judges: &[Record],
     records: &[Record],
     (seed, most): (u64, usize),
     watch: &dyn Watch,
-) -> Comparison {
+    rows: &mut Rows,
+) {
     let differs = |&i: &usize| {
-        // Where neither side decides anything, averages over so few periods are nobody's claim.
-        let are_open = classify(&records[i]) == Class::Undecided
-            && classify(&measured_record(&truth[i], &Needs::EVERYTHING)) == Class::Undecided;
-        if are_open {
+        // If neither engine decides, averages over so few periods claim nothing.
+        if [&records[i], &judges[i]].iter().all(|record| classify(record) == Class::Undecided) {
             return false;
         }
         let period = std::f64::consts::TAU / cells[i].0.omega;
-        let judge = measured_record(&truth[i], &Needs::EVERYTHING);
-        !differences(&records[i], &judge, precision, period, &budget()).is_empty()
+        !differences(&records[i], &judges[i], precision, period, &budget()).is_empty()
     };
-    let is_silent = |&i: &usize| {
+    let is_undecided = |&i: &usize| {
         let is_open =
             classify(&records[i]) == Class::Undecided && records[i].periods_run >= lane_settings().periods;
         is_open || CAPS.contains(&status(&records[i]))
     };
-    let (silent, mut different): (Vec<usize>, Vec<usize>) =
-        (0..cells.len()).filter(differs).partition(is_silent);
+    let (undecided, mut different): (Vec<usize>, Vec<usize>) =
+        (0..cells.len()).filter(differs).partition(is_undecided);
+    rows.undecided += undecided.len();
     let examined = different.len().min(most);
     Random::new(seed).draw(&mut different, examined);
-    let left = different.split_off(examined).len();
-    let told = Told::new(watch, "lanes examined", examined);
-    let examine = |&i: &usize| {
-        let mismatch = Cell::new(precision, cells[i], records[i]).examine();
+    rows.unexamined += different.split_off(examined).len();
+    let counter = Counter::new(watch, "lanes examined", examined);
+    let explanation = |&i: &usize| {
+        let mismatch = explain(precision, cells[i], records[i]);
         if let Some(Mismatch { engine, pair, start, differences, kind: Kind::Unexplained }) = &mismatch {
             watch.found(&format!("unexplained: {} {pair:?} from {start:?}: {differences:?}", engine.name()));
         }
-        told.count(mismatch)
+        counter.count(mismatch)
     };
-    let mismatches = each(&different, examine).into_iter().flatten().collect();
-    Comparison { silent: silent.len(), mismatches, left }
+    rows.mismatches.extend(each(&different, explanation).into_iter().flatten());
 }
 
-/// A cell and its record as a map of which it is the first cell.
-struct Cell {
-    precision: Precision,
-    pair: GearPair,
-    start: State,
-    plan: Plan,
-    records: Vec<Record>,
+/// Validates a lane's record as that of the first cell of a map. Returns `None` if it is right.
+fn explain(precision: Precision, (pair, start): Start, record: Record) -> Option<Mismatch> {
+    let plan = plan(&pair, start);
+    let mut records = vec![Record::default(); plan.cell_count()];
+    records[0] = record;
+    let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
+    let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
+    let sample = Sample { seed: 0, draws, states: Vec::new() };
+    let mismatch = replay(&subject, &sample, &Lanes::default(), &|_| ()).mismatches.into_iter().next()?;
+    let (differences, kind) = (mismatch.differences, mismatch.kind);
+    Some(Mismatch { engine: precision.into(), pair, start, differences, kind })
 }
 
-impl Cell {
-    fn new(precision: Precision, (pair, start): Start, record: Record) -> Cell {
-        let plan = plan(&pair, start);
-        let mut records = vec![Record::default(); plan.cell_count()];
-        records[0] = record;
-        Cell { precision, pair, start, plan, records }
-    }
-
-    fn subject(&self) -> Subject<'_> {
-        Subject { plan: &self.plan, records: &self.records, precision: self.precision, is_lane: true }
-    }
-
-    fn examine(&self) -> Option<Mismatch> {
-        let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
-        let sample = Sample { seed: 0, draws, states: Vec::new() };
-        let validation = replay(&self.subject(), &sample, &Lanes::default(), &|_| ());
-        let mismatch = validation.mismatches.into_iter().next()?;
-        Some(Mismatch {
-            engine: self.precision.into(),
-            pair: self.pair,
-            start: self.start,
-            differences: mismatch.differences,
-            kind: mismatch.kind,
-        })
-    }
-}
-
-/// A plan whose first cell is this one: the swept parameters have no upper bound.
+/// Returns a plan whose first cell is this one. The swept parameters have no upper bound.
 fn plan(pair: &GearPair, start: State) -> Plan {
-    const SWEPT: [&str; 2] = ["omega", "mesh_speed"];
-    let value = |name: &str| pair.get(name).expect("a parameter of the table");
-    let names = GearPair::PARAMETERS.iter().map(|parameter| &*parameter.name);
-    let fixed: String = names
-        .filter(|name| !SWEPT.contains(name))
-        .map(|name| format!("{name} = {:?}\n", value(name)))
-        .collect();
-    let axis = |name: &str| {
-        let min = value(name);
-        format!("[[axis]]\nparameter = '{name}'\nmin = {min:?}\nmax = {:?}\ncount = 2\n", 2.0 * min + 1.0)
-    };
-    let axes = SWEPT.map(axis).concat();
+    use Quantity::{Class, Impacts, Lyapunov, Mesh, Symmetric, Word};
     let rattlemap_dynamics::orbit::Settings { transient_periods, observed_periods, max_period } = SETTINGS;
-    let text = format!(
-        "[parameters]\n{fixed}{axes}[integration]\ntransient_periods = {transient_periods}\n\
-         observed_periods = {observed_periods}\nmax_period = {max_period}\n\
-         [start]\npolicy = 'state'\nstate = {start:?}\n\
-         [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n"
-    );
-    let scene = Scene::parse(&text, "cell", &[], Purpose::Map).expect("a valid cell makes a valid scene");
-    Plan::new(&scene)
+    let integration =
+        Integration { transient_periods, observed_periods, max_period, ..Integration::default() };
+    let scene = Scene::builder(*pair)
+        .axis("omega", pair.omega..=2.0 * pair.omega + 1.0, 2)
+        .axis("mesh_speed", pair.mesh_speed..=2.0 * pair.mesh_speed + 1.0, 2)
+        .integration(integration)
+        .start(scene::Start::State(start))
+        .quantities(&[Class, Lyapunov, Impacts, Mesh, Symmetric, Word]);
+    Plan::new(&scene.build().expect("a valid cell makes a valid scene"))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{budget, space};
+    use super::super::space;
     use super::*;
+    use rattlemap_dynamics::model::Model;
 
     #[test]
-    fn the_first_cell_of_the_plan_is_the_cell() {
+    fn the_first_cell_of_the_plan_is_the_given_cell() {
         for (pair, start) in space::all_bounded(200, 3, &()) {
             let plan = plan(&pair, start);
             let (model, mut of_plan) = (plan.model(0), GearPair::paper(0.0));

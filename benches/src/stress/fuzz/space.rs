@@ -1,4 +1,4 @@
-//! Where random cells come from: the whole valid space, its edges more often than by chance.
+//! Random cells from the whole valid space. Cells at its edges are more frequent than by chance.
 
 use super::super::cells::{REST, flow_of};
 use super::super::lanes::Start;
@@ -9,24 +9,24 @@ use rattlemap::map::random::Random;
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::reference::Trajectory;
 
-/// Bounded cells take fewer steps per forcing period on the finest grid they need, and fewer
-/// steps and root iterations on the reference in the first few periods: where the backlash is
-/// tiny beside the motion there may be a million impacts in a period.
+/// Limit of bounded cells: steps per forcing period on the finest grid they need, and steps and root iterations of the
+/// reference in each of the first periods. If the backlash is tiny compared to the motion, a period may have a million
+/// impacts.
 const ITERATIONS: u64 = 2000;
 const TRIAL_PERIODS: u32 = 3;
-/// Checks of a trial per period.
+/// Checks per period of a trial.
 const CHECKS: u32 = 32;
 
-/// Wild cells turn fewer radians of their fastest rate in one forcing period: about as many
-/// steps on the reference, which would else take its 2 * 10^8 steps per period before it stops.
+/// Limit of wild cells: the fastest rate times the forcing period, in radians. The reference needs about as many steps.
+/// Without a limit it would take its maximum of 2 * 10^8 steps per period before it stops.
 const WILD_RADIANS: f64 = 1e6;
 
-/// `10^x` with x even in `[low, high]`.
+/// Returns `10^x` with x uniform in `[low, high]`.
 fn logarithmic(random: &mut Random, low: f64, high: f64) -> f64 {
     10f64.powf(low + (high - low) * random.unit())
 }
 
-/// Nothing at all once in so many times.
+/// Returns zero with probability `share`, else a logarithmic number.
 fn or_none(random: &mut Random, share: f64, low: f64, high: f64) -> f64 {
     if random.unit() < share { 0.0 } else { logarithmic(random, low, high) }
 }
@@ -41,38 +41,38 @@ fn restitution(random: &mut Random) -> f64 {
     }
 }
 
-/// Steps per forcing period of a lane that is in its stiffest domain all the time; none if
-/// lanes refuse it.
+/// Returns the steps per forcing period of a lane that is always in its stiffest domain; `None` if lanes cannot compute the
+/// cell.
 pub(super) fn iterations(pair: &GearPair) -> Option<u64> {
     let constants = Constants::new(&pair.oscillator().ok()?, None)?;
     let finest = constants.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
     Some((f64::from(constants.steps) * finest) as u64)
 }
 
-/// Candidates that are examined together.
+/// Number of candidates that are checked together.
 const BLOCK: usize = 1024;
 
-/// So many cells of bounded stiffness and their starts.
+/// Draws `count` cells of bounded work and their starts.
 pub(super) fn all_bounded(count: usize, seed: u64, watch: &dyn Watch) -> Vec<Start> {
     let mut random = Random::new(seed);
     let mut cells = Vec::with_capacity(count);
     while cells.len() < count {
-        let drawn: Vec<Start> = (0..BLOCK).map(|_| candidate(&mut random)).collect();
-        let kept = each(&drawn, is_bounded);
-        cells.extend(drawn.into_iter().zip(kept).filter_map(|(cell, kept)| kept.then_some(cell)));
+        let candidates: Vec<Start> = (0..BLOCK).map(|_| candidate(&mut random)).collect();
+        let bounded = each(&candidates, is_bounded);
+        cells.extend(candidates.into_iter().zip(bounded).filter_map(|(cell, fits)| fits.then_some(cell)));
         cells.truncate(count);
-        watch.progress("cells drawn", cells.len(), count);
+        watch.progress("bounded cells", cells.len(), count);
     }
     cells
 }
 
-/// So many cells of any magnitude at all.
+/// Draws `count` cells of any magnitude.
 pub(super) fn all_wild(count: usize, seed: u64) -> Vec<GearPair> {
     let mut random = Random::new(!seed);
     (0..count).map(|_| wild(&mut random)).collect()
 }
 
-/// A cell that may be too stiff, or keep the reference too busy.
+/// Draws a cell that may need too much work.
 fn candidate(random: &mut Random) -> Start {
     let pair = GearPair {
         m1: logarithmic(random, -2.0, 2.0),
@@ -92,7 +92,7 @@ fn candidate(random: &mut Random) -> Start {
     (pair, start(&pair, random))
 }
 
-/// Whether lanes and the reference have little enough to do.
+/// Whether the work of a cell is within the limit, in lanes and on the reference.
 fn is_bounded((pair, start): &Start) -> bool {
     if iterations(pair).is_none_or(|iterations| iterations >= ITERATIONS) {
         return false;
@@ -117,24 +117,24 @@ fn is_bounded((pair, start): &Start) -> bool {
     true
 }
 
-/// At rest, between the walls, on a wall or beyond it.
+/// Draws a start: at rest, between the walls, on a wall or behind it.
 fn start(pair: &GearPair, random: &mut Random) -> [f64; 4] {
     let kind = random.unit();
     if kind < 0.5 {
         return REST;
     }
-    let mut even = |reach: f64| reach * (2.0 * random.unit() - 1.0);
+    let mut uniform = |reach: f64| reach * (2.0 * random.unit() - 1.0);
     let gap = match kind {
-        kind if kind < 0.8 => even(pair.b),
-        kind if kind < 0.9 => pair.b.copysign(even(1.0)),
-        _ => even(2.0 * pair.b),
+        kind if kind < 0.8 => uniform(pair.b),
+        kind if kind < 0.9 => pair.b.copysign(uniform(1.0)),
+        _ => uniform(2.0 * pair.b),
     };
     let speed = pair.omega * pair.b;
-    let (x2, w, v2) = (even(pair.b), even(4.0 * speed), even(4.0 * speed));
+    let (x2, w, v2) = (uniform(pair.b), uniform(4.0 * speed), uniform(4.0 * speed));
     [gap + x2, w + v2, x2, v2]
 }
 
-/// A cell of any magnitude at all.
+/// Draws a cell of any magnitude.
 fn wild(random: &mut Random) -> GearPair {
     loop {
         let mut any = |share: f64| match random.unit() {
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_cell_is_valid_and_edges_are_met() {
+    fn every_cell_is_valid_and_edges_are_frequent() {
         let bounded = all_bounded(2000, 1, &());
         let wild = all_wild(500, 1);
         let pairs = || bounded.iter().map(|(pair, _)| pair);
@@ -173,7 +173,7 @@ mod tests {
             ("without support", pairs().filter(|pair| pair.k1 == 0.0 && pair.k2 == 0.0).count()),
             ("unforced", pairs().filter(|pair| pair.force == 0.0).count()),
             ("stiff", pairs().filter(|pair| pair.k > 1e5).count()),
-            ("beyond a wall", bounded.iter().filter(|(pair, y)| (y[0] - y[2]).abs() > pair.b).count()),
+            ("behind a wall", bounded.iter().filter(|(pair, y)| (y[0] - y[2]).abs() > pair.b).count()),
         ] {
             assert!(count >= 10, "{what}: {count}");
         }
