@@ -18,7 +18,7 @@ use crate::job::size::{self, Free};
 use crate::record::Record;
 use crate::store::folder::Folder;
 use crate::validate::{DEFAULT_SAMPLES, Kind};
-use measure::{Bench, Point, Run, Series, Target, scene};
+use measure::{OpenEngine, Point, Run, Series, Target, scene};
 
 /// Sides of the maps: 10^3 to 10^7 cells, two sizes per decade.
 const SIDES: [u32; 9] = [32, 56, 100, 178, 316, 562, 1000, 1778, 3162];
@@ -95,7 +95,7 @@ fn measure(
     folder: &Folder,
 ) -> anyhow::Result<Series> {
     let clock = Instant::now();
-    let mut bench = Bench::open(target)?;
+    let mut bench = OpenEngine::open(target)?;
     let open_seconds = bench.open_seconds;
     let mut series =
         Series { target: target.clone(), open_seconds, points: Vec::new(), skipped: None, check: None };

@@ -1,8 +1,9 @@
 //! `rattlemap check`: compares a folder's files with its manifest, and repairs them.
 
 use crate::cli::arguments::Check;
+use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::cli::say::{self, Console};
+use crate::cli::say;
 use crate::job::check;
 use crate::store::folder::Folder;
 use crate::store::map::MANIFEST;

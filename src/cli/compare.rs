@@ -6,9 +6,10 @@ use std::time::Instant;
 use anyhow::anyhow;
 
 use super::arguments::{Compare, FigureFormat};
+use super::console::Console;
 use super::failure::Failure;
 use super::interrupt::Interrupt;
-use super::say::{self, Console};
+use super::say;
 use super::stdout::print_json;
 use crate::findings::compare::{Comparison, Kind, Tally};
 use crate::job::compare::CompareJob;

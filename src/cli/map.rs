@@ -11,9 +11,10 @@ use std::time::Instant;
 use rattlemap_dynamics::orbit::Class;
 
 use crate::cli::arguments::{FigureFormat, Map};
+use crate::cli::console::Console;
 use crate::cli::failure::{Failure, fail_if};
 use crate::cli::interrupt::Interrupt;
-use crate::cli::say::{self, Console};
+use crate::cli::say;
 use crate::cli::stdout::print_json;
 use crate::job::error::JobError;
 use crate::job::map::{ComputedMap, MapJob, MapRun, OpenMap, require_engine};

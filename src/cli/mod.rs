@@ -6,6 +6,7 @@ mod bifurcation;
 mod check;
 mod compare;
 mod completions;
+mod console;
 mod devices;
 pub mod failure;
 mod interrupt;

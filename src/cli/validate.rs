@@ -4,9 +4,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use crate::cli::arguments::Validate;
+use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::say::{self, Console};
+use crate::cli::say;
 use crate::job::observer::Observer;
 use crate::job::validate::{SampleLanes, ValidateJob};
 use crate::validate::{HORIZON, HalfMesh, Judge, Kind, StratumResult, Validation};

@@ -231,7 +231,7 @@ mod tests {
         let validation = validate::replay(&subject, &sample, &Lanes::default(), &|_| {});
         let error = verdict(Path::new("o"), &plan, &validation).unwrap_err();
         assert!(
-            !error.is_usage() && error.to_string().starts_with("none of 4 cells was replayed"),
+            !error.is_usage() && error.to_string().starts_with("none of 4 cells was compared"),
             "{error}"
         );
     }

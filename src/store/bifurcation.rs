@@ -18,7 +18,7 @@ use crate::store::manifest::MANIFEST;
 pub use crate::store::manifest::bifurcation::DiagramArguments;
 use crate::store::manifest::bifurcation::bifurcation;
 
-const CSV: &str = "bifurcation.csv";
+const POINTS: &str = "bifurcation.csv";
 const COLUMNS_CSV: &str = "bifurcation_columns.csv";
 /// Strobe states, for models with walls that fix a displacement.
 const STROBE_CSV: &str = "bifurcation_strobe.csv";
@@ -27,7 +27,9 @@ static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figure
 
 /// Names of all files that a bifurcation diagram may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    [MANIFEST, CSV, COLUMNS_CSV, STROBE_CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+    [MANIFEST, POINTS, COLUMNS_CSV, STROBE_CSV]
+        .into_iter()
+        .chain(FIGURES.iter().map(|(_, name)| name.as_str()))
 }
 
 /// Writes the files that the scene asks for, and the manifest last. Returns the names of the files.
@@ -50,9 +52,9 @@ pub fn write(
     let (names, fixed) = (scene.base().state_names(), fixed(&scene.line()));
     if wanted.contains(&Format::Csv) {
         let axis = &parameter.name;
-        folder.replace(CSV, |out| bifurcation_tables::write_points(out, axis, &names, columns))?;
+        folder.replace(POINTS, |out| bifurcation_tables::write_points(out, axis, &names, columns))?;
         folder.replace(COLUMNS_CSV, |out| bifurcation_tables::write_columns(out, axis, columns))?;
-        files.extend([CSV, COLUMNS_CSV]);
+        files.extend([POINTS, COLUMNS_CSV]);
         if fixed.is_some() {
             folder
                 .replace(STROBE_CSV, |out| bifurcation_tables::write_strobes(out, axis, &names, columns))?;

@@ -17,13 +17,13 @@ use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::{Head, MANIFEST, joined};
 
-const CSV: &str = "compare.csv";
+const DIFFERENCES: &str = "compare.csv";
 /// Names of the figure, by format.
 static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("compare"));
 
 /// Names of all files that a comparison may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    [MANIFEST, CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+    [MANIFEST, DIFFERENCES].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
 }
 
 /// Describes the result of the comparison. `by_pattern` and `by_word` count cells that agree in class and period and differ
@@ -83,8 +83,8 @@ pub fn write(
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
     folder.remove(&names().collect::<Vec<_>>())?;
-    folder.replace(CSV, |out| compare_csv::write(out, compared))?;
-    let mut files = vec![CSV];
+    folder.replace(DIFFERENCES, |out| compare_csv::write(out, compared))?;
+    let mut files = vec![DIFFERENCES];
     let has_figure = compared.sides[0].cells.scene().list().is_none();
     for (format, name) in FIGURES.iter().filter(|(format, _)| has_figure && formats.contains(format)) {
         folder.replace(name, |out| figure::compare::write(out, *format, compared))?;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{LONGEST_EXCERPT, Place, Problem, SceneError};
+use super::error::{Place, Problem, SceneError, shorten};
 
 /// The fields of a table by name.
 pub(crate) type Table = BTreeMap<String, Node>;
@@ -178,21 +178,4 @@ impl<'a> Source<'a> {
 /// Counts the UTF-8 characters that begin in `bytes`.
 fn begun(bytes: &[u8]) -> usize {
     bytes.iter().filter(|&&byte| byte & 0xc0 != 0x80).count()
-}
-
-/// Returns the beginning of a text as one line of at most [`LONGEST_EXCERPT`] characters. The rest is not read.
-pub(crate) fn shorten(text: &str) -> String {
-    let mut line = String::new();
-    let mut left = LONGEST_EXCERPT;
-    for word in text.split_whitespace() {
-        let space = if line.is_empty() { "" } else { " " };
-        for c in space.chars().chain(word.chars()) {
-            if left == 0 {
-                return line + "...";
-            }
-            left -= 1;
-            line.push(c);
-        }
-    }
-    line
 }

@@ -3,7 +3,6 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::document::shorten;
 use super::printable;
 use rattlemap_dynamics::model::ModelError;
 use thiserror::Error;
@@ -200,4 +199,21 @@ pub(crate) fn suggest(name: &str, known: &[&str], all: &str) -> String {
         }
         _ => format!("valid names: {all}"),
     }
+}
+
+/// Returns the beginning of a text as one line of at most [`LONGEST_EXCERPT`] characters. The rest is not read.
+pub(crate) fn shorten(text: &str) -> String {
+    let mut line = String::new();
+    let mut left = LONGEST_EXCERPT;
+    for word in text.split_whitespace() {
+        let space = if line.is_empty() { "" } else { " " };
+        for c in space.chars().chain(word.chars()) {
+            if left == 0 {
+                return line + "...";
+            }
+            left -= 1;
+            line.push(c);
+        }
+    }
+    line
 }

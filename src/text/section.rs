@@ -2,7 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use super::document::{Node, Table, Value, shorten};
+use super::document::{Node, Table, Value};
+use super::error::shorten;
 use super::error::{Fault, Place, Problem, SceneError, suggest};
 use super::expression::{Expression, ExpressionError};
 use rattlemap_dynamics::model::ModelError;

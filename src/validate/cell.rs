@@ -36,7 +36,7 @@ const MOST_OF_MESH_SPEED: f64 = 2e-3;
 /// Number of perturbed motions that measure the effect of rounding on a cycle.
 const TURNS: u64 = 6;
 /// Factor by which a lane may deviate farther than these: it rounds at every step, they once per period.
-pub(super) const FACTOR: f64 = 8.0;
+pub(super) const ROUNDING_FACTOR: f64 = 8.0;
 
 /// Multiple of the budget for which a slow approach to a cycle is followed.
 const FOLLOWED: u32 = 8;
@@ -214,7 +214,7 @@ impl<'a> Cell<'a> {
         }
         let ends = self.perturbed_motions::<0>(state, period, []).map(|end| end.state());
         let spread = ends.map(|end| self.apart(&end, &state)).fold(self.resolution, farther);
-        spread.is_finite() && earlier <= FACTOR * spread
+        spread.is_finite() && earlier <= ROUNDING_FACTOR * spread
     }
 
     /// Returns logarithms of the largest multiplier over `period` periods, for motions perturbed after each period.

@@ -15,7 +15,7 @@ use rattlemap_dynamics::orbit::Class;
 const FEWEST: usize = 8;
 
 /// Probability that the test rejects a right map.
-const CHANCE: f64 = 1e-4;
+const FALSE_ALARM_RATE: f64 = 1e-4;
 
 /// Number of compared averages: exponent, logarithm of its error, impacts, meshing.
 const COUNT: usize = 4;
@@ -84,7 +84,7 @@ pub(super) fn tests(all: &[Differences]) -> Vec<ChaosTest> {
             let pairs: Vec<[f64; 2]> = all.iter().filter_map(|cell| cell[i]).collect();
             let [map, own] = [0, 1].map(|side| pairs.iter().map(|pair| pair[side]).collect::<Vec<f64>>());
             let cells = pairs.len();
-            let bar = (0.5 * (2.0 / CHANCE).ln()).sqrt() * (2.0 / cells as f64).sqrt();
+            let bar = (0.5 * (2.0 / FALSE_ALARM_RATE).ln()).sqrt() * (2.0 / cells as f64).sqrt();
             ChaosTest {
                 name,
                 cells,

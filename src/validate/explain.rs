@@ -20,7 +20,7 @@ const MANY_PERTURBED: u64 = 48;
 
 /// Records of lanes that computed the cell again.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Lanes<'a> {
+pub(super) struct RepeatedLanes<'a> {
     /// The lane with the map's settings.
     pub(super) again: Option<&'a Record>,
     /// The lane without early stops.
@@ -31,7 +31,7 @@ pub(super) struct Lanes<'a> {
 
 /// Returns the kind of a mismatch between `claim` and `truth`. The claim is the map's record, or the second judge's for a
 /// map that the reference computed. The truth is the reference's answer.
-pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes<'_>) -> Kind {
+pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: RepeatedLanes<'_>) -> Kind {
     // No engine produces such numbers.
     if claim.periods_run > cell.longest() || !cell.is_finite(claim) {
         return Kind::Unexplained;

@@ -378,7 +378,7 @@ fn replay_cell(
     let truth = cell.truth();
     let mut fields = cell.bars.compare(cell.record, &truth);
     let differs = |fields: &[Compared]| fields.iter().any(|(_, differs)| differs.is_some());
-    let ran = explain::Lanes { again, whole: lanes.whole(id), double: lanes.double(id) };
+    let ran = explain::RepeatedLanes { again, whole: lanes.whole(id), double: lanes.double(id) };
     let mut kind = differs(&fields).then(|| explain::kind(cell, cell.record, &truth, ran));
     if kind.is_none()
         && let Some(judged) = judged(subject, cell, id, judge, lanes)
@@ -388,7 +388,7 @@ fn replay_cell(
         kind = differs(&fields).then(|| match classify(&judged) {
             // An undecided answer contradicts nothing.
             Class::Undecided => Kind::Budget,
-            _ => explain::kind(cell, &judged, &truth, explain::Lanes::default()),
+            _ => explain::kind(cell, &judged, &truth, explain::RepeatedLanes::default()),
         });
     }
     Replayed {

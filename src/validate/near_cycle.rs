@@ -4,7 +4,7 @@
 //! `slow`. Where the strobe map is strongly curved or amplifies rounding, these multipliers differ from those of the
 //! cycle. The record is right if the reference computes the same values at the same state.
 
-use super::cell::{Cell, FACTOR};
+use super::cell::{Cell, ROUNDING_FACTOR};
 use crate::gpu::rules;
 use crate::record::classify::{classify, status};
 use crate::record::distance::apart;
@@ -27,7 +27,7 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
     let cycle = refine(&seed, StrobeMap::Periods(period))?;
     let is_slow = status(record) == Status::Slow;
     let reach = if is_slow { rules::recurrence_distance() } else { rules::ON_CYCLE };
-    let is_there = cell.apart(&record.strobe, &cycle.state) <= FACTOR * reach;
+    let is_there = cell.apart(&record.strobe, &cycle.state) <= ROUNDING_FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };
     // The lane's window ends at the strobe state. With a negative multiplier it began on the other side of the cycle.
@@ -66,7 +66,7 @@ pub(super) fn meets_strobe(cell: &Cell<'_>, state: State, period: u32) -> bool {
     if (0..period).any(|_| trajectory.advance_period(&mut met).is_err()) {
         return false;
     }
-    let bar = FACTOR * rules::on_strobe(cell.precision);
+    let bar = ROUNDING_FACTOR * rules::on_strobe(cell.precision);
     met.iter().any(|event| {
         let turns = event.t / cell.flow.period;
         apart(turns, turns.round()) < bar

@@ -4,7 +4,7 @@
 pub const TOLERATED: f64 = 1e-4;
 
 /// A stratum fails if its number of unexplained cells has less than this probability at the tolerated rate.
-const CHANCE: f64 = 0.01;
+const SIGNIFICANCE: f64 = 0.01;
 
 /// Probability that an interval does not contain the true rate.
 const OUTSIDE: f64 = 0.05;
@@ -46,7 +46,7 @@ impl Rate {
 
     /// Whether this number of unexplained cells exceeds one in 10,000 at 99 % confidence.
     pub fn is_too_many(&self) -> bool {
-        self.count > 0 && at_least(self.count, self.among, TOLERATED) < CHANCE
+        self.count > 0 && at_least(self.count, self.among, TOLERATED) < SIGNIFICANCE
     }
 }
 

@@ -5,7 +5,7 @@
 //! the reference: parameters, start, and the state after each period are perturbed within the engine's resolution.
 
 use super::Subject;
-use super::cell::{Cell, resolution};
+use super::cell::{Cell, ROUNDING_FACTOR, resolution};
 use super::rate::Rate;
 use crate::record::distance::farther;
 use rattlemap_dynamics::model::State;
@@ -19,9 +19,6 @@ pub const HORIZON: u32 = 4;
 /// Numbers of perturbed motions: for every lane, and for a lane that seems wrong.
 const FEW: u64 = 6;
 const MANY: u64 = 200;
-
-/// Tolerated factor between a lane's deviation and the largest of the perturbed motions. A lane rounds at every step.
-const FACTOR: f64 = 8.0;
 
 /// Largest relative deviation by rounding for which states are compared.
 const PREDICTABLE: f64 = 0.05;
@@ -73,7 +70,7 @@ fn compare(cell: &Cell<'_>, id: u32, state: State, subject: &Subject<'_>) -> Opt
     let compare = |count: u64| {
         let (end, moved) = cell.states(count, HORIZON)?;
         let spread = moved.iter().map(|other| cell.apart(&end, other)).fold(0.0, farther);
-        let bar = FACTOR * spread.max(resolution(subject.precision));
+        let bar = ROUNDING_FACTOR * spread.max(resolution(subject.precision));
         (bar < PREDICTABLE).then(|| Off { id, distance: cell.apart(&end, &state), bar })
     };
     let few = compare(FEW)?;

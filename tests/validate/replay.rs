@@ -533,7 +533,7 @@ fn a_validation_without_a_recomputed_cell_fails() {
     let subject = Subject { plan: &plan, records: &filled, precision: Precision::F64, is_lane: true };
     let found = replay(&subject, &selection, &Lanes::default(), &|_| {});
     assert_eq!((found.replayed, found.filled), (0, 9));
-    assert_eq!(found.faults(), ["none of 9 cells was replayed"]);
+    assert_eq!(found.faults(), ["none of 9 cells was compared"]);
 }
 
 /// Another device than the map's may round differently, so the result names it.

@@ -3,7 +3,7 @@
 use super::PERIODS;
 use super::cells::{Latest, Subject};
 use super::outcome::Outcome;
-use rattlemap::validate::independent::field::Field;
+use rattlemap::validate::independent::field::Equations;
 use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Gap;
 
@@ -12,7 +12,7 @@ const ENDINGS_PER_PERIOD: u32 = 10_000;
 
 /// Returns the state a step of length `h` after `y`, from the cosines of the phase at its start, middle and end.
 #[inline(always)]
-fn runge_kutta(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
+fn runge_kutta(field: &Equations, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
     let slope = |y: &Gap, cos: f64| {
         let [a, b] = field.accelerations(y, cos);
         [y[1], a, y[3], b]

@@ -110,7 +110,7 @@ impl Point {
 
 /// Comparison of a sample of the largest map with the reference.
 #[derive(Clone, Debug)]
-pub(super) struct Check {
+pub(super) struct SampleCheck {
     pub(super) validation: Validation,
     /// Restitution and frequency of cells that differ without an explanation.
     pub(super) unexplained: Vec<[f64; 2]>,
@@ -125,7 +125,7 @@ pub(super) struct Series {
     pub(super) points: Vec<Point>,
     /// Number of cells that was left out, with the reason.
     pub(super) skipped: Option<(usize, String)>,
-    pub(super) check: Option<Check>,
+    pub(super) check: Option<SampleCheck>,
 }
 
 /// Builds the scene with `side` x `side` cells.
@@ -136,7 +136,7 @@ pub(super) fn scene(side: u32) -> Scene {
 }
 
 /// An engine that is ready to be measured.
-pub(super) struct Bench {
+pub(super) struct OpenEngine {
     /// None for the processor. The engine takes the device and returns it after each run.
     device: Option<Box<gpu::Gpu>>,
     /// What the device's clock has counted since it was last read.
@@ -144,15 +144,16 @@ pub(super) struct Bench {
     pub(super) open_seconds: f64,
 }
 
-impl Bench {
+impl OpenEngine {
     /// Opens the engine and computes the first four cells, so that shaders are compiled.
     ///
     /// # Errors
     /// If the device cannot be opened, fails its self test or does not compile the lane.
-    pub(super) fn open(target: &Target) -> Result<Bench> {
+    pub(super) fn open(target: &Target) -> Result<OpenEngine> {
         let clock = Instant::now();
         let device_times = Arc::new(Mutex::new(None));
-        let mut bench = Bench { device: None, device_times: Arc::clone(&device_times), open_seconds: 0.0 };
+        let mut bench =
+            OpenEngine { device: None, device_times: Arc::clone(&device_times), open_seconds: 0.0 };
         if let Some(number) = target.adapter {
             let choice = AdapterChoice::numbered(number);
             let mut device = pollster::block_on(gpu::Gpu::open(target.precision, &choice))?;
@@ -206,7 +207,7 @@ impl Bench {
     /// Computes the map of a scene `runs` times, fewer if `seconds` run out, but at least twice.
     ///
     /// # Errors
-    /// As [`Bench::run`].
+    /// As [`OpenEngine::run`].
     pub(super) fn point(&mut self, scene: &Scene, runs: usize, seconds: f64) -> Result<(Point, Vec<Record>)> {
         let clock = Instant::now();
         let (first, mut records) = self.run(scene)?;
@@ -225,7 +226,7 @@ impl Bench {
     ///
     /// # Errors
     /// If the device fails while it computes the sample's lanes again.
-    pub(super) fn check(&mut self, scene: &Scene, records: &[Record], samples: usize) -> Result<Check> {
+    pub(super) fn check(&mut self, scene: &Scene, records: &[Record], samples: usize) -> Result<SampleCheck> {
         let plan = Plan::new(scene);
         let device = self.device.as_deref_mut();
         let precision = device.as_ref().map_or(Precision::F64, |device| device.precision());
@@ -242,6 +243,6 @@ impl Bench {
             let [i, j] = plan.indices(mismatch.id);
             [plan.axes()[0].value(i), plan.axes()[1].value(j)]
         });
-        Ok(Check { unexplained: unexplained.collect(), validation })
+        Ok(SampleCheck { unexplained: unexplained.collect(), validation })
     }
 }

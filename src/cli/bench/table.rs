@@ -6,7 +6,7 @@ use std::io::Write;
 use serde::Serialize;
 
 use super::figure;
-use super::measure::{Check, Run, SCENE, Series};
+use super::measure::{Run, SCENE, SampleCheck, Series};
 use super::spread::Spread;
 use crate::gpu::DeviceTimes;
 use crate::job::processor;
@@ -117,7 +117,7 @@ struct CheckObject<'a> {
     unexplained_cells: &'a [[f64; 2]],
 }
 
-fn check_object(Check { validation, unexplained }: &Check) -> CheckObject<'_> {
+fn check_object(SampleCheck { validation, unexplained }: &SampleCheck) -> CheckObject<'_> {
     let kinds = Kind::ALL.into_iter().map(|kind| (kind.name(), validation.of_kind(kind)));
     CheckObject {
         samples: validation.replayed,

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use crate::cli::arguments::Map;
+use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::cli::say::{Console, path, quoted};
+use crate::cli::say::{path, quoted};
 use crate::cli::stdout::{print, print_json};
 use crate::job::dry_run::DryRun;
 use crate::job::map::MapJob;

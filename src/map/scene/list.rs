@@ -6,10 +6,10 @@ use sha2::{Digest, Sha256};
 
 use super::Purpose;
 use super::axis::{Target, component, meanings, names};
-use super::document::shorten;
 use super::error::{Fault, Place, Problem, SceneError, suggest};
 use super::keys;
 use super::section::Section;
+use crate::text::error::shorten;
 use rattlemap_dynamics::model::{Model, Parameter};
 
 /// A file that a scene names, as the caller has read it.

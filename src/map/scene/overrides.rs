@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::TOP_LEVEL;
-use super::document::{Node, Table, Value, read_argument, shorten};
+use super::document::{Node, Table, Value, read_argument};
 use super::error::{Fault, Place, Problem, SceneError};
+use crate::text::error::shorten;
 
 /// Largest number of names in a path: more than any setting has, and few enough for recursion.
 const DEEPEST: usize = 8;

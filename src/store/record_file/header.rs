@@ -7,12 +7,12 @@ use crate::store::record_file::columns::NAMES;
 use crate::store::record_file::identity::Identity;
 
 /// Version of the file format. It is raised when files of the version before become unreadable.
-const FORMAT: u32 = 2;
+const RECORD_FORMAT: u32 = 2;
 
 /// First bytes of a record file.
 const MAGIC: [u8; 8] = *b"RTLMAP2\0";
 /// Number of bytes of magic, length and checksum.
-const HEAD: usize = 16;
+const PREFIX: usize = 16;
 
 /// Number of bytes at the beginning of a file in which the header must lie. Headers are far shorter.
 pub(crate) const MOST_BYTES: usize = 1 << 20;
@@ -49,7 +49,7 @@ pub(crate) fn bytes(identity: &Identity) -> serde_json::Result<Vec<u8>> {
 
 fn bytes_of(identity: &Identity, columns: &[&str]) -> serde_json::Result<Vec<u8>> {
     let columns = columns.iter().map(|&name| name.to_owned()).collect();
-    let body = serde_json::to_vec(&Body { format: FORMAT, columns, identity: identity.clone() })?;
+    let body = serde_json::to_vec(&Body { format: RECORD_FORMAT, columns, identity: identity.clone() })?;
     let length = (body.len() as u32).to_le_bytes();
     Ok([&MAGIC[..], &length, &checksum(length, &body).to_le_bytes(), &body].concat())
 }
@@ -58,10 +58,10 @@ fn bytes_of(identity: &Identity, columns: &[&str]) -> serde_json::Result<Vec<u8>
 pub(crate) fn find(bytes: &[u8], is_all: bool) -> Found {
     if let Some((body, end)) = body(bytes) {
         return match serde_json::from_slice::<Body>(body) {
-            Ok(Body { format: FORMAT, columns, identity }) if columns == NAMES => {
+            Ok(Body { format: RECORD_FORMAT, columns, identity }) if columns == NAMES => {
                 Found::Header { identity, end: end as u64 }
             }
-            Ok(Body { format: FORMAT, .. }) => Found::OtherFields,
+            Ok(Body { format: RECORD_FORMAT, .. }) => Found::OtherFields,
             _ => Found::Damaged("its header is not one of this version"),
         };
     }
@@ -76,11 +76,11 @@ pub(crate) fn find(bytes: &[u8], is_all: bool) -> Found {
 
 /// Returns the body of an undamaged header and the offset of its end.
 fn body(bytes: &[u8]) -> Option<(&[u8], usize)> {
-    let (head, rest) = bytes.split_first_chunk::<HEAD>()?;
+    let (head, rest) = bytes.split_first_chunk::<PREFIX>()?;
     let word = |at: usize| [head[at], head[at + 1], head[at + 2], head[at + 3]];
     let body = rest.get(..u32::from_le_bytes(word(8)) as usize)?;
     let is_good = head[..8] == MAGIC && checksum(word(8), body) == u32::from_le_bytes(word(12));
-    is_good.then_some((body, HEAD + body.len()))
+    is_good.then_some((body, PREFIX + body.len()))
 }
 
 fn checksum(length: [u8; 4], body: &[u8]) -> u32 {

@@ -8,7 +8,7 @@ use std::cell::Cell;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, System, Vector5};
 
-use super::field::Field;
+use super::field::Equations;
 use super::flight::{Flight, Sighting};
 use rattlemap_dynamics::flow::Gap;
 
@@ -150,13 +150,13 @@ impl Solver {
     }
 
     /// Returns the state after a time `tau`, ignoring walls.
-    fn after(&self, field: &Field, y: Gap, t: f64, tau: f64) -> Option<Gap> {
+    fn after(&self, field: &Equations, y: Gap, t: f64, tau: f64) -> Option<Gap> {
         self.run(field, y, t, tau, tau, |_, _| false)
     }
 
     fn run(
         &self,
-        field: &Field,
+        field: &Equations,
         y: Gap,
         t: f64,
         duration: f64,

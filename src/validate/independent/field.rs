@@ -52,16 +52,16 @@ fn inverse(m: [[f64; 2]; 2]) -> Matrix2<f64> {
 
 /// The equations of motion of one domain in gap coordinates, solved for the accelerations.
 #[derive(Clone, Copy, Debug)]
-pub struct Field {
+pub struct Equations {
     /// Coefficients of `(z, w, x, v)` in the accelerations of the gap and of the displacement.
     rows: [[f64; 4]; 2],
     force: [f64; 2],
     load: [f64; 2],
 }
 
-impl Field {
+impl Equations {
     /// Builds the equations of one domain.
-    pub fn new(oscillator: &Oscillator, domain: &Domain) -> Field {
+    pub fn new(oscillator: &Oscillator, domain: &Domain) -> Equations {
         let Coordinates { gap, other, .. } = Coordinates::new(oscillator);
         // Matrices from displacements to `(z, x)` and back.
         let [own, rest] = if other == 1 { gap } else { [gap[1], gap[0]] };
@@ -78,7 +78,7 @@ impl Field {
             |m: [[f64; 2]; 2]| -per_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * from_gap;
         let (k, c) = (matrix(domain.stiffness), matrix(domain.damping));
         let vector = |f: [f64; 2]| (per_mass * Vector2::from(f)).into();
-        Field {
+        Equations {
             rows: [0, 1].map(|i| [k[(i, 0)], c[(i, 0)], k[(i, 1)], c[(i, 1)]]),
             force: vector(oscillator.force),
             load: vector(domain.load),
@@ -86,12 +86,12 @@ impl Field {
     }
 
     /// Returns the equations with the gap held at rest by a wall that takes up its acceleration.
-    pub(super) fn held(&self, coordinates: &Coordinates) -> Field {
+    pub(super) fn held(&self, coordinates: &Coordinates) -> Equations {
         let kick = coordinates.kick();
         let of = |pair: [f64; 2]| [0.0, pair[1] - kick * pair[0]];
         let [gap, kept] = self.rows;
         let row = std::array::from_fn(|j| kept[j] - kick * gap[j]);
-        Field { rows: [[0.0; 4], row], force: of(self.force), load: of(self.load) }
+        Equations { rows: [[0.0; 4], row], force: of(self.force), load: of(self.load) }
     }
 
     /// Returns the accelerations of gap and displacement, given the cosine of the forcing's phase.
@@ -135,7 +135,7 @@ mod tests {
             assert!(off < 1e-15, "{gap:?}: {back:?}");
             for domain in [oscillator.free, oscillator.meshing[0]] {
                 let cos = 0.6;
-                let [a, b] = Field::new(&oscillator, &domain).accelerations(&q, cos);
+                let [a, b] = Equations::new(&oscillator, &domain).accelerations(&q, cos);
                 let x = coordinates.state(&[a, 0.0, b, 0.0]);
                 let (acceleration, k, c) = ([x[0], x[2]], domain.stiffness, domain.damping);
                 for i in 0..2 {

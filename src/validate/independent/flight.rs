@@ -1,7 +1,7 @@
 //! Flights and contacts for an integrator with time steps: finds where a step meets a wall and applies the contact law.
 //! Written from the equations of motion in gap coordinates `(z, w, x, v)`, in which a gap can be set to a wall exactly.
 
-use super::field::{Coordinates, Field};
+use super::field::{Coordinates, Equations};
 use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::reference::EventKind;
@@ -87,7 +87,7 @@ pub struct Flight {
     law: Law,
     coordinates: Coordinates,
     /// Equations of free motion, and of lasting contact with the right and the left wall.
-    fields: [Field; 3],
+    fields: [Equations; 3],
     mode: Mode,
     /// The ending at which the present motion starts, and the order of that root.
     from: Option<(Ending, u32)>,
@@ -102,11 +102,11 @@ impl Flight {
     /// wall.
     pub fn new(oscillator: &Oscillator, law: Law, start: State) -> Flight {
         let coordinates = Coordinates::new(oscillator);
-        let free = Field::new(oscillator, &oscillator.free);
+        let free = Equations::new(oscillator, &oscillator.free);
         let behind = |side: Side| match oscillator.contacts[side.index()] {
             _ if oscillator.walls[side.index()].is_infinite() => free,
             Contact::Rigid => free.held(&coordinates),
-            _ => Field::new(oscillator, &oscillator.meshing[side.index()]),
+            _ => Equations::new(oscillator, &oscillator.meshing[side.index()]),
         };
         let mut flight = Flight {
             walls: oscillator.walls,
@@ -158,7 +158,7 @@ impl Flight {
 
     /// Returns the present equations of motion.
     #[inline]
-    pub fn field(&self) -> &Field {
+    pub fn field(&self) -> &Equations {
         match self.meshing() {
             None => &self.fields[0],
             Some(side) => self.meshing_field(side),
@@ -179,7 +179,7 @@ impl Flight {
         self.from = None;
     }
 
-    fn meshing_field(&self, side: Side) -> &Field {
+    fn meshing_field(&self, side: Side) -> &Equations {
         &self.fields[if side == Side::Right { 1 } else { 2 }]
     }
 
@@ -199,18 +199,18 @@ impl Flight {
 
     /// Returns the acceleration of the gap into a wall by the equations of a domain.
     #[inline]
-    fn pressing(&self, field: &Field, side: Side, q: &Gap, t: f64) -> f64 {
+    fn pressing(&self, field: &Equations, side: Side, q: &Gap, t: f64) -> f64 {
         side.sign() * field.accelerations(q, self.cos(t))[0]
     }
 
     /// Whether the equations of a domain press a gap at rest into a wall. The first derivative that is not zero decides.
-    fn presses(&self, field: &Field, side: Side, q: &Gap, t: f64) -> bool {
+    fn presses(&self, field: &Equations, side: Side, q: &Gap, t: f64) -> bool {
         let pressing = self.pressing(field, side, q, t);
         pressing > 0.0 || pressing == 0.0 && self.pressing_rate(field, field, side, q, t) > 0.0
     }
 
     /// Returns the rate of the acceleration into a wall by the equations `of`, along the motion by the equations `along`.
-    fn pressing_rate(&self, of: &Field, along: &Field, side: Side, q: &Gap, t: f64) -> f64 {
+    fn pressing_rate(&self, of: &Equations, along: &Equations, side: Side, q: &Gap, t: f64) -> f64 {
         let (sin, cos) = (self.omega * t).sin_cos();
         let [a, b] = along.accelerations(q, cos);
         side.sign() * of.gap_rate(&[q[1], a, q[3], b], -self.omega * sin)
