@@ -177,7 +177,8 @@ fn the_folder_of_a_list_can_be_resumed_checked_and_validated() {
     assert!(cells() == good);
     fs::write(out.join("list.csv"), "F,k1\n41,20\n").unwrap();
     fails(&folder, "validate out/l --quiet", 2, &["`cells.rows` was 4, now 1"]);
-    let again = "with the scene's own table `rattlemap map SCENE --out out/l --resume`";
+    let again =
+        "`rattlemap map SCENE --out out/l --resume` makes every file again from the scene's own table";
     fails(&folder, "check out/l --repair --quiet", 1, &["list.csv is damaged", again]);
 }
 

@@ -178,7 +178,7 @@ fn damaged_manifests_are_refused() {
     for line in ["validate out/s", "check out/s --repair"] {
         fs::remove_file(out.join("map.png")).ok();
         let large = "60000 x 60000 = 3600000000 cells needs about";
-        fails(&folder, line, 2, &[large, "use a machine that has as much"]);
+        fails(&folder, line, 2, &[large, "use a larger machine"]);
     }
     fs::remove_file(&path).unwrap();
     check(2, &["the run is unfinished", "--resume"]);

@@ -293,7 +293,7 @@ fn resuming_a_finished_shard_changes_nothing() {
     damage(&records, 40);
     let check = format!("check {dir}");
     fails(&folder, &check, 1, &["records.bin is damaged"]);
-    let repair = ["nothing of shard 2/3 can be made of the rest", "--shard 2/3"];
+    let repair = ["no file of shard 2/3 can be made from the others", "--shard 2/3"];
     fails(&folder, &format!("{check} --repair"), 1, &repair);
     again(&["0 cells are kept", "shard 2/3: 8 of 24 cells"]);
     succeeds(&folder, &check).stderr(says(&["as manifest.json says"]));
