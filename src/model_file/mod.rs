@@ -21,7 +21,7 @@ use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter};
 pub use builtin::{BUILT_IN, DEFAULT};
 pub use contact::{Wall, WallLaw, WallSpring};
 pub use definition::Definition;
-#[cfg(feature = "cli")]
+#[cfg(feature = "job")]
 pub(crate) use equations::factor;
 
 use crate::text::error::SceneError;
