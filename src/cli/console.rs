@@ -44,10 +44,7 @@ impl Observer for Console {
     }
 
     fn progress(&self, done: usize, expected: usize) {
-        let start = || match self.grows {
-            true => Progress::of_at_least(expected, done, self.unit, self.quiet),
-            false => Progress::new(expected, done, self.unit, self.quiet),
-        };
+        let start = || Progress::of(expected, done, self.unit, self.quiet, self.grows);
         self.progress.get_or_init(start).report(done, expected);
     }
 }

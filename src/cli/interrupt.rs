@@ -38,50 +38,37 @@ impl Interrupt {
     ///
     /// # Errors
     /// If the operating system refuses.
-    #[cfg(unix)]
     pub(super) fn listen(quiet: bool) -> Result<Interrupt, Failure> {
         let interrupt = Interrupt::default();
-        let listener = interrupt.clone();
         for signal in [SIGINT, SIGTERM] {
             // The handler itself ends the process: the thread below may be blocked by a terminal that accepts no text.
-            signal_hook::flag::register_conditional_shutdown(
-                signal,
-                SIGNALLED + signal,
-                Arc::clone(&interrupt.raised),
-            )
-            .context("cannot listen for signals")?;
+            let raised = Arc::clone(&interrupt.raised);
+            signal_hook::flag::register_conditional_shutdown(signal, SIGNALLED + signal, raised)
+                .context("cannot listen for signals")?;
         }
-        let mut signals =
-            signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).context("cannot listen for signals")?;
-        std::thread::spawn(move || signals.forever().for_each(|signal| listener.receive(signal, quiet)));
+        interrupt.clone().wait_in_thread(quiet).context("cannot listen for signals")?;
         Ok(interrupt)
     }
 
-    /// Listens to signals from now on. A second signal ends the process at once; record files stay readable.
-    ///
-    /// # Errors
-    /// If the operating system refuses.
+    #[cfg(unix)]
+    fn wait_in_thread(self, quiet: bool) -> std::io::Result<()> {
+        let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
+        std::thread::spawn(move || signals.forever().for_each(|signal| self.receive(signal, quiet)));
+        Ok(())
+    }
+
     #[cfg(not(unix))]
-    pub(super) fn listen(quiet: bool) -> Result<Interrupt, Failure> {
-        let interrupt = Interrupt::default();
-        interrupt.signal.store(SIGINT, Ordering::Relaxed);
+    fn wait_in_thread(self, quiet: bool) -> std::io::Result<()> {
         for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register_conditional_shutdown(
-                signal,
-                SIGNALLED + signal,
-                Arc::clone(&interrupt.raised),
-            )
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&interrupt.raised)))
-            .context("cannot listen for signals")?;
+            signal_hook::flag::register(signal, Arc::clone(&self.raised))?;
         }
-        let listener = interrupt.clone();
         std::thread::spawn(move || {
-            while !listener.is_raised() {
+            while !self.is_raised() {
                 std::thread::sleep(INTERVAL);
             }
-            listener.receive(SIGINT, quiet);
+            self.receive(SIGINT, quiet);
         });
-        Ok(interrupt)
+        Ok(())
     }
 
     fn receive(&self, signal: i32, quiet: bool) {

@@ -28,7 +28,8 @@ pub enum Progress {
 /// Progress as lines.
 pub struct Lines {
     unit: &'static str,
-    total: Total,
+    /// Whether the total is a lower bound that can grow. Then the remaining time is not shown.
+    grows: bool,
     /// Units that earlier runs had done.
     from: usize,
     /// Start of this run.
@@ -37,34 +38,24 @@ pub struct Lines {
     printed: AtomicUsize,
 }
 
-/// Meaning of a total.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Total {
-    Exact,
-    /// A lower bound; it can grow, so the remaining time is not shown.
-    AtLeast,
-}
-
 impl Progress {
     /// Starts a report on `total` units, at least one, of which earlier runs have done `from`.
     pub fn new(total: usize, from: usize, unit: &'static str, quiet: bool) -> Progress {
-        Progress::with(Total::Exact, total, from, unit, quiet)
+        Progress::of(total, from, unit, quiet, false)
     }
 
-    /// Starts a report on at least `total` units.
-    pub fn of_at_least(total: usize, from: usize, unit: &'static str, quiet: bool) -> Progress {
-        Progress::with(Total::AtLeast, total, from, unit, quiet)
-    }
-
-    fn with(kind: Total, total: usize, from: usize, unit: &'static str, quiet: bool) -> Progress {
+    /// Starts a report on `total` units; the total may grow.
+    pub(super) fn of(total: usize, from: usize, unit: &'static str, quiet: bool, grows: bool) -> Progress {
         if quiet {
             return Progress::Quiet;
         }
         if !stderr().is_terminal() {
             let (clock, printed) = (Instant::now(), AtomicUsize::new(from * LINES / total));
-            return Progress::Lines(Lines { unit, total: kind, from, clock, printed });
+            return Progress::Lines(Lines { unit, grows, from, clock, printed });
         }
-        let bar = ProgressBar::new(total as u64).with_position(from as u64).with_style(style(kind, unit));
+        let style = ProgressStyle::with_template(&template(grows, unit));
+        let style = style.unwrap_or_else(|_| ProgressStyle::default_bar()).with_key("rate", write_rate);
+        let bar = ProgressBar::new(total as u64).with_position(from as u64).with_style(style);
         bar.reset_eta();
         bar.enable_steady_tick(TICK);
         Progress::Bar(bar)
@@ -111,20 +102,14 @@ impl Progress {
     }
 }
 
-fn style(total: Total, unit: &str) -> ProgressStyle {
-    let style = ProgressStyle::with_template(&template(total, unit));
-    style.unwrap_or_else(|_| ProgressStyle::default_bar()).with_key(
-        "rate",
-        |state: &ProgressState, text: &mut dyn Write| {
-            let _ = text.write_str(&rate(state.per_sec()));
-        },
-    )
+fn write_rate(state: &ProgressState, text: &mut dyn Write) {
+    let _ = text.write_str(&rate(state.per_sec()));
 }
 
-fn template(total: Total, unit: &str) -> String {
-    match total {
-        Total::Exact => format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{rate}}/s, {{eta}} left"),
-        Total::AtLeast => format!("{{bar:40}} {{pos}} of at least {{len}} {unit}, {{rate}}/s"),
+fn template(grows: bool, unit: &str) -> String {
+    match grows {
+        false => format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{rate}}/s, {{eta}} left"),
+        true => format!("{{bar:40}} {{pos}} of at least {{len}} {unit}, {{rate}}/s"),
     }
 }
 
@@ -136,14 +121,14 @@ fn rate(per_second: f64) -> String {
 impl Lines {
     fn text(&self, done: usize, total: usize, elapsed: Duration) -> String {
         let unit = self.unit;
-        let at_least = if self.total == Total::AtLeast { "at least " } else { "" };
+        let at_least = if self.grows { "at least " } else { "" };
         let seconds = elapsed.as_secs_f64();
         let rate = (done - self.from.min(done)) as f64 / seconds.max(1e-9);
         let left = (total - done) as f64 / rate.max(1e-9);
         if done == total || seconds < 1.0 {
             return format!("{done} of {at_least}{total} {unit}");
         }
-        let left = if self.total == Total::AtLeast { String::new() } else { format!(", {left:.0} s left") };
+        let left = if self.grows { String::new() } else { format!(", {left:.0} s left") };
         format!("{done} of {at_least}{total} {unit}, {} per second{left}", self::rate(rate))
     }
 }
@@ -152,17 +137,17 @@ impl Lines {
 mod tests {
     use super::*;
 
-    fn text(total: Total, done: usize) -> String {
+    fn text(grows: bool, done: usize) -> String {
         let lines =
-            Lines { unit: "cells", total, from: 0, clock: Instant::now(), printed: AtomicUsize::new(0) };
+            Lines { unit: "cells", grows, from: 0, clock: Instant::now(), printed: AtomicUsize::new(0) };
         lines.text(done, 400, Duration::from_secs(10))
     }
 
     #[test]
     fn the_remaining_time_is_shown_if_the_total_is_exact() {
-        assert_eq!(text(Total::Exact, 200), "200 of 400 cells, 20 per second, 10 s left");
-        assert_eq!(text(Total::AtLeast, 200), "200 of at least 400 cells, 20 per second");
-        assert_eq!(text(Total::AtLeast, 400), "400 of at least 400 cells");
+        assert_eq!(text(false, 200), "200 of 400 cells, 20 per second, 10 s left");
+        assert_eq!(text(true, 200), "200 of at least 400 cells, 20 per second");
+        assert_eq!(text(true, 400), "400 of at least 400 cells");
     }
 
     #[test]
@@ -172,8 +157,8 @@ mod tests {
 
     #[test]
     fn templates_are_valid() {
-        for total in [Total::Exact, Total::AtLeast] {
-            assert!(ProgressStyle::with_template(&template(total, "cells")).is_ok());
+        for grows in [false, true] {
+            assert!(ProgressStyle::with_template(&template(grows, "cells")).is_ok());
         }
     }
 }

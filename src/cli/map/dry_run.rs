@@ -11,6 +11,7 @@ use crate::cli::failure::Failure;
 use crate::cli::say::{path, quoted};
 use crate::cli::stdout::{print, print_json};
 use crate::job::dry_run::DryRun;
+use crate::job::forecast::Forecast;
 use crate::job::map::MapJob;
 use crate::job::processor;
 use crate::job::size::Free;
@@ -55,7 +56,7 @@ fn text(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> String {
         format!("engine   {} ({}) on {device}{reason}", dry.engine, dry.precision),
         format!("memory   about {}{on_device}{}", bytes(dry.host_memory), free(dry.free.memory)),
         format!("disk     about {}{} for {}", bytes(dry.disk), free(dry.free.disk), path(out)),
-        format!("time     {}", time(dry)),
+        format!("time     {}", time(&dry.forecast, dry.is_adaptive)),
         format!(
             "         predicted from {} cells; opening the engine ({}) and writing tables and figures are not included",
             dry.forecast.sampled,
@@ -90,11 +91,11 @@ fn object(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> Value {
 }
 
 /// The predicted time. An adaptive map integrates fewer cells, and takes less.
-fn time(dry: &DryRun) -> String {
-    let total = seconds(dry.forecast.seconds);
-    let at_most = if dry.is_upper_bound() { "at most " } else { "" };
-    match dry.forecast.interval {
-        None if dry.is_adaptive => format!("if every cell were integrated, more than {total}"),
+fn time(forecast: &Forecast, is_adaptive: bool) -> String {
+    let total = seconds(forecast.seconds);
+    let at_most = if is_adaptive { "at most " } else { "" };
+    match forecast.interval {
+        None if is_adaptive => format!("if every cell were integrated, more than {total}"),
         None => format!("more than {total}"),
         Some([low, high]) if high > low => {
             format!("{at_most}about {total} (95 %: {} to {})", seconds(low), seconds(high))
@@ -117,7 +118,6 @@ fn seconds(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::forecast::Forecast;
 
     #[test]
     fn times_have_suitable_units() {
@@ -127,32 +127,11 @@ mod tests {
 
     #[test]
     fn only_a_sample_that_ended_bounds_the_time_of_an_adaptive_map() {
-        let dry = |interval, is_adaptive| DryRun {
-            runs: 1,
-            stored: 0,
-            engine: "cpu",
-            precision: "f64",
-            device: String::new(),
-            reason: String::new(),
-            host_memory: 0,
-            device_memory: None,
-            disk: 0,
-            free: Free { memory: None, disk: None },
-            open_seconds: 0.0,
-            forecast: Forecast { seconds: 75.0, interval, sampled: 16 },
-            is_adaptive,
-        };
-        let ended = Some([60.0, 90.0]);
-        let cases = [dry(ended, false), dry(ended, true), dry(None, false), dry(None, true)];
-        assert_eq!(cases.each_ref().map(DryRun::is_upper_bound), [false, true, false, false]);
-        assert_eq!(
-            cases.each_ref().map(time),
-            [
-                "about 75 s (95 %: 60 s to 90 s)",
-                "at most about 75 s (95 %: 60 s to 90 s)",
-                "more than 75 s",
-                "if every cell were integrated, more than 75 s"
-            ]
-        );
+        let ended = Forecast { seconds: 75.0, interval: Some([60.0, 90.0]), sampled: 16 };
+        let cut = Forecast { interval: None, ..ended };
+        assert_eq!(time(&ended, false), "about 75 s (95 %: 60 s to 90 s)");
+        assert_eq!(time(&ended, true), "at most about 75 s (95 %: 60 s to 90 s)");
+        assert_eq!(time(&cut, false), "more than 75 s");
+        assert_eq!(time(&cut, true), "if every cell were integrated, more than 75 s");
     }
 }

@@ -324,7 +324,8 @@ mod tests {
         let error = number(&here, "", "", double).unwrap_err();
         assert_eq!(
             error,
-            "no graphics card has f64 (0 (Arc A770, PCI 0000:03:00.0)); give --engine cpu, which computes in f64, --precision f32 or --adapter 1 (llvmpipe, a software driver)"
+            "no graphics card has f64 (0 (Arc A770, PCI 0000:03:00.0)); give --engine cpu, which computes in f64, \
+             --precision f32 or --adapter 1 (llvmpipe, a software driver)"
         );
         // The message is the same without a software driver.
         let error = number(&[INTEL], "", "", double).unwrap_err();
