@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -24,6 +25,10 @@ RUN = "import sys; sys.path.append(sys.argv.pop(1)); import _native; sys.exit(_n
 Program = Callable[..., "subprocess.CompletedProcess[str]"]
 #: Runs the program with the scene of a Dataset, and opens its folder.
 Rerun = Callable[..., xr.Dataset]
+
+
+# A shell starts background jobs with SIGINT ignored; Python then raises no KeyboardInterrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
