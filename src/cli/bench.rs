@@ -29,7 +29,7 @@ const QUICK_SIDES: [u32; 2] = [6, 9];
 /// Largest number of runs of one size.
 const MAX_RUNS: usize = 5;
 
-/// Share of the time budget that is kept for comparing samples with the reference.
+/// Share of the time budget that is reserved for comparing samples with the reference.
 const CHECK_SHARE: f64 = 0.15;
 
 /// Measures every engine, writes the folder after each, and prints a summary.

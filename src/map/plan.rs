@@ -116,7 +116,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Plans a map. The scene must have been read for a map, and its [`Size`](crate::map::size::Size) accepted.
+    /// Plans a map. The scene must have been read for a map, and the caller must have checked its size.
     ///
     /// # Panics
     /// If the scene has neither two axes nor a list, or has more runs than a `u32` can number.

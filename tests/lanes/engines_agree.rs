@@ -1,4 +1,4 @@
-//! The same cells on the reference and on lanes, in both precisions.
+//! Compares cells on the reference with lanes in both precisions.
 //!
 //! Without an adapter the tests fail: install a software driver (see `scripts/test.sh`).
 
