@@ -304,7 +304,7 @@ impl<'p> MapRun<'p> {
         }
     }
 
-    /// Writes the files of a shard beside its records. Returns their names; none for a whole map, and without a folder.
+    /// Writes the files of a shard next to its records. Returns their names; none for a whole map or without a folder.
     ///
     /// # Errors
     /// [`OutputError`] if a file cannot be written.

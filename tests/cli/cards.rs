@@ -251,11 +251,11 @@ fn an_interrupted_map_of_several_cards_can_be_resumed() {
     run.args(GPU).args(slow).args(["--adapter", "all", "--out", "cut"]).stderr(Stdio::piped());
     let run = run.spawn().unwrap();
     let clock = Instant::now();
-    let kept = || fs::metadata(machine.file("cut", "records.bin")).map_or(0, |data| data.len());
+    let stored = || fs::metadata(machine.file("cut", "records.bin")).map_or(0, |data| data.len());
     // The file grows beyond its header.
     let mut header = 0;
-    while (header == 0 || kept() <= header) && clock.elapsed() < Duration::from_secs(60) {
-        header = if header == 0 { kept() } else { header };
+    while (header == 0 || stored() <= header) && clock.elapsed() < Duration::from_secs(60) {
+        header = if header == 0 { stored() } else { header };
         std::thread::sleep(Duration::from_millis(20));
     }
     let clock = Instant::now();

@@ -238,8 +238,8 @@ fn orbit_prints_the_state_at_a_time() {
     let time = format!("{:?}", 3.0 * flow.period + 0.5);
     let orbit: serde_json::Value = serde_json::from_slice(&at(&[&time, "--json"])).unwrap();
     assert_eq!(orbit["time"], 3.0 * flow.period + 0.5);
-    for (told, expected) in orbit["state"].as_array().unwrap().iter().zip(trajectory.state()) {
-        assert!((told.as_f64().unwrap() - expected).abs() < 1e-12, "{told} {expected}");
+    for (found, expected) in orbit["state"].as_array().unwrap().iter().zip(trajectory.state()) {
+        assert!((found.as_f64().unwrap() - expected).abs() < 1e-12, "{found} {expected}");
     }
     let text = String::from_utf8(at(&["0"])).unwrap();
     assert!(text.contains("x1=0.125 v1=0.0 x2=-0.25 v2=1.5 at t = 0.0\n"), "{text}");

@@ -134,8 +134,8 @@ fn cells_that_differ_by_pattern_are_listed_and_do_not_fail() {
     let differing = patterns[0].iter().zip(&patterns[1]).filter(|(up, down)| up != down).count();
     assert!(differing > 3, "{patterns:?}");
     let done = compare(&folder, "up down --fail --json --out c").success();
-    let told = printed(&done);
-    let counts = ["differing", "by_pattern", "by_word"].map(|name| told[name].as_u64().unwrap());
+    let object = printed(&done);
+    let counts = ["differing", "by_pattern", "by_word"].map(|name| object[name].as_u64().unwrap());
     assert_eq!(counts, [0, differing as u64, 0]);
     let (_, rows) = rows(&folder.path().join("c/compare.csv"));
     assert_eq!(rows.len(), differing);
