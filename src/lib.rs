@@ -65,6 +65,7 @@ pub mod show;
 #[cfg(feature = "files")]
 pub mod store;
 
+#[cfg(feature = "job")]
 pub mod job;
 
 #[cfg(feature = "cli")]

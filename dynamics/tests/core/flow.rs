@@ -1,9 +1,10 @@
 //! The exact flow against closed forms and against the matrix exponential of nalgebra.
 
-use crate::common::{REST, flow_of, max_or_nan};
+use crate::common::{REST, departure, flow_of, max_or_nan, paper};
 use nalgebra::{SMatrix, SVector};
 use rattlemap_dynamics::flow::DomainKind;
 use rattlemap_dynamics::model::{GearPair, Side, State};
+use rattlemap_dynamics::reference::Trajectory;
 
 /// Rounding error of a matrix exponential per radian of the fastest rate. Every doubling of the time doubles the
 /// error and adds that of a product.
@@ -327,4 +328,34 @@ fn gap_coordinates_momentum_and_energy_of_a_state() {
     assert_eq!(flow.kinetic_energy(y), 8.5);
     assert_eq!([flow.wall(Side::Right), flow.wall(Side::Left)], [0.5, -0.5]);
     assert_eq!(flow.period, std::f64::consts::TAU / 5.6);
+}
+
+/// Without contact the exponent is the decay rate of the first support, `-r1 / (2 m1)`, and the motion becomes the
+/// particular solution.
+#[test]
+fn contact_free_motion_contracts_at_the_rate_of_its_support() {
+    let pair = paper(0.5, 11.0);
+    let flow = flow_of(&pair);
+    let mut trajectory = Trajectory::with_tangents(&flow, pair.law(), REST, [[0.6, -0.8, 0.5, 0.5]]);
+    let advance = |trajectory: &mut Trajectory<'_, 1>, periods: u32| {
+        (0..periods).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
+    };
+    advance(&mut trajectory, 500);
+    trajectory.set_tangents([[0.6, -0.8, 0.5, 0.5]]);
+    let (decay, square) = (pair.r1 / (2.0 * pair.m1), pair.k1 / pair.m1);
+    // Decaying amplitude of the first support's free motion, without its oscillation.
+    let amplitude = |[x, v, ..]: State| ((square - decay * decay) * x * x + (v + decay * x).powi(2)).sqrt();
+    let before = (amplitude(trajectory.tangents()[0]), trajectory.work().impacts);
+    advance(&mut trajectory, 100);
+    assert_eq!(trajectory.work().impacts, before.1, "the motion is not contact-free");
+    let exponent = (amplitude(trajectory.tangents()[0]) / before.0).ln() / (100.0 * flow.period);
+    assert!((exponent + 0.15).abs() < 1e-14, "exponent {exponent}, not -0.15");
+    assert!(departure(trajectory.state(), closed_form_steady(&pair)) < 1e-12);
+}
+
+/// Returns the state of the particular solution at phase 0.
+fn closed_form_steady(pair: &GearPair) -> State {
+    let (real, imaginary) = (pair.k1 - pair.m1 * pair.omega.powi(2), pair.r1 * pair.omega);
+    let scale = pair.force / (real * real + imaginary * imaginary);
+    [scale * real, scale * imaginary * pair.omega, 0.0, 0.0]
 }
