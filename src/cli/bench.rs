@@ -45,20 +45,20 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
     let clock = Instant::now();
     let budget = if ask.run.quick { f64::INFINITY } else { f64::from(ask.budget) };
     let mut all: Vec<Series> = Vec::new();
-    let mut files = [""; 3];
+    let mut files = Vec::new();
     for (nth, target) in targets.iter().enumerate() {
         note(ask, &format!("{}:", target.label()));
         let left = ((1.0 - CHECK_SHARE) * budget - clock.elapsed().as_secs_f64()).max(0.0);
-        match measure(ask, target, left / (targets.len() - nth) as f64, all.first(), &folder) {
+        match measure(ask, target, left / (targets.len() - nth) as f64, all.first()) {
             Ok(series) => {
                 all.push(series);
                 // A run that is stopped before the last engine leaves the results of the others.
-                files = table::write(&folder, &all, f64::from(ask.budget))?;
+                files = table::write(&folder, &all, f64::from(ask.budget))?.to_vec();
             }
             Err(error) => note(ask, &format!("{} is left out: {error:#}", target.label())),
         }
     }
-    if !ask.run.quiet {
+    if !ask.run.quiet && !files.is_empty() {
         say::notes(format_args!("{}\n{}: {}", summary(&all), say::path(&out), files.join(", ")));
     }
     verdict(&all)
@@ -87,13 +87,7 @@ fn is_listed([vendor, model]: Card, cards: &[Card]) -> bool {
 }
 
 /// Measures growing maps on one engine until the next one would exceed its time or the machine's memory.
-fn measure(
-    ask: &Engines,
-    target: &Target,
-    seconds: f64,
-    first: Option<&Series>,
-    folder: &Folder,
-) -> anyhow::Result<Series> {
+fn measure(ask: &Engines, target: &Target, seconds: f64, first: Option<&Series>) -> anyhow::Result<Series> {
     let clock = Instant::now();
     let mut bench = OpenEngine::open(target)?;
     let open_seconds = bench.open_seconds;
@@ -107,7 +101,7 @@ fn measure(
         let needed = series.points.last().map_or(0.0, |point| {
             2.0 * point.spread(|run| run.prepare + run.integrate).median * lanes as f64 / point.lanes as f64
         });
-        let misfit = size::check_map(&scene, None, choice, &Free::for_output(Some(folder.path()))).err();
+        let misfit = size::check_map(&scene, None, choice, &Free::for_output(None)).err();
         if needed > left {
             series.skipped =
                 Some((lanes, format!("it would take about {needed:.0} s, {left:.0} s are left")));

@@ -59,6 +59,8 @@ impl Interrupt {
 
     #[cfg(not(unix))]
     fn wait_in_thread(self, quiet: bool) -> std::io::Result<()> {
+        // The handlers only set the flag; a command that sees it first must still know a signal.
+        self.signal.store(SIGINT, Ordering::Relaxed);
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&self.raised))?;
         }

@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
         console.note(&format!("{} ({}): {reason}", engine.name(), engine.precision()));
     }
     let mut run = opened.begin()?;
-    if *resume && run.done() == 0 {
+    if *resume && run.done() == 0 && !run.is_damaged() {
         console.note(&format!("{}: no records are stored there; the map starts anew", out.display()));
     }
     integrate(&mut run, &restart, &interrupt)?;

@@ -13,8 +13,8 @@ use crate::map::plan::Plan;
 use crate::map::sweep::SweepError;
 use crate::store::folder::Folder;
 use crate::store::map;
-use crate::store::record_file::{Identity, RECORDS, RecordFileError};
-use crate::store::run_records::Work;
+use crate::store::record_file::{Identity, RECORDS};
+use crate::store::run_records::{self, Work};
 
 /// What a map takes.
 #[derive(Clone, Debug)]
@@ -61,8 +61,8 @@ impl DryRun {
         free: Free,
         observer: Arc<dyn Observer>,
     ) -> Result<DryRun, JobError> {
-        if job.resume && !out.join(RECORDS).is_file() && Folder::holds_results(out) {
-            return Err(RecordFileError::NothingToResume { folder: out.to_owned() }.into());
+        if job.resume {
+            run_records::require_records(out)?;
         }
         Folder::check(out, force || job.resume, map::names())?;
         let job = MapJob { engine: job.engine_request(Some(out)), ..job.clone() };

@@ -151,7 +151,7 @@ impl<'a> MapJob<'a> {
                 let precision = Precision::ALL.into_iter().find(|p| p.name() == identity.precision());
                 EngineRequest { kind: EngineKind::Gpu, precision, ..request }
             }
-            // `MapRun::begin` reports an unreadable file.
+            // `OpenMap::begin` reports an unreadable file.
             Ok(None) | Err(_) => request,
         }
     }
@@ -239,12 +239,17 @@ impl<'p> MapRun<'p> {
         self.work.schedule.expected()
     }
 
+    /// Whether stored records were damaged.
+    pub fn is_damaged(&self) -> bool {
+        self.records.as_ref().is_some_and(|records| records.damage().is_some())
+    }
+
     /// Number of runs that earlier, interrupted runs of the program did.
     pub fn resumed(&self) -> usize {
         self.records.as_ref().map_or(0, RunRecords::resumed)
     }
 
-    /// Computes the remaining runs, and stores their records about once a second. Returns false if `halt` was raised
+    /// Computes the remaining runs, and stores their records twice a second. Returns false if `halt` was raised
     /// before the last one ended.
     ///
     /// # Errors

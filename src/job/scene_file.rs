@@ -4,11 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use crate::map::scene::{Along, CompanionFile, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
-use crate::store::finished_map::MOST_LIST_BYTES;
+use crate::store::finished_map::{MOST_LIST_BYTES, MOST_TABLE_BYTES};
 use crate::store::plain_file::read_text;
-
-/// Largest size of a table of cells, in bytes.
-const MOST: u64 = 256_000_000;
 
 /// Largest size of a model's file, in bytes.
 const MOST_OF_MODEL: u64 = 1_000_000;
@@ -52,7 +49,7 @@ impl SceneFile<'_> {
             }
             match self.list_copy.filter(|copy| !path.exists() && copy.exists()) {
                 Some(copy) => find_table(copy, MOST_LIST_BYTES),
-                None => find_table(&path, MOST),
+                None => find_table(&path, MOST_TABLE_BYTES),
             }
         };
         Scene::parse_with_files(&text, &name, sets, self.purpose, self.along, &find)

@@ -185,12 +185,13 @@ pub fn check_finished(scene: &Scene) -> Result<(), JobError> {
 /// Bytes on disk: per run of a record, and per cell of all other files. They are the upper ends of measured maps.
 fn disk(scene: &Scene) -> [u64; 2] {
     let quantities = &scene.outputs().quantities;
-    let columns = |words: u64, exponent: u64, flag: u64| -> u64 {
+    let columns = |words: u64, exponent: u64, class: u64| -> u64 {
         let column = |quantity: &Quantity| match quantity {
             Quantity::Word | Quantity::Pattern => words,
             Quantity::Lyapunov => exponent,
             Quantity::Impacts | Quantity::Mesh => 8,
-            Quantity::Class | Quantity::Symmetric => flag,
+            Quantity::Class => class,
+            Quantity::Symmetric => 1,
         };
         quantities.iter().map(column).sum()
     };
@@ -261,7 +262,7 @@ mod tests {
     use super::*;
     use crate::gpu::Constants;
     use crate::map::plan::Plan;
-    use crate::map::scene::Purpose;
+    use crate::map::scene::{FileText, Purpose};
     use crate::record::RecordStore;
     use rattlemap_dynamics::flow::Flow;
 
@@ -311,6 +312,16 @@ mod tests {
         let too_many = scene("k", 1e3, 1e4, [2, 100_000], &[]);
         assert_eq!(sizes(&too_many), (gpu::MOST_FLOWS as u64 * one(&too_many), 0));
         assert_eq!(sizes(&scene("omega", 0.002, 0.003, [2, 10_000], &[])).0, gpu::MOST_BYTES);
+    }
+
+    #[test]
+    fn a_list_needs_more_memory_than_a_grid() {
+        let text = "e,omega\n".to_owned() + &"0.5,5.6\n".repeat(100);
+        let find = |_, _: &str| Ok(FileText { name: "l.csv".to_owned(), text: text.clone() });
+        let scene_text = "[cells]\nfile = 'l.csv'\n";
+        let list = Scene::parse_with_files(scene_text, "s", &[], Purpose::Map, None, &find).unwrap();
+        assert_eq!(list_rows(&list), 100 * LIST_ROW);
+        assert_eq!(list_rows(&scene("omega", 1.0, 12.0, [10, 10], &[])), 0);
     }
 
     #[test]

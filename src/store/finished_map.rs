@@ -20,9 +20,10 @@ use crate::store::record_file::{Damage, Extent, Identity, Order, RecordFile, Rec
 use crate::store::run_records::Work;
 use crate::text::shell::quoted;
 
-/// Largest size of a folder's copy of a list of cells, in bytes: four times that of the scene's own table, because the
-/// copy spells out numbers such as 1e15.
-pub(crate) const MOST_LIST_BYTES: u64 = 1_024_000_000;
+/// Largest size of a scene's table of cells, in bytes.
+pub(crate) const MOST_TABLE_BYTES: u64 = 256_000_000;
+/// Largest size of a folder's copy of that table. It spells out numbers such as 1e15.
+pub(crate) const MOST_LIST_BYTES: u64 = 4 * MOST_TABLE_BYTES;
 
 /// Why the folder of a finished map cannot be read.
 #[derive(Debug, Error)]
@@ -82,7 +83,10 @@ pub enum FinishedMapError {
         unit: &'static str,
         command: String,
     },
-    /// The record file cannot be read, or belongs to another run.
+    /// The records belong to another run than the manifest.
+    #[error("{} does not belong to the {MANIFEST} in its folder: {differences}; make the map again with `{command}`", .path.display())]
+    OtherRecords { path: PathBuf, differences: String, command: String },
+    /// The record file cannot be read.
     #[error(transparent)]
     Records(#[from] RecordFileError),
 }
@@ -327,7 +331,14 @@ impl FinishedMap {
         let StoredManifest { engine, precision, device, sources, target, .. } = &self.manifest;
         let identity = Identity::new(engine, precision, device, scene.identity()).built_from(sources, target);
         let mut work = Work::new(plan, None);
-        let Extent { count, damage, .. } = work.read(&path, &identity)?;
+        let Extent { count, damage, .. } = work.read(&path, &identity).map_err(|error| match error {
+            RecordFileError::OtherRun { path, differences } => {
+                let StoredManifest { set, .. } = &self.manifest;
+                let command = command(Some(&self.folder), None, set, "--force");
+                FinishedMapError::OtherRecords { path, differences, command }
+            }
+            error => error.into(),
+        })?;
         let Work { schedule, mut records, .. } = work;
         let unit = plan.unit();
         if !schedule.is_finished() {

@@ -39,7 +39,7 @@ use crate::record::{RecordStore, Records};
 use crate::show::cells::{Cells, Survey};
 use crate::show::provenance::Provenance;
 use crate::store::error::OutputError;
-use crate::store::finished_map::{FinishedMap, StoredManifest, UnfinishedRun};
+use crate::store::finished_map::{FinishedMap, FinishedMapError, StoredManifest, UnfinishedRun};
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry, Finding};
 use crate::store::map::{self, Run, ShardOrigin};
@@ -93,7 +93,11 @@ impl Parts {
                 Some(UnfinishedRun { identity: Some(identity), .. }) if identity.shard().is_none() => {
                     return Err(MergeError::WholeMap { part: folder.clone() });
                 }
-                Some(run) => begun.push(run),
+                Some(run) => {
+                    // An unreadable header has an error of its own.
+                    Identity::read(&folder.join(RECORDS))?;
+                    begun.push(run);
+                }
                 None => parts.push(Part::open(folder)?),
             }
         }
@@ -136,7 +140,7 @@ impl Parts {
     /// false.
     ///
     /// # Errors
-    /// [`MergeError`]; the folder is unchanged.
+    /// [`MergeError`]. While records are read, the folder is unchanged.
     pub fn gather(
         self,
         folder: &Folder,
@@ -200,7 +204,8 @@ impl Parts {
             if let Some(error) = failed {
                 return Err(error);
             }
-            let Extent { count, damage, .. } = read.map_err(|error| part.damaged(fault(error)))?;
+            let Extent { count, damage, .. } =
+                read.map_err(|error| fault(error, |what| part.damaged(what)))?;
             if !work.schedule.is_finished() {
                 let damage = damage.map_or(String::new(), |damage| format!("{damage}: "));
                 let expected = part.shard.run_count(plan);
@@ -258,15 +263,21 @@ impl Part {
     /// Reads the manifest of a finished shard and checks its files. Records have checksums of their own and are read
     /// later.
     fn open(folder: &Path) -> Result<Part, MergeError> {
-        let map = FinishedMap::open_part(folder)?;
+        let map = FinishedMap::open_part(folder).map_err(|error| match error {
+            FinishedMapError::NoManifest { folder } => MergeError::NoShard { part: folder },
+            error => error.into(),
+        })?;
         let Some(shard) = map.manifest().shard else {
             return Err(MergeError::WholeMap { part: folder.to_owned() });
         };
         let damaged = |what| Err(damaged(&map, shard, what));
+        if !folder.join(RECORDS).is_file() {
+            return damaged(format!("{RECORDS} is missing"));
+        }
         let identity = match Identity::read(&folder.join(RECORDS)) {
             Ok(Some(identity)) => identity,
             Ok(None) => return damaged(format!("{RECORDS} is empty")),
-            Err(error) => return damaged(fault(error)),
+            Err(error) => return Err(fault(error, |what| self::damaged(&map, shard, what))),
         };
         let StoredManifest { engine, precision, device, sources, target, files, .. } = map.manifest();
         let in_manifest = [engine, precision, device, sources, target].map(String::as_str);
@@ -295,11 +306,13 @@ fn damaged(map: &FinishedMap, shard: Shard, what: String) -> MergeError {
     MergeError::Damaged { part: map.folder().to_owned(), what, command }
 }
 
-/// Describes the damage to a part's record file.
-fn fault(error: RecordFileError) -> String {
+/// Converts the error of a part's record file. Damage is reported through `damaged`, with the command that mends it.
+fn fault(error: RecordFileError, damaged: impl Fn(String) -> MergeError) -> MergeError {
     match error {
-        RecordFileError::Damaged { at, what, .. } => format!("{RECORDS} is damaged at byte {at}: {what}"),
-        other => other.to_string(),
+        RecordFileError::Damaged { at, what, .. } => {
+            damaged(format!("{RECORDS} is damaged at byte {at}: {what}"))
+        }
+        other => other.into(),
     }
 }
 

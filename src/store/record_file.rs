@@ -4,7 +4,7 @@
 //! little-endian:
 //!
 //! ```text
-//! header: magic "RTLMAP2\0"   length u32   crc32 u32 (over all else)   format, columns, identity (JSON)
+//! header: magic "RTLMAP3\0"   length u32   crc32 u32 (over all else)   format, columns, identity (JSON)
 //! batch:  mark "\x93RTLBAT\n"   number u32   cells u32   columns u32 (a bit each)   bytes u32
 //!         crc32 u32 (of what follows the head)   crc32 u32 (of the head)   columns, compressed
 //! ```

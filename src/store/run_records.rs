@@ -80,13 +80,24 @@ impl<'p> Work<'p> {
     }
 }
 
+/// Refuses to resume in a folder that has results but no records.
+///
+/// # Errors
+/// [`RecordFileError::NothingToResume`].
+pub fn require_records(out: &Path) -> Result<(), RecordFileError> {
+    match out.join(RECORDS).is_file() || !Folder::holds_results(out) {
+        true => Ok(()),
+        false => Err(RecordFileError::NothingToResume { folder: out.to_owned() }),
+    }
+}
+
 /// Opens a new folder; with `force` or `resume` also the folder of an earlier run.
 ///
 /// # Errors
 /// [`RunRecordsError`] if the folder cannot be used, or if there is nothing in it to resume but other files.
 pub fn open_folder(out: &Path, force: bool, resume: bool) -> Result<Folder, RunRecordsError> {
-    if resume && !out.join(RECORDS).is_file() && Folder::holds_results(out) {
-        return Err(RecordFileError::NothingToResume { folder: out.to_owned() }.into());
+    if resume {
+        require_records(out)?;
     }
     let folder = Folder::open(out, force || resume)?;
     folder.refuse_links(map::names())?;

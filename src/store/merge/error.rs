@@ -20,6 +20,9 @@ pub enum MergeError {
     /// A folder is not that of a finished shard.
     #[error(transparent)]
     Part(#[from] FinishedMapError),
+    /// A folder has no manifest.
+    #[error("{}: this is not the folder of a shard; `rattlemap map SCENE --engine E --shard I/N` computes one", .part.display())]
+    NoShard { part: PathBuf },
     /// A folder contains a whole map.
     #[error("{}: this is a whole map, not a shard of one; name the folders of shards", .part.display())]
     WholeMap { part: PathBuf },
@@ -67,7 +70,7 @@ impl MergeError {
             MergeError::Damaged { .. }
             | MergeError::Output(_)
             | MergeError::Stopped
-            | MergeError::Records(RecordFileError::Io { .. }) => false,
+            | MergeError::Records(RecordFileError::Io { .. } | RecordFileError::Damaged { .. }) => false,
             _ => true,
         }
     }

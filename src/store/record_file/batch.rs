@@ -10,7 +10,7 @@ pub(crate) const HEAD: usize = 32;
 /// Largest number of cells in a batch. It bounds the loss by one damaged byte and the memory of a reader.
 pub(crate) const MOST_CELLS: usize = 1 << 16;
 
-/// BatchHead of a batch.
+/// Head of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BatchHead {
     /// Number of the batch; it increases along the file.

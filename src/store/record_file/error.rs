@@ -34,13 +34,13 @@ pub enum RecordFileError {
         /// Description of the damage.
         what: &'static str,
     },
-    /// Another version of the program wrote the file, with other columns.
+    /// Another version of the program wrote the file, in another format or with other columns.
     #[error(
-        "{} was written by another version, and its records have other fields; make the map anew with --force, or \
-         resume it with the version that began it",
+        "{} was written by another version in another format; make the map anew with --force, or resume it with the \
+         version that began it",
         .path.display()
     )]
-    OtherFields {
+    OtherVersion {
         /// The file.
         path: PathBuf,
     },

@@ -7,10 +7,12 @@ use crate::store::record_file::columns::NAMES;
 use crate::store::record_file::identity::Identity;
 
 /// Version of the file format. It is raised when files of the version before become unreadable.
-const RECORD_FORMAT: u32 = 2;
+const RECORD_FORMAT: u32 = 3;
 
-/// First bytes of a record file.
-const MAGIC: [u8; 8] = *b"RTLMAP2\0";
+/// First bytes of a record file: a name and the version of the format.
+const MAGIC: [u8; 8] = *b"RTLMAP3\0";
+/// Number of bytes of the name in [`MAGIC`].
+const NAME: usize = 6;
 /// Number of bytes of magic, length and checksum.
 const PREFIX: usize = 16;
 
@@ -36,8 +38,8 @@ pub(crate) enum Found {
     },
     /// No header and no batch: the run ended before it wrote anything.
     Nothing,
-    /// A header of this format whose columns this version does not have.
-    OtherFields,
+    /// A header of another format, or with columns that this version does not have.
+    OtherVersion,
     /// Bytes that no run leaves; the text describes the damage.
     Damaged(&'static str),
 }
@@ -61,8 +63,8 @@ pub(crate) fn find(bytes: &[u8], is_all: bool) -> Found {
             Ok(Body { format: RECORD_FORMAT, columns, identity }) if columns == NAMES => {
                 Found::Header { identity, end: end as u64 }
             }
-            Ok(Body { format: RECORD_FORMAT, .. }) => Found::OtherFields,
-            _ => Found::Damaged("its header is not one of this version"),
+            Ok(_) => Found::OtherVersion,
+            Err(_) => Found::Damaged("its header is not one of this version"),
         };
     }
     let length = bytes.len().min(MAGIC.len());
@@ -70,7 +72,10 @@ pub(crate) fn find(bytes: &[u8], is_all: bool) -> Found {
     match is_begun {
         true if is_all && batch::find(bytes).is_none() => Found::Nothing,
         true => Found::Damaged("its header does not match its checksum"),
-        false => Found::Damaged("it is no record file of this version"),
+        false if bytes.starts_with(&MAGIC[..NAME]) && bytes.get(MAGIC.len() - 1) == Some(&0) => {
+            Found::OtherVersion
+        }
+        false => Found::Damaged("it is no record file"),
     }
 }
 
@@ -94,11 +99,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_header_with_other_columns_is_not_reported_as_damaged() {
+    fn a_header_of_another_version_is_not_reported_as_damaged() {
         let identity = Identity::new("cpu", "f64", "d", Vec::new());
         let found = |columns: &[&str]| find(&bytes_of(&identity, columns).unwrap(), true);
         assert!(matches!(found(&NAMES), Found::Header { .. }));
-        assert!(matches!(found(&NAMES[..13]), Found::OtherFields));
-        assert!(matches!(found(&[&NAMES[..], &["later"]].concat()), Found::OtherFields));
+        assert!(matches!(found(&NAMES[..13]), Found::OtherVersion));
+        assert!(matches!(found(&[&NAMES[..], &["later"]].concat()), Found::OtherVersion));
+        let older = [&b"RTLMAP2\0"[..], &[7; 100]].concat();
+        assert!(matches!(find(&older, true), Found::OtherVersion));
+        assert!(matches!(find(b"another file of that length", true), Found::Damaged(_)));
     }
 }

@@ -113,7 +113,7 @@ impl<'a> Reader<'a> {
                 Ok(Some(Reader { file, path, length, identity, begin }))
             }
             Found::Nothing => Ok(None),
-            Found::OtherFields => Err(RecordFileError::OtherFields { path: path.to_owned() }),
+            Found::OtherVersion => Err(RecordFileError::OtherVersion { path: path.to_owned() }),
             Found::Damaged(what) => Err(RecordFileError::Damaged { path: path.to_owned(), at: 0, what }),
         }
     }
