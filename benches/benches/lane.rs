@@ -49,12 +49,21 @@ struct Size {
     periods: u32,
     /// Number of runs of each variant. The median is printed.
     runs: usize,
+    /// Measured precisions.
+    precisions: &'static [Precision],
+    /// Whether lanes compute exponents, for each measurement.
+    exponents: &'static [bool],
 }
 
 /// Returns the full size for measurements, and a tiny one for tests.
 fn size() -> Size {
     let measured = std::env::args().any(|a| a == "--bench") && !std::env::args().any(|a| a == "--test");
-    if measured { Size { side: 48, periods: 100, runs: 5 } } else { Size { side: 3, periods: 3, runs: 1 } }
+    match measured {
+        true => {
+            Size { side: 48, periods: 100, runs: 5, precisions: &Precision::ALL, exponents: &[false, true] }
+        }
+        false => Size { side: 3, periods: 3, runs: 1, precisions: &[Precision::F32], exponents: &[false] },
+    }
 }
 
 /// Cells over restitution in `[0, 1]` and frequency in `[1, 12]`, from rest.
@@ -113,8 +122,8 @@ fn main() {
     let plane = Plane::new(size.side);
     let lane_periods = plane.lanes.len() as f64 * f64::from(size.periods);
     println!("{0} x {0} cells, {1} periods from rest, median of {2}", size.side, size.periods, size.runs);
-    for precision in Precision::ALL {
-        for exponent in [false, true] {
+    for &precision in size.precisions {
+        for &exponent in size.exponents {
             println!("{precision:?}, exponent {exponent}");
             let mut gpus: Vec<_> = VARIANTS.iter().map(|&(_, rewrite)| open(precision, rewrite)).collect();
             let times = seconds(&plane, &size, &mut gpus, exponent);

@@ -16,13 +16,13 @@ from pathlib import Path
 NEEDED = {"avx2": "AVX2", "fma": "FMA3"}
 #: Message if the processor lacks features of the build.
 MISFIT = (
-    "rattlemap was built for processors with AVX2 and FMA, and this one lacks {lacking}; build it for this one, in its "
-    'sources: RUSTFLAGS="" pip install --force-reinstall ./python'
+    "rattlemap was built for processors with AVX2 and FMA, and this one lacks {lacking}; build it for this one in the "
+    'source folder: RUSTFLAGS="" pip install --force-reinstall ./python'
 )
 #: Message if the processor has features that the build does not use.
 SLOWER = (
     "rattlemap was built without {missing}, which this processor has: the reference takes about twice as long; build it "
-    "again, in its sources, with RUSTFLAGS unset: pip install --force-reinstall ./python"
+    "again in the source folder, with RUSTFLAGS unset: pip install --force-reinstall ./python"
 )
 
 # The target among the module's constants, as build.rs writes it.
@@ -32,7 +32,7 @@ _TARGET = re.compile(rb"x86_64-[a-z0-9_-]+ ([a-z0-9.,_-]+)")
 def require(package: Path) -> None:
     """Raise ImportError, with the remedy, if the processor lacks features that the native module in this folder was built for."""
     lacking = NEEDED.keys() - features()
-    # The module has tens of megabytes, so it is searched on old processors alone.
+    # The module has tens of megabytes, so it is searched only on old processors.
     if lacking:
         lacking &= built_for(package)
     if lacking:
@@ -40,7 +40,7 @@ def require(package: Path) -> None:
 
 
 def slower(target: str) -> str | None:
-    """Return a message if the module was built for less than this processor has. ``target`` is that of manifests."""
+    """Return a message if the build does not use all features of this processor. ``target`` is the field of manifests."""
     if not target.startswith("x86_64-"):
         return None
     missing = (NEEDED.keys() - {*target.partition(" ")[2].split(",")}) & features()
@@ -48,7 +48,7 @@ def slower(target: str) -> str | None:
 
 
 def built_for(package: Path) -> frozenset[str]:
-    """Return the features that the native module in this folder was built for; if it does not contain them, :data:`NEEDED`."""
+    """Return the features that the native module in this folder was built for; :data:`NEEDED` if it does not list them."""
     for path in sorted(package.glob("_native.*")):
         if path.suffix in (".so", ".pyd"):
             with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as module:
@@ -64,7 +64,7 @@ def is_x86() -> bool:
 
 
 def features() -> frozenset[str]:
-    """Return those of :data:`NEEDED` that this processor has; all on other architectures, and if NumPy does not report them."""
+    """Return the features of :data:`NEEDED` that this processor has; all if NumPy does not report them, or off x86-64."""
     # With this variable NumPy reports less than the processor has.
     if not is_x86() or "NPY_DISABLE_CPU_FEATURES" in os.environ:
         return frozenset(NEEDED)

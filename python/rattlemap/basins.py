@@ -45,7 +45,7 @@ def basins(
         See :func:`rattlemap.map`.
     **names
         Two axes in the form of :func:`rattlemap.map`, at least one of a component of the start at phase 0
-        (``model.state_names``). Then values of single parameters and of other components, which are 0 by default.
+        (``model.state_names``). Also values of single parameters and of other components, which are 0 by default.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def basins(
     components = require_model(model).state_names
     if swept and not any(name in components for name in swept):
         raise SceneError(
-            f"the axes {', '.join(swept)} are no components of the start, {', '.join(components)}; at least one axis must be"
+            f"none of the axes {', '.join(swept)} is a component of the start ({', '.join(components)}); at least one must be"
         )
     return compute_map(
         model,

@@ -34,14 +34,14 @@ def bifurcation(
     Parameters
     ----------
     model
-        The oscillator. Its values are those of all parameters that no keyword names.
+        The oscillator. It supplies the values of all parameters that no keyword sets.
     scene
-        A scene file instead of a model and an axis, with changes ``set`` in the form of the program's ``--set``. If the scene
+        A scene file, instead of a model and an axis. ``set`` overrides its values, like the program's ``--set``. If the scene
         has two axes, ``along`` names the one that is swept, and ``at`` gives the value of the other one.
     axes, parameters, settings, progress
         See :func:`rattlemap.map`.
     start
-        ``"rest"``, a state, or ``"up"``, ``"down"``, ``"both"``: each column starts from the end of its neighbour.
+        ``"rest"`` or a state. With ``"up"``, ``"down"`` or ``"both"`` each column starts from the last state of its neighbour.
     **names
         One axis, a tuple ``(min, max, count)`` or an array of increasing values; values of single parameters; settings of
         ``[integration]``. All quantities are dimensionless.

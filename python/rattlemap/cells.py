@@ -35,9 +35,9 @@ def cells(
     Parameters
     ----------
     model
-        The oscillator. Its values are those of all parameters that neither a column nor a keyword names.
+        The oscillator. It supplies the values of all parameters that neither a column nor a keyword sets.
     frame
-        One row per cell, with columns named after parameters or components of the start; or arrays of one length by name.
+        One row per cell, with columns named after parameters or components of the start; or a mapping of such names to arrays.
     columns
         The columns that are parameters; by default all.
     **names

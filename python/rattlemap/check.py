@@ -19,7 +19,7 @@ class FileFault(NamedTuple):
     reason: str
     """Description of the damage; otherwise empty."""
     is_repaired: bool
-    """Whether the file has been made again."""
+    """Whether the file has been recreated."""
 
 
 def check(folder: str | os.PathLike[str], repair: bool = False) -> list[FileFault]:
@@ -30,7 +30,7 @@ def check(folder: str | os.PathLike[str], repair: bool = False) -> list[FileFaul
     folder
         Folder that any command of the program, or ``out=``, has written.
     repair
-        Whether to make damaged and missing tables, figures and the report of a map again from its records.
+        Whether to recreate damaged and missing tables, figures and the report of a map from its records.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def check(folder: str | os.PathLike[str], repair: bool = False) -> list[FileFaul
     Raises
     ------
     FolderError
-        If the folder has no readable manifest, or ``repair`` is given and a damaged file cannot be made from the records.
+        If the folder has no readable manifest, or ``repair`` is true and a damaged file cannot be recreated from the records.
 
     Examples
     --------

@@ -29,7 +29,7 @@ FEWEST_RUNS = 64
 #: Fields of a manifest that must agree between shards.
 _IDENTITY = ("engine", "precision", "device", "sources", "target", "set", "scene")
 
-#: A worker computes one shard at a time on its card.
+#: Lock, because a worker computes one shard at a time on its card.
 _CARD = threading.Lock()
 
 
@@ -49,7 +49,7 @@ def compute_shards(
 ) -> _native.MapResult:
     """Return a map whose shards the workers of a cluster compute.
 
-    A task is a shard and uses one thread of its worker; on a graphics card a worker computes one shard at a time. A finished
+    Each task computes a shard on one thread of its worker; on a graphics card a worker computes one shard at a time. A finished
     shard is fetched at once. If a worker is lost, Dask gives its unfinished shards to other workers. ``report`` receives the
     number of finished shards and of all shards.
     """

@@ -31,7 +31,7 @@ class Comparison:
     differing
         Number of cells that differ by class or period.
     transitions
-        Number of ``cells`` by class ``a`` in the first and ``b`` in the second map, if these differ.
+        One row per pair of different classes: class ``a`` in the first map, ``b`` in the second, and the number of ``cells``.
     table
         One row per differing cell, as in ``compare.csv``: indices, swept values, ``class_a``, ``period_a``, ``class_b``,
         ``period_b``, ``lyapunov_a``, ``lyapunov_b``, and ``kind`` (``class``, ``period``, ``pattern``, ``word``).

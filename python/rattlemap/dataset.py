@@ -50,7 +50,7 @@ RESULTS = frozenset(_LONG_NAMES)
 
 
 def code_names(codes: Mapping[str, int]) -> Array:
-    """Return the names of one-byte codes by code, shape (256,): text of fixed width, with the code -1 at the last place."""
+    """Return an array of names indexed by code, shape (256,), text of fixed width. The code -1 is the last entry."""
     width = max(map(len, codes), default=1)
     names = np.full(256, "", dtype=f"<U{width}")
     for name, code in codes.items():
@@ -223,7 +223,7 @@ def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, 
     variables = {
         name: xr.Variable(dims, values[place], variable_attributes(name, codes)) for name, values in data.items()
     }
-    # A row without a side is a column without a point.
+    # A row without a side has no section point.
     for name, values in table_columns(points[points["side"] != ""]).items():
         if name in (axis, "direction"):
             coords[f"point_{name}"] = (("point",), values)

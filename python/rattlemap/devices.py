@@ -1,4 +1,4 @@
-"""What this machine can compute on."""
+"""Processor and graphics adapters of this machine."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Devices:
 
 
 def devices() -> Devices:
-    """List what this machine can compute on, and the choice of ``engine="auto"``, like ``rattlemap devices``.
+    """List the processor, the graphics adapters, and the choice of ``engine="auto"``, like ``rattlemap devices``.
 
     Returns
     -------

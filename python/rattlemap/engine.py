@@ -45,7 +45,7 @@ def no_display() -> Iterator[None]:
 
 
 def warn(lines: Iterable[str]) -> None:
-    """Issue warnings at the line that called the public function, which called this one."""
+    """Issue warnings that point to the caller of the public function, which must call this one directly."""
     for line in lines:
         warnings.warn(line, RuntimeWarning, stacklevel=3)
 

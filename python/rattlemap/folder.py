@@ -94,7 +94,7 @@ class FolderBackend(BackendEntrypoint):
 
 
 def _require(folder: Path, manifest: dict[str, Any], name: str, kind: str) -> Path:
-    """Return the path of a file in the folder; if it is missing, the error says how to make it."""
+    """Return the path of a file in the folder; if it is missing, raise FolderError with the remedy."""
     path = folder / name
     if path.is_file():
         return path
@@ -102,7 +102,7 @@ def _require(folder: Path, manifest: dict[str, Any], name: str, kind: str) -> Pa
     if any(entry["name"] == name for entry in manifest["files"]):
         has_records = (folder / _RECORDS).is_file()
         again = f"rattlemap check {folder} --repair" if has_records else f"rattlemap {command} SCENE --out {folder} --force"
-        raise FolderError(f"{folder}: {name} is missing; `{again}` makes it again")
+        raise FolderError(f"{folder}: {name} is missing; `{again}` recreates it")
     again = "--resume" if command == "map" else "--force"
     raise FolderError(
         f"{folder}: there is no {name}, because outputs.files of the scene lacks {kind!r}; add it and write the files again: "
@@ -162,7 +162,7 @@ class _Cells:
 
     def _damage_error(self, name: str, why: str) -> FolderError:
         folder = self.path.parent
-        return FolderError(f"{folder}: {name} is damaged: {why}; `rattlemap check {folder} --repair` makes it again")
+        return FolderError(f"{folder}: {name} is damaged: {why}; `rattlemap check {folder} --repair` recreates it")
 
     def convert(self, table: str, codes: dict[str, int] | None, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
         try:

@@ -41,9 +41,9 @@ def map(  # noqa: A001
     Parameters
     ----------
     model
-        The oscillator. Its values are those of all parameters that no keyword names.
+        The oscillator. It supplies the values of all parameters that no keyword sets.
     scene
-        A scene file instead of a model and axes, with changes ``set`` in the form of the program's ``--set``.
+        A scene file, instead of a model and axes. ``set`` overrides its values, like the program's ``--set``.
     axes, parameters
         Axes and single values by name, for parameters whose names are keywords of this function, such as ``force`` or
         ``out``: ``axes={"force": (0, 1, 64)}``, ``parameters={"out": 2.0}``. Axes of ``axes`` precede those of keywords.
@@ -66,18 +66,18 @@ def map(  # noqa: A001
         A folder that also receives the files of the program. It must be empty, unless ``force`` or ``resume`` is given.
         ``resume`` continues an interrupted map.
     client
-        A ``distributed.Client``. The workers of its Dask cluster compute ``shards`` of the map, which are merged here; the
-        result is the same to the bit. The engine must be named. If a worker is lost, others compute its shards again.
-        Progress counts shards.
+        A ``distributed.Client``. The workers of its Dask cluster compute shards of the map, and this process merges them; the
+        result is the same to the bit. The engine must be named. If a worker is lost, others compute its shards again. Progress
+        counts shards.
     shards
-        Number of parts that a cluster computes; by default 4 for each of its threads.
+        Number of shards that a cluster computes; by default 4 for each of its threads.
     progress
-        True for a bar of tqdm if it is installed, or a function of (done, total).
+        True shows a bar of tqdm if it is installed; a function receives (done, total).
     **names
-        Two axes, the first keyword is the first axis: a tuple ``(min, max, count)`` with both ends included, or an array of
-        increasing values, which are used exactly (those of ``np.linspace`` differ from a tuple's in the last digits). Then
-        values of single parameters, components of the start, and settings of ``[integration]`` such as ``max_period=32``.
-        An axis of a component of the start (``v1=(-2, 2, 64)``) makes a map of basins. All quantities are dimensionless.
+        Two axes in order. Each is a tuple ``(min, max, count)`` with both ends included, or an array of increasing values.
+        Arrays are used exactly; those of ``np.linspace`` differ from tuples in the last digits. Also values of single
+        parameters, components of the start, and settings of ``[integration]`` such as ``max_period=32``. An axis of a component
+        of the start (``v1=(-2, 2, 64)``) makes a map of basins. All quantities are dimensionless.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from .toml import assignments
 
 
 class Model:
-    """An oscillator with walls, and values of its parameters. Immutable: :meth:`replace` returns another one.
+    """An oscillator with walls, and values of its parameters. It is immutable: :meth:`replace` returns another model.
 
     :func:`gear_pair` and :func:`load_model` return it. All quantities are dimensionless.
     """
@@ -117,7 +117,7 @@ def gear_pair(**parameters: float) -> Model:
     **parameters
         Any of ``m1 m2 r1 r2 k1 k2 r k F omega b e mesh_speed``, dimensionless: masses, dampings, stiffnesses, damping
         and stiffness of meshing, amplitude and frequency of the forcing, half the backlash, restitution, meshing speed.
-        The others have the paper's values. ``rm.gear_pair().help`` lists meanings and ranges.
+        The other parameters have the paper's values. ``rm.gear_pair().help`` lists meanings and ranges.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def load_model(model: str | os.PathLike[str], /, **parameters: float) -> Model:
     model
         A name that :func:`rattlemap.models` lists, or the path of a model's file (``docs/models.md`` describes it).
     **parameters
-        Values by name; the others have those of the file.
+        Values by name; the other parameters keep the values of the file.
 
     Returns
     -------

@@ -15,7 +15,7 @@ from . import _native, dataset, scenes
 from .errors import SceneError
 from .model import Model, require_model
 
-#: Ranges of the arguments, those of the program.
+#: Ranges of the arguments, as in the program.
 _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
 
 
@@ -34,7 +34,7 @@ class Orbit:
         """The model with the values of this orbit."""
 
     def __reduce__(self) -> tuple[type[Orbit], tuple[Model, int, int, list[float] | None]]:
-        """Return the arguments: another process computes the orbit again, which takes milliseconds and gives the same bits."""
+        """Return the arguments, from which another process computes the same orbit in milliseconds, to the bit."""
         return Orbit, self._arguments
 
     @property
@@ -59,12 +59,12 @@ class Orbit:
 
     @property
     def word(self) -> str:
-        """The word in order of time, without the ``w`` of tables. That of a periodic motion is in canonical rotation."""
+        """The word in order of time, without the ``w`` of tables. For a periodic motion it is in canonical rotation."""
         return str(self._facts["word"])
 
     @property
     def pattern(self) -> str:
-        """The word with each run of one symbol written once."""
+        """The word with repeated symbols written once."""
         return str(self._facts["pattern"])
 
     @property
@@ -100,7 +100,7 @@ class Orbit:
 
     @property
     def periods_run(self) -> int:
-        """Forcing periods that the motion was followed for."""
+        """Number of integrated forcing periods."""
         return int(self._facts["periods_run"])
 
     @property
@@ -205,14 +205,14 @@ def orbit(
     parameters
         Values by name, for parameters whose names are keywords of this function.
     periods
-        Forcing periods of the first check, 2 to 10,000,000. While the motion is undecided, the length is doubled, up to
-        32,768 periods or this number. Cycles of up to half this number, at most 64, are found.
+        Forcing periods of the first analysis, 2 to 10,000,000. While the motion is undecided, the analysis is repeated with
+        twice as many, up to 32,768 or this number. Cycles of up to half this number, at most 64, are found.
     transient
-        Forcing periods before the first check, 1 to 1,000,000,000.
+        Forcing periods before the first analysis, 1 to 1,000,000,000.
     start
         The state at phase 0: all components, or some by name (the others are 0); by default rest.
     **names
-        Values of parameters; the others have those of the model.
+        Values of parameters; the others keep the values of the model.
 
     Returns
     -------

@@ -28,9 +28,9 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     Parameters
     ----------
     data
-        A map of :func:`rattlemap.map`, :func:`rattlemap.basins` or :func:`rattlemap.open`: its attractors are image if it has
-        any, else periods and classes. Or one of its variables: ``ds["class"]``, ``ds["pattern"]``, ``ds["word"]``,
-        ``ds["status"]``, ``ds["period"]``, ``ds["attractor"]``; two dimensions.
+        A map of :func:`rattlemap.map`, :func:`rattlemap.basins` or :func:`rattlemap.open`: draws its attractors if it has any,
+        else periods and classes. Or one of its variables: ``ds["class"]``, ``ds["pattern"]``, ``ds["word"]``, ``ds["status"]``,
+        ``ds["period"]``, ``ds["attractor"]``; two dimensions.
     ax
         Axes to draw on; by default the current ones.
     most

@@ -1,4 +1,4 @@
-"""Progress of a long computation: reported to a function, or shown by tqdm if it is installed."""
+"""Progress of a long computation, for a function, or for a bar of tqdm if it is installed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of keywords: the text that the program would read from a file.
+"""Scenes from keywords: writes the text that the program would read from a file.
 
 The library reads the text and checks it, so that error messages are the program's. Only keywords that no text can express are
 checked here.
@@ -74,7 +74,7 @@ def scene_of(
     settings: Mapping[str, Any] | None = None,
     cells: str | None = None,
 ) -> _native.Scene:
-    """Return the scene of a model and keywords, or of a scene file at ``path``. Beside a model there must be ``axes`` axes."""
+    """Return the scene of a model and keywords, or of a scene file. With a model, the keywords must contain ``axes`` axes."""
     if path is None:
         if model is None:
             raise SceneError("no model and no scene is given; give a model, such as rm.gear_pair(), or scene=PATH")

@@ -23,13 +23,13 @@ class Validation:
     Attributes
     ----------
     judge
-        What decides about the cells of the map: ``reference``, ``lanes_f64`` or ``dop853``.
+        Computation that judges the cells of the map: ``reference``, ``lanes_f64`` or ``dop853``.
     samples
         Number of cells that were computed again.
     strata
         Rates of each stratum: columns ``runs``, ``sampled``, and for all differing cells (``differing``) and each kind of
         mismatch (``unexplained``, ``border``, ...) the count and the ends of its 95 % interval, such as ``differing``,
-        ``differing_low``, ``differing_high``. Indexed by ``stratum``.
+        ``differing_low``, ``differing_high``. The index is ``stratum``.
     mismatches
         One row per differing field of a cell of the sample: ``id``, ``i``, ``j``, the swept values, ``kind``, ``field``, its
         value ``map`` in the map and ``judge`` in the second computation, and ``replay``, the command that repeats the cell.
@@ -66,7 +66,7 @@ def validate(
     seed
         Seed of the sample. The same seed draws the same cells.
     progress
-        True for a bar of tqdm if it is installed, or a function of (done, total).
+        True shows a bar of tqdm if it is installed; a function receives (done, total).
 
     Returns
     -------

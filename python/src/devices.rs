@@ -1,4 +1,4 @@
-//! What the machine can compute on.
+//! Processor and graphics adapters of the machine.
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

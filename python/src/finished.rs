@@ -1,4 +1,4 @@
-//! Finished folders: manifests, checks, comparisons and validations. Python itself reads the tables.
+//! Finished folders: manifests, checks, comparisons and validations. The Python package reads the tables itself.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -22,10 +22,10 @@ pub(crate) fn manifest(folder: PathBuf) -> PyResult<String> {
     Ok(finished_map::read_tables(&folder).map_err(Problem::from)?.to_string())
 }
 
-/// The name of a file, its fault, and a description of the damage.
+/// Name of a file, its fault, and a description of the damage.
 type FileFault = (String, &'static str, String);
 
-/// Compares the files of a folder with its manifest. With `repair` it makes damaged and missing files of a map again. Returns the
+/// Compares the files of a folder with its manifest. With `repair` it recreates damaged and missing files of a map. Returns the
 /// faults, the names of the repaired files, and warnings.
 #[pyfunction]
 #[pyo3(signature = (folder, repair=false))]

@@ -70,10 +70,10 @@ pub(crate) fn map<'py>(
     result.into_dict(py)
 }
 
-/// Red, green and blue. A tuple, because Python would receive an array of bytes as `bytes`.
+/// Red, green and blue. It is a tuple, because Python would receive an array of bytes as `bytes`.
 type Rgb = (u8, u8, u8);
 
-/// Returns the colours of the program's figures: by name, and in the order of items without a name.
+/// Returns the colours of the program's figures: those with names, and the sequence for other items.
 #[pyfunction]
 pub(crate) fn colors() -> (BTreeMap<&'static str, Rgb>, Vec<Rgb>) {
     let SharedColors { named, in_a_row } = in_memory::colors();

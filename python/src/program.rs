@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use rattlemap::cli;
 use rattlemap::job::environment;
 
-/// Runs a command, the program's name first, and returns its exit code.
+/// Runs arguments that begin with the program's name, and returns the exit code.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| {

@@ -65,7 +65,7 @@ impl Scene {
             (CompanionFile::Cells, _, Some(text)) => {
                 Ok(FileText { name: "cells".to_owned(), text: text.clone() })
             }
-            _ => Err("names a file, and there is none".to_owned()),
+            _ => Err("names a file, but none was given".to_owned()),
         };
         let scene =
             LibraryScene::parse_generated(text, &sets, checked.purpose, checked.along.as_ref(), &find)?;

@@ -21,7 +21,7 @@ use crate::scene::Scene;
 use crate::task::{Out, Task, request};
 use crate::worker::{self, Watch};
 
-/// Checks that a map can be computed in so many shards and merged into a folder.
+/// Checks that a map can be computed in this number of shards and merged into a folder.
 #[pyfunction]
 #[pyo3(signature = (scene, count, engine, precision, adapter=None, out=None, force=false))]
 pub(crate) fn check_shards(
@@ -38,7 +38,7 @@ pub(crate) fn check_shards(
     let plan = Plan::new(&scene.scene);
     shard.check(&plan).map_err(|error| Problem::scene(format!("--shard {error}")))?;
     if let Some(out) = out {
-        // As in `gather`.
+        // A folder without results may be replaced, as in `merge`.
         let force = force || !Folder::holds_results(&out);
         Folder::check(&out, force, store::map::names()).map_err(Problem::from)?;
     }
@@ -59,7 +59,7 @@ fn shard_request(
     Ok((shard, request))
 }
 
-/// Computes the shard `index`, from 1, of `count` into the folder `out`, like `map --shard`. With `resume` it continues from
+/// Computes shard `index` of `count`, counted from 1, into the folder `out`, like `map --shard`. With `resume` it continues from
 /// the records in the folder. The CPU engine uses `threads` threads, by default all. Returns the files' names.
 #[pyfunction]
 #[pyo3(signature = (scene, index, count, engine, precision, out, resume=false, threads=None, progress=None, adapter=None))]
@@ -87,15 +87,15 @@ pub(crate) fn of_map<'py>(
         out: Some(Out { path: out, force: false, resume }),
     };
     task.check()?;
-    // 0 threads: as many as the machine has.
+    // 0 means as many threads as the machine has.
     let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-    let pool = pool.map_err(|error| Problem::engine(format!("no threads to compute with: {error}")))?;
+    let pool = pool.map_err(|error| Problem::engine(format!("cannot start threads: {error}")))?;
     worker::run(py, progress, move |watch| {
         pool.install(|| task.compute(watch, |_, run, _| Ok(run.write_shard()?)))
     })
 }
 
-/// Makes the map of all its shards, in any order, like `rattlemap merge`. The folder `out` receives the records, and with
+/// Combines the shards of a map, in any order, like `rattlemap merge`. The folder `out` receives the records, and with
 /// `writes` all other files of a map.
 #[pyfunction]
 #[pyo3(signature = (parts, out, force=false, writes=true, progress=None))]
@@ -115,7 +115,7 @@ fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Op
     let parts = Parts::open(parts)?;
     parts.refuse(&out.path)?;
     check_merge(parts.scene(), Some(&out.path))?;
-    // A run that was killed before it stored anything leaves nothing worth keeping.
+    // A folder without results may be replaced. A run that was killed at its start leaves one.
     let force = out.force || !Folder::holds_results(&out.path);
     let folder = Out { force, ..out }.open(watch)?;
     let continues = |Progress { done, of }| {

@@ -27,7 +27,7 @@ pub(crate) fn request(
 ) -> Result<EngineRequest, Problem> {
     let named = |name: &str| {
         let known = Precision::ALL.into_iter().find(|precision| precision.name() == name);
-        known.ok_or_else(|| Problem::engine(format!("the precision {name:?} is none of f32 and f64")))
+        known.ok_or_else(|| Problem::engine(format!("unknown precision {name:?}; it must be f32 or f64")))
     };
     if let Some(text) = adapter.filter(|text| text.trim().is_empty()) {
         return Err(Problem::engine(format!(
@@ -37,7 +37,7 @@ pub(crate) fn request(
     let request = EngineRequest {
         kind: engine.parse()?,
         precision: precision.map(named).transpose()?,
-        // Every text is a number or a name.
+        // Parsing never fails: a text that is no number is a name.
         adapter: adapter.and_then(|text| text.parse().ok()),
     };
     engine_choice::check(&request)?;

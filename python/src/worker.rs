@@ -21,8 +21,7 @@ pub(crate) const TICK: Duration = Duration::from_millis(50);
 /// Longest interval between calls of `progress`: it may raise an exception to end the computation.
 const CALL_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Time that a halted computation has to end. After it the computation is abandoned, because a driver that compiles cannot
-/// be halted.
+/// Time limit for a halted computation to end. Then it is abandoned, because a driver that compiles cannot be halted.
 const GRACE: Duration = Duration::from_millis(700);
 
 /// Connects a computation with the thread that waits for it.
@@ -94,8 +93,8 @@ pub(crate) fn has_abandoned_work() -> bool {
     ABANDONED.load(Ordering::SeqCst) > 0
 }
 
-/// Dropped by the computation at its end and by the waiting thread when it abandons the computation. The second drop
-/// reduces the count.
+/// End of a computation. The computation drops one value at its end, and the waiting thread drops another if it abandons the
+/// computation. The second drop reduces the count.
 struct End(Arc<AtomicBool>);
 
 impl Drop for End {
@@ -115,7 +114,7 @@ pub(crate) fn store_process() {
 }
 
 /// Returns a thread pool for a process that was forked after it had loaded the module, and none for other processes. A
-/// forked process has none of the threads of rayon's global pool, and would wait for them for ever.
+/// forked process has none of the threads of rayon's global pool, and would wait for them forever.
 fn own_threads() -> Result<Option<&'static ThreadPool>, Problem> {
     static OWN: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
     let this = process::id();
@@ -127,8 +126,8 @@ fn own_threads() -> Result<Option<&'static ThreadPool>, Problem> {
         return Ok(Some(pool));
     }
     let pool = ThreadPoolBuilder::new().build();
-    let pool = pool.map_err(|error| Problem::engine(format!("no threads to compute with: {error}")))?;
-    // Never dropped: the threads of a parent process's pool do not exist here.
+    let pool = pool.map_err(|error| Problem::engine(format!("cannot start threads: {error}")))?;
+    // The pool is never dropped: the threads of a parent process's pool do not exist here.
     let pool: &'static ThreadPool = Box::leak(Box::new(pool));
     *own = Some((this, pool));
     Ok(Some(pool))

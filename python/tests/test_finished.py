@@ -120,7 +120,7 @@ def test_models_and_their_parameters_are_listed(program: Program) -> None:
 
 def test_devices_are_the_programs(program: Program) -> None:
     found, printed = rm.devices(), program("devices").stdout
-    assert f"auto takes {found.engine} ({found.precision}): {found.reason}" in printed
+    assert f"auto chooses {found.engine} ({found.precision}): {found.reason}" in printed
     assert found.processor in printed
     for number, adapter in found.adapters.iterrows():
         assert f"(--adapter {number})" in printed and f"gpu: {adapter['name']}" in printed

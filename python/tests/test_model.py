@@ -27,7 +27,7 @@ def test_errors_name_the_remedy(tmp_path: Path) -> None:
         rm.load_model("gear-pair", e=1.5)
     with pytest.raises(rm.SceneError, match="wrong type"):
         rm.gear_pair(e="half")
-    with pytest.raises(rm.ModelError, match="no model is called `gear`; there is gear-pair"):
+    with pytest.raises(rm.ModelError, match="no model is called `gear`; the built-in models are gear-pair"):
         rm.load_model("gear")
     (tmp_path / "mine.toml").write_text('name = "mine"\n')
     with pytest.raises(rm.ModelError, match="mine.toml"):

@@ -50,7 +50,7 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
     parsed_from(std::env::args_os()).map_err(ExitCode::from)
 }
 
-/// Parses these arguments, the program's name first. Prints help, version or an error.
+/// Parses arguments that begin with the program's name. Prints help, version or an error.
 ///
 /// # Errors
 /// The exit code, if the program should end.
@@ -58,10 +58,10 @@ pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsStrin
     P::try_parse_from(arguments).map_err(|mut error| {
         if error.use_stderr() {
             quote(&mut error);
-            // Without colours: a quoted argument could contain some.
+            // Colours are removed, because a quoted argument could contain some.
             say::notes(error.render().to_string().trim_end());
         } else {
-            // A closed stdout has no reader.
+            // An error means that stdout is closed.
             let _ = error.print();
         }
         error.exit_code() as u8
@@ -75,7 +75,7 @@ fn quote(error: &mut clap::Error) {
         let value = match value {
             ContextValue::String(text) => ContextValue::String(say::quoted(text)),
             ContextValue::Strings(list) => ContextValue::Strings(list.iter().map(say::quoted).collect()),
-            // Advice that would have to be escaped could not be typed.
+            // Drops advice with characters that must be escaped: it could not be typed.
             ContextValue::StyledStrs(list)
                 if !list.iter().all(|text| text.to_string().chars().all(is_printable)) =>
             {
@@ -94,7 +94,7 @@ pub(crate) enum Command {
     Orbit(Orbit),
     Bifurcation(Bifurcation),
     Models(Models),
-    /// List the processor and the graphics adapters, and what `--engine auto` takes
+    /// List the processor and the graphics adapters, and the engine that `--engine auto` chooses
     ///
     /// For each adapter: kind, interface, precisions, number for --adapter, largest buffer and batch. The environment
     /// variables WGPU_ADAPTER_NAME (part of a name) and WGPU_BACKEND (vulkan, metal, dx12) exclude other adapters.
@@ -116,13 +116,13 @@ pub(crate) enum Bench {
     Engines(Engines),
 }
 
-/// Compute one map on every engine: speed, and whether the answers agree
+/// Compute one map on every engine, to measure speed and agreement
 #[derive(Debug, Args)]
 #[command(
     after_help = "Computes the map scenes/e_omega.toml with 10^3 to 10^7 cells, as far as time and memory allow, on the \
     processor and on every graphics adapter in every precision. The speed is forcing periods per second. The answers are \
-    compared with each other, and a sample of them with the reference; the exit code is 1 if more cells differ without \
-    an explanation than one in 10,000 allows.\n\n\
+    compared with each other, and a sample of them with the reference; the exit code is 1 if significantly more than \
+    one cell in 10,000 differs without an explanation.\n\n\
     Example, two minutes on the first adapter:\n  \
     rattlemap bench engines --budget 120 --adapter 0"
 )]
@@ -134,8 +134,8 @@ pub(crate) struct Engines {
     #[arg(long, value_name = "SECONDS", default_value_t = 480, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) budget: u32,
 
-    /// Measure this graphics adapter only: its number in `rattlemap devices`, or a part of its name, driver or PCI address
-    /// that no other adapter has [default: all; of several equal cards the first one]
+    /// Measure this graphics adapter only: its number in `rattlemap devices`, or a unique part of its name, driver or PCI
+    /// address [default: all adapters; only the first of several equal cards]
     #[arg(long, value_name = "N|NAME", value_parser = adapter)]
     pub(crate) adapter: Option<AdapterRequest>,
 }
@@ -147,11 +147,11 @@ pub(crate) struct BenchOptions {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Replace the files of an earlier run in the folder. Without it a folder that is not empty is an error
+    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
 
-    /// Use tiny sizes, to check that everything works. The measured figures mean nothing
+    /// Use tiny maps, to check that everything works. The measured speeds are meaningless
     #[arg(long)]
     pub(crate) quick: bool,
 
@@ -170,8 +170,8 @@ impl BenchOptions {
 /// Compute a map: the motion in every cell of a plane of two parameters
 ///
 /// Writes tables (cells.csv, cells.npy), figures (map.png and others), an interactive page (report.html) and manifest.json.
-/// While the map is computed, the records of finished cells are stored in records.bin. After Ctrl-C or a crash --resume
-/// continues from there, and the files are the same to the byte as those of an uninterrupted run.
+/// While the map is computed, the records of finished cells are stored in records.bin. After Ctrl-C or a crash, --resume
+/// continues from these records. The files are byte for byte those of an uninterrupted run.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n\n\
     The main map with fewer cells:\n  \
@@ -191,8 +191,8 @@ pub(crate) struct Map {
     pub(crate) resume: bool,
 
     /// Compute only shard I of N, counted from 1, for instance 1/4. It writes records and a manifest, but no tables, to
-    /// out/<scene's name>.shard-I-of-N; `rattlemap merge` makes the map of all shards. All shards take about the same time.
-    /// --engine must be given, the same for all. Adaptive maps have no shards
+    /// out/<scene's name>.shard-I-of-N; `rattlemap merge` combines all shards into the map. All shards take about the
+    /// same time. Requires --engine, with the same value for all shards. Adaptive maps cannot be divided into shards
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<Shard>,
 
@@ -217,7 +217,7 @@ impl Map {
     }
 }
 
-/// Make a map of its shards
+/// Combine the shards of a map
 ///
 /// Reads the folders of all shards, in any order and from any machines, and writes the map: records, tables, figures, report
 /// and manifest are those of a single run, apart from times and devices. All shards must come from the same scene, engine,
@@ -238,7 +238,7 @@ pub(crate) struct Merge {
     #[arg(value_name = "PART", required = true)]
     pub(crate) parts: Vec<PathBuf>,
 
-    /// Replace the files of an earlier run in OUT. Without it a folder that is not empty is an error
+    /// Replace the files of an earlier run in OUT. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
 
@@ -271,7 +271,7 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Replace the files of an earlier run in the folder. Without it a folder that is not empty is an error
+    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
 
@@ -324,14 +324,14 @@ pub(crate) struct EngineOptions {
     #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
     pub(crate) engine: EngineChoice,
 
-    /// Precision of the motion: f32 or f64 [default: f32 on a GPU, f64 on the processor]. The CPU engine has f64 only; a GPU
-    /// has f64 only if it has double precision
+    /// Precision of the motion: f32 or f64 [default: f32 on a GPU, f64 on the processor]. The CPU engine computes in f64.
+    /// Some GPUs do not support f64
     #[arg(long, value_name = "PRECISION", value_parser = precision)]
     pub(crate) precision: Option<Precision>,
 
-    /// Graphics adapter: its number in `rattlemap devices`, or a part of its name, driver or PCI address that no other
-    /// adapter has. `all` uses all cards of the model and driver of the first one; their records are the same. It takes
-    /// precedence over WGPU_ADAPTER_NAME. Example: --adapter 1
+    /// Graphics adapter: its number in `rattlemap devices`, or a unique part of its name, driver or PCI address. `all`
+    /// uses all cards with the model and driver of the first one; their records are identical. This option overrides
+    /// WGPU_ADAPTER_NAME. Example: --adapter 1
     #[arg(long, value_name = "N|NAME|all", value_parser = adapter)]
     pub(crate) adapter: Option<AdapterRequest>,
 }
@@ -373,8 +373,8 @@ pub(crate) enum EngineChoice {
 
 /// Compute one motion: class, word, Lyapunov exponent, Floquet multipliers and events
 ///
-/// Starts at phase 0, waits for the transient, and describes the motion that is reached: one cycle of a periodic motion, the
-/// last 8 forcing periods of any other.
+/// Starts at phase 0, integrates the transient, and describes the motion after it: one cycle if the motion is periodic,
+/// otherwise its last 8 forcing periods.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n\n\
     The gear pair with meshing on both sides, with figures:\n  \
@@ -391,24 +391,24 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 
-    /// State at phase 0 to start from [default: at rest]. Models of one coordinate take X,V. Example: --start 0.1,0,-0.2,1.5
+    /// Initial state at phase 0 [default: at rest]. For models with one coordinate: X,V. Example: --start 0.1,0,-0.2,1.5
     #[arg(long, value_name = "X1,V1,X2,V2", allow_hyphen_values = true, value_parser = state)]
     pub(crate) start: Option<StartState>,
 
-    /// Number of forcing periods after the transient that are examined first, at least 2. Cycles of up to N/2 periods, and at
-    /// most 64, are found. N does not limit the integration: while the class is undecided, twice as many periods are
-    /// examined, and so on up to 32768. Example: --periods 256
+    /// Number of forcing periods in the first analysis after the transient, at least 2. It finds cycles of up to N/2
+    /// periods, at most 64. While the class is undecided, the analysis is repeated with twice as many periods, up to
+    /// 32768 or N. Example: --periods 256
     #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
           value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     pub(crate) periods: u32,
 
-    /// Length of the transient, in forcing periods, at least 1. It is always integrated whole. Example: --transient 1000
+    /// Length of the transient, in forcing periods, at least 1. All of it is integrated. Example: --transient 1000
     #[arg(long, value_name = "N", default_value_t = Settings::default().transient_periods,
           value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     pub(crate) transient: u32,
 
-    /// Also print the state at time T after the start, which is at time 0 and phase 0. It is exact to rounding; in a chaotic
-    /// motion rounding errors grow with time. Example: --time 10
+    /// Also print the state at time T; the motion starts at time 0 and phase 0. The state is exact to rounding, but
+    /// rounding errors grow with time if the motion is chaotic. Example: --time 10
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = time)]
     pub(crate) time: Option<f64>,
 
@@ -459,7 +459,8 @@ fn state(text: &str) -> Result<StartState, String> {
 fn time(text: &str) -> Result<f64, String> {
     let time = text.trim().parse().ok().filter(|time: &f64| time.is_finite() && *time >= 0.0);
     // -0.0 becomes 0.0.
-    time.map(f64::abs).ok_or_else(|| "it must be a finite number, 0 or more: time since the start".to_owned())
+    time.map(f64::abs)
+        .ok_or_else(|| "it must be a finite number, 0 or more, the time since the start".to_owned())
 }
 
 impl Orbit {
@@ -468,7 +469,7 @@ impl Orbit {
         self.start.map_or(REST, |start| start.state)
     }
 
-    /// The integration settings. A cycle is confirmed when it has been traversed twice.
+    /// The integration settings. The longest period is half the observed periods, because a cycle must be observed twice.
     pub(crate) fn settings(&self) -> Settings {
         Settings {
             transient_periods: self.transient,
@@ -484,8 +485,8 @@ impl Orbit {
 /// Writes bifurcation.csv (one row per event), bifurcation_columns.csv (one row per value: class, period, word, pattern,
 /// exponent and its error), bifurcation.png and manifest.json; for models whose walls fix a displacement also
 /// bifurcation_strobe.csv (states at phase 0). The scene's steps_per_period, early_stop and quantities are ignored. With
-/// start.policy=both the motion is followed upwards and downwards, and a message lists where class, period or pattern
-/// differ.
+/// start.policy=both the motion is followed in both directions of the axis, and a message lists where class, period or
+/// pattern differ.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n\n\
     The paper's Fig. 5 with fewer columns:\n  \
@@ -498,8 +499,8 @@ pub(crate) struct Bifurcation {
     #[command(flatten)]
     pub(crate) run: SceneOptions,
 
-    /// Parameter to vary, one of the axes of a map's scene. Settings for maps alone are ignored ([refine], start.count, html,
-    /// npy). The default folder is out/<scene's name>.NAME.OTHER=VALUE
+    /// Parameter to vary, one of the axes of a map's scene. Settings that only maps have ([refine], start.count, html,
+    /// npy) are ignored. The default folder is out/<scene's name>.NAME.OTHER=VALUE
     #[arg(long, value_name = "NAME")]
     along: Option<String>,
 
@@ -541,19 +542,20 @@ pub(crate) struct Models {
     #[arg(value_name = "NAME|FILE")]
     pub(crate) name: Option<String>,
 
-    /// Print the model's file, for instance to write a model of your own from it
+    /// Print the model's file, for instance as a template for your own model
     #[arg(long, requires = "name")]
     pub(crate) file: bool,
 }
 
-/// Check how right a finished map is: compute a sample of its cells with a different engine
+/// Check a finished map: compute a sample of its cells with a different engine
 ///
-/// Half of the sample is drawn from all integrated cells, a quarter at borders between classes, a quarter by status. The
-/// rates of differing cells come from the first half. The event-driven reference computes each cell over the whole budget,
-/// without early stops. Maps of the reference itself are compared with lanes in f64, or with DOP853 and event location if
-/// no adapter has f64. Each differing cell is of one of five kinds: another attractor, a border within rounding, a budget
-/// too short, a limit of the engine, or unexplained. Averages over chaotic motions are compared as distributions. The exit
-/// code is 1 if more cells are unexplained than one in 10,000 allows. Writes validation.json and a section of report.html.
+/// Half of the sample is drawn from all integrated cells, a quarter from cells at borders between classes, a quarter from
+/// cells whose status is not ok. The rates of differing cells come from the first half. The event-driven reference
+/// computes each cell over the whole budget, without early stops. Maps that the reference computed are compared with
+/// lanes in f64, or with the ODE solver DOP853 if no adapter has f64. Each difference is of one of five kinds: another
+/// attractor, a border within rounding, a budget too short, a limit of the engine, or unexplained. Averages over chaotic
+/// motions are compared as distributions. The exit code is 1 if significantly more than one cell in 10,000 is unexplained.
+/// Writes validation.json and a section of report.html.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, a thousand cells of the main map:\n  \
     rattlemap validate out/e_omega --samples 1000")]
@@ -578,12 +580,12 @@ pub(crate) struct Validate {
 
 /// Compare two finished maps of the same cells: by class, period and pattern
 ///
-/// For instance to compare starts (start.policy up and down), engines or versions. The axes must have the same values; other
-/// parameters may differ, and are listed. Writes compare.csv (one row per differing cell), compare.png and manifest.json. A
-/// cell differs if its class or period differs. Cells that differ only by pattern (by word if a map has no patterns) are
-/// listed, drawn and counted separately. For cells of equal period the summary also counts differences in symmetry, words
-/// and patterns, and gives the largest difference of exponents. A motion and its mirror image have the same word. Filled
-/// cells of adaptive maps are compared like the others.
+/// Use it to compare starts (start.policy up and down), engines or versions. The axes must have the same values;
+/// differences of other parameters are listed. Writes compare.csv (one row per differing cell), compare.png and
+/// manifest.json. A cell differs if its class or period differs. Cells that differ only by pattern (by word if a map has
+/// no patterns) are listed, drawn and counted separately. For cells of equal period the summary also counts differences
+/// in symmetry, words and patterns, and gives the largest difference of exponents. A motion and its mirror image have the
+/// same word. Filled cells of adaptive maps are compared like the others.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, hysteresis:\n  \
     rattlemap map scenes/e_omega.toml --set start.policy=up --out out/up\n  \
@@ -610,7 +612,7 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', default_value = "png")]
     pub(crate) format: Vec<FigureFormat>,
 
-    /// Replace the files of an earlier comparison. Without it a folder that is not empty is an error
+    /// Replace the files of an earlier comparison. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
 
@@ -626,8 +628,8 @@ pub(crate) struct Compare {
 /// Check the files of a folder against its manifest, and repair them
 ///
 /// Compares size and SHA-256 hash of every file with manifest.json. Names damaged, missing and unknown files; if any is
-/// damaged or missing, the exit code is 1. --repair makes tables, figures and report of a map again from records.bin, without
-/// the scene file. Without --repair nothing is written.
+/// damaged or missing, the exit code is 1. --repair recreates tables, figures and report of a map from records.bin,
+/// without the scene file. Without --repair nothing is written.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
     rattlemap check out/e_omega --repair")]
@@ -636,7 +638,7 @@ pub(crate) struct Check {
     #[arg(value_name = "DIR")]
     pub(crate) folder: PathBuf,
 
-    /// Make damaged and missing files of a map again from its records
+    /// Recreate damaged and missing files of a map from its records
     #[arg(long)]
     pub(crate) repair: bool,
 
@@ -645,7 +647,7 @@ pub(crate) struct Check {
     pub(crate) quiet: bool,
 }
 
-/// Print a completion script for a shell, or a page for man
+/// Print a completion script for a shell, or the man page
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     rattlemap completions bash > ~/.local/share/bash-completion/completions/rattlemap\n  \
@@ -656,7 +658,7 @@ pub(crate) struct Completions {
     pub(crate) target: CompletionTarget,
 }
 
-/// Readers of the command line's description.
+/// Targets of `completions`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum CompletionTarget {
     Bash,
@@ -665,7 +667,7 @@ pub(crate) enum CompletionTarget {
     #[value(name = "powershell")]
     PowerShell,
     Zsh,
-    /// A page for man
+    /// The man page
     Man,
 }
 

@@ -52,7 +52,7 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
         match measure(ask, target, left / (targets.len() - nth) as f64, all.first()) {
             Ok(series) => {
                 all.push(series);
-                // A run that is stopped before the last engine leaves the results of the others.
+                // If the run is stopped, the results of the finished engines remain.
                 files = table::write(&folder, &all, f64::from(ask.budget))?.to_vec();
             }
             Err(error) => note(ask, &format!("{} is left out: {error:#}", target.label())),
@@ -180,7 +180,7 @@ fn summary(all: &[Series]) -> String {
     lines.join("\n")
 }
 
-/// Fails if nothing was measured, or if more cells of an engine differ without an explanation than are allowed.
+/// Fails if nothing was measured, or if too many cells of an engine differ without an explanation.
 fn verdict(all: &[Series]) -> Result<(), Failure> {
     if all.iter().all(|series| series.points.is_empty()) {
         return Err(Failure::Run(anyhow!("nothing could be measured")));

@@ -43,11 +43,11 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     };
     let (start, settings, halt) = (scene.start(), scene.orbit_settings(), interrupt.raised());
     let columns = bifurcation::run_until(&cells, start, &settings, &report, halt)?;
-    // A signal may come with the last column.
+    // A signal may arrive during the last column.
     let Some(columns) = columns.filter(|_| !interrupt.is_raised()) else {
         let (ended, path) = (ended.into_inner(), folder.path().display());
         return Err(interrupt.failure(format!(
-            "interrupted after {ended} of {count} columns; no column is stored, and nothing was written to {path}"
+            "interrupted after {ended} of {count} columns; nothing was written to {path}"
         )));
     };
     let elapsed = clock.elapsed();
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
         files.join(", ")
     ));
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);
-    fail_if(all_failed, "every column failed; the status column says why")
+    fail_if(all_failed, "the motion failed in every column; `status` in bifurcation_columns.csv says why")
 }
 
 /// Describes where the two passes differ.
@@ -88,7 +88,9 @@ fn described(found: &Hysteresis, name: &str) -> String {
         0 => by_class,
         _ => {
             let ranges = listed(pattern_ranges);
-            format!("{by_class}\nby pattern alone they differ in {by_pattern}, at {name} = {ranges}")
+            format!(
+                "{by_class}\nup and down differ by pattern only in {by_pattern} columns, at {name} = {ranges}"
+            )
         }
     }
 }

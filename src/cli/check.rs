@@ -8,7 +8,7 @@ use crate::job::check;
 use crate::store::folder::Folder;
 use crate::store::map::MANIFEST;
 
-/// Names the damaged and missing files, and with `--repair` makes them again.
+/// Lists the damaged and missing files, and recreates them with `--repair`.
 pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     let (dir, quiet) = (&arguments.folder, arguments.quiet);
     let folder = match arguments.repair && dir.is_dir() {
@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     let repaired =
         folder.map(|folder| checked.repair(&folder, &Console::new(quiet, "", false))).transpose()?;
     for name in repaired.iter().flatten().filter(|_| !quiet) {
-        say::note(format_args!("{}: {name} was made again", dir.display()));
+        say::note(format_args!("{}: {name} was recreated", dir.display()));
     }
     Ok(checked.require_good(repaired.as_deref())?)
 }

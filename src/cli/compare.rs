@@ -18,7 +18,7 @@ use crate::show::map_pair::MapPair;
 use crate::store;
 use crate::store::folder::Folder;
 
-/// Reads both maps, compares, writes.
+/// Reads both maps, compares them, and writes the result.
 pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let clock = Instant::now();
     let interrupt = Interrupt::listen(arguments.quiet)?;
@@ -56,7 +56,7 @@ impl Compare {
     }
 }
 
-/// The differences of scenes, engines, classes and periods, then of cells that agree in both.
+/// Lists differences of scenes, engines, classes and periods, then differences between cells of equal class and period.
 fn summary(maps: &MapPair<'_>, scene: &Scene) -> String {
     let MapPair { sides, comparison } = maps;
     let (differing, cells) = (comparison.differing(), comparison.kinds.len());
@@ -86,7 +86,7 @@ fn summary(maps: &MapPair<'_>, scene: &Scene) -> String {
     lines.join("\n")
 }
 
-/// Differences between cells of one class and period, and in the number of attractors.
+/// Lists differences between cells of equal class and period, and in the number of attractors.
 fn other_differences(comparison: &Comparison, scene: &Scene) -> Vec<String> {
     let tally = |what: &str, Tally { compared, differing }: Tally| {
         (compared > 0).then(|| format!("{differing} of {compared} {what}"))
@@ -102,7 +102,8 @@ fn other_differences(comparison: &Comparison, scene: &Scene) -> Vec<String> {
         exponents,
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
-    let cycles = (!parts.is_empty()).then(|| format!("of cycles of one period differ: {}", parts.join(", ")));
+    let cycles = (!parts.is_empty())
+        .then(|| format!("differences between cycles of equal period: {}", parts.join(", ")));
     let attractors = tally("cells differ in the number of attractors", comparison.attractors);
     // Each map numbers its attractors by its own shares, so numbers of two maps cannot be compared.
     let basins = scene.is_basin().then(|| {

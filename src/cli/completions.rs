@@ -1,4 +1,4 @@
-//! `rattlemap completions`: prints completion scripts for shells, and a page for `man`.
+//! `rattlemap completions`: prints completion scripts for shells, and the man page.
 
 use std::io;
 
@@ -9,7 +9,7 @@ use super::arguments::{Cli, Completions};
 use super::failure::Failure;
 use super::stdout::print;
 
-/// Prints a script for a shell, or the page for `man`.
+/// Prints a script for a shell, or the man page.
 pub(crate) fn run(arguments: &Completions) -> Result<(), Failure> {
     let mut command = Cli::command();
     let mut text = Vec::new();

@@ -9,7 +9,7 @@ use crate::job::observer::Observer;
 /// Prints the reports of a job on stderr.
 pub(crate) struct Console {
     quiet: bool,
-    /// What progress counts.
+    /// Unit of progress.
     unit: &'static str,
     /// Whether the total can grow.
     grows: bool,
@@ -17,7 +17,7 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    /// Returns a console that prints nothing but warnings if it is quiet.
+    /// Returns a console. If `quiet`, it prints only warnings.
     pub(crate) fn new(quiet: bool, unit: &'static str, grows: bool) -> Console {
         Console { quiet, unit, grows, progress: OnceLock::new() }
     }

@@ -1,4 +1,4 @@
-//! `rattlemap devices`: lists what the machine can compute on, and what `auto` takes.
+//! `rattlemap devices`: lists the processor, the graphics adapters, and the engine that `auto` chooses.
 
 use crate::cli::failure::Failure;
 use crate::cli::say::quoted;
@@ -6,7 +6,7 @@ use crate::cli::stdout::print;
 use crate::gpu::{self, AdapterReport};
 use crate::job::devices;
 
-/// Prints the processor, the adapters, and the engine that `--engine auto` takes.
+/// Prints the processor, the adapters, and the engine that `--engine auto` chooses.
 pub(crate) fn run() -> Result<(), Failure> {
     let devices = devices::devices()?;
     print(&format!("cpu: event-driven reference on {}", devices.processor))?;
@@ -16,7 +16,7 @@ pub(crate) fn run() -> Result<(), Failure> {
         let mesa = "a software driver comes with Mesa (Debian: mesa-vulkan-drivers)".to_owned();
         print(&format!("no graphics adapter; {}", quoted(devices.narrowed_by.unwrap_or(mesa))))?;
     }
-    print(&format!("auto takes {} ({}): {}", devices.engine, devices.precision, quoted(devices.reason)))
+    print(&format!("auto chooses {} ({}): {}", devices.engine, devices.precision, quoted(devices.reason)))
 }
 
 fn print_adapter(adapter: &AdapterReport) -> Result<(), Failure> {

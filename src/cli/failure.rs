@@ -32,7 +32,7 @@ pub enum Failure {
     },
 }
 
-/// The exit code of a process that a signal ended, less the number of the signal.
+/// Exit code of a process that a signal ended, minus the signal's number.
 pub(crate) const SIGNALLED: i32 = 128;
 
 impl Failure {
@@ -52,7 +52,7 @@ impl Failure {
     }
 }
 
-/// Returns an error with this message if a run that ended has failed.
+/// Returns an error with this message if the run has failed.
 ///
 /// # Errors
 /// [`Failure::Run`].

@@ -10,7 +10,7 @@ use signal_hook::low_level;
 use crate::cli::failure::{Failure, SIGNALLED};
 use crate::cli::say;
 
-/// Interval at which the flag of a signal is read on systems that do not wake a thread.
+/// Polling interval of the signal's flag, on systems where a signal cannot wake a thread.
 #[cfg(not(unix))]
 const INTERVAL: std::time::Duration = std::time::Duration::from_millis(50);
 
@@ -19,13 +19,13 @@ const INTERVAL: std::time::Duration = std::time::Duration::from_millis(50);
 pub(super) struct Interrupt {
     raised: Arc<AtomicBool>,
     signal: Arc<AtomicI32>,
-    /// What must end before the command can stop, if that may take a while.
+    /// Event after which the command stops, if that may take a while. It completes the message `stopping as soon as ...`.
     waits_for: Arc<Mutex<Option<&'static str>>>,
-    /// What to do if the process can end at once.
+    /// How the process ends. None unless it can end at once.
     ending: Arc<Mutex<Option<Ending>>>,
 }
 
-/// The end of a process.
+/// Message and clean-up of a process that ends at once.
 struct Ending {
     /// What is stored, and how to continue.
     text: String,
@@ -88,19 +88,20 @@ impl Interrupt {
         say::note(format_args!("stopping{}; Ctrl-C again ends at once", once.unwrap_or_default()));
     }
 
-    /// From now on a signal stops the command soon, or as soon as `what`. Returns false if one has come already.
+    /// Lets a signal stop the command, after the event `what` if it is given. Returns false if a signal has already
+    /// arrived.
     pub(super) fn wait_for(&self, what: Option<&'static str>) -> bool {
         *self.ending.lock().unwrap_or_else(PoisonError::into_inner) = None;
         *self.waits_for.lock().unwrap_or_else(PoisonError::into_inner) = what;
         !self.is_raised()
     }
 
-    /// From now on a signal ends the process at once, after `clean_up`. The text says what is stored and how to continue.
-    /// Use it only while nothing is computed that is not stored.
+    /// Lets a signal end the process at once, after `clean_up`. The text says what is stored and how to continue. Call it
+    /// only while all computed results are stored.
     pub(super) fn ends_at_once(&self, text: String, clean_up: impl FnOnce() + Send + 'static) {
         let ending = Ending { text, clean_up: Box::new(clean_up) };
         *self.ending.lock().unwrap_or_else(PoisonError::into_inner) = Some(ending);
-        // A signal that came before this call found no ending.
+        // A signal that arrived earlier could not end the process.
         if self.is_raised() {
             self.end();
         }
@@ -112,12 +113,12 @@ impl Interrupt {
         if let Some(Ending { text, clean_up }) = ending {
             clean_up();
             say::note(format_args!("error: interrupted; {text}"));
-            // Without exit handlers: threads of libraries may be running.
+            // Skips exit handlers, because threads of libraries may still be running.
             low_level::exit(SIGNALLED + self.signal.load(Ordering::Relaxed));
         }
     }
 
-    /// Whether a signal has come.
+    /// Whether a signal has arrived.
     pub(super) fn is_raised(&self) -> bool {
         self.raised.load(Ordering::Relaxed)
     }

@@ -27,7 +27,7 @@ use crate::store::run_records::open_folder;
 use crate::store::shard;
 use restart::Restart;
 
-/// Loads the scene, checks, computes, writes.
+/// Loads and checks the scene, computes the map, and writes its files.
 pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     let engine = arguments.engine.request();
     require_engine(arguments.shard, engine.kind)?;
@@ -62,7 +62,10 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     }
     let mut run = opened.begin()?;
     if *resume && run.done() == 0 && !run.is_damaged() {
-        console.note(&format!("{}: no records are stored there; the map starts anew", out.display()));
+        console.note(&format!(
+            "{}: the folder has no records; the map starts from its first cell",
+            out.display()
+        ));
     }
     integrate(&mut run, &restart, &interrupt)?;
     let clock = Instant::now();
@@ -73,7 +76,7 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     }
 }
 
-/// Computes the remaining runs. A signal stops it once some of those under way have ended; the others are computed again.
+/// Computes the remaining runs. After a signal it stores the runs that have ended, and stops; unfinished runs are lost.
 fn integrate(run: &mut MapRun<'_>, restart: &Restart<'_>, interrupt: &Interrupt) -> Result<(), Failure> {
     let integrated = match interrupt.wait_for(Some("finished cells are stored")) {
         true => run.integrate(interrupt.raised()),
@@ -87,7 +90,9 @@ fn integrate(run: &mut MapRun<'_>, restart: &Restart<'_>, interrupt: &Interrupt)
             let text = format!("{error}; {restart_text}{}", restart.with_the_cpu());
             Err(JobError::Failed(text).into())
         }
-        Err(error) => Err(JobError::Failed(format!("{error}; make room there; {restart_text}")).into()),
+        Err(error) => {
+            Err(JobError::Failed(format!("{error}; make space on this disk; {restart_text}")).into())
+        }
     }
 }
 
@@ -106,7 +111,7 @@ fn finish_map(
     let without_effect: String = run
         .without_effect
         .iter()
-        .map(|name| format!("\n{name} has no effect: along it {every} is like the others"))
+        .map(|name| format!("\n{name} has no effect: along this axis {every} has the same result"))
         .collect();
     console.finish(&format!(
         "{}{without_effect}\n{}: {}",
@@ -130,7 +135,7 @@ fn finish_shard(run: &MapRun<'_>, folder: &Path, arguments: &Map, console: &Cons
     }
     if finished.tally.all_failed() {
         console.warn(
-            "every cell of the shard failed; merging fails if every cell of the other shards failed, too",
+            "every cell of the shard failed; `rattlemap merge` fails if every cell of the other shards failed, too",
         );
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! `rattlemap merge`: makes the map of all its shards.
+//! `rattlemap merge`: combines the shards of a map.
 
 use super::arguments::Merge;
 use super::failure::{Failure, fail_if};
@@ -18,7 +18,7 @@ pub(crate) fn run(arguments: &Merge) -> Result<(), Failure> {
     let parts = Parts::open(&arguments.parts)?;
     parts.refuse(&arguments.out)?;
     size::check_merge(parts.scene(), Some(&arguments.out))?;
-    // A run that was killed before it stored anything leaves nothing worth keeping.
+    // A folder without results may be replaced. A run that was killed at its start leaves one.
     let folder = Folder::open(&arguments.out, arguments.force || !Folder::holds_results(&arguments.out))?;
     folder.refuse_links(store::map::names())?;
     let (shards, out) = (parts.count(), arguments.out.display());

@@ -33,7 +33,7 @@ pub fn run() -> ExitCode {
     ExitCode::from(run_with(std::env::args_os()))
 }
 
-/// Runs the command of these arguments, the program's name first, and returns its exit code.
+/// Runs the command of these arguments, which begin with the program's name, and returns its exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match parsed_from::<Cli>(arguments) {
         Ok(cli) => cli,

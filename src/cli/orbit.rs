@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let clock = Instant::now();
     let (start, settings) = (arguments.start(), arguments.settings());
     let stopped = || {
-        let text = "interrupted before the motion was decided; nothing was written";
+        let text = "interrupted before the class was decided; nothing was written";
         interrupt.failure(text.to_owned())
     };
     let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(stopped);
@@ -63,7 +63,7 @@ fn check_time(time: Option<f64>, forcing_period: f64) -> Result<(), Failure> {
     let most = LONGEST_TIME * forcing_period;
     match time {
         Some(time) if time > most => Err(Failure::Usage(anyhow!(
-            "--time {time:?}: it must be at most {most:.0}, {LONGEST_TIME:.0} forcing periods, which take a minute"
+            "--time {time:?}: it must be at most {most:.0} ({LONGEST_TIME:.0} forcing periods), which takes a minute"
         ))),
         _ => Ok(()),
     }

@@ -1,4 +1,4 @@
-//! Reports progress on stderr: a bar on a terminal, lines in a pipe, nothing if quiet.
+//! Reports progress on stderr: a bar on a terminal, lines in a pipe, nothing with `--quiet`.
 
 use std::fmt::Write;
 use std::io::{IsTerminal, stderr};
@@ -9,10 +9,10 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use crate::cli::say;
 
-/// Largest number of plain lines about the whole.
+/// Largest number of lines in a pipe.
 const LINES: usize = 10;
 
-/// Interval at which a bar is redrawn, so that its time goes on.
+/// Interval at which a bar is redrawn, so that its clock runs.
 const TICK: Duration = Duration::from_secs(1);
 
 /// Reports progress.
@@ -30,7 +30,7 @@ pub struct Lines {
     unit: &'static str,
     /// Whether the total is a lower bound that can grow. Then the remaining time is not shown.
     grows: bool,
-    /// Units that earlier runs had done.
+    /// Number of units that earlier runs have done.
     from: usize,
     /// Start of this run.
     clock: Instant,
@@ -72,7 +72,7 @@ impl Progress {
                 }
             }
             Progress::Lines(lines) => {
-                // When the total has grown, a part can be reported again.
+                // After the total has grown, the same share can be reached again.
                 let part = done * LINES / total;
                 if lines.printed.swap(part, Ordering::Relaxed) < part {
                     say::note(lines.text(done, total, lines.clock.elapsed()));

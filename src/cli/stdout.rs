@@ -11,7 +11,7 @@ use anyhow::{Context, anyhow};
 /// Prints lines to stdout. Characters that a terminal would interpret are escaped: see [`printable`].
 ///
 /// # Errors
-/// If stdout cannot be written. A reader that has closed it, such as `head`, is no error.
+/// If stdout cannot be written. It is no error if a reader such as `head` has closed it.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     match writeln!(stdout(), "{}", printable::lines(text.trim_end())) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
@@ -22,7 +22,7 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
 /// Prints an object as JSON.
 ///
 /// # Errors
-/// As [`print`], or if the object cannot be put into JSON.
+/// If stdout cannot be written, or the object cannot be converted to JSON.
 pub(crate) fn print_json(object: &impl Serialize) -> Result<(), Failure> {
-    print(&serde_json::to_string_pretty(object).context("cannot put the result into JSON")?)
+    print(&serde_json::to_string_pretty(object).context("cannot convert the result to JSON")?)
 }

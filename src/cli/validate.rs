@@ -12,7 +12,7 @@ use crate::job::observer::Observer;
 use crate::job::validate::{SampleLanes, ValidateJob};
 use crate::validate::{HORIZON, HalfMesh, Judge, Kind, StratumResult, Validation};
 
-/// Reads the map, computes the sample again, compares, writes.
+/// Reads the map, computes the sample again, and writes the comparison.
 pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
     let (clock, quiet) = (Instant::now(), arguments.quiet);
     let interrupt = Interrupt::listen(quiet)?;
@@ -62,20 +62,20 @@ fn summary(validation: &Validation, lanes: &SampleLanes) -> String {
         }
         Judge::Independent => "DOP853 with event location, and the reference".to_owned(),
     };
-    lines.push(format!("judged by {judge}"));
+    lines.push(format!("judge: {judge}"));
     let [same, count] = validation.again;
     if count > 0 {
-        lines.push(format!("computed again by the same engine: {same} of {count} are the same to the bit"));
+        lines.push(format!("same engine again: {same} of {count} records are the same to the bit"));
     }
     if let Some(states) = &validation.states {
         let (off, compared) = (states.off.len(), states.compared);
         let rate = states.rate().text();
-        lines.push(format!("states after {HORIZON} periods: {off} of {compared} lanes are off ({rate})"));
+        lines.push(format!("states after {HORIZON} periods: {off} of {compared} lanes are wrong ({rate})"));
     }
     if let Some(half) = &validation.half_mesh {
         let HalfMesh { classes, periods, words, patterns } = half;
         lines.push(format!(
-            "half the mesh_speed changes the class of {} of {} meshing {}; of {} cycles it changes the period of {}, the word \
+            "half the mesh_speed changes the class of {} of {} meshing {}; among {} cycles it changes the period of {}, the word \
              of {}, the pattern of {}",
             classes.count,
             classes.among,

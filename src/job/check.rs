@@ -1,4 +1,4 @@
-//! Compares the files of a folder with its manifest, and repairs those that can be made from a map's records.
+//! Compares the files of a folder with its manifest, and recreates those of a map from its records.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ pub fn check(dir: &Path) -> Result<CheckedFolder, JobError> {
     finished::require_folder(dir)?;
     let manifest = finished_map::read_manifest(dir).map_err(|error| match error {
         FinishedMapError::Unreadable { manifest, reason } => JobError::Failed(format!(
-            "{} is damaged ({reason}); the command that made the folder makes it again",
+            "{} is damaged ({reason}); run the command that wrote the folder again",
             manifest.display()
         )),
         other => other.into(),
@@ -68,12 +68,11 @@ impl CheckedFolder {
         self.findings.iter().filter(|finding| finding.is_lost())
     }
 
-    /// Makes the damaged and missing tables, figures and report of a map from its records. The folder must have been locked
-    /// before it was checked. Returns the names of the files.
+    /// Recreates the damaged and missing tables, figures and report of a map from its records. The caller must have
+    /// locked the folder before the check. Returns the names of the files.
     ///
     /// # Errors
-    /// [`JobError`] if the folder is not a map's, if what is damaged cannot be made from records, or if a file cannot be
-    /// written.
+    /// [`JobError`] if the folder is not a map's, a damaged file cannot be recreated, or a file cannot be written.
     pub fn repair(&self, folder: &Folder, observer: &dyn Observer) -> Result<Vec<String>, JobError> {
         let dir = &self.dir;
         let lost: Vec<&str> = self.lost().map(|finding| finding.name.as_str()).collect();
@@ -82,8 +81,7 @@ impl CheckedFolder {
         }
         if self.command != MAP {
             return Err(JobError::Failed(format!(
-                "{}: only the files of a map can be made from its records; `{}`, which made the folder, makes them again \
-                 with --force",
+                "{}: only the files of a map can be recreated from records; run `{}` again with --force",
                 damage(dir, self.lost()),
                 self.command.escape_debug()
             )));
@@ -93,8 +91,8 @@ impl CheckedFolder {
         let remake = part.remake_command();
         if let Some(shard) = part.manifest().shard {
             return Err(JobError::Failed(format!(
-                "{}: no file of shard {shard} can be made from the others; `{remake}` keeps the undamaged records, computes \
-                 the others and writes the files again",
+                "{}: no file of shard {shard} can be recreated from the others; `{remake}` keeps the undamaged records, \
+                 computes the others and writes the files again",
                 damage(dir, self.lost())
             )));
         }
@@ -104,18 +102,18 @@ impl CheckedFolder {
             JobError::Failed(format!("{dir}: {name} is damaged or missing, and {why}"))
         };
         if lost.contains(&MANIFEST) {
-            return Err(cannot(MANIFEST, &format!("cannot be trusted; `{remake}` makes every file again")));
+            return Err(cannot(MANIFEST, &format!("cannot be trusted; `{remake}` recreates every file")));
         }
         if lost.contains(&RECORDS) {
             let why = format!(
-                "cannot be made from other files; `{remake}` keeps its undamaged records, computes the others and makes \
-                 every file again"
+                "cannot be recreated from other files; `{remake}` keeps its undamaged records, computes the others \
+                 and recreates every file"
             );
             return Err(cannot(RECORDS, &why));
         }
         if lost.contains(&LIST) {
             let why = format!(
-                "no other file lists the cells; `{remake}` makes every file again from the scene's own table"
+                "no other file lists the cells; `{remake}` recreates every file from the scene's own table"
             );
             return Err(cannot(LIST, &why));
         }
@@ -127,7 +125,7 @@ impl CheckedFolder {
         Ok(map::repair(folder, &loaded.cells(&scene, &survey), &lost, has_validation)?)
     }
 
-    /// Checks that no file is damaged or missing but for the repaired ones. `None`: no repair was requested.
+    /// Checks that no file is damaged or missing, except the repaired ones. `repaired` is none if no repair was requested.
     ///
     /// # Errors
     /// [`JobError::Failed`] with the files and the remedy.
@@ -138,9 +136,9 @@ impl CheckedFolder {
             return Ok(());
         }
         let remedy = if left.iter().any(|finding| finding.name == VALIDATION) {
-            format!("; `rattlemap validate` makes {VALIDATION} and its section of the report again")
+            format!("; `rattlemap validate` recreates {VALIDATION} and its section of the report")
         } else if repaired.is_none() && self.command == MAP {
-            format!("; `{}` makes again what can be made from the records", repair_command(&self.dir))
+            format!("; `{}` recreates tables, figures and report from the records", repair_command(&self.dir))
         } else {
             String::new()
         };

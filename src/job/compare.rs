@@ -47,7 +47,7 @@ impl<'a> CompareJob<'a> {
         &self.scenes[0]
     }
 
-    /// Checks that the output folder is neither of the maps' own.
+    /// Checks that the output folder is not the folder of either map.
     ///
     /// # Errors
     /// [`JobError::Usage`].
@@ -63,8 +63,8 @@ impl<'a> CompareJob<'a> {
         }
     }
 
-    /// Reads all records and compares them. Damage that cost no record is reported to the observer. Returns none if `halt` was
-    /// raised meanwhile.
+    /// Reads all records and compares them. Damage that affects no record is reported to the observer. Returns none if
+    /// `halt` is raised.
     ///
     /// # Errors
     /// [`JobError`] if the records of a map cannot be read.
@@ -130,7 +130,7 @@ impl MapComparison<'_> {
     }
 }
 
-/// The name of a folder, whatever path leads to it.
+/// Returns the name of a folder, also for paths such as `.`.
 fn folder_name(dir: &Path) -> String {
     let whole = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
     whole.file_name().map_or("map".into(), |name| name.to_string_lossy()).into_owned()
@@ -140,7 +140,7 @@ fn require_classes(dirs: [&Path; 2], scenes: &[Scene; 2]) -> Result<(), JobError
     let has_none = |scene: &Scene| !scene.outputs().quantities.contains(&Quantity::Class);
     match dirs.into_iter().zip(scenes).find(|(_, scene)| has_none(scene)) {
         Some((dir, _)) => Err(JobError::Usage(format!(
-            "{}: the map has no classes; make it again with \"class\" in outputs.quantities",
+            "{}: the map has no classes; compute it again with \"class\" in outputs.quantities",
             dir.display()
         ))),
         None => Ok(()),
@@ -159,7 +159,7 @@ fn require_same_cells(dirs: [&Path; 2], scenes: &[Scene; 2]) -> Result<(), JobEr
             true => Ok(()),
             false => Err(JobError::Usage(format!(
                 "maps of different cells cannot be compared: {dir_a} and {dir_b} have different lists, or one of them has \
-                 none; make one of them again with the cells of the other"
+                 none; compute one of them again with the cells of the other"
             ))),
         };
     }
@@ -175,7 +175,7 @@ fn require_same_cells(dirs: [&Path; 2], scenes: &[Scene; 2]) -> Result<(), JobEr
             });
             let values = if a == b { ", and the values between differ" } else { "" };
             return Err(JobError::Usage(format!(
-                "maps of different grids cannot be compared: axis {number} of {dir_a} is {a}, of {dir_b} {b}{values}; make \
+                "maps of different grids cannot be compared: axis {number} of {dir_a} is {a}, of {dir_b} {b}{values}; compute \
                  one of them again with the axes of the other"
             )));
         }

@@ -1,4 +1,4 @@
-//! Lists what this machine can compute on.
+//! Lists the processor and the graphics adapters of this machine.
 
 use crate::gpu::{self, AdapterChoice, AdapterReport};
 use crate::job::engine_choice::{self, EngineRequest};
@@ -10,16 +10,16 @@ use crate::map::scene::{Purpose, Scene};
 /// A scene for which `auto` chooses an engine.
 const MAIN_MAP: &str = include_str!("../../scenes/e_omega.toml");
 
-/// What this machine can compute on.
+/// Processor and graphics adapters of this machine, and the engine that `auto` chooses.
 #[derive(Clone, Debug)]
 pub struct Devices {
     /// Name and cores of the processor.
     pub processor: String,
     /// Graphics adapters, the best one first.
     pub adapters: Vec<AdapterReport>,
-    /// Why there may be no adapter, if there is none: the variables of the environment that exclude adapters.
+    /// Environment variables that exclude adapters. None if there are none, or an adapter was found.
     pub narrowed_by: Option<String>,
-    /// Name of the engine that `auto` takes.
+    /// Name of the engine that `auto` chooses.
     pub engine: &'static str,
     /// Its precision.
     pub precision: &'static str,

@@ -1,4 +1,4 @@
-//! Estimates what a map takes, and writes nothing.
+//! Estimates the memory, disk space and time of a map. Writes nothing.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,18 +16,18 @@ use crate::store::map;
 use crate::store::record_file::{Identity, RECORDS};
 use crate::store::run_records::{self, Work};
 
-/// What a map takes.
+/// Estimate of a map's memory, disk space and time.
 #[derive(Clone, Debug)]
 pub struct DryRun {
     /// Number of runs of the map or shard.
     pub runs: usize,
-    /// Number of them whose records are in the folder already.
+    /// Number of runs whose records are already in the folder.
     pub stored: usize,
     /// Name of the engine.
     pub engine: &'static str,
-    /// Its precision.
+    /// Precision of the engine.
     pub precision: &'static str,
-    /// Its device, as manifests name it.
+    /// Device of the engine, as manifests name it.
     pub device: String,
     /// Reason for the choice of the engine. Empty if the request left no choice.
     pub reason: String,
@@ -43,7 +43,7 @@ pub struct DryRun {
     pub open_seconds: f64,
     /// Predicted time of integration.
     pub forecast: Forecast,
-    /// Whether the map is adaptive: then fewer cells are integrated than are predicted.
+    /// Whether the map is adaptive. An adaptive map integrates fewer cells than predicted.
     pub is_adaptive: bool,
 }
 
@@ -98,7 +98,7 @@ impl DryRun {
         })
     }
 
-    /// Whether the map takes no longer than predicted: it is adaptive, and the whole sample ended in time.
+    /// Whether the predicted time is an upper bound: the map is adaptive, and the whole sample ended in time.
     pub fn is_upper_bound(&self) -> bool {
         self.is_adaptive && self.forecast.interval.is_some()
     }

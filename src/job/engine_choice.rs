@@ -32,7 +32,7 @@ pub struct EngineRequest {
 /// Kind of engine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EngineKind {
-    /// A hardware GPU if there is one, else the processor. Never a software GPU.
+    /// A hardware GPU if there is one, else the processor. A software GPU is never chosen.
     #[default]
     Auto,
     /// Lanes on a graphics device.
@@ -67,7 +67,7 @@ impl<'p> ChosenEngine<'p> {
 #[derive(Debug, Error)]
 pub enum ChoiceError {
     /// No engine has this name.
-    #[error("the engine {name:?} is none of auto, gpu and cpu")]
+    #[error("unknown engine {name:?}; it must be auto, gpu or cpu")]
     UnknownEngine {
         /// The name.
         name: String,
@@ -75,7 +75,7 @@ pub enum ChoiceError {
     /// The CPU engine has no f32.
     #[error("--precision f32: the CPU engine computes in f64; leave out --precision, or give --engine gpu")]
     CpuInF32,
-    /// `auto` uses hardware GPUs alone, and the CPU engine has no f32.
+    /// `auto` uses only hardware GPUs, and the CPU engine has no f32.
     #[error(
         "--precision f32: there is no hardware GPU, and the CPU engine computes in f64; leave out --precision, or give \
          --engine gpu to use a software driver"
@@ -144,7 +144,7 @@ pub fn check(request: &EngineRequest) -> Result<(), ChoiceError> {
 /// Opens the requested engine. `auto` takes a hardware GPU if there is one that has the precision, else the processor.
 ///
 /// # Errors
-/// [`ChoiceError`]; nothing has been computed.
+/// [`ChoiceError`] if the engine cannot be opened.
 pub async fn open<'p>(plan: &'p Plan, request: &EngineRequest) -> Result<ChosenEngine<'p>, ChoiceError> {
     check(request)?;
     if request.kind == EngineKind::Cpu {
@@ -170,7 +170,7 @@ fn is_hardware(selection: &Selection, all: &[AdapterReport]) -> bool {
     gpu::is_hardware(&all[selection.numbers[0]].info)
 }
 
-/// Makes the choice of `auto` where neither an adapter nor f32 is requested.
+/// Chooses the engine of `auto` if neither an adapter nor f32 is requested.
 async fn choose<'p>(
     plan: &'p Plan,
     precision: Precision,
@@ -276,7 +276,9 @@ mod tests {
             ..EngineRequest::default()
         };
         assert!(check(&request).is_err_and(|error| error.is_usage()));
-        assert!("gpu2".parse::<EngineKind>().unwrap_err().to_string().contains("none of auto, gpu and cpu"));
+        assert!(
+            "gpu2".parse::<EngineKind>().unwrap_err().to_string().contains("it must be auto, gpu or cpu")
+        );
         let no = GpuError::NoAdapter { wanted: "at all".into(), remedy: "r".into(), found: "none".into() };
         assert!(ChoiceError::from(no).is_usage());
         assert!(!ChoiceError::from(GpuError::Lost { message: "gone".into() }).is_usage());

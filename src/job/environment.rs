@@ -7,13 +7,13 @@ use std::path::Path;
 const FOLDER: &str = "XDG_RUNTIME_DIR";
 const DISPLAY: &str = "WAYLAND_DISPLAY";
 
-/// A path at which no display can be.
+/// A path that is never a display.
 const NOWHERE: &str = "/dev/null";
 
 /// Returns a variable that the program should set before anything else, and its value. None on a desktop.
 ///
-/// A layer of Mesa's Vulkan drivers opens a Wayland display to find the card of the screen. Without a folder for displays
-/// Wayland's library prints an error on stderr. It needs no folder if the name of the display is a path.
+/// A layer of Mesa's Vulkan drivers opens a Wayland display to find the card of the screen. If there is no folder for
+/// displays, Wayland's library prints an error on stderr. The library needs no folder if the name of the display is a path.
 pub fn missing_variable() -> Option<(&'static str, &'static str)> {
     if cfg!(all(unix, not(target_os = "macos"))) { no_display(|name| std::env::var_os(name)) } else { None }
 }

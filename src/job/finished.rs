@@ -12,7 +12,7 @@ use crate::store::finished_map::{FinishedMap, FinishedMapError, StoredRecords};
 use crate::store::inventory::Finding;
 use crate::text::shell::quoted;
 
-/// The scene of a finished map, if it fits this machine.
+/// Returns the scene of a finished map, if the map fits this machine.
 ///
 /// # Errors
 /// [`JobError`] if the scene is wrong or its map too large.
@@ -29,10 +29,10 @@ pub(crate) struct LoadedMap {
 }
 
 impl LoadedMap {
-    /// Reads all records. Damage that cost no record is reported to the observer.
+    /// Reads all records. Damage that affects no record is reported to the observer.
     ///
     /// # Errors
-    /// [`JobError`] if records are missing, damaged or another map's.
+    /// [`JobError`] if records are missing, damaged, or of another map.
     pub(crate) fn read(
         map: &FinishedMap,
         scene: &Scene,
@@ -66,7 +66,7 @@ pub(crate) fn require_folder(dir: &Path) -> Result<(), FinishedMapError> {
     if dir.is_dir() { Ok(()) } else { Err(FinishedMapError::NoFolder { folder: dir.to_owned() }) }
 }
 
-/// Names the damaged and missing files of a folder.
+/// Lists the damaged and missing files of a folder.
 pub(crate) fn damage<'f>(dir: &Path, lost: impl IntoIterator<Item = &'f Finding>) -> String {
     let names: Vec<String> =
         lost.into_iter().map(|finding| finding.name.escape_debug().to_string()).collect();

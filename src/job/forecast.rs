@@ -8,16 +8,16 @@ use std::time::{Duration, Instant};
 use crate::map::engine::{Engine, EngineError};
 use crate::map::plan::{Cell, Plan};
 
-/// A sample that takes this long is the last one.
+/// A sample that takes at least this long is the last one.
 const LONG_ENOUGH: Duration = Duration::from_millis(1500);
 
-/// Longest time of a sample. One that is not finished by then gives a lower bound.
+/// Time limit of a sample. An unfinished sample gives a lower bound.
 const LONGEST: Duration = Duration::from_secs(30);
 
 /// Ratio of the sizes of successive samples.
 const GROWTH: usize = 4;
 
-/// Number of neighbouring cells in a sample: engines compute neighbours together, in a map as in a sample.
+/// Number of neighbouring cells in a tile of the sample. Engines compute neighbours together, as in a map.
 const TILE: usize = 16;
 
 /// An odd number near 2^32 times the golden section: multiples of it are spread evenly modulo 2^32.
@@ -31,8 +31,8 @@ const QUANTILE: f64 = 1.96;
 pub struct Forecast {
     /// Seconds of integration.
     pub seconds: f64,
-    /// Their 95 % interval, from the spread of forcing periods between cells. None if the sample did not end in time: the
-    /// map takes longer than `seconds`.
+    /// 95 % interval of `seconds`, from the spread of forcing periods between cells. None if the sample did not end in
+    /// time: the map takes longer than `seconds`.
     pub interval: Option<[f64; 2]>,
     /// Number of cells in the sample.
     pub sampled: usize,
@@ -73,7 +73,7 @@ impl Forecast {
         }
     }
 
-    /// Extrapolates from a sample of `count` cells. `periods` are those of the cells that have ended.
+    /// Extrapolates from a sample of `count` cells. `periods` lists the forcing periods of the finished cells.
     fn from_sample(seconds: f64, periods: &[f64], count: usize, runs: usize) -> Forecast {
         let each = seconds / periods.len().max(1) as f64;
         let rest = each * runs.saturating_sub(periods.len()) as f64;
@@ -88,8 +88,8 @@ impl Forecast {
     }
 }
 
-/// Computes cells as a map does, at most `most` at a time. Returns the forcing periods of each in order; fewer if the halt
-/// flag is raised.
+/// Computes cells as a map does, at most `most` at a time. Returns the forcing periods of each cell in order; fewer if
+/// the halt flag is raised.
 fn compute(engine: &mut Engine<'_>, cells: &[Cell], most: usize) -> Result<Vec<f64>, EngineError> {
     let (mut rest, mut under_way) = (cells, 0);
     let mut periods = HashMap::with_capacity(cells.len());
@@ -109,7 +109,8 @@ fn compute(engine: &mut Engine<'_>, cells: &[Cell], most: usize) -> Result<Vec<f
     Ok(cells.iter().filter_map(|cell| periods.get(&cell.id).copied()).collect())
 }
 
-/// Standard error of the mean divided by the mean. Values within a tile are not independent, so tiles count, not values.
+/// Standard error of the mean divided by the mean. Values within a tile are not independent, so each tile counts as one
+/// value.
 fn relative_error(values: &[f64]) -> f64 {
     let tiles: Vec<f64> =
         values.chunks(TILE).map(|tile| tile.iter().sum::<f64>() / tile.len() as f64).collect();

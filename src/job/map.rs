@@ -54,10 +54,10 @@ impl<'a> MapJob<'a> {
         MapJob { scene, sets: &[], engine, shard: None, resume: false }
     }
 
-    /// Checks the request and that the map fits this machine, without computing anything. Returns what is free.
+    /// Checks the request, and that the map fits this machine. Returns the free memory and disk space.
     ///
     /// # Errors
-    /// [`JobError`] if the scene is not one of a map, no engine can satisfy the request, a shard's engine is not named, or
+    /// [`JobError`] if the scene is not a map's, no engine can satisfy the request, a shard's engine is not named, or
     /// memory or disk are too small.
     pub fn check(&self, out: Option<&Path>) -> Result<Free, JobError> {
         let axes = self.scene.axes().len();
@@ -75,7 +75,7 @@ impl<'a> MapJob<'a> {
     /// Numbers the cells and checks that each has a motion.
     ///
     /// # Errors
-    /// [`JobError`] if one has none, or if the map cannot be divided into so many shards.
+    /// [`JobError`] if a cell has no motion, or the map cannot be divided into this number of shards.
     pub fn plan(&self) -> Result<Plan, JobError> {
         let plan = Plan::new(self.scene);
         if let Some(shard) = self.shard {
@@ -98,7 +98,7 @@ impl<'a> MapJob<'a> {
             EngineKind::Cpu | EngineKind::Auto => ("cpu", Precision::F64),
         };
         let is_same = |identity: &Identity| {
-            // Any device: merging compares devices.
+            // Any device is accepted: merging compares devices.
             let own = Identity::new(engine, precision.name(), identity.device(), self.scene.identity());
             identity.differences(&own.of_shard(Some(shard))).is_empty()
         };
@@ -107,8 +107,8 @@ impl<'a> MapJob<'a> {
         let Some(identity) = Identity::read(&path).ok().flatten().filter(is_same) else { return false };
         let findings = inventory::check(out, &part.manifest().files);
         let is_good = findings.is_ok_and(|list| !list.iter().any(Finding::is_lost));
-        // The hashes do not suffice: on a network disk without locks a second run may have spoilt the records before the
-        // first one computed their hash.
+        // Matching hashes are not enough: on a network disk without locks a second run may have spoilt the records before
+        // the first one computed their hash.
         let count = || Work::new(plan, Some(shard)).read(&path, &identity).map_or(0, |extent| extent.count);
         is_good && part.is_of(self.scene, self.sets) && count() == shard.run_count(plan)
     }
@@ -157,16 +157,15 @@ impl<'a> MapJob<'a> {
     }
 }
 
-/// Checks that a shard's engine is named.
+/// Checks that the engine of a shard is not `auto`.
 ///
 /// # Errors
-/// [`JobError::Usage`] if `auto` would choose it on each machine.
+/// [`JobError::Usage`] if a shard's engine is `auto`.
 pub fn require_engine(shard: Option<Shard>, kind: EngineKind) -> Result<(), JobError> {
     match (shard, kind) {
         (Some(shard), EngineKind::Auto) => Err(JobError::Usage(format!(
-            "--shard {shard}: --engine auto may choose otherwise on another machine, and shards of two engines cannot be \
-             merged; name one, the same for all shards: --engine cpu, or --engine gpu (in f32 unless --precision says \
-             otherwise)"
+            "--shard {shard}: --engine auto may choose different engines on different machines, and their shards cannot be \
+             merged; give all shards the same engine: --engine cpu, or --engine gpu (in f32 by default)"
         ))),
         _ => Ok(()),
     }
@@ -187,8 +186,7 @@ pub struct OpenMap<'p> {
 }
 
 impl<'p> OpenMap<'p> {
-    /// Creates the record file in the folder, or takes up the records that are there. Without a folder records stay in
-    /// memory.
+    /// Creates the record file in the folder, or continues with its records. Without a folder, records stay in memory.
     ///
     /// # Errors
     /// [`JobError`] if the records belong to another map, or a file cannot be read or written.
@@ -244,7 +242,7 @@ impl<'p> MapRun<'p> {
         self.records.as_ref().is_some_and(|records| records.damage().is_some())
     }
 
-    /// Number of runs that earlier, interrupted runs of the program did.
+    /// Number of runs that were stored before this call of the program.
     pub fn resumed(&self) -> usize {
         self.records.as_ref().map_or(0, RunRecords::resumed)
     }
@@ -253,7 +251,7 @@ impl<'p> MapRun<'p> {
     /// before the last one ended.
     ///
     /// # Errors
-    /// [`SweepError`] if the engine fails or a record cannot be stored. What was stored before can be resumed.
+    /// [`SweepError`] if the engine fails or a record cannot be stored. Stored records can be resumed.
     pub fn integrate(&mut self, halt: &Arc<AtomicBool>) -> Result<bool, SweepError> {
         let clock = Instant::now();
         let MapRun { open: OpenMap { engine, observer, .. }, records: stored, work, done, .. } = self;
@@ -368,7 +366,7 @@ impl ComputedMap<'_> {
     /// Returns the manifest and the columns of the map.
     ///
     /// # Errors
-    /// [`OutputError`] if something cannot be put into its format.
+    /// [`OutputError`] if a result cannot be converted.
     pub fn in_memory(&self) -> Result<in_memory::Map, OutputError> {
         in_memory::map(&self.cells(), &self.description())
     }
@@ -389,12 +387,12 @@ fn all_failed(batch: &[(u32, Record)], unit: &str) -> Option<String> {
     ))
 }
 
-/// Describes the steps that lanes take where the scene's number is too small.
+/// Describes how many steps lanes take if the scene's number is too small.
 fn raised_steps(scene: &Scene, engine: &Engine<'_>) -> Option<String> {
     let Steps::PerPeriod(steps) = scene.integration().steps_per_period else { return None };
     let [least, most] = engine.steps_per_period().filter(|&[_, most]| most > steps)?;
     let range = if least == most { most.to_string() } else { format!("{least} to {most}") };
     Some(format!(
-        "integration.steps_per_period = {steps} is raised to {range}: lanes need an even number, and so many"
+        "integration.steps_per_period = {steps} is raised to {range}: lanes need an even number of at least this size"
     ))
 }

@@ -1,5 +1,5 @@
-//! What every front end needs to run a job: find the model, load the scene, check the machine, open an engine, store
-//! records, finish, list, check, compare and validate. Nothing here prints or parses arguments.
+//! Jobs of every front end: find the model, load the scene, check the machine, open an engine, store records, finish,
+//! list, check, compare and validate. This layer prints nothing and parses no arguments.
 
 pub mod check;
 pub mod compare;

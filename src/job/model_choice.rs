@@ -9,7 +9,7 @@ use crate::job::scene_file;
 use crate::model_file::{BUILT_IN, FileModel};
 use crate::text::printable;
 
-/// Parts of file names. Names of built-in models contain none of them.
+/// Strings that mark the path of a file. Names of built-in models do not contain them.
 const FILE_MARKS: [&str; 3] = [".toml", "/", "\\"];
 
 /// Returns the built-in model of this name, or reads the model's file of this name.
@@ -28,7 +28,7 @@ pub fn find(name: &str) -> Result<FileModel, JobError> {
     }
     let names: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
     Err(JobError::Usage(format!(
-        "no model is called `{quoted}`; there is {}, or give the path of a model's file, such as my-model.toml",
+        "no model is called `{quoted}`; the built-in models are {}; or give the path of a model's file, such as my-model.toml",
         names.join(", ")
     )))
 }
@@ -36,7 +36,7 @@ pub fn find(name: &str) -> Result<FileModel, JobError> {
 /// Checks that a state has as many numbers as the model's state.
 ///
 /// # Errors
-/// [`JobError::Usage`] if it has not.
+/// [`JobError::Usage`] if the numbers differ.
 pub fn check_components(model: &dyn Model, count: usize) -> Result<(), JobError> {
     let names = model.state_names();
     let number = if names.len() == 2 { "two" } else { "four" };

@@ -67,8 +67,8 @@ fn contact(side: Side, wall: &Wall) -> String {
             let _ = writeln!(
                 text,
                 "An impact multiplies the rate w by -{}, with an\n    impulse along the gap row. After the impact the contact is sustained if {lasts}\n    and the load \
-                 presses the gap to the wall; otherwise the motion is free again. w = 0 with the load\n    pulling away is \
-                 grazing: nothing happens.",
+                 presses the gap to the wall; otherwise the motion is free again. A contact at\n    w = 0 is \
+                 grazing if the load pulls the gap off the wall: nothing happens.",
                 factor(restitution)
             );
             text += match wall.contact() {
@@ -85,7 +85,7 @@ fn contact(side: Side, wall: &Wall) -> String {
     text
 }
 
-/// Explains the symbols of words that a model can have. `right` and `left`: whether it has these walls.
+/// Explains the symbols of words that a model can have. `right` and `left` say whether it has these walls.
 fn words([right, left]: [bool; 2]) -> String {
     let mut text = "Words\n\n    One symbol per flight, between two events:\n".to_owned();
     let symbols = [
@@ -112,7 +112,7 @@ fn line(parameter: &Parameter) -> String {
 /// Explains a status.
 fn meaning(status: Status) -> &'static str {
     match status {
-        Status::Ok => "nothing to remark",
+        Status::Ok => "no remark",
         Status::Slow => "the motion converges slowly: the class rests on Newton's method, or is undecided",
         Status::NearGrazing => "a contact is nearly grazing: multipliers and exponent are inaccurate",
         Status::StrobeOnEvent => "an event coincides with phase 0, at which states are compared",
@@ -121,26 +121,26 @@ fn meaning(status: Status) -> &'static str {
         Status::TooStiff => "failed: too stiff for the engine",
         Status::NonFinite => "failed: the state became infinite or not a number",
         Status::BelowResolution => {
-            "points of the cycle are closer than the engine resolves: the period may be a divisor"
+            "points of the cycle are closer than the engine resolves: the true period may be a divisor"
         }
     }
 }
 
 const READING: &str = "    A word is the cyclic sequence of a cycle's flights in order of time, rotated to the smallest number: 13554622.
     The literature composes maps from right to left, with powers: P_{1 2^2 6 4 5^2 3} is the same cycle.
-    Its pattern, 135462, writes each run of one symbol once: it leaves out the number of bounces before a sustained contact.
+    Its pattern, 135462, writes repeated symbols once: it leaves out the number of bounces before a sustained contact.
 ";
 
 const CLASSES: &str = "\
 Class
 
     periodic    a stable cycle; the period is its number of forcing periods
-    chaotic     no cycle, and the Lyapunov exponent exceeds 0 by six standard errors
+    chaotic     no cycle, and the Lyapunov exponent exceeds 0 by three standard errors (six for an early stop)
     undecided   neither was found within the budget: long transients, bifurcations near by, tori
     failed      the integration stopped; the status gives the reason";
 
 const ERRORS: &str = "\
 Errors
 
-    lyapunov_error is the standard error of an exponent that is an average of blocks. That of a cycle comes from its
-    multipliers and has none.";
+    lyapunov_error is the standard error of an exponent that is an average of blocks. The exponent of
+    a cycle comes from its multipliers and has no error.";

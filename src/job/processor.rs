@@ -5,10 +5,10 @@ use raw_cpuid::native_cpuid::cpuid_count;
 
 /// The message for a processor that lacks the instructions that the program was compiled for.
 pub const MISFIT: &str = "error: this program was built for processors with AVX2 and FMA, and this one lacks them; build it \
-                          for this one, in its sources: RUSTFLAGS=\"\" cargo install --path .\n";
+                          for this one in the source folder: RUSTFLAGS=\"\" cargo install --path .\n";
 
-/// Whether the processor has the instructions that the program was compiled for. Call it first: without them the process
-/// can end at any place, without a message. This function itself uses hardly any instruction.
+/// Whether the processor has the instructions that the program was compiled for. Call it first: a missing instruction
+/// ends the process without a message. This function itself is too short to contain such instructions.
 #[cfg(target_arch = "x86_64")]
 pub fn is_fit() -> bool {
     // Leaf 1, ecx and leaf 7, ebx: Intel, Software developer's manual 2A, CPUID. `is_x86_feature_detected` would return
@@ -39,7 +39,7 @@ pub fn name() -> Option<String> {
     system.cpus().first().map(|cpu| cpu.brand().trim().to_owned())
 }
 
-/// Name and number of cores, for people.
+/// Describes the processor in messages: name and number of cores.
 pub fn described() -> String {
     let cores = cores();
     let named = name().filter(|name| !name.is_empty());

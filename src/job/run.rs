@@ -81,9 +81,9 @@ pub struct Map {
 /// A cell of a computed map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapCell<'m> {
-    /// Indices along the two axes. Of a cell of a list: its row, and 0.
+    /// Indices along the two axes; in a list the row and 0.
     pub indices: [usize; 2],
-    /// Values of the swept parameters: of the axes, or of the columns of a list.
+    /// Values of the swept parameters: the axes, or the columns of a list.
     pub values: Vec<f64>,
     /// The measured quantities. The bits of its field `valid` tell which of them are present.
     pub record: &'m Record,

@@ -13,14 +13,14 @@ const MOST_OF_MODEL: u64 = 1_000_000;
 /// The `--set` argument that lists the output files.
 const FILES: &str = "outputs.files=";
 
-/// The file of a scene, and how it is read.
+/// File of a scene, and settings for reading it.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneFile<'a> {
-    /// Path of the file. Messages name the scene by it.
+    /// Path of the file, which messages show.
     pub path: &'a Path,
     /// Purpose of the scene.
     pub purpose: Purpose,
-    /// The line of a bifurcation diagram through a scene of several axes.
+    /// Line of a bifurcation diagram through a scene with several axes.
     pub along: Option<&'a Along>,
     /// A copy of the scene's table of cells, used if the table itself does not exist: a run can be resumed without it.
     pub list_copy: Option<&'a Path>,
@@ -35,7 +35,7 @@ impl SceneFile<'_> {
     /// Reads and checks the scene, with parameters and settings overridden by `--set` arguments.
     ///
     /// # Errors
-    /// [`SceneError`] if the file cannot be read, or for the first error in it.
+    /// [`SceneError`] if the file cannot be read or is wrong.
     pub fn load(&self, sets: &[String]) -> Result<Scene, SceneError> {
         let name = self.path.display().to_string();
         let text = fs::read_to_string(self.path).map_err(|error| SceneError {
@@ -55,8 +55,8 @@ impl SceneFile<'_> {
         Scene::parse_with_files(&text, &name, sets, self.purpose, self.along, &find)
     }
 
-    /// Returns the `--set` arguments with one that replaces the scene's figures by these formats, if there are any.
-    /// Manifests list it and resumed runs compare it like any other.
+    /// Returns the `--set` arguments. If formats are given, adds an argument that replaces the scene's formats of
+    /// figures. Manifests list it, and resumed runs compare it.
     ///
     /// # Errors
     /// [`SceneError`] if there are formats and the scene cannot be loaded.
@@ -76,13 +76,13 @@ impl SceneFile<'_> {
 /// Reads the file of a model.
 ///
 /// # Errors
-/// The end of a sentence that names the model.
+/// A text that completes a sentence about the model.
 pub(crate) fn find_model(path: &Path) -> Result<FileText, String> {
     let name = path.display().to_string();
     match read_text(path, MOST_OF_MODEL, "write a shorter model") {
         Ok(text) => Ok(FileText { name, text }),
         Err(error) => Err(format!(
-            "cannot be read at {name} ({error}); give the path of a model's file, in a scene relative to the scene's folder"
+            "cannot be read at {name} ({error}); give the path of a model's file (in a scene: relative to the scene's folder)"
         )),
     }
 }

@@ -13,13 +13,13 @@ use crate::record::Record;
 use crate::store::map;
 use crate::text::size::bytes;
 
-/// Memory per run besides its record, in bytes: its place in the order, and the rows of tables and figures.
+/// Memory per run without its record, in bytes: its place in the order, and the rows of tables and figures.
 const RUN: u64 = 64;
 /// Memory per cell of a list, in bytes: values, their text, flow and law.
 const LIST_ROW: u64 = 200;
 /// Memory per forcing period of a cell that is being computed, in bytes: strobe state, growth of a tangent vector.
 const PERIOD: u64 = 40;
-/// Memory per flow that the CPU engine keeps, in bytes: an upper bound of the built-in models'.
+/// Memory per flow that the CPU engine keeps, in bytes: an upper bound for built-in models.
 const FLOW: u64 = 100_000;
 /// Number of flows from which the size of all lane tables is estimated.
 const SAMPLED_FLOWS: u64 = 256;
@@ -40,8 +40,8 @@ pub struct Size {
 }
 
 impl Size {
-    /// Estimates the size of a map, or of a shard of it. A shard writes records alone, and keeps in memory a byte per run of
-    /// the map, and all records where cells follow their neighbours.
+    /// Estimates the size of a map, or of a shard of it. A shard writes only records. Its memory holds a byte per run of
+    /// the map, and all records if cells follow their neighbours.
     pub fn of(scene: &Scene, shard: Option<Shard>) -> Size {
         let (cells, runs) = (scene.cell_count(), scene.run_count());
         let record = size_of::<Record>() as u64;
@@ -79,7 +79,7 @@ impl Size {
         Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
-    /// Memory of the host that a kind of engine needs, in bytes; of `auto` the larger one.
+    /// Memory of the host that a kind of engine needs, in bytes; for `auto` the larger one.
     pub fn memory(&self, kind: EngineKind) -> u64 {
         match kind {
             EngineKind::Cpu => self.cpu_memory,
@@ -88,7 +88,7 @@ impl Size {
         }
     }
 
-    /// Compares the size with what is free; `remedy` ends the message.
+    /// Compares the size with the free memory and disk space. `remedy` ends the message.
     fn check(&self, scene: &Scene, kind: EngineKind, free: &Free, remedy: &str) -> Result<(), JobError> {
         let counts: Vec<String> = scene.axes().iter().map(|axis| axis.count().to_string()).collect();
         let starts = if self.runs > self.cells { format!(", {} runs,", self.runs) } else { String::new() };
@@ -121,7 +121,7 @@ impl Size {
     }
 }
 
-/// Free memory and disk space, in bytes. None where the system does not report it; then it is taken to suffice.
+/// Free memory and disk space, in bytes. None if the system does not report it; then it counts as enough.
 #[derive(Clone, Copy, Debug)]
 pub struct Free {
     /// Memory, within the limits of a container.
@@ -131,7 +131,7 @@ pub struct Free {
 }
 
 impl Free {
-    /// Asks the system; for disk space only if there is an output folder, which need not exist yet.
+    /// Reads the free memory, and the free disk space if there is an output folder. The folder need not exist yet.
     pub fn for_output(out: Option<&Path>) -> Free {
         let mut system = sysinfo::System::new();
         system.refresh_memory();
@@ -154,7 +154,7 @@ fn replaced(out: &Path) -> u64 {
 /// Checks that a map, or a shard of it, fits into free memory and disk space.
 ///
 /// # Errors
-/// [`JobError::TooLarge`] with what the map needs and what is free.
+/// [`JobError::TooLarge`] with the needed and the free amount.
 pub fn check_map(scene: &Scene, shard: Option<Shard>, kind: EngineKind, free: &Free) -> Result<(), JobError> {
     let remedy = match scene.list() {
         Some(_) => "shorten the list of cells",
@@ -169,7 +169,7 @@ const LARGER_MACHINE: &str = "use a larger machine";
 /// Checks that a map that is merged from shards fits this machine.
 ///
 /// # Errors
-/// [`JobError::TooLarge`] with what the map needs and what is free.
+/// [`JobError::TooLarge`] with the needed and the free amount.
 pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
     Size::merged(scene).check(scene, EngineKind::Cpu, &Free::for_output(out), LARGER_MACHINE)
 }
@@ -177,12 +177,12 @@ pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
 /// Checks that the records of a finished map fit this machine's memory.
 ///
 /// # Errors
-/// [`JobError::TooLarge`] with what the map needs and what is free.
+/// [`JobError::TooLarge`] with the needed and the free amount.
 pub fn check_finished(scene: &Scene) -> Result<(), JobError> {
     Size::of(scene, None).check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
 }
 
-/// Bytes on disk: per run of a record, and per cell of all other files. They are the upper ends of measured maps.
+/// Bytes on disk: per run for its record, and per cell for all other files. The constants are the largest of measured maps.
 fn disk(scene: &Scene) -> [u64; 2] {
     let quantities = &scene.outputs().quantities;
     let columns = |words: u64, exponent: u64, class: u64| -> u64 {
@@ -209,7 +209,7 @@ fn disk(scene: &Scene) -> [u64; 2] {
     [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
 }
 
-/// Bytes per run in a [`RecordStore`](crate::record::RecordStore), which has the requested columns alone.
+/// Bytes per run in a [`RecordStore`](crate::record::RecordStore), which has only the requested columns.
 fn stored_run(scene: &Scene) -> u64 {
     let quantities = &scene.outputs().quantities;
     let column = |quantity: &Quantity| match quantity {
@@ -234,8 +234,8 @@ fn kept_flows(flows: &Parts, runs: u64) -> u64 {
     if stores_flows(count, runs) { count * FLOW } else { 0 }
 }
 
-/// Bytes of the constants that are in memory for lanes at a time, estimated from flows spread over the map. If the flows
-/// are too many to be kept, those in memory are neighbours, and all of them may be as large as the largest.
+/// Largest size of the lanes' constants in memory, in bytes, estimated from flows spread over the map. If memory cannot
+/// hold all flows, it holds neighbours, which may all be as large as the largest.
 fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
     let flows = parts.count() as u64;
     let steps = match scene.integration().steps_per_period {

@@ -1,4 +1,4 @@
-//! Validates a finished map: computes a sample of its cells again and compares.
+//! Validates a finished map: computes a sample of its cells again and compares them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -97,8 +97,8 @@ impl ValidateJob {
         }
     }
 
-    /// Computes the sample's lanes again: on the device that made the map, else on the best adapter; and in f64 where an
-    /// adapter has it. Drivers may compile for a while without regard to `halt`.
+    /// Computes the sample's lanes again: on the device that made the map, else on the best adapter; also in f64 if an
+    /// adapter has it. `halt` has no effect while a driver compiles.
     ///
     /// # Errors
     /// [`JobError::Failed`] if a device fails.
@@ -159,7 +159,7 @@ impl ValidateJob {
         Ok(map::write_validation(&self.folder, &cells, &provenance, lanes.device(), validation, elapsed)?)
     }
 
-    /// Checks that the map is valid, and that no file of the folder is damaged or missing but for the `written` ones.
+    /// Checks that the map is valid, and that no file of the folder is damaged or missing, except the `written` ones.
     ///
     /// # Errors
     /// [`JobError::Failed`].
@@ -171,7 +171,7 @@ impl ValidateJob {
         match left.is_empty() {
             true => Ok(()),
             false => Err(JobError::Failed(format!(
-                "{}; `{}` makes again what can be made from the records",
+                "{}; `{}` recreates tables, figures and report from the records",
                 damage(dir, left),
                 repair_command(dir)
             ))),

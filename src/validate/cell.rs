@@ -35,7 +35,7 @@ const MOST_OF_MESH_SPEED: f64 = 2e-3;
 
 /// Number of perturbed motions that measure the effect of rounding on a cycle.
 const TURNS: u64 = 6;
-/// Factor by which a lane may deviate farther than these: it rounds at every step, they once per period.
+/// Factor by which a lane may deviate farther than perturbed motions: a lane rounds at every step, not once per period.
 pub(super) const ROUNDING_FACTOR: f64 = 8.0;
 
 /// Multiple of the budget for which a slow approach to a cycle is followed.
@@ -103,7 +103,7 @@ impl<'a> Cell<'a> {
         budget
     }
 
-    /// Whether all numbers of a record are finite where they must be.
+    /// Whether all numbers of a record that must be finite are finite.
     pub(super) fn is_finite(&self, record: &Record) -> bool {
         not_finite(record, &self.budget).is_none()
     }
@@ -129,7 +129,7 @@ impl<'a> Cell<'a> {
         budget
     }
 
-    /// Computes what the cell's start leads to within the whole budget.
+    /// Computes the motion from the cell's start over the whole budget.
     pub(super) fn truth(&self) -> Answer {
         self.reached(&self.flow, self.law, self.start)
     }
@@ -199,7 +199,7 @@ impl<'a> Cell<'a> {
         Some((trajectory.state(), moved.collect()))
     }
 
-    /// Whether a cycle of `period` periods closes earlier within the effect of rounding.
+    /// Whether a cycle of `period` periods closes after fewer periods, within the effect of rounding.
     pub(super) fn closes_earlier(&self, state: State, period: u32) -> bool {
         let mut trajectory =
             Trajectory::<0>::new(&self.flow, self.law, state).allowing(Allowance::UNLIMITED.until(self.halt));
@@ -269,8 +269,8 @@ impl<'a> Cell<'a> {
             // A parameter at the end of its range keeps its value.
             let _ = model.set_at(index, value * (1.0 + self.resolution * (2.0 * random.unit() - 1.0)));
         }
-        // Leaving speeds have the rounding errors of the motion's velocity. Both walls get the same change, so that a
-        // symmetric law stays symmetric.
+        // The meshing speed is compared with velocities, so it is perturbed by their rounding errors. Both walls get the
+        // same change, so that a symmetric law stays symmetric.
         let draw = 2.0 * Random::new(!(self.seed ^ k)).unit() - 1.0;
         let mut law = model.law();
         for speed in &mut law.mesh_speed {

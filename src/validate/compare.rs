@@ -25,7 +25,7 @@ pub enum Field {
     Pattern,
     /// Whether the cycle is its own mirror image, if the periods agree.
     Symmetric,
-    /// The exponent: through the largest multiplier for cycles, with wide tolerances otherwise.
+    /// The exponent. For cycles the largest multiplier is compared, otherwise the exponent with wide tolerances.
     Exponent,
     /// The attractor of the start in a map of basins, if both are periodic.
     Attractor,
@@ -135,7 +135,7 @@ impl Either {
         Either { own, mirrored }
     }
 
-    /// Whether a text is the word's or its mirror image's.
+    /// Whether a text is that of the word or of its mirror image.
     fn is(&self, ours: &Spelling) -> bool {
         let length = |spelling: &Spelling| match spelling {
             Spelling::Whole(word) => word.len() as u32,
@@ -171,7 +171,7 @@ impl Answer {
 
 /// Tolerances of the comparison of numbers.
 ///
-/// Lanes evaluate a cycle near it, not on it, and compute tangents in their own precision. Over the plane, multipliers of
+/// Lanes compute the multipliers of a cycle at a state near it, in their own precision. Over the plane, multipliers of
 /// 99 % of the cycles agree with the reference within 3e-4 (f32) and 4e-6 (f64). All agree within 6e-3 and 3e-3, except
 /// where the multiplier is close to 1 or the motion has not settled. Fractions of meshing agree within 2e-6 and 3e-8.
 #[derive(Clone, Copy, Debug)]
@@ -187,7 +187,7 @@ pub(super) struct Bars<'a> {
     pub(super) labels: Option<Labels<'a>>,
 }
 
-/// The attractors of a map of basins, seen from one of its cells.
+/// The attractors of a map of basins, for one of its cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Labels<'a> {
     pub(super) basins: &'a Basins,
@@ -207,8 +207,8 @@ impl Labels<'_> {
     }
 }
 
-/// Logarithm of the growth or decay that takes a rounding error to the size of the motion. A motion with less over its
-/// budget cannot be distinguished from a neutral one.
+/// Logarithm of the growth or decay that takes a rounding error to the size of the motion. A motion that grows or decays
+/// less over its budget cannot be distinguished from a neutral one.
 const DECISIVE_GROWTH: f64 = 40.0;
 
 /// Tolerance of impacts per period of a cycle. Impacts are counted, so only the division rounds.

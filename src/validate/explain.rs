@@ -15,7 +15,7 @@ const PERTURBED: u64 = 12;
 /// an attractor.
 const PERTURBED_IN_BASINS: u64 = 512;
 
-/// Number of perturbed cells where a transient must be as long as the record's.
+/// Number of perturbed cells if the transient must be as long as the record's.
 const MANY_PERTURBED: u64 = 48;
 
 /// Records of lanes that computed the cell again.
@@ -32,7 +32,7 @@ pub(super) struct RepeatedLanes<'a> {
 /// Returns the kind of a mismatch between `claim` and `truth`. The claim is the map's record, or the second judge's for a
 /// map that the reference computed. The truth is the reference's answer.
 pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: RepeatedLanes<'_>) -> Kind {
-    // No engine produces such numbers.
+    // No kind explains such numbers.
     if claim.periods_run > cell.longest() || !cell.is_finite(claim) {
         return Kind::Unexplained;
     }
@@ -41,7 +41,7 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
     if status(claim).is_failure() {
         return if is_reproduced { Kind::Cap } else { Kind::Unexplained };
     }
-    // With early stops a costly cell may end before the cap that its judge meets.
+    // With early stops a computation may end before the cap that its judge meets.
     if matches!(status(&truth.record), Status::TooStiff | Status::CapEvents) {
         let is_own = lanes.again.is_some_and(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(claim));
         return if is_own { Kind::Budget } else { Kind::Unexplained };
@@ -110,7 +110,7 @@ fn is_multiple(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     (ours % theirs == 0 || theirs % ours == 0) && cell.bars.agree(&once, answer)
 }
 
-/// Whether one side gives the other's answer with fewer or more periods, or no side can decide within the budget.
+/// Whether one side gives the other's answer with fewer or more periods, or neither side can decide within the budget.
 fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn(&Answer) -> bool) -> bool {
     // A slow approach is not finished. Lanes and the reference have different limits for it.
     let is_open = |record: &Record| {

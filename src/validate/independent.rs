@@ -3,7 +3,7 @@
 //!
 //! The motion is integrated over the whole budget. It is periodic if its strobe states recur and the cycle is stable;
 //! multipliers come from finite differences of neighbouring motions. It is chaotic if a neighbouring motion separates from
-//! it. If neither is found, for instance while a motion approaches its cycle slowly, the judge gives no answer.
+//! it. Otherwise, for instance while a motion approaches its cycle slowly, the judge gives no answer.
 
 pub mod dop853;
 pub mod field;

@@ -222,7 +222,7 @@ impl Validation {
         }));
         if let Some(states) = self.states.as_ref().filter(|states| states.rate().is_too_many()) {
             let (off, compared) = (states.off.len(), states.compared);
-            faults.push(format!("states of {off} of {compared} lanes are off after {HORIZON} periods"));
+            faults.push(format!("states of {off} of {compared} lanes are wrong after {HORIZON} periods"));
         }
         faults
     }

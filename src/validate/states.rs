@@ -1,8 +1,9 @@
 //! Comparison of lanes' states with the reference after a few periods.
 //!
-//! A lane that misses one impact in thousands reaches the same attractor, so its record is right. Its state a few periods
-//! after the start is wrong. Therefore many lanes are compared over a few periods. The effect of rounding is measured on
-//! the reference: parameters, start, and the state after each period are perturbed within the engine's resolution.
+//! A lane that misses one impact in thousands reaches the same attractor, so its record is right. But its state a few
+//! periods after the start is wrong. Therefore many lanes are compared over a few periods. The effect of rounding is
+//! measured on the reference: parameters, start, and the state after each period are perturbed within the engine's
+//! resolution.
 
 use super::Subject;
 use super::cell::{Cell, ROUNDING_FACTOR, resolution};
@@ -74,6 +75,6 @@ fn compare(cell: &Cell<'_>, id: u32, state: State, subject: &Subject<'_>) -> Opt
         (bar < PREDICTABLE).then(|| Off { id, distance: cell.apart(&end, &state), bar })
     };
     let few = compare(FEW)?;
-    // An event near grazing moves only few of the perturbed motions, but these far.
+    // A nearly grazing event moves only a few of the perturbed motions, but moves them far.
     if few.distance > few.bar { compare(MANY) } else { Some(few) }
 }

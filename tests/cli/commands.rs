@@ -95,7 +95,7 @@ fn bad_orbit_requests_are_refused() {
         (&["--time", "-1"], "it must be a finite number, 0 or more"),
         (&["--time", "inf"], "it must be a finite number, 0 or more"),
         (&["--time", "nan"], "it must be a finite number, 0 or more"),
-        (&["--time", "1e300"], "--time 1e300: it must be at most 33659921, 30000000 forcing periods"),
+        (&["--time", "1e300"], "--time 1e300: it must be at most 33659921 (30000000 forcing periods)"),
         (&["--set", "E=0.6"], "did you mean `e`? valid names: m1 (equivalent mass of gear 1), m2 ("),
         (&["--periods", "1"], "2..=10000000"),
         (&["--force"], "--out <DIR>"),

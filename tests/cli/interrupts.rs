@@ -45,8 +45,7 @@ fn an_interrupted_diagram_leaves_no_folder() {
     let folder = with_scene(SLOW);
     for start in ["rest", "up"] {
         let start = format!("start.policy={start}");
-        let says =
-            "error: interrupted after 0 of 5 columns; no column is stored, and nothing was written to out/s";
+        let says = "error: interrupted after 0 of 5 columns; nothing was written to out/s";
         stops(folder.path(), &["bifurcation", "s.toml", "--set", &start], says);
         assert!(!folder.path().join("out").exists());
     }
@@ -55,7 +54,7 @@ fn an_interrupted_diagram_leaves_no_folder() {
 #[test]
 fn an_interrupted_orbit_leaves_no_folder() {
     let folder = with_scene(SLOW);
-    let says = "error: interrupted before the motion was decided; nothing was written";
+    let says = "error: interrupted before the class was decided; nothing was written";
     stops(folder.path(), &["orbit", "--transient", "1000000000", "--out", "a/b"], says);
     assert!(!folder.path().join("a").exists());
 }

@@ -94,7 +94,10 @@ fn every_model_has_a_line_and_a_page() {
 fn unknown_and_wrong_models_are_refused() {
     let folder = my_model();
     let error = refusal(&folder, "models gears\u{1b}");
-    assert!(error.starts_with("error: no model is called `gears\\u{1b}`; there is gear-pair, "), "{error}");
+    assert!(
+        error.starts_with("error: no model is called `gears\\u{1b}`; the built-in models are gear-pair, "),
+        "{error}"
+    );
     assert!(error.ends_with("or give the path of a model's file, such as my-model.toml\n"), "{error}");
     let error = refusal(&folder, "orbit --model no/such.toml");
     assert!(error.contains("cannot be read at no/such.toml"), "{error}");

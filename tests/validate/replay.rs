@@ -467,8 +467,7 @@ fn a_map_is_validated_and_its_report_says_so() {
     let (folder, out) = finished();
     let run = |arguments: &[&str]| rattlemap(folder.path(), &[&["validate", "o"], arguments].concat());
     let text = said(&run(&["--samples", "150", "--seed", "3"]).success().stdout(""));
-    for part in
-        ["uniform: 0 of ", "unexplained 0 (below ", "judged by lanes in f64 on ", "the same to the bit"]
+    for part in ["uniform: 0 of ", "unexplained 0 (below ", "judge: lanes in f64 on ", "the same to the bit"]
     {
         assert!(text.contains(part), "{part}: {text}");
     }

@@ -1,4 +1,4 @@
-//! Runs of the main map on one engine, timed.
+//! Timed runs of the main map on one engine.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -18,16 +18,16 @@ use rattlemap_dynamics::orbit::Class;
 /// Text of the scene that is measured. Only its number of cells changes.
 pub(super) const SCENE: &str = include_str!("../../../scenes/e_omega.toml");
 
-/// Largest number of cells handed to an engine at once.
+/// Largest number of cells in one call of an engine.
 const BATCH: usize = 1 << 20;
 
 /// Seed of the sample of cells that the reference recomputes.
 const SEED: u64 = 1;
 
-/// What is measured: an engine, its precision and its device.
+/// Target of a measurement: an engine, its precision and its device.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Target {
-    /// Description of the device as manifests have it.
+    /// Description of the device, as in manifests.
     pub(super) device: String,
     pub(super) precision: Precision,
     /// Index of the adapter; none for the processor.
@@ -66,11 +66,11 @@ impl Target {
 pub(super) struct Run {
     /// Seconds to number the cells, derive constants and upload them.
     pub(super) prepare: f64,
-    /// Seconds from the first cell handed to the engine until all records are on the host.
+    /// Seconds from the first call of the engine until all records are on the host.
     pub(super) integrate: f64,
     /// Forcing periods integrated, over all cells.
     pub(super) periods: u64,
-    /// Times by the device's own clock; none for the processor and for devices without timestamps.
+    /// Times that the device's clock measured; none for the processor and for devices without timestamps.
     pub(super) device: Option<DeviceTimes>,
 }
 
@@ -80,7 +80,7 @@ impl Run {
         self.periods as f64 / self.integrate
     }
 
-    /// Returns the share of the integration during which the device worked; NaN without its clock.
+    /// Returns the share of the integration during which the device worked; NaN if the device has no clock.
     pub(super) fn device_share(&self) -> f64 {
         self.device.map_or(f64::NAN, |device| device.busy / self.integrate)
     }
@@ -92,7 +92,7 @@ pub(super) struct Point {
     pub(super) lanes: usize,
     pub(super) runs: Vec<Run>,
     pub(super) classes: Vec<Class>,
-    /// Number of cells whose class differs from the first engine's; none where that has no map of this size.
+    /// Number of cells whose class differs from the first engine's; none if the first engine has no map of this size.
     pub(super) differing: Option<usize>,
 }
 
@@ -123,7 +123,7 @@ pub(super) struct Series {
     /// Seconds to open the device, compile the lane and compute the first four cells.
     pub(super) open_seconds: f64,
     pub(super) points: Vec<Point>,
-    /// Number of cells that was left out, with the reason.
+    /// Smallest number of cells that was not measured, with the reason.
     pub(super) skipped: Option<(usize, String)>,
     pub(super) check: Option<SampleCheck>,
 }
@@ -139,7 +139,7 @@ pub(super) fn scene(side: u32) -> Scene {
 pub(super) struct OpenEngine {
     /// None for the processor. The engine takes the device and returns it after each run.
     device: Option<Box<gpu::Gpu>>,
-    /// What the device's clock has counted since it was last read.
+    /// Times that the device's clock has counted since the last reading.
     device_times: Arc<Mutex<Option<DeviceTimes>>>,
     pub(super) open_seconds: f64,
 }
@@ -164,7 +164,7 @@ impl OpenEngine {
                 }
             });
             bench.device = Some(Box::new(device));
-            bench.run(&scene(2)).context("the first lanes")?;
+            bench.run(&scene(2)).context("cannot compute the first lanes")?;
         }
         bench.open_seconds = clock.elapsed().as_secs_f64();
         Ok(bench)
@@ -207,7 +207,7 @@ impl OpenEngine {
     /// Computes the map of a scene `runs` times, fewer if `seconds` run out, but at least twice.
     ///
     /// # Errors
-    /// As [`OpenEngine::run`].
+    /// If the engine fails.
     pub(super) fn point(&mut self, scene: &Scene, runs: usize, seconds: f64) -> Result<(Point, Vec<Record>)> {
         let clock = Instant::now();
         let (first, mut records) = self.run(scene)?;
@@ -222,7 +222,7 @@ impl OpenEngine {
         Ok((Point { lanes: records.len(), runs: list, classes, differing: None }, records))
     }
 
-    /// Recomputes `samples` cells of a map on the reference and compares.
+    /// Recomputes `samples` cells of a map on the reference and compares them.
     ///
     /// # Errors
     /// If the device fails while it computes the sample's lanes again.
@@ -234,7 +234,7 @@ impl OpenEngine {
         let sample = validate::sample(&plan, records, samples, SEED);
         let lanes = match device {
             Some(device) => pollster::block_on(Lanes::run(&subject, &sample, Some(device), None))
-                .map_err(|error| anyhow!("the sample's lanes: {error}"))?,
+                .map_err(|error| anyhow!("cannot compute the sample's lanes again: {error}"))?,
             None => Lanes::default(),
         };
         let validation = validate::replay(&subject, &sample, &lanes, &|_| {});

@@ -1,4 +1,4 @@
-//! `rattlemap map --dry-run`: prints what a map takes.
+//! `rattlemap map --dry-run`: prints the memory, disk space and time that a map needs.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::job::size::Free;
 use crate::map::plan::Plan;
 use crate::text::size::bytes;
 
-/// Estimates what the map takes, and prints it.
+/// Estimates memory, disk space and time, and prints them.
 pub(super) fn run(
     job: &MapJob<'_>,
     plan: &Plan,
@@ -90,7 +90,7 @@ fn object(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> Value {
     })
 }
 
-/// The predicted time. An adaptive map integrates fewer cells, and takes less.
+/// Formats the predicted time. It is an upper bound for an adaptive map, which integrates fewer cells.
 fn time(forecast: &Forecast, is_adaptive: bool) -> String {
     let total = seconds(forecast.seconds);
     let at_most = if is_adaptive { "at most " } else { "" };

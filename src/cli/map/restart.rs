@@ -40,8 +40,8 @@ impl Restart<'_> {
         }
     }
 
-    /// Adds to the error of an engine that cannot be opened what the folder contains. Errors of the request stay as they
-    /// are.
+    /// Extends the error of an engine that cannot be opened by what the folder contains. Errors of the request are
+    /// returned unchanged.
     pub(super) fn engine_not_opened(&self, error: JobError, folder: &Folder) -> Failure {
         if error.is_usage() {
             return error.into();
@@ -59,8 +59,8 @@ impl Restart<'_> {
         JobError::Failed(format!("{error}; {rest}{}", self.with_the_cpu())).into()
     }
 
-    /// The command that computes the map with the CPU engine, if the request leaves the engine open. It cannot continue the
-    /// records of another engine.
+    /// The command that computes the map with the CPU engine, if the engine is `auto`. It starts from the first cell,
+    /// because records of another engine cannot be continued.
     pub(super) fn with_the_cpu(&self) -> String {
         match self.arguments.engine.engine {
             EngineChoice::Auto => {

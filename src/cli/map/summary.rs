@@ -10,7 +10,7 @@ use crate::show::cells::Cells;
 use crate::store::map::Run;
 use crate::store::shard::FinishedShard;
 
-/// Counts, speed and classes of a map. `finishing`: seconds from the last cell to the last file.
+/// Counts, speed and classes of a map. `finishing` is the time from the last cell to the last file, in seconds.
 pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, finishing: f64) -> String {
     let (count, [columns, rows]) = (cells.runs(), cells.counts());
     let unit = if count > columns * rows { "runs" } else { "cells" };
@@ -35,13 +35,13 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
     )
 }
 
-/// Counts, speed and classes of a shard, its files, and how to go on.
+/// Counts, speed and classes of a shard, its files, and the next command.
 pub(super) fn shard(finished: &FinishedShard<'_>, folder: &Path, files: &[String]) -> String {
     let FinishedShard { shard, plan, run, tally, .. } = finished;
     let (count, unit, seconds) = (shard.run_count(plan), plan.unit(), run.elapsed.as_secs_f64().max(1e-9));
     format!(
         "shard {shard}: {count} of {} {unit}{} in {seconds:.3} s on {} ({}): {:.0} {unit}/s\n{}{}\n{}: {}; \
-         `rattlemap merge OUT PART...` makes the map of all {} shards",
+         `rattlemap merge OUT PART...` combines all {} shards",
         plan.run_count(),
         resumed(run),
         run.made.engine,
@@ -104,7 +104,7 @@ fn refinement(refined: &Refined, count: usize) -> String {
         let exceeds = if audit.rate() > refined.max_error {
             let allowed = 100.0 * refined.max_error;
             format!(
-                ", more than refine.max_error allows ({allowed:.2} %): refine.rounds ended the refinement before it was reached"
+                ", more than refine.max_error allows ({allowed:.2} %): refine.rounds is too small"
             )
         } else {
             String::new()

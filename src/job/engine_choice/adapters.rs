@@ -44,7 +44,7 @@ impl fmt::Display for AdapterRequest {
 /// Selected adapters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Selection {
-    /// Their numbers; at least one.
+    /// Numbers of the adapters, at least one.
     pub(crate) numbers: Vec<usize>,
     /// One line for each adapter that [`AdapterRequest::All`] does not include, with the reason.
     pub(crate) left_out: Vec<String>,
@@ -82,15 +82,15 @@ pub enum AdapterError {
     /// The requested adapter lacks the precision.
     #[error("adapter {adapter} has no {precision}; give {remedies}")]
     Lacks {
-        /// Its number and name.
+        /// Number and name of the adapter.
         adapter: String,
         /// The precision.
         precision: &'static str,
         /// Requests that would succeed.
         remedies: String,
     },
-    /// No hardware adapter has the precision. A software driver is not used instead without a request: it may be slower by
-    /// orders of magnitude.
+    /// No hardware adapter has the precision. A software driver is used only on request: it may be slower by orders of
+    /// magnitude.
     #[error("no graphics card has {precision} ({cards}); give {remedies}")]
     NoCardHas {
         /// The precision.
@@ -129,7 +129,7 @@ pub(crate) fn select(
 }
 
 impl AdapterRequest {
-    /// Returns the adapters of the list that match the request, whatever their precisions.
+    /// Returns the adapters of the list that match the request. Precisions are not checked.
     ///
     /// # Errors
     /// [`AdapterError`] if no adapter matches, or if several match a name.
@@ -225,7 +225,8 @@ fn equal_to(first: &AdapterReport, all: &[AdapterReport]) -> Selection {
     Selection { numbers: selected.iter().map(|adapter| adapter.number).collect(), left_out }
 }
 
-/// Whether two adapters are one card, listed by two interfaces (some of which do not report the model) or twice by one.
+/// Whether two adapters are the same card: two interfaces list it, or one lists it twice. Some interfaces do not report
+/// the model.
 fn is_same_card(one: &AdapterReport, other: &AdapterReport) -> bool {
     let (one, other) = (&one.info, &other.info);
     if one.backend != other.backend {
@@ -241,7 +242,7 @@ fn is_hardware(adapter: &AdapterReport) -> bool {
     gpu::is_hardware(&adapter.info)
 }
 
-/// Lists the requests that would succeed where a precision is missing.
+/// Lists the requests that would succeed if the precision is missing.
 fn remedies(precision: Precision, all: &[AdapterReport]) -> String {
     let mut list = match precision {
         Precision::F64 => {

@@ -15,7 +15,8 @@ use rattlemap_dynamics::flow::Gap;
 /// Largest number of endings in one interval.
 const ENDINGS: u32 = 10_000;
 
-/// Shortest duration for the crate, whose first trial step underflows below it. One Euler step is exact there.
+/// Shortest duration for the crate, whose first trial step underflows in a shorter one. For such durations one Euler step
+/// is exact.
 const SHORTEST: f64 = 1e-12;
 
 /// Largest number of steps of one integration.
@@ -56,7 +57,7 @@ pub struct Integration {
     pub tolerance: f64,
     /// Longest step.
     pub longest: f64,
-    /// Distance of the returned samples; none for the ends of steps.
+    /// Time between the returned samples; none returns the ends of steps.
     pub samples: Option<f64>,
 }
 

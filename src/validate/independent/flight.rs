@@ -1,5 +1,5 @@
 //! Flights and contacts for an integrator with time steps: finds where a step meets a wall and applies the contact law.
-//! Written from the equations of motion in gap coordinates `(z, w, x, v)`, in which a gap can be set to a wall exactly.
+//! The equations of motion are in gap coordinates `(z, w, x, v)`, in which a gap can be set exactly to a wall.
 
 use super::field::{Coordinates, Equations};
 use rattlemap_dynamics::flow::Gap;
@@ -8,7 +8,7 @@ use rattlemap_dynamics::reference::EventKind;
 
 /// Largest number of iterations of a root search.
 const ROOT_CAP: u32 = 100;
-/// Largest number of Newton steps, which come first.
+/// Largest number of Newton steps, which precede bisection.
 const NEWTON_CAP: u32 = 20;
 
 /// Number of bisections for the minimum of an acceleration.
@@ -26,7 +26,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 pub enum Ending {
     /// Free motion reaches a wall.
     Contact(Side),
-    /// The contact onset ends. This is no event.
+    /// The contact onset ends. This is not an event.
     OnsetEnds(Side),
     /// The gap falls back through the wall.
     MeshEnds(Side),
@@ -59,7 +59,7 @@ enum Mode {
 pub struct Sighting {
     /// The ending.
     pub ending: Ending,
-    /// Zero if the start itself lies beyond by rounding.
+    /// Zero if the start itself lies beyond the ending, by rounding.
     pub within: f64,
     /// First guess of the root.
     pub guess: f64,
@@ -173,7 +173,7 @@ impl Flight {
         field.rate().max(self.omega).recip()
     }
 
-    /// Notes that the next step does not start on a wall.
+    /// Records that the next step does not start on a wall.
     #[inline]
     pub fn leave_wall(&mut self) {
         self.from = None;

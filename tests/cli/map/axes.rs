@@ -93,11 +93,11 @@ fn a_map_names_parameters_without_effect() {
     let run = map(&folder, idle).success();
     let summary: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
     assert_eq!(summary["without_effect"], serde_json::json!(["k", "F"]));
-    run.stderr(says(&["k has no effect: along it every cell is like the others"]));
+    run.stderr(says(&["k has no effect: along this axis every cell has the same result"]));
     assert_eq!(json(&folder.path().join("out/s/manifest.json"))["without_effect"], summary["without_effect"]);
     // In an adaptive map only integrated cells are compared.
     let run = map(&folder, &format!("{idle} --force --set refine.minimum_grid=1")).success();
-    run.stderr(says(&["along it every integrated cell is like the others"]));
+    run.stderr(says(&["along this axis every integrated cell has the same result"]));
 }
 
 /// The line follows a logarithmic axis, and derived parameters vary along it.
@@ -177,8 +177,7 @@ fn the_folder_of_a_list_can_be_resumed_checked_and_validated() {
     assert!(cells() == good);
     fs::write(out.join("list.csv"), "F,k1\n41,20\n").unwrap();
     fails(&folder, "validate out/l --quiet", 2, &["`cells.rows` was 4, now 1"]);
-    let again =
-        "`rattlemap map SCENE --out out/l --resume` makes every file again from the scene's own table";
+    let again = "`rattlemap map SCENE --out out/l --resume` recreates every file from the scene's own table";
     fails(&folder, "check out/l --repair --quiet", 1, &["list.csv is damaged", again]);
 }
 

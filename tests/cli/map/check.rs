@@ -61,7 +61,7 @@ fn every_damaged_file_of_a_map_is_named_and_repaired() {
             continue;
         }
         fs::write(out.join(name), &bytes[1..]).unwrap();
-        succeeds(&folder, "check out/s --repair").stderr(says(&[&format!("{name} was made again")]));
+        succeeds(&folder, "check out/s --repair").stderr(says(&[&format!("{name} was recreated")]));
         assert!(files(&out) == good, "{name}");
         is_good(&folder, "out/s");
     }
@@ -82,7 +82,7 @@ fn damaged_records_are_repaired_by_resuming() {
     let bad = fs::read(&records).unwrap();
     fs::remove_file(out.join("cells.csv")).unwrap();
     let resume = format!("`rattlemap map SCENE --out out/s {FEW} --resume`");
-    let nothing = "records.bin is damaged or missing, and cannot be made from other files";
+    let nothing = "records.bin is damaged or missing, and cannot be recreated from other files";
     fails(&folder, "check out/s --repair", 1, &["cells.csv is missing", nothing, &resume]);
     assert!(!out.join("cells.csv").exists() && fs::read(&records).unwrap() == bad);
     map(&folder, &format!("{FEW} --quiet --out out/s --resume")).success();

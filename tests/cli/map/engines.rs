@@ -64,7 +64,7 @@ fn devices_says_what_there_is_and_what_auto_takes() {
         "interface   ",
         "precision   f32",
         "batch       up to",
-        "auto takes ",
+        "auto chooses ",
     ]));
     let hardware = || says(&["a hardware GPU"]);
     let run = map(&folder, "--engine auto --out few");
@@ -114,5 +114,5 @@ fn an_environment_that_leaves_no_adapter_is_named() {
         .env("WGPU_BACKEND", "foo")
         .assert()
         .success()
-        .stdout(says(&["WGPU_BACKEND=foo", "auto takes cpu"]));
+        .stdout(says(&["WGPU_BACKEND=foo", "auto chooses cpu"]));
 }

@@ -28,7 +28,7 @@ fn figures_of_a_map_come_in_each_format() {
     fs::write(out.join("word.pdf"), "%PDF").unwrap();
     fails(&folder, "check out/s --quiet", 1, &["map.svg is missing", "word.pdf is damaged"]);
     let run = succeeds(&folder, "check out/s --repair");
-    run.stderr(says(&["map.svg was made again", "word.pdf was made again"]));
+    run.stderr(says(&["map.svg was recreated", "word.pdf was recreated"]));
     assert_eq!(["map.svg", "word.pdf"].map(|name| fs::read(out.join(name)).unwrap()), good);
     // Resuming with other formats replaces the figures.
     map(&folder, &format!("{FEW} --quiet --format png --resume")).success();

@@ -206,7 +206,7 @@ fn resuming_without_records_begins_the_map() {
     let folder = folder();
     let resume = || {
         let run = map(&folder, &format!("{FEW} --resume")).success();
-        let begins = "out/s: no records are stored there; the map starts anew";
+        let begins = "out/s: the folder has no records; the map starts from its first cell";
         run.stderr(says(&[begins, "12 of 12 cells"]));
     };
     resume();

@@ -153,7 +153,7 @@ fn impossible_shards_are_refused() {
         fails(&folder, &format!("map s.toml {arguments}"), 2, parts);
         assert!(!path(&folder, "out").exists(), "{arguments}");
     };
-    refused("--shard 1/4", &["--shard 1/4: --engine auto may choose otherwise", "--engine cpu"]);
+    refused("--shard 1/4", &["--shard 1/4: --engine auto may choose different engines", "--engine cpu"]);
     let cpu = |shard, parts: &[&str]| refused(&format!("--engine cpu --shard {shard}"), parts);
     cpu("0/4", &["'0/4'", "--shard <I/N>", "counted from 1", "1/4"]);
     cpu("5/4", &["'5/4'", "the last 4/4"]);
@@ -293,7 +293,7 @@ fn resuming_a_finished_shard_changes_nothing() {
     damage(&records, 40);
     let check = format!("check {dir}");
     fails(&folder, &check, 1, &["records.bin is damaged"]);
-    let repair = ["no file of shard 2/3 can be made from the others", "--shard 2/3"];
+    let repair = ["no file of shard 2/3 can be recreated from the others", "--shard 2/3"];
     fails(&folder, &format!("{check} --repair"), 1, &repair);
     again(&["0 cells are kept", "shard 2/3: 8 of 24 cells"]);
     succeeds(&folder, &check).stderr(says(&["as manifest.json says"]));
