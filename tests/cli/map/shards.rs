@@ -276,7 +276,7 @@ fn resuming_a_finished_shard_changes_nothing() {
     let folder = folder();
     let resume = format!("{SMALL} --shard 2/3 --resume");
     let again = |parts: &[&str]| map(&folder, &resume).success().stderr(says(parts));
-    again(&["no records are stored there", "shard 2/3: 8 of 24 cells in "]);
+    again(&["the folder has no records", "shard 2/3: 8 of 24 cells in "]);
     let dir = "out/s.shard-2-of-3";
     let out = path(&folder, dir);
     let (file, records) = (out.join("manifest.json"), out.join("records.bin"));
