@@ -397,7 +397,7 @@ pub(crate) struct Orbit {
 
     /// Number of forcing periods in the first analysis after the transient, at least 2. It finds cycles of up to N/2
     /// periods, at most 64. While the class is undecided, the analysis is repeated with twice as many periods, up to
-    /// 32768 or N. Example: --periods 256
+    /// 32768, or N if that is larger. Example: --periods 256
     #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
           value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     pub(crate) periods: u32,

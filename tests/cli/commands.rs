@@ -352,5 +352,5 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
 fn orbit_help_explains_periods_and_transient() {
     run(&folder(), "orbit --help")
         .success()
-        .stdout(says(&["N does not limit the integration", "It is always integrated whole"]));
+        .stdout(says(&["up to N/2 periods, at most 64", "All of it is integrated"]));
 }

@@ -607,7 +607,10 @@ fn a_folder_without_a_finished_map_is_refused() {
     with("\"command\": \"map\"", "\"command\": \"bifurcation\"");
     refused(&["o"], &["not the manifest of a map, but of `bifurcation`"]);
     with("max = 12.0", "max = 11.0");
-    refused(&["o"], &["records.bin holds another run", "`axis.1.max` was 12.0, now 11.0"]);
+    refused(
+        &["o"],
+        &["records.bin does not belong to the manifest.json", "`axis.1.max` was 12.0, now 11.0", "--force"],
+    );
     with("\"precision\": \"f64\"", "\"precision\": \"f16\"");
     refused(&["o"], &["f16"]);
     with("{", "");

@@ -118,7 +118,7 @@ fn the_files_of_a_validation_are_checked() {
     succeeds(&folder, "check out/s --repair --quiet");
     assert!(files(&out) == good);
     fs::remove_file(out.join("validation.json")).unwrap();
-    let anew = "`rattlemap validate` makes validation.json and its section of the report again";
+    let anew = "`rattlemap validate` recreates validation.json and its section of the report";
     fails(&folder, "check out/s --repair", 1, &[anew]);
     // A validation reports damage to other files.
     fs::write(out.join("cells.npy"), "").unwrap();

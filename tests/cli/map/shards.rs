@@ -191,7 +191,7 @@ fn parts_that_make_no_map_are_refused_and_named() {
     refused(2, "1 2 copy", &["1 and copy are both shard 1/3"]);
     refused(2, "1 2 nowhere", &["nowhere: there is no such folder"]);
     fs::create_dir(path(&folder, "empty")).unwrap();
-    refused(2, "1 2 empty", &["empty: there is no manifest.json; it is not the folder of a map"]);
+    refused(2, "1 2 empty", &["empty: this is not the folder of a shard", "--shard I/N"]);
     map(&folder, &format!("{SMALL} --quiet --out whole")).success();
     refused(2, "1 2 whole", &["whole: this is a whole map"]);
     part("of2", "1/2");
