@@ -205,7 +205,10 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), JobEr
         if plan.is_list() { i.to_string() } else { format!("({i}, {j})") }
     };
     let named: Vec<String> = ids.into_iter().take(NAMED_CELLS).map(name).collect();
-    let cells = if named.is_empty() { String::new() } else { format!(": cells {}{more}", named.join(" ")) };
+    let cells = match named.is_empty() {
+        true => String::new(),
+        false => format!("; all such cells: {}{more}", named.join(" ")),
+    };
     Err(JobError::Failed(format!(
         "{}{cells}; {} lists them, each with the command that replays it",
         faults.join("; "),

@@ -73,7 +73,7 @@ fn the_map_has_the_classes_of_the_page() {
         .assert();
     run.code(0);
     let mut reader = csv::Reader::from_path(folder.path().join("out/my-gears/cells.csv")).unwrap();
-    // Classes by speed in 1/min.
+    // Classes and impacts per period by speed in 1/min.
     let mut column = BTreeMap::new();
     for cell in reader.deserialize() {
         let cell: BTreeMap<String, String> = cell.unwrap();
@@ -83,17 +83,21 @@ fn the_map_has_the_classes_of_the_page() {
                 "" => cell["class"].clone(),
                 period => format!("{}, period {period}", cell["class"]),
             };
-            column.insert(speed.round() as u32, class);
+            let impacts: f64 = cell["impacts_per_period"].parse().unwrap();
+            column.insert(speed.round() as u32, (class, impacts));
         }
     }
     assert_eq!(column.len(), 31);
-    let listed = rows("| omega | n, 1/min | class |");
-    assert_eq!(listed.len(), 5);
+    let listed = rows("| omega | n, 1/min | class | impacts per period |");
+    assert_eq!(listed.len(), 9);
     for row in listed {
         let (omega, speed): (f64, u32) = (row[0].parse().unwrap(), row[1].parse().unwrap());
         assert_eq!((397.887 * omega).round() as u32, speed);
-        assert_eq!(column[&speed], row[2], "at {speed} per minute");
+        let (class, impacts) = &column[&speed];
+        assert_eq!([class.as_str(), &format!("{impacts:.1}")], row[2..], "at {speed} per minute");
     }
-    assert!(column.range(2000..=2300).all(|(_, class)| class == "chaotic"), "{column:?}");
-    assert!(column.range(2500..).all(|(_, class)| class == "periodic, period 1"), "{column:?}");
+    let chaotic: Vec<u32> =
+        column.iter().filter(|(_, (class, _))| class == "chaotic").map(|(speed, _)| *speed).collect();
+    assert_eq!(chaotic, [1600, 2000, 2100, 2200, 2300]);
+    assert!(column.iter().all(|(&speed, &(_, impacts))| (impacts > 0.0) == (speed < 4000)), "{column:?}");
 }

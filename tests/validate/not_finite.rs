@@ -119,7 +119,7 @@ fn the_command_fails_for_a_map_of_states_that_are_not_numbers() {
     let failed = run(&["validate", "o", "--samples", "4", "--quiet"]).code(1).stdout("");
     let message = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
     assert!(message.contains("36 of 36 cells hold numbers that are not finite"), "{message}");
-    assert!(message.contains("cells (0, 0) (1, 0)"), "{message}");
+    assert!(message.contains("all such cells: (0, 0) (1, 0)"), "{message}");
     let written = fs::read(folder.path().join("o/validation.json")).unwrap();
     let found: serde_json::Value = serde_json::from_slice(&written).unwrap();
     assert_eq!(found["not_finite"].as_array().unwrap().len(), 36);
