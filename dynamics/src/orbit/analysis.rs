@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::approach::{BRANCH_CYCLES, HULL_CYCLES, LINEAR_TOLERANCE, stays};
 use super::itinerary::Recorder;
+use super::quantities::{Meter, Quantities};
 use super::reading::Reading;
 use super::recurrence::{Candidate, Metric, candidates};
 use super::{Class, Orbit, Settings, Status};
@@ -78,7 +79,8 @@ pub fn analyse_until(
     halt: &AtomicBool,
 ) -> Result<Option<Orbit>, ModelError> {
     let (flow, allowance) = (Flow::of(model)?, ALLOWANCE.until(halt));
-    let analysis = Analysis { flow: &flow, law: model.law(), settings, event_periods, allowance };
+    let analysis =
+        Analysis { flow: &flow, law: model.law(), settings, event_periods, measures: true, allowance };
     let orbit = analysis.orbit(start);
     Ok((!allowance.is_halted()).then_some(orbit))
 }
@@ -86,7 +88,7 @@ pub fn analyse_until(
 /// Classifies a motion like [`analyse`], with a flow that the caller has computed, and lists the events of the last
 /// `event_periods` of aperiodic motion.
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, event_periods: u32) -> Orbit {
-    Analysis { flow, law, settings, event_periods, allowance: ALLOWANCE }.orbit(start)
+    Analysis { flow, law, settings, event_periods, measures: true, allowance: ALLOWANCE }.orbit(start)
 }
 
 /// Returns the status of a motion that a stop has ended.
@@ -110,6 +112,7 @@ fn failed(status: Status, strobe: State, forcing_period: f64) -> Orbit {
         word: Word::default(),
         impacts_per_period: f64::NAN,
         mesh_fraction: f64::NAN,
+        quantities: None,
         strobe,
         strobe_meshing: None,
         events: Vec::new(),
@@ -134,6 +137,8 @@ pub(super) struct Analysis<'a> {
     pub(super) law: Law,
     pub(super) settings: &'a Settings,
     pub(super) event_periods: u32,
+    /// Whether quantities are measured.
+    pub(super) measures: bool,
     /// Work that the motion may take.
     pub(super) allowance: Allowance<'a>,
 }
@@ -371,12 +376,12 @@ impl Analysis<'_> {
     pub(super) fn read(&self, seed: &Trajectory<'_>, cycle: &Cycle) -> Result<Reading, Stop> {
         let mut trajectory = seed.at(cycle.state, []);
         let first = trajectory.clone();
-        let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
+        let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         let closes = trajectory.is_in_domain_of(&first) || reading.on_strobe;
         // The symbol of the first flight depends on the wall that `seed` came from. If the cycle comes from another
         // wall, a second turn has the right symbol.
         if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
-            reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
+            reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         }
         Ok(Reading { closes, ..reading })
     }
@@ -402,6 +407,7 @@ impl Analysis<'_> {
             word: reading.word.clone(),
             impacts_per_period: reading.impacts_per_period,
             mesh_fraction: reading.mesh_fraction,
+            quantities: reading.quantities,
             strobe: cycle.state,
             strobe_meshing: reading.strobe_meshing,
             events: reading.events.clone(),
@@ -409,6 +415,21 @@ impl Analysis<'_> {
             forcing_period: self.flow.period,
             periods_run: 0,
         }
+    }
+
+    /// Measures the observed periods that follow a trajectory; none if they are not requested or it cannot be
+    /// continued.
+    pub(super) fn quantities(&self, trajectory: &Trajectory<'_>) -> Option<Quantities> {
+        let measure =
+            || Meter::measure(self.flow, &mut trajectory.clone(), self.settings.observed_periods.max(1));
+        self.measures.then(measure)?.ok()
+    }
+
+    /// Measures a period of contact-free motion in its steady response.
+    pub(super) fn steady_quantities(&self, motion: &NonImpacting) -> Option<Quantities> {
+        let steady =
+            || Meter::measure(self.flow, &mut Trajectory::new(self.flow, self.law, motion.steady()), 1);
+        self.measures.then(steady)?.ok()
     }
 
     /// Builds the orbit of aperiodic motion.
@@ -419,7 +440,8 @@ impl Analysis<'_> {
         class: Class,
         status: Status,
     ) -> Result<Orbit, Stop> {
-        let reading = Reading::take(self.flow, &mut trajectory, self.event_periods)?;
+        let quantities = self.quantities(&trajectory);
+        let reading = Reading::take(self.flow, &mut trajectory, self.event_periods, false)?;
         Ok(Orbit {
             class,
             status: if status == Status::Ok && reading.on_strobe { Status::StrobeOnEvent } else { status },
@@ -430,6 +452,7 @@ impl Analysis<'_> {
             word: reading.word,
             impacts_per_period: window.impacts_per_period,
             mesh_fraction: window.mesh_fraction,
+            quantities,
             strobe: reading.strobe,
             strobe_meshing: reading.strobe_meshing,
             events: reading.events,
