@@ -10,6 +10,7 @@ use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
 use crate::map::scene::{Along, Format};
 use crate::map::shard::Shard;
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
+use crate::store::inventory::figure_formats;
 use crate::text::printable::is_printable;
 use crate::text::shell::quoted;
 use crate::validate::DEFAULT_SAMPLES;
@@ -186,7 +187,8 @@ pub(crate) struct Map {
     pub(crate) engine: EngineOptions,
 
     /// Continue an interrupted run of the same scene. Without stored records the map starts from its first cell. A finished
-    /// shard is not computed again
+    /// map is not computed again: its files are written again, in the formats of the scene and those that the folder has,
+    /// and validation.json stays. A finished shard is not computed again
     #[arg(long, conflicts_with = "force")]
     pub(crate) resume: bool,
 
@@ -271,7 +273,8 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
+    /// Replace the files of an earlier run in the folder, of this or another command; files that are not written again are
+    /// removed and named. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
 
@@ -280,7 +283,8 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 
-    /// Formats of figures, instead of those in the scene (outputs.files): png, svg, pdf. Example: --format png,pdf
+    /// Formats of figures, instead of those in the scene (outputs.files): png, svg, pdf. Figures of other formats that the
+    /// folder has are drawn again, too. Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
 
@@ -314,6 +318,15 @@ impl FigureFormat {
         let [png, svg, pdf] = Format::FIGURES;
         let all = [(FigureFormat::Png, png), (FigureFormat::Svg, svg), (FigureFormat::Pdf, pdf)];
         all.into_iter().filter(|(named, _)| formats.contains(named)).map(|(_, format)| format).collect()
+    }
+
+    /// The formats of a command without a scene: the requested ones and those that the command has written into its folder
+    /// before. Without a request, png.
+    pub(crate) fn added(formats: &[FigureFormat], folder: &Path, command: &str) -> Vec<Format> {
+        if formats.is_empty() {
+            return vec![Format::Png];
+        }
+        [FigureFormat::scene(formats), figure_formats(folder, command)].concat()
     }
 }
 
@@ -420,18 +433,12 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Formats of figures: png, svg, pdf. Example: --format png,pdf
-    #[arg(
-        long,
-        value_name = "FORMAT,...",
-        value_enum,
-        value_delimiter = ',',
-        default_value = "png",
-        requires = "out"
-    )]
+    /// Formats of figures: png, svg, pdf [default: png]. Figures of other formats that the folder has are drawn again, too.
+    /// Example: --format png,pdf
+    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', requires = "out")]
     pub(crate) format: Vec<FigureFormat>,
 
-    /// Write even if the folder is not empty
+    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long, requires = "out")]
     pub(crate) force: bool,
 }
@@ -608,8 +615,9 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Formats of the figure: png, svg, pdf. Example: --format png,pdf
-    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', default_value = "png")]
+    /// Formats of the figure: png, svg, pdf [default: png]. Figures of other formats that the folder has are drawn again, too.
+    /// Example: --format png,pdf
+    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
 
     /// Replace the files of an earlier comparison. Without this option the folder must be empty

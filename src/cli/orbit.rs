@@ -51,9 +51,10 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
         let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
-        let formats = FigureFormat::scene(&arguments.format);
+        let formats = FigureFormat::added(&arguments.format, folder.path(), "orbit");
         let files = store::orbit::write(&folder, &*model, &orbit, &request, &formats)?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
+        say::removed(&folder);
     }
     fail_if(failed, "the integration failed; `status` says why")
 }
