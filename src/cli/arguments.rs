@@ -18,7 +18,7 @@ use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use rattlemap_dynamics::model::{REST, State};
-use rattlemap_dynamics::orbit::Settings;
+use rattlemap_dynamics::orbit::{LONGEST_WINDOW, Settings};
 
 /// Version and commit, as `--version` prints them.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("RATTLEMAP_COMMIT"), ")");
@@ -408,12 +408,11 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "X1,V1,X2,V2", allow_hyphen_values = true, value_parser = state)]
     pub(crate) start: Option<StartState>,
 
-    /// Number of forcing periods in the first analysis after the transient, at least 2. It finds cycles of up to N/2
-    /// periods, at most 64. While the class is undecided, the analysis is repeated with twice as many periods, up to
-    /// 32768, or N if that is larger. Example: --periods 256
-    #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
-          value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
-    pub(crate) periods: u32,
+    /// Number of forcing periods to analyse after the transient, at least 2. Cycles of up to N/2 periods, at most 64, are
+    /// found. If the class is not decided then, the motion is undecided [default: 128; while the class is undecided, the
+    /// analysis is repeated with twice as many periods, up to 32768]. Example: --periods 256
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    pub(crate) periods: Option<u32>,
 
     /// Length of the transient, in forcing periods, at least 1. All of it is integrated. Example: --transient 1000
     #[arg(long, value_name = "N", default_value_t = Settings::default().transient_periods,
@@ -478,11 +477,15 @@ impl Orbit {
 
     /// The integration settings. The longest period is half the observed periods, because a cycle must be observed twice.
     pub(crate) fn settings(&self) -> Settings {
-        Settings {
-            transient_periods: self.transient,
-            observed_periods: self.periods,
-            max_period: Settings::default().max_period.min(self.periods / 2),
-        }
+        let Settings { observed_periods, max_period, .. } = Settings::default();
+        let observed_periods = self.periods.unwrap_or(observed_periods);
+        let max_period = max_period.min(observed_periods / 2);
+        Settings { transient_periods: self.transient, observed_periods, max_period }
+    }
+
+    /// Forcing periods of the longest analysis of an undecided motion.
+    pub(crate) fn longest_window(&self) -> u32 {
+        self.periods.unwrap_or(LONGEST_WINDOW)
     }
 }
 
@@ -642,7 +645,7 @@ pub(crate) struct Compare {
 #[command(after_help = "Example:\n  \
     rattlemap check out/e_omega --repair")]
 pub(crate) struct Check {
-    /// Folder of a finished map, diagram or orbit
+    /// Folder of a finished map, diagram, orbit or comparison
     #[arg(value_name = "DIR")]
     pub(crate) folder: PathBuf,
 

@@ -42,8 +42,8 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(stopped);
     let instant =
         arguments.time.map(|time| at(time).map(|state| store::orbit::Instant { time, state })).transpose()?;
-    let (shown, halt) = (orbit::EVENT_PERIODS, interrupt.raised());
-    let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(stopped)?;
+    let (shown, longest, halt) = (orbit::EVENT_PERIODS, arguments.longest_window(), interrupt.raised());
+    let orbit = orbit::analyse_until(&*model, start, &settings, longest, shown, halt)?.ok_or_else(stopped)?;
     print(&match arguments.json {
         true => store::orbit::json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),

@@ -100,7 +100,7 @@ fn measure_within(
     allowance: Allowance<'_>,
 ) -> Measurement {
     let settings = &budget.settings;
-    let analysis = Analysis { flow, law, settings, event_periods: 0, allowance };
+    let analysis = Analysis { flow, law, settings, longest_window: 0, event_periods: 0, allowance };
     let mut run = CellRun {
         analysis: &analysis,
         budget,

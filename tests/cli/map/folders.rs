@@ -100,3 +100,13 @@ fn force_removes_the_files_of_another_command_and_names_them() {
     succeeds(&folder, "orbit --out o --force");
     assert!(folder.path().join("line.toml").exists());
 }
+
+/// The system reports no free space there.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_that_cannot_be_written_is_refused_for_this_reason() {
+    let folder = folder();
+    for line in ["map s.toml --engine cpu --out /proc/x", "map s.toml --engine cpu --out /proc/x --dry-run"] {
+        fails(&folder, line, 2, &["/proc/x: cannot write there (/proc cannot be written)", "another folder"]);
+    }
+}
