@@ -623,7 +623,7 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
 
-    /// Replace the files of an earlier comparison. Without this option the folder must be empty
+    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
 

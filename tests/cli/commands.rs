@@ -399,7 +399,9 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
 
 #[test]
 fn orbit_help_explains_periods_and_transient() {
-    run(&folder(), "orbit --help")
-        .success()
-        .stdout(says(&["up to N/2", "periods, at most 64", "All of it is integrated"]));
+    run(&folder(), "orbit --help").success().stdout(says(&[
+        "up to N/2",
+        "periods, at most 64",
+        "All of it is integrated",
+    ]));
 }
