@@ -20,7 +20,8 @@ mod tests;
 mod trace;
 
 pub use analysis::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, analyse, analyse_flow, analyse_until, status_of,
+    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, analyse, analyse_flow, analyse_until,
+    status_of,
 };
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;

@@ -20,9 +20,8 @@ pub const EVENT_PERIODS: u32 = 8;
 /// Standard errors by which an exponent must exceed zero for chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
 
-/// Forcing periods of the longest window, unless more are requested. An undecided motion is observed in windows that
-/// double in length.
-const LONGEST_WINDOW: u32 = 32_768;
+/// Default number of forcing periods in the longest window. An undecided motion is observed in windows that double in length.
+pub const LONGEST_WINDOW: u32 = 32_768;
 
 /// Logarithm of the growth of a tangent vector that is too large for an escape from an unstable cycle: more than the
 /// ratio of the size of the motion to rounding.
@@ -66,8 +65,8 @@ pub fn analyse(model: &dyn Model, start: State, settings: &Settings) -> Result<O
     Ok(analyse_flow(&Flow::of(model)?, model.law(), start, settings, EVENT_PERIODS))
 }
 
-/// Classifies a motion like [`analyse`], and lists the events of the last `event_periods` of aperiodic motion.
-/// Returns none if `halt` was raised.
+/// Classifies a motion like [`analyse`], with windows of at most `longest_window` forcing periods after the first one, and
+/// lists the events of the last `event_periods` of aperiodic motion. Returns none if `halt` was raised.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -75,12 +74,20 @@ pub fn analyse_until(
     model: &dyn Model,
     start: State,
     settings: &Settings,
+    longest_window: u32,
     event_periods: u32,
     halt: &AtomicBool,
 ) -> Result<Option<Orbit>, ModelError> {
     let (flow, allowance) = (Flow::of(model)?, ALLOWANCE.until(halt));
-    let analysis =
-        Analysis { flow: &flow, law: model.law(), settings, event_periods, measures: true, allowance };
+    let analysis = Analysis {
+        flow: &flow,
+        law: model.law(),
+        settings,
+        longest_window,
+        event_periods,
+        measures: true,
+        allowance,
+    };
     let orbit = analysis.orbit(start);
     Ok((!allowance.is_halted()).then_some(orbit))
 }
@@ -88,7 +95,8 @@ pub fn analyse_until(
 /// Classifies a motion like [`analyse`], with a flow that the caller has computed, and lists the events of the last
 /// `event_periods` of aperiodic motion.
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, event_periods: u32) -> Orbit {
-    Analysis { flow, law, settings, event_periods, measures: true, allowance: ALLOWANCE }.orbit(start)
+    let (longest_window, allowance) = (LONGEST_WINDOW, ALLOWANCE);
+    Analysis { flow, law, settings, longest_window, event_periods, measures: true, allowance }.orbit(start)
 }
 
 /// Returns the status of a motion that a stop has ended.
@@ -136,6 +144,7 @@ pub(super) struct Analysis<'a> {
     pub(super) flow: &'a Flow,
     pub(super) law: Law,
     pub(super) settings: &'a Settings,
+    pub(super) longest_window: u32,
     pub(super) event_periods: u32,
     /// Whether quantities are measured.
     pub(super) measures: bool,
@@ -162,7 +171,7 @@ impl Analysis<'_> {
             return Ok(orbit);
         }
         let mut length = self.settings.observed_periods.max(2);
-        let last = length.max(LONGEST_WINDOW);
+        let last = length.max(self.longest_window);
         loop {
             let window = self.observe(&mut trajectory, length, periods_run)?;
             let found = candidates(&window.strobes, &window.metric, self.settings.max_period);

@@ -105,7 +105,15 @@ fn measure_within(
     allowance: Allowance<'_>,
 ) -> Measurement {
     let settings = &budget.settings;
-    let analysis = Analysis { flow, law, settings, event_periods: 0, measures: budget.quantities, allowance };
+    let analysis = Analysis {
+        flow,
+        law,
+        settings,
+        longest_window: 0,
+        event_periods: 0,
+        measures: budget.quantities,
+        allowance,
+    };
     let mut run = CellRun {
         analysis: &analysis,
         budget,
