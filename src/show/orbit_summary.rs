@@ -4,11 +4,10 @@ use std::fmt::Write;
 
 use crate::show::instant::Instant;
 use crate::show::names;
-use rattlemap_dynamics::model::Model;
+use crate::show::symbols::with_unit;
+use rattlemap_dynamics::model::{Model, Parameter, State};
+use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
-
-/// Number of decimals: one more than in the tables of the paper.
-const DECIMALS: usize = 5;
 
 /// Returns a summary of the orbit of a model in lines of aligned text.
 pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
@@ -25,7 +24,12 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         1 => "1 forcing period".to_owned(),
         periods => format!("{periods} forcing periods"),
     };
-    let _ = writeln!(text, "\nevents over {span} (T = {:.DECIMALS$})", orbit.forcing_period);
+    let units = model.units();
+    let _ = writeln!(
+        text,
+        "\nevents over {span} (T = {})",
+        with_unit(&significant(orbit.forcing_period), units.time.as_deref())
+    );
     text.push_str(&match orbit.strobe_meshing {
         Some(side) if orbit.events.is_empty() => {
             format!("none: always in contact with the {} wall\n", names::side(side))
@@ -71,11 +75,10 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
         };
         add("symmetric", text.to_owned());
     }
-    add("impacts per period", format!("{:.DECIMALS$}", orbit.impacts_per_period));
-    add("fraction meshing", format!("{:.DECIMALS$}", orbit.mesh_fraction));
+    add("impacts per period", significant(orbit.impacts_per_period));
+    add("fraction meshing", significant(orbit.mesh_fraction));
     let names = model.state_names();
-    let strobe = numbers(&orbit.strobe[..names.len()]).trim_start().to_owned();
-    add(&format!("strobe {}", names.join(" ")), strobe);
+    add(&format!("strobe {}", names.join(" ")), state_in_units(model, orbit.strobe));
     facts
 }
 
@@ -86,7 +89,10 @@ pub(crate) fn has_mirror_images(model: &dyn Model) -> bool {
 
 fn parameters(model: &dyn Model) -> String {
     let all = model.parameters().iter().enumerate();
-    all.map(|(i, p)| format!("{}={:?}", p.name, model.value(i))).collect::<Vec<_>>().join(" ")
+    let text = |(i, p): (usize, &Parameter)| {
+        with_unit(&format!("{}={:?}", p.name, model.value(i)), p.unit.as_deref())
+    };
+    all.map(text).collect::<Vec<_>>().join(" ")
 }
 
 fn class(orbit: &Orbit) -> String {
@@ -117,49 +123,66 @@ fn status(status: Status) -> &'static str {
 fn exponent(orbit: &Orbit) -> String {
     match orbit.lyapunov_error {
         _ if orbit.lyapunov.is_nan() => "-".to_owned(),
-        Some(error) => format!("{:.DECIMALS$} +- {error:.DECIMALS$}", orbit.lyapunov),
-        None => format!("{:.DECIMALS$}", orbit.lyapunov),
+        Some(error) => format!("{} +- {}", significant(orbit.lyapunov), significant(error)),
+        None => significant(orbit.lyapunov),
     }
 }
 
 fn complex([re, im]: [f64; 2]) -> String {
-    if im == 0.0 { format!("{re:.DECIMALS$}") } else { format!("{re:.DECIMALS$}{im:+.DECIMALS$}i") }
+    let [sign, size] = if im < 0.0 { ["-", &significant(-im)] } else { ["+", &significant(im)] };
+    if im == 0.0 { significant(re) } else { format!("{}{sign}{size}i", significant(re)) }
 }
 
 fn or_dash(text: String) -> String {
     if text.is_empty() { "-".to_owned() } else { text }
 }
 
-fn numbers(state: &[f64]) -> String {
-    state.iter().map(|x| format!(" {x:>9.DECIMALS$}")).collect()
+/// Formats a state with the units of its components.
+fn state_in_units(model: &dyn Model, state: State) -> String {
+    let units = model.units();
+    let count = model.state_names().len();
+    let values = state[..count].iter().enumerate();
+    let texts = values.map(|(i, x)| with_unit(&significant(*x), units.component(i).as_deref()));
+    texts.collect::<Vec<_>>().join(" ")
 }
 
 fn events(model: &dyn Model, events: &[Event]) -> String {
     if events.is_empty() {
         return "none: the motion does not reach a wall\n".to_owned();
     }
-    let names = model.state_names();
-    let (count, listed) = (names.len(), names.join(", "));
-    let mut text = format!(
-        "{:<11}{:<6} {:>10} {:>10}  {:<width$}   after ({listed})\n",
-        "kind",
-        "side",
-        "t",
-        "t mod T",
-        format!(" before ({listed})"),
-        width = 10 * count
+    let (names, units) = (model.state_names(), model.units());
+    let count = names.len();
+    let components =
+        || names.iter().enumerate().map(|(i, name)| with_unit(name, units.component(i).as_deref()));
+    let time = units.time.as_deref();
+    let mut rows =
+        vec![vec!["kind".to_owned(), "side".to_owned(), with_unit("t", time), with_unit("t mod T", time)]];
+    rows[0].extend(
+        components()
+            .map(|name| format!("{name} before"))
+            .chain(components().map(|name| format!("{name} after"))),
     );
     for event in events {
-        let side = names::side(event.side);
-        let _ = writeln!(
-            text,
-            "{:<11}{side:<6} {:>10.DECIMALS$} {:>10.DECIMALS$}  {}  {}",
-            names::kind(event.kind),
-            event.t,
-            event.t_mod_period,
-            numbers(&event.before[..count]),
-            numbers(&event.after[..count])
+        let numbers = [event.t, event.t_mod_period].into_iter();
+        let numbers = numbers.chain(event.before[..count].iter().chain(&event.after[..count]).copied());
+        let head = [names::kind(event.kind), names::side(event.side)].map(str::to_owned);
+        rows.push(head.into_iter().chain(numbers.map(significant)).collect());
+    }
+    aligned(&rows)
+}
+
+/// Aligns a table: the first two columns, which are texts, at the left, numbers at the right.
+fn aligned(rows: &[Vec<String>]) -> String {
+    let columns = rows.first().map_or(0, Vec::len);
+    let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or_default();
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for row in rows {
+        let cells = row.iter().zip(&widths).enumerate();
+        let cells = cells.map(
+            |(i, (cell, &width))| if i < 2 { format!("{cell:<width$}") } else { format!("{cell:>width$}") },
         );
+        let _ = writeln!(text, "{}", cells.collect::<Vec<_>>().join("  ").trim_end());
     }
     text
 }

@@ -50,7 +50,7 @@ fn wrong_values_in_a_scene_are_refused_with_their_place() {
 fn scene_for_another_command_is_refused() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/e_omega.toml");
     let run = rattlemap(&folder()).args(["bifurcation", scene]).assert();
-    run.code(2).stderr(says(&["e_omega.toml:17:1", "`axis = 2 tables`", "needs 1 axis"]));
+    run.code(2).stderr(says(&["e_omega.toml:17:1", "`axis = 2 tables`", "one table for `bifurcation`"]));
 }
 
 #[test]
