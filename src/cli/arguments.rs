@@ -27,7 +27,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("RATTLEMAP_C
 /// Between contacts the motion follows the exact solution, and every contact is located to rounding error. Each motion is
 /// described by its class, period, word (the sequence of its flights) and Lyapunov exponent.
 ///
-/// All quantities are dimensionless.
+/// Quantities have the units of the model; those of the gear pair are dimensionless.
 ///
 /// Exit codes: 0 done; 1 the run or a validation failed; 2 wrong usage or scene, nothing was computed; 130 interrupted by
 /// Ctrl-C; 143 by SIGTERM.

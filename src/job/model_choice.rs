@@ -39,14 +39,13 @@ pub fn find(name: &str) -> Result<FileModel, JobError> {
 /// [`JobError::Usage`] if the numbers differ.
 pub fn check_components(model: &dyn Model, count: usize) -> Result<(), JobError> {
     let names = model.state_names();
+    let number = if names.len() == 2 { "two" } else { "four" };
     match count == names.len() {
         true => Ok(()),
         false => Err(JobError::Usage(format!(
-            "--start: the state of {} is {}, which are {} numbers, and {count} were given; give one number for each, or \
-             choose another model with --model",
-            model.name(),
+            "--start: it must be {number} finite numbers, the model's {}; {count} were given, and the model is {}",
             names.join(", "),
-            names.len()
+            model.name()
         ))),
     }
 }

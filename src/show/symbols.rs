@@ -69,7 +69,25 @@ pub(crate) fn lowered(sign: char) -> Option<char> {
 
 #[cfg(test)]
 mod tests {
+    use super::{axis_label, equation};
+    use crate::model_file::FileModel;
     use crate::show::symbols::symbol;
+    use rattlemap_dynamics::model::Model;
+
+    #[test]
+    fn labels_and_equations_have_units() {
+        let text = FileModel::built_in("bilinear").unwrap().definition().text.clone();
+        let with =
+            text.replace("meaning = \"excitation frequency\"", "unit = \"rad/s\", meaning = \"frequency\"");
+        let model = FileModel::parse(&with, "m.toml").unwrap();
+        let [omega, zeta] = ["omega", "zeta"].map(|name| &model.parameters()[model.index(name).unwrap()]);
+        assert_eq!(axis_label(omega), "frequency, \u{3c9} [rad/s]");
+        assert_eq!(equation(omega, 1.5), "\u{3c9} = 1.5 rad/s");
+        assert_eq!(
+            (axis_label(zeta), equation(zeta, 0.1)),
+            ("damping ratio, \u{3b6}".into(), "\u{3b6} = 0.1".into())
+        );
+    }
 
     #[test]
     #[rustfmt::skip]
