@@ -9,6 +9,11 @@ use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
 
+/// Largest number of events in the table, and number of events before those that are left out. The summary above the table
+/// stays on the screen.
+const MOST_ROWS: usize = 24;
+const FIRST_ROWS: usize = 16;
+
 /// Returns a summary of the orbit of a model in lines of aligned text.
 pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
     let mut text = String::new();
@@ -52,15 +57,26 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let mut add = |label: &str, value: String| facts.push((label.to_owned(), value));
     add("parameters", parameters(model));
     add("class", class(orbit));
-    add("status", status(orbit.status).to_owned());
+    let text = match orbit.class {
+        Class::Undecided if orbit.status == Status::Slow => "slow: more periods may decide the class",
+        _ => status(orbit.status),
+    };
+    add("status", text.to_owned());
     if orbit.class == Class::Failed {
         return facts;
     }
-    add("word, in time", or_dash(orbit.word.time_order()));
-    add("word, as printed", or_dash(orbit.word.paper_notation()));
-    let pattern = orbit.word.pattern();
-    if pattern != orbit.word {
-        add("pattern", pattern.time_order());
+    match (orbit.class, orbit.strobe_meshing) {
+        (Class::Periodic { .. }, _) if !orbit.events.is_empty() => {
+            add("word, in time", orbit.word.time_order());
+            add("word, as printed", orbit.word.paper_notation());
+            let pattern = orbit.word.pattern();
+            if pattern != orbit.word {
+                add("pattern", pattern.time_order());
+            }
+        }
+        (Class::Periodic { .. }, None) => add("word", "none: no contact".to_owned()),
+        (Class::Periodic { .. }, Some(_)) => add("word", "none: always in contact".to_owned()),
+        _ => add("word", "none: the motion is not periodic".to_owned()),
     }
     add("Lyapunov exponent", exponent(orbit));
     if let Some(multipliers) = &orbit.floquet {
@@ -98,6 +114,9 @@ fn parameters(model: &dyn Model) -> String {
 fn class(orbit: &Orbit) -> String {
     match orbit.class {
         Class::Periodic { period } => format!("periodic, period {period}"),
+        Class::Undecided => {
+            format!("undecided: neither periodic nor chaotic within {} forcing periods", orbit.periods_run)
+        }
         other => other.name().to_owned(),
     }
 }
@@ -123,7 +142,10 @@ fn status(status: Status) -> &'static str {
 fn exponent(orbit: &Orbit) -> String {
     match orbit.lyapunov_error {
         _ if orbit.lyapunov.is_nan() => "-".to_owned(),
-        Some(error) => format!("{} +- {}", significant(orbit.lyapunov), significant(error)),
+        Some(error) if error.is_finite() => {
+            format!("{} +- {}", significant(orbit.lyapunov), significant(error))
+        }
+        Some(_) => format!("{}, with unknown error", significant(orbit.lyapunov)),
         None => significant(orbit.lyapunov),
     }
 }
@@ -133,14 +155,9 @@ fn complex([re, im]: [f64; 2]) -> String {
     if im == 0.0 { significant(re) } else { format!("{}{sign}{size}i", significant(re)) }
 }
 
-fn or_dash(text: String) -> String {
-    if text.is_empty() { "-".to_owned() } else { text }
-}
-
 /// Formats a state with the units of its components.
 fn state_in_units(model: &dyn Model, state: State) -> String {
-    let units = model.units();
-    let count = model.state_names().len();
+    let (units, count) = (model.units(), model.state_names().len());
     let values = state[..count].iter().enumerate();
     let texts = values.map(|(i, x)| with_unit(&significant(*x), units.component(i).as_deref()));
     texts.collect::<Vec<_>>().join(" ")
@@ -151,38 +168,40 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
         return "none: the motion does not reach a wall\n".to_owned();
     }
     let (names, units) = (model.state_names(), model.units());
-    let count = names.len();
-    let components =
-        || names.iter().enumerate().map(|(i, name)| with_unit(name, units.component(i).as_deref()));
-    let time = units.time.as_deref();
-    let mut rows =
-        vec![vec!["kind".to_owned(), "side".to_owned(), with_unit("t", time), with_unit("t mod T", time)]];
-    rows[0].extend(
-        components()
-            .map(|name| format!("{name} before"))
-            .chain(components().map(|name| format!("{name} after"))),
-    );
-    for event in events {
+    let (count, time) = (names.len(), units.time.as_deref());
+    let components = |moment: &str| {
+        let names = names.iter().enumerate();
+        names.map(|(i, name)| with_unit(name, units.component(i).as_deref()) + moment).collect::<Vec<_>>()
+    };
+    let head = ["kind".to_owned(), "side".to_owned(), with_unit("t", time), with_unit("t mod T", time)];
+    let head = head.into_iter().chain(components(" before")).chain(components(" after")).collect();
+    let row = |event: &Event| -> Vec<String> {
         let numbers = [event.t, event.t_mod_period].into_iter();
         let numbers = numbers.chain(event.before[..count].iter().chain(&event.after[..count]).copied());
         let head = [names::kind(event.kind), names::side(event.side)].map(str::to_owned);
-        rows.push(head.into_iter().chain(numbers.map(significant)).collect());
+        head.into_iter().chain(numbers.map(significant)).collect()
+    };
+    let hidden = events.len().saturating_sub(MOST_ROWS);
+    let first = if hidden > 0 { FIRST_ROWS } else { events.len() };
+    let shown = events[..first].iter().chain(&events[first + hidden..]);
+    let mut lines = aligned(&[head].into_iter().chain(shown.map(row)).collect::<Vec<_>>());
+    if hidden > 0 {
+        lines.insert(1 + first, format!("... {hidden} more events; --json and --out list all of them"));
     }
-    aligned(&rows)
+    lines.join("\n") + "\n"
 }
 
-/// Aligns a table: the first two columns, which are texts, at the left, numbers at the right.
-fn aligned(rows: &[Vec<String>]) -> String {
+/// Returns the lines of a table. The first two columns, which are texts, are aligned at the left, numbers at the right.
+fn aligned(rows: &[Vec<String>]) -> Vec<String> {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or_default();
     let widths: Vec<usize> = (0..columns).map(width).collect();
-    let mut text = String::new();
-    for row in rows {
-        let cells = row.iter().zip(&widths).enumerate();
-        let cells = cells.map(
-            |(i, (cell, &width))| if i < 2 { format!("{cell:<width$}") } else { format!("{cell:>width$}") },
-        );
-        let _ = writeln!(text, "{}", cells.collect::<Vec<_>>().join("  ").trim_end());
-    }
-    text
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| match i < 2 {
+            true => format!("{cell:<width$}"),
+            false => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect()
 }
