@@ -7,6 +7,7 @@ use rattlemap_dynamics::orbit::Status;
 use rattlemap_dynamics::word::Word;
 
 use crate::model_file::{FileModel, Wall, WallLaw, factor, gap_names};
+use crate::show::symbols::with_unit;
 
 /// Returns the name and a summary of every built-in model.
 pub fn list() -> Vec<(String, String)> {
@@ -37,11 +38,10 @@ pub fn page(model: &FileModel) -> String {
         }
     }
     let _ = writeln!(text, "\nParameters\n");
-    let lengths =
-        model.parameters().iter().map(|p| p.unit.as_ref().map_or(0, |unit| unit.chars().count() + 2));
-    let width = lengths.max().unwrap_or(0).max(4);
-    let has_units = model.parameters().iter().any(|parameter| parameter.unit.is_some());
-    let unit = |text: &str| if has_units { format!("{text:<width$}") } else { String::new() };
+    let units = model.parameters().iter().filter_map(|parameter| parameter.unit.as_ref());
+    // Without units there is no such column.
+    let width = units.map(|unit| unit.chars().count().max("unit".len()) + 2).max().unwrap_or(0);
+    let unit = |text: &str| format!("{:<width$}", if width > 0 { text } else { "" });
     text += &format!("    {:<11} {:<9} {}{:<25} {}\n", "symbol", "default", unit("unit"), "range", "meaning");
     for parameter in model.parameters() {
         text += &line(parameter, &unit(parameter.unit.as_deref().unwrap_or_default()));
@@ -128,9 +128,7 @@ fn words([right, left]: [bool; 2]) -> String {
 fn components(model: &FileModel) -> Vec<String> {
     let units = model.units();
     let names = model.state_names().into_iter().enumerate();
-    names
-        .map(|(i, name)| units.component(i).map_or(name.to_owned(), |unit| format!("{name} [{unit}]")))
-        .collect()
+    names.map(|(i, name)| with_unit(name, units.component(i).as_deref())).collect()
 }
 
 fn line(parameter: &Parameter, unit: &str) -> String {

@@ -223,6 +223,15 @@ fn common_names_are_free_and_the_gap_gets_another_name() {
 }
 
 #[test]
+fn reserved_names_are_documented() {
+    let page = include_str!("../../docs/models.md");
+    let (_, section) = page.split_once("## Names\n").unwrap();
+    let (section, _) = section.split_once("\n## ").unwrap();
+    let listed = section.lines().filter(|line| line.starts_with("    ")).flat_map(str::split_whitespace);
+    assert_eq!(listed.collect::<Vec<_>>(), parameters::COLUMNS);
+}
+
+#[test]
 fn velocities_and_the_gap_have_the_units_of_coordinates_and_time() {
     let units = |of_coordinates: &str, gap: &str| {
         let with = TWO_DEGREES.replace("[motion]", &format!("[motion]\n{of_coordinates}"));
