@@ -77,7 +77,7 @@ def map(  # noqa: A001
         Two axes in order. Each is a tuple ``(min, max, count)`` with both ends included, or an array of increasing values.
         Arrays are used exactly; those of ``np.linspace`` differ from tuples in the last digits. Also values of single
         parameters, components of the start, and settings of ``[integration]`` such as ``max_period=32``. An axis of a component
-        of the start (``v1=(-2, 2, 64)``) makes a map of basins. All quantities are dimensionless.
+        of the start (``v1=(-2, 2, 64)``) makes a map of basins. Quantities have the units of the model.
 
     Returns
     -------

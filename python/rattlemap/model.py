@@ -13,7 +13,7 @@ from .toml import assignments
 class Model:
     """An oscillator with walls, and values of its parameters. It is immutable: :meth:`replace` returns another model.
 
-    :func:`gear_pair` and :func:`load_model` return it. All quantities are dimensionless.
+    :func:`gear_pair` and :func:`load_model` return it. Quantities have the units of the model.
     """
 
     __slots__ = ("_model",)

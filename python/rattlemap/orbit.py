@@ -22,8 +22,8 @@ _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
 class Orbit:
     """A motion after its transient: its class, its cycle and every event. :func:`orbit` returns it.
 
-    A periodic motion is described over one cycle, any other over its last 8 forcing periods. All quantities are
-    dimensionless.
+    A periodic motion is described over one cycle, any other over its last 8 forcing periods. Quantities have
+    the units of the model, :attr:`units`.
     """
 
     def __init__(self, model: Model, transient: int, periods: int, start: list[float] | None) -> None:
@@ -51,6 +51,11 @@ class Orbit:
     def parameters(self) -> dict[str, float]:
         """The value of every parameter."""
         return dict(self._facts["parameters"])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units by name: parameters, components of the state, the gap and the time ``t``. Empty if the model has none."""
+        return dict(self._facts.get("units", {}))
 
     @property
     def period(self) -> int | None:

@@ -110,8 +110,10 @@ impl Model {
     fn meanings(&self) -> Vec<(String, String, String, Option<f64>)> {
         let parameters = self.model.parameters().iter();
         let meanings = parameters.map(|parameter| {
+            let unit = parameter.unit.as_ref().map_or(String::new(), |unit| format!(" [{unit}]"));
+            let meaning = format!("{}{unit}", parameter.meaning);
             let range = parameter.range.requirement().into_owned();
-            (parameter.name.to_string(), parameter.meaning.to_string(), range, parameter.default)
+            (parameter.name.to_string(), meaning, range, parameter.default)
         });
         meanings.collect()
     }

@@ -14,7 +14,7 @@ use crate::store::inventory::figure_formats;
 use crate::text::printable::is_printable;
 use crate::text::shell::quoted;
 use crate::validate::DEFAULT_SAMPLES;
-use clap::error::ContextValue;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use rattlemap_dynamics::model::{REST, State};
@@ -28,7 +28,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("RATTLEMAP_C
 /// Between contacts the motion follows the exact solution, and every contact is located to rounding error. Each motion is
 /// described by its class, period, word (the sequence of its flights) and Lyapunov exponent.
 ///
-/// All quantities are dimensionless.
+/// Quantities have the units of the model; those of the gear pair are dimensionless.
 ///
 /// Exit codes: 0 done; 1 the run or a validation failed; 2 wrong usage or scene, nothing was computed; 130 interrupted by
 /// Ctrl-C; 143 by SIGTERM.
@@ -58,6 +58,7 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
 pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
     P::try_parse_from(arguments).map_err(|mut error| {
         if error.use_stderr() {
+            advise_set(&mut error);
             quote(&mut error);
             // Colours are removed, because a quoted argument could contain some.
             say::notes(error.render().to_string().trim_end());
@@ -67,6 +68,25 @@ pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsStrin
         }
         error.exit_code() as u8
     })
+}
+
+/// Adds advice to the error for an argument `NAME=VALUE` without `--set`.
+fn advise_set(error: &mut clap::Error) {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        Some(ContextValue::StyledStr(text)) => Some(text.to_string()),
+        _ => None,
+    };
+    let (argument, usage) = (text(ContextKind::InvalidArg), text(ContextKind::Usage));
+    let sets = ["map", "bifurcation", "orbit"].map(|command| format!("rattlemap {command} "));
+    let takes_sets = usage.is_some_and(|usage| sets.iter().any(|command| usage.contains(command)));
+    let is_assignment = |argument: &String| !argument.starts_with('-') && argument.contains('=');
+    if let (ErrorKind::UnknownArgument, Some(argument), true) =
+        (error.kind(), argument.filter(is_assignment), takes_sets)
+    {
+        let advice = format!("a parameter is set by an option: --set {argument}");
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
+    }
 }
 
 /// Escapes arguments that an error quotes.
@@ -456,7 +476,8 @@ fn state(text: &str) -> Result<StartState, String> {
         Some(&[x, v]) => Ok(StartState { state: [x, v, 0.0, 0.0], count: 2 }),
         Some(&[x1, v1, x2, v2]) => Ok(StartState { state: [x1, v1, x2, v2], count: 4 }),
         _ => Err(
-            "it must be four finite numbers, such as 0.1,0,-0.2,1.5, or two for a model of one coordinate"
+            "it must be finite numbers: two, such as 0.1,0, for a model of one coordinate; four, such as \
+             0.1,0,-0.2,1.5, for a model of two"
                 .to_owned(),
         ),
     }

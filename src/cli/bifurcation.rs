@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::Class;
 
 use super::arguments::{Bifurcation, FigureFormat};
@@ -103,8 +104,8 @@ fn described(found: &Hysteresis, name: &str) -> String {
 
 fn listed(ranges: &[[f64; 2]]) -> String {
     let range = |[first, last]: &[f64; 2]| match first == last {
-        true => format!("{first:?}"),
-        false => format!("{first:?} to {last:?}"),
+        true => significant(*first),
+        false => format!("{} to {}", significant(*first), significant(*last)),
     };
     let mut list: Vec<String> = ranges.iter().take(LISTED_RANGES).map(range).collect();
     if ranges.len() > LISTED_RANGES {

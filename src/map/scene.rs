@@ -63,6 +63,15 @@ impl Purpose {
             Purpose::Bifurcation => ("bifurcation", 1),
         }
     }
+
+    /// Returns a scene of this program for the purpose, as an example in messages.
+    #[cfg(feature = "job")]
+    pub(crate) fn example(self) -> &'static str {
+        match self {
+            Purpose::Map => "scenes/e_omega.toml",
+            Purpose::Bifurcation => "scenes/paper_fig5.toml",
+        }
+    }
 }
 
 /// A scene without errors.
@@ -132,6 +141,7 @@ impl Scene {
         along: Option<&Along>,
         find: FindFile<'_>,
     ) -> Result<Scene, SceneError> {
+        refuse_model(&document)?;
         for set in sets {
             overrides::apply(&mut document, set)?;
         }
@@ -278,13 +288,13 @@ impl Scene {
         self.points.derived().rules().iter().map(|rule| (rule.parameter(), rule.text()))
     }
 
-    /// Returns names and values of the parameters that are neither swept nor derived.
-    pub fn fixed(&self) -> impl Iterator<Item = (&str, f64)> {
+    /// Returns the parameters that are neither swept nor derived, with their values.
+    pub fn fixed(&self) -> impl Iterator<Item = (&Parameter, f64)> {
         let base = self.base();
         let all = base.parameters().iter().enumerate();
         let is_swept = |index| self.points.targets().any(|target| target == Target::Parameter(index));
         let fixed = all.filter(move |&(index, _)| !is_swept(index) && !self.points.derived().has(index));
-        fixed.map(|(index, parameter)| (&*parameter.name, base.value(index)))
+        fixed.map(|(index, parameter)| (parameter, base.value(index)))
     }
 
     /// Returns how long each cell is integrated.
@@ -372,6 +382,17 @@ pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>,
         }
     })?;
     Ok(cell)
+}
+
+/// Refuses the text of a model.
+fn refuse_model(document: &Node) -> Result<(), SceneError> {
+    let motion = Section::open_any(document, "").and_then(|root| root.get("motion"));
+    motion.map_or(Ok(()), |motion| {
+        Err(motion.misplaced(
+            "this file is a model, but a scene is needed: write one with model = \"FILE\" and [[axis]] tables; \
+             `rattlemap models FILE` describes the model, `rattlemap orbit --model FILE` computes one motion",
+        ))
+    })
 }
 
 fn default_title(model: &dyn Model, points: &Points) -> String {

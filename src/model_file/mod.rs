@@ -16,7 +16,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter};
+use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter, Units};
 
 pub use builtin::{BUILT_IN, DEFAULT};
 pub use contact::{Wall, WallLaw, WallSpring};
@@ -64,11 +64,22 @@ impl FileModel {
 
     /// Writes the equations of motion as lines: free motion, then contact with each wall.
     pub fn equations(&self) -> Vec<String> {
-        equations::lines(&self.definition)
+        equations::lines(&self.definition, gap_names(self))
     }
 
     fn new(definition: Definition) -> FileModel {
         FileModel { values: definition.defaults.clone(), definition: Arc::new(definition) }
+    }
+}
+
+/// Returns the names of the gap and its velocity in texts and tables: `z` and `w`, or `gap` and `gap_rate` if the model
+/// has a parameter, a coordinate or a velocity called `z` or `w`.
+pub fn gap_names(model: &dyn Model) -> [&'static str; 2] {
+    let states = model.state_names();
+    let parameters = model.parameters().iter().map(|parameter| &*parameter.name);
+    match parameters.chain(states).any(|name| ["z", "w"].contains(&name)) {
+        true => ["gap", "gap_rate"],
+        false => ["z", "w"],
     }
 }
 
@@ -121,6 +132,10 @@ impl Model for FileModel {
 
     fn state_names(&self) -> Vec<&str> {
         self.definition.motion.state_names().collect()
+    }
+
+    fn units(&self) -> Units {
+        self.definition.motion.units.clone()
     }
 
     fn bodies(&self) -> Vec<&str> {

@@ -1,17 +1,18 @@
 //! `[motion]`: coordinates, matrices, forcing and the gap.
 
 use super::entry::Names;
-use super::parameters::check_name;
+use super::parameters::{check_name, read_unit};
 use crate::text::document::Value;
 use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
+use rattlemap_dynamics::model::Units;
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
-const MOTION_KEYS: [&str; 10] = [
+const MOTION_KEYS: [&str; 13] = [
     "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "load", "frequency",
-    "gap",
+    "gap", "units", "gap_unit", "time_unit",
 ];
 
 /// Limits of all models, for messages.
@@ -43,6 +44,8 @@ pub struct Motion {
     pub frequency: Expression,
     /// Gap row: the gap is `gap . x`.
     pub gap: Vec<Expression>,
+    /// Units of coordinates, gap and time.
+    pub units: Units,
 }
 
 impl Motion {
@@ -88,11 +91,13 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         None if count == 1 => vec!["v".to_owned()],
         None => vec!["v1".to_owned(), "v2".to_owned()],
     };
-    let all: Vec<&String> = coordinates.iter().chain(&velocities).collect();
-    for (i, name) in all.iter().enumerate() {
-        if names.0.contains(&name.as_str()) || all[..i].contains(name) {
+    let pairs = coordinates.iter().zip(&velocities);
+    let states: Vec<&str> = pairs.flat_map(|(x, v)| [x.as_str(), v.as_str()]).collect();
+    for (i, name) in states.iter().enumerate() {
+        if names.parameters.contains(name) || states[..i].contains(name) {
             return Err(field.conflict(format!(
-                "`{name}` is already the name of a parameter, a coordinate or a velocity; rename one of them"
+                "`{name}` is already the name of a parameter, a coordinate or a velocity; rename one of them (`motion.velocities` names the \
+                 velocities)"
             )));
         }
     }
@@ -106,20 +111,45 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         }
         None => coordinates.clone(),
     };
+    let names = Names { states: &states, ..names };
     let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
     let gap = section.require("gap", "write the gap row, such as gap = [\"1\"]: z = gap . x")?;
+    let gap = names.vector(&gap, count, "one gap row")?;
     Ok(Motion {
+        units: read_units(&section, &gap)?,
         mass: names.matrix(&mass, count)?,
         damping: names.matrix_or_zeros(&section, "damping", count)?,
         stiffness: names.matrix_or_zeros(&section, "stiffness", count)?,
         force: names.vector_or_zeros(&section, "force", count)?,
         load: names.vector_or_zeros(&section, "load", count)?,
         frequency: read_frequency(&section, names)?,
-        gap: names.vector(&gap, count, "one gap row")?,
+        gap,
         coordinates,
         velocities,
         bodies,
     })
+}
+
+/// Reads the units. The gap has the unit of the coordinates in its row, if they have the same one and plain numbers as
+/// factors, unless the file gives another.
+fn read_units(section: &Section<'_>, gap: &[Expression]) -> Result<Units, SceneError> {
+    let each = "a list of units, one for each coordinate, such as [\"mm\"]";
+    let coordinates = match section.get("units") {
+        Some(field) => {
+            let items = field.list(each)?;
+            if items.len() != gap.len() {
+                return Err(field.out_of_range(each));
+            }
+            items.iter().map(|item| read_unit(item).map(Some)).collect::<Result<_, _>>()?
+        }
+        None => vec![None; gap.len()],
+    };
+    let unit = |key| section.get(key).map(|field| read_unit(&field)).transpose();
+    let (given, time) = (unit("gap_unit")?, unit("time_unit")?);
+    let used = gap.iter().zip(&coordinates).filter(|(entry, _)| entry.as_number() != Some(0.0));
+    let mut used = used.map(|(entry, unit)| entry.as_number().and(unit.clone()));
+    let common = used.next().flatten().filter(|first| used.all(|unit| unit.as_ref() == Some(first)));
+    Ok(Units { coordinates, gap: given.or(common), time })
 }
 
 fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {

@@ -22,7 +22,7 @@ fn parameters_and(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool, deri
     };
     let of_rank = |wanted| fixed.iter().filter(move |fixed| rank(fixed) == Some(wanted));
     let listed: Vec<String> =
-        (0..3).flat_map(of_rank).map(|(parameter, value, _)| equation(&parameter.name, *value)).collect();
+        (0..3).flat_map(of_rank).map(|(parameter, value, _)| equation(parameter, *value)).collect();
     let is_all = listed.len() == fixed.len();
     let listed = [listed, derived].concat();
     let rest = match (listed.is_empty(), is_all) {
@@ -35,13 +35,13 @@ fn parameters_and(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool, deri
 
 /// Describes the oscillators of a scene by their fixed and derived parameters.
 pub fn of_scene(scene: &Scene) -> String {
-    let is_fixed = |parameter: &Parameter| scene.fixed().any(|(name, _)| name == parameter.name);
+    let is_fixed = |parameter: &Parameter| scene.fixed().any(|(fixed, _)| fixed.name == parameter.name);
     parameters_and(scene.base(), |parameter| !is_fixed(parameter), derived(scene).collect())
 }
 
 /// Returns all fixed and derived parameters of a scene.
 pub(crate) fn all_fixed(scene: &Scene) -> String {
-    let fixed = scene.fixed().map(|(name, value)| equation(name, value));
+    let fixed = scene.fixed().map(|(parameter, value)| equation(parameter, value));
     fixed.chain(derived(scene)).collect::<Vec<_>>().join(", ")
 }
 

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::show::instant::Instant;
 use crate::show::names;
-use crate::show::parameters::Parameters;
+use crate::show::parameters::{self, Parameters};
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{Event, Orbit};
 
@@ -45,6 +45,7 @@ pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         "events": orbit.events.iter().map(event).collect::<Vec<Value>>(),
     });
     object.extend(properties.as_object().cloned().into_iter().flatten());
+    object.extend(parameters::units(model).map(|units| ("units".to_owned(), json!(units))));
     if let Some(Instant { time, state }) = instant {
         object.insert("time".to_owned(), time.into());
         object.insert("state".to_owned(), json!(components(state)));

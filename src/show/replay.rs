@@ -3,7 +3,7 @@
 use crate::map::scene::{Scene, Start};
 use crate::model_file::{DEFAULT, FileModel};
 use crate::show::cells::Cells;
-use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::orbit::Settings;
 
 /// Name of the copy of the model's file in the folder of a map whose model is not built in.
@@ -17,9 +17,8 @@ pub(crate) fn arguments(scene: &Scene) -> String {
     if let Some(model) = base.downcast_ref::<FileModel>().and_then(model) {
         words.push(format!(" --model {model}"));
     }
-    for (name, value) in scene.fixed() {
-        let parameter = base.parameters().iter().find(|parameter| parameter.name == name);
-        if parameter.is_some_and(|parameter| parameter.default != Some(value)) {
+    for (Parameter { name, default, .. }, value) in scene.fixed() {
+        if *default != Some(value) {
             words.push(format!(" --set {name}={value:?}"));
         }
     }

@@ -202,6 +202,7 @@ fn axis(axis: &Axis) -> Value {
         "parameter": parameter.name,
         "symbol": symbol(&parameter.name),
         "meaning": parameter.meaning,
+        "unit": parameter.unit,
         "min": axis.min(),
         "max": axis.max(),
         "count": axis.count(),

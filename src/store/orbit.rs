@@ -85,7 +85,7 @@ pub fn write(
         write_trajectory(folder, model, orbit)?;
         files.push(TRAJECTORY);
         if let Some(spectrum) = Spectrum::of(model, orbit)? {
-            folder.replace(SPECTRUM, |out| orbit_tables::write_spectrum(out, &spectrum))?;
+            folder.replace(SPECTRUM, |out| orbit_tables::write_spectrum(out, model, &spectrum))?;
             files.push(SPECTRUM);
             for (format, name) in SPECTRUM_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {
                 folder.replace(name, |out| spectrum::write(out, *format, model, orbit, &spectrum))?;
@@ -118,7 +118,7 @@ pub fn write(
 fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<(), OutputError> {
     let samples = TABLED.div_ceil(orbit.cycle_periods.max(1) as usize).max(LEAST_TABLED);
     let moments = moments(model, orbit, samples)?;
-    folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, &model.state_names(), &moments))
+    folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, model, &moments))
 }
 
 /// Samples the motion over the periods of the orbit's events, and adds every event.

@@ -73,7 +73,7 @@ fn a_line_through_a_plane_equals_a_scene_of_one_axis() {
     fs::write(folder.path().join("line.toml"), line).unwrap();
     run(&folder, "bifurcation plane.toml")
         .code(2)
-        .stderr(says(&["needs 1 axis", "--along e --at omega=VALUE"]));
+        .stderr(says(&["one table for `bifurcation`", "--along e --at omega=VALUE"]));
     run(&folder, "bifurcation plane.toml --along e")
         .code(2)
         .stderr(says(&["--along e: `--at omega=VALUE` is missing"]));

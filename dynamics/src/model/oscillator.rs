@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::Side;
+use crate::number::significant;
 
 /// Rounding error that checks of a matrix allow, relative to its entries.
 const MATRIX_TOLERANCE: f64 = 1e-12;
@@ -11,7 +12,7 @@ const MATRIX_TOLERANCE: f64 = 1e-12;
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum OscillatorError {
     /// A number that is out of its range.
-    #[error("{quantity} = {value}: it must be {requirement}")]
+    #[error("{quantity} = {}: it must be {requirement}", significant(*.value))]
     OutOfRange {
         /// The quantity.
         quantity: String,
@@ -21,13 +22,13 @@ pub enum OscillatorError {
         requirement: &'static str,
     },
     /// Walls that leave no room between them.
-    #[error("walls at {} and {}: the right one must lie above the left one", .walls[0], .walls[1])]
+    #[error("walls at {} and {}: the right one must lie above the left one", significant(.walls[0]), significant(.walls[1]))]
     Walls {
         /// Positions of the right and the left wall.
         walls: [f64; 2],
     },
     /// A mass, damping or stiffness matrix that is not symmetric.
-    #[error("{quantity} = {matrix:?}: the matrix must be symmetric")]
+    #[error("{quantity} = {}: the matrix must be symmetric", written(.matrix))]
     NotSymmetric {
         /// Name of the matrix.
         quantity: String,
@@ -36,7 +37,8 @@ pub enum OscillatorError {
     },
     /// A matrix behind an elastic wall that differs from that of free motion by more than `c g g^T`.
     #[error(
-        "{quantity} = {matrix:?}: behind an elastic wall it must be that of free motion and a part along the gap row"
+        "{quantity} = {}: behind an elastic wall it must be that of free motion and a part along the gap row",
+        written(.matrix)
     )]
     NotAlongGap {
         /// Name of the matrix.
@@ -45,19 +47,25 @@ pub enum OscillatorError {
         matrix: [[f64; 2]; 2],
     },
     /// A mass matrix that is not positive definite.
-    #[error("mass = {matrix:?}: the matrix must be positive definite")]
+    #[error("mass = {}: the matrix must be positive definite", written(.matrix))]
     NotDefinite {
         /// The matrix.
         matrix: [[f64; 2]; 2],
     },
     /// A damping or stiffness matrix that is not positive semidefinite.
-    #[error("{quantity} = {matrix:?}: the matrix must be positive semidefinite")]
+    #[error("{quantity} = {}: the matrix must be positive semidefinite", written(.matrix))]
     NotSemidefinite {
         /// Name of the matrix.
         quantity: String,
         /// The matrix.
         matrix: [[f64; 2]; 2],
     },
+}
+
+/// Writes a matrix for a message.
+fn written(matrix: &[[f64; 2]; 2]) -> String {
+    let row = |row: &[f64; 2]| format!("[{}, {}]", significant(row[0]), significant(row[1]));
+    format!("[{}, {}]", row(&matrix[0]), row(&matrix[1]))
 }
 
 /// One linear domain: `M x'' + damping x' + stiffness x = force cos(omega t) + load`.
@@ -178,7 +186,8 @@ impl Oscillator {
         require(is_known, || "degrees of freedom".to_owned(), self.degrees as f64, "1 or 2")?;
         let [[m1, m], [other, m2]] = self.mass;
         for (i, mass) in [m1, m2].into_iter().enumerate() {
-            positive(|| format!("mass {}", i + 1), mass)?;
+            let quantity = || if self.degrees == 1 { "mass".to_owned() } else { format!("mass {}", i + 1) };
+            positive(quantity, mass)?;
         }
         if m != other {
             return Err(OscillatorError::NotSymmetric { quantity: "mass".to_owned(), matrix: self.mass });
@@ -187,7 +196,7 @@ impl Oscillator {
         if !is_definite {
             return Err(OscillatorError::NotDefinite { matrix: self.mass });
         }
-        positive(|| "omega".to_owned(), self.omega)?;
+        positive(|| "excitation frequency".to_owned(), self.omega)?;
         for (i, entry) in self.gap.into_iter().enumerate() {
             finite(|| format!("entry {} of the gap row", i + 1), entry)?;
         }
@@ -206,12 +215,12 @@ impl Oscillator {
         if !are_apart {
             return Err(OscillatorError::Walls { walls: self.walls });
         }
-        self.free.validate("free motion")?;
+        self.free.validate(self.degrees, "free motion")?;
         for (side, place) in
             [(Side::Right, "contact with the right wall"), (Side::Left, "contact with the left wall")]
         {
             if self.has_motion_behind(side) {
-                self.meshing[side.index()].validate(place)?;
+                self.meshing[side.index()].validate(self.degrees, place)?;
             }
             if self.is_elastic(side) {
                 self.validate_elastic(side, place)?;
@@ -349,11 +358,17 @@ impl Oscillator {
 }
 
 impl Domain {
-    fn validate(&self, place: &str) -> Result<(), OscillatorError> {
+    /// Checks the domain of an oscillator of `degrees` degrees of freedom. `place` names it in messages.
+    fn validate(&self, degrees: usize, place: &str) -> Result<(), OscillatorError> {
         for (name, matrix) in [("damping", self.damping), ("stiffness", self.stiffness)] {
             let quantity = || format!("{name} in {place}");
             matrix.as_flattened().iter().try_for_each(|&entry| finite(quantity, entry))?;
             let [[a, b], [c, d]] = matrix;
+            if degrees == 1 {
+                // The other entries have a check of their own.
+                require(a >= 0.0, quantity, a, "at least 0")?;
+                continue;
+            }
             if b != c {
                 return Err(OscillatorError::NotSymmetric { quantity: quantity(), matrix });
             }
@@ -447,7 +462,10 @@ mod tests {
             oscillator.validate().unwrap_err().to_string()
         };
         assert_eq!(slip(|o| o.mass[1][1] = 0.0), "mass 2 = 0: it must be finite and greater than 0");
-        assert_eq!(slip(|o| o.omega = f64::NAN), "omega = NaN: it must be finite and greater than 0");
+        assert_eq!(
+            slip(|o| o.omega = f64::NAN),
+            "excitation frequency = NaN: it must be finite and greater than 0"
+        );
         assert_eq!(
             slip(|o| o.gap = [0.0; 2]),
             "the largest entry of the gap row = 0: it must be different from 0"
@@ -465,12 +483,21 @@ mod tests {
         );
         assert_eq!(
             slip(|o| o.free.damping[0][1] = 0.1),
-            "damping in free motion = [[0.6, 0.1], [0.0, 0.6]]: the matrix must be symmetric"
+            "damping in free motion = [[0.6, 0.1], [0, 0.6]]: the matrix must be symmetric"
         );
         assert_eq!(
             slip(|o| o.meshing[1].stiffness = [[1.0, 2.0], [2.0, 1.0]]),
-            "stiffness in contact with the left wall = [[1.0, 2.0], [2.0, 1.0]]: the matrix must be positive \
+            "stiffness in contact with the left wall = [[1, 2], [2, 1]]: the matrix must be positive \
              semidefinite"
+        );
+        let single = Oscillator {
+            degrees: 1,
+            free: Domain { damping: [[-0.1 - 0.2, 0.0], [0.0; 2]], ..good.free },
+            ..good
+        };
+        assert_eq!(
+            single.validate().unwrap_err().to_string(),
+            "damping in free motion = -0.3: it must be at least 0"
         );
         assert_eq!(
             slip(|o| o.meshing[0].load[0] = f64::INFINITY),

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 
 use thiserror::Error;
 
-use super::{Law, Oscillator, OscillatorError, Parameter, ParameterError};
+use super::{Law, Oscillator, OscillatorError, Parameter, ParameterError, Units};
 
 /// An error in a model's parameters or in the oscillator that they give.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -71,6 +71,11 @@ pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// Returns the name of the moving body of each degree of freedom. The default is the displacement's name.
     fn bodies(&self) -> Vec<&str> {
         self.state_names().into_iter().step_by(2).collect()
+    }
+
+    /// Returns the units of state and time. The default has none.
+    fn units(&self) -> Units {
+        Units::default()
     }
 
     /// Returns the index of the parameter called `name`.

@@ -6,6 +6,7 @@ use super::axis::{Axis, Target};
 use super::derived::Derived;
 use super::list::List;
 use rattlemap_dynamics::model::{Model, Parameter, State};
+use rattlemap_dynamics::number::significant;
 
 /// All cells of a scene, numbered from 0: along the first axis, then along the second; or in the order of the list.
 #[derive(Clone, Debug)]
@@ -101,7 +102,8 @@ impl Points {
 
     /// Describes a cell by the values of the swept quantities, such as `e = 0.5, omega = 5.6`.
     pub(crate) fn named(&self, cell: usize) -> String {
-        let named = self.swept().zip(self.values(cell)).map(|(p, value)| format!("{} = {value:?}", p.name));
+        let swept = self.swept().zip(self.values(cell));
+        let named = swept.map(|(parameter, value)| format!("{} = {}", parameter.name, significant(value)));
         named.collect::<Vec<_>>().join(", ")
     }
 

@@ -182,7 +182,8 @@ function drawAxes(p) {
   pen.font = "14px system-ui, sans-serif";
   pen.textAlign = "center";
   // A parameter without a description has its name as meaning.
-  const name = ({ parameter, meaning, symbol }) => (meaning === parameter ? symbol : `${meaning}, ${symbol}`);
+  const name = ({ parameter, meaning, symbol, unit }) =>
+    (meaning === parameter ? symbol : `${meaning}, ${symbol}`) + (unit ? ` [${unit}]` : "");
   pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44, p.width + 60);
   pen.save();
   pen.translate(14, p.y + p.height / 2);

@@ -168,6 +168,12 @@ const ATTRACTOR: CellColumn = column(
     TypedValue::I32(|c, _| c.row.attractor.map_or(i32::from(ABSENT), i32::from)),
 );
 
+/// Returns the names of all columns after indices and swept values.
+#[cfg(test)]
+pub(super) fn all_names() -> impl Iterator<Item = &'static str> {
+    COLUMNS.iter().chain([&ATTRACTORS, &ATTRACTOR]).map(|column| column.name)
+}
+
 // `Source::ALL` gives the codes.
 const _: () = assert!(Source::Integrated as i8 == 0 && Source::Filled as i8 == 1);
 

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::map::scene::{Axis, Scale, Scene, Start};
 use crate::model_file::FileModel;
+use crate::show::parameters;
 use rattlemap_dynamics::model::Model;
 
 pub use crate::store::file_names::MANIFEST;
@@ -55,10 +56,19 @@ pub(crate) fn without_nulls(mut object: Value) -> Value {
 }
 
 /// Describes a model. `text` is the text of its file, which makes the folder independent of that file; it is null for a
-/// model in code.
+/// model in code. `meanings` and `units` are those of its parameters and of the state's components, by name.
 pub(crate) fn model(model: &dyn Model) -> Value {
     let text = model.downcast_ref().map(|file: &FileModel| &file.definition().text);
-    json!({ "name": model.name(), "title": model.title(), "source": model.source(), "text": text })
+    joined([
+        json!({
+            "name": model.name(),
+            "title": model.title(),
+            "source": model.source(),
+            "text": text,
+            "meanings": parameters::meanings(model),
+        }),
+        without_nulls(json!({ "units": parameters::units(model) })),
+    ])
 }
 
 /// Describes an axis. `is_start` marks the axis of a component of the initial state, `scale` is `linear`, `log` or

@@ -28,7 +28,7 @@ fn derived_parameters_follow_the_cell() {
         assert_eq!(model.get("m2"), Ok(1.5));
     }
     assert_eq!(scene.base().get("k2"), Ok(5.0));
-    let fixed: Vec<&str> = scene.fixed().map(|(name, _)| name).collect();
+    let fixed: Vec<&str> = scene.fixed().map(|(parameter, _)| &*parameter.name).collect();
     assert_eq!(fixed, ["m1", "r1", "r", "k", "omega", "b", "e", "mesh_speed"]);
     let derived: Vec<(&str, &str)> = scene.derived().map(|(p, text)| (&*p.name, text)).collect();
     // Each rule comes after those that it needs.

@@ -8,7 +8,7 @@ use crate::show::figure::orbit::flights;
 use crate::show::figure::orbit::motion::Piece;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
 use crate::show::names;
-use crate::show::symbols::number;
+use crate::show::symbols::{number, with_unit};
 use rattlemap_dynamics::model::{Contact, Side, State};
 
 /// Room for the walls' names right of the panel, and the room for their text, which includes the margin.
@@ -33,8 +33,9 @@ impl OrbitPlot<'_> {
         let split = if self.has_depth() { top + 0.64 * (bottom - top) } else { bottom };
         let label = match is_coordinate {
             true => format!("displacement, {}", self.walls.gap()),
-            false => format!("gap, z = {}", self.gap_expression()),
+            false => format!("gap, {} = {}", self.walls.gap(), self.gap_expression()),
         };
+        let label = with_unit(&label, self.units.gap.as_deref());
         let frame =
             Frame { rect: Rect { bottom: split, ..panel }, x: self.time_axis(), y: self.gap_axis(&label) };
         self.draw_walls(canvas, &frame);
@@ -157,6 +158,7 @@ impl OrbitPlot<'_> {
             Some(half) => format!("depth, |{}| \u{2212} {half}", self.walls.gap()),
             None => "depth behind the wall".to_owned(),
         };
+        let label = with_unit(&label, self.units.gap.as_deref());
         let frame = Frame {
             rect,
             x: self.time_axis(),

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use crate::map::scene::Format;
+use crate::model_file::gap_names;
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::draw_head;
@@ -11,6 +12,7 @@ use crate::show::error::WriteError;
 use crate::show::figure::orbit::heading;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, ORBIT_WIDTH};
 use crate::show::orbit_spectrum::Spectrum;
+use crate::show::symbols::with_unit;
 use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::Orbit;
@@ -38,12 +40,12 @@ pub fn write(
         let whole = canvas.panel(ORBIT_LEFT, top);
         let middle = (top + whole.bottom) / 2.0;
         let labels = WallLabels::of(model);
-        let quantity = if labels.gap() == "z" { "the gap" } else { labels.gap() };
-        let of_gap = format!("amplitude of {quantity}");
-        let panels = [
-            (of_gap.as_str(), top, middle - 15.0),
-            ("amplitude of its velocity", middle + 15.0, whole.bottom),
-        ];
+        let quantity = if gap_names(model).contains(&labels.gap()) { "the gap" } else { labels.gap() };
+        let units = model.units();
+        let of_gap = with_unit(&format!("amplitude of {quantity}"), units.gap.as_deref());
+        let of_velocity = with_unit("amplitude of its velocity", units.gap_velocity().as_deref());
+        let panels =
+            [(of_gap.as_str(), top, middle - 15.0), (of_velocity.as_str(), middle + 15.0, whole.bottom)];
         for (which, (label, top, bottom)) in panels.into_iter().enumerate() {
             draw(canvas, Rect { top, bottom, ..whole }, spectrum, which, label);
         }
