@@ -21,6 +21,7 @@ use crate::show::cells::{Cells, Row, Source};
 use crate::show::color::hex;
 use crate::show::error::WriteError;
 use crate::show::layers::{Bar, Layer, NamedColor};
+use crate::show::provenance::Provenance;
 use crate::show::symbols::symbol;
 use crate::show::table::attractors_csv::attractor_name;
 use crate::show::words::{MapWords, WordIndex};
@@ -35,6 +36,7 @@ const SCRIPT: &str = include_str!("report/page.js");
 pub fn write(
     mut page: impl Write,
     cells: &Cells<'_>,
+    made: &Provenance<'_>,
     layers: &[Layer],
     words: &MapWords,
     validation: Option<&Value>,

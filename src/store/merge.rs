@@ -39,6 +39,7 @@ use crate::record::{RecordStore, Records};
 use crate::show::cells::{Cells, Survey};
 use crate::show::provenance::Provenance;
 use crate::store::error::OutputError;
+use crate::store::manifest::OWN_COMMIT;
 use crate::store::finished_map::{FinishedMap, FinishedMapError, StoredManifest, UnfinishedRun};
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry, Finding};
@@ -445,7 +446,7 @@ impl MapRecords {
         let survey = Survey::of(plan, records, None);
         let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey);
         let processor = parts.processors();
-        let made = Provenance { engine: &first.engine, precision: &first.precision, device: &first.device };
+        let made = Provenance { commit: OWN_COMMIT, ..first.provenance() };
         // Adapters and cards are in the manifests of the parts.
         let run = Run {
             opening: parts.sum(StoredManifest::opening_seconds),

@@ -17,6 +17,9 @@ pub use crate::store::file_names::MANIFEST;
 /// Version of the manifest. It is raised when a field changes its meaning.
 pub const FORMAT: u32 = 2;
 
+/// Commit of this program.
+pub const OWN_COMMIT: &str = env!("RATTLEMAP_COMMIT");
+
 /// First fields of a manifest: its format, the command, and the program that wrote it.
 #[derive(Serialize)]
 pub struct Head {
@@ -35,7 +38,7 @@ impl Head {
             format: FORMAT,
             command,
             crate_version: env!("CARGO_PKG_VERSION"),
-            commit: env!("RATTLEMAP_COMMIT"),
+            commit: OWN_COMMIT,
         }
     }
 }
