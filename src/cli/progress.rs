@@ -163,7 +163,10 @@ mod tests {
         for (done, total) in [(9, 100), (41, 100), (20, 100), (40, 100), (45, 100), (50, 200), (80, 200)] {
             report(done, total);
         }
-        assert_eq!(printed, [(41, 100), (80, 200)].map(|(done, total)| format!("{done} of at least {total} cells")));
+        assert_eq!(
+            printed,
+            [(41, 100), (80, 200)].map(|(done, total)| format!("{done} of at least {total} cells"))
+        );
     }
 
     #[test]

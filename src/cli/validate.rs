@@ -19,7 +19,9 @@ pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
     let Validate { folder, samples, seed, .. } = arguments;
     let job = ValidateJob::open(folder, *samples as usize, *seed, &console)?;
     let (dir, count) = (job.folder().path(), job.sample_count());
-    console.note(&format!("computing {count} different cells of the map again, on a graphics device if there is one"));
+    console.note(&format!(
+        "computing {count} different cells of the map again, on a graphics device if there is one"
+    ));
     let path = dir.display();
     let nothing = format!("none of {count} cells was replayed, and nothing was written to {path}");
     interrupt.ends_at_once(nothing, job.folder().leaver());
@@ -45,7 +47,8 @@ pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
         .ok_or_else(|| stopped(replayed.load(Ordering::Relaxed)))?;
     let validated = job.validated(&lanes, &validation);
     let files = job.write(&validated, clock.elapsed())?;
-    let mut lines: Vec<String> = validated.rates().into_iter().chain(validated.remarks()).map(say::quoted).collect();
+    let mut lines: Vec<String> =
+        validated.rates().into_iter().chain(validated.remarks()).map(say::quoted).collect();
     lines.push(format!("{}: {}", say::path(dir), files.join(", ")));
     // The error of a map that fails says the same.
     lines.extend(validation.faults().is_empty().then(|| validated.verdict()));

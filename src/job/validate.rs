@@ -234,7 +234,8 @@ mod tests {
         let validation = validate::replay(&subject, &sample, &Lanes::default(), &|_| {});
         let error = verdict(Path::new("o"), &plan, &validation).unwrap_err();
         assert!(
-            !error.is_usage() && error.to_string().starts_with("do not trust this map: none of 4 cells was compared"),
+            !error.is_usage()
+                && error.to_string().starts_with("do not trust this map: none of 4 cells was compared"),
             "{error}"
         );
     }

@@ -54,14 +54,17 @@ impl Validated<'_> {
                     .to_owned(),
             );
         }
-        sentences.extend(with_reason(random).map(|differ| format!("{differ} for a known reason.")));
+        sentences.extend(reasons(random).map(|(count, kinds)| {
+            let differ = if count == 1 { "differs" } else { "differ" };
+            format!("{count} {differ} for a known reason ({kinds}).")
+        }));
         let drawn: usize = difficult.iter().map(|stratum| stratum.sampled).sum();
         if drawn > 0 {
             let count = |kind: fn(&StratumResult) -> usize| difficult.iter().map(kind).sum::<usize>();
             let wrong = count(|stratum| stratum.rate(Kind::Unexplained).count);
             let differ = count(|stratum| stratum.differing().count);
             sentences.push(format!(
-                "Difficult {} were chosen on purpose: {wrong} of {drawn} {} wrong, {} more {} for a known reason.",
+                "Difficult {} were chosen on purpose: {wrong} of {drawn} {} wrong, and {} {} for a known reason.",
                 validation.counted(),
                 are(wrong),
                 differ - wrong,
@@ -93,8 +96,9 @@ impl Validated<'_> {
             let [median, worst] = states.distances;
             let (off, compared) = (states.off.len(), states.compared);
             format!(
-                "States of {compared} lanes after {HORIZON} periods: {off} {} wrong ({}). Distances from the reference, relative \
-                 to the size of the motion, have the median {median:.0e}; the largest that rounding explains is {worst:.0e}.",
+                "States of {compared} lanes after {HORIZON} periods: {off} {} wrong ({}). The distance of the others from the \
+                 reference, relative to the size of the motion, has the median {median:.0e} and the maximum {worst:.0e}, \
+                 which rounding explains.",
                 are(off),
                 states.rate().text()
             )
@@ -171,7 +175,10 @@ impl Validated<'_> {
                 format!("Lanes did not run again, so no record was compared to the bit{why}.")
             }
             (false, _, true) => {
-                format!("The map's engine, the reference, ran again on the same kind of processor, {}: {equal}.", self.processors[1])
+                format!(
+                    "The map's engine, the reference, ran again on the same kind of processor, {}: {equal}.",
+                    self.processors[1]
+                )
             }
             (false, _, false) => format!(
                 "The map's engine, the reference, ran again on {}; the map was computed on {}: {equal}. Processors may round \
@@ -186,25 +193,23 @@ fn are(count: usize) -> &'static str {
     if count == 1 { "is" } else { "are" }
 }
 
-/// Returns the number of cells that differ for a known reason, with the kinds; none if there are none.
-fn with_reason(stratum: &StratumResult) -> Option<String> {
+/// Counts the cells that differ for a known reason, and lists the reasons; none if there are none.
+fn reasons(stratum: &StratumResult) -> Option<(usize, String)> {
     let known = Kind::ALL.into_iter().filter(|&kind| kind != Kind::Unexplained);
-    let counts: Vec<(Kind, usize)> =
-        known.map(|kind| (kind, stratum.rate(kind).count)).filter(|(_, count)| *count > 0).collect();
-    let kinds: Vec<String> =
-        counts.iter().map(|(kind, count)| format!("{} {count}", kind.name().replace('_', " "))).collect();
-    let total: usize = counts.iter().map(|(_, count)| count).sum();
-    let differ = if total == 1 { "differs" } else { "differ" };
-    (total > 0).then(|| format!("{total} more {differ} ({})", kinds.join(", ")))
+    let counts = known.map(|kind| (kind, stratum.rate(kind).count)).filter(|(_, count)| *count > 0);
+    let counts: Vec<(Kind, usize)> = counts.collect();
+    let kinds = counts.iter().map(|(kind, count)| format!("{count} {}", kind.name().replace('_', " ")));
+    let kinds = kinds.collect::<Vec<_>>().join(", ");
+    (!counts.is_empty()).then(|| (counts.iter().map(|(_, count)| count).sum(), kinds))
 }
 
 /// Returns the rates of a stratum: wrong cells, and cells that differ for a known reason.
 fn rates(stratum: &StratumResult, counted: &str) -> String {
     let cells = stratum.stratum.describe(counted);
     let (wrong, differing) = (stratum.rate(Kind::Unexplained), stratum.differing());
-    let kinds = with_reason(stratum).map_or(String::new(), |differ| format!("; {differ}"));
+    let kinds = reasons(stratum).map_or(String::new(), |(_, kinds)| format!("; {kinds}"));
     format!(
-        "{} {cells} of {} in the map: {} differ ({}), {} wrong ({}){kinds}",
+        "{} of {} {cells}: {} differ ({}{kinds}), {} wrong ({})",
         stratum.sampled,
         stratum.runs,
         differing.count,
@@ -240,7 +245,7 @@ fn half_mesh(half: &HalfMesh, counted: &str) -> String {
              it. Otherwise compute the map with {halved} and validate it; halve again until these numbers no longer fall."
         ),
         false => format!(
-            "Class, period and pattern do not depend on the choice of mesh_speed: keep {now}. Words count each bounce before \
+            "In this sample, class, period and pattern do not depend on the choice of mesh_speed: keep {now}. Words count each bounce before \
              meshing; compare patterns instead."
         ),
     };
@@ -280,7 +285,13 @@ mod tests {
         }
     }
 
-    fn text(engine: &str, own_lanes: Option<&str>, double_lanes: Option<&str>, judge: Judge, here: &str) -> String {
+    fn text(
+        engine: &str,
+        own_lanes: Option<&str>,
+        double_lanes: Option<&str>,
+        judge: Judge,
+        here: &str,
+    ) -> String {
         let (validation, precision) = (validation(judge), if engine == "gpu" { "f32" } else { "f64" });
         let device = if engine == "gpu" { CARD } else { "event-driven reference" };
         let made = Provenance { engine, precision, device, commit: "c" };
@@ -296,18 +307,73 @@ mod tests {
         use Judge::{Independent, Lanes, Reference};
         let same = "AMD, 2 cores";
         for (engine, own, double, judge, here, parts) in [
-            ("cpu", None, Some(OTHER), Lanes, same, ["the reference, ran again on the same kind of processor, AMD, 2 cores: 397 of 397", "lanes in f64 on llvmpipe, which are another engine"]),
-            ("cpu", None, Some(OTHER), Lanes, "Intel", ["ran again on Intel; the map was computed on AMD, 2 cores", "lanes in f64 on llvmpipe"]),
+            (
+                "cpu",
+                None,
+                Some(OTHER),
+                Lanes,
+                same,
+                [
+                    "the reference, ran again on the same kind of processor, AMD, 2 cores: 397 of 397",
+                    "lanes in f64 on llvmpipe, which are another engine",
+                ],
+            ),
+            (
+                "cpu",
+                None,
+                Some(OTHER),
+                Lanes,
+                "Intel",
+                ["ran again on Intel; the map was computed on AMD, 2 cores", "lanes in f64 on llvmpipe"],
+            ),
             ("cpu", None, None, Independent, same, ["same kind of processor", "and DOP853, an ODE program"]),
             ("cpu", None, None, Reference, same, ["same kind of processor", "no second one was available"]),
-            ("gpu", Some(CARD), None, Reference, same, ["again on the map's own device, Some card", "without early stops, on the processor."]),
-            ("gpu", Some(CARD), Some(OTHER), Reference, same, ["again on the map's own device, Some card", "Lanes in f64 on llvmpipe show"]),
-            ("gpu", Some(OTHER), Some(OTHER), Reference, same, ["again on llvmpipe, not on the map's own device, Some card (no such adapter)", "Lanes in f64 on llvmpipe show"]),
-            ("gpu", None, None, Reference, same, ["did not run again, so no record was compared to the bit: no such adapter", "on the processor"]),
+            (
+                "gpu",
+                Some(CARD),
+                None,
+                Reference,
+                same,
+                ["again on the map's own device, Some card", "without early stops, on the processor."],
+            ),
+            (
+                "gpu",
+                Some(CARD),
+                Some(OTHER),
+                Reference,
+                same,
+                ["again on the map's own device, Some card", "Lanes in f64 on llvmpipe show"],
+            ),
+            (
+                "gpu",
+                Some(OTHER),
+                Some(OTHER),
+                Reference,
+                same,
+                [
+                    "again on llvmpipe, not on the map's own device, Some card (no such adapter)",
+                    "Lanes in f64 on llvmpipe show",
+                ],
+            ),
+            (
+                "gpu",
+                None,
+                None,
+                Reference,
+                same,
+                [
+                    "did not run again, so no record was compared to the bit: no such adapter",
+                    "on the processor",
+                ],
+            ),
         ] {
             let text = text(engine, own, double, judge, here);
             parts.iter().for_each(|part| assert!(text.contains(part), "{part}: {text}"));
-            assert_eq!(text.contains("not on the map's own device"), engine == "gpu" && own == Some(OTHER), "{text}");
+            assert_eq!(
+                text.contains("not on the map's own device"),
+                engine == "gpu" && own == Some(OTHER),
+                "{text}"
+            );
         }
     }
 
@@ -320,14 +386,15 @@ mod tests {
             let made = Provenance { engine: "cpu", precision: "f64", device: "d", commit: "c" };
             let [own_lanes, not_own, double_lanes] = [None; 3];
             let processors = ["p"; 2];
-            Validated { validation: &validation, made, processors, own_lanes, not_own, double_lanes }.verdict()
+            Validated { validation: &validation, made, processors, own_lanes, not_own, double_lanes }
+                .verdict()
         };
         assert_eq!(
             verdict([0; 5], 0),
             "The map stands: 0 of 200 random cells are wrong (below 1.5 %). Difficult cells were chosen on purpose: 0 of 200 are \
-             wrong, 3 more differ for a known reason."
+             wrong, and 3 differ for a known reason."
         );
-        assert!(verdict([0, 0, 1, 0, 0], 0).contains(" 1 more differs (budget too short 1) for a known reason. "));
+        assert!(verdict([0, 0, 1, 0, 0], 0).contains(" 1 differs for a known reason (1 budget too short). "));
         let doubt = verdict([0, 0, 0, 0, 1], 0);
         assert!(
             doubt.starts_with("The map stands with a reservation: 1 of 200 random cells is wrong (0.5 %, ")
@@ -357,9 +424,15 @@ mod tests {
         };
         let text = half(4, 12, Some(0.01));
         assert!(text.contains("4 of 85 (4.7 %, ") && text.contains("12 of 69 (17 %, "), "{text}");
-        assert!(text.contains("depend on it") && text.contains("compute the map with mesh_speed = 0.005"), "{text}");
+        assert!(
+            text.contains("depend on it") && text.contains("compute the map with mesh_speed = 0.005"),
+            "{text}"
+        );
         assert!(half(0, 1, None).contains("compute the map with half the mesh_speed"));
         let text = half(0, 0, Some(0.01));
-        assert!(text.contains("do not depend on the choice") && text.contains("keep mesh_speed = 0.01"), "{text}");
+        assert!(
+            text.contains("do not depend on the choice") && text.contains("keep mesh_speed = 0.01"),
+            "{text}"
+        );
     }
 }

@@ -468,8 +468,8 @@ fn a_map_is_validated_and_its_report_says_so() {
     let run = |arguments: &[&str]| rattlemap(folder.path(), &[&["validate", "o"], arguments].concat());
     let text = said(&run(&["--samples", "150", "--seed", "3"]).success().stdout(""));
     for part in [
-        " random cells of 576 in the map: 0 differ (below ",
-        " cells next to another class or period of ",
+        " of 576 random cells: 0 differ (below ",
+        " cells next to another class or period: ",
         "without early stops, and lanes in f64 on ",
         "ran again on the same kind of processor, ",
         "are the same to the bit",

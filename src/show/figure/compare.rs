@@ -99,7 +99,8 @@ fn subtitle(pair: &MapPair<'_>) -> String {
     }
     if (a.crate_version, a.provenance.commit) != (b.crate_version, b.provenance.commit) {
         let short = |commit: &str| commit.chars().take(7).collect::<String>();
-        let version = |side: MapSide<'_>| format!("{} ({})", side.crate_version, short(side.provenance.commit));
+        let version =
+            |side: MapSide<'_>| format!("{} ({})", side.crate_version, short(side.provenance.commit));
         parts.push(format!("A by version {}, B by {}", version(a), version(b)));
     }
     let text = match parts.is_empty() {

@@ -84,7 +84,6 @@ function differing({ kinds, mismatches }) {
 
 function showValidation(found) {
   const section = byId("validation");
-  document.body.classList.add("validated");
   section.hidden = byId("validated").hidden = false;
   byId("verdict").textContent = found.verdict;
   byId("details").addEventListener("click", () => section.scrollIntoView({ behavior: "smooth" }));

@@ -67,11 +67,14 @@ function showBar(current) {
   const scale = element("div", undefined, "ticks");
   for (const [value, text] of ticks(low, high, 6)) {
     const tick = element("span", text);
-    tick.style.left = `${(100 * (value - low)) / (high - low)}%`;
+    const share = (value - low) / (high - low);
+    tick.style.left = `${100 * share}%`;
+    // Labels are centred; near the ends of the bar they stay inside it.
+    tick.style.transform = `translateX(${-50 * (within(share / 0.06, 0, 1) + within((share - 0.94) / 0.06, 0, 1))}%)`;
     scale.append(tick);
   }
   const isWhole = low === least && high === most;
-  const remarks = isWhole ? beyond : [`The colours fit the visible cells; at most ${100 * BEYOND} % of these lie beyond each end.`];
+  const remarks = isWhole ? beyond : [`The colours fit the visible cells; at most ${100 * BEYOND}\u00a0% of these lie beyond each end.`];
   byId("bar").append(...(label === current.title ? [] : [element("div", label)]), ramp, scale,
     ...remarks.map((text) => element("div", text, "beyond")));
 }

@@ -34,12 +34,7 @@ pub struct Head {
 impl Head {
     /// Returns the first fields of a manifest that `command` writes.
     pub fn of(command: &'static str) -> Head {
-        Head {
-            format: FORMAT,
-            command,
-            crate_version: env!("CARGO_PKG_VERSION"),
-            commit: OWN_COMMIT,
-        }
+        Head { format: FORMAT, command, crate_version: env!("CARGO_PKG_VERSION"), commit: OWN_COMMIT }
     }
 }
 
