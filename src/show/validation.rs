@@ -54,21 +54,20 @@ impl Validated<'_> {
                     .to_owned(),
             );
         }
-        sentences.extend(reasons(random).map(|(count, kinds)| {
-            let differ = if count == 1 { "differs" } else { "differ" };
-            format!("{count} {differ} for a known reason ({kinds}).")
-        }));
+        sentences.extend(
+            reasons(random)
+                .map(|(count, kinds)| format!("{count} {} for a known reason ({kinds}).", differ(count))),
+        );
         let drawn: usize = difficult.iter().map(|stratum| stratum.sampled).sum();
         if drawn > 0 {
             let count = |kind: fn(&StratumResult) -> usize| difficult.iter().map(kind).sum::<usize>();
             let wrong = count(|stratum| stratum.rate(Kind::Unexplained).count);
-            let differ = count(|stratum| stratum.differing().count);
+            let known = count(|stratum| stratum.differing().count) - wrong;
             sentences.push(format!(
-                "Difficult {} were chosen on purpose: {wrong} of {drawn} {} wrong, and {} {} for a known reason.",
+                "Difficult {} were chosen on purpose: {wrong} of {drawn} {} wrong, and {known} {} for a known reason.",
                 validation.counted(),
                 are(wrong),
-                differ - wrong,
-                if differ - wrong == 1 { "differs" } else { "differ" },
+                differ(known),
             ));
         }
         sentences.join(" ")
@@ -193,6 +192,10 @@ fn are(count: usize) -> &'static str {
     if count == 1 { "is" } else { "are" }
 }
 
+fn differ(count: usize) -> &'static str {
+    if count == 1 { "differs" } else { "differ" }
+}
+
 /// Counts the cells that differ for a known reason, and lists the reasons; none if there are none.
 fn reasons(stratum: &StratumResult) -> Option<(usize, String)> {
     let known = Kind::ALL.into_iter().filter(|&kind| kind != Kind::Unexplained);
@@ -209,10 +212,11 @@ fn rates(stratum: &StratumResult, counted: &str) -> String {
     let (wrong, differing) = (stratum.rate(Kind::Unexplained), stratum.differing());
     let kinds = reasons(stratum).map_or(String::new(), |(_, kinds)| format!("; {kinds}"));
     format!(
-        "{} of {} {cells}: {} differ ({}{kinds}), {} wrong ({})",
+        "{} of {} {cells}: {} {} ({}{kinds}), {} wrong ({})",
         stratum.sampled,
         stratum.runs,
         differing.count,
+        differ(differing.count),
         differing.text(),
         wrong.count,
         wrong.text()

@@ -206,7 +206,8 @@ impl Validation {
         let rate = stratum.rate(Kind::Unexplained);
         let (count, verb) = (rate.count, if rate.count == 1 { "is" } else { "are" });
         if stratum.sampled == stratum.runs && stratum.stratum == Stratum::Uniform {
-            return format!("{count} of all {} {} {verb} wrong", stratum.runs, self.counted());
+            let integrated = if self.filled > 0 { "integrated " } else { "" };
+            return format!("{count} of all {} {integrated}{} {verb} wrong", stratum.runs, self.counted());
         }
         let cells = stratum.stratum.describe(self.counted());
         format!("{count} of {} {cells} {verb} wrong ({})", rate.among, rate.text())

@@ -76,9 +76,12 @@ function differing({ kinds, mismatches }) {
   const order = Object.keys(kinds).sort((a, b) => (b === "unexplained") - (a === "unexplained"));
   const groups = order.map((kind) => [kind, mismatches.filter((mismatch) => mismatch.kind === kind)]);
   const box = element("div");
-  box.append(element("h3", "Cells that differ"), ...groups.filter(([, list]) => list.length).map(([kind, list]) =>
-    table(`${spaced(kind)}: ${count(list.length, "cell")} (${kinds[kind]})`, ["cell", ...parameters, "what differs", "replay"],
-      list.map(line))));
+  box.append(element("h3", "Cells that differ, by kind"));
+  for (const [kind, list] of groups.filter(([, list]) => list.length)) {
+    const group = table(`${spaced(kind)}: ${count(list.length, "cell")}`, ["cell", ...parameters, "what differs", "replay"], list.map(line));
+    group.firstChild.after(element("p", kinds[kind], "note"));
+    box.append(group);
+  }
   return box;
 }
 
