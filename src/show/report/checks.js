@@ -85,6 +85,7 @@ function differing({ kinds, mismatches }) {
   return box;
 }
 
+// Shows a validation. One that an earlier program stored may lack texts.
 function showValidation(found) {
   const section = byId("validation");
   section.hidden = byId("validated").hidden = false;
@@ -96,7 +97,7 @@ function showValidation(found) {
   const strata = found.strata.filter(({ sampled }) => sampled > 0);
   tables.append(
     table("Rates, with their 95 % intervals", ["", "checked", "in the map", "differ", ...kinds.map(spaced)],
-      strata.map(({ text, sampled, runs, differing: all, kinds: of }) =>
+      strata.map(({ name, text = name, sampled, runs, differing: all, kinds: of }) =>
         ({ cells: [text, sampled, runs, ...[all, ...kinds.map((kind) => of[kind])].map(({ count, text }) => `${count} (${text})`)] })), [1, 2]),
     table("Agreement", ["", "compared", "agree"], Object.entries(found.agreement).filter(([, { compared }]) => compared)
       .map(([name, { compared, agreeing }]) => ({ cells: [fieldName(name), compared, agreeing] })), [1, 2]),
@@ -113,6 +114,6 @@ function showValidation(found) {
     element("h2", "Validation"),
     element("p", found.verdict, found.faults.length ? "verdict bad" : "verdict"),
     element("p", `${found.samples} of ${found.integrated} integrated ${found.counted} were checked, drawn with the seed ${found.seed}.`),
-    ...found.remarks.map((remark) => element("p", remark)), tables);
+    ...(found.remarks ?? []).map((remark) => element("p", remark)), tables);
   if (found.mismatches.length) section.append(differing(found));
 }
