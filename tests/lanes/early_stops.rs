@@ -67,8 +67,8 @@ fn judged(pair: &GearPair, record: &Record) -> Option<Kind> {
     let sets = [SHIPPED.to_owned(), format!("parameters.e={:?}", pair.e)];
     let plan = Plan::new(&Scene::parse(&text, "cell", &sets, Purpose::Map).unwrap());
     let sample = Sample {
-        requested: 0,
         seed: 0,
+        requested: 1,
         draws: vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }],
         states: Vec::new(),
     };
