@@ -33,6 +33,7 @@ pub(crate) use points::Points;
 pub use settings::{Continuous, DEFAULT_AUDIT, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, Start};
 
+use crate::model_file::{FileModel, MODEL_FILE};
 use crate::text::document::{self, Node};
 use crate::text::error;
 use crate::text::section::{self, Section};
@@ -78,6 +79,7 @@ impl Purpose {
 #[derive(Clone, Debug)]
 pub struct Scene {
     text: String,
+    settings: String,
     title: String,
     points: Points,
     integration: Integration,
@@ -188,6 +190,7 @@ impl Scene {
         let points = Points::new(base, axes, list, derived);
         let scene = Scene {
             text,
+            settings: settings_of(document, model),
             title: title.unwrap_or_else(|| default_title(model, &points)),
             integration: settings::read_integration(&root)?,
             start: start::read(&root, model, purpose)?,
@@ -235,6 +238,12 @@ impl Scene {
     /// Returns the scene's text without the `--set` arguments. For a scene that was built, this is generated TOML.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Returns the scene as TOML without its axes, with the `--set` arguments applied. A model from a file is named
+    /// `model.toml`, as in the folder of a map.
+    pub fn settings(&self) -> &str {
+        &self.settings
     }
 
     /// Returns the heading of figures and reports.
@@ -393,6 +402,17 @@ fn refuse_model(document: &Node) -> Result<(), SceneError> {
              `rattlemap models FILE` describes the model, `rattlemap orbit --model FILE` computes one motion",
         ))
     })
+}
+
+/// Writes the tree of a scene as TOML without its axes.
+fn settings_of(document: &Node, model: &dyn Model) -> String {
+    let Some(toml::Value::Table(mut fields)) = document.to_toml() else { return String::new() };
+    fields.remove("axis");
+    if model.downcast_ref().is_some_and(|file: &FileModel| !file.is_built_in()) {
+        fields.insert("model".to_owned(), MODEL_FILE.into());
+    }
+    // A table of TOML values can always be written.
+    toml::to_string(&fields).unwrap_or_default()
 }
 
 fn default_title(model: &dyn Model, points: &Points) -> String {

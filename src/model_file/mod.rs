@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter, Units};
 
-pub use builtin::{BUILT_IN, DEFAULT};
+pub use builtin::{BUILT_IN, DEFAULT, MODEL_FILE};
 pub use contact::{Wall, WallLaw, WallSpring};
 pub use definition::Definition;
 #[cfg(feature = "job")]

@@ -1,13 +1,11 @@
 //! The command that replays one cell of a map.
 
 use crate::map::scene::{Scene, Start};
+pub use crate::model_file::MODEL_FILE as MODEL;
 use crate::model_file::{DEFAULT, FileModel};
 use crate::show::cells::Cells;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::orbit::Settings;
-
-/// Name of the copy of the model's file in the folder of a map whose model is not built in.
-pub const MODEL: &str = "model.toml";
 
 /// Returns the arguments that are the same for all cells: the model, values that differ from the defaults of `orbit`, the
 /// start and the transient. `orbit` analyses as many periods as the class needs.

@@ -39,7 +39,7 @@ pub(crate) fn result(compared: &MapPair<'_>) -> Value {
             "precision": side.provenance.precision,
             "device": side.provenance.device,
             "crate_version": side.crate_version,
-            "commit": side.commit,
+            "commit": side.provenance.commit,
         })
     });
     let tally = |Tally { compared, differing }| {

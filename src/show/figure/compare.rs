@@ -97,9 +97,10 @@ fn subtitle(pair: &MapPair<'_>) -> String {
     if engine(a) != engine(b) {
         parts.push(format!("A on {}, B on {}", engine(a), engine(b)));
     }
-    if (a.crate_version, a.commit) != (b.crate_version, b.commit) {
+    if (a.crate_version, a.provenance.commit) != (b.crate_version, b.provenance.commit) {
         let short = |commit: &str| commit.chars().take(7).collect::<String>();
-        let version = |side: MapSide<'_>| format!("{} ({})", side.crate_version, short(side.commit));
+        let version =
+            |side: MapSide<'_>| format!("{} ({})", side.crate_version, short(side.provenance.commit));
         parts.push(format!("A by version {}, B by {}", version(a), version(b)));
     }
     let text = match parts.is_empty() {

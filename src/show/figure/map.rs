@@ -123,6 +123,7 @@ mod tests {
             title: "a map",
             indices: (0..CELLS).map(|id| u8::from(id % 7 == 3)).collect(),
             palette: vec![[255, 254, 250], [9, 99, 199]],
+            numbers: None,
             entries: (0..entries).map(entry).collect(),
             bar: Some(Bar { label: "exponent", colors, low: -0.4, high: 1.0, beyond }),
         }

@@ -53,5 +53,6 @@ pub(crate) fn layer(basins: &Basins) -> Layer {
         palette,
         entries: legend(entries),
         bar: None,
+        numbers: None,
     }
 }

@@ -88,6 +88,7 @@ impl Continuous {
             short: self.short,
             title: self.title,
             indices: values.par_iter().map(index).collect(),
+            numbers: Some(values.iter().map(|&value| value as f32).collect()),
             palette: colors.iter().copied().chain([NO_VALUE]).collect(),
             entries: legend([NamedColor { color: NO_VALUE, text: "no value".to_owned(), cells: absent }]),
             bar: Some(Bar {

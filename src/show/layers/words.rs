@@ -69,6 +69,7 @@ fn layer(words: &WordIndex, texts: &Texts) -> Layer {
         entries: entries(words, texts, &spellings, |number| palette[usize::from(indices[number])]),
         palette,
         bar: None,
+        numbers: None,
     }
 }
 

@@ -18,6 +18,9 @@ pub use crate::store::file_names::MANIFEST;
 /// Version of the manifest. It is raised when a field changes its meaning.
 pub const FORMAT: u32 = 2;
 
+/// Commit of this program.
+pub const OWN_COMMIT: &str = env!("RATTLEMAP_COMMIT");
+
 /// First fields of a manifest: its format, the command, and the program that wrote it.
 #[derive(Serialize)]
 pub struct Head {
@@ -32,12 +35,7 @@ pub struct Head {
 impl Head {
     /// Returns the first fields of a manifest that `command` writes.
     pub fn of(command: &'static str) -> Head {
-        Head {
-            format: FORMAT,
-            command,
-            crate_version: env!("CARGO_PKG_VERSION"),
-            commit: env!("RATTLEMAP_COMMIT"),
-        }
+        Head { format: FORMAT, command, crate_version: env!("CARGO_PKG_VERSION"), commit: OWN_COMMIT }
     }
 }
 
