@@ -26,7 +26,8 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     let (along, options) = (arguments.along(), &arguments.run);
     let along = along.as_ref();
     let file = SceneFile { purpose: Purpose::Bifurcation, along, ..SceneFile::map(&options.scene) };
-    let sets = file.with_figures(options.set.clone(), &FigureFormat::scene(&options.format))?;
+    let sets = [options.set.clone(), options.figure.sets()].concat();
+    let sets = file.with_figures(sets, &FigureFormat::scene(&options.format))?;
     let scene = file.load(&sets)?;
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(options.quiet)?;

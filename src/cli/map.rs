@@ -35,7 +35,8 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     let (out, quiet) = (arguments.out(), options.quiet);
     let list_copy = resume.then(|| out.join(LIST));
     let file = SceneFile { list_copy: list_copy.as_deref(), ..SceneFile::map(&options.scene) };
-    let sets = file.with_figures(options.set.clone(), &FigureFormat::scene(&options.format))?;
+    let sets = [options.set.clone(), options.figure.sets()].concat();
+    let sets = file.with_figures(sets, &FigureFormat::scene(&options.format))?;
     let scene = file.load(&sets)?;
     let job = MapJob { scene: &scene, sets: &sets, engine, shard: *shard, resume: *resume };
     let free = job.check(Some(&out))?;

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::figure;
 use super::measure::{Run, SCENE, SampleCheck, Series};
 use super::spread::Spread;
+use crate::map::scene::FigureStyle;
 use crate::gpu::DeviceTimes;
 use crate::job::processor;
 use crate::show::error::WriteError;
@@ -29,10 +30,11 @@ pub(super) fn write(
     folder: &Folder,
     all: &[Series],
     budget_seconds: f64,
+    style: &FigureStyle,
 ) -> Result<[&'static str; 3], OutputError> {
     folder.remove(&[MANIFEST, TABLE, FIGURE])?;
     folder.replace(TABLE, |out| write_table(out, all))?;
-    folder.replace(FIGURE, |out| figure::write(out, all, &processor::described()))?;
+    folder.replace(FIGURE, |out| figure::write(out, style, all, &processor::described()))?;
     let files = inventory::entries(folder, &[TABLE, FIGURE])?;
     inventory::write_manifest(folder, &manifest(all, budget_seconds, &files))?;
     Ok([TABLE, FIGURE, MANIFEST])

@@ -4,4 +4,5 @@ pub mod bifurcation;
 pub mod compare;
 pub mod map;
 mod map_layout;
+mod map_lines;
 pub mod orbit;
