@@ -6,15 +6,14 @@ use super::measure::{Point, Run, Series, Target};
 use crate::gpu::Precision;
 use crate::map::scene::{FigureStyle, Format};
 use crate::show::drawing::axis::Axis;
-use crate::show::drawing::frame::{Frame, column, stacked};
+use crate::show::drawing::frame::{Frame, single};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
 use crate::show::drawing::{Canvas, Color, Marker, Shape, write_figure};
 use crate::show::error::WriteError;
 
-/// Default size, and height of the panel in a figure of other size, in panels.
+/// Default size.
 const FIGURE_WIDTH: f64 = 1700.0;
 const FIGURE_HEIGHT: f64 = 1150.0;
-const PANEL: f64 = 1.8;
 /// Least left margin in a figure of default size.
 const LEFT: f64 = 190.0;
 /// Width of curves in pixels.
@@ -54,15 +53,12 @@ pub(super) fn write(
          fastest; processor: {processor}"
     );
     let top = draw_head(&canvas, title, &subtitle, &entries) + 10.0;
-    let [x, y] = axes(&sorted);
-    let edges = stacked(&canvas, top, FIGURE_HEIGHT, &[PANEL])[0];
-    for frame in column(&canvas, vec![(edges, y)], &x, LEFT, 0.0) {
-        frame.draw_grid(&canvas);
-        for series in &sorted {
-            curve(&canvas, &frame, series);
-        }
-        frame.draw_axes(&canvas, true);
+    let frame = single(&canvas, top, FIGURE_HEIGHT, axes(&sorted), LEFT);
+    frame.draw_grid(&canvas);
+    for series in &sorted {
+        curve(&canvas, &frame, series);
     }
+    frame.draw_axes(&canvas, true);
     write_figure(out, Format::Png, &canvas)
 }
 

@@ -46,7 +46,9 @@ impl FigureStyle {
     pub fn width(text: &str) -> Result<f64, String> {
         let [least, most] = WIDTHS;
         let requirement = || {
-            format!("a length from {least} mm to {most} mm with its unit (mm, cm, in or pt), such as \"85mm\"")
+            format!(
+                "a length from {least} mm to {most} mm with its unit (mm, cm, in or pt), such as \"85mm\""
+            )
         };
         let unit = UNITS.iter().find_map(|(unit, points)| Some((text.trim().strip_suffix(unit)?, points)));
         let length = unit.and_then(|(number, points)| Some(number.trim().parse::<f64>().ok()? * points));
@@ -74,7 +76,9 @@ impl FigureStyle {
         let most = width / LEAST_WIDTH;
         let requirement = || {
             let most = (10.0 * most).floor() / 10.0;
-            format!("a type size of at most {most} points at this width; choose a smaller type or a larger width")
+            format!(
+                "a type size of at most {most} points at this width; choose a smaller type or a larger width"
+            )
         };
         if size <= most { Ok(()) } else { Err(requirement()) }
     }
@@ -117,7 +121,8 @@ pub(super) fn read(root: &Section<'_>, points: &Points) -> Result<Figure, SceneE
         style.legend = field.flag()?;
     }
     if let Some(field) = section.get("font_size") {
-        style.font_size = Some(FigureStyle::font_size(field.number()?).map_err(|text| field.out_of_range(&text))?);
+        style.font_size =
+            Some(FigureStyle::font_size(field.number()?).map_err(|text| field.out_of_range(&text))?);
         style.check().map_err(|text| field.out_of_range(&text))?;
     }
     let lines = section.get("lines").map(|field| read_lines(&field, points)).transpose()?;
@@ -132,7 +137,8 @@ fn read_lines(field: &Field<'_>, points: &Points) -> Result<Vec<MapLine>, SceneE
     let Some(lines) = Section::open_any(field.node, &field.path) else { return Ok(Vec::new()) };
     let line = |(name, field): (&str, Field<'_>)| {
         let expression = field.expression(&names(model), &meanings(model), "\"k1 - 2*k2\"")?;
-        let is_swept = |axis: &Axis| axis.target().parameter().is_some_and(|swept| points.follows(&expression, swept));
+        let is_swept =
+            |axis: &Axis| axis.target().parameter().is_some_and(|swept| points.follows(&expression, swept));
         if points.axes().len() == 2 && !points.axes().iter().any(is_swept) {
             return Err(field.conflict("it has the same value in all cells; use a parameter of an axis"));
         }

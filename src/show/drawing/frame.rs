@@ -126,6 +126,8 @@ fn mark_length(label: &str) -> f64 {
 /// Height of a panel in a figure of other than default size, as a share of the figure's width, and its least value.
 const PANEL_HEIGHT: f64 = 0.36;
 const LEAST_PANEL: f64 = 240.0;
+/// Height of the only panel of a figure, in panels.
+const SINGLE: f64 = 1.6;
 
 /// Returns the upper and lower edges of panels one below the other, whose heights are proportional to `shares`. A figure of
 /// default size has the height `default`; otherwise a share of 1 has the usual height of a panel.
@@ -160,9 +162,19 @@ pub fn column(
     let right = width - right_margin(canvas, x, width - left) - beside;
     let bottom = panels.last().map_or(0.0, |([_, bottom], _)| *bottom);
     canvas.set_height(bottom + below(canvas, x, [left, right]));
-    let frame =
-        |([top, bottom], y): ([f64; 2], Axis)| Frame { rect: Rect { left, top, right, bottom }, x: x.clone(), y };
+    let frame = |([top, bottom], y): ([f64; 2], Axis)| Frame {
+        rect: Rect { left, top, right, bottom },
+        x: x.clone(),
+        y,
+    };
     panels.into_iter().map(frame).collect()
+}
+
+/// Returns the frame of a figure of one panel, given its axes, and sets the height of the figure. `default` is the height and
+/// `left` the least margin of a figure of default size.
+pub fn single(canvas: &Canvas, top: f64, default: f64, [x, y]: [Axis; 2], left: f64) -> Frame {
+    let edges = stacked(canvas, top, default, &[SINGLE]);
+    column(canvas, vec![(edges[0], y)], &x, left, 0.0).remove(0)
 }
 
 /// A panel: its place on the canvas and its axes.

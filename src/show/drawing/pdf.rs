@@ -35,7 +35,8 @@ pub(crate) fn encoded(canvas: &Canvas) -> Result<Vec<u8>, WriteError> {
     };
     // Coordinates are units from the upper left corner.
     let points = 72.0 / canvas.per_inch;
-    let (scale, size) = (points as f32, [canvas.size().0, canvas.size().1].map(|side| (side * points) as f32));
+    let (scale, size) =
+        (points as f32, [canvas.size().0, canvas.size().1].map(|side| (side * points) as f32));
     page.content.transform([scale, 0.0, 0.0, -scale, 0.0, size[1]]);
     page.content.set_line_cap(LineCapStyle::RoundCap).set_line_join(LineJoinStyle::RoundJoin);
     let items = canvas.items.borrow();

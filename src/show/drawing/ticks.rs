@@ -134,8 +134,7 @@ fn round(axis: &Axis, length: f64, spacing: f64) -> Ticks {
         let Ticks { list, power } = linear(&values, most);
         let positive = list.into_iter().filter(|tick| tick.at > 0.0);
         let list: Vec<Tick> = positive.map(|tick| Tick { at: tick.at.log10(), ..tick }).collect();
-        let closest =
-            list.windows(2).map(|pair| (pair[1].at - pair[0].at) * pixels).fold(f64::MAX, f64::min);
+        let closest = list.windows(2).map(|pair| (pair[1].at - pair[0].at) * pixels).fold(f64::MAX, f64::min);
         if closest >= 0.75 * spacing || most < 2.0 {
             return Ticks { list, power };
         }
@@ -213,10 +212,7 @@ mod tests {
             (far.0, far.1),
             (plain(&["10\u{207b}\u{2076}", "10\u{207b}\u{b3}", "10\u{2070}", "10\u{b3}"]), 9)
         );
-        assert_eq!(
-            log_labels(1e5, 1e6, 400.0, 90.0).0,
-            ["10\u{2075}", "10\u{2076}"]
-        );
+        assert_eq!(log_labels(1e5, 1e6, 400.0, 90.0).0, ["10\u{2075}", "10\u{2076}"]);
     }
 
     #[test]

@@ -55,7 +55,7 @@ pub fn write(
     write_figure(out, format, &draw(style, texts, axis, panels, columns))
 }
 
-fn draw(
+pub(super) fn draw(
     style: &FigureStyle,
     [title, subtitle]: [&str; 2],
     axis: (&str, Scale),

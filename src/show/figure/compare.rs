@@ -69,7 +69,7 @@ pub fn write(
     write_figure(out, format, &draw(style, pair))
 }
 
-fn draw(style: &FigureStyle, pair: &MapPair<'_>) -> Canvas {
+pub(super) fn draw(style: &FigureStyle, pair: &MapPair<'_>) -> Canvas {
     let index = |(classes, kind): ([Class; 2], &Option<Kind>)| match kind {
         Some(kind) if !kind.is_decisive() => OTHER_PATTERN,
         _ => color_index(classes),

@@ -30,17 +30,19 @@ pub fn write(out: impl Write, format: Format, cells: &Cells<'_>, layer: &Layer) 
     write_figure(out, format, &draw(cells, layer))
 }
 
-fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
+pub(super) fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
     let scene = cells.scene();
     let subtitle = format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
-    let row = |entry: &NamedColor| {
-        Row::of_color(entry.color, &entry.text, share(entry.cells, cells.count()))
-    };
+    let row = |entry: &NamedColor| Row::of_color(entry.color, &entry.text, share(entry.cells, cells.count()));
     let mut rows: Vec<Row> = layer.entries.iter().map(row).collect();
     let color = |nth: usize| LINE_COLORS[nth % LINE_COLORS.len()]();
-    rows.extend(scene.lines().iter().enumerate().map(|(nth, line)| {
-        Row::drawn(Key::Line { color: color(nth), width: LINE }, &line.name)
-    }));
+    rows.extend(
+        scene
+            .lines()
+            .iter()
+            .enumerate()
+            .map(|(nth, line)| Row::drawn(Key::Line { color: color(nth), width: LINE }, &line.name)),
+    );
     let attractors = attractors(cells);
     if !attractors.is_empty() {
         rows.push(Row::drawn(Key::Marker(ATTRACTOR), "attractor, at phase 0"));
@@ -58,7 +60,12 @@ fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
         |id| layer.palette[usize::from(layer.indices[id])],
         |canvas, frame| {
             for (nth, line) in scene.lines().iter().enumerate() {
-                draw_line(canvas, frame, &map_lines::zeros([&frame.x, &frame.y], line.function(scene.points())), color(nth));
+                draw_line(
+                    canvas,
+                    frame,
+                    &map_lines::zeros([&frame.x, &frame.y], line.function(scene.points())),
+                    color(nth),
+                );
             }
             let inside = attractors.iter().filter(|(x, y)| {
                 (frame.x.low..=frame.x.high).contains(x) && (frame.y.low..=frame.y.high).contains(y)

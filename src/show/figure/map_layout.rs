@@ -91,7 +91,8 @@ impl MapFigure<'_> {
         let has_legend = style.legend && !(self.rows.is_empty() && self.bar.is_none());
         let canvas = Canvas::new(style, 0.0);
         let left_of = |height: f64| left_margin(&canvas, MAP_LEFT, &[(&y, height)]);
-        let beside = if has_legend { self.legend.0 } else { right_margin(&canvas, &x, sides[0]) - LEGEND_GAP };
+        let beside =
+            if has_legend { self.legend.0 } else { right_margin(&canvas, &x, sides[0]) - LEGEND_GAP };
         canvas.set_width(left_of(sides[1]) + sides[0] + LEGEND_GAP + beside);
         let width = canvas.size().0;
         let is_below = has_legend
@@ -123,11 +124,8 @@ impl MapFigure<'_> {
         overlay(&canvas, &frame);
         frame.draw_axes(&canvas, true);
         if has_legend && !is_below {
-            let place = Rect {
-                left: right + LEGEND_GAP,
-                right: right + self.legend.0 - LEGEND_MARGIN,
-                ..map
-            };
+            let place =
+                Rect { left: right + LEGEND_GAP, right: right + self.legend.0 - LEGEND_MARGIN, ..map };
             let top = self.draw_rows(&canvas, place, &self.rows);
             let above = if self.rows.is_empty() { 0.0 } else { ABOVE_BAR };
             self.draw_bar(&canvas, (place.left, top + above));
@@ -179,15 +177,12 @@ impl MapFigure<'_> {
     /// Draws the upright bar below a position.
     fn draw_bar(&self, canvas: &Canvas, (left, top): (f64, f64)) {
         let Some(bar) = self.bar else { return };
-        let rect = Rect {
-            left,
-            top: top + BAR_HEAD,
-            right: left + BAR_WIDTH,
-            bottom: top + BAR_HEAD + BAR_HEIGHT,
-        };
+        let rect =
+            Rect { left, top: top + BAR_HEAD, right: left + BAR_WIDTH, bottom: top + BAR_HEAD + BAR_HEIGHT };
         canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row]);
         canvas.outline(rect, 1.0);
-        let frame = Frame { rect, x: Axis::exact("", 0.0, 1.0), y: Axis::exact(bar.label, bar.low, bar.high) };
+        let frame =
+            Frame { rect, x: Axis::exact("", 0.0, 1.0), y: Axis::exact(bar.label, bar.low, bar.high) };
         frame.draw_scale(canvas);
         canvas.text(&frame.scale_name(), (left, top + 12.0), SMALL, Align::Left, DARK);
         let middle = left + BAR_WIDTH / 2.0;

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::show::drawing::axis::Axis;
 use crate::show::drawing::Point;
+use crate::show::drawing::axis::Axis;
 
 /// Number of squares along each axis.
 const SQUARES: usize = 256;
@@ -19,7 +19,8 @@ pub(crate) fn zeros([x, y]: [&Axis; 2], function: impl Fn([f64; 2]) -> f64) -> V
     let place = |axis: &Axis, at: f64| axis.low + at / SQUARES as f64 * (axis.high - axis.low);
     let point = |at: [f64; 2]| [x.value(place(x, at[0])), y.value(place(y, at[1]))];
     let corner = |i: usize, j: usize| function(point([i as f64, j as f64]));
-    let values: Vec<f64> = (0..=SQUARES).flat_map(|j| (0..=SQUARES).map(move |i| [i, j])).map(|[i, j]| corner(i, j)).collect();
+    let values: Vec<f64> =
+        (0..=SQUARES).flat_map(|j| (0..=SQUARES).map(move |i| [i, j])).map(|[i, j]| corner(i, j)).collect();
     let value = |[i, j]: [usize; 2]| values[j * (SQUARES + 1) + i];
     let crossing = |([i, j], is_upwards): Edge| {
         let end = if is_upwards { [i, j + 1] } else { [i + 1, j] };
@@ -45,10 +46,13 @@ pub(crate) fn zeros([x, y]: [&Axis; 2], function: impl Fn([f64; 2]) -> f64) -> V
     for [i, j] in (0..SQUARES).flat_map(|j| (0..SQUARES).map(move |i| [i, j])) {
         // Counterclockwise, so that consecutive crossings belong together.
         let edges = [([i, j], false), ([i + 1, j], true), ([i, j + 1], false), ([i, j], true)];
-        let crossed: Vec<Edge> = edges.into_iter().filter(|&edge| match points.contains_key(&edge) {
-            true => true,
-            false => crossing(edge).map(|point| points.insert(edge, point)).is_some(),
-        }).collect();
+        let crossed: Vec<Edge> = edges
+            .into_iter()
+            .filter(|&edge| match points.contains_key(&edge) {
+                true => true,
+                false => crossing(edge).map(|point| points.insert(edge, point)).is_some(),
+            })
+            .collect();
         for pair in crossed.chunks_exact(2) {
             next.entry(pair[0]).or_default().push(pair[1]);
             next.entry(pair[1]).or_default().push(pair[0]);

@@ -52,7 +52,7 @@ impl OrbitFigure {
         write_figure(out, format, &self.draw(style, plot))
     }
 
-    fn draw(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {
+    pub(super) fn draw(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {
         let canvas = Canvas::new(style, ORBIT_WIDTH);
         match self {
             OrbitFigure::PhasePlane => plot.draw_phase_planes(&canvas),

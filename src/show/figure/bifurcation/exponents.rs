@@ -83,7 +83,8 @@ pub(crate) fn draw(canvas: &Canvas, frame: &Frame, columns: &[Column], coloring:
         let columns: Vec<&Column> = of(pass).collect();
         let bottom = frame.rect.bottom - STRIP * row as f64;
         let spans = spans(frame, &columns);
-        let colored: Vec<_> = columns.iter().zip(spans).map(|(c, span)| (class_color(c.class), span)).collect();
+        let colored: Vec<_> =
+            columns.iter().zip(spans).map(|(c, span)| (class_color(c.class), span)).collect();
         // One rectangle for neighbours of one class: seams between rectangles would look like stripes.
         for run in colored.chunk_by(|a, b| a.0 == b.0) {
             let (from, to) = (run[0].1[0], run[run.len() - 1].1[1]);

@@ -39,7 +39,12 @@ pub fn write(
     write_figure(out, format, &draw(style, model, orbit, spectrum))
 }
 
-fn draw(style: &FigureStyle, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Canvas {
+pub(in crate::show::figure) fn draw(
+    style: &FigureStyle,
+    model: &dyn Model,
+    orbit: &Orbit,
+    spectrum: &Spectrum,
+) -> Canvas {
     let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
     let canvas = Canvas::new(style, ORBIT_WIDTH);
     let top = draw_head(&canvas, &heading::parameters(model), &subtitle, &[]) + 14.0;
@@ -48,7 +53,9 @@ fn draw(style: &FigureStyle, model: &dyn Model, orbit: &Orbit, spectrum: &Spectr
     let labels = [format!("amplitude of {quantity}"), "amplitude of its velocity".to_owned()];
     let end = spectrum.lines.last().map_or(1.0, |line| line.frequency);
     let x = Axis::exact("frequency in multiples of the forcing frequency", 0.0, end);
-    let y = |(which, label): (usize, &String)| Axis::decades(label, visible(spectrum, which).map(|(_, size)| size));
+    let y = |(which, label): (usize, &String)| {
+        Axis::decades(label, visible(spectrum, which).map(|(_, size)| size))
+    };
     let edges = stacked(&canvas, top, HEIGHT, &[1.0, 1.0]);
     let panels = edges.into_iter().zip(labels.iter().enumerate().map(y)).collect();
     for (which, frame) in column(&canvas, panels, &x, ORBIT_LEFT, 0.0).iter().enumerate() {
@@ -71,7 +78,8 @@ fn visible(spectrum: &Spectrum, which: usize) -> impl Iterator<Item = (f64, f64)
 fn draw_panel(canvas: &Canvas, frame: &Frame, spectrum: &Spectrum, which: usize) {
     frame.draw_grid(canvas);
     if spectrum.cycle.is_none() {
-        let path: Vec<_> = lines(spectrum, which).map(|(frequency, size)| frame.at(frequency, size)).collect();
+        let path: Vec<_> =
+            lines(spectrum, which).map(|(frequency, size)| frame.at(frequency, size)).collect();
         canvas.stroke(&path, 1.4, DARK);
     } else {
         let [width, radius] = if spectrum.lines.len() <= THICK_LINES { [FREE_LINE, 5.0] } else { [1.0, 2.5] };
