@@ -245,6 +245,60 @@ impl Canvas {
     }
 }
 
+/// The geometry of the items, for tests.
+#[cfg(test)]
+impl Canvas {
+    /// Returns every text with its place and type size. The place spans from the baseline to the height of capitals.
+    pub(crate) fn texts(&self) -> Vec<(String, Rect, f64)> {
+        let face = Typeface::of_figures();
+        let text = |item: &Item| match item {
+            Item::Text { text, at, em, align, .. } => {
+                let (width, height) = (face.set(text, *em).1, face.cap_height(*em));
+                let ((x, y), (dx, dy)) = crate::show::drawing::typeface::beginning(*at, width, *align);
+                let end = (x + width * dx + height * dy, y + width * dy - height * dx);
+                let place =
+                    Rect { left: x.min(end.0), top: y.min(end.1), right: x.max(end.0), bottom: y.max(end.1) };
+                Some((text.clone(), place, *em))
+            }
+            _ => None,
+        };
+        self.items.borrow().iter().filter_map(text).collect()
+    }
+
+    /// Returns the outlined rectangles: panels, colour bars, patches of legends.
+    pub(crate) fn outlines(&self) -> Vec<Rect> {
+        let outline = |item: &Item| match item {
+            Item::Line { path, .. } if path.len() == 5 && path[0] == path[4] => Some(extent(path)),
+            _ => None,
+        };
+        self.items.borrow().iter().filter_map(outline).collect()
+    }
+
+    /// Returns the rectangles around all items except texts.
+    pub(crate) fn extents(&self) -> Vec<Rect> {
+        let around = |item: &Item| match item {
+            Item::Area { outline: Outline::Rect(rect), .. } | Item::Image { rect, .. } => Some(*rect),
+            Item::Area { outline: Outline::Circle { center, radius }, .. } => {
+                Some(Rect::around(*center, (*radius, *radius)))
+            }
+            Item::Area { outline: Outline::Polygon(path), .. } | Item::Line { path, .. } => {
+                Some(extent(path))
+            }
+            Item::Text { .. } => None,
+        };
+        self.items.borrow().iter().filter_map(around).collect()
+    }
+}
+
+#[cfg(test)]
+fn extent(path: &[Point]) -> Rect {
+    let ends = |coordinate: fn(&Point) -> f64| {
+        path.iter().map(coordinate).fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)))
+    };
+    let ((left, right), (top, bottom)) = (ends(|p| p.0), ends(|p| p.1));
+    Rect { left, top, right, bottom }
+}
+
 /// Returns a path without points that are not finite or too close to the previous one. Its last point is always kept.
 fn thinned(path: &[Point]) -> Vec<Point> {
     let near = |v: f64| v.clamp(-FAR, FAR);

@@ -50,7 +50,8 @@ impl Canvas {
                 continue;
             }
             if !line.is_empty() {
-                lines.push(std::mem::take(&mut line).trim_end().to_owned());
+                // A separator at the end of a line is superfluous.
+                lines.push(std::mem::take(&mut line).trim_end_matches([' ', '\u{b7}']).to_owned());
             }
             let mut broken = self.broken(part, size, room, rest);
             line = broken.pop().unwrap_or_default();

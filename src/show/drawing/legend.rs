@@ -77,7 +77,7 @@ pub fn draw_head(canvas: &Canvas, title: &str, subtitle: &str, entries: &[Entry]
         y = draw_lines(canvas, title, y, LARGE);
         for (i, line) in subtitle.lines().enumerate() {
             y += if i == 0 { 40.0 } else { 34.0 };
-            y = draw_lines(canvas, line, y, MEDIUM);
+            y = draw_lines(canvas, line, y, if canvas.is_default() { MEDIUM } else { SMALL });
         }
         y += 44.0;
     }

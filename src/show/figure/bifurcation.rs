@@ -68,7 +68,10 @@ pub(super) fn draw(
     let coloring = Coloring::of(columns);
     let top = draw_head(canvas, title, subtitle, &legend(columns, panels, coloring)) + 14.0;
     let x = value_axis(axis, columns);
-    let shares = [vec![1.0; panels.list.len()], vec![EXPONENTS_HEIGHT]].concat();
+    // Strips of classes need more of a low panel.
+    let is_low = !canvas.is_default() && coloring.strips() > 0;
+    let exponents = if is_low { 1.0 } else { EXPONENTS_HEIGHT };
+    let shares = [vec![1.0; panels.list.len()], vec![exponents]].concat();
     let edges = stacked(canvas, top, HEIGHT, &shares);
     let axis = |(i, edges): (usize, [f64; 2])| {
         let height = edges[1] - edges[0];

@@ -33,7 +33,9 @@ const PATCH: (f64, f64) = (34.0, 20.0);
 const AFTER_PATCH: f64 = 14.0;
 /// Least distances from a text to the number of its cells, and between two columns.
 const BEFORE_CELLS: f64 = 16.0;
-const BETWEEN_COLUMNS: f64 = 30.0;
+const BETWEEN_COLUMNS: f64 = 24.0;
+/// Largest number of columns of a legend below a map.
+const MOST_COLUMNS: usize = 4;
 
 /// Size of an upright colour bar, and height of a horizontal one.
 pub(crate) const BAR_WIDTH: f64 = 34.0;
@@ -102,7 +104,11 @@ impl MapFigure<'_> {
         let is_usual = canvas.is_default() && canvas.has_heading();
         let top = if is_usual { (head + BELOW_HEAD).max(MAP_TOP) } else { head + 2.0 * BELOW_HEAD };
         let right = match is_below || !has_legend {
-            true => width - right_margin(&canvas, &x, width - left_of(LEAST_MAP)),
+            true => {
+                let length = width - left_of(LEAST_MAP);
+                let bar = self.bar.map(|bar| right_margin(&canvas, &bar.axis(), length));
+                width - right_margin(&canvas, &x, length).max(bar.unwrap_or(0.0))
+            }
             false => width - beside - LEGEND_GAP,
         };
         let height = |left: f64| match canvas.is_default() {
@@ -157,19 +163,25 @@ impl MapFigure<'_> {
     /// Draws the legend below the map in as many columns as fit, then the bar. Returns the y coordinate below it.
     fn draw_below(&self, canvas: &Canvas, map: Rect, top: f64) -> f64 {
         let room = canvas.size().0 - 2.0 * EDGE;
-        let widest = self.rows.iter().map(|row| row.width(canvas)).fold(0.0, f64::max).min(room);
         let has_sections = self.rows.iter().any(|row| row.is_apart);
-        let most = ((room + BETWEEN_COLUMNS) / (widest + BETWEEN_COLUMNS)).floor().max(1.0) as usize;
-        let most = if has_sections { 1 } else { most };
-        let in_column = self.rows.len().div_ceil(most).max(1);
-        let columns = self.rows.chunks(in_column);
-        let total = columns.len() as f64 * (widest + BETWEEN_COLUMNS) - BETWEEN_COLUMNS;
-        let mut left = if map.left + total <= room { map.left } else { EDGE + (room - total) / 2.0 };
+        let most = if has_sections { 1 } else { self.rows.len().clamp(1, MOST_COLUMNS) };
+        let widths = |count: usize| -> Vec<f64> {
+            let columns = self.rows.chunks(self.rows.len().div_ceil(count).max(1));
+            let widest = |rows: &[Row]| rows.iter().map(|row| row.width(canvas)).fold(0.0, f64::max);
+            columns.map(|rows| widest(rows).min(room)).collect()
+        };
+        let total = |widths: &[f64]| {
+            widths.iter().map(|width| width + BETWEEN_COLUMNS).sum::<f64>() - BETWEEN_COLUMNS
+        };
+        let count = (1..=most).rev().find(|count| total(&widths(*count)) <= room).unwrap_or(1);
+        let widths = widths(count);
+        let is_narrow = map.left + total(&widths) <= canvas.size().0 - EDGE;
+        let mut left = if is_narrow { map.left } else { EDGE + (room - total(&widths)) / 2.0 };
         let mut bottom = top;
-        for column in columns {
-            let place = Rect { left, top, right: left + widest, ..map };
-            bottom = self.draw_rows(canvas, place, column).max(bottom);
-            left += widest + BETWEEN_COLUMNS;
+        for (rows, width) in self.rows.chunks(self.rows.len().div_ceil(count).max(1)).zip(widths) {
+            let place = Rect { left, top, right: left + width, ..map };
+            bottom = self.draw_rows(canvas, place, rows).max(bottom);
+            left += width + BETWEEN_COLUMNS;
         }
         self.draw_flat_bar(canvas, map, bottom) + EDGE
     }
@@ -181,8 +193,7 @@ impl MapFigure<'_> {
             Rect { left, top: top + BAR_HEAD, right: left + BAR_WIDTH, bottom: top + BAR_HEAD + BAR_HEIGHT };
         canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row]);
         canvas.outline(rect, 1.0);
-        let frame =
-            Frame { rect, x: Axis::exact("", 0.0, 1.0), y: Axis::exact(bar.label, bar.low, bar.high) };
+        let frame = Frame { rect, x: Axis::exact("", 0.0, 1.0), y: bar.axis() };
         frame.draw_scale(canvas);
         canvas.text(&frame.scale_name(), (left, top + 12.0), SMALL, Align::Left, DARK);
         let middle = left + BAR_WIDTH / 2.0;
@@ -200,7 +211,7 @@ impl MapFigure<'_> {
         let Some(bar) = self.bar else { return top };
         let inset = if bar.beyond == [0, 0] { 0.0 } else { ARROW };
         let (left, right) = (map.left + inset, map.right - inset);
-        let axis = Axis::exact(bar.label, bar.low, bar.high);
+        let axis = bar.axis();
         let name = canvas.lines(&x_name_of(canvas, &axis, right - left), SMALL, map.right - map.left);
         let mut y = top + 0.8 * ROW;
         for line in &name.lines {

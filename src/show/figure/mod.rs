@@ -6,3 +6,5 @@ pub mod map;
 mod map_layout;
 mod map_lines;
 pub mod orbit;
+#[cfg(test)]
+mod pages;

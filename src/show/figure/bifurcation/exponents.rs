@@ -49,7 +49,8 @@ pub(crate) fn axis(columns: &[Column], strips: usize, height: f64) -> Axis {
     let label = if is_clipped { "exponent \u{3bb}, cut below" } else { "largest exponent \u{3bb}" };
     let mut axis = Axis::around(label, finite.iter().map(|x| x.max(floor)).chain([0.0]), 1e-3);
     // Leaves room for the strips below the data.
-    axis.low -= (axis.high - axis.low) * STRIP * strips as f64 / height;
+    let share = STRIP * strips as f64 / height;
+    axis.low -= (axis.high - axis.low) * share / (1.0 - share);
     axis
 }
 

@@ -3,7 +3,7 @@
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::draw_head;
-use crate::show::drawing::{Align, Canvas, DARK, MEDIUM, MESHING, Rect, SMALL, wall_color};
+use crate::show::drawing::{Align, Canvas, DARK, MEDIUM, MESHING, Point, Rect, SMALL, wall_color};
 use crate::show::figure::orbit::flights;
 use crate::show::figure::orbit::motion::Piece;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
@@ -13,7 +13,7 @@ use rattlemap_dynamics::model::{Contact, Side, State};
 
 /// Default height, and shares of the panels of gap and depth.
 const HEIGHT: f64 = 1050.0;
-const SHARES: [f64; 2] = [1.0, 0.53];
+const SHARES: [f64; 2] = [1.4, 0.75];
 /// Room for the walls' names right of the panel in a figure of default size, and the room for their text, which includes the
 /// margin.
 const WALL_NAMES: f64 = 97.0;
@@ -22,6 +22,10 @@ const WALL_TEXT: f64 = 135.0;
 const WALL_AWAY: f64 = 14.0;
 /// Distance between a symbol of the word and its flight.
 const SYMBOL_AWAY: f64 = 30.0;
+/// Width of a symbol.
+const SYMBOL_WIDTH: f64 = 13.0;
+/// Least distance of the middle of a symbol from the edges of the panel.
+const SYMBOL_HALF: f64 = 14.0;
 /// A single wall is shown if its distance from the motion is less than this many times the motion's extent.
 const FAR_WALL: f64 = 2.0;
 /// Margin beyond the motion's ends, as a share of its extent, unless two walls bound it.
@@ -37,7 +41,7 @@ impl OrbitPlot<'_> {
         let free = if is_coordinate { "free motion" } else { "gap in free motion" };
         let legend = self.legend(self.motion_entries(free), false);
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
-        let shares: &[f64] = if self.has_depth() { &SHARES } else { &[1.0] };
+        let shares = if self.has_depth() { &SHARES[..] } else { &SHARES[..1] };
         let label = match is_coordinate {
             true => format!("displacement, {}", self.walls.gap()),
             false => format!("gap, z = {}", self.gap_expression()),
@@ -98,10 +102,12 @@ impl OrbitPlot<'_> {
         Axis::around(label, gaps().chain(ends), least_span)
     }
 
-    /// Draws the symbols of the word: behind the wall of a flight that returns to it, else beside the flight.
+    /// Draws the symbols of the word: behind the wall of a flight that returns to it, else beside the flight. Symbols that
+    /// would overlap an earlier one are left out.
     fn draw_symbols(&self, canvas: &Canvas, frame: &Frame) {
         let walls = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
         let is_elastic = |side: Side| self.contact(side) == Some(Contact::Elastic);
+        let mut drawn: Vec<Point> = Vec::new();
         for (t, symbol) in flights::symbols(&self.motion.events, self.cycle) {
             let nearest = self.motion.points().min_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
             let Some((_, state)) = nearest else { continue };
@@ -120,6 +126,14 @@ impl OrbitPlot<'_> {
                 '3' => (x + SYMBOL_AWAY, y - 0.5 * SYMBOL_AWAY),
                 _ => (x - SYMBOL_AWAY, y - 0.5 * SYMBOL_AWAY),
             };
+            let Rect { top, bottom, .. } = frame.rect;
+            let at = (at.0, at.1.max(top + SYMBOL_HALF).min(bottom - SYMBOL_HALF));
+            let is_close =
+                |(x, y): &Point| (x - at.0).abs() < SYMBOL_WIDTH && (y - at.1).abs() < SYMBOL_WIDTH;
+            if drawn.iter().any(is_close) {
+                continue;
+            }
+            drawn.push(at);
             canvas.text(&symbol.to_string(), at, MEDIUM, Align::Center, DARK);
         }
     }

@@ -39,12 +39,7 @@ pub fn write(
     write_figure(out, format, &draw(style, model, orbit, spectrum))
 }
 
-pub(in crate::show::figure) fn draw(
-    style: &FigureStyle,
-    model: &dyn Model,
-    orbit: &Orbit,
-    spectrum: &Spectrum,
-) -> Canvas {
+pub(crate) fn draw(style: &FigureStyle, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Canvas {
     let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
     let canvas = Canvas::new(style, ORBIT_WIDTH);
     let top = draw_head(&canvas, &heading::parameters(model), &subtitle, &[]) + 14.0;
