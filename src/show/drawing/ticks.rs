@@ -20,9 +20,10 @@ pub(crate) struct Ticks {
 }
 
 impl Ticks {
-    /// Returns the name of the axis with the common factor of its labels.
+    /// Returns the name of the axis, if it has one, with the common factor of its labels.
     pub(crate) fn name(&self, axis: &Axis) -> String {
         match self.power {
+            _ if axis.label.is_empty() => String::new(),
             0 => axis.label.clone(),
             power => format!("{}, in {}", axis.label, power_label(power)),
         }

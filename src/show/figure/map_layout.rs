@@ -93,8 +93,10 @@ impl MapFigure<'_> {
         let has_legend = style.legend && !(self.rows.is_empty() && self.bar.is_none());
         let canvas = Canvas::new(style, 0.0);
         let left_of = |height: f64| left_margin(&canvas, MAP_LEFT, &[(&y, height)]);
-        let beside =
-            if has_legend { self.legend.0 } else { right_margin(&canvas, &x, sides[0]) - LEGEND_GAP };
+        let beside = match has_legend {
+            true => self.width(&canvas),
+            false => right_margin(&canvas, &x, sides[0]) - LEGEND_GAP,
+        };
         canvas.set_width(left_of(sides[1]) + sides[0] + LEGEND_GAP + beside);
         let width = canvas.size().0;
         let is_below = has_legend
@@ -130,13 +132,27 @@ impl MapFigure<'_> {
         overlay(&canvas, &frame);
         frame.draw_axes(&canvas, true);
         if has_legend && !is_below {
-            let place =
-                Rect { left: right + LEGEND_GAP, right: right + self.legend.0 - LEGEND_MARGIN, ..map };
+            let margin = if canvas.is_default() { LEGEND_GAP + LEGEND_MARGIN } else { EDGE };
+            let place = Rect { left: right + LEGEND_GAP, right: width - margin, ..map };
             let top = self.draw_rows(&canvas, place, &self.rows);
             let above = if self.rows.is_empty() { 0.0 } else { ABOVE_BAR };
             self.draw_bar(&canvas, (place.left, top + above));
         }
         canvas
+    }
+
+    /// Returns the width of the legend at the right and of the margin right of it.
+    fn width(&self, canvas: &Canvas) -> f64 {
+        if canvas.is_default() {
+            return self.legend.0;
+        }
+        let rows = self.rows.iter().map(|row| row.width(canvas));
+        let of_bar = |bar: &Bar| {
+            let texts =
+                [vec![upright(bar, (0.0, 0.0)).scale_name()], bar.remarks(self.cells.count())].concat();
+            texts.iter().map(|text| canvas.text_width(text, SMALL)).fold(0.0, f64::max)
+        };
+        rows.chain(self.bar.map(of_bar)).fold(0.0, f64::max) + EDGE
     }
 
     /// Returns the height of the legend at the right: rows, then the bar.
@@ -189,11 +205,10 @@ impl MapFigure<'_> {
     /// Draws the upright bar below a position.
     fn draw_bar(&self, canvas: &Canvas, (left, top): (f64, f64)) {
         let Some(bar) = self.bar else { return };
-        let rect =
-            Rect { left, top: top + BAR_HEAD, right: left + BAR_WIDTH, bottom: top + BAR_HEAD + BAR_HEIGHT };
+        let frame = upright(bar, (left, top + BAR_HEAD));
+        let rect = frame.rect;
         canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row]);
         canvas.outline(rect, 1.0);
-        let frame = Frame { rect, x: Axis::exact("", 0.0, 1.0), y: bar.axis() };
         frame.draw_scale(canvas);
         canvas.text(&frame.scale_name(), (left, top + 12.0), SMALL, Align::Left, DARK);
         let middle = left + BAR_WIDTH / 2.0;
@@ -234,6 +249,12 @@ impl MapFigure<'_> {
         }
         bottom
     }
+}
+
+/// Returns the frame of an upright bar, given its top left corner.
+fn upright(bar: &Bar, (left, top): Point) -> Frame {
+    let rect = Rect { left, top, right: left + BAR_WIDTH, bottom: top + BAR_HEIGHT };
+    Frame { rect, x: Axis::exact("", 0.0, 1.0), y: bar.axis() }
 }
 
 /// Draws an arrow at each end of a bar beyond which there are values, given the corners of both.

@@ -87,7 +87,9 @@ fn check(name: &str, canvas: &Canvas, has_texts_inside: bool) {
         let band = gap * millimetres(canvas);
         assert!(band <= LARGEST_BAND, "{name}: an empty band is {band} mm {direction}");
     }
-    check_files(name, canvas);
+    if canvas.style == style() {
+        check_files(name, canvas);
+    }
 }
 
 /// Checks the size of the page in all formats.
@@ -261,12 +263,12 @@ fn orbits_fit_a_page() {
         let trace =
             orbit::trace(&*model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, 400).unwrap();
         let plot = OrbitPlot::new(&*model, &orbit, &trace).unwrap();
+        let spectrum = Spectrum::of(&*model, &orbit).unwrap().unwrap();
         for style in styles() {
             for figure in OrbitFigure::ALL {
                 let name = format!("{} {figure:?} {style:?}", model.name());
                 check(&name, &figure.draw(&style, &plot), figure == OrbitFigure::Gap);
             }
-            let spectrum = Spectrum::of(&*model, &orbit).unwrap().unwrap();
             let canvas = spectrum::draw(&style, &*model, &orbit, &spectrum);
             check(&format!("{} spectrum {style:?}", model.name()), &canvas, false);
         }
