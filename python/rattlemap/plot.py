@@ -120,9 +120,12 @@ def _inches(width: str) -> float:
 
 
 def _legend_below(axes: Axes, handles: list[Patch], lines: list[str], inches: float) -> None:
-    """Draw the legend below the map, and make the figure higher by its height."""
-    # About 30 characters of a line with its patch need 55 mm.
-    columns = max(1, int(inches * 25.4 / (1.4 * max(map(len, lines)) + 12)))
+    """Draw the legend below the map, and make the figure higher by its height. Long words are cut in the middle."""
+    # In millimetres: a patch with its margins, and a character.
+    patch, character, page = 12, 1.7, inches * 25.4
+    most = int((page - patch) / character)
+    lines = [line if len(line) <= most else f"{line[: most - 12]}…{line[-11:]}" for line in lines]
+    columns = max(1, int(page / (character * max(map(len, lines)) + patch)))
     rows = -(-len(lines) // columns)
     figure: Any = axes.figure
     figure.legend(handles, lines, loc="outside lower center", ncols=columns, fontsize=_POINTS, frameon=False)
