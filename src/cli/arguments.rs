@@ -4,16 +4,18 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::cli::failure::Failure;
 use crate::cli::say;
 use crate::gpu::Precision;
 use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
-use crate::map::scene::{Along, Format};
+use crate::map::scene::{Along, FigureStyle, Format, toml};
 use crate::map::shard::Shard;
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
 use crate::store::inventory::figure_formats;
 use crate::text::printable::is_printable;
 use crate::text::shell::quoted;
 use crate::validate::DEFAULT_SAMPLES;
+use anyhow::anyhow;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -172,6 +174,9 @@ pub(crate) struct BenchOptions {
     #[arg(long)]
     pub(crate) force: bool,
 
+    #[command(flatten)]
+    pub(crate) figure: FigureOptions,
+
     /// Use tiny maps, to check that everything works. The measured speeds are meaningless
     #[arg(long)]
     pub(crate) quick: bool,
@@ -308,6 +313,9 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
 
+    #[command(flatten)]
+    pub(crate) figure: FigureOptions,
+
     /// Print only errors and warnings
     #[arg(long)]
     pub(crate) quiet: bool,
@@ -318,6 +326,64 @@ impl SceneOptions {
     pub(crate) fn out(&self) -> PathBuf {
         let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
         self.out.clone().unwrap_or_else(default)
+    }
+}
+
+/// Appearance of figures.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct FigureOptions {
+    /// Width of figures, 60mm to 300mm, in mm, cm, in or pt. All type then has at least 7.4 points, or the size of --font-size.
+    /// PNG files have 600 dots per inch. Example: --width 85mm
+    #[arg(long, value_name = "LENGTH", value_parser = width, allow_hyphen_values = true)]
+    width: Option<String>,
+
+    /// Size of tick labels and legends in points, 7 to 24; the width must be at least 21 times as large
+    #[arg(long, value_name = "POINTS", value_parser = font_size, allow_hyphen_values = true)]
+    font_size: Option<f64>,
+
+    /// Title of figures, instead of their own; --title "" removes the heading
+    #[arg(long, value_name = "TEXT")]
+    title: Option<String>,
+
+    /// Draw figures without legends and colour bars
+    #[arg(long)]
+    no_legend: bool,
+}
+
+fn width(text: &str) -> Result<String, String> {
+    FigureStyle::width(text).map(|_| text.trim().to_owned()).map_err(|reason| format!("it must be {reason}"))
+}
+
+fn font_size(text: &str) -> Result<f64, String> {
+    let size = text.trim().parse().unwrap_or(f64::NAN);
+    FigureStyle::font_size(size).map_err(|reason| format!("it must be {reason}"))
+}
+
+impl FigureOptions {
+    /// The `--set` arguments with the same effect.
+    pub(crate) fn sets(&self) -> Vec<String> {
+        let width = self.width.as_ref().map(|width| format!("figure.width={}", toml(width)));
+        let font_size = self.font_size.map(|size| format!("figure.font_size={size:?}"));
+        let title = self.title.as_ref().map(|title| format!("figure.title={}", toml(title)));
+        let legend = self.no_legend.then(|| "figure.legend=false".to_owned());
+        [width, font_size, title, legend].into_iter().flatten().collect()
+    }
+
+    /// The style of the figures.
+    ///
+    /// # Errors
+    /// A text that names the option and the remedy.
+    pub(crate) fn style(&self) -> Result<FigureStyle, Failure> {
+        let style = FigureStyle {
+            width: self.width.as_deref().and_then(|text| FigureStyle::width(text).ok()),
+            font_size: self.font_size,
+            title: self.title.clone(),
+            legend: !self.no_legend,
+        };
+        match style.check() {
+            Ok(()) => Ok(style),
+            Err(reason) => Err(Failure::Usage(anyhow!("--font-size: it must be {reason}"))),
+        }
     }
 }
 
@@ -456,6 +522,9 @@ pub(crate) struct Orbit {
     /// Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', requires = "out")]
     pub(crate) format: Vec<FigureFormat>,
+
+    #[command(flatten)]
+    pub(crate) figure: FigureOptions,
 
     /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long, requires = "out")]
@@ -643,6 +712,9 @@ pub(crate) struct Compare {
     /// Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
+
+    #[command(flatten)]
+    pub(crate) figure: FigureOptions,
 
     /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long)]

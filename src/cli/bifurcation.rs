@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     let file = SceneFile { purpose: Purpose::Bifurcation, along, ..SceneFile::map(&options.scene) };
     let (out, figures) = (arguments.out(), FigureFormat::scene(&options.format));
     let stored = if figures.is_empty() { Vec::new() } else { figure_formats(&out, "bifurcation") };
-    let sets = file.with_formats(options.set.clone(), &figures, &stored)?;
+    let sets = file.with_formats([options.set.clone(), options.figure.sets()].concat(), &figures, &stored)?;
     let scene = file.load(&sets)?;
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(options.quiet)?;

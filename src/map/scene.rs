@@ -8,6 +8,7 @@ mod along;
 mod axis;
 mod builder;
 mod derived;
+mod figure;
 mod identity;
 mod keys;
 mod limits;
@@ -24,8 +25,9 @@ mod tests;
 pub use crate::text::error::{Fault, Place, Problem, SceneError};
 pub use along::Along;
 pub use axis::{Axis, Scale, Target};
-pub use builder::SceneBuilder;
+pub use builder::{SceneBuilder, quoted as toml};
 pub(crate) use derived::Rule;
+pub use figure::{FigureStyle, MapLine};
 pub use keys::{KEYS, Key, KeyDefault, Takes};
 pub use limits::MAX_COUNT;
 pub use list::{CompanionFile, FileText, FindFile, List};
@@ -38,14 +40,17 @@ use crate::text::document::{self, Node};
 use crate::text::error;
 use crate::text::section::{self, Section};
 use derived::Derived;
+use figure::Figure;
 use parameters::ParameterSources;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, Parameter, ParameterError};
 use rattlemap_dynamics::orbit;
 
 /// Keys outside of any table, and the names of the tables.
-const TOP_LEVEL: [&str; 10] =
-    ["title", "model", "parameters", "derived", "axis", "cells", "integration", "start", "refine", "outputs"];
+#[rustfmt::skip]
+const TOP_LEVEL: [&str; 11] = [
+    "title", "model", "parameters", "derived", "axis", "cells", "integration", "start", "refine", "outputs", "figure",
+];
 
 /// Purpose for which a scene is read. It decides the number of axes and the kinds of output files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,6 +92,7 @@ pub struct Scene {
     draw: Option<Draw>,
     refine: Option<Refine>,
     outputs: Outputs,
+    figure: Figure,
 }
 
 impl Scene {
@@ -197,6 +203,7 @@ impl Scene {
             draw: start::read_draw(&root, purpose)?,
             refine: settings::read_refine(&root, purpose)?,
             outputs: settings::read_outputs(&root, purpose, is_list)?,
+            figure: figure::read(&root, &points)?,
             points,
         };
         start::check(&root, &scene)?;
@@ -334,6 +341,16 @@ impl Scene {
     /// Returns the quantities and files of the map.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
+    }
+
+    /// Returns the appearance of the figures.
+    pub fn figure_style(&self) -> &FigureStyle {
+        &self.figure.style
+    }
+
+    /// Returns the lines that figures of maps show.
+    pub fn lines(&self) -> &[MapLine] {
+        &self.figure.lines
     }
 
     /// Returns the number of cells.

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant as Clock};
 
 use serde_json::json;
 
-use crate::map::scene::Format;
+use crate::map::scene::{FigureStyle, Format};
 use crate::show::figure::orbit::{OrbitFigure, OrbitPlot, spectrum};
 pub use crate::show::instant::Instant;
 use crate::show::names;
@@ -66,7 +66,7 @@ pub fn write(
     model: &dyn Model,
     orbit: &Orbit,
     request: &OrbitRequest,
-    formats: &[Format],
+    (formats, style): (&[Format], &FigureStyle),
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Clock::now();
     // The manifest does not list files of an earlier orbit.
@@ -79,7 +79,7 @@ pub fn write(
         let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
         let plot = OrbitPlot::new(model, orbit, &trace)?;
         for (figure, format, name) in FIGURES.iter().filter(|(_, format, _)| formats.contains(format)) {
-            folder.replace(name, |out| figure.write(out, *format, &plot))?;
+            folder.replace(name, |out| figure.write(out, *format, style, &plot))?;
             files.push(name);
         }
         write_trajectory(folder, model, orbit)?;
@@ -88,7 +88,7 @@ pub fn write(
             folder.replace(SPECTRUM, |out| orbit_tables::write_spectrum(out, model, &spectrum))?;
             files.push(SPECTRUM);
             for (format, name) in SPECTRUM_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {
-                folder.replace(name, |out| spectrum::write(out, *format, model, orbit, &spectrum))?;
+                folder.replace(name, |out| spectrum::write(out, *format, style, model, orbit, &spectrum))?;
                 files.push(name);
             }
         }

@@ -210,7 +210,7 @@ fn list(items: impl Iterator<Item = String>) -> String {
 }
 
 /// Quotes a TOML string or key.
-fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     let mut quoted = String::from('"');
     for c in text.chars() {
         match c {

@@ -95,6 +95,11 @@ pub const KEYS: &[Key] = &[
     key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts and mesh fraction of filled cells"),
     key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]), "quantities to compute"),
     key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "files to write; png, svg and pdf are figures. `bifurcation` accepts figures and csv; a list of cells accepts csv and npy"),
+    key("figure", "width", Words("depends on the figure"), Takes::Words("\"60mm\" to \"300mm\"; also cm, in, pt"), "width of all figures. PNG files then have 600 dots per inch"),
+    key("figure", "font_size", Words("7.4"), Takes::Words("7 to 24, and at most width / 21"), "size of tick labels and legends, in points. Exponents are smaller; headings and names of axes are at least as large"),
+    key("figure", "title", Words("the scene's title"), Takes::Text(LONGEST_TITLE), "title of figures; \"\" removes the heading, with its lines below the title"),
+    key("figure", "legend", Value("true"), Takes::Flag, "whether figures have a legend. Without it, maps have no colour bar either"),
+    key("figure", "lines", KeyDefault::None, Takes::Words("{ \"name\" = \"expression\", ... } in parameters of the model, also derived ones"), "lines on maps, where an expression is zero"),
 ];
 
 /// Returns the names of the keys in one table.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::axis::{Axis, Target};
 use super::derived::Derived;
 use super::list::List;
+use crate::text::expression::Expression;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::number::significant;
 
@@ -63,6 +64,21 @@ impl Points {
         self.assignments(cell).for_each(|(target, value)| target.set(&mut *model, value));
         self.derived.apply(&mut *model);
         model
+    }
+
+    /// Returns the model at any values of the two axes.
+    pub(crate) fn model_at(&self, values: [f64; 2]) -> Box<dyn Model> {
+        let mut model = self.base.clone();
+        self.targets().zip(values).for_each(|(target, value)| target.set(&mut *model, value));
+        self.derived.apply(&mut *model);
+        model
+    }
+
+    /// Whether an expression depends on the parameter `index`, directly or through derived parameters.
+    pub(crate) fn follows(&self, expression: &Expression, index: usize) -> bool {
+        let uses = expression.uses();
+        let rules = self.derived.rules().iter().filter(|rule| uses.contains(&rule.index()));
+        uses.contains(&index) || rules.into_iter().any(|rule| rule.follows(index))
     }
 
     /// Returns the start of a cell: `start` with the swept components replaced.

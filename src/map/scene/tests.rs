@@ -5,6 +5,7 @@ mod axes;
 mod built;
 mod cells;
 mod derived;
+mod figures;
 mod keys;
 mod ranges;
 mod sets;

@@ -13,8 +13,8 @@ use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::{Contact, Model, ModelError, Oscillator, Side, State, Units};
 use rattlemap_dynamics::orbit::{Class, EventKind, Orbit, Sample};
 
-/// Width of all figures of an orbit, and the distance of panels from the left edge.
-pub(crate) const ORBIT_WIDTH: u32 = 1600;
+/// Default width of all figures of an orbit, and least distance of panels from the left edge.
+pub(crate) const ORBIT_WIDTH: f64 = 1600.0;
 pub(crate) const ORBIT_LEFT: f64 = 130.0;
 /// Widths of the lines of free motion and of meshing.
 pub(crate) const FREE_LINE: f64 = 2.2;
