@@ -114,7 +114,7 @@ fn cells_without_motion_are_named_before_anything_is_computed() {
     let corner = scene("omega - 1.2").unwrap_err();
     assert_says(
         &corner.to_string(),
-        &["scene: at F = 1.0, omega = 1.0: damping in free motion", "semidefinite"],
+        &["scene: at F = 1, omega = 1: damping in free motion = -0.2: it must be at least 0"],
     );
     let plan = Plan::new(&scene("(omega - 1.8)*(omega - 2.2)").unwrap());
     let inside = plan.check().unwrap_err();

@@ -61,7 +61,7 @@ fn cells_of_a_list_share_flows_and_laws() {
     let bad = Plan::new(&read(&format!("{SCENE}[derived]\nk2 = \"omega - 5\"\n"), TABLE, &[]).unwrap());
     assert_says(
         &bad.check().unwrap_err().to_string(),
-        &["at e = 0.25, omega = 4.0: `k2 = -1` is out of range"],
+        &["at e = 0.25, omega = 4: `k2 = -1` is out of range"],
     );
 }
 
