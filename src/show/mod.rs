@@ -13,6 +13,7 @@ pub mod instant;
 pub mod layers;
 pub mod map_pair;
 pub mod names;
+pub mod numbers;
 pub mod orbit_json;
 pub mod orbit_spectrum;
 pub mod orbit_summary;

@@ -230,9 +230,9 @@ fn layer(layer: &Layer) -> Value {
         })
     };
     let mut object = packed("u8", &layer.indices);
-    object["name"] = layer.name.into();
-    object["short"] = layer.short.into();
-    object["title"] = layer.title.into();
+    object["name"] = (*layer.name).into();
+    object["short"] = (*layer.short).into();
+    object["title"] = (*layer.title).into();
     object["palette"] = layer.palette.iter().copied().map(hex).collect();
     object["entries"] = layer.entries.iter().map(entry).collect();
     object["bar"] = layer.bar.as_ref().map(bar).into();

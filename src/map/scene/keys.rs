@@ -92,8 +92,8 @@ pub const KEYS: &[Key] = &[
     key("refine", "max_error", Value("0.003"), Takes::Fraction, "accepted share of wrong filled cells; if the audit finds more, the map is refined further"),
     key("refine", "audit", Words("2000, or a quarter of the filled cells"), Takes::Whole(1, 10_000_000), "number of filled cells that the first audit integrates"),
     key("refine", "word", Value("false"), Takes::Flag, "also refine where only the word changes (only the pattern, if the scene requests patterns)"),
-    key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts and mesh fraction of filled cells"),
-    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]), "quantities to compute"),
+    key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts, mesh fraction and measured quantities of filled cells"),
+    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern", "impact_speed", "impact_speed_max", "impact_energy", "impact_rate", "contact_force_max", "contact_force_rms", "amplitude", "rms", "harmonic", "dissipated", "multiplier", "state"]), "quantities to compute"),
     key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "files to write; png, svg and pdf are figures. `bifurcation` accepts figures and csv; a list of cells accepts csv and npy"),
 ];
 

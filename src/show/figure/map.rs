@@ -65,7 +65,7 @@ fn draw(canvas: &Canvas, cells: &Cells<'_>, layer: &Layer, layout: &MapLayout) {
 }
 
 fn draw_bar(canvas: &Canvas, bar: &Bar, (left, top): (f64, f64), total: usize) {
-    canvas.text(bar.label, (left, top + 12.0), SMALL, Align::Left, DARK);
+    canvas.text(&bar.label, (left, top + 12.0), SMALL, Align::Left, DARK);
     let top = top + BAR_HEAD;
     let rect = Rect { left, top, right: left + BAR_WIDTH, bottom: top + BAR_HEIGHT };
     canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row]);
@@ -118,13 +118,13 @@ mod tests {
         let entry = |n: usize| NamedColor { color: [200; 3], text: format!("period {n}"), cells: 1 };
         let colors = vec![LOW, [120; 3], HIGH];
         Layer {
-            name: "map",
-            short: "map",
-            title: "a map",
+            name: "map".into(),
+            short: "map".into(),
+            title: "a map".into(),
             indices: (0..CELLS).map(|id| u8::from(id % 7 == 3)).collect(),
             palette: vec![[255, 254, 250], [9, 99, 199]],
             entries: (0..entries).map(entry).collect(),
-            bar: Some(Bar { label: "exponent", colors, low: -0.4, high: 1.0, beyond }),
+            bar: Some(Bar { label: "exponent".into(), colors, low: -0.4, high: 1.0, beyond }),
         }
     }
 

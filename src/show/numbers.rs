@@ -1,0 +1,113 @@
+//! Numbers that a scene requests besides exponent, impacts and meshing: names, headings and values.
+
+use crate::map::scene::Quantity;
+use crate::record::measures::{Dimension, Measure, Measured};
+use crate::show::cells::{Cells, Row};
+use crate::show::symbols::symbol;
+use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::orbit::Orbit;
+
+/// A number of a motion, as a column of tables, a layer of maps, a panel of diagrams, and a variable in Python.
+#[derive(Clone, Debug)]
+pub struct Number {
+    /// Name in tables, of layers, and in Python.
+    pub name: String,
+    /// Heading in plain text.
+    pub title: String,
+    /// Heading with mathematical symbols, for figures.
+    pub label: String,
+    /// Physical dimension.
+    pub dimension: Dimension,
+    /// Quantity that the scene must request.
+    pub quantity: Quantity,
+    /// Index of the state component that the number describes, if it describes one.
+    pub component: Option<usize>,
+    source: Source,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Measure(Measure),
+    ImpactRate,
+    State(usize),
+}
+
+impl Number {
+    /// Returns the numbers of some quantities of a model, in the order of the quantities.
+    pub fn of(model: &dyn Model, quantities: &[Quantity]) -> Vec<Number> {
+        let mut quantities = quantities.to_vec();
+        quantities.sort_unstable();
+        let names = model.state_names();
+        quantities.into_iter().flat_map(|quantity| of_quantity(quantity, &names)).collect()
+    }
+
+    /// Whether the number is an angle, so that minus pi and pi are equal.
+    pub fn is_angle(&self) -> bool {
+        self.dimension == Dimension::Angle
+    }
+
+    /// Returns the number of a cell.
+    pub(crate) fn of_cell(&self, cells: &Cells<'_>, id: usize, row: &Row) -> Option<f64> {
+        match self.source {
+            Source::Measure(measure) => row.measures[measure.place],
+            Source::ImpactRate => cells.impact_rate(id),
+            Source::State(component) => row.state.map(|state| state[component]),
+        }
+        .filter(|value| value.is_finite())
+    }
+
+    /// Returns the number of an orbit.
+    pub fn of_orbit(&self, orbit: &Orbit) -> Option<f64> {
+        match self.source {
+            Source::Measure(measure) => measure.read(&Measured::from(orbit)),
+            Source::ImpactRate => Some(orbit.impacts_per_period / orbit.forcing_period),
+            Source::State(component) => Some(orbit.strobe[component]),
+        }
+        .filter(|value| value.is_finite())
+    }
+}
+
+fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
+    let number = |name: String, title: String, label: String, dimension, component, source| Number {
+        name,
+        title,
+        label,
+        dimension,
+        quantity,
+        component,
+        source,
+    };
+    match quantity {
+        Quantity::ImpactRate => {
+            let title = "impacts per unit time".to_owned();
+            vec![number(
+                "impact_rate".to_owned(),
+                title.clone(),
+                title,
+                Dimension::Rate,
+                None,
+                Source::ImpactRate,
+            )]
+        }
+        Quantity::State => {
+            let of = |(i, name): (usize, &&str)| {
+                let dimension = if i % 2 == 0 { Dimension::Length } else { Dimension::Speed };
+                let title = |name: &str| format!("final state, {name}");
+                let column = format!("state_{name}");
+                number(column, title(name), title(&symbol(name)), dimension, Some(i), Source::State(i))
+            };
+            states.iter().enumerate().map(of).collect()
+        }
+        _ => {
+            let measures = quantity.group().into_iter().flat_map(|group| group.measures());
+            let of = |measure: Measure| {
+                let subject = measure.subject(states)?;
+                let [title, label] = [measure.title(subject), measure.title(&symbol(subject))];
+                let component = measure.coordinate().map(|i| 2 * i);
+                let name = measure.name(states);
+                Some(number(name, title, label, measure.dimension(), component, Source::Measure(measure)))
+            };
+            measures.filter_map(of).collect()
+        }
+    }
+}
