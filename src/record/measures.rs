@@ -178,6 +178,11 @@ impl Measure {
         }
     }
 
+    /// Returns the word that distinguishes the number from the first one of its quantity.
+    pub fn part(&self) -> &'static str {
+        self.number.name.strip_prefix(self.group.name).unwrap_or(self.number.name).trim_start_matches('_')
+    }
+
     /// Returns the heading, with this symbol of the displacement.
     pub fn title(&self, symbol: &str) -> String {
         self.number.title.replace("{}", symbol)

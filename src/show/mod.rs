@@ -15,6 +15,7 @@ pub mod map_pair;
 pub mod names;
 pub mod numbers;
 pub mod orbit_json;
+mod orbit_quantities;
 pub mod orbit_spectrum;
 pub mod orbit_summary;
 pub mod parameters;

@@ -16,6 +16,9 @@ pub struct Number {
     pub title: String,
     /// Heading with mathematical symbols, for figures.
     pub label: String,
+    /// Name of the displacement or state component, or the word that distinguishes it from other numbers of its quantity;
+    /// else empty.
+    pub subject: String,
     /// Physical dimension.
     pub dimension: Dimension,
     /// Quantity that the scene must request.
@@ -68,46 +71,45 @@ impl Number {
 }
 
 fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
-    let number = |name: String, title: String, label: String, dimension, component, source| Number {
-        name,
-        title,
-        label,
-        dimension,
-        quantity,
-        component,
-        source,
-    };
     match quantity {
-        Quantity::ImpactRate => {
-            let title = "impacts per unit time".to_owned();
-            vec![number(
-                "impact_rate".to_owned(),
-                title.clone(),
-                title,
-                Dimension::Rate,
-                None,
-                Source::ImpactRate,
-            )]
-        }
+        Quantity::ImpactRate => vec![Number {
+            name: "impact_rate".to_owned(),
+            title: "impacts per unit time".to_owned(),
+            label: "impacts per unit time".to_owned(),
+            subject: String::new(),
+            dimension: Dimension::Rate,
+            quantity,
+            component: None,
+            source: Source::ImpactRate,
+        }],
         Quantity::State => {
-            let of = |(i, name): (usize, &&str)| {
-                let dimension = if i % 2 == 0 { Dimension::Length } else { Dimension::Speed };
-                let title = |name: &str| format!("final state, {name}");
-                let column = format!("state_{name}");
-                number(column, title(name), title(&symbol(name)), dimension, Some(i), Source::State(i))
+            let of = |(i, &name): (usize, &&str)| Number {
+                name: format!("state_{name}"),
+                title: format!("final state, {name}"),
+                label: format!("final state, {}", symbol(name)),
+                subject: name.to_owned(),
+                dimension: if i % 2 == 0 { Dimension::Length } else { Dimension::Speed },
+                quantity,
+                component: Some(i),
+                source: Source::State(i),
             };
             states.iter().enumerate().map(of).collect()
         }
         _ => {
-            let measures = quantity.group().into_iter().flat_map(|group| group.measures());
             let of = |measure: Measure| {
                 let subject = measure.subject(states)?;
-                let [title, label] = [measure.title(subject), measure.title(&symbol(subject))];
-                let component = measure.coordinate().map(|i| 2 * i);
-                let name = measure.name(states);
-                Some(number(name, title, label, measure.dimension(), component, Source::Measure(measure)))
+                Some(Number {
+                    name: measure.name(states),
+                    title: measure.title(subject),
+                    label: measure.title(&symbol(subject)),
+                    subject: [measure.part(), subject].join(" ").trim().to_owned(),
+                    dimension: measure.dimension(),
+                    quantity,
+                    component: measure.coordinate().map(|i| 2 * i),
+                    source: Source::Measure(measure),
+                })
             };
-            measures.filter_map(of).collect()
+            quantity.group().into_iter().flat_map(|group| group.measures()).filter_map(of).collect()
         }
     }
 }

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use crate::show::instant::Instant;
 use crate::show::names;
+use crate::show::orbit_quantities::{self, significant};
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
 
@@ -14,7 +15,8 @@ const DECIMALS: usize = 5;
 pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
     let mut text = String::new();
     let instant = instant.map(|instant| ("state".to_owned(), state(model, instant)));
-    for (label, value) in facts(model, orbit).into_iter().chain(instant) {
+    let measured = orbit_quantities::facts(model, orbit);
+    for (label, value) in facts(model, orbit).into_iter().chain(measured).chain(instant) {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{label:<22}{value}");
     }
@@ -141,22 +143,24 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
     let names = model.state_names();
     let (count, listed) = (names.len(), names.join(", "));
     let mut text = format!(
-        "{:<11}{:<6} {:>10} {:>10}  {:<width$}   after ({listed})\n",
+        "{:<11}{:<6} {:>10} {:>10} {:>12}  {:<width$}   after ({listed})\n",
         "kind",
         "side",
         "t",
         "t mod T",
+        "impulse",
         format!(" before ({listed})"),
         width = 10 * count
     );
-    for event in events {
+    for (event, impulse) in events.iter().zip(orbit_quantities::impulses(model, events)) {
         let side = names::side(event.side);
         let _ = writeln!(
             text,
-            "{:<11}{side:<6} {:>10.DECIMALS$} {:>10.DECIMALS$}  {}  {}",
+            "{:<11}{side:<6} {:>10.DECIMALS$} {:>10.DECIMALS$} {:>12}  {}  {}",
             names::kind(event.kind),
             event.t,
             event.t_mod_period,
+            impulse.map_or("-".to_owned(), significant),
             numbers(&event.before[..count]),
             numbers(&event.after[..count])
         );

@@ -223,6 +223,12 @@ impl Quantity {
         name(&QUANTITIES, self)
     }
 
+    /// Returns the quantities that describe the size of a motion, its contacts and its energy.
+    pub fn measured() -> Vec<Quantity> {
+        let is_measured = |quantity: &Quantity| quantity.group().is_some() || *quantity == Quantity::ImpactRate;
+        QUANTITIES.iter().map(|&(_, quantity)| quantity).filter(is_measured).collect()
+    }
+
     /// Returns its entry in the table of measured quantities; none if its values have fields of their own in records.
     pub fn group(self) -> Option<&'static Group> {
         Group::named(self.name())
