@@ -84,9 +84,12 @@ def attributes(manifest: Mapping[str, Any]) -> dict[str, Any]:
     return {name: plain(value) for name, value in manifest.items() if name not in left_out and value is not None}
 
 
-def variable_attributes(name: str, codes: Mapping[str, Mapping[str, int]]) -> dict[str, Any]:
-    """Return the attributes of a variable: a long name, which labels plots, and the meaning of integer codes."""
-    found: dict[str, Any] = {"long_name": _LONG_NAMES.get(name, name)}
+def variable_attributes(
+    name: str, codes: Mapping[str, Mapping[str, int]], manifest: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the attributes of a variable: a long name, which labels plots, units, and the meaning of integer codes."""
+    measured = manifest.get("measured", {})
+    found: dict[str, Any] = dict(measured.get(name, {"long_name": _LONG_NAMES.get(name, name)}))
     if name == "symmetric":
         ordered = sorted(codes[name].items(), key=lambda item: item[1])
         found["flag_values"] = np.array([code for _, code in ordered], dtype=np.int8)
@@ -125,7 +128,7 @@ def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable
         if name in INDICES or name in coords:
             continue
         table = "words" if name in TEXT_COLUMNS else name if name in CODE_COLUMNS else None
-        variables[name] = xr.Variable(dims, read(name, shape, table), variable_attributes(name, codes))
+        variables[name] = xr.Variable(dims, read(name, shape, table), variable_attributes(name, codes, manifest))
     return xr.Dataset(variables, coords, attributes(manifest))
 
 
@@ -221,7 +224,8 @@ def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, 
         dims, coords = ("direction", axis), {"direction": np.array(names), axis: value[place[0]]}
     codes = {"symmetric": {"absent": -1, "false": 0, "true": 1}}
     variables = {
-        name: xr.Variable(dims, values[place], variable_attributes(name, codes)) for name, values in data.items()
+        name: xr.Variable(dims, values[place], variable_attributes(name, codes, manifest))
+        for name, values in data.items()
     }
     # A row without a side has no section point.
     for name, values in table_columns(points[points["side"] != ""]).items():

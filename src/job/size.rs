@@ -207,8 +207,8 @@ fn disk(scene: &Scene) -> [u64; 2] {
         // A word has a row of words.csv, too.
         Format::Npy => 33 + columns(12, 16, 3),
         // The starts of cells that follow their neighbours.
-        Format::Html if scene.start().follows() => 68,
-        Format::Html => 24,
+        Format::Html if scene.start().follows() => 68 + 4 * figures,
+        Format::Html => 24 + 4 * figures,
         // One figure per number, and one of attractors.
         Format::Png | Format::Svg | Format::Pdf => 4 * (figures + 1),
     };

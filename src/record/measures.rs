@@ -1,5 +1,6 @@
 //! Table of the measured quantities of a motion. Columns, layers, names in Python, and tolerances are made from it.
 
+use super::distance::{apart, farther};
 use super::{Record, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Measurement, Orbit, Quantities};
@@ -100,6 +101,10 @@ pub(crate) const fn places_before(group: usize) -> usize {
     places
 }
 
+fn relative(distance: f64, scale: f64) -> f64 {
+    if distance == 0.0 { 0.0 } else { distance / scale }
+}
+
 /// Number of displacements of an oscillator, and of its gap.
 const DISPLACEMENTS: usize = 3;
 /// Index of the gap among the displacements.
@@ -113,6 +118,29 @@ impl Group {
     /// Returns the group of a name.
     pub fn named(name: &str) -> Option<&'static Group> {
         GROUPS.iter().find(|group| group.name == name)
+    }
+
+    /// Returns the distance of the numbers of two records up to mirror image, relative to the larger numbers of the second: the
+    /// largest over all displacements. Amplitude and phase are compared as a complex number.
+    pub fn distance(&self, a: &Record, b: &Record) -> f64 {
+        let places: Vec<usize> = self.measures().map(|measure| measure.place).collect();
+        let of_displacement = |places: &[usize]| {
+            let [a, b] =
+                [a, b].map(|record| places.iter().map(|&place| record.measures[place]).collect::<Vec<_>>());
+            let has_phase = self.numbers.last().is_some_and(|number| number.dimension == Dimension::Angle);
+            if has_phase {
+                let [x, y] = [0, 1].map(|i| {
+                    let part = |of: &[f64]| of[0] * if i == 0 { of[1].cos() } else { of[1].sin() };
+                    apart(part(&a), part(&b))
+                });
+                return relative(x.hypot(y), b[0].abs());
+            }
+            let scale = b.iter().fold(0.0, |scale: f64, value| scale.max(value.abs()));
+            // The mean of the mirror image has the other sign.
+            let distances = a.iter().zip(&b).map(|(a, b)| relative(apart(a.abs(), b.abs()), scale));
+            distances.fold(0.0, farther)
+        };
+        places.chunks(self.numbers.len()).map(of_displacement).fold(0.0, farther)
     }
 
     /// Returns the numbers of the group.
@@ -213,6 +241,19 @@ impl Measure {
         let difference = a - b;
         if self.is_angle() { difference.sin().atan2(difference.cos()) } else { difference }
     }
+
+    /// Returns the average of values with weights of sum 1. Values of different signs, as those of mirror images, have no
+    /// average: the result is the value with the largest weight. Angles are averaged the shorter way round.
+    pub fn average(&self, weighted: &[(f64, f64)]) -> f64 {
+        let &(nearest, _) = weighted.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(&(0.0, 0.0));
+        let differ = weighted.iter().any(|(value, weight)| *weight > 0.0 && value * nearest < 0.0);
+        if differ && !self.is_angle() {
+            return nearest;
+        }
+        let sum =
+            weighted.iter().map(|(value, weight)| weight * self.difference(*value, nearest)).sum::<f64>();
+        self.difference(nearest + sum, 0.0)
+    }
 }
 
 /// The measured motion from which numbers are read.
@@ -225,6 +266,13 @@ pub struct Measured<'a> {
 }
 
 impl<'a> Measured<'a> {
+    /// Returns all numbers by their places in a record.
+    pub fn numbers(&self) -> [Option<f64>; MEASURES] {
+        let mut numbers = [None; MEASURES];
+        all().for_each(|measure| numbers[measure.place] = measure.read(self));
+        numbers
+    }
+
     /// Returns the quantities if there are impacts.
     fn impacts(&self) -> Option<&'a Quantities> {
         self.quantities.filter(|quantities| quantities.approaches[2].count > 0)
@@ -312,6 +360,36 @@ mod tests {
         assert_eq!(absent.map(value), [None; 4]);
         assert_eq!((value("dissipated"), value("rms")), (Some(2.0), Some(0.0)));
         assert_eq!(record.measures.iter().filter(|value| value.to_bits() != 0).count(), 1);
+    }
+
+    #[test]
+    fn numbers_are_compared_relative_to_the_motion_and_up_to_mirror_image() {
+        let distance = |name: &str, change: fn(&mut Record, usize)| {
+            let group = Group::named(name).unwrap();
+            let first = group.measures().next().unwrap().place;
+            let record = Record { measures: [0.5; MEASURES], ..Record::default() };
+            let mut other = record;
+            change(&mut other, first);
+            group.distance(&other, &record)
+        };
+        assert_eq!(distance("amplitude", |record, first| record.measures[first + 1] *= -1.0), 0.0);
+        assert!(
+            (distance("amplitude", |record, first| record.measures[first + 1] = 0.0) - 1.0).abs() < 1e-12
+        );
+        assert_eq!(distance("rms", |record, first| record.measures[first] = f64::NAN), f64::INFINITY);
+        let turned =
+            distance("harmonic", |record, first| record.measures[first + 1] += std::f64::consts::TAU + 1e-3);
+        assert!((turned - 1e-3).abs() < 1e-6, "{turned}");
+        assert!(distance("rms", |record, first| record.measures[first + 2] = 0.6) > 0.19, "the gap");
+    }
+
+    #[test]
+    fn averages_of_angles_and_of_mirror_images_stay_between_their_values() {
+        let named = |name: &str| all().find(|measure| measure.name(&["x", "v"]) == name).unwrap();
+        let phase = named("harmonic_phase_x").average(&[(3.0, 0.75), (-3.0, 0.25)]);
+        assert!((phase - (3.0 + 0.25 * (std::f64::consts::TAU - 6.0))).abs() < 1e-12, "{phase}");
+        assert_eq!(named("mean_x").average(&[(0.25, 0.75), (-0.25, 0.25)]), 0.25);
+        assert_eq!(named("rms_x").average(&[(1.0, 0.75), (2.0, 0.25)]), 1.25);
     }
 
     #[test]

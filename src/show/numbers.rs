@@ -1,10 +1,11 @@
 //! Numbers that a scene requests besides exponent, impacts and meshing: names, headings and values.
 
+use crate::map::bifurcation::Column;
 use crate::map::scene::Quantity;
-use crate::record::measures::{Dimension, Measure, Measured};
+use crate::record::measures::{Dimension, MEASURES, Measure, Measured};
 use crate::show::cells::{Cells, Row};
 use crate::show::symbols::symbol;
-use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::Orbit;
 
 /// A number of a motion, as a column of tables, a layer of maps, a panel of diagrams, and a variable in Python.
@@ -51,20 +52,30 @@ impl Number {
 
     /// Returns the number of a cell.
     pub(crate) fn of_cell(&self, cells: &Cells<'_>, id: usize, row: &Row) -> Option<f64> {
-        match self.source {
-            Source::Measure(measure) => row.measures[measure.place],
-            Source::ImpactRate => cells.impact_rate(id),
-            Source::State(component) => row.state.map(|state| state[component]),
-        }
-        .filter(|value| value.is_finite())
+        self.read(&row.measures, || cells.impact_rate(id), row.state)
     }
 
     /// Returns the number of an orbit.
     pub fn of_orbit(&self, orbit: &Orbit) -> Option<f64> {
+        let rate = || Some(orbit.impacts_per_period / orbit.forcing_period);
+        self.read(&Measured::from(orbit).numbers(), rate, Some(orbit.strobe))
+    }
+
+    /// Returns the number of a column of a bifurcation diagram.
+    pub fn of_column(&self, column: &Column) -> Option<f64> {
+        self.read(&column.measures, || Some(column.impact_rate), column.state)
+    }
+
+    fn read(
+        &self,
+        measures: &[Option<f64>; MEASURES],
+        rate: impl FnOnce() -> Option<f64>,
+        state: Option<State>,
+    ) -> Option<f64> {
         match self.source {
-            Source::Measure(measure) => measure.read(&Measured::from(orbit)),
-            Source::ImpactRate => Some(orbit.impacts_per_period / orbit.forcing_period),
-            Source::State(component) => Some(orbit.strobe[component]),
+            Source::Measure(measure) => measures[measure.place],
+            Source::ImpactRate => rate(),
+            Source::State(component) => state.map(|state| state[component]),
         }
         .filter(|value| value.is_finite())
     }

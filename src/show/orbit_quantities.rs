@@ -45,7 +45,8 @@ pub(crate) fn impulses(model: &dyn Model, events: &[Event]) -> Vec<Option<f64>> 
 /// Returns labels and values of the lines of a summary, one per quantity that the motion has.
 pub(crate) fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let list = |quantity: Quantity| {
-        let of = |number: &Number| Some(format!("{} {}", number.subject, significant(number.of_orbit(orbit)?)));
+        let of =
+            |number: &Number| Some(format!("{} {}", number.subject, significant(number.of_orbit(orbit)?)));
         let texts: Vec<String> = Number::of(model, &[quantity]).iter().filter_map(of).collect();
         (quantity.name().replace('_', " "), texts.join(", ").trim().to_owned())
     };

@@ -63,7 +63,8 @@ pub fn write(
         "words": spellings(&words.words),
         "patterns": spellings(&words.patterns),
         "attractors": attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect::<Vec<_>>(),
-        "refinement": cells.refinement().map(refinement::object),
+        "numbers": cells.numbers().iter().map(|number| json!([number.name, number.label])).collect::<Vec<_>>(),
+        "refinement": refinement::object(cells),
         "validation": validation,
     });
     // Start states of cells that follow their neighbours, four numbers per cell.
@@ -168,6 +169,10 @@ fn values(cells: &Cells<'_>, words: &MapWords) -> Value {
     }
     if cells.has(Quantity::Mesh) {
         object["mesh_fraction"] = floats(|row| row.mesh_fraction);
+    }
+    for number in cells.numbers() {
+        let value = |id: usize| number.of_cell(cells, id, &cells.row(id)).unwrap_or(f64::NAN) as f32;
+        object[&*number.name] = packed("f32", &cells.ids().map(value).collect::<Vec<_>>());
     }
     if cells.has(Quantity::Symmetric) {
         object["symmetric"] = bytes(|row| row.symmetric.map_or(u8::MAX, u8::from));

@@ -225,7 +225,8 @@ impl Quantity {
 
     /// Returns the quantities that describe the size of a motion, its contacts and its energy.
     pub fn measured() -> Vec<Quantity> {
-        let is_measured = |quantity: &Quantity| quantity.group().is_some() || *quantity == Quantity::ImpactRate;
+        let is_measured =
+            |quantity: &Quantity| quantity.group().is_some() || *quantity == Quantity::ImpactRate;
         QUANTITIES.iter().map(|&(_, quantity)| quantity).filter(is_measured).collect()
     }
 

@@ -223,6 +223,7 @@ function facts({ i, j }) {
     ["exponent", between(error && exponent ? `${exponent} \u00b1 ${error}` : exponent)],
     ["impacts per period", between(number("impacts_per_period"))],
     ["meshing", between(number("mesh_fraction"))],
+    ...map.numbers.map(([name, title]) => [title, between(number(name))]),
     ["symmetric", symmetric],
     ...(values.pattern ? [["pattern", pattern]] : []),
     ["word", word],
@@ -421,8 +422,9 @@ function showRefinement({ integrated, filled, rounds, audits }) {
       + `${interval(last.rate, last.interval)}.`
       + wrong(last.words, last.wrong_words, "word") + wrong(last.patterns, last.wrong_patterns, "pattern")
     : "The scene requests no audit.");
-  if (last) byId("audit-errors").append(...["lyapunov", "impacts_per_period", "mesh_fraction"]
-    .filter((name) => last.errors[name]).map((name) => element("li", errorText(FIELDS[name], last.errors[name]))));
+  if (last) byId("audit-errors").append(...["lyapunov", "impacts_per_period", "mesh_fraction", ...map.numbers.map(([name]) => name)]
+    .filter((name) => last.errors[name])
+    .map((name) => element("li", errorText(FIELDS[name] ?? new Map(map.numbers).get(name), last.errors[name]))));
   if (audits.length > 1) {
     byId("audits").append(...audits.map((audit, k) => {
       const row = element("tr");
