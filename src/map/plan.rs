@@ -89,9 +89,14 @@ impl Needs {
         self.measures & group.bit != 0
     }
 
+    /// Whether one of these measured quantities is requested.
+    pub fn has_any(&self, quantities: &[Quantity]) -> bool {
+        quantities.iter().filter_map(|quantity| quantity.group()).any(|group| self.has(group))
+    }
+
     /// Whether the motion must be measured: for all measured quantities but the multiplier, which is known for a cycle.
     pub fn measures_motion(&self) -> bool {
-        let multiplier = Group::named(Quantity::Multiplier.name()).map_or(0, |group| group.bit);
+        let multiplier = Quantity::Multiplier.group().map_or(0, |group| group.bit);
         self.measures & !multiplier != 0
     }
 }

@@ -34,7 +34,7 @@ pub const GROUPS: [Group; 10] = [
             |of, i| Some(of.quantities?.displacements[i].harmonic[1]))]),
     group("multiplier", 18, false, &[
         number("multiplier", "modulus of the largest multiplier", Dimension::None, |of, _| Some(of.multiplier?[0])),
-        number("multiplier_argument", "argument of the largest multiplier", Dimension::Angle, |of, _| Some(of.multiplier?[1]))]),
+        number("multiplier_argument", "argument of the largest multiplier", Dimension::Angle, |of, _| Some(of.multiplier?[1].abs()))]),
 ];
 
 /// Physical dimension of a number, from which its unit follows.
