@@ -63,7 +63,7 @@ pub fn write(
             files.push(STROBE_CSV);
         }
     }
-    let panels = Panels::of(scene.base(), fixed);
+    let panels = Panels::of(scene.base(), fixed, &numbers);
     for (format, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
         let subtitle =

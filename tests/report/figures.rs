@@ -23,7 +23,7 @@ const PERIOD: f64 = TAU / 5.6;
 /// Returns a diagram of the gear pair.
 fn diagram(format: Format, title: [&str; 2], axis: (&str, Scale), columns: &[Column]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let panels = Panels::of(&GearPair::paper(0.5), None);
+    let panels = Panels::of(&GearPair::paper(0.5), None, &[]);
     bifurcation::write(&mut bytes, format, title, axis, &panels, columns).unwrap();
     bytes
 }

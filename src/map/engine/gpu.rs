@@ -8,7 +8,9 @@ use std::sync::atomic::AtomicBool;
 use rayon::prelude::*;
 
 use super::{Device, EngineError, drop_unrequested};
-use crate::gpu::{self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables};
+use crate::gpu::{
+    self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables,
+};
 use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};
 use crate::record::Record;

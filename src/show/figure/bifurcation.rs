@@ -1,5 +1,5 @@
-//! A bifurcation diagram like Fig. 5 of the paper: section points against a parameter, and below them the largest Lyapunov
-//! exponent. Lengths are in pixels.
+//! A bifurcation diagram like Fig. 5 of the paper: section points against a parameter, and below them measured quantities and
+//! the largest Lyapunov exponent. Lengths are in pixels.
 
 mod coloring;
 mod exponents;
@@ -22,6 +22,8 @@ use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::Class;
 
 const DIAGRAM_SIZE: (u32, u32) = (1600, 1750);
+/// Height that a panel of a measured quantity adds.
+const MEASURED_HEIGHT: u32 = 420;
 /// Distance of the panels from the left edge, and between panels.
 const PANEL_LEFT: f64 = 130.0;
 const PANEL_GAP: f64 = 30.0;
@@ -37,7 +39,7 @@ const POINT_DOT: (f64, f64) = (0.7, 2.2);
 const CURVE_POINTS: usize = 24;
 const CURVE_DOT: f64 = 1.3;
 
-/// Draws the section points, one panel per quantity, and the largest Lyapunov exponent, and writes the figure.
+/// Draws the section points, one panel per displacement, measured quantities, and the largest Lyapunov exponent, and writes the figure.
 ///
 /// Points are coloured by wall. Where they overlap, opacity increases with the logarithm of their number and shows the density
 /// of a chaotic band. In a diagram of two passes they are coloured by direction, and grey where both passes agree. Columns that
@@ -51,7 +53,9 @@ pub fn write(
     panels: &Panels,
     columns: &[Column],
 ) -> Result<(), WriteError> {
-    write_figure(out, format, DIAGRAM_SIZE, |canvas| draw(canvas, [title, subtitle], axis, panels, columns))
+    let (width, height) = DIAGRAM_SIZE;
+    let size = (width, height + MEASURED_HEIGHT * panels.measured() as u32);
+    write_figure(out, format, size, |canvas| draw(canvas, [title, subtitle], axis, panels, columns))
 }
 
 fn draw(
