@@ -91,6 +91,11 @@ const fn number(
     Number { name, title, dimension, read }
 }
 
+/// Returns the validity bits of all groups.
+pub fn bits() -> u32 {
+    GROUPS.iter().fold(0, |bits, group| bits | group.bit)
+}
+
 /// Returns the number of places of the groups before one of them.
 pub(crate) const fn places_before(group: usize) -> usize {
     let (mut i, mut places) = (0, 0);
@@ -296,7 +301,7 @@ impl<'a> From<&'a Orbit> for Measured<'a> {
 impl Record {
     /// Stores the numbers of a motion, and the validity bits of the quantities that it has.
     pub fn set_measures(&mut self, motion: &Measured<'_>) {
-        self.valid |= GROUPS.iter().fold(0, |bits, group| bits | group.bit);
+        self.valid |= bits();
         for measure in all() {
             match measure.read(motion) {
                 // The sum turns minus zero into zero, so that columns of zeros take no memory.

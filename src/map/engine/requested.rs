@@ -1,7 +1,7 @@
 //! Records with the requested quantities.
 
 use crate::map::plan::Needs;
-use crate::record::{Record, valid};
+use crate::record::{Record, measures, valid};
 use rattlemap_dynamics::orbit::Measurement;
 
 /// Converts a measurement to a record with the requested quantities.
@@ -53,7 +53,9 @@ pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
     clear_unless(needs.pattern, valid::PATTERN, |r| {
         (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
     });
-    record.clear_measures(|group| !needs.has(group));
+    if record.valid & measures::bits() & !needs.measures != 0 {
+        record.clear_measures(|group| !needs.has(group));
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 
 use std::io::{self, Read, Write};
 use std::mem::offset_of;
+use std::ops::Range;
 
 use flate2::Compression;
 use flate2::read::DeflateDecoder;
@@ -78,11 +79,15 @@ const PLACES: [(usize, usize); BEFORE] = [
     (ID + offset_of!(Record, pattern_length), 4),
 ];
 
+/// Returns the range of a column's bytes in a row.
+fn range_of(column: usize) -> Range<usize> {
+    place(column).0..if column + 1 < COUNT { place(column + 1).0 } else { ROW }
+}
+
 /// Returns the places of a column's bytes in a row, the most significant byte of each number first.
 fn bytes_of(column: usize) -> impl Iterator<Item = usize> {
-    let (from, width) = place(column);
-    let to = if column + 1 < COUNT { place(column + 1).0 } else { ROW };
-    (from..to).step_by(width).flat_map(move |number| (number..number + width).rev())
+    let width = place(column).1;
+    range_of(column).step_by(width).flat_map(move |number| (number..number + width).rev())
 }
 
 type Row = [u8; ROW];
@@ -93,7 +98,7 @@ pub(crate) fn encode(batch: &[(u32, Record)]) -> io::Result<(u32, Vec<u8>)> {
     let mut mask = 0;
     let mut output = DeflateEncoder::new(Vec::new(), Compression::fast());
     for column in 0..COUNT {
-        if bytes_of(column).all(|at| rows.iter().all(|row| row[at] == 0)) {
+        if rows.iter().all(|row| row[range_of(column)].iter().all(|byte| *byte == 0)) {
             continue;
         }
         mask |= 1 << column;
