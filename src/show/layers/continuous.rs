@@ -153,7 +153,7 @@ mod tests {
     use super::*;
     use crate::map::plan::Plan;
     use crate::map::scene::{Purpose, Scene};
-    use crate::record::{Record, valid};
+    use crate::record::{Record, measures, valid};
 
     /// Returns the layer of exponents of a map of 400 cells.
     fn exponents(value: impl Fn(usize) -> f64) -> Layer {
@@ -189,5 +189,33 @@ mod tests {
         assert_eq!((bar.low, bar.beyond), (-0.2, [1, 0]));
         assert_eq!(bar.remarks(2000), ["values below \u{2212}0.2: 1 cell"]);
         assert_eq!(bar.remarks(100), ["values below \u{2212}0.2: 1.0 %"]);
+    }
+
+    #[test]
+    fn measured_quantities_have_a_scale_that_suits_their_signs() {
+        let axis = |name: &str| format!("[[axis]]\nparameter = '{name}'\nmin = 0.1\nmax = 1.0\ncount = 5\n");
+        let quantities = "[outputs]\nquantities = ['amplitude', 'harmonic']\n";
+        let scene = Scene::parse(&(axis("e") + &axis("omega") + quantities), "s", &[], Purpose::Map).unwrap();
+        let plan = Plan::new(&scene);
+        let record = |id: usize| {
+            let mut record = Record { valid: measures::bits() | valid::PERIOD, ..Record::default() };
+            for measure in measures::all() {
+                record.measures[measure.place] =
+                    0.1 * id as f64 - if measure.name(&[]).starts_with("mean") { 1.0 } else { 0.0 };
+            }
+            record
+        };
+        let records: Vec<Record> = (0..plan.run_count()).map(record).collect();
+        let layers: Vec<Layer> = layers(&Cells::new(&scene, &plan, &records)).collect();
+        assert_eq!(layers.len(), 12);
+        let ends = |name: &str| {
+            let layer = layers.iter().find(|layer| layer.name == name).unwrap();
+            let bar = layer.bar.as_ref().unwrap();
+            (bar.low, bar.high, bar.colors[0], bar.colors[254])
+        };
+        assert_eq!(ends("amplitude_x1"), (0.0, 2.5, sequential(0.0), sequential(1.0)));
+        assert_eq!(ends("mean_gap"), (-1.0, 1.5, signed(-1.0), signed(1.0)));
+        let (low, high, first, last) = ends("harmonic_phase_x2");
+        assert!((low, high) == (-PI, PI) && first == last, "one colour at both ends");
     }
 }
