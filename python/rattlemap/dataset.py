@@ -99,9 +99,12 @@ def described(name: str, manifest: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def variable_attributes(name: str, codes: Mapping[str, Mapping[str, int]]) -> dict[str, Any]:
-    """Return the attributes of a variable: a long name, which labels plots, and the meaning of integer codes."""
-    found: dict[str, Any] = {"long_name": _LONG_NAMES.get(name, name)}
+def variable_attributes(
+    name: str, codes: Mapping[str, Mapping[str, int]], manifest: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the attributes of a variable: a long name, which labels plots, units, and the meaning of integer codes."""
+    measured = manifest.get("measured", {})
+    found: dict[str, Any] = dict(measured.get(name, {"long_name": _LONG_NAMES.get(name, name)}))
     if name == "symmetric":
         ordered = sorted(codes[name].items(), key=lambda item: item[1])
         found["flag_values"] = np.array([code for _, code in ordered], dtype=np.int8)
@@ -142,7 +145,7 @@ def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable
         if name in INDICES or name in coords:
             continue
         table = "words" if name in TEXT_COLUMNS else name if name in CODE_COLUMNS else None
-        variables[name] = xr.Variable(dims, read(name, shape, table), variable_attributes(name, codes))
+        variables[name] = xr.Variable(dims, read(name, shape, table), variable_attributes(name, codes, manifest))
     return xr.Dataset(variables, coords, attributes(manifest))
 
 
@@ -240,7 +243,8 @@ def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, 
     coords[axis] = ((axis,), values, described(axis, manifest))
     codes = {"symmetric": {"absent": -1, "false": 0, "true": 1}}
     variables = {
-        name: xr.Variable(dims, column[place], variable_attributes(name, codes)) for name, column in data.items()
+        name: xr.Variable(dims, column[place], variable_attributes(name, codes, manifest))
+        for name, column in data.items()
     }
     # A row without a side has no section point.
     for name, column in table_columns(points[points["side"] != ""]).items():

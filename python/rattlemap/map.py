@@ -55,7 +55,9 @@ def map(  # noqa: A001
         A graphics adapter: its number in :func:`rattlemap.devices`, or a part of its name that no other adapter has.
         ``"all"``: all adapters equal to the best one share the cells. The records are the same to the bit.
     quantities
-        Some of ``class lyapunov impacts mesh symmetric word pattern``; by default class and lyapunov. Others are not computed.
+        Some of ``class lyapunov impacts mesh symmetric word pattern impact_speed impact_speed_max impact_energy impact_rate
+        contact_force_max contact_force_rms amplitude rms harmonic dissipated multiplier state``; by default class and lyapunov.
+        Others are not computed. ``docs/scenes.md`` explains them.
     start
         The start of cells at phase 0: ``"rest"``, ``"up"``, ``"down"``, a state ``[x1, v1, x2, v2]``, or some of its
         components by name.

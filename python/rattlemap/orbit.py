@@ -104,6 +104,15 @@ class Orbit:
         return _number(self._facts["mesh_fraction"])
 
     @property
+    def quantities(self) -> dict[str, float]:
+        """Measured quantities by name: speeds and energy of impacts, contact forces, amplitudes, harmonics and so on.
+
+        Averages run over the cycle, or over the observed periods of other motion. A quantity that the motion does not have is
+        NaN. ``docs/scenes.md`` lists names and meanings.
+        """
+        return {name: _number(value) for name, value in self._facts["quantities"].items()}
+
+    @property
     def periods_run(self) -> int:
         """Number of integrated forcing periods."""
         return int(self._facts["periods_run"])
@@ -123,7 +132,7 @@ class Orbit:
         """All events in order of time: a structured array, shape (events,).
 
         Fields: ``kind`` (``impact``, ``mesh_start``, ``mesh_end``), ``side`` (1 right, -1 left), ``t`` (since phase 0 of
-        the cycle), ``t_mod_period`` (in [0, T)), ``before`` and ``after`` (states).
+        the cycle), ``t_mod_period`` (in [0, T)), ``before`` and ``after`` (states), ``impulse`` (of the contact on the gap).
         """
         events = self._facts["events"]
         count = len(self._native.state_names)
@@ -135,6 +144,7 @@ class Orbit:
                 ("t_mod_period", np.float64),
                 ("before", np.float64, (count,)),
                 ("after", np.float64, (count,)),
+                ("impulse", np.float64),
             ]
         )
         assert kind.names is not None

@@ -584,9 +584,9 @@ impl Orbit {
 /// Integrates the motion at each value of the scene's axis with the event-driven reference, until its class is decided.
 /// Writes bifurcation.csv (one row per event), bifurcation_columns.csv (one row per value: class, period, word, pattern,
 /// exponent and its error), bifurcation.png and manifest.json; for models whose walls fix a displacement also
-/// bifurcation_strobe.csv (states at phase 0). The scene's steps_per_period, early_stop and quantities are ignored. With
-/// start.policy=both the motion is followed in both directions of the axis, and a message lists where class, period or
-/// pattern differ.
+/// bifurcation_strobe.csv (states at phase 0). Each measured quantity that the scene requests has a column and a panel of
+/// the figure. The scene's steps_per_period and early_stop are ignored. With start.policy=both the motion is followed in
+/// both directions of the axis, and a message lists where class, period or pattern differ.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n\n\
     The paper's Fig. 5 with fewer columns:\n  \

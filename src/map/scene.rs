@@ -210,8 +210,23 @@ impl Scene {
         if is_list {
             list::check(&root, scene.start.follows())?;
         }
+        scene.check_columns(&root)?;
         scene.check_corners(&root)?;
         Ok(scene)
+    }
+
+    /// Refuses a measured quantity whose column has the name of a swept parameter.
+    fn check_columns(&self, root: &Section<'_>) -> Result<(), SceneError> {
+        let states = self.base().state_names();
+        let mut columns = self.outputs.quantities.iter().flat_map(|quantity| quantity.columns(&states));
+        let twice = columns.find(|name| self.swept().any(|parameter| parameter.name == **name));
+        let outputs = root.section("outputs", &keys::names("outputs"))?;
+        match (twice, outputs.get("quantities")) {
+            (Some(name), Some(field)) => Err(field.conflict(format!(
+                "it has the column `{name}`, which is the name of a swept parameter; rename the parameter in the model file"
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// Refuses a scene whose model has no motion in a cell at a corner of the plane. The other cells are checked by

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use crate::show::instant::Instant;
 use crate::show::names;
+use crate::show::orbit_quantities;
 use crate::show::symbols::with_unit;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::number::significant;
@@ -18,7 +19,8 @@ const FIRST_ROWS: usize = 16;
 pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
     let mut text = String::new();
     let instant = instant.map(|instant| ("state".to_owned(), state(model, instant)));
-    for (label, value) in facts(model, orbit).into_iter().chain(instant) {
+    let measured = orbit_quantities::facts(model, orbit);
+    for (label, value) in facts(model, orbit).into_iter().chain(measured).chain(instant) {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{label:<22}{value}");
     }
@@ -173,17 +175,26 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
         let names = names.iter().enumerate();
         names.map(|(i, name)| with_unit(name, units.component(i).as_deref()) + moment).collect::<Vec<_>>()
     };
-    let head = ["kind".to_owned(), "side".to_owned(), with_unit("t", time), with_unit("t mod T", time)];
+    let head = [
+        "kind".to_owned(),
+        "side".to_owned(),
+        with_unit("t", time),
+        with_unit("t mod T", time),
+        "impulse".to_owned(),
+    ];
     let head = head.into_iter().chain(components(" before")).chain(components(" after")).collect();
-    let row = |event: &Event| -> Vec<String> {
-        let numbers = [event.t, event.t_mod_period].into_iter();
-        let numbers = numbers.chain(event.before[..count].iter().chain(&event.after[..count]).copied());
+    let row = |(event, impulse): &(&Event, Option<f64>)| -> Vec<String> {
         let head = [names::kind(event.kind), names::side(event.side)].map(str::to_owned);
-        head.into_iter().chain(numbers.map(significant)).collect()
+        let times = [event.t, event.t_mod_period].map(significant);
+        let impulse = impulse.map_or("-".to_owned(), significant);
+        let states = event.before[..count].iter().chain(&event.after[..count]).copied();
+        head.into_iter().chain(times).chain([impulse]).chain(states.map(significant)).collect()
     };
+    let impulses = orbit_quantities::impulses(model, events);
+    let listed: Vec<(&Event, Option<f64>)> = events.iter().zip(impulses).collect();
     let hidden = events.len().saturating_sub(MOST_ROWS);
     let first = if hidden > 0 { FIRST_ROWS } else { events.len() };
-    let shown = events[..first].iter().chain(&events[first + hidden..]);
+    let shown = listed[..first].iter().chain(&listed[first + hidden..]);
     let mut lines = aligned(&[head].into_iter().chain(shown.map(row)).collect::<Vec<_>>());
     if hidden > 0 {
         lines.insert(1 + first, format!("... {hidden} more events; --json and --out list all of them"));

@@ -84,7 +84,8 @@ pub fn write(
         "words": spellings(&words.words),
         "patterns": spellings(&words.patterns),
         "attractors": attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect::<Vec<_>>(),
-        "refinement": cells.refinement().map(refinement::object),
+        "numbers": cells.numbers().iter().map(|number| json!([number.name, number.label])).collect::<Vec<_>>(),
+        "refinement": refinement::object(cells),
         "validation": validation,
     });
     // Start states of cells that follow their neighbours, four numbers per cell.

@@ -8,6 +8,7 @@ use crate::map::scene::{self, Along, Format, Scene};
 use crate::show::drawing::axis::Scale;
 use crate::show::figure;
 use crate::show::figure::bifurcation::Panels;
+use crate::show::numbers::Number;
 use crate::show::symbols::{axis_label, symbol};
 use crate::show::table::bifurcation_tables;
 use crate::show::{caption, names};
@@ -49,11 +50,12 @@ pub fn write(
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
     let mut files = Vec::new();
+    let numbers = Number::of(scene.base(), &scene.outputs().quantities);
     let (names, fixed) = (scene.base().state_names(), fixed(&scene.line()));
     if wanted.contains(&Format::Csv) {
         let axis = &parameter.name;
         folder.replace(POINTS, |out| bifurcation_tables::write_points(out, axis, &names, columns))?;
-        folder.replace(COLUMNS_CSV, |out| bifurcation_tables::write_columns(out, axis, columns))?;
+        folder.replace(COLUMNS_CSV, |out| bifurcation_tables::write_columns(out, axis, &numbers, columns))?;
         files.extend([POINTS, COLUMNS_CSV]);
         if fixed.is_some() {
             folder
@@ -61,7 +63,7 @@ pub fn write(
             files.push(STROBE_CSV);
         }
     }
-    let panels = Panels::of(scene.base(), fixed);
+    let panels = Panels::of(scene.base(), fixed, &numbers);
     for (format, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
         let title = format!("{}{}", scene.title(), line(arguments.along));

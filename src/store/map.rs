@@ -37,7 +37,7 @@ const WORDS: &str = "words.csv";
 const HTML: &str = "report.html";
 const ATTRACTORS: &str = "attractors.csv";
 
-/// Layers that have figures.
+/// Layers that have figures, without those of measured quantities, whose names depend on the model.
 const LAYERS: [&str; 8] =
     ["map", layers::CLASS, "lyapunov", "impacts", "mesh", "pattern", "word", "attractors"];
 
@@ -260,15 +260,20 @@ fn write_pictures(
     let mut files = Vec::new();
     let wants_page = asks(Format::Html) && wanted(HTML);
     let formats: Vec<Format> = Format::FIGURES.into_iter().filter(|&format| asks(format)).collect();
-    let names = |layer| formats.iter().map(move |&format| (format, names::figure(layer, format)));
-    let wants_figures = LAYERS.iter().any(|layer| names(*layer).any(|(_, name)| wanted(&name)));
+    let names = |layer: &str| -> Vec<(Format, String)> {
+        formats.iter().map(|&format| (format, names::figure(layer, format))).collect()
+    };
+    let numbers = cells.numbers();
+    let mut all = LAYERS.into_iter().chain(numbers.iter().map(|number| &*number.name));
+    let wants_figures = all.any(|layer| names(layer).iter().any(|(_, name)| wanted(name)));
     if !wants_page && !wants_figures {
         return Ok(files);
     }
     let layers = layers::of(cells, words);
     if wants_figures {
-        let figures =
-            layers.iter().flat_map(|layer| names(layer.name).map(move |(f, name)| (layer, f, name)));
+        let figures = layers
+            .iter()
+            .flat_map(|layer| names(&layer.name).into_iter().map(move |(f, name)| (layer, f, name)));
         let figures: Vec<_> = figures.filter(|(.., name)| wanted(name)).collect();
         let draw = |(layer, format, name): &(&Layer, Format, String)| {
             folder.replace(name, |out| figure::map::write(out, *format, cells, layer))

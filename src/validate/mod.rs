@@ -313,11 +313,15 @@ fn replay_whole(
         })
         .collect();
     let again = again(&mut replayed);
-    let agreement = Field::ALL.map(|field| {
+    let agreement = Field::all().into_iter().map(|field| {
         let of_field = || replayed.iter().flat_map(|cell| &cell.fields).filter(move |(f, _)| *f == field);
         let agreeing = of_field().filter(|(_, differs)| differs.is_none()).count();
         Agreement { field, compared: of_field().count(), agreeing }
     });
+    // Measured quantities that the scene does not request are not listed.
+    let is_listed =
+        |agreement: &Agreement| agreement.compared > 0 || !matches!(agreement.field, Field::Measured(_));
+    let agreement = agreement.filter(is_listed).collect();
     let changes: Vec<half_mesh::Changes> = replayed.iter().filter_map(|cell| cell.half_mesh).collect();
     let chaos: Vec<chaos::Differences> = replayed.iter().filter_map(|cell| cell.chaos).collect();
     let mismatches: Vec<Mismatch> = replayed.into_iter().filter_map(mismatch).collect();
@@ -332,7 +336,7 @@ fn replay_whole(
         strata: sample.draws.iter().map(|draw| stratum(draw, &mismatches)).collect(),
         replayed: ids.len(),
         again,
-        agreement: agreement.to_vec(),
+        agreement,
         chaos: chaos::tests(&chaos),
         half_mesh: half_mesh::rates(&changes),
         states: has_states.then(|| states::check(subject, lanes.states(), halt)),

@@ -23,7 +23,7 @@ const PERIOD: f64 = TAU / 5.6;
 /// Returns a diagram of the gear pair.
 fn diagram(format: Format, title: [&str; 2], axis: (&str, Scale), columns: &[Column]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let panels = Panels::of(&GearPair::paper(0.5), None);
+    let panels = Panels::of(&GearPair::paper(0.5), None, &[]);
     let style = FigureStyle::default();
     bifurcation::write(&mut bytes, format, &style, title, axis, &panels, columns).unwrap();
     bytes
@@ -293,6 +293,9 @@ fn columns(count: u32, points: u32) -> Vec<Column> {
             lyapunov_error: Some(0.1),
             impacts_per_period: 1.0,
             mesh_fraction: 0.0,
+            impact_rate: 0.0,
+            measures: [None; rattlemap::record::measures::MEASURES],
+            state: None,
             symmetric: None,
             word: None,
             periods_run: 100,

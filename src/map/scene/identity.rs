@@ -1,6 +1,6 @@
 //! The identity of a scene: everything that a cell's record depends on.
 
-use super::{Axis, Scale, Scene, Start, Steps, list, models};
+use super::{Axis, Quantity, Scale, Scene, Start, Steps, list, models};
 use crate::model_file::FileModel;
 use rattlemap_dynamics::model::{Model, Parameter};
 
@@ -79,7 +79,8 @@ impl Scene {
         }
         let mut quantities = self.outputs().quantities.clone();
         quantities.sort_unstable();
-        add("outputs.quantities".into(), format!("{quantities:?}").to_lowercase());
+        let names: Vec<&str> = quantities.into_iter().map(Quantity::name).collect();
+        add("outputs.quantities".into(), format!("[{}]", names.join(", ")));
         list
     }
 }

@@ -13,6 +13,7 @@ mod starts;
 mod texts;
 
 use super::*;
+use crate::model_file::FileModel;
 use crate::text::test_cases;
 use rattlemap_dynamics::model::GearPair;
 
@@ -272,4 +273,20 @@ fn starts_from_a_state() {
     for (policy, start) in [("up", Start::Up), ("down", Start::Down)] {
         assert_eq!(parse(GOOD, &[&format!("start.policy={policy}")]).unwrap().start(), start);
     }
+}
+
+#[test]
+fn a_measured_column_with_the_name_of_a_swept_parameter_is_refused() {
+    let model = FileModel::built_in("impact-oscillator").unwrap().definition().text.replace("zeta", "rms_x");
+    let model = FileModel::parse(&model, "m.toml").unwrap();
+    let scene = |quantity| {
+        Scene::builder(model.clone())
+            .axis("rms_x", 0.1..=0.2, 2)
+            .axis("F", 1.0..=2.0, 2)
+            .quantities(&[quantity])
+            .build()
+    };
+    assert!(scene(Quantity::Amplitude).is_ok());
+    let error = scene(Quantity::Rms).unwrap_err().to_string();
+    assert!(error.contains("the column `rms_x`") && error.contains("rename the parameter"), "{error}");
 }

@@ -1,5 +1,5 @@
-//! A bifurcation diagram like Fig. 5 of the paper: section points against a parameter, and below them the largest Lyapunov
-//! exponent. Lengths are in pixels.
+//! A bifurcation diagram like Fig. 5 of the paper: section points against a parameter, and below them measured quantities and
+//! the largest Lyapunov exponent. Lengths are in pixels.
 
 mod coloring;
 mod exponents;
@@ -24,6 +24,8 @@ use rattlemap_dynamics::orbit::Class;
 /// Default size, and least distance of the panels from the left edge.
 const WIDTH: f64 = 1600.0;
 const HEIGHT: f64 = 1750.0;
+/// Height that a panel of a measured quantity adds.
+const MEASURED_HEIGHT: f64 = 420.0;
 const PANEL_LEFT: f64 = 130.0;
 /// Height of the panel of exponents, as a share of the height of another panel.
 const EXPONENTS_HEIGHT: f64 = 0.6;
@@ -37,7 +39,7 @@ const POINT_DOT: (f64, f64) = (0.7, 2.2);
 const CURVE_POINTS: usize = 24;
 const CURVE_DOT: f64 = 1.3;
 
-/// Draws the section points, one panel per quantity, and the largest Lyapunov exponent, and writes the figure.
+/// Draws the section points, one panel per displacement, measured quantities, and the largest Lyapunov exponent, and writes the figure.
 ///
 /// Points are coloured by wall. Where they overlap, opacity increases with the logarithm of their number and shows the density
 /// of a chaotic band. In a diagram of two passes they are coloured by direction, and grey where both passes agree. Columns that
@@ -72,7 +74,8 @@ pub(super) fn draw(
     let is_low = !canvas.is_default() && coloring.strips() > 0;
     let exponents = if is_low { 1.0 } else { EXPONENTS_HEIGHT };
     let shares = [vec![1.0; panels.list.len()], vec![exponents]].concat();
-    let edges = stacked(canvas, top, HEIGHT, &shares);
+    let height = HEIGHT + MEASURED_HEIGHT * panels.measured() as f64;
+    let edges = stacked(canvas, top, height, &shares);
     let axis = |(i, edges): (usize, [f64; 2])| {
         let height = edges[1] - edges[0];
         let Some(panel) = panels.list.get(i) else {

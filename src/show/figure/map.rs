@@ -130,14 +130,14 @@ mod tests {
         let entry = |n: usize| NamedColor { color: [200; 3], text: format!("period {n}"), cells: 1 };
         let colors = vec![LOW, [120; 3], HIGH];
         Layer {
-            name: "map",
-            short: "map",
-            title: "a map",
+            name: "map".into(),
+            short: "map".into(),
+            title: "a map".into(),
             indices: (0..CELLS).map(|id| u8::from(id % 7 == 3)).collect(),
             palette: vec![[255, 254, 250], [9, 99, 199]],
             numbers: None,
             entries: (0..entries).map(entry).collect(),
-            bar: Some(Bar { label: "exponent", colors, low: -0.4, high: 1.0, beyond }),
+            bar: Some(Bar { label: "exponent".into(), colors, low: -0.4, high: 1.0, beyond }),
         }
     }
 

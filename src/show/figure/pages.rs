@@ -241,7 +241,7 @@ fn diagrams_fit_a_page() {
         let columns: Vec<Column> =
             diagram::run_until(&line, start, &settings, &|_| (), &Default::default()).unwrap().unwrap();
         for style in styles() {
-            let panels = Panels::of(&*line[0].1, diagram::fixed(&line));
+            let panels = Panels::of(&*line[0].1, diagram::fixed(&line), &[]);
             let texts =
                 ["Gear rattle, along e at \u{3c9} = 5.6", "k = 900; all other parameters at their defaults"];
             let axis = ("coefficient of restitution, e", Scale::Linear);

@@ -53,9 +53,9 @@ pub(crate) fn layer(basins: &Basins) -> Layer {
     let cells = labels.iter().filter(|&&label| label == NONE).count();
     entries.push(NamedColor { color: UNDECIDED, text: "undecided or failed".to_owned(), cells });
     Layer {
-        name: "map",
-        short: "attractor",
-        title: "basins of attraction",
+        name: "map".into(),
+        short: "attractor".into(),
+        title: "basins of attraction".into(),
         indices: labels.iter().map(index_of_cell).collect(),
         palette,
         entries: legend(entries),

@@ -62,9 +62,9 @@ fn layer(words: &WordIndex, texts: &Texts) -> Layer {
     palette.extend((1..COLORED_WORDS).map(distinct));
     palette.push(RARE);
     Layer {
-        name: texts.name,
-        short: texts.name,
-        title: texts.title,
+        name: texts.name.into(),
+        short: texts.name.into(),
+        title: texts.title.into(),
         indices: words.numbers.iter().map(index).collect(),
         entries: entries(words, texts, &spellings, |number| palette[usize::from(indices[number])]),
         palette,

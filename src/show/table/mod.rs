@@ -25,7 +25,7 @@ mod tests {
             &["i", "j", "t", "phase", "direction", "domain", "event", "side", "moment"],
         ];
         let of_cells = super::cell_columns::all_names();
-        for name in fixed.concat().into_iter().chain(of_cells) {
+        for name in fixed.concat().into_iter().chain(of_cells.iter().map(String::as_str)) {
             let named = text.replace("zeta", name);
             let error = FileModel::parse(&named, "m.toml").expect_err(name).to_string();
             assert!(error.contains(&format!("`{name}` is ")) && error.contains("cannot be used"), "{error}");

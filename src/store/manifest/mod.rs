@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::map::scene::{Axis, Scale, Scene, Start};
 use crate::model_file::FileModel;
+use crate::show::numbers::Number;
 use crate::show::parameters;
 use rattlemap_dynamics::model::Model;
 
@@ -67,6 +68,14 @@ pub(crate) fn model(model: &dyn Model) -> Value {
         }),
         without_nulls(json!({ "units": parameters::units(model) })),
     ])
+}
+
+/// Describes the columns of measured quantities; none if the scene requests none.
+pub(crate) fn measured(scene: &Scene) -> Option<Value> {
+    let numbers = Number::of(scene.base(), &scene.outputs().quantities);
+    let described = |number: &Number| (number.name.clone(), json!({ "long_name": number.title }));
+    let all: BTreeMap<String, Value> = numbers.iter().map(described).collect();
+    (!all.is_empty()).then(|| json!(all))
 }
 
 /// Describes an axis. `is_start` marks the axis of a component of the initial state, `scale` is `linear`, `log` or
