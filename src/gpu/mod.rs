@@ -41,7 +41,7 @@ pub(crate) use adapter::no_adapter;
 pub use adapter::{
     AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
 };
-pub use constants::{Constants, has_elastic_or_rigid_wall};
+pub use constants::{Constants, has_elastic_or_rigid_wall, has_sine};
 pub use error::GpuError;
 pub use pool::Pool;
 pub use precision::Precision;
@@ -109,6 +109,8 @@ pub struct LaneSettings {
     pub chatter: bool,
     /// Whether flows may have elastic or rigid walls.
     pub kinds: bool,
+    /// Whether forces may have a sine.
+    pub sine: bool,
     /// Periods before the exponent of aperiodic cells is accumulated.
     pub exponent_from: u32,
     /// First period at which a lane may stop as chaotic, with early stops.
@@ -149,6 +151,7 @@ impl Default for LaneSettings {
             symmetry: true,
             chatter: true,
             kinds: true,
+            sine: true,
             exponent_from: 100,
             chaos_from: 198,
             chaos_errors: 6.0,
@@ -380,8 +383,8 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::WrongAnswer`] if the device computes something else; other errors of the device.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
-        let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, chatter, kinds, .. } =
-            *settings;
+        let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, .. } = *settings;
+        let LaneSettings { chatter, kinds, sine, .. } = *settings;
         let keep = self.policy.keep;
         // Where it saves time, lanes run without the tangent vector until they need it.
         let growths: &[bool] = match (exponent, self.policy.late_tangent) {
@@ -401,6 +404,7 @@ impl Gpu {
             symmetry,
             chatter,
             kinds,
+            sine,
             keep,
         };
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();

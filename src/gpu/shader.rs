@@ -30,6 +30,8 @@ pub struct Variant {
     pub chatter: bool,
     /// Whether walls may be elastic or rigid.
     pub kinds: bool,
+    /// Whether forces may have a sine.
+    pub sine: bool,
     /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
     pub keep: bool,
 }
@@ -77,6 +79,7 @@ impl Variant {
             symmetry: true,
             chatter: true,
             kinds: true,
+            sine: true,
             keep: false,
         }
     }
@@ -111,6 +114,7 @@ impl Variant {
             ("SYMMETRY", self.symmetry),
             ("CHATTER", self.chatter),
             ("KINDS", self.kinds),
+            ("SINE", self.sine),
             ("KEEP", self.keep),
         ]
         .map(|(name, value)| format!("const {name}: bool = {value};\n"))

@@ -9,8 +9,8 @@ use crate::text::section::{Field, Section};
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
-const MOTION_KEYS: [&str; 10] = [
-    "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "load", "frequency",
+const MOTION_KEYS: [&str; 11] = [
+    "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "force_sin", "load", "frequency",
     "gap",
 ];
 
@@ -35,8 +35,10 @@ pub struct Motion {
     pub damping: Vec<Vec<Expression>>,
     /// Stiffness matrix.
     pub stiffness: Vec<Vec<Expression>>,
-    /// Amplitudes of the harmonic force.
+    /// Factors of the cosine in the harmonic force.
     pub force: Vec<Expression>,
+    /// Factors of the sine.
+    pub force_sin: Vec<Expression>,
     /// Constant load.
     pub load: Vec<Expression>,
     /// Excitation frequency.
@@ -59,7 +61,7 @@ impl Motion {
     /// Returns all entries.
     pub(super) fn entries(&self) -> impl Iterator<Item = &Expression> {
         let matrices = [&self.mass, &self.damping, &self.stiffness].into_iter().flatten().flatten();
-        let vectors = [&self.force, &self.load, &self.gap].into_iter().flatten();
+        let vectors = [&self.force, &self.force_sin, &self.load, &self.gap].into_iter().flatten();
         matrices.chain(vectors).chain([&self.frequency])
     }
 }
@@ -113,6 +115,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         damping: names.matrix_or_zeros(&section, "damping", count)?,
         stiffness: names.matrix_or_zeros(&section, "stiffness", count)?,
         force: names.vector_or_zeros(&section, "force", count)?,
+        force_sin: names.vector_or_zeros(&section, "force_sin", count)?,
         load: names.vector_or_zeros(&section, "load", count)?,
         frequency: read_frequency(&section, names)?,
         gap: names.vector(&gap, count, "one gap row")?,
@@ -125,9 +128,9 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
 fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {
     let field = section.require("frequency", "name it, such as frequency = \"omega\"")?;
     match field.node.value {
-        Value::List(_) => {
-            Err(field.wrong_type("one entry: the force is force cos(frequency t), one harmonic"))
-        }
+        Value::List(_) => Err(field.wrong_type(
+            "one entry: the force is one harmonic, force cos(frequency t) + force_sin sin(frequency t)",
+        )),
         _ => names.entry(&field),
     }
 }

@@ -146,7 +146,7 @@ fn errors_name_the_field_and_the_limit() {
 ["x"] | [] | at most two degrees of freedom
 gap = [1] | gap = [1]\nforce2 = ["F"] | m.toml:22:1: unknown field `motion.force2 = ["F"]`; did you mean `force`?
 gap = [1] | gap = [1]\nharmonics = 2 | one harmonic force and one gap row
-"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry: the force is force cos(frequency t), one harmonic
+"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry: the force is one harmonic
 gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry
 [[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact = 3 tables` is out of range: it must be one or two tables, [[contact]]: a model has at most two walls
 [[contact]] | [[contact]]\nside = "right"\nat = 1\nlaw = "impact"\nrestitution = 1\n[[contact]] | m.toml:29:8: `contact.1.side = "right"` does not fit: there is already a wall on this side

@@ -10,7 +10,7 @@ use rattlemap_dynamics::orbit::Settings;
 pub const MODEL: &str = "model.toml";
 
 /// Returns the arguments that are the same for all cells: the model, values that differ from the defaults of `orbit`, the
-/// start and the length of the integration.
+/// start with its phase, and the length of the integration.
 pub(crate) fn arguments(scene: &Scene) -> String {
     let mut words = Vec::new();
     let base = scene.base();
@@ -22,6 +22,9 @@ pub(crate) fn arguments(scene: &Scene) -> String {
         if parameter.is_some_and(|parameter| parameter.default != Some(value)) {
             words.push(format!(" --set {name}={value:?}"));
         }
+    }
+    if base.start_phase() != 0.0 {
+        words.push(format!(" --set start.phase={:?}", base.start_phase()));
     }
     if let Start::State(state) = scene.start() {
         words.push(start(base, state));
