@@ -258,3 +258,25 @@ fn equations_are_written_in_usual_notation() {
         ]
     );
 }
+
+#[test]
+fn a_force_has_a_cosine_and_a_sine() {
+    let force = "force = [\"F*omega^2\"]";
+    let mut model = read(&ONE_DEGREE.replace(force, &format!("{force}\nforce_sin = [\"-2*F\"]")));
+    let at_zero = model.oscillator().unwrap();
+    assert_eq!((at_zero.force, at_zero.force_sin), ([6.0, 0.0], [-3.0, 0.0]));
+    let [_, _, _, free, ..] = &model.equations()[..] else { panic!("{:?}", model.equations()) };
+    assert!(free.ends_with("= F*omega^2 cos(omega t) - 2*F sin(omega t) - 0.5"), "{free}");
+    assert!(model.parameters()[model.index("F").unwrap()].shapes.oscillator());
+    // A quarter turn later the cosine has become the negative sine.
+    let before = model.clone();
+    assert!(model.set_start_phase(std::f64::consts::FRAC_PI_2));
+    let later = model.oscillator().unwrap();
+    assert!((later.force[0] + 3.0).abs() < 1e-15 && (later.force_sin[0] + 6.0).abs() < 1e-15, "{later:?}");
+    assert_eq!((later.force[1], later.force_sin[1]), (0.0, 0.0));
+    assert_ne!(model, before);
+    check_refusals(
+        ONE_DEGREE,
+        "gap = [1] | force_sin = [1, 2]\ngap = [1] | a list of one entry, one for each coordinate",
+    );
+}
