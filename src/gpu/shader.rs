@@ -1,6 +1,7 @@
 //! Shader variants: one source, composed of small files.
 
-use super::layout::{BLOCK, CONTACTS, SYMBOLS_PER_NUMBER};
+use super::Measures;
+use super::layout::{BLOCK, CONTACTS, EXTREMES, SUMS, SYMBOLS_PER_NUMBER};
 use super::precision::Precision;
 use super::rules;
 use super::unroll::unroll;
@@ -32,6 +33,8 @@ pub struct Variant {
     pub kinds: bool,
     /// Whether forces may have a sine.
     pub sine: bool,
+    /// What this variant measures on lanes whose class is decided; none in a variant that decides classes.
+    pub measures: Option<Measures>,
     /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
     pub keep: bool,
 }
@@ -59,6 +62,7 @@ const BODY: &str = concat!(
     include_str!("../../shaders/cycle.wgsl"),
     include_str!("../../shaders/refine.wgsl"),
     include_str!("../../shaders/approach.wgsl"),
+    include_str!("../../shaders/measure.wgsl"),
     include_str!("../../shaders/sweep.wgsl"),
     include_str!("../../shaders/compact.wgsl"),
     include_str!("../../shaders/begin.wgsl"),
@@ -80,6 +84,7 @@ impl Variant {
             chatter: true,
             kinds: true,
             sine: true,
+            measures: None,
             keep: false,
         }
     }
@@ -98,6 +103,8 @@ impl Variant {
         let sizes = [
             ("WORKGROUP", self.workgroup),
             ("BLOCK", BLOCK),
+            ("SUMS", SUMS as u32),
+            ("EXTREMES", EXTREMES as u32),
             ("WORD_SYMBOLS", WORD_SYMBOLS as u32),
             ("SYMBOLS_PER_NUMBER", SYMBOLS_PER_NUMBER as u32),
         ]
@@ -115,6 +122,9 @@ impl Variant {
             ("CHATTER", self.chatter),
             ("KINDS", self.kinds),
             ("SINE", self.sine),
+            ("MEASURE", self.measures.is_some()),
+            ("EXTREME", self.measures.is_some_and(|measures| measures.extremes)),
+            ("MOMENTS", self.measures.is_some_and(|measures| measures.moments)),
             ("KEEP", self.keep),
         ]
         .map(|(name, value)| format!("const {name}: bool = {value};\n"))
