@@ -60,7 +60,7 @@ def map(  # noqa: A001
         Others are not computed. ``docs/scenes.md`` explains them.
     start
         The start of cells at phase 0: ``"rest"``, ``"up"``, ``"down"``, a state ``[x1, v1, x2, v2]``, or some of its
-        components by name.
+        components by name. ``settings={"start.phase": 1.57}`` starts at another phase of the force.
     settings
         Any other setting of a scene by its path: ``{"start.count": 5, "refine.max_error": 0.01}``. ``docs/scenes.md`` lists
         them.

@@ -209,6 +209,7 @@ def orbit(
     periods: int = 128,
     transient: int = 400,
     start: Sequence[float] | Mapping[str, float] | None = None,
+    phase: float | None = None,
     **names: float,
 ) -> Orbit:
     """Compute one motion after its transient, like ``rattlemap orbit``.
@@ -226,6 +227,8 @@ def orbit(
         Forcing periods before the first analysis, 1 to 1,000,000,000.
     start
         The state at phase 0: all components, or some by name (the others are 0); by default rest.
+    phase
+        The phase of the force at the start, in radians, 0 by default. It is then phase 0 of the results.
     **names
         Values of parameters; the others keep the values of the model.
 
@@ -253,7 +256,10 @@ def orbit(
         is_whole = isinstance(value, (int, np.integer)) or (isinstance(value, float) and value.is_integer())
         if not is_whole or not least <= value <= most:
             raise SceneError(f"{name} = {value!r}: it must be a whole number from {least} to {most}")
-    model = require_model(model).replace(**scenes.all_names(names, None, parameters))
+    changes = scenes.all_names(names, None, parameters)
+    if phase is not None:
+        changes["start.phase"] = phase
+    model = require_model(model).replace(**changes)
     state = None if start is None else _state(model, start)
     return Orbit(model, int(transient), int(periods), state)
 

@@ -92,7 +92,7 @@ impl Model {
         Ok(values)
     }
 
-    /// Parameter values that differ from the defaults.
+    /// Parameter values that differ from the defaults, and `start.phase` if it is not 0.
     #[getter]
     fn changed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
@@ -101,6 +101,9 @@ impl Model {
             if parameter.default != Some(value) {
                 values.set_item(&*parameter.name, value)?;
             }
+        }
+        if self.model.start_phase() != 0.0 {
+            values.set_item("start.phase", self.model.start_phase())?;
         }
         Ok(values)
     }

@@ -486,7 +486,8 @@ pub(crate) struct Orbit {
     pub(crate) model: String,
 
     /// Set a parameter of the model; the others keep the model's defaults. The gear pair has the parameters m1 m2 r1 r2 k1 k2
-    /// r k F omega b e mesh_speed, with the values of the paper's Table 1 and e = 0.605. May be repeated
+    /// r k F omega b e mesh_speed, with the values of the paper's Table 1 and e = 0.605. start.phase=P starts at the phase P of
+    /// the force, in radians, instead of 0; this is then phase 0. May be repeated
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 

@@ -190,7 +190,8 @@ impl Scene {
         };
         let derived = derived::read(&root, model, is_swept)?;
         let sources = ParameterSources { axes: &axes, list: list.as_ref(), derived: &derived };
-        let base = parameters::read(&root, model, sources)?;
+        let mut base = parameters::read(&root, model, sources)?;
+        start::read_phase(&root.section("start", &keys::names("start"))?, &mut *base)?;
         let title = root.get("title").map(|title| settings::read_title(&title)).transpose()?;
         let is_list = list.is_some();
         let points = Points::new(base, axes, list, derived);
@@ -398,11 +399,11 @@ impl Scene {
     }
 }
 
-/// Sets parameters of a model by `NAME=VALUE` arguments.
+/// Sets parameters and the start phase of a model by `NAME=VALUE` arguments.
 ///
 /// # Errors
-/// [`SceneError`] for an unknown parameter, a value out of its range, a setting that is not a parameter, or values for
-/// which the model has no motion.
+/// [`SceneError`] for an unknown parameter, a value out of its range, any other setting, or values for which the
+/// model has no motion.
 pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>, SceneError> {
     let values = model.parameters().iter().enumerate();
     let values = values.map(|(index, parameter)| format!("{} = {:?}\n", parameter.name, model.value(index)));
@@ -411,9 +412,10 @@ pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>,
     for set in sets {
         overrides::apply(&mut document, set)?;
     }
-    let root = Section::open(&document, "", &["parameters"])?;
+    let root = Section::open(&document, "", &["parameters", "start"])?;
     let sources = ParameterSources { axes: &[], list: None, derived: &Derived::default() };
-    let cell = parameters::read(&root, model, sources)?;
+    let mut cell = parameters::read(&root, model, sources)?;
+    start::read_phase(&root.section("start", &["phase"])?, &mut *cell)?;
     Flow::validate(&*cell).map_err(|error| {
         // The defaults have a motion, so the error is in the arguments.
         let error = root.no_motion("", &error);

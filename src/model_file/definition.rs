@@ -215,6 +215,7 @@ impl Definition {
             contacts: [Contact::Rigid; 2],
             omega: of(&motion.frequency),
             force: vector(&motion.force, of),
+            force_sin: vector(&motion.force_sin, of),
             free,
             meshing: [free; 2],
         };

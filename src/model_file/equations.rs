@@ -72,8 +72,12 @@ fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Ite
             terms(&motion.stiffness[i], &displacements),
             vec![along],
         ];
-        let harmonic = format!("cos({})", product(&motion.frequency, "t").unwrap_or_else(|| "0".to_owned()));
-        let right = [product(&motion.force[i], &harmonic), constant(&motion.load[i])];
+        let phase = product(&motion.frequency, "t").unwrap_or_else(|| "0".to_owned());
+        let right = [
+            product(&motion.force[i], &format!("cos({phase})")),
+            product(&motion.force_sin[i], &format!("sin({phase})")),
+            constant(&motion.load[i]),
+        ];
         format!("{} = {}", sum(left.into_iter().flatten()), sum(right))
     })
 }

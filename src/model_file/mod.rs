@@ -1,7 +1,7 @@
 //! Model files: names, parameters and matrices in TOML, read into a [`Model`]. Pure.
 //!
-//! A file defines `M x'' + C x' + K x = force cos(frequency t) + load` in one or two coordinates, a gap `z = g . x`,
-//! and one or two walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
+//! A file defines `M x'' + C x' + K x = force cos(frequency t) + force_sin sin(frequency t) + load` in one or two
+//! coordinates, a gap `z = g . x`, and one or two walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
 //! f64. `docs/models.md` describes each key.
 
 mod builtin;
@@ -26,11 +26,12 @@ pub(crate) use equations::factor;
 
 use crate::text::error::SceneError;
 
-/// A model from a file, with values of its parameters. Clones share everything but the values.
+/// A model from a file, with values of its parameters and a start phase. Clones share everything else.
 #[derive(Clone, Debug)]
 pub struct FileModel {
     definition: Arc<Definition>,
     values: Vec<f64>,
+    start_phase: f64,
 }
 
 impl FileModel {
@@ -68,7 +69,7 @@ impl FileModel {
     }
 
     fn new(definition: Definition) -> FileModel {
-        FileModel { values: definition.defaults.clone(), definition: Arc::new(definition) }
+        FileModel { values: definition.defaults.clone(), definition: Arc::new(definition), start_phase: 0.0 }
     }
 }
 
@@ -83,10 +84,12 @@ pub fn gap_names(model: &dyn Model) -> [&'static str; 2] {
     }
 }
 
-/// Models are equal if their texts and values are.
+/// Models are equal if their texts, values and start phases are.
 impl PartialEq for FileModel {
     fn eq(&self, other: &FileModel) -> bool {
-        self.values == other.values && self.definition == other.definition
+        self.values == other.values
+            && self.start_phase == other.start_phase
+            && self.definition == other.definition
     }
 }
 
@@ -121,13 +124,22 @@ impl Model for FileModel {
 
     fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
-        let oscillator = self.definition.oscillator(&self.values)?;
+        let oscillator = self.definition.oscillator(&self.values)?.at_phase(self.start_phase);
         oscillator.validate()?;
         Ok(oscillator)
     }
 
     fn law(&self) -> Law {
         self.definition.law(&self.values)
+    }
+
+    fn start_phase(&self) -> f64 {
+        self.start_phase
+    }
+
+    fn set_start_phase(&mut self, phase: f64) -> bool {
+        self.start_phase = phase;
+        true
     }
 
     fn state_names(&self) -> Vec<&str> {

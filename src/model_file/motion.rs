@@ -10,8 +10,8 @@ use rattlemap_dynamics::model::Units;
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
-const MOTION_KEYS: [&str; 13] = [
-    "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "load", "frequency",
+const MOTION_KEYS: [&str; 14] = [
+    "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "force_sin", "load", "frequency",
     "gap", "units", "gap_unit", "time_unit",
 ];
 
@@ -36,8 +36,10 @@ pub struct Motion {
     pub damping: Vec<Vec<Expression>>,
     /// Stiffness matrix.
     pub stiffness: Vec<Vec<Expression>>,
-    /// Amplitudes of the harmonic force.
+    /// Factors of the cosine in the harmonic force.
     pub force: Vec<Expression>,
+    /// Factors of the sine.
+    pub force_sin: Vec<Expression>,
     /// Constant load.
     pub load: Vec<Expression>,
     /// Excitation frequency.
@@ -62,7 +64,7 @@ impl Motion {
     /// Returns all entries.
     pub(super) fn entries(&self) -> impl Iterator<Item = &Expression> {
         let matrices = [&self.mass, &self.damping, &self.stiffness].into_iter().flatten().flatten();
-        let vectors = [&self.force, &self.load, &self.gap].into_iter().flatten();
+        let vectors = [&self.force, &self.force_sin, &self.load, &self.gap].into_iter().flatten();
         matrices.chain(vectors).chain([&self.frequency])
     }
 }
@@ -121,6 +123,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         damping: names.matrix_or_zeros(&section, "damping", count)?,
         stiffness: names.matrix_or_zeros(&section, "stiffness", count)?,
         force: names.vector_or_zeros(&section, "force", count)?,
+        force_sin: names.vector_or_zeros(&section, "force_sin", count)?,
         load: names.vector_or_zeros(&section, "load", count)?,
         frequency: read_frequency(&section, names)?,
         gap,
@@ -155,9 +158,9 @@ fn read_units(section: &Section<'_>, gap: &[Expression]) -> Result<Units, SceneE
 fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {
     let field = section.require("frequency", "name it, such as frequency = \"omega\"")?;
     match field.node.value {
-        Value::List(_) => {
-            Err(field.wrong_type("one entry: the force is force cos(frequency t), one harmonic"))
-        }
+        Value::List(_) => Err(field.wrong_type(
+            "one entry: the force is one harmonic, force cos(frequency t) + force_sin sin(frequency t)",
+        )),
         _ => names.entry(&field),
     }
 }

@@ -146,7 +146,7 @@ fn errors_name_the_field_and_the_limit() {
 ["x"] | [] | at most two degrees of freedom
 gap = [1] | gap = [1]\nforce2 = ["F"] | m.toml:22:1: unknown field `motion.force2 = ["F"]`; did you mean `force`?
 gap = [1] | gap = [1]\nharmonics = 2 | one harmonic force and one gap row
-"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry: the force is force cos(frequency t), one harmonic
+"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry: the force is one harmonic
 gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry
 [[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact = 3 tables` is out of range: it must be one or two tables, [[contact]]: a model has at most two walls
 [[contact]] | [[contact]]\nside = "right"\nat = 1\nlaw = "impact"\nrestitution = 1\n[[contact]] | m.toml:29:8: `contact.1.side = "right"` does not fit: there is already a wall on this side
@@ -302,5 +302,27 @@ fn equations_are_written_in_usual_notation() {
             "    m a'' + 0.5 b'' + c a' - c b' + k a - k b + N = 0",
             "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - 2 N = 0",
         ]
+    );
+}
+
+#[test]
+fn a_force_has_a_cosine_and_a_sine() {
+    let force = "force = [\"F*omega^2\"]";
+    let mut model = read(&ONE_DEGREE.replace(force, &format!("{force}\nforce_sin = [\"-2*F\"]")));
+    let at_zero = model.oscillator().unwrap();
+    assert_eq!((at_zero.force, at_zero.force_sin), ([6.0, 0.0], [-3.0, 0.0]));
+    let [_, _, _, free, ..] = &model.equations()[..] else { panic!("{:?}", model.equations()) };
+    assert!(free.ends_with("= F*omega^2 cos(omega t) - 2*F sin(omega t) - 0.5"), "{free}");
+    assert!(model.parameters()[model.index("F").unwrap()].shapes.oscillator());
+    // A quarter turn later the cosine has become the negative sine.
+    let before = model.clone();
+    assert!(model.set_start_phase(std::f64::consts::FRAC_PI_2));
+    let later = model.oscillator().unwrap();
+    assert!((later.force[0] + 3.0).abs() < 1e-15 && (later.force_sin[0] + 6.0).abs() < 1e-15, "{later:?}");
+    assert_eq!((later.force[1], later.force_sin[1]), (0.0, 0.0));
+    assert_ne!(model, before);
+    check_refusals(
+        ONE_DEGREE,
+        "gap = [1] | force_sin = [1, 2]\ngap = [1] | a list of one entry, one for each coordinate",
     );
 }

@@ -6,8 +6,8 @@ use crate::show::symbols::{equation, number, symbol};
 use rattlemap_dynamics::model::{Model, Parameter};
 
 /// Describes an oscillator: values of parameters without a default, the frequency, values that differ from the defaults, and
-/// whether all others have their defaults. For a user's model it lists all values, because readers cannot look up its
-/// defaults. Parameters for which `is_swept` is true are not mentioned.
+/// whether all others have their defaults; then the start phase if it is not 0. For a user's model it lists all values, because
+/// readers cannot look up its defaults. Parameters for which `is_swept` is true are not mentioned.
 pub(crate) fn parameters(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool) -> String {
     parameters_and(model, is_swept, Vec::new())
 }
@@ -27,7 +27,7 @@ fn parameters_and(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool, deri
     let listed: Vec<String> =
         (0..3).flat_map(of_rank).map(|(parameter, value, _)| equation(parameter, *value)).collect();
     let is_all = listed.len() == fixed.len();
-    let listed = [listed, derived].concat();
+    let listed = [listed, derived, start_phase(model).into_iter().collect()].concat();
     let rest = match (listed.is_empty(), is_all) {
         (_, true) => "",
         (true, _) => "all other parameters at their defaults",
@@ -42,10 +42,16 @@ pub fn of_scene(scene: &Scene) -> String {
     parameters_and(scene.base(), |parameter| !is_fixed(parameter), derived(scene).collect())
 }
 
-/// Returns all fixed and derived parameters of a scene.
+/// Returns all fixed and derived parameters of a scene, and its start phase if that is not 0.
 pub(crate) fn all_fixed(scene: &Scene) -> String {
     let fixed = scene.fixed().map(|(parameter, value)| equation(parameter, value));
-    fixed.chain(derived(scene)).collect::<Vec<_>>().join(", ")
+    fixed.chain(derived(scene)).chain(start_phase(scene.base())).collect::<Vec<_>>().join(", ")
+}
+
+/// Describes the start phase of a model, if it is not 0.
+fn start_phase(model: &dyn Model) -> Option<String> {
+    let phase = model.start_phase();
+    (phase != 0.0).then(|| format!("start phase {} rad", number(phase)))
 }
 
 /// Returns the derived parameters of a scene with their expressions.

@@ -32,6 +32,7 @@ pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
     }
     let properties = json!({
         "parameters": Parameters::of(model),
+        "start_phase": model.start_phase(),
         "class": orbit.class.name(),
         "period": names::period(orbit.class),
         "lyapunov": orbit.lyapunov,

@@ -58,6 +58,9 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let mut facts = Vec::new();
     let mut add = |label: &str, value: String| facts.push((label.to_owned(), value));
     add("parameters", parameters(model));
+    if model.start_phase() != 0.0 {
+        add("start phase", format!("{:?} rad", model.start_phase()));
+    }
     add("class", class(orbit));
     let text = match orbit.class {
         Class::Undecided if orbit.status == Status::Slow => "slow: more periods may decide the class",

@@ -8,7 +8,7 @@ use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::orbit::Settings;
 
 /// Returns the arguments that are the same for all cells: the model, values that differ from the defaults of `orbit`, the
-/// start and the transient. `orbit` analyses as many periods as the class needs.
+/// start with its phase, and the transient. `orbit` analyses as many periods as the class needs.
 pub(crate) fn arguments(scene: &Scene) -> String {
     let mut words = Vec::new();
     let base = scene.base();
@@ -19,6 +19,9 @@ pub(crate) fn arguments(scene: &Scene) -> String {
         if *default != Some(value) {
             words.push(format!(" --set {name}={value:?}"));
         }
+    }
+    if base.start_phase() != 0.0 {
+        words.push(format!(" --set start.phase={:?}", base.start_phase()));
     }
     if let Start::State(state) = scene.start() {
         words.push(start(base, state));

@@ -103,6 +103,7 @@ pub fn write(
             "model": manifest::model(model),
             "parameters": Parameters::of(model),
             "start": request.start[..model.state_names().len()],
+            "start_phase": model.start_phase(),
             "transient_periods": transient_periods,
             "observed_periods": observed_periods,
             "max_period": max_period,

@@ -68,7 +68,7 @@ fn written(matrix: &[[f64; 2]; 2]) -> String {
     format!("[{}, {}]", row(&matrix[0]), row(&matrix[1]))
 }
 
-/// One linear domain: `M x'' + damping x' + stiffness x = force cos(omega t) + load`.
+/// One linear domain: `M x'' + damping x' + stiffness x = force cos(omega t) + force_sin sin(omega t) + load`.
 ///
 /// Damping and stiffness are symmetric and positive semidefinite. The energy bounds of the event certificate need
 /// that (see [`crate::flow`]).
@@ -114,8 +114,10 @@ pub struct Oscillator {
     pub contacts: [Contact; 2],
     /// Excitation frequency, > 0.
     pub omega: f64,
-    /// Amplitude of the harmonic force `force cos(omega t)`, the same in every domain.
+    /// Factor of `cos(omega t)` in the harmonic force, which is the same in every domain.
     pub force: [f64; 2],
+    /// Factor of `sin(omega t)` in the harmonic force.
+    pub force_sin: [f64; 2],
     /// Motion between the walls.
     pub free: Domain,
     /// Motion in lasting contact with the right and the left wall; ignored for rigid and missing walls.
@@ -126,6 +128,20 @@ impl Oscillator {
     /// Returns the forcing period `2 pi / omega`.
     pub fn period(&self) -> f64 {
         std::f64::consts::TAU / self.omega
+    }
+
+    /// Returns the oscillator whose phase 0 is this phase of the forcing, in radians.
+    pub fn at_phase(&self, phase: f64) -> Oscillator {
+        if phase == 0.0 {
+            return *self;
+        }
+        let (sin, cos) = phase.sin_cos();
+        let turned = |i: usize| {
+            let (f, g) = (self.force[i], self.force_sin[i]);
+            [cos * f + sin * g, cos * g - sin * f]
+        };
+        let [[f1, g1], [f2, g2]] = [turned(0), turned(1)];
+        Oscillator { force: [f1, f2], force_sin: [g1, g2], ..*self }
     }
 
     pub(crate) fn wall(&self, side: Side) -> f64 {
@@ -207,8 +223,10 @@ impl Oscillator {
             largest,
             "different from 0",
         )?;
-        for (i, force) in self.force.into_iter().enumerate() {
-            finite(|| format!("force {}", i + 1), force)?;
+        for (name, force) in [("force", self.force), ("force_sin", self.force_sin)] {
+            for (i, force) in force.into_iter().enumerate() {
+                finite(|| format!("{name} {}", i + 1), force)?;
+            }
         }
         let [right, left] = self.walls;
         let are_apart = right > left && right > f64::NEG_INFINITY && left < f64::INFINITY;
@@ -295,6 +313,7 @@ impl Oscillator {
         };
         none("entry 2 of the gap row", self.gap[1])?;
         none("force 2", self.force[1])?;
+        none("force_sin 2", self.force_sin[1])?;
         none("mass 1, 2", self.mass[0][1])?;
         let mass = self.mass[1][1];
         require(mass == 1.0, || "mass 2".to_owned(), mass, "1 where there is one degree of freedom")?;
@@ -318,12 +337,12 @@ impl Oscillator {
     /// max(|wall|, |D force|, |D load|),   D = (K + omega^2 M)^-1
     /// ```
     ///
-    /// over the existing walls and both displacements, with `K` and `load` of free motion. `D force` is the forced
-    /// deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
+    /// over the existing walls and both displacements, with `K` and `load` of free motion. `|D force|` is the amplitude
+    /// of the forced deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
     /// or none it is the distance that the load moves a mass in a radian of the forcing. The scale is finite for
     /// every oscillator.
     ///
-    /// A factor on `walls`, `force` and `load` that is a power of two multiplies the scale exactly. A change of the
+    /// A factor on `walls`, the force and `load` that is a power of two multiplies the scale exactly. A change of the
     /// unit of time does not change it.
     pub fn length_scale(&self) -> f64 {
         let [right, left] = self.walls;
@@ -331,19 +350,20 @@ impl Oscillator {
         if half.is_finite() && half > 0.0 {
             return half;
         }
-        let deflections = [self.force, self.free.load].map(|force| self.deflection(force));
+        let [cos, sin, load] = [self.force, self.force_sin, self.free.load].map(|f| self.deflections(f));
+        let deflections = [0, 1].map(|i| cos[i].hypot(sin[i]).max(load[i].abs()));
         let walls = self.walls.map(f64::abs).into_iter().filter(|wall| wall.is_finite());
         walls.chain(deflections).fold(LEAST_LENGTH, f64::max)
     }
 
-    fn deflection(&self, force: [f64; 2]) -> f64 {
+    fn deflections(&self, force: [f64; 2]) -> [f64; 2] {
         let [[k1, k], [_, k2]] = self.free.stiffness;
         let [[m1, m], [_, m2]] = self.mass;
         let [a, b, m] = [m1, m2, m].map(|m| m * self.omega * self.omega);
         let (a, b, k) = (a + k1, b + k2, m + k);
         let determinant = a * b - k * k;
         let [f1, f2] = force;
-        ((b * f1 - k * f2) / determinant).abs().max(((a * f2 - k * f1) / determinant).abs())
+        [(b * f1 - k * f2) / determinant, (a * f2 - k * f1) / determinant]
     }
 
     /// Whether the walls and the domains behind them are mirror images, so that `(y, t) -> (-y, t + T/2)` maps
@@ -477,6 +497,7 @@ mod tests {
             "entry 2 of the gap row = -1: it must be 0, since one degree of freedom has no second displacement"
         );
         assert_eq!(slip(|o| o.force[0] = f64::INFINITY), "force 1 = inf: it must be a finite number");
+        assert_eq!(slip(|o| o.force_sin[1] = f64::NAN), "force_sin 2 = NaN: it must be a finite number");
         assert_eq!(
             slip(|o| o.walls = [-0.5, 0.5]),
             "walls at -0.5 and 0.5: the right one must lie above the left one"
@@ -550,6 +571,8 @@ mod tests {
         assert_eq!(with(one, [-16.0, 0.0], [0.0; 2]), 0.5);
         assert_eq!(with(one, [16.0, 0.0], [0.0, 63.0]), 3.0);
         assert_eq!(with([0.0, 0.0], [16.0, 0.0], [0.0; 2]), 0.5);
+        let sine = Oscillator { walls: one, force: [12.0, 0.0], force_sin: [16.0, 0.0], ..pair };
+        assert_eq!(sine.length_scale(), 0.625, "the amplitude is 20");
         assert_eq!(with([f64::INFINITY, f64::NEG_INFINITY], [0.0; 2], [0.0; 2]), LEAST_LENGTH);
     }
 }

@@ -64,6 +64,16 @@ pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// Returns the contact law.
     fn law(&self) -> Law;
 
+    /// Returns the start phase: the phase of the forcing, in radians, that the oscillator has as phase 0.
+    fn start_phase(&self) -> f64 {
+        0.0
+    }
+
+    /// Sets the start phase. Returns false if the model has no other than 0.
+    fn set_start_phase(&mut self, phase: f64) -> bool {
+        phase == 0.0
+    }
+
     /// Returns the names of the state's components: displacement and velocity of each degree of freedom. A model of
     /// one degree of freedom uses the first half of a [`State`](super::State); the other half is 0.
     fn state_names(&self) -> Vec<&str>;

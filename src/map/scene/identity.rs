@@ -66,6 +66,9 @@ impl Scene {
             start => start.policy().to_owned(),
         };
         add("start".into(), start);
+        if model.start_phase() != 0.0 {
+            add("start.phase".into(), format!("{:?}", model.start_phase()));
+        }
         if let Some(draw) = self.draw() {
             add("start.count".into(), draw.count.to_string());
             add("start.seed".into(), draw.seed.to_string());

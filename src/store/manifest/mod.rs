@@ -116,7 +116,7 @@ pub(crate) fn derived(scene: &Scene) -> Option<BTreeMap<String, Value>> {
     Some(described.collect())
 }
 
-/// Describes the initial states of a scene; `count` and `seed` belong to random ones.
+/// Describes the initial states of a scene and their phase; `count` and `seed` belong to random states.
 pub(crate) fn start(scene: &Scene) -> Value {
     let (policy, state) = match scene.start() {
         Start::Rest => ("rest", None),
@@ -126,5 +126,6 @@ pub(crate) fn start(scene: &Scene) -> Value {
         Start::Both => ("both", None),
     };
     let drawn = scene.draw().map(|draw| json!({ "count": draw.count, "seed": draw.seed }));
-    joined([json!({ "policy": policy, "state": state }), drawn.unwrap_or_default()])
+    let phase = scene.base().start_phase();
+    joined([json!({ "policy": policy, "state": state, "phase": phase }), drawn.unwrap_or_default()])
 }
