@@ -50,16 +50,14 @@ fn known_cycles() -> Vec<Known> {
             list.push(Known { what, oscillator, law, period: 1, strobe, radius, impacts: 1.0 });
         }
     }
-    for omega in [0.7, 0.8, 1.5] {
-        let (oscillator, law) = clearance::pair(omega);
-        for orbit in clearance::symmetric(omega) {
+    for (what, (oscillator, law)) in clearance::clearances() {
+        for orbit in clearance::symmetric(&(oscillator, law)) {
             let monodromy: Matrix4<f64> = orbit.half * orbit.half;
             let [re, im] = multipliers(&monodromy).unwrap()[0];
             let radius = re.hypot(im);
             if orbit.is_free_between && radius < 1.0 {
-                let what = format!("two masses, omega = {omega}");
                 list.push(Known {
-                    what,
+                    what: what.clone(),
                     oscillator,
                     law,
                     period: 1,
