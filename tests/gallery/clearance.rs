@@ -229,14 +229,14 @@ fn closing(oscillator: &Oscillator, y: &Vector4<f64>) -> f64 {
 pub(crate) fn clearances() -> Vec<(String, (Oscillator, Law))> {
     let two_masses = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.5, 1.8]
         .map(|omega| (format!("two masses, omega = {omega}"), pair(omega)));
-    let dampers = [(10.0, 0.05), (10.0, 0.06), (10.5, 0.05), (9.5, 0.06)].map(|(hertz, clearance)| {
+    let dampers = [(9.8, 0.055), (10.0, 0.05), (10.2, 0.045), (10.5, 0.05)].map(|(hertz, clearance)| {
         let damper = Damper { omega: 2.0 * PI * hertz, clearance, ..DAMPER };
         (format!("impact damper, {hertz} Hz, {clearance} m"), damper.pair())
     });
-    let sinks = [(1.0, 0.2), (1.0, 0.16), (1.002, 0.2)].map(|(omega, clearance)| {
+    let sinks = [(1.01, 0.18), (1.02, 0.14), (1.04, 0.1)].map(|(omega, clearance)| {
         (format!("energy sink, omega = {omega}, {clearance}"), Damper { omega, clearance, ..SINK }.pair())
     });
-    let containers = [(1.5, 0.5), (1.8, 0.5), (2.0, 0.6), (4.0, 0.8)]
+    let containers = [(1.7, 0.5), (1.8, 0.5), (2.0, 0.6), (4.0, 0.8)]
         .map(|(d, e)| (format!("container, d = {d}, e = {e}"), container(d, e)));
     [two_masses.to_vec(), dampers.to_vec(), sinks.to_vec(), containers.to_vec()].concat()
 }
@@ -284,8 +284,10 @@ fn a_ball_between_shaken_walls_has_the_phase_and_the_speed_of_the_closed_form() 
         assert!(!orbits.is_empty(), "d = {d}, e = {e}");
         for orbit in orbits {
             let nearest = [1.0, -1.0].map(|sign| lag + sign * (d / size).acos());
-            let off =
-                nearest.map(|phase| (orbit.phase - phase.rem_euclid(TAU)).abs()).into_iter().fold(1.0, f64::min);
+            let off = nearest
+                .map(|phase| (orbit.phase - phase.rem_euclid(TAU)).abs())
+                .into_iter()
+                .fold(1.0, f64::min);
             let speed = 2.0 * orbit.phase.sin() / (1.0 - e) - orbit.before[1];
             println!("d = {d}, e = {e}: phase {off:.1e}, speed {speed:.1e}");
             assert!(off < 1e-12 && speed.abs() < 1e-12);

@@ -50,7 +50,10 @@ fn states_and_events_agree_with_the_closed_form() {
         let (end, events) = walled.run([0.0; 2], 3);
         let ours: Vec<EventKind> = found.events.iter().map(|event| event.kind).collect();
         println!("{multiple} {backlash} {e}: {ours:?} {events:?}");
-        assert!(ours.ends_with(&events.iter().map(|event| event.1).collect::<Vec<_>>()), "{ours:?} {events:?}");
+        assert!(
+            ours.ends_with(&events.iter().map(|event| event.1).collect::<Vec<_>>()),
+            "{ours:?} {events:?}"
+        );
         let off = apart(found.end, [end[0], end[1], 0.0, 0.0]);
         assert!(off < 1e-12 && off_the_integrator(&oscillator, law, [0.0; 4], 3) < 1e-10, "{off:e}");
         let released = found.events.iter().find(|event| event.kind == EventKind::MeshEnd).unwrap();
