@@ -42,8 +42,8 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(stopped);
     let instant =
         arguments.time.map(|time| at(time).map(|state| store::orbit::Instant { time, state })).transpose()?;
-    let (shown, halt) = (orbit::EVENT_PERIODS, interrupt.raised());
-    let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(stopped)?;
+    let (shown, longest, halt) = (orbit::EVENT_PERIODS, arguments.longest_window(), interrupt.raised());
+    let orbit = orbit::analyse_until(&*model, start, &settings, longest, shown, halt)?.ok_or_else(stopped)?;
     print(&match arguments.json {
         true => store::orbit::json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),
@@ -51,9 +51,10 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
         let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
-        let formats = FigureFormat::scene(&arguments.format);
+        let formats = FigureFormat::added(&arguments.format, folder.path(), "orbit");
         let files = store::orbit::write(&folder, &*model, &orbit, &request, &formats)?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
+        say::removed(&folder);
     }
     fail_if(failed, "the integration failed; `status` says why")
 }
