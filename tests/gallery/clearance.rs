@@ -233,7 +233,7 @@ pub(crate) fn clearances() -> Vec<(String, (Oscillator, Law))> {
         let damper = Damper { omega: 2.0 * PI * hertz, clearance, ..DAMPER };
         (format!("impact damper, {hertz} Hz, {clearance} m"), damper.pair())
     });
-    let sinks = [(1.01, 0.18), (1.02, 0.14), (1.04, 0.1)].map(|(omega, clearance)| {
+    let sinks = [(1.005, 0.2), (1.01, 0.18), (1.04, 0.14)].map(|(omega, clearance)| {
         (format!("energy sink, omega = {omega}, {clearance}"), Damper { omega, clearance, ..SINK }.pair())
     });
     let containers = [(1.7, 0.5), (1.8, 0.5), (2.0, 0.6), (4.0, 0.8)]

@@ -121,7 +121,7 @@ fn a_legend_names_motion_that_never_leaves_contact() {
             .map(|file| fs::read_to_string(folder.path().join(name).join(file)).unwrap());
         let has = |text: &str| figure.contains(text);
         assert!(has("period 1, always in contact") && has("period 1, contact"), "{figure}");
-        let entry = format!(r##""cells":{cells},"color":"#ebaac8","text":"period 1, always in contact""##);
+        let entry = format!(r#""color":"ebaac8","text":"period 1, always in contact","cells":{cells}"#);
         assert!(report.contains(&entry), "{report}");
     }
 }
