@@ -24,6 +24,7 @@ def bifurcation(
     at: Mapping[str, float] | None = None,
     axes: scenes.Axes | None = None,
     parameters: scenes.Parameters | None = None,
+    quantities: Iterable[str] | None = None,
     start: scenes.Start | None = None,
     settings: Mapping[str, Any] | None = None,
     progress: bool | Report = True,
@@ -40,18 +41,20 @@ def bifurcation(
         has two axes, ``along`` names the one that is swept, and ``at`` gives the value of the other one.
     axes, parameters, settings, progress
         See :func:`rattlemap.map`.
+    quantities
+        Measured quantities, such as ``["amplitude", "impact_speed"]``: each adds variables.
     start
         ``"rest"`` or a state. With ``"up"``, ``"down"`` or ``"both"`` each column starts from the last state of its neighbour.
     **names
         One axis, a tuple ``(min, max, count)`` or an array of increasing values; values of single parameters; settings of
-        ``[integration]``. All quantities are dimensionless.
+        ``[integration]``. Quantities have the units of the model.
 
     Returns
     -------
     xarray.Dataset
         Over the parameter (and over ``direction`` with ``start="both"``): ``class``, ``period``, ``word``, ``pattern``,
         ``lyapunov``, ``lyapunov_error``, ``impacts_per_period``, ``mesh_fraction``, ``symmetric``, ``status``,
-        ``periods_run``. Over ``point``, one row per crossing of a wall: ``side``, ``kind``, ``t_mod_period``, and the state
+        ``periods_run``, and the requested quantities. Over ``point``, one row per crossing of a wall: ``side``, ``kind``, ``t_mod_period``, and the state
         before (``x1_before`` ...) and after (``x1`` ...); the coordinate ``point_<name>`` is the parameter's value there.
         :func:`rattlemap.open` returns the same for the program's folder.
 
@@ -74,6 +77,7 @@ def bifurcation(
         sets=set,
         along=along,
         at=at,
+        quantities=quantities,
         start=start,
         settings=settings,
     )

@@ -3,7 +3,7 @@
 use super::constants::Constants;
 use super::layout::{Finding, Measured, Reading, SYMBOLS_PER_NUMBER};
 use super::measured;
-use crate::record::{Record, WORD_SYMBOLS, joined, valid};
+use crate::record::{Record, WORD_SYMBOLS, joined, measures, valid};
 use rattlemap_dynamics::orbit::Quantities;
 use rattlemap_dynamics::word::Word;
 
@@ -46,7 +46,12 @@ impl LaneResult {
     /// Returns its record. `constants` are those of the tables on which it ran. A million records take most of a
     /// second: convert them on all cores.
     pub fn record(&self, constants: &[Option<Constants>]) -> Record {
-        record(constants[self.flow as usize].as_ref(), &self.reading, &self.finding)
+        let mut record = record(constants[self.flow as usize].as_ref(), &self.reading, &self.finding);
+        if self.measured.is_some() {
+            let (quantities, multiplier) = (self.quantities(constants), self.multiplier(constants));
+            record.set_measures(&measures::Measured { quantities: quantities.as_ref(), multiplier });
+        }
+        record
     }
 }
 

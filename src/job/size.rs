@@ -191,21 +191,28 @@ fn disk(scene: &Scene) -> [u64; 2] {
         let column = |quantity: &Quantity| match quantity {
             Quantity::Word | Quantity::Pattern => words,
             Quantity::Lyapunov => exponent,
-            Quantity::Impacts | Quantity::Mesh => 8,
+            Quantity::Impacts | Quantity::Mesh | Quantity::ImpactRate => 8,
             Quantity::Class => class,
             Quantity::Symmetric => 1,
+            Quantity::State => 32,
+            measured => numbers(*measured),
         };
         quantities.iter().map(column).sum()
     };
+    let figures = |quantity: &Quantity| match quantity {
+        Quantity::State => 4,
+        other => (numbers(*other) / 8).max(1),
+    };
+    let figures: u64 = quantities.iter().map(figures).sum();
     let file = |format: &Format| match format {
         Format::Csv => 190,
         // A word has a row of words.csv, too.
         Format::Npy => 33 + columns(12, 16, 3),
         // The starts of cells that follow their neighbours.
-        Format::Html if scene.start().follows() => 68,
-        Format::Html => 24,
-        // One figure per quantity, and one of attractors.
-        Format::Png | Format::Svg | Format::Pdf => 4 * (quantities.len() as u64 + 1),
+        Format::Html if scene.start().follows() => 68 + 4 * figures,
+        Format::Html => 24 + 4 * figures,
+        // One figure per number, and one of attractors.
+        Format::Png | Format::Svg | Format::Pdf => 4 * (figures + 1),
     };
     // Every record has an exponent with its error: the class needs them.
     [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
@@ -215,15 +222,24 @@ fn disk(scene: &Scene) -> [u64; 2] {
 fn stored_run(scene: &Scene) -> u64 {
     let quantities = &scene.outputs().quantities;
     let column = |quantity: &Quantity| match quantity {
-        Quantity::Impacts | Quantity::Mesh => 8,
+        // The rate is computed from the impacts per period.
+        Quantity::ImpactRate if quantities.contains(&Quantity::Impacts) => 0,
+        Quantity::Impacts | Quantity::Mesh | Quantity::ImpactRate => 8,
         Quantity::Word | Quantity::Pattern => 4,
-        Quantity::Class | Quantity::Lyapunov | Quantity::Symmetric => 0,
+        Quantity::Class | Quantity::Lyapunov | Quantity::Symmetric | Quantity::State => 0,
+        measured => numbers(*measured),
     };
     let is_exponent = |quantity: &Quantity| matches!(quantity, Quantity::Class | Quantity::Lyapunov);
     let exponent = if quantities.iter().any(is_exponent) || scene.is_basin() { 16 } else { 0 };
     let has_starts = scene.run_count() > scene.cell_count();
-    let state = if has_starts || scene.is_basin() || scene.start().follows() { 32 } else { 0 };
+    let needs_state = quantities.contains(&Quantity::State) || scene.is_basin() || scene.start().follows();
+    let state = if has_starts || needs_state { 32 } else { 0 };
     8 + exponent + state + quantities.iter().map(column).sum::<u64>()
+}
+
+/// Bytes of the numbers of a measured quantity.
+fn numbers(quantity: Quantity) -> u64 {
+    quantity.group().map_or(0, |group| 8 * group.measures().count() as u64)
 }
 
 fn list_rows(scene: &Scene) -> u64 {
@@ -266,6 +282,7 @@ mod tests {
     use crate::map::plan::Plan;
     use crate::map::scene::{FileText, Purpose};
     use crate::record::RecordStore;
+    use crate::record::measures::MEASURES;
     use rattlemap_dynamics::flow::Flow;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2], sets: &[&str]) -> Scene {
@@ -334,6 +351,7 @@ mod tests {
             ("['class','lyapunov','impacts','mesh','symmetric','word','pattern']", None, 48),
             ("['class']", Some("start.count=3"), 56),
             ("['class','mesh']", Some("start.policy='up'"), 64),
+            ("['state','impact_rate','harmonic','dissipated']", None, 8 + 32 + 8 + 6 * 8 + 8),
         ] {
             let quantities = format!("outputs.quantities={quantities}");
             let sets: Vec<&str> = [&*quantities].into_iter().chain(more).collect();
@@ -346,11 +364,13 @@ mod tests {
                 lyapunov_error: number(needs.exponent),
                 impacts_per_period: number(needs.impacts),
                 mesh_fraction: number(needs.mesh),
+                measures: [0.5; MEASURES],
                 strobe: [1.0; 4],
                 period: 1,
                 periods_run: 100,
                 ..Record::default()
             };
+            record.clear_measures(|group| !needs.has(group));
             if needs.word {
                 let word = rattlemap_dynamics::word::Word::cyclic(b"13");
                 record.set_word(&word);

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use crate::map::scene::Start;
+use crate::record::measures::{MEASURES, Measured};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, REST, Side, State};
 use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Settings, Status};
@@ -29,6 +30,12 @@ pub struct Column {
     pub impacts_per_period: f64,
     /// Fraction of the time spent meshing; NaN if the integration failed.
     pub mesh_fraction: f64,
+    /// Impacts per unit time; NaN if the integration failed.
+    pub impact_rate: f64,
+    /// Measured quantities, by their places in a record.
+    pub measures: [Option<f64>; MEASURES],
+    /// Last state at phase 0; none if the integration failed.
+    pub state: Option<State>,
     /// Whether a periodic orbit is its own mirror image.
     pub symmetric: Option<bool>,
     /// The word of a periodic orbit.
@@ -215,6 +222,9 @@ impl Column {
             lyapunov_error: None,
             impacts_per_period: 0.0,
             mesh_fraction: 0.0,
+            impact_rate: 0.0,
+            measures: [None; MEASURES],
+            state: None,
             symmetric: None,
             word: None,
             periods_run: 0,
@@ -243,6 +253,9 @@ impl Column {
             lyapunov_error: orbit.lyapunov_error,
             impacts_per_period: orbit.impacts_per_period,
             mesh_fraction: orbit.mesh_fraction,
+            impact_rate: orbit.impacts_per_period / orbit.forcing_period,
+            measures: Measured::from(&orbit).numbers(),
+            state: (orbit.class != Class::Failed).then_some(orbit.strobe),
             symmetric: orbit.symmetric,
             periods_run: orbit.periods_run,
             points: orbit.events.iter().map(point).collect(),

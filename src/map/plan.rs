@@ -23,6 +23,7 @@ use thiserror::Error;
 pub(crate) use start::followed;
 
 use crate::map::scene::{Axis, Points, Quantity, Refine, Scene, Start, Steps};
+use crate::record::measures::Group;
 use crate::record::{Record, Records};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, State};
@@ -63,6 +64,10 @@ pub struct Needs {
     pub word: bool,
     /// Pattern of a cycle.
     pub pattern: bool,
+    /// Measured quantities, by the bits of their [groups](crate::record::measures::GROUPS).
+    pub measures: u32,
+    /// Last strobe state as a quantity.
+    pub state: bool,
 }
 
 impl Needs {
@@ -75,7 +80,25 @@ impl Needs {
         symmetric: true,
         word: true,
         pattern: true,
+        measures: u32::MAX,
+        state: true,
     };
+
+    /// Whether a measured quantity is requested.
+    pub fn has(&self, group: &Group) -> bool {
+        self.measures & group.bit != 0
+    }
+
+    /// Whether one of these measured quantities is requested.
+    pub fn has_any(&self, quantities: &[Quantity]) -> bool {
+        quantities.iter().filter_map(|quantity| quantity.group()).any(|group| self.has(group))
+    }
+
+    /// Whether the motion must be measured: for all measured quantities but the multiplier, which is known for a cycle.
+    pub fn measures_motion(&self) -> bool {
+        let multiplier = Quantity::Multiplier.group().map_or(0, |group| group.bit);
+        self.measures & !multiplier != 0
+    }
 }
 
 /// Error: the model has no motion in a cell.
@@ -139,7 +162,7 @@ impl Plan {
                 undecided_periods: integration.undecided_periods,
                 exponent: needs.exponent,
                 shows_exponent: needs.lyapunov,
-                quantities: false,
+                quantities: needs.measures_motion(),
             },
             steps: integration.steps_per_period,
             refine: scene.refine(),
@@ -246,9 +269,9 @@ impl Plan {
         }
     }
 
-    /// Whether the last states of runs are needed, to distinguish attractors or as starts of other cells.
+    /// Whether the last states of runs are needed: as a quantity, to distinguish attractors, or as starts of other cells.
     pub fn reads_strobes(&self) -> bool {
-        self.start_count() > 1 || self.is_basin() || self.policy().follows()
+        self.needs.state || self.start_count() > 1 || self.is_basin() || self.policy().follows()
     }
 
     /// Returns the state of the run `id` at phase 0. If cells follow their neighbours, it is the neighbour's last
@@ -368,11 +391,16 @@ fn needs(quantities: &[Quantity]) -> Needs {
         // The exponent distinguishes chaos from a cycle that was not found.
         exponent: has(Quantity::Lyapunov) || has(Quantity::Class),
         lyapunov: has(Quantity::Lyapunov),
-        impacts: has(Quantity::Impacts),
+        impacts: has(Quantity::Impacts) || has(Quantity::ImpactRate),
         mesh: has(Quantity::Mesh),
         symmetric: has(Quantity::Symmetric),
         word: has(Quantity::Word),
         pattern: has(Quantity::Pattern),
+        measures: quantities
+            .iter()
+            .filter_map(|quantity| quantity.group())
+            .fold(0, |bits, group| bits | group.bit),
+        state: has(Quantity::State),
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod classify;
 pub mod distance;
 pub mod limits;
+pub mod measures;
 mod spelling;
 mod store;
 
@@ -13,8 +14,10 @@ pub use store::{RecordStore, Records};
 
 use bytemuck::{Pod, Zeroable};
 
+use measures::MEASURES;
+
 /// Layout version of [`Record`], stored in files that hold records.
-pub const RECORD_VERSION: u32 = 2;
+pub const RECORD_VERSION: u32 = 3;
 
 /// Longest word or pattern whose symbols a record holds. Of longer ones it holds hash and length.
 pub const WORD_SYMBOLS: usize = 64;
@@ -39,11 +42,12 @@ pub mod valid {
     pub const FILLED: u32 = 1 << 7;
     /// `pattern`, `pattern_length` and `pattern_hash`.
     pub const PATTERN: u32 = 1 << 8;
+    // The bits from 9 on belong to the groups of [`measures`](super::measures::GROUPS).
 }
 
 /// Results of one cell, in one fixed layout for all engines, precisions and variants.
 ///
-/// 176 bytes, no padding, little-endian in files.
+/// 360 bytes, no padding, little-endian in files.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Record {
@@ -82,6 +86,8 @@ pub struct Record {
     pub pattern_length: u32,
     /// Reserved; zero.
     pub reserved: u32,
+    /// Measured quantities, at the places of [`measures::all`].
+    pub measures: [f64; MEASURES],
 }
 
 /// Rounding error of a mesh fraction of 1. Lanes count whole steps, without error.

@@ -7,6 +7,7 @@ use std::hash::Hash;
 use bytemuck::Pod;
 
 use super::Record;
+use super::measures::MEASURES;
 
 /// Records by number, in any container.
 pub trait Records: Debug + Sync {
@@ -33,13 +34,14 @@ impl<R: AsRef<[Record]> + Debug + Sync + ?Sized> Records for R {
 /// A fixed number of records, stored by column.
 ///
 /// A column that is zero in all records takes no memory, and equal words are stored once. A map of classes and
-/// exponents takes 24 bytes per run; a [`Record`] takes 176. Records come back to the bit, but for strobe states,
+/// exponents takes 24 bytes per run; a [`Record`] takes 360. Records come back to the bit, but for strobe states,
 /// which are stored on request only.
 #[derive(Clone, Debug)]
 pub struct RecordStore {
     count: usize,
     with_strobes: bool,
     numbers: [Column<f64>; 4],
+    measures: [Column<f64>; MEASURES],
     strobe: Column<[f64; 4]>,
     periods_run: Column<u32>,
     /// Period, status, symmetry, validity and the reserved field: few combinations occur.
@@ -55,6 +57,7 @@ impl RecordStore {
             count,
             with_strobes,
             numbers: Default::default(),
+            measures: Default::default(),
             strobe: Column::default(),
             periods_run: Column::default(),
             flags: Distinct::default(),
@@ -73,6 +76,10 @@ impl RecordStore {
         let &Record { lyapunov, lyapunov_error, impacts_per_period, mesh_fraction, .. } = record;
         let numbers = [lyapunov, lyapunov_error, impacts_per_period, mesh_fraction];
         self.numbers.iter_mut().zip(numbers).for_each(|(column, number)| column.put(count, id, number));
+        self.measures
+            .iter_mut()
+            .zip(record.measures)
+            .for_each(|(column, number)| column.put(count, id, number));
         if self.with_strobes {
             self.strobe.put(count, id, record.strobe);
         }
@@ -86,7 +93,7 @@ impl RecordStore {
     /// Returns the bytes of memory of the columns, without the lists of words.
     pub fn bytes(&self) -> usize {
         let small = [&self.periods_run, &self.flags.places, &self.word.places, &self.pattern.places];
-        self.numbers.iter().map(Column::bytes).sum::<usize>()
+        self.numbers.iter().chain(&self.measures).map(Column::bytes).sum::<usize>()
             + small.iter().map(|column| column.bytes()).sum::<usize>()
             + self.strobe.bytes()
     }
@@ -122,6 +129,7 @@ impl Records for RecordStore {
             pattern_hash,
             pattern_length,
             reserved,
+            measures: self.measures.each_ref().map(|column| column.get(id)),
         }
     }
 }
@@ -245,5 +253,8 @@ mod tests {
         all.set_word(&Word::cyclic(b"13552"));
         all.set_pattern(&Word::cyclic(b"1352"));
         assert_eq!((per_run(&all, false), per_run(&all, true)), (48, 80));
+        let mut measures = [0.0; MEASURES];
+        (measures[0], measures[5]) = (1.0, 2.0);
+        assert_eq!(per_run(&Record { measures, ..by_default }, false), 24 + 2 * 8);
     }
 }

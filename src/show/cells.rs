@@ -1,5 +1,7 @@
 //! A finished map as rows, the input of tables, figures and reports.
 
+use std::f64::consts::TAU;
+
 use rayon::prelude::*;
 
 use crate::findings::attractors::{self, Basins, NONE};
@@ -8,7 +10,9 @@ use crate::map::plan::Plan;
 use crate::map::scene::{Continuous, Quantity, Scene};
 use crate::map::schedule::Refined;
 use crate::record::classify::{classify, status};
+use crate::record::measures::{self, MEASURES};
 use crate::record::{Record, Records, Spelling, valid};
+use crate::show::numbers::Number;
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -45,6 +49,10 @@ pub(crate) struct Row {
     pub(crate) lyapunov_error: Option<f64>,
     pub(crate) impacts_per_period: Option<f64>,
     pub(crate) mesh_fraction: Option<f64>,
+    /// Measured quantities, by their places in a record.
+    pub(crate) measures: [Option<f64>; MEASURES],
+    /// Last state at phase 0.
+    pub(crate) state: Option<State>,
     pub(crate) symmetric: Option<bool>,
     pub(crate) status: Status,
     pub(crate) periods_run: u32,
@@ -215,6 +223,25 @@ impl<'a> Cells<'a> {
         if self.has(Quantity::Pattern) { self.record(id).pattern() } else { None }
     }
 
+    /// Returns the numbers that the scene requests besides exponent, impacts and meshing.
+    pub fn numbers(&self) -> Vec<Number> {
+        Number::of(self.scene.base(), &self.scene.outputs().quantities)
+    }
+
+    /// Returns the impacts per unit time of the run `id`.
+    pub(crate) fn impact_rate(&self, id: usize) -> Option<f64> {
+        let record = self.record(id);
+        let is_shown = self.shows_averages(&record) && record.valid & valid::IMPACTS != 0;
+        let omega = || self.plan.model(id as u32).oscillator().ok().map(|oscillator| oscillator.omega);
+        Some(record.impacts_per_period * is_shown.then(omega)?? / TAU)
+    }
+
+    /// Whether the continuous quantities of a record are shown: it was integrated, or filled cells are interpolated.
+    fn shows_averages(&self, record: &Record) -> bool {
+        let is_filled = record.valid & valid::FILLED != 0;
+        !is_filled || self.scene.refine().is_none_or(|refine| refine.continuous == Continuous::Interpolated)
+    }
+
     /// Returns the values of the run `id` except word and pattern.
     pub(crate) fn row(&self, id: usize) -> Row {
         let record = &self.record(id);
@@ -222,11 +249,15 @@ impl<'a> Cells<'a> {
         let class = classify(record);
         let periodic = matches!(class, Class::Periodic { .. });
         let is_filled = record.valid & valid::FILLED != 0;
-        let shows = !is_filled
-            || self.scene.refine().is_none_or(|refine| refine.continuous == Continuous::Interpolated);
+        let shows = self.shows_averages(record);
         let measured = |quantity, bit, value: f64| {
             (shows && self.has(quantity) && record.valid & bit != 0 && value.is_finite()).then_some(value)
         };
+        let mut measures = [None; MEASURES];
+        if shows && self.plan.needs().measures != 0 {
+            measures::all().for_each(|measure| measures[measure.place] = measure.of(record));
+        }
+        let has_state = self.has(Quantity::State) && !status(record).is_failure();
         let has_class = self.has(Quantity::Class);
         let lyapunov = measured(Quantity::Lyapunov, valid::LYAPUNOV, record.lyapunov);
         Row {
@@ -241,6 +272,8 @@ impl<'a> Cells<'a> {
                 .map(|_| record.lyapunov_error),
             impacts_per_period: measured(Quantity::Impacts, valid::IMPACTS, record.impacts_per_period),
             mesh_fraction: measured(Quantity::Mesh, valid::MESH, record.mesh_fraction),
+            measures,
+            state: record.state().filter(|_| has_state),
             symmetric: (self.has(Quantity::Symmetric) && record.valid & valid::SYMMETRIC != 0)
                 .then_some(record.symmetric != 0),
             status: status(record),

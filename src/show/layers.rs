@@ -52,7 +52,7 @@ pub fn of(cells: &Cells<'_>, words: &MapWords) -> Vec<Layer> {
     let mut layers: Vec<Layer> = cells.basins().map(basins::layer).into_iter().collect();
     if cells.has(Quantity::Class) {
         let classes = classes::layer(cells);
-        layers.push(if layers.is_empty() { classes } else { Layer { name: CLASS, ..classes } });
+        layers.push(if layers.is_empty() { classes } else { Layer { name: CLASS.into(), ..classes } });
     }
     layers.extend(continuous::layers(cells));
     layers.extend(words.patterns.as_ref().map(words::patterns));

@@ -3,19 +3,23 @@
 use serde_json::{Value, json};
 
 use crate::map::schedule::{Audit, Deviation, Refined};
+use crate::record::measures;
+use crate::show::cells::Cells;
 
-/// Returns the numbers of integrated and filled cells of an adaptive map, and the audits of the filled ones.
-pub fn object(refined: &Refined) -> Value {
-    let Refined { integrated, filled, rounds, ref audits, .. } = *refined;
-    let audits: Vec<Value> = audits.iter().map(audit).collect();
-    json!({ "integrated": integrated, "filled": filled, "rounds": rounds, "audits": audits })
+/// Returns the numbers of integrated and filled cells of an adaptive map, and the audits of the filled ones; none for other maps.
+pub fn object(cells: &Cells<'_>) -> Option<Value> {
+    let state_names = &cells.scene().base().state_names();
+    let Refined { integrated, filled, rounds, ref audits, .. } = *cells.refinement()?;
+    let audits: Vec<Value> = audits.iter().map(|one| audit(one, state_names)).collect();
+    Some(json!({ "integrated": integrated, "filled": filled, "rounds": rounds, "audits": audits }))
 }
 
 /// Returns an audit: a random sample of filled cells was integrated. `rate` is the share of wrong cells and `interval` its 95 %
 /// interval (Wilson). `words` counts sampled cells that had been filled with a word, `wrong_words` those whose word was wrong;
-/// `patterns` and `wrong_patterns` count patterns. `errors` are null where filled cells have no such value.
-fn audit(audit: &Audit) -> Value {
-    json!({
+/// `patterns` and `wrong_patterns` count patterns. `errors` are null where filled cells have no such value; measured quantities
+/// have an entry if the scene requests them.
+fn audit(audit: &Audit, state_names: &[&str]) -> Value {
+    let mut object = json!({
         "filled": audit.filled,
         "sampled": audit.sampled,
         "wrong": audit.wrong,
@@ -30,7 +34,13 @@ fn audit(audit: &Audit) -> Value {
             "impacts_per_period": audit.errors.impacts.map(|deviation| deviations(deviation, true)),
             "mesh_fraction": audit.errors.mesh.map(|deviation| deviations(deviation, false)),
         },
-    })
+    });
+    for measure in measures::all().filter(|measure| measure.is_of(state_names)) {
+        if let Some(deviation) = audit.errors.measures[measure.place] {
+            object["errors"][measure.name(state_names)] = deviations(deviation, false);
+        }
+    }
+    object
 }
 
 /// Returns absolute differences between filled and integrated values. `empty` counts cells that were filled without a value;

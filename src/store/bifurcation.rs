@@ -8,6 +8,7 @@ use crate::map::scene::{self, Along, Format, Scene};
 use crate::show::drawing::axis::Scale;
 use crate::show::figure;
 use crate::show::figure::bifurcation::Panels;
+use crate::show::numbers::Number;
 use crate::show::symbols::{axis_label, symbol};
 use crate::show::table::bifurcation_tables;
 use crate::show::{caption, names};
@@ -49,11 +50,12 @@ pub fn write(
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
     let mut files = Vec::new();
+    let numbers = Number::of(scene.base(), &scene.outputs().quantities);
     let (names, fixed) = (scene.base().state_names(), fixed(&scene.line()));
     if wanted.contains(&Format::Csv) {
         let axis = &parameter.name;
         folder.replace(POINTS, |out| bifurcation_tables::write_points(out, axis, &names, columns))?;
-        folder.replace(COLUMNS_CSV, |out| bifurcation_tables::write_columns(out, axis, columns))?;
+        folder.replace(COLUMNS_CSV, |out| bifurcation_tables::write_columns(out, axis, &numbers, columns))?;
         files.extend([POINTS, COLUMNS_CSV]);
         if fixed.is_some() {
             folder
@@ -61,19 +63,19 @@ pub fn write(
             files.push(STROBE_CSV);
         }
     }
-    let panels = Panels::of(scene.base(), fixed);
+    let panels = Panels::of(scene.base(), fixed, &numbers);
     for (format, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
-        let subtitle =
-            format!("{}{}; {}", line(arguments.along), scene.start().in_words(), caption::of_scene(scene));
+        let title = format!("{}{}", scene.title(), line(arguments.along));
+        let subtitle = format!("{}; {}", scene.start().in_words(), caption::of_scene(scene));
         let scale = match scene.axes()[0].scale() {
             scene::Scale::Log => Scale::Logarithmic,
             scene::Scale::Linear => Scale::Linear,
             scene::Scale::Values => Scale::Listed,
         };
-        let texts = [scene.title(), &subtitle];
+        let (texts, style) = ([&*title, &*subtitle], scene.figure_style());
         folder.replace(name, |out| {
-            figure::bifurcation::write(out, *format, texts, (&label, scale), &panels, columns)
+            figure::bifurcation::write(out, *format, style, texts, (&label, scale), &panels, columns)
         })?;
         files.push(name);
     }
@@ -84,7 +86,7 @@ pub fn write(
     Ok(files)
 }
 
-/// Describes a line through a plane; the title of such a scene describes the plane.
+/// Describes a line through a plane, to complete a title that describes the plane.
 fn line(along: Option<&Along>) -> String {
     let Some(Along { parameter, at }) = along.filter(|along| !along.at.is_empty()) else {
         return String::new();
@@ -94,5 +96,5 @@ fn line(along: Option<&Along>) -> String {
         .filter_map(|at| at.split_once('='))
         .map(|(name, value)| format!("{} = {}", symbol(name.trim()), value.trim()))
         .collect();
-    format!("along {} at {}, ", symbol(parameter), at.join(", "))
+    format!(", along {} at {}", symbol(parameter), at.join(", "))
 }

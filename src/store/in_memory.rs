@@ -8,6 +8,7 @@ use crate::show::cells::Cells;
 use crate::show::error::WriteError;
 pub use crate::show::layers::SharedColors;
 use crate::show::map_pair::MapPair;
+use crate::show::numbers::Number;
 use crate::show::table::cell_columns::{self, Values};
 use crate::show::table::words_csv::WordRows;
 use crate::show::table::{attractors_csv, bifurcation_tables, compare_csv, orbit_tables};
@@ -77,10 +78,11 @@ pub fn diagram(
     elapsed: Duration,
 ) -> Result<Diagram, OutputError> {
     let (axis, names) = (&*scene.axes()[0].parameter().name, scene.base().state_names());
+    let numbers = Number::of(scene.base(), &scene.outputs().quantities);
     let manifest = bifurcation(scene, arguments, columns, [elapsed, Duration::ZERO], &[]);
     Ok(Diagram {
         manifest: manifest.to_string(),
-        columns: text(|to| bifurcation_tables::write_columns(to, axis, columns))?,
+        columns: text(|to| bifurcation_tables::write_columns(to, axis, &numbers, columns))?,
         points: text(|to| bifurcation_tables::write_points(to, axis, &names, columns))?,
     })
 }
@@ -98,7 +100,7 @@ pub fn trajectory(
         Class::Failed => Vec::new(),
         _ => moments(model, orbit, samples_per_period)?,
     };
-    text(|to| orbit_tables::write_trajectory(to, &model.state_names(), &moments))
+    text(|to| orbit_tables::write_trajectory(to, model, &moments))
 }
 
 /// Returns a comparison as JSON, without a folder and its files, and its table `compare.csv`.

@@ -20,7 +20,7 @@ pub fn object(folder: &Path, files: &[String], cells: &Cells<'_>, run: &Run<'_>,
         json!({ "cells": cells.count(), "runs": cells.runs() }),
         counts(cells),
         json!({
-            "refinement": cells.refinement().map(refinement::object),
+            "refinement": refinement::object(cells),
             "periods": cells.periods(),
             "without_effect": run.without_effect,
             "resumed": resumed(run),

@@ -6,8 +6,8 @@
 //! from the first. The two samples are compared by the Kolmogorov-Smirnov statistic.
 
 use super::cell::Cell;
-use super::compare::Field;
 use crate::record::classify::classify;
+use crate::record::measures::GROUPS;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::Class;
 
@@ -17,8 +17,9 @@ const FEWEST: usize = 8;
 /// Probability that the test rejects a right map.
 const FALSE_ALARM_RATE: f64 = 1e-4;
 
-/// Number of compared averages: exponent, logarithm of its error, impacts, meshing.
-const COUNT: usize = 4;
+/// Number of compared averages: exponent, logarithm of its error, impacts, meshing, and the first number of each measured quantity.
+const COUNT: usize = NAMES.len() + GROUPS.len();
+const NAMES: [&str; 4] = ["lyapunov", "lyapunov_error", "impacts_per_period", "mesh_fraction"];
 
 /// Test of one average over all chaotic cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,33 +56,33 @@ pub(super) fn differences(cell: &Cell<'_>) -> Option<Differences> {
     if [record, &first, &second].iter().any(|side| classify(side) != Class::Chaotic) {
         return None;
     }
-    let of = |field: Field, scale: f64, value: fn(&Record) -> f64| {
-        let bit = if field == Field::Exponent {
-            valid::LYAPUNOV
-        } else if field == Field::Impacts {
-            valid::IMPACTS
-        } else {
-            valid::MESH
-        };
-        let known = record.valid & bit != 0;
+    let of = |bit: u32, scale: f64, value: &dyn Fn(&Record) -> f64| {
+        let known = [record, &first, &second].iter().all(|side| side.valid & bit != 0);
         known.then(|| [record, &second].map(|side| (value(side) - value(&first)) / scale))
     };
-    Some([
-        of(Field::Exponent, first.lyapunov_error, |record| record.lyapunov),
-        of(Field::Exponent, 1.0, |record| record.lyapunov_error.ln()),
-        of(Field::Impacts, first.impacts_per_period, |record| record.impacts_per_period),
-        of(Field::Mesh, 1.0, |record| record.mesh_fraction),
-    ])
+    let mut all = [None; COUNT];
+    let (averages, measured) = all.split_at_mut(NAMES.len());
+    averages.copy_from_slice(&[
+        of(valid::LYAPUNOV, first.lyapunov_error, &|record| record.lyapunov),
+        of(valid::LYAPUNOV, 1.0, &|record| record.lyapunov_error.ln()),
+        of(valid::IMPACTS, first.impacts_per_period, &|record| record.impacts_per_period),
+        of(valid::MESH, 1.0, &|record| record.mesh_fraction),
+    ]);
+    for (to, measure) in measured.iter_mut().zip(GROUPS.iter().filter_map(|group| group.measures().next())) {
+        *to = of(measure.group.bit, first.measures[measure.place], &|record| record.measures[measure.place]);
+    }
+    Some(all)
 }
 
 /// Tests each average over all chaotic cells.
 pub(super) fn tests(all: &[Differences]) -> Vec<ChaosTest> {
-    let names = ["lyapunov", "lyapunov_error", "impacts_per_period", "mesh_fraction"];
+    let names = NAMES.into_iter().chain(GROUPS.iter().map(|group| group.name));
     names
-        .into_iter()
         .enumerate()
-        .map(|(i, name)| {
-            let pairs: Vec<[f64; 2]> = all.iter().filter_map(|cell| cell[i]).collect();
+        .map(|(i, name)| (i, name, all.iter().filter_map(|cell| cell[i]).collect::<Vec<[f64; 2]>>()))
+        // Measured quantities that the scene does not request are not listed.
+        .filter(|(i, _, pairs)| *i < NAMES.len() || !pairs.is_empty())
+        .map(|(_, name, pairs)| {
             let [map, own] = [0, 1].map(|side| pairs.iter().map(|pair| pair[side]).collect::<Vec<f64>>());
             let cells = pairs.len();
             let bar = (0.5 * (2.0 / FALSE_ALARM_RATE).ln()).sqrt() * (2.0 / cells as f64).sqrt();
@@ -122,7 +123,12 @@ mod tests {
     #[test]
     fn a_shift_of_all_cells_is_found() {
         let cells = |shift: f64| -> Vec<Differences> {
-            (0..40).map(|i| [Some([f64::from(i) + shift, f64::from(i)]), None, None, None]).collect()
+            let cell = |i| {
+                let mut cell = [None; COUNT];
+                cell[0] = Some([f64::from(i) + shift, f64::from(i)]);
+                cell
+            };
+            (0..40).map(cell).collect()
         };
         let first = |shift| tests(&cells(shift))[0];
         assert!(!first(0.0).fails() && !first(10.0).fails() && first(25.0).fails());

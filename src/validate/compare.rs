@@ -1,5 +1,7 @@
 //! Comparison of two records of one cell.
 
+use std::cmp::Ordering;
+
 use serde::Serialize;
 
 use super::finite::not_finite;
@@ -7,6 +9,7 @@ use crate::findings::attractors::{Basins, NONE};
 use crate::gpu::Precision;
 use crate::record::classify::{classify, status};
 use crate::record::distance::{apart, is_within};
+use crate::record::measures::{GROUPS, Group};
 use crate::record::{Record, Spelling, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Budget, Class, Status};
@@ -33,6 +36,8 @@ pub enum Field {
     Impacts,
     /// Fraction of time spent meshing.
     Mesh,
+    /// A measured quantity, by its index in the table of [`GROUPS`].
+    Measured(usize),
     /// How the integration ended.
     Status,
     /// Number of integrated forcing periods, which the plan limits.
@@ -44,22 +49,22 @@ pub enum Field {
 }
 
 impl Field {
-    /// All fields, in the order in which they are reported.
-    pub const ALL: [Field; 13] = [
-        Field::Class,
-        Field::Period,
-        Field::Word,
-        Field::Pattern,
-        Field::Symmetric,
-        Field::Exponent,
-        Field::Attractor,
-        Field::Impacts,
-        Field::Mesh,
-        Field::Status,
-        Field::Periods,
-        Field::Finite,
-        Field::Again,
-    ];
+    /// Returns all fields, in the order in which they are reported.
+    pub fn all() -> Vec<Field> {
+        let before = [
+            Field::Class,
+            Field::Period,
+            Field::Word,
+            Field::Pattern,
+            Field::Symmetric,
+            Field::Exponent,
+            Field::Attractor,
+            Field::Impacts,
+            Field::Mesh,
+        ];
+        let after = [Field::Status, Field::Periods, Field::Finite, Field::Again];
+        before.into_iter().chain((0..GROUPS.len()).map(Field::Measured)).chain(after).collect()
+    }
 
     /// Returns the name in files, which is the record's field name if there is one.
     pub fn name(self) -> &'static str {
@@ -73,6 +78,7 @@ impl Field {
             Field::Attractor => "attractor",
             Field::Impacts => "impacts_per_period",
             Field::Mesh => "mesh_fraction",
+            Field::Measured(group) => GROUPS[group].name,
             Field::Status => "status",
             Field::Periods => "periods_run",
             Field::Finite => "finite",
@@ -182,6 +188,8 @@ pub(super) struct Bars<'a> {
     /// Smallest multiplier that the monodromy matrix resolves; smaller ones count as zero.
     no_multiplier: f64,
     mesh: f64,
+    /// Tolerance of measured quantities of a cycle, relative to the quantity.
+    measured: f64,
     forcing_period: f64,
     budget: Budget,
     pub(super) labels: Option<Labels<'a>>,
@@ -211,6 +219,14 @@ impl Labels<'_> {
 /// less over its budget cannot be distinguished from a neutral one.
 const DECISIVE_GROWTH: f64 = 40.0;
 
+/// Name of the quantity that only cycles have.
+const MULTIPLIER: &str = "multiplier";
+
+/// Orders pairs of numbers by their distance.
+fn farther_apart(a: &[f64; 2], b: &[f64; 2]) -> Ordering {
+    apart(a[0], a[1]).total_cmp(&apart(b[0], b[1]))
+}
+
 /// Tolerance of impacts per period of a cycle. Impacts are counted, so only the division rounds.
 const IMPACTS_BAR: f64 = 1e-9;
 
@@ -222,11 +238,11 @@ const CHAOS_BARS: [f64; 3] = [0.1, 0.5, 0.25];
 
 impl Bars<'_> {
     pub(super) fn new(precision: Precision, forcing_period: f64, budget: &Budget) -> Self {
-        let (multiplier, no_multiplier, mesh) = match precision {
-            Precision::F32 => (4e-3, 1e-2, 2e-5),
-            Precision::F64 => (1e-3, 1e-5, 1e-6),
+        let (multiplier, no_multiplier, mesh, measured) = match precision {
+            Precision::F32 => (4e-3, 1e-2, 2e-5, 2e-3),
+            Precision::F64 => (1e-3, 1e-5, 1e-6, 1e-4),
         };
-        Bars { multiplier, no_multiplier, mesh, forcing_period, budget: *budget, labels: None }
+        Bars { multiplier, no_multiplier, mesh, measured, forcing_period, budget: *budget, labels: None }
     }
 
     /// Compares a record with its judge's, for all fields that both have.
@@ -328,6 +344,10 @@ impl Bars<'_> {
             is_same,
         );
         self.push_averages(list, record, judge, [IMPACTS_BAR, self.mesh]);
+        self.push_measured(list, record, judge, |group| match group.name == MULTIPLIER {
+            true => self.is_same_complex(group, record, judge, period),
+            false => is_within(group.distance(record, judge), self.measured),
+        });
     }
 
     /// Whether two logarithms of the largest multiplier of a cycle agree.
@@ -351,6 +371,9 @@ impl Bars<'_> {
         self.push(list, (Field::Exponent, valid::LYAPUNOV), exponents, both, is_same);
         let impacts = CHAOS_BARS[1] * judge.impacts_per_period + 1.0;
         self.push_averages(list, record, judge, [impacts, CHAOS_BARS[2]]);
+        self.push_measured(list, record, judge, |group| {
+            group.name == MULTIPLIER || is_within(group.distance(record, judge), CHAOS_BARS[1])
+        });
     }
 
     fn push_averages(&self, list: &mut Vec<Compared>, record: &Record, judge: &Record, bars: [f64; 2]) {
@@ -361,6 +384,39 @@ impl Bars<'_> {
         ];
         for ((field, values), bar) in of.into_iter().zip(bars) {
             self.push(list, field, values, both, is_within(apart(values[0], values[1]), bar));
+        }
+    }
+
+    /// Whether the largest multipliers of a cycle agree up to complex conjugation. Near a double multiplier the argument
+    /// changes like the square root of the errors.
+    fn is_same_complex(&self, group: &Group, record: &Record, judge: &Record, period: f64) -> bool {
+        let mut measures =
+            group.measures().map(|measure| [record, judge].map(|side| side.measures[measure.place]));
+        let (Some(moduli), Some(arguments)) = (measures.next(), measures.next()) else { return false };
+        let logs = moduli.map(f64::ln);
+        let bar = (self.multiplier * period.max(5.0)).sqrt();
+        let is_same_argument = is_within(apart(arguments[0].abs(), arguments[1].abs()), bar);
+        let is_none = logs.iter().all(|log| *log <= self.none());
+        self.is_same_multiplier(logs[0], logs[1], period) && (is_same_argument || is_none)
+    }
+
+    /// Adds the comparison of each measured quantity that both sides have. A difference shows the number that
+    /// differs most.
+    fn push_measured(
+        &self,
+        list: &mut Vec<Compared>,
+        record: &Record,
+        judge: &Record,
+        is_same: impl Fn(&Group) -> bool,
+    ) {
+        let both = record.valid & judge.valid;
+        for (place, group) in GROUPS.iter().enumerate().filter(|(_, group)| both & group.bit != 0) {
+            let values = || {
+                let pairs = group.measures().map(|m| [record, judge].map(|side| side.measures[m.place]));
+                let [ours, theirs] = pairs.max_by(farther_apart).unwrap_or_default();
+                (Value::Number(ours), Value::Number(theirs))
+            };
+            list.push(compared(Field::Measured(place), is_same(group), values));
         }
     }
 

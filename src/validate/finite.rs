@@ -1,6 +1,6 @@
 //! Check that the numbers of a record are finite.
 
-use crate::record::{Record, valid};
+use crate::record::{Record, measures, valid};
 use rattlemap_dynamics::orbit::Budget;
 use rattlemap_dynamics::stability::LEAST_FOR_ERROR;
 
@@ -22,10 +22,12 @@ pub(super) fn not_finite(record: &Record, budget: &Budget) -> Option<(&'static s
         (valid::STROBE, "x2", record.strobe[2], None),
         (valid::STROBE, "v2", record.strobe[3], None),
     ];
+    let measured = measures::all()
+        .map(|measure| (measure.group.bit, measure.group.name, record.measures[measure.place], None));
     let is_wrong = |&(bit, _, value, answer): &(u32, &str, f64, Option<f64>)| {
         record.valid & bit != 0 && !value.is_finite() && answer != Some(value)
     };
-    fields.into_iter().find(is_wrong).map(|(_, name, value, _)| (name, value))
+    fields.into_iter().chain(measured).find(is_wrong).map(|(_, name, value, _)| (name, value))
 }
 
 #[cfg(test)]

@@ -51,6 +51,19 @@ fn the_page_lists_the_columns_of_all_files() {
     fs::write(dir.join("starts.toml"), starts).unwrap();
     run(&folder, "map starts.toml --engine cpu --quiet").code(0);
     assert_eq!(header(&dir.join("out/starts/attractors.csv")), listed("attractors.csv"));
+    let measured = listed("Measured quantities");
+    let quantities = "impact_speed impact_speed_max impact_energy impact_rate contact_force_max contact_force_rms amplitude rms \
+                      harmonic dissipated multiplier state";
+    let list: String = quantities.split_whitespace().map(|name| format!("'{name}', ")).collect();
+    let requested = format!("[outputs]\nquantities = [{list}]\n");
+    fs::write(dir.join("measured.toml"), format!("{e}{omega}{requested}")).unwrap();
+    run(&folder, "map measured.toml --engine cpu --quiet").code(0);
+    let columns = header(&dir.join("out/measured/cells.csv"));
+    assert_eq!(columns[12..12 + measured.len()], measured, "all quantities after those that every table has");
+    fs::write(dir.join("measured_line.toml"), format!("{e}{requested}")).unwrap();
+    run(&folder, "bifurcation measured_line.toml --quiet").code(0);
+    let columns = header(&dir.join("out/measured_line/bifurcation_columns.csv"));
+    assert_eq!(columns[columns.len() - measured.len()..], measured);
     assert_eq!(header(&dir.join("out/plane/words.csv")), listed("words.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation_columns.csv")), listed("bifurcation_columns.csv"));

@@ -6,6 +6,7 @@ use crate::cli::say::{path, quoted};
 use crate::map::engine::CardReport;
 use crate::map::plan::count_classes;
 use crate::map::schedule::{Deviation, Errors, Refined};
+use crate::record::measures;
 use crate::show::cells::Cells;
 use crate::store::map::{Provenance, Run};
 use crate::store::shard::FinishedShard;
@@ -24,7 +25,7 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
     format!(
         "{integrated} {unit}{speed}; files written in {finishing:.3} s\n{}{}{}",
         cards(&run.cards, unit),
-        cells.refinement().map_or(String::new(), |refined| refinement(refined, count)),
+        cells.refinement().map_or(String::new(), |refined| refinement(refined, count, cells)),
         classes(count_classes(cells.classes())),
     )
 }
@@ -89,7 +90,7 @@ fn short(x: f64) -> String {
 }
 
 /// Share of integrated cells of an adaptive map, and the result of its audit.
-fn refinement(refined: &Refined, count: usize) -> String {
+fn refinement(refined: &Refined, count: usize, cells: &Cells<'_>) -> String {
     let share = 100.0 * refined.integrated as f64 / count as f64;
     let audit = refined.audits.last().map_or(String::new(), |audit| {
         let [low, high] = audit.interval().map(|rate| 100.0 * rate);
@@ -110,14 +111,14 @@ fn refinement(refined: &Refined, count: usize) -> String {
         };
         format!(
             "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}{exceeds}{}",
-            errors(&audit.errors)
+            errors(&audit.errors, &cells.scene().base().state_names())
         )
     });
     format!("{share:.1} % of {count} cells integrated, the others filled{audit}\n")
 }
 
 /// One line per quantity: how far filled values differ from integrated ones.
-fn errors(errors: &Errors) -> String {
+fn errors(errors: &Errors, state_names: &[&str]) -> String {
     let line = |name: &str, deviation: Option<Deviation>, share: fn(&Deviation) -> String| {
         let Some(deviation) = deviation else { return String::new() };
         let Deviation { compared, empty, median, p95, worst, .. } = deviation;
@@ -135,10 +136,13 @@ fn errors(errors: &Errors) -> String {
         let [low, high] = impacts.off_by_one_interval().map(|rate| 100.0 * rate);
         format!("; 1 or more in {off} cells, {rate:.2} % (95 %: {low:.2} to {high:.2} %)")
     };
-    [
+    let first = [
         line("exponent", errors.lyapunov, |_| String::new()),
         line("impacts per period", errors.impacts, off_by_one),
         line("mesh fraction", errors.mesh, |_| String::new()),
-    ]
-    .concat()
+    ];
+    let measures = measures::all().filter(|measure| measure.is_of(state_names));
+    let measured = measures
+        .map(|measure| line(&measure.name(state_names), errors.measures[measure.place], |_| String::new()));
+    first.into_iter().chain(measured).collect()
 }

@@ -8,9 +8,11 @@ use std::sync::atomic::AtomicBool;
 use rayon::prelude::*;
 
 use super::{Device, EngineError, drop_unrequested};
-use crate::gpu::{self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Pool, Tables};
+use crate::gpu::{
+    self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables,
+};
 use crate::map::plan::{Cell, Plan};
-use crate::map::scene::Steps;
+use crate::map::scene::{Quantity, Steps};
 use crate::record::Record;
 use rattlemap_dynamics::model::{Contact, Oscillator};
 
@@ -297,12 +299,32 @@ fn settings_after(plan: &Plan, survey: &Survey) -> LaneSettings {
         pattern: plan.needs().pattern,
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
+        multiplier: plan.needs().has_any(&[Quantity::Multiplier]),
+        measures: measures(plan),
         chatter: survey.chatter,
         kinds: survey.kinds,
+        sine: survey.sine,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
         steps_per_period: requested_steps(plan),
         ..default
     }
+}
+
+/// Returns what lanes measure for the requested quantities.
+fn measures(plan: &Plan) -> Option<Measures> {
+    let has_any = |quantities: &[Quantity]| plan.needs().has_any(quantities);
+    plan.needs().measures_motion().then(|| Measures {
+        periods: plan.budget().settings.observed_periods,
+        extremes: has_any(&[Quantity::Amplitude, Quantity::ContactForceMax]),
+        moments: has_any(&[
+            Quantity::Amplitude,
+            Quantity::Rms,
+            Quantity::Harmonic,
+            Quantity::Dissipated,
+            Quantity::ContactForceMax,
+            Quantity::ContactForceRms,
+        ]),
+    })
 }
 
 fn requested_steps(plan: &Plan) -> Option<u32> {
@@ -319,6 +341,8 @@ struct Survey {
     chatter: bool,
     /// Whether any wall is elastic or rigid.
     kinds: bool,
+    /// Whether any force has a sine.
+    sine: bool,
     /// Least and most free steps per forcing period, of flows that lanes can carry.
     steps: Option<[u32; 2]>,
 }
@@ -330,6 +354,7 @@ impl Survey {
         Survey {
             chatter: self.chatter || other.chatter,
             kinds: self.kinds || other.kinds,
+            sine: self.sine || other.sine,
             steps: steps.reduce(|[least, most], [low, high]| [least.min(low), most.max(high)]),
         }
     }
@@ -356,7 +381,9 @@ fn survey_flows<T: Send>(
             bounces && gpu::follows_chatter(&oscillator, least[side])
         });
         let kinds = gpu::has_elastic_or_rigid_wall(&oscillator);
-        let survey = Survey { chatter, kinds, steps: Constants::steps(&oscillator, steps).map(|n| [n; 2]) };
+        let sine = gpu::has_sine(&oscillator);
+        let steps_used = Constants::steps(&oscillator, steps).map(|n| [n; 2]);
+        let survey = Survey { chatter, kinds, sine, steps: steps_used };
         (of(&oscillator, steps), survey)
     })
 }

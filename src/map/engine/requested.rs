@@ -1,7 +1,7 @@
 //! Records with the requested quantities.
 
 use crate::map::plan::Needs;
-use crate::record::{Record, valid};
+use crate::record::{Record, measures, valid};
 use rattlemap_dynamics::orbit::Measurement;
 
 /// Converts a measurement to a record with the requested quantities.
@@ -32,6 +32,7 @@ pub fn measured_record(measured: &Measurement, needs: &Needs) -> Record {
         record.set_word(word);
         record.set_pattern(&word.pattern());
     }
+    record.set_measures(&measured.into());
     drop_unrequested(&mut record, needs);
     record
 }
@@ -52,11 +53,15 @@ pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
     clear_unless(needs.pattern, valid::PATTERN, |r| {
         (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
     });
+    if record.valid & measures::bits() & !needs.measures != 0 {
+        record.clear_measures(|group| !needs.has(group));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::measures::MEASURES;
 
     #[test]
     fn quantities_that_are_not_requested_are_cleared() {
@@ -72,7 +77,8 @@ mod tests {
             pattern_hash: 1,
             pattern_length: 1,
             symmetric: 1,
-            valid: !valid::FILLED & (u32::MAX >> 23),
+            measures: [1.0; MEASURES],
+            valid: !valid::FILLED & (u32::MAX >> 13),
             ..Record::default()
         };
         let whole = record;
@@ -88,6 +94,8 @@ mod tests {
                 symmetric: false,
                 word: false,
                 pattern: false,
+                measures: 0,
+                state: false,
             },
         );
         assert_eq!(record, Record { valid: valid::PERIOD | valid::STROBE, ..Record::default() });

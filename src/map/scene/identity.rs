@@ -1,8 +1,8 @@
 //! The identity of a scene: everything that a cell's record depends on.
 
-use super::{Axis, Scale, Scene, Start, Steps, list, models};
+use super::{Axis, Quantity, Scale, Scene, Start, Steps, list, models};
 use crate::model_file::FileModel;
-use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::model::{Model, Parameter};
 
 /// Largest number of axis values that are listed; longer axes are identified by a hash.
 const MOST_LISTED_VALUES: usize = 32;
@@ -47,7 +47,7 @@ impl Scene {
         for (parameter, expression) in self.derived() {
             add(format!("derived.{}", parameter.name), expression.to_owned());
         }
-        for (name, value) in self.fixed() {
+        for (Parameter { name, .. }, value) in self.fixed() {
             add(format!("parameters.{name}"), format!("{value:?}"));
         }
         let integration = self.integration();
@@ -66,6 +66,9 @@ impl Scene {
             start => start.policy().to_owned(),
         };
         add("start".into(), start);
+        if model.start_phase() != 0.0 {
+            add("start.phase".into(), format!("{:?}", model.start_phase()));
+        }
         if let Some(draw) = self.draw() {
             add("start.count".into(), draw.count.to_string());
             add("start.seed".into(), draw.seed.to_string());
@@ -79,7 +82,8 @@ impl Scene {
         }
         let mut quantities = self.outputs().quantities.clone();
         quantities.sort_unstable();
-        add("outputs.quantities".into(), format!("{quantities:?}").to_lowercase());
+        let names: Vec<&str> = quantities.into_iter().map(Quantity::name).collect();
+        add("outputs.quantities".into(), format!("[{}]", names.join(", ")));
         list
     }
 }

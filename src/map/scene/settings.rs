@@ -7,6 +7,7 @@ use super::keys;
 use super::limits::{LONGEST_TITLE, MAX_PERIODS};
 use super::section::{Field, Section};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
+use crate::record::measures::Group;
 use rattlemap_dynamics::orbit;
 
 /// Resolution of the lanes' time grid.
@@ -108,7 +109,7 @@ impl Refine {
     }
 }
 
-/// Values of exponent, impacts and mesh fraction in filled cells.
+/// Values of continuous quantities in filled cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuous {
     /// The bilinear average of the corners of the block.
@@ -134,6 +135,30 @@ pub enum Quantity {
     Word,
     /// Mapping word with each run of one symbol counted once.
     Pattern,
+    /// Mean approach speed of impacts.
+    ImpactSpeed,
+    /// Largest approach speed of impacts.
+    ImpactSpeedMax,
+    /// Energy lost in impacts per unit time.
+    ImpactEnergy,
+    /// Impacts per unit time.
+    ImpactRate,
+    /// Largest force of compliant contacts.
+    ContactForceMax,
+    /// Root mean square force of compliant contacts over the contact time.
+    ContactForceRms,
+    /// Amplitude and mean of each displacement and of the gap.
+    Amplitude,
+    /// Root mean square of each displacement and of the gap.
+    Rms,
+    /// Amplitude and phase of the first harmonic of each displacement and of the gap.
+    Harmonic,
+    /// Energy that dampers take per unit time.
+    Dissipated,
+    /// Modulus and argument of the largest Floquet multiplier.
+    Multiplier,
+    /// Last state at phase 0.
+    State,
 }
 
 /// Kinds of output files.
@@ -162,7 +187,7 @@ pub struct Outputs {
     pub files: Vec<Format>,
 }
 
-const QUANTITIES: [(&str, Quantity); 7] = [
+const QUANTITIES: [(&str, Quantity); 19] = [
     ("class", Quantity::Class),
     ("lyapunov", Quantity::Lyapunov),
     ("impacts", Quantity::Impacts),
@@ -170,6 +195,18 @@ const QUANTITIES: [(&str, Quantity); 7] = [
     ("symmetric", Quantity::Symmetric),
     ("word", Quantity::Word),
     ("pattern", Quantity::Pattern),
+    ("impact_speed", Quantity::ImpactSpeed),
+    ("impact_speed_max", Quantity::ImpactSpeedMax),
+    ("impact_energy", Quantity::ImpactEnergy),
+    ("impact_rate", Quantity::ImpactRate),
+    ("contact_force_max", Quantity::ContactForceMax),
+    ("contact_force_rms", Quantity::ContactForceRms),
+    ("amplitude", Quantity::Amplitude),
+    ("rms", Quantity::Rms),
+    ("harmonic", Quantity::Harmonic),
+    ("dissipated", Quantity::Dissipated),
+    ("multiplier", Quantity::Multiplier),
+    ("state", Quantity::State),
 ];
 const FORMATS: [(&str, Format); 6] = [
     ("csv", Format::Csv),
@@ -184,6 +221,30 @@ impl Quantity {
     /// Returns the name in scenes.
     pub fn name(self) -> &'static str {
         name(&QUANTITIES, self)
+    }
+
+    /// Returns the quantities that describe the size of a motion, its contacts and its energy.
+    pub fn measured() -> Vec<Quantity> {
+        let is_measured =
+            |quantity: &Quantity| quantity.group().is_some() || *quantity == Quantity::ImpactRate;
+        QUANTITIES.iter().map(|&(_, quantity)| quantity).filter(is_measured).collect()
+    }
+
+    /// Returns the names of its columns for a model with these state components, if it is a measured quantity or the state.
+    pub fn columns(self, state_names: &[&str]) -> Vec<String> {
+        match self {
+            Quantity::ImpactRate => vec![self.name().to_owned()],
+            Quantity::State => state_names.iter().map(|name| format!("state_{name}")).collect(),
+            _ => {
+                let measures = self.group().into_iter().flat_map(|group| group.measures());
+                measures.filter(|m| m.is_of(state_names)).map(|m| m.name(state_names)).collect()
+            }
+        }
+    }
+
+    /// Returns its entry in the table of measured quantities; none if its values have fields of their own in records.
+    pub fn group(self) -> Option<&'static Group> {
+        Group::named(self.name())
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::map::plan::Needs;
 use crate::map::statistics::{TWO_SIDED_95, score_interval};
 use crate::record::distance::apart;
+use crate::record::measures::{self, MEASURES};
 use crate::record::{Record, valid};
 
 /// Two counts of impacts per cycle that differ by less than this are equal.
@@ -21,6 +22,8 @@ pub struct Errors {
     pub impacts: Option<Deviation>,
     /// Errors of the fraction of time spent meshing.
     pub mesh: Option<Deviation>,
+    /// Errors of measured quantities, by their places in a record.
+    pub measures: [Option<Deviation>; MEASURES],
 }
 
 /// Absolute differences between filled and integrated values.
@@ -49,9 +52,16 @@ impl Errors {
                 Some(field(record)).filter(|&value| record.valid & bit != 0 && value != f64::NEG_INFINITY)
             };
             let values = pairs.iter().map(|(filled, own)| (value(filled), value(own)));
-            Deviation::new(values)
+            Deviation::new(values, apart)
         };
+        let mut measures = [None; MEASURES];
+        for measure in measures::all().filter(|measure| needs.has(measure.group)) {
+            let values = pairs.iter().map(|(filled, own)| (measure.of(filled), measure.of(own)));
+            let difference = |a, b| apart(measure.difference(a, b), 0.0);
+            measures[measure.place] = Some(Deviation::new(values, difference));
+        }
         Errors {
+            measures,
             lyapunov: needs.lyapunov.then(|| deviation(valid::LYAPUNOV, |record| record.lyapunov)),
             impacts: needs.impacts.then(|| deviation(valid::IMPACTS, |record| record.impacts_per_period)),
             mesh: needs.mesh.then(|| deviation(valid::MESH, |record| record.mesh_fraction)),
@@ -61,7 +71,10 @@ impl Errors {
 
 impl Deviation {
     /// Compares pairs of filled and integrated values.
-    fn new(pairs: impl Iterator<Item = (Option<f64>, Option<f64>)>) -> Deviation {
+    fn new(
+        pairs: impl Iterator<Item = (Option<f64>, Option<f64>)>,
+        apart: impl Fn(f64, f64) -> f64,
+    ) -> Deviation {
         let (mut differences, mut empty) = (Vec::new(), 0);
         for pair in pairs {
             match pair {
@@ -110,12 +123,13 @@ mod tests {
     fn differences_are_ranked_and_missing_values_counted_separately() {
         let pairs = (1..=100).map(|k| (Some(f64::from(k) * 0.125), Some(0.0)));
         let absent = [(None, Some(1.0)), (Some(1.0), None), (None, None)];
-        let deviation = Deviation::new(pairs.chain(absent));
+        let deviation = Deviation::new(pairs.chain(absent), apart);
         let expected =
             Deviation { compared: 100, empty: 1, median: 6.25, p95: 11.875, worst: 12.5, off_by_one: 93 };
         assert_eq!(deviation, expected);
-        assert_eq!(Deviation::new(std::iter::empty()), Deviation::default());
-        let not_finite = Deviation::new([(Some(1.0), Some(1.0)), (Some(f64::NAN), Some(1.0))].into_iter());
+        assert_eq!(Deviation::new(std::iter::empty(), apart), Deviation::default());
+        let not_finite =
+            Deviation::new([(Some(1.0), Some(1.0)), (Some(f64::NAN), Some(1.0))].into_iter(), apart);
         assert_eq!((not_finite.compared, not_finite.worst, not_finite.off_by_one), (2, f64::INFINITY, 1));
         let [low, high] = deviation.off_by_one_interval();
         assert!(low < deviation.off_by_one_rate() && deviation.off_by_one_rate() < high);
@@ -124,6 +138,6 @@ mod tests {
     #[test]
     fn counts_over_several_periods_that_differ_by_one_a_period_are_off_by_one() {
         let thirds = (0..30).map(|k| (Some(f64::from(k + 3) / 3.0), Some(f64::from(k) / 3.0)));
-        assert_eq!(Deviation::new(thirds).off_by_one, 30);
+        assert_eq!(Deviation::new(thirds, apart).off_by_one, 30);
     }
 }

@@ -4,6 +4,7 @@ use super::blocks::Block;
 use super::errors::same_count;
 use super::label::{pattern_of, word_of};
 use crate::record::classify::classify;
+use crate::record::measures::{self, GROUPS, MEASURES};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::Class;
 
@@ -50,7 +51,9 @@ impl<'r> Filling<'r> {
             let weighted = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
             weighted.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
         };
-        let filled = Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..*self.corners[nearest] };
+        let mut filled =
+            Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..*self.corners[nearest] };
+        filled.clear_measures(|group| self.valid & group.bit == 0);
         if !self.averages[nearest] {
             return filled;
         }
@@ -59,6 +62,7 @@ impl<'r> Filling<'r> {
             lyapunov_error: average(|corner| corner.lyapunov_error),
             impacts_per_period: average(|corner| corner.impacts_per_period),
             mesh_fraction: average(|corner| corner.mesh_fraction),
+            measures: self.measures(weights),
             ..filled
         };
         if !matches!(classify(&filled), Class::Periodic { .. }) {
@@ -71,6 +75,21 @@ impl<'r> Filling<'r> {
         } else {
             Record { impacts_per_period: 0.0, valid: averaged.valid & !valid::IMPACTS, ..averaged }
         }
+    }
+}
+
+impl Filling<'_> {
+    /// Returns the averages of the measured quantities that all corners have.
+    fn measures(&self, weights: [f64; 4]) -> [f64; MEASURES] {
+        let mut averages = [0.0; MEASURES];
+        if GROUPS.iter().any(|group| self.valid & group.bit != 0) {
+            for measure in measures::all().filter(|measure| self.valid & measure.group.bit != 0) {
+                let values = self.corners.map(|corner| corner.measures[measure.place]);
+                let weighted: Vec<(f64, f64)> = values.into_iter().zip(weights).collect();
+                averages[measure.place] = measure.average(&weighted);
+            }
+        }
+        averages
     }
 }
 
@@ -94,6 +113,30 @@ mod tests {
             assert_eq!((record.period, record.periods_run), (2, 0));
             assert_eq!(record.valid, valid::PERIOD | valid::LYAPUNOV | valid::FILLED);
         }
+    }
+
+    #[test]
+    fn measured_quantities_are_interpolated_if_all_corners_have_them() {
+        let block = Block { i: [0, 4], j: [0, 2] };
+        let [speed, phase] = ["impact_speed", "harmonic_phase_x"]
+            .map(|name| measures::all().find(|measure| measure.name(&["x", "v"]) == name).unwrap());
+        let corners = [2.0, 3.0, 2.0, 3.0].map(|value| {
+            let mut record = corner(0.0);
+            record.valid |= speed.group.bit | phase.group.bit;
+            record.measures[speed.place] = value;
+            record.measures[phase.place] = if value > 2.5 { -value } else { value + 1.0 };
+            record
+        });
+        let filled = |corners: &[Record; 4]| Filling::new(&block, corners.each_ref()).record([2, 1]);
+        let record = filled(&corners);
+        assert_eq!(
+            (speed.of(&record), record.measures[phase.place].abs()),
+            (Some(2.5), std::f64::consts::PI)
+        );
+        let mut lacking = corners;
+        lacking[3].valid &= !speed.group.bit;
+        let record = filled(&lacking);
+        assert_eq!((speed.of(&record), record.measures[speed.place]), (None, 0.0));
     }
 
     #[test]

@@ -24,13 +24,14 @@ pub(crate) fn layer(counts: &[u8]) -> Layer {
     });
     entries.push(entry(0, "none decided".to_owned()));
     Layer {
-        name: "attractors",
-        short: "attractors",
-        title: "coexisting attractors, symmetry-conjugate orbits as one",
+        name: "attractors".into(),
+        short: "attractors".into(),
+        title: "coexisting attractors, symmetry-conjugate orbits as one".into(),
         indices: counts.to_vec(),
         palette,
         entries: legend(entries),
         bar: None,
+        numbers: None,
     }
 }
 

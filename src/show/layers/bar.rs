@@ -1,6 +1,9 @@
 //! Colour bars: the range of numbers that a range of colours represents.
 
+use std::borrow::Cow;
+
 use crate::show::color::Color;
+use crate::show::drawing::axis::Axis;
 use crate::show::symbols::number;
 
 /// Largest share of the values that may lie beyond an end of a bar. A few extreme values must not take the contrast from
@@ -10,7 +13,7 @@ const LARGEST_SHARE_BEYOND: f64 = 0.005;
 /// A range of colours that represents a range of numbers.
 #[derive(Clone, Debug)]
 pub struct Bar {
-    pub(crate) label: &'static str,
+    pub(crate) label: Cow<'static, str>,
     pub(crate) colors: Vec<Color>,
     pub(crate) low: f64,
     pub(crate) high: f64,
@@ -19,6 +22,11 @@ pub struct Bar {
 }
 
 impl Bar {
+    /// Returns the axis of the numbers.
+    pub(crate) fn axis(&self) -> Axis {
+        Axis::exact(&self.label, self.low, self.high)
+    }
+
     /// Returns one sentence for each end of the bar beyond which cells lie. `total` is the number of all cells.
     pub(crate) fn remarks(&self, total: usize) -> Vec<String> {
         let [below, above] = self.beyond;

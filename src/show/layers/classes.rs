@@ -45,7 +45,7 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
     let indices: Vec<u8> = cells.ids().map(|id| index(&cells.record(id))).collect();
     let palette = palette();
     let bar = Bar {
-        label: "chaos: largest Lyapunov exponent, \u{3bb}",
+        label: "chaos: largest Lyapunov exponent, \u{3bb}".into(),
         colors: palette[FIRST_SHADE.into()..].to_vec(),
         low: 0.0,
         high,
@@ -54,13 +54,14 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
     let entries = entries(&indices, &palette, shows_chaos, cells.has(Quantity::Symmetric));
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);
     Layer {
-        name: "map",
-        short: "period and chaos",
-        title: if shows_chaos { "period, and chaos by exponent" } else { "period and chaos" },
+        name: "map".into(),
+        short: "period and chaos".into(),
+        title: if shows_chaos { "period, and chaos by exponent" } else { "period and chaos" }.into(),
         entries,
         bar: (has_chaos && shows_chaos).then_some(bar),
         indices,
         palette,
+        numbers: None,
     }
 }
 

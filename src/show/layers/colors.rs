@@ -54,6 +54,13 @@ const DIVERGING: [Color; 11] = [
     hex(0xfddbc7), hex(0xf4a582), hex(0xd6604d), hex(0xb2182b), hex(0x67001f),
 ];
 
+/// The colour map Twilight of Matplotlib, whose ends are equal.
+#[rustfmt::skip]
+const CYCLIC: [Color; 9] = [
+    hex(0xe2d9e2), hex(0x9ebbc9), hex(0x6785be), hex(0x5e43a5), hex(0x2f1436),
+    hex(0x8e2c50), hex(0xba6657), hex(0xceac94), hex(0xe2d9e2),
+];
+
 /// Returns the colour of a period of 2 or more.
 pub(crate) fn period(period: u32) -> Color {
     distinct(period as usize - 1)
@@ -86,6 +93,16 @@ pub(crate) fn sequential(share: f64) -> Color {
 pub(crate) fn diverging(value: f64) -> Color {
     let spread = if value > 0.0 { value.sqrt() } else { value };
     between(&DIVERGING, 0.5 * (spread + 1.0))
+}
+
+/// Returns the colour of a number from -1 to 1. Zero is white.
+pub(crate) fn signed(value: f64) -> Color {
+    between(&DIVERGING, 0.5 * (value + 1.0))
+}
+
+/// Returns the colour of an angle as a share of pi, from -1 to 1. Both ends have one colour.
+pub(crate) fn cyclic(share: f64) -> Color {
+    between(&CYCLIC, 0.5 * (share + 1.0))
 }
 
 /// Returns the grey of chaos whose exponent is a share (0 to 1) of the largest.

@@ -1,4 +1,7 @@
-//! Layers of continuous quantities: exponent, impacts, time in meshing.
+//! Layers of continuous quantities: exponent, impacts, time in meshing, measured quantities.
+
+use std::borrow::Cow;
+use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
@@ -6,67 +9,115 @@ use crate::map::scene::Quantity;
 use crate::show::cells::{Cells, Row};
 use crate::show::color::Color;
 use crate::show::layers::bar::{Bar, count_beyond, round_bound};
-use crate::show::layers::colors::{NO_VALUE, diverging, sequential};
+use crate::show::layers::colors::{NO_VALUE, cyclic, diverging, sequential, signed};
 use crate::show::layers::layer::{Layer, NamedColor, legend};
+use crate::show::numbers::Number;
 
 /// A continuous quantity and its colours.
-struct Continuous {
-    quantity: Quantity,
-    name: &'static str,
-    short: &'static str,
-    title: &'static str,
-    value: fn(&Row) -> Option<f64>,
-    color: fn(f64) -> Color,
+struct Continuous<'c> {
+    name: Cow<'static, str>,
+    short: Cow<'static, str>,
+    title: Cow<'static, str>,
+    value: Box<dyn Fn(usize, &Row) -> Option<f64> + Sync + 'c>,
+    colors: Colors,
 }
 
-const CONTINUOUS: [Continuous; 3] = [
-    Continuous {
-        quantity: Quantity::Lyapunov,
-        name: "lyapunov",
-        short: "exponent",
-        title: "largest Lyapunov exponent, \u{3bb}",
-        value: |row| row.lyapunov,
-        color: diverging,
-    },
-    Continuous {
-        quantity: Quantity::Impacts,
-        name: "impacts",
-        short: "impacts",
-        title: "impacts per forcing period",
-        value: |row| row.impacts_per_period,
-        color: sequential,
-    },
-    Continuous {
-        quantity: Quantity::Mesh,
-        name: "mesh",
-        short: "meshing",
-        title: "fraction of time in meshing",
-        value: |row| row.mesh_fraction,
-        color: sequential,
-    },
-];
+/// Kinds of colour scales.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Colors {
+    /// Numbers from zero on.
+    Sequential,
+    /// Exponents, with more colours for small positive ones.
+    Exponents,
+    /// Numbers of both signs, or numbers from zero on if none is negative.
+    Signed,
+    /// Angles from minus pi to pi, whose ends have one colour.
+    Cyclic,
+}
+
+impl Colors {
+    /// Returns the colour of a value: a share of the largest, or of the smallest if it is negative.
+    fn of(self, share: f64, has_negative: bool) -> Color {
+        match self {
+            Colors::Exponents => diverging(share),
+            Colors::Signed if has_negative => signed(share),
+            Colors::Sequential | Colors::Signed => sequential(share),
+            Colors::Cyclic => cyclic(share),
+        }
+    }
+}
 
 /// Number of colours. The next index is for cells without a value.
 const LEVELS: u8 = 255;
 
 /// Returns the layers of the continuous quantities that the scene requests.
-pub(crate) fn layers(cells: &Cells<'_>) -> impl Iterator<Item = Layer> {
-    CONTINUOUS
-        .iter()
-        .filter(|continuous| cells.has(continuous.quantity))
+pub(crate) fn layers<'c>(cells: &'c Cells<'c>) -> impl Iterator<Item = Layer> + 'c {
+    let fixed = [
+        (
+            Quantity::Lyapunov,
+            fixed("lyapunov", "exponent", "largest Lyapunov exponent, \u{3bb}", Colors::Exponents, |row| {
+                row.lyapunov
+            }),
+        ),
+        (
+            Quantity::Impacts,
+            fixed("impacts", "impacts", "impacts per forcing period", Colors::Sequential, |row| {
+                row.impacts_per_period
+            }),
+        ),
+        (
+            Quantity::Mesh,
+            fixed("mesh", "meshing", "fraction of time in meshing", Colors::Sequential, |row| {
+                row.mesh_fraction
+            }),
+        ),
+    ];
+    let fixed =
+        fixed.into_iter().filter(|(quantity, _)| cells.has(*quantity)).map(|(_, continuous)| continuous);
+    fixed
+        .chain(cells.numbers().into_iter().map(|number| measured(cells, number)))
         .map(|continuous| continuous.layer(cells))
 }
 
-impl Continuous {
-    fn layer(&self, cells: &Cells<'_>) -> Layer {
+fn fixed(
+    name: &'static str,
+    short: &'static str,
+    title: &'static str,
+    colors: Colors,
+    value: fn(&Row) -> Option<f64>,
+) -> Continuous<'static> {
+    let value = Box::new(move |_, row: &Row| value(row));
+    Continuous { name: name.into(), short: short.into(), title: title.into(), value, colors }
+}
+
+fn measured<'c>(cells: &'c Cells<'c>, number: Number) -> Continuous<'c> {
+    Continuous {
+        name: number.name.clone().into(),
+        short: number.name.replace('_', " ").into(),
+        title: number.label.clone().into(),
+        colors: if number.is_angle() { Colors::Cyclic } else { Colors::Signed },
+        value: Box::new(move |id, row| number.of_cell(cells, id, row)),
+    }
+}
+
+impl Continuous<'_> {
+    fn layer(self, cells: &Cells<'_>) -> Layer {
         let values: Vec<f64> =
-            cells.ids().map(|id| (self.value)(&cells.row(id)).unwrap_or(f64::NAN)).collect();
+            cells.ids().map(|id| (self.value)(id, &cells.row(id)).unwrap_or(f64::NAN)).collect();
         let numbers = || values.iter().copied().filter(|value| !value.is_nan());
         let sizes = |sign: f64| numbers().map(move |value| sign * value).filter(|size| *size > 0.0);
         let has_negative = sizes(-1.0).next().is_some();
-        let high =
-            if has_negative && numbers().all(|value| value < 0.0) { 0.0 } else { round_bound(sizes(1.0)) };
-        let low = if has_negative { -round_bound(sizes(-1.0)) } else { 0.0 };
+        let [low, high] = match self.colors {
+            Colors::Cyclic => [-PI, PI],
+            _ => [
+                if has_negative { -round_bound(sizes(-1.0)) } else { 0.0 },
+                if has_negative && numbers().all(|value| value < 0.0) {
+                    0.0
+                } else {
+                    round_bound(sizes(1.0))
+                },
+            ],
+        };
         let level = |value: f64| {
             let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
             (share * f64::from(LEVELS - 1)).round() as u8
@@ -74,29 +125,26 @@ impl Continuous {
         let color = |level: u8| {
             let value = low + f64::from(level) / f64::from(LEVELS - 1) * (high - low);
             // Each side uses all its colours: values are relative to the end of their side.
-            (self.color)(match value {
+            let share = match value {
                 negative if negative < 0.0 => negative / -low,
                 positive if high > 0.0 => positive / high,
                 _ => 0.0,
-            })
+            };
+            self.colors.of(share, has_negative)
         };
         let colors: Vec<Color> = (0..LEVELS).map(color).collect();
         let absent = values.iter().filter(|value| value.is_nan()).count();
         let index = |&value: &f64| if value.is_nan() { LEVELS } else { level(value) };
+        let label = self.title.clone();
         Layer {
             name: self.name,
             short: self.short,
             title: self.title,
             indices: values.par_iter().map(index).collect(),
+            numbers: Some(values.iter().map(|&value| value as f32).collect()),
             palette: colors.iter().copied().chain([NO_VALUE]).collect(),
             entries: legend([NamedColor { color: NO_VALUE, text: "no value".to_owned(), cells: absent }]),
-            bar: Some(Bar {
-                label: self.title,
-                colors,
-                low,
-                high,
-                beyond: count_beyond(numbers(), low, high),
-            }),
+            bar: Some(Bar { label, colors, low, high, beyond: count_beyond(numbers(), low, high) }),
         }
     }
 }
@@ -106,7 +154,7 @@ mod tests {
     use super::*;
     use crate::map::plan::Plan;
     use crate::map::scene::{Purpose, Scene};
-    use crate::record::{Record, valid};
+    use crate::record::{Record, measures, valid};
 
     /// Returns the layer of exponents of a map of 400 cells.
     fn exponents(value: impl Fn(usize) -> f64) -> Layer {
@@ -142,5 +190,33 @@ mod tests {
         assert_eq!((bar.low, bar.beyond), (-0.2, [1, 0]));
         assert_eq!(bar.remarks(2000), ["values below \u{2212}0.2: 1 cell"]);
         assert_eq!(bar.remarks(100), ["values below \u{2212}0.2: 1.0 %"]);
+    }
+
+    #[test]
+    fn measured_quantities_have_a_scale_that_suits_their_signs() {
+        let axis = |name: &str| format!("[[axis]]\nparameter = '{name}'\nmin = 0.1\nmax = 1.0\ncount = 5\n");
+        let quantities = "[outputs]\nquantities = ['amplitude', 'harmonic']\n";
+        let scene = Scene::parse(&(axis("e") + &axis("omega") + quantities), "s", &[], Purpose::Map).unwrap();
+        let plan = Plan::new(&scene);
+        let record = |id: usize| {
+            let mut record = Record { valid: measures::bits() | valid::PERIOD, ..Record::default() };
+            for measure in measures::all() {
+                record.measures[measure.place] =
+                    0.1 * id as f64 - if measure.name(&[]).starts_with("mean") { 1.0 } else { 0.0 };
+            }
+            record
+        };
+        let records: Vec<Record> = (0..plan.run_count()).map(record).collect();
+        let layers: Vec<Layer> = layers(&Cells::new(&scene, &plan, &records)).collect();
+        assert_eq!(layers.len(), 12);
+        let ends = |name: &str| {
+            let layer = layers.iter().find(|layer| layer.name == name).unwrap();
+            let bar = layer.bar.as_ref().unwrap();
+            (bar.low, bar.high, bar.colors[0], bar.colors[254])
+        };
+        assert_eq!(ends("amplitude_x1"), (0.0, 2.5, sequential(0.0), sequential(1.0)));
+        assert_eq!(ends("mean_gap"), (-1.0, 1.5, signed(-1.0), signed(1.0)));
+        let (low, high, first, last) = ends("harmonic_phase_x2");
+        assert!((low, high) == (-PI, PI) && first == last, "one colour at both ends");
     }
 }

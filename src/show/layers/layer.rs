@@ -1,5 +1,7 @@
 //! The type of a layer.
 
+use std::borrow::Cow;
+
 use crate::show::color::Color;
 use crate::show::layers::bar::Bar;
 
@@ -7,13 +9,15 @@ use crate::show::layers::bar::Bar;
 #[derive(Clone, Debug)]
 pub struct Layer {
     /// Name of its figure's file.
-    pub(crate) name: &'static str,
+    pub(crate) name: Cow<'static, str>,
     /// Label of its button in the report.
-    pub(crate) short: &'static str,
+    pub(crate) short: Cow<'static, str>,
     /// Heading.
-    pub(crate) title: &'static str,
+    pub(crate) title: Cow<'static, str>,
     /// Index into the palette of each cell, by id.
     pub(crate) indices: Vec<u8>,
+    /// Numbers that the colours represent, by id, in a layer of a continuous quantity. NaN where there is none.
+    pub(crate) numbers: Option<Vec<f32>>,
     /// Colours.
     pub(crate) palette: Vec<Color>,
     /// Named colours, in the order of the legend.

@@ -6,14 +6,15 @@ use crate::map::bifurcation::{Column, SectionPoint};
 use crate::record::Spelling;
 use crate::show::error::WriteError;
 use crate::show::names::{self, float, optional};
+use crate::show::numbers::Number;
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::word::Word;
 
 /// Columns of a point before its states.
-const POINT_FIELDS: [&str; 3] = ["side", "kind", "t_mod_period"];
+pub(super) const POINT_FIELDS: [&str; 3] = ["side", "kind", "t_mod_period"];
 
 /// Columns of the table of columns after value and direction.
-const COLUMN_FIELDS: [&str; 11] = [
+pub(super) const COLUMN_FIELDS: [&str; 11] = [
     "class",
     "period",
     "word",
@@ -86,12 +87,19 @@ fn write_rows(
     Ok(table.flush()?)
 }
 
-/// Writes `bifurcation_columns.csv`: class, word, exponent and averages at each value of the axis.
-pub fn write_columns(out: impl io::Write, axis: &str, columns: &[Column]) -> Result<(), WriteError> {
+/// Writes `bifurcation_columns.csv`: class, word, exponent, averages and the requested `numbers` at each value of the axis.
+pub fn write_columns(
+    out: impl io::Write,
+    axis: &str,
+    numbers: &[Number],
+    columns: &[Column],
+) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
-    table.write_record([axis].into_iter().chain(direction_field(columns)).chain(COLUMN_FIELDS))?;
+    let head = [axis].into_iter().chain(direction_field(columns)).chain(COLUMN_FIELDS);
+    table.write_record(head.chain(numbers.iter().map(|number| &*number.name)))?;
     for column in columns {
-        table.write_record(location(column).chain([
+        let measured = numbers.iter().map(|number| float(number.of_column(column)));
+        let fields = location(column).chain([
             column.class.name().to_owned(),
             optional(names::period(column.class)),
             spelling(column.word.as_ref()),
@@ -103,7 +111,8 @@ pub fn write_columns(out: impl io::Write, axis: &str, columns: &[Column]) -> Res
             optional(column.symmetric),
             column.status.name().to_owned(),
             column.periods_run.to_string(),
-        ]))?;
+        ]);
+        table.write_record(fields.chain(measured))?;
     }
     Ok(table.flush()?)
 }
@@ -215,7 +224,7 @@ mod tests {
         let fields = "class,period,word,pattern,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
                       periods_run";
         assert_eq!(
-            text(|out| write_columns(out, "e", &columns)),
+            text(|out| write_columns(out, "e", &[], &columns)),
             format!(
                 "e,{fields}\n0.25,periodic,2,w3336,w36,0.25,,2.0,0.125,true,ok,578\n\
                  0.5,chaotic,,,,0.25,0.30000000000000004,2.0,0.125,,ok,578\n1.0,failed,,,,,,,,,too_stiff,578\n"
@@ -223,7 +232,7 @@ mod tests {
         );
         let both = Direction::BOTH
             .map(|direction| Column { direction: Some(direction), ..column(0.5, Class::Chaotic) });
-        let text = text(|out| write_columns(out, "e", &both));
+        let text = text(|out| write_columns(out, "e", &[], &both));
         assert!(text.starts_with("e,direction,class,"), "{text}");
         assert!(text.contains("\n0.5,up,chaotic,") && text.contains("\n0.5,down,chaotic,"), "{text}");
     }

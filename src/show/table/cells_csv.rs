@@ -18,7 +18,7 @@ const PART: usize = 1 << 12;
 pub fn write(mut out: impl Write, cells: &Cells<'_>) -> Result<(), WriteError> {
     let columns = of_csv(cells);
     let mut header = csv::Writer::from_writer(&mut out);
-    header.write_record(location_names(cells).chain(columns.iter().map(|column| column.name)))?;
+    header.write_record(location_names(cells).chain(columns.iter().map(|column| &*column.name)))?;
     header.flush()?;
     drop(header);
     let count = cells.count();
@@ -33,7 +33,7 @@ pub fn write(mut out: impl Write, cells: &Cells<'_>) -> Result<(), WriteError> {
     Ok(out.flush()?)
 }
 
-fn part(cells: &Cells<'_>, columns: &[&CellColumn], ids: Range<usize>) -> Result<Vec<u8>, WriteError> {
+fn part(cells: &Cells<'_>, columns: &[CellColumn], ids: Range<usize>) -> Result<Vec<u8>, WriteError> {
     let mut table = csv::Writer::from_writer(Vec::with_capacity(160 * ids.len()));
     for id in ids {
         let cell = CellRow::new(cells, id);

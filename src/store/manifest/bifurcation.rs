@@ -51,7 +51,7 @@ pub(crate) fn bifurcation(
             "axis": manifest::axis(&scene.axes()[0]),
             "parameters": Parameters::of_scene(scene),
         }),
-        without_nulls(json!({ "derived": manifest::derived(scene) })),
+        without_nulls(json!({ "derived": manifest::derived(scene), "measured": manifest::measured(scene) })),
         json!({
             "start": manifest::start(scene),
             "integration": {

@@ -93,8 +93,7 @@ pub struct ShardOrigin<'a> {
 /// Returns the manifest of a map. It contains neither paths nor user names.
 pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, writing: Duration, files: &[FileEntry]) -> Value {
     let scene = cells.scene();
-    let quantities: Vec<String> =
-        scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect();
+    let quantities: Vec<&str> = scene.outputs().quantities.iter().map(|quantity| quantity.name()).collect();
     joined([
         run_and_scene("map", None, run, scene),
         json!({ "parameters": Parameters::of_scene(scene) }),
@@ -105,6 +104,7 @@ pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, writing: Duration, files: &[
             "quantities": quantities,
             "cells": cells.count(),
         }),
+        without_nulls(json!({ "measured": manifest::measured(scene) })),
         counts(cells),
         json!({
             "periods": cells.periods(),
@@ -112,7 +112,7 @@ pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, writing: Duration, files: &[
             "codes": codes(),
             "elapsed_seconds": (run.elapsed_before + run.elapsed).as_secs_f64(),
             "resumed_cells": run.resumed_cells,
-            "refinement": cells.refinement().map(refinement::object),
+            "refinement": refinement::object(cells),
             "timings": timings(run, writing),
             "files": files,
         }),
@@ -149,7 +149,7 @@ pub(crate) fn run_and_scene(
 
 /// Describes the engine and its graphics adapters.
 pub(crate) fn engine_and_cards(run: &Run<'_>) -> Value {
-    let Provenance { engine, precision, device } = run.made;
+    let Provenance { engine, precision, device, .. } = run.made;
     let adapter = run.adapter.as_ref();
     let cards: Vec<Value> = run.cards.iter().map(card).collect();
     joined([

@@ -4,22 +4,35 @@
 
 use std::io::{self, Read, Write};
 use std::mem::offset_of;
+use std::ops::Range;
 
 use flate2::Compression;
 use flate2::read::DeflateDecoder;
 use flate2::write::DeflateEncoder;
 
 use crate::record::Record;
+use crate::record::measures::{GROUPS, places_before};
 
 /// Number of bytes of an id and its record.
 const ROW: usize = ID + size_of::<Record>();
 const ID: usize = size_of::<u32>();
 
-/// Number of columns.
-const COUNT: usize = 17;
+/// Number of columns without measured quantities, and of all columns.
+const BEFORE: usize = 17;
+const COUNT: usize = BEFORE + GROUPS.len();
 
-/// Names of the columns, in the order of their bits.
-pub(crate) const NAMES: [&str; COUNT] = [
+/// Names of the columns, in the order of their bits. A later version may add columns at the end.
+pub(crate) const NAMES: [&str; COUNT] = {
+    let mut names = [""; COUNT];
+    let mut i = 0;
+    while i < COUNT {
+        names[i] = if i < BEFORE { FIRST_NAMES[i] } else { GROUPS[i - BEFORE].name };
+        i += 1;
+    }
+    names
+};
+
+const FIRST_NAMES: [&str; BEFORE] = [
     "id",
     "lyapunov",
     "lyapunov_error",
@@ -39,8 +52,14 @@ pub(crate) const NAMES: [&str; COUNT] = [
     "pattern_length",
 ];
 
-/// Offset of each column in a row and the size of its numbers in bytes. The last column includes the reserved bytes.
-const PLACES: [(usize, usize); COUNT] = [
+/// Returns the offset of a column in a row and the size of its numbers in bytes.
+fn place(column: usize) -> (usize, usize) {
+    let of_group = |group: usize| (ID + offset_of!(Record, measures) + 8 * places_before(group), 8);
+    PLACES.get(column).copied().unwrap_or_else(|| of_group(column - BEFORE))
+}
+
+/// Places of the columns without measured quantities. The last one includes the reserved bytes.
+const PLACES: [(usize, usize); BEFORE] = [
     (0, 4),
     (ID + offset_of!(Record, lyapunov), 8),
     (ID + offset_of!(Record, lyapunov_error), 8),
@@ -60,11 +79,15 @@ const PLACES: [(usize, usize); COUNT] = [
     (ID + offset_of!(Record, pattern_length), 4),
 ];
 
+/// Returns the range of a column's bytes in a row.
+fn range_of(column: usize) -> Range<usize> {
+    place(column).0..if column + 1 < COUNT { place(column + 1).0 } else { ROW }
+}
+
 /// Returns the places of a column's bytes in a row, the most significant byte of each number first.
 fn bytes_of(column: usize) -> impl Iterator<Item = usize> {
-    let (from, width) = PLACES[column];
-    let to = PLACES.get(column + 1).map_or(ROW, |&(next, _)| next);
-    (from..to).step_by(width).flat_map(move |number| (number..number + width).rev())
+    let width = place(column).1;
+    range_of(column).step_by(width).flat_map(move |number| (number..number + width).rev())
 }
 
 type Row = [u8; ROW];
@@ -75,7 +98,7 @@ pub(crate) fn encode(batch: &[(u32, Record)]) -> io::Result<(u32, Vec<u8>)> {
     let mut mask = 0;
     let mut output = DeflateEncoder::new(Vec::new(), Compression::fast());
     for column in 0..COUNT {
-        if bytes_of(column).all(|at| rows.iter().all(|row| row[at] == 0)) {
+        if rows.iter().all(|row| row[range_of(column)].iter().all(|byte| *byte == 0)) {
             continue;
         }
         mask |= 1 << column;

@@ -10,6 +10,7 @@ mod figures;
 mod folders;
 mod interrupts;
 mod json;
+mod quantities;
 mod records;
 mod shards;
 mod streams;

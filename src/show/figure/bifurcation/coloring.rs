@@ -53,6 +53,7 @@ impl Coloring {
     pub(crate) fn colors(self, panel: &Panel) -> [Color; 2] {
         match (self, panel.states) {
             (Coloring::Walls, States::Strobes) => [STROBE; 2],
+            (Coloring::Walls, States::None) => [DARK; 2],
             _ => Side::BOTH.map(wall_color),
         }
     }

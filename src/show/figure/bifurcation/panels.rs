@@ -1,7 +1,9 @@
 //! Panels of a diagram: which quantities of a model it shows.
 
 use crate::map::bifurcation::Column;
-use crate::show::symbols::symbol;
+use crate::map::scene::Quantity;
+use crate::show::numbers::Number;
+use crate::show::symbols::{symbol, with_unit};
 use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::{Model, Side, State};
 use rattlemap_dynamics::orbit::EventKind;
@@ -13,12 +15,14 @@ pub struct Panels {
     pub(crate) walls: WallLabels,
 }
 
-/// A panel: one component of certain states.
+/// A panel: one component of certain states, or a measured quantity.
 #[derive(Clone, Debug)]
 pub(crate) struct Panel {
     pub(crate) label: String,
     component: usize,
     pub(crate) states: States,
+    /// The quantity that the panel shows instead of states.
+    number: Option<Number>,
 }
 
 /// States that a panel shows.
@@ -30,17 +34,26 @@ pub(crate) enum States {
     Contacts,
     /// States at phase 0.
     Strobes,
+    /// None: the panel shows a measured quantity.
+    None,
 }
 
 impl Panels {
     /// Returns the panels of a model: displacements at the walls. If the walls [fix](crate::map::bifurcation::fixed) one of the
-    /// displacements, the panels show its velocity before contact and the displacements at phase 0 instead.
-    pub fn of(model: &dyn Model, fixed: Option<usize>) -> Panels {
+    /// displacements, the panels show its velocity before contact and the displacements at phase 0 instead. Below them, each of
+    /// the `numbers` except states has a panel.
+    pub fn of(model: &dyn Model, fixed: Option<usize>, numbers: &[Number]) -> Panels {
         let walls = WallLabels::of(model);
         let names: Vec<String> = model.state_names().into_iter().map(symbol).collect();
         let displacements = || (0..names.len()).step_by(2);
-        let panel = |label, component, states| Panel { label, component, states };
-        let list = match fixed.map(|i| 2 * i + 1).filter(|velocity| *velocity < names.len()) {
+        let units = model.units();
+        let panel = |label: String, component, states| Panel {
+            label: with_unit(&label, units.component(component).as_deref()),
+            component,
+            states,
+            number: None,
+        };
+        let mut list: Vec<Panel> = match fixed.map(|i| 2 * i + 1).filter(|velocity| *velocity < names.len()) {
             None => {
                 let label = |i: usize| format!("{} at {}", names[i], walls.section());
                 displacements().map(|i| panel(label(i), i, States::Crossings)).collect()
@@ -52,7 +65,19 @@ impl Panels {
                 [first].into_iter().chain(displacements().map(strobe)).collect()
             }
         };
+        let measured = numbers.iter().filter(|number| number.quantity != Quantity::State);
+        list.extend(measured.map(|number| Panel {
+            label: number.label.clone(),
+            component: 0,
+            states: States::None,
+            number: Some(number.clone()),
+        }));
         Panels { list, walls }
+    }
+
+    /// Returns the number of panels of measured quantities.
+    pub(crate) fn measured(&self) -> usize {
+        self.list.iter().filter(|panel| panel.states == States::None).count()
     }
 
     /// Whether a panel shows states at phase 0.
@@ -73,6 +98,35 @@ impl Panel {
             States::Crossings => crossings(|_| true),
             States::Contacts => crossings(|kind| kind != EventKind::MeshEnd),
             States::Strobes => column.strobes.iter().map(|state| (component(state), None)).collect(),
+            States::None => {
+                let value = self.number.as_ref().and_then(|number| number.of_column(column));
+                value.map(|value| (value, None)).into_iter().collect()
+            }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::model::GearPair;
+    use rattlemap_dynamics::orbit::Class;
+
+    #[test]
+    fn each_measured_number_has_a_panel_below_the_displacements() {
+        let model = GearPair::paper(0.5);
+        let numbers = Number::of(&model, &[Quantity::State, Quantity::ImpactSpeed, Quantity::Rms]);
+        let panels = Panels::of(&model, None, &numbers);
+        let labels: Vec<&str> = panels.list.iter().skip(2).map(|panel| &*panel.label).collect();
+        let rms = ["x\u{2081}", "x\u{2082}", "gap"].map(|name| format!("root mean square of {name}"));
+        assert_eq!(labels, [&["mean approach speed of impacts".to_owned()], &rms[..]].concat());
+        assert_eq!(panels.measured(), 4);
+        let mut column = Column::plain(1.0, Class::Chaotic);
+        let group = Quantity::Rms.group().unwrap();
+        group.measures().for_each(|measure| column.measures[measure.place] = Some(measure.place as f64));
+        let values: Vec<_> = panels.list.iter().skip(2).map(|panel| panel.values(&column)).collect();
+        let first = group.measures().next().unwrap().place as f64;
+        let of = |i: u32| vec![(first + f64::from(i), None)];
+        assert_eq!(values, [vec![], of(0), of(1), of(2)], "no value without impacts");
     }
 }

@@ -1,0 +1,405 @@
+//! Table of the measured quantities of a motion. Columns, layers, names in Python, and tolerances are made from it.
+
+use super::distance::{apart, farther};
+use super::{Record, valid};
+use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::orbit::{Measurement, Orbit, Quantities};
+
+/// Number of numbers in [`Record::measures`].
+pub const MEASURES: usize = places_before(GROUPS.len());
+
+/// Quantities that a scene requests by one name, in the order of their places in a record.
+#[rustfmt::skip]
+pub const GROUPS: [Group; 10] = [
+    group("impact_speed", 9, false, &[number("impact_speed", "mean approach speed of impacts", Dimension::Speed,
+        |of, _| of.impacts()?.approaches.get(2).map(|both| both.mean))]),
+    group("impact_speed_max", 10, false, &[number("impact_speed_max", "largest approach speed of impacts", Dimension::Speed,
+        |of, _| of.impacts()?.approaches.get(2).map(|both| both.largest))]),
+    group("impact_energy", 11, false, &[number("impact_energy", "energy lost in impacts per unit time", Dimension::Power,
+        |of, _| Some(of.quantities?.impact_energy))]),
+    group("contact_force_max", 12, false, &[number("contact_force_max", "largest contact force", Dimension::Force,
+        |of, _| Some(of.quantities?.contact_force?[0]))]),
+    group("contact_force_rms", 13, false, &[number("contact_force_rms", "rms contact force", Dimension::Force,
+        |of, _| Some(of.quantities?.contact_force?[1]))]),
+    group("dissipated", 14, false, &[number("dissipated", "energy that dampers take per unit time", Dimension::Power,
+        |of, _| Some(of.quantities?.dissipated))]),
+    group("amplitude", 15, true, &[
+        number("amplitude", "amplitude of {}", Dimension::Length, |of, i| Some(of.quantities?.displacements[i].amplitude)),
+        number("mean", "mean of {}", Dimension::Length, |of, i| Some(of.quantities?.displacements[i].mean))]),
+    group("rms", 16, true, &[number("rms", "root mean square of {}", Dimension::Length,
+        |of, i| Some(of.quantities?.displacements[i].rms))]),
+    group("harmonic", 17, true, &[
+        number("harmonic", "first harmonic of {}", Dimension::Length, |of, i| Some(of.quantities?.displacements[i].harmonic[0])),
+        number("harmonic_phase", "phase of the first harmonic of {}", Dimension::Angle,
+            |of, i| Some(of.quantities?.displacements[i].harmonic[1]))]),
+    group("multiplier", 18, false, &[
+        number("multiplier", "modulus of the largest multiplier", Dimension::None, |of, _| Some(of.multiplier?[0])),
+        number("multiplier_argument", "argument of the largest multiplier", Dimension::Angle, |of, _| Some(of.multiplier?[1].abs()))]),
+];
+
+/// Physical dimension of a number, from which its unit follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    /// Dimension of a displacement or of the gap.
+    Length,
+    /// Length per time.
+    Speed,
+    /// Force.
+    Force,
+    /// Energy per time.
+    Power,
+    /// One per time.
+    Rate,
+    /// Angle in radians, from minus pi to pi.
+    Angle,
+    /// None.
+    None,
+}
+
+/// A quantity that a scene requests by one name. Its numbers have one validity bit.
+#[derive(Debug)]
+pub struct Group {
+    /// Name in scenes.
+    pub name: &'static str,
+    /// Bit of [`valid`] of its numbers.
+    pub bit: u32,
+    /// Whether it has the numbers for each displacement and for the gap.
+    of_displacements: bool,
+    numbers: &'static [Number],
+}
+
+/// A number of a quantity.
+#[derive(Debug)]
+struct Number {
+    name: &'static str,
+    title: &'static str,
+    dimension: Dimension,
+    /// Returns the number of a motion, and of one of [both displacements, gap].
+    read: fn(&Measured<'_>, usize) -> Option<f64>,
+}
+
+const fn group(name: &'static str, bit: u32, of_displacements: bool, numbers: &'static [Number]) -> Group {
+    Group { name, bit: 1 << bit, of_displacements, numbers }
+}
+
+const fn number(
+    name: &'static str,
+    title: &'static str,
+    dimension: Dimension,
+    read: fn(&Measured<'_>, usize) -> Option<f64>,
+) -> Number {
+    Number { name, title, dimension, read }
+}
+
+/// Returns the validity bits of all groups.
+pub fn bits() -> u32 {
+    GROUPS.iter().fold(0, |bits, group| bits | group.bit)
+}
+
+/// Returns the number of places of the groups before one of them.
+pub(crate) const fn places_before(group: usize) -> usize {
+    let (mut i, mut places) = (0, 0);
+    while i < group {
+        places += GROUPS[i].places();
+        i += 1;
+    }
+    places
+}
+
+fn relative(distance: f64, scale: f64) -> f64 {
+    if distance == 0.0 { 0.0 } else { distance / scale }
+}
+
+/// Number of displacements of an oscillator, and of its gap.
+const DISPLACEMENTS: usize = 3;
+/// Index of the gap among the displacements.
+const GAP: usize = 2;
+
+impl Group {
+    const fn places(&self) -> usize {
+        self.numbers.len() * if self.of_displacements { DISPLACEMENTS } else { 1 }
+    }
+
+    /// Returns the group of a name.
+    pub fn named(name: &str) -> Option<&'static Group> {
+        GROUPS.iter().find(|group| group.name == name)
+    }
+
+    /// Returns the distance of the numbers of two records up to mirror image, relative to the larger numbers of the second: the
+    /// largest over all displacements. Amplitude and phase are compared as a complex number.
+    pub fn distance(&self, a: &Record, b: &Record) -> f64 {
+        let places: Vec<usize> = self.measures().map(|measure| measure.place).collect();
+        let of_displacement = |places: &[usize]| {
+            let [a, b] =
+                [a, b].map(|record| places.iter().map(|&place| record.measures[place]).collect::<Vec<_>>());
+            let has_phase = self.numbers.last().is_some_and(|number| number.dimension == Dimension::Angle);
+            if has_phase {
+                let [x, y] = [0, 1].map(|i| {
+                    let part = |of: &[f64]| of[0] * if i == 0 { of[1].cos() } else { of[1].sin() };
+                    apart(part(&a), part(&b))
+                });
+                return relative(x.hypot(y), b[0].abs());
+            }
+            let scale = b.iter().fold(0.0, |scale: f64, value| scale.max(value.abs()));
+            // The mean of the mirror image has the other sign.
+            let distances = a.iter().zip(&b).map(|(a, b)| relative(apart(a.abs(), b.abs()), scale));
+            distances.fold(0.0, farther)
+        };
+        places.chunks(self.numbers.len()).map(of_displacement).fold(0.0, farther)
+    }
+
+    /// Returns the numbers of the group.
+    pub fn measures(&self) -> impl Iterator<Item = Measure> {
+        all().filter(|measure| measure.group.bit == self.bit)
+    }
+}
+
+/// A number in [`Record::measures`].
+#[derive(Clone, Copy, Debug)]
+pub struct Measure {
+    /// Its index in [`Record::measures`].
+    pub place: usize,
+    /// Its quantity.
+    pub group: &'static Group,
+    /// The displacement that it describes; 2 is the gap.
+    displacement: Option<usize>,
+    number: &'static Number,
+}
+
+/// Returns all numbers of a record, in the order of their places.
+pub fn all() -> impl Iterator<Item = Measure> {
+    let of_group = |group: &'static Group| {
+        let displacements = if group.of_displacements { DISPLACEMENTS } else { 1 };
+        (0..displacements).flat_map(move |i| {
+            group.numbers.iter().map(move |number| (group, group.of_displacements.then_some(i), number))
+        })
+    };
+    GROUPS.iter().flat_map(of_group).enumerate().map(|(place, (group, displacement, number))| Measure {
+        place,
+        group,
+        displacement,
+        number,
+    })
+}
+
+impl Measure {
+    /// Whether a motion with these state components has the number.
+    pub fn is_of(&self, state_names: &[&str]) -> bool {
+        self.subject(state_names).is_some()
+    }
+
+    /// Returns the name of the displacement, or an empty text if the number describes the whole motion; none if the model
+    /// has no such displacement.
+    pub fn subject<'n>(&self, state_names: &[&'n str]) -> Option<&'n str> {
+        match self.displacement {
+            None => Some(""),
+            Some(GAP) => Some("gap"),
+            Some(i) => state_names.get(2 * i).copied(),
+        }
+    }
+
+    /// Returns the index of the displacement that the number describes; none for the gap and for the whole motion.
+    pub fn coordinate(&self) -> Option<usize> {
+        self.displacement.filter(|&i| i != GAP)
+    }
+
+    /// Returns the name in tables, layers and Python for a model with these state components.
+    pub fn name(&self, state_names: &[&str]) -> String {
+        match self.subject(state_names) {
+            Some(subject) if !subject.is_empty() => format!("{}_{subject}", self.number.name),
+            _ => self.number.name.to_owned(),
+        }
+    }
+
+    /// Returns the word that distinguishes the number from the first one of its quantity.
+    pub fn part(&self) -> &'static str {
+        self.number.name.strip_prefix(self.group.name).unwrap_or(self.number.name).trim_start_matches('_')
+    }
+
+    /// Returns the heading, with this symbol of the displacement.
+    pub fn title(&self, symbol: &str) -> String {
+        self.number.title.replace("{}", symbol)
+    }
+
+    /// Returns the physical dimension.
+    pub fn dimension(&self) -> Dimension {
+        self.number.dimension
+    }
+
+    /// Whether the number is an angle, so that minus pi and pi are equal.
+    pub fn is_angle(&self) -> bool {
+        self.number.dimension == Dimension::Angle
+    }
+
+    /// Returns the number of a record, if it has the quantity.
+    pub fn of(&self, record: &Record) -> Option<f64> {
+        (record.valid & self.group.bit != 0).then(|| record.measures[self.place])
+    }
+
+    /// Returns the number of a motion.
+    pub fn read(&self, motion: &Measured<'_>) -> Option<f64> {
+        (self.number.read)(motion, self.displacement.unwrap_or(0)).filter(|value| value.is_finite())
+    }
+
+    /// Returns the difference of two values: of angles, the shorter way round.
+    pub fn difference(&self, a: f64, b: f64) -> f64 {
+        let difference = a - b;
+        if self.is_angle() { difference.sin().atan2(difference.cos()) } else { difference }
+    }
+
+    /// Returns the average of values with weights of sum 1. Values of different signs, as those of mirror images, have no
+    /// average: the result is the value with the largest weight. Angles are averaged the shorter way round.
+    pub fn average(&self, weighted: &[(f64, f64)]) -> f64 {
+        let &(nearest, _) = weighted.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(&(0.0, 0.0));
+        let differ = weighted.iter().any(|(value, weight)| *weight > 0.0 && value * nearest < 0.0);
+        if differ && !self.is_angle() {
+            return nearest;
+        }
+        let sum =
+            weighted.iter().map(|(value, weight)| weight * self.difference(*value, nearest)).sum::<f64>();
+        self.difference(nearest + sum, 0.0)
+    }
+}
+
+/// The measured motion from which numbers are read.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured<'a> {
+    /// Measured quantities.
+    pub quantities: Option<&'a Quantities>,
+    /// Modulus and argument of the largest multiplier.
+    pub multiplier: Option<[f64; 2]>,
+}
+
+impl<'a> Measured<'a> {
+    /// Returns all numbers by their places in a record.
+    pub fn numbers(&self) -> [Option<f64>; MEASURES] {
+        let mut numbers = [None; MEASURES];
+        all().for_each(|measure| numbers[measure.place] = measure.read(self));
+        numbers
+    }
+
+    /// Returns the quantities if there are impacts.
+    fn impacts(&self) -> Option<&'a Quantities> {
+        self.quantities.filter(|quantities| quantities.approaches[2].count > 0)
+    }
+}
+
+impl<'a> From<&'a Measurement> for Measured<'a> {
+    fn from(measurement: &'a Measurement) -> Self {
+        Measured { quantities: measurement.quantities.as_ref(), multiplier: measurement.multiplier }
+    }
+}
+
+impl<'a> From<&'a Orbit> for Measured<'a> {
+    fn from(orbit: &'a Orbit) -> Self {
+        let polar = |&[re, im]: &[f64; 2]| [re.hypot(im), im.atan2(re)];
+        let largest = orbit.floquet.as_ref().and_then(|multipliers| multipliers.first());
+        Measured { quantities: orbit.quantities.as_ref(), multiplier: largest.map(polar) }
+    }
+}
+
+impl Record {
+    /// Stores the numbers of a motion, and the validity bits of the quantities that it has.
+    pub fn set_measures(&mut self, motion: &Measured<'_>) {
+        self.valid |= bits();
+        for measure in all() {
+            match measure.read(motion) {
+                // The sum turns minus zero into zero, so that columns of zeros take no memory.
+                Some(value) => self.measures[measure.place] = value + 0.0,
+                None => self.valid &= !measure.group.bit,
+            }
+        }
+        let valid = self.valid;
+        self.clear_measures(|group| valid & group.bit == 0);
+    }
+
+    /// Removes the numbers of some quantities.
+    pub fn clear_measures(&mut self, is_cleared: impl Fn(&Group) -> bool) {
+        for measure in all().filter(|measure| is_cleared(measure.group)) {
+            self.valid &= !measure.group.bit;
+            self.measures[measure.place] = 0.0;
+        }
+    }
+
+    /// Returns the last strobe state, if the record has it.
+    pub fn state(&self) -> Option<State> {
+        (self.valid & valid::STROBE != 0).then_some(self.strobe)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_number_has_a_place_and_each_quantity_a_bit_of_its_own() {
+        let places: Vec<usize> = all().map(|measure| measure.place).collect();
+        assert_eq!(places, (0..MEASURES).collect::<Vec<_>>());
+        let bits = GROUPS.iter().fold(valid::PATTERN * 2 - 1, |bits, group| {
+            assert_eq!(bits & group.bit, 0, "{}", group.name);
+            bits | group.bit
+        });
+        assert_eq!(bits.count_ones() as usize, 9 + GROUPS.len());
+    }
+
+    #[test]
+    fn names_contain_those_of_the_models_displacements() {
+        let names = |states: &[&str]| -> Vec<String> {
+            let own = |group: &Group| group.measures().filter(|m| m.is_of(states)).collect::<Vec<_>>();
+            let groups = ["amplitude", "harmonic", "multiplier"].map(|name| own(Group::named(name).unwrap()));
+            groups.concat().iter().map(|measure| measure.name(states)).collect()
+        };
+        let one = "amplitude_y mean_y amplitude_gap mean_gap harmonic_y harmonic_phase_y harmonic_gap \
+                   harmonic_phase_gap multiplier multiplier_argument";
+        assert_eq!(names(&["y", "vy"]).join(" "), one);
+        assert_eq!(names(&["x1", "v1", "x2", "v2"]).len(), 14);
+    }
+
+    #[test]
+    fn a_quantity_that_the_motion_does_not_have_is_cleared() {
+        let quantities = Quantities { impact_energy: -0.0, dissipated: 2.0, ..Quantities::default() };
+        let mut record = Record { measures: [7.0; MEASURES], valid: valid::PERIOD, ..Record::default() };
+        record.set_measures(&Measured { quantities: Some(&quantities), multiplier: Some([0.5, f64::NAN]) });
+        let value = |name: &str| Group::named(name).unwrap().measures().next().unwrap().of(&record);
+        let absent = ["impact_speed", "impact_speed_max", "contact_force_max", "multiplier"];
+        assert_eq!(absent.map(value), [None; 4]);
+        assert_eq!((value("dissipated"), value("rms")), (Some(2.0), Some(0.0)));
+        assert_eq!(record.measures.iter().filter(|value| value.to_bits() != 0).count(), 1);
+    }
+
+    #[test]
+    fn numbers_are_compared_relative_to_the_motion_and_up_to_mirror_image() {
+        let distance = |name: &str, change: fn(&mut Record, usize)| {
+            let group = Group::named(name).unwrap();
+            let first = group.measures().next().unwrap().place;
+            let record = Record { measures: [0.5; MEASURES], ..Record::default() };
+            let mut other = record;
+            change(&mut other, first);
+            group.distance(&other, &record)
+        };
+        assert_eq!(distance("amplitude", |record, first| record.measures[first + 1] *= -1.0), 0.0);
+        assert!(
+            (distance("amplitude", |record, first| record.measures[first + 1] = 0.0) - 1.0).abs() < 1e-12
+        );
+        assert_eq!(distance("rms", |record, first| record.measures[first] = f64::NAN), f64::INFINITY);
+        let turned =
+            distance("harmonic", |record, first| record.measures[first + 1] += std::f64::consts::TAU + 1e-3);
+        assert!((turned - 1e-3).abs() < 1e-6, "{turned}");
+        assert!(distance("rms", |record, first| record.measures[first + 2] = 0.6) > 0.19, "the gap");
+    }
+
+    #[test]
+    fn averages_of_angles_and_of_mirror_images_stay_between_their_values() {
+        let named = |name: &str| all().find(|measure| measure.name(&["x", "v"]) == name).unwrap();
+        let phase = named("harmonic_phase_x").average(&[(3.0, 0.75), (-3.0, 0.25)]);
+        assert!((phase - (3.0 + 0.25 * (std::f64::consts::TAU - 6.0))).abs() < 1e-12, "{phase}");
+        assert_eq!(named("mean_x").average(&[(0.25, 0.75), (-0.25, 0.25)]), 0.25);
+        assert_eq!(named("rms_x").average(&[(1.0, 0.75), (2.0, 0.25)]), 1.25);
+    }
+
+    #[test]
+    fn differences_of_angles_take_the_shorter_way() {
+        let phase = all().find(|measure| measure.is_angle()).unwrap();
+        assert!((phase.difference(3.0, -3.0) - (6.0 - std::f64::consts::TAU)).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,126 @@
+//! Numbers that a scene requests besides exponent, impacts and meshing: names, headings and values.
+
+use crate::map::bifurcation::Column;
+use crate::map::scene::Quantity;
+use crate::record::measures::{Dimension, MEASURES, Measure, Measured};
+use crate::show::cells::{Cells, Row};
+use crate::show::symbols::symbol;
+use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::orbit::Orbit;
+
+/// A number of a motion, as a column of tables, a layer of maps, a panel of diagrams, and a variable in Python.
+#[derive(Clone, Debug)]
+pub struct Number {
+    /// Name in tables, of layers, and in Python.
+    pub name: String,
+    /// Heading in plain text.
+    pub title: String,
+    /// Heading with mathematical symbols, for figures.
+    pub label: String,
+    /// Name of the displacement or state component, or the word that distinguishes it from other numbers of its quantity;
+    /// else empty.
+    pub subject: String,
+    /// Physical dimension.
+    pub dimension: Dimension,
+    /// Quantity that the scene must request.
+    pub quantity: Quantity,
+    /// Index of the state component that the number describes, if it describes one.
+    pub component: Option<usize>,
+    source: Source,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Measure(Measure),
+    ImpactRate,
+    State(usize),
+}
+
+impl Number {
+    /// Returns the numbers of some quantities of a model, in the order of the quantities.
+    pub fn of(model: &dyn Model, quantities: &[Quantity]) -> Vec<Number> {
+        let mut quantities = quantities.to_vec();
+        quantities.sort_unstable();
+        let names = model.state_names();
+        quantities.into_iter().flat_map(|quantity| of_quantity(quantity, &names)).collect()
+    }
+
+    /// Whether the number is an angle, so that minus pi and pi are equal.
+    pub fn is_angle(&self) -> bool {
+        self.dimension == Dimension::Angle
+    }
+
+    /// Returns the number of a cell.
+    pub(crate) fn of_cell(&self, cells: &Cells<'_>, id: usize, row: &Row) -> Option<f64> {
+        self.read(&row.measures, || cells.impact_rate(id), row.state)
+    }
+
+    /// Returns the number of an orbit.
+    pub fn of_orbit(&self, orbit: &Orbit) -> Option<f64> {
+        let rate = || Some(orbit.impacts_per_period / orbit.forcing_period);
+        self.read(&Measured::from(orbit).numbers(), rate, Some(orbit.strobe))
+    }
+
+    /// Returns the number of a column of a bifurcation diagram.
+    pub fn of_column(&self, column: &Column) -> Option<f64> {
+        self.read(&column.measures, || Some(column.impact_rate), column.state)
+    }
+
+    fn read(
+        &self,
+        measures: &[Option<f64>; MEASURES],
+        rate: impl FnOnce() -> Option<f64>,
+        state: Option<State>,
+    ) -> Option<f64> {
+        match self.source {
+            Source::Measure(measure) => measures[measure.place],
+            Source::ImpactRate => rate(),
+            Source::State(component) => state.map(|state| state[component]),
+        }
+        .filter(|value| value.is_finite())
+    }
+}
+
+fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
+    match quantity {
+        Quantity::ImpactRate => vec![Number {
+            name: "impact_rate".to_owned(),
+            title: "impacts per unit time".to_owned(),
+            label: "impacts per unit time".to_owned(),
+            subject: String::new(),
+            dimension: Dimension::Rate,
+            quantity,
+            component: None,
+            source: Source::ImpactRate,
+        }],
+        Quantity::State => {
+            let of = |(i, &name): (usize, &&str)| Number {
+                name: format!("state_{name}"),
+                title: format!("final state, {name}"),
+                label: format!("final state, {}", symbol(name)),
+                subject: name.to_owned(),
+                dimension: if i % 2 == 0 { Dimension::Length } else { Dimension::Speed },
+                quantity,
+                component: Some(i),
+                source: Source::State(i),
+            };
+            states.iter().enumerate().map(of).collect()
+        }
+        _ => {
+            let of = |measure: Measure| {
+                let subject = measure.subject(states)?;
+                Some(Number {
+                    name: measure.name(states),
+                    title: measure.title(subject),
+                    label: measure.title(&symbol(subject)),
+                    subject: [measure.part(), subject].join(" ").trim().to_owned(),
+                    dimension: measure.dimension(),
+                    quantity,
+                    component: measure.coordinate().map(|i| 2 * i),
+                    source: Source::Measure(measure),
+                })
+            };
+            quantity.group().into_iter().flat_map(|group| group.measures()).filter_map(of).collect()
+        }
+    }
+}

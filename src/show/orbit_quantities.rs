@@ -1,0 +1,63 @@
+//! Measured quantities of an orbit, as JSON and as text.
+
+use serde_json::{Map, Value};
+
+use crate::map::scene::Quantity;
+use crate::show::names;
+use crate::show::numbers::Number;
+use crate::show::orbit_spectrum::gap;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Model, Side};
+use rattlemap_dynamics::number::significant;
+use rattlemap_dynamics::orbit::{Event, Orbit};
+
+/// Returns all measured quantities by name, and the approach speeds at each wall. A quantity that the motion does not have is
+/// null.
+pub(crate) fn object(model: &dyn Model, orbit: &Orbit) -> Value {
+    let numbers = Number::of(model, &Quantity::measured());
+    let mut object: Map<String, Value> =
+        numbers.iter().map(|number| (number.name.clone(), number.of_orbit(orbit).into())).collect();
+    for side in Side::BOTH {
+        let [mean, largest] = approaches(orbit, side).map_or([None; 2], |speeds| speeds.map(Some));
+        for (name, value) in [("impact_speed", mean), ("impact_speed_max", largest)] {
+            object.insert(format!("{name}_{}", names::side(side)), value.into());
+        }
+    }
+    object.into()
+}
+
+/// Returns the mean and the largest approach speed at a wall, if there are impacts.
+fn approaches(orbit: &Orbit, side: Side) -> Option<[f64; 2]> {
+    let speeds = orbit.quantities.as_ref()?.approaches[side.index()];
+    (speeds.count > 0).then_some([speeds.mean, speeds.largest])
+}
+
+/// Returns the impulse of each event on the gap: the jump of its velocity over the compliance of the gap. It is negative at the
+/// right wall.
+pub(crate) fn impulses(model: &dyn Model, events: &[Event]) -> Vec<Option<f64>> {
+    let (oscillator, flow) = (model.oscillator().ok(), Flow::of(model).ok());
+    let of = |event: &Event| {
+        let [before, after] = [event.before, event.after].map(|state| oscillator.map(|o| gap(&o, &state, 1)));
+        Some((after? - before?) / flow.as_ref()?.compliance())
+    };
+    events.iter().map(of).collect()
+}
+
+/// Returns labels and values of the lines of a summary, one per quantity that the motion has.
+pub(crate) fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
+    let list = |quantity: Quantity| {
+        let of =
+            |number: &Number| Some(format!("{} {}", number.subject, significant(number.of_orbit(orbit)?)));
+        let texts: Vec<String> = Number::of(model, &[quantity]).iter().filter_map(of).collect();
+        (quantity.name().replace('_', " "), texts.join(", ").trim().to_owned())
+    };
+    let mut facts: Vec<(String, String)> = Quantity::measured().into_iter().map(list).collect();
+    let of_side = |side: Side| {
+        let [mean, largest] = approaches(orbit, side)?.map(significant);
+        Some(format!("{} {mean} (largest {largest})", names::side(side)))
+    };
+    let sides: Vec<String> = Side::BOTH.into_iter().filter_map(of_side).collect();
+    facts.insert(0, ("impact speed by wall".to_owned(), sides.join(", ")));
+    facts.retain(|(_, text)| !text.is_empty());
+    facts
+}

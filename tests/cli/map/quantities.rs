@@ -1,0 +1,104 @@
+//! Measured quantities of a map: columns, figures, audits, and records that are stored, merged and read again.
+
+use super::*;
+use crate::common::{run, with_scene};
+
+const ALL: &str = "impact_speed impact_speed_max impact_energy impact_rate contact_force_max contact_force_rms amplitude rms harmonic \
+                   dissipated multiplier state";
+
+/// A folder with a scene `s.toml` of a model, over two of its parameters, that requests all measured quantities.
+fn measured(model: &str, axes: [(&str, f64, f64); 2], counts: [usize; 2], more: &str) -> TempDir {
+    let axis = |((name, min, max), count)| {
+        format!("[[axis]]\nparameter = '{name}'\nmin = {min:?}\nmax = {max:?}\ncount = {count}\n")
+    };
+    let axes: String = axes.into_iter().zip(counts).map(axis).collect();
+    let list: String = ALL.split_whitespace().map(|name| format!("'{name}', ")).collect();
+    with_scene(&format!("model = '{model}'\n{axes}[outputs]\nquantities = ['class', {list}]\n{more}"))
+}
+
+const GEARS: [(&str, f64, f64); 2] = [("e", 0.1, 0.9), ("omega", 2.0, 10.0)];
+
+/// The numbers of a column; none where the field is empty.
+fn column(csv: &Path, name: &str) -> Vec<Option<f64>> {
+    let (header, rows) = rows(csv);
+    let place = header.split(',').position(|column| column == name).unwrap_or_else(|| panic!("no {name}"));
+    rows.iter().map(|row| (!row[place].is_empty()).then(|| row[place].parse().unwrap())).collect()
+}
+
+#[test]
+fn a_model_with_one_coordinate_has_columns_and_figures_of_that_coordinate() {
+    let axes = [("F", 0.5, 1.5), ("omega", 1.5, 3.0)];
+    let folder = measured("impact-oscillator", axes, [3, 3], "");
+    succeeds(&folder, "map s.toml --engine cpu --quiet");
+    let out = folder.path().join("out/s");
+    let (header, _) = rows(&out.join("cells.csv"));
+    let names = "impact_speed,impact_speed_max,impact_energy,impact_rate,contact_force_max,contact_force_rms,amplitude_x,mean_x,\
+                 amplitude_gap,mean_gap,rms_x,rms_gap,harmonic_x,harmonic_phase_x,harmonic_gap,harmonic_phase_gap,dissipated,\
+                 multiplier,multiplier_argument,state_x,state_v,status";
+    assert!(header.contains(&format!(",{names},")), "{header}");
+    let files = crate::common::names(&out);
+    for name in names.split(',').filter(|name| *name != "status") {
+        assert!(files.contains(&format!("{name}.png")), "no figure of {name}");
+    }
+    let csv = out.join("cells.csv");
+    assert_eq!(column(&csv, "contact_force_max"), [None; 9], "a rigid stop has no force");
+    let [x, gap] = ["amplitude_x", "amplitude_gap"].map(|name| column(&csv, name));
+    assert!(
+        x == gap && x.iter().all(|value| value.is_some_and(|value| value > 0.0)),
+        "the gap is the coordinate"
+    );
+}
+
+#[test]
+fn shards_and_records_keep_measured_quantities() {
+    let folder = measured("gear-pair", GEARS, [5, 4], "");
+    let cells = |name: &str| fs::read(folder.path().join(name).join("cells.csv")).unwrap();
+    succeeds(&folder, "map s.toml --engine cpu --quiet --out whole");
+    for shard in 1..=2 {
+        succeeds(&folder, &format!("map s.toml --engine cpu --quiet --shard {shard}/2 --out part-{shard}"));
+    }
+    succeeds(&folder, "merge merged --quiet part-1 part-2");
+    let whole = cells("whole");
+    assert!(cells("merged") == whole);
+    fs::remove_file(folder.path().join("whole/cells.csv")).unwrap();
+    succeeds(&folder, "check whole --repair");
+    assert!(cells("whole") == whole, "read from the records");
+    let speeds = column(&folder.path().join("whole/cells.csv"), "impact_speed");
+    assert!(speeds.iter().any(|speed| speed.is_some_and(|speed| speed > 0.0)));
+}
+
+#[test]
+fn numbers_of_a_map_are_those_of_its_orbits() {
+    let folder = measured("gear-pair", GEARS, [2, 2], "");
+    succeeds(&folder, "map s.toml --engine cpu --quiet");
+    let output = run(&folder, "orbit --set e=0.1 --set omega=2.0 --json").code(0).get_output().stdout.clone();
+    let orbit: serde_json::Value = serde_json::from_slice(&output).unwrap();
+    let csv = folder.path().join("out/s/cells.csv");
+    let numbers = orbit["quantities"].as_object().unwrap();
+    assert_eq!(orbit["class"], "periodic");
+    for (name, value) in
+        numbers.iter().filter(|(name, _)| !name.ends_with("_right") && !name.ends_with("_left"))
+    {
+        let (own, value) = (column(&csv, name)[0], value.as_f64());
+        let is_near = own.zip(value).is_none_or(|(a, b)| (a - b).abs() <= 1e-6 * (1.0 + b.abs()));
+        assert!(own.is_some() == value.is_some() && is_near, "{name}: {own:?} {value:?}");
+    }
+}
+
+#[test]
+fn an_adaptive_map_fills_and_audits_measured_quantities() {
+    let refine = "[refine]\nminimum_grid = 4\n";
+    let folder = measured("gear-pair", [("k", 100.0, 200.0), ("omega", 9.0, 10.0)], [17, 17], refine);
+    succeeds(&folder, "map s.toml --engine cpu --quiet");
+    let out = folder.path().join("out/s");
+    let manifest = crate::common::json(&out.join("manifest.json"));
+    let audits = manifest["refinement"]["audits"].as_array().unwrap();
+    let errors = &audits.last().unwrap()["errors"];
+    assert!(errors["amplitude_x1"]["compared"].as_u64().unwrap() > 0, "{errors}");
+    let (amplitude, worst) =
+        (column(&out.join("cells.csv"), "amplitude_x1"), &errors["amplitude_x1"]["worst"]);
+    let largest = amplitude.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
+    assert!(worst.as_f64().unwrap() < 0.05 * largest, "{worst} of {largest}");
+    assert_eq!(manifest["measured"]["mean_gap"]["long_name"], "mean of gap");
+    succeeds(&folder, "validate out/s --quiet --samples 20");
+}
