@@ -21,6 +21,8 @@ for scene in scenes/gallery/*.toml; do
     publish "$name" map.png
 done
 
+publish loose_gear impact_energy.png
+
 # line SCENE AT START: a bifurcation diagram along omega. One shows a jump, the other the onset of grazing.
 line() {
     "$program" bifurcation "scenes/gallery/$1.toml" --along omega --at "$2" --set axis.0.count=600 \

@@ -41,6 +41,8 @@ pub struct Attractor {
     pub strobe: Option<State>,
     /// Word of the cycle, if the reference confirmed it.
     pub word: Option<Word>,
+    /// Whether the cycle is in contact at phase 0.
+    pub meshes: bool,
     /// Largest Lyapunov exponent; for chaos the mean over its cells.
     pub exponent: Option<f64>,
     /// Modulus of the largest Floquet multiplier of the cycle.
@@ -307,6 +309,7 @@ impl<R: Records + ?Sized> Sources<'_, R> {
                 Some(re.hypot(im))
             }),
             symmetric: orbit.as_ref().and_then(|orbit| orbit.symmetric),
+            meshes: orbit.as_ref().is_some_and(|orbit| orbit.strobe_meshing.is_some()),
             word: orbit.map(|orbit| orbit.word),
             cells: 0,
             cell,
@@ -320,6 +323,7 @@ impl<R: Records + ?Sized> Sources<'_, R> {
             class: Class::Chaotic,
             strobe: None,
             word: None,
+            meshes: false,
             exponent: Some(sum / ids.len() as f64).filter(|mean| mean.is_finite()),
             multiplier: None,
             symmetric: None,

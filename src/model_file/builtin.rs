@@ -22,6 +22,10 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("two-masses", include_str!("../../models/two_masses.toml")),
     ("coco-impact", include_str!("../../models/coco_impact.toml")),
     ("shaking-table", include_str!("../../models/shaking_table.toml")),
+    ("shaken-container", include_str!("../../models/shaken_container.toml")),
+    ("impact-damper", include_str!("../../models/impact_damper.toml")),
+    ("energy-sink", include_str!("../../models/energy_sink.toml")),
+    ("loose-gear", include_str!("../../models/loose_gear.toml")),
 ];
 
 /// The built-in models, read once. A test shows that each can be read.

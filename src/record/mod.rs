@@ -90,10 +90,22 @@ pub struct Record {
     pub measures: [f64; MEASURES],
 }
 
+/// Rounding error of a mesh fraction of 1. Lanes count whole steps, without error.
+const MESH_ROUNDING: f64 = 1e-9;
+
 impl Record {
     /// Whether the cell had neither impacts nor meshing. Both must be in the record.
     pub fn is_contact_free(&self) -> bool {
+        self.is_without_impacts() && self.mesh_fraction == 0.0
+    }
+
+    /// Whether the cell meshed all the time. Impacts and mesh fraction must be in the record.
+    pub fn is_always_in_contact(&self) -> bool {
+        self.is_without_impacts() && self.mesh_fraction > 1.0 - MESH_ROUNDING
+    }
+
+    fn is_without_impacts(&self) -> bool {
         let contacts = valid::IMPACTS | valid::MESH;
-        self.valid & contacts == contacts && self.impacts_per_period == 0.0 && self.mesh_fraction == 0.0
+        self.valid & contacts == contacts && self.impacts_per_period == 0.0
     }
 }

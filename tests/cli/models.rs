@@ -244,6 +244,26 @@ fn a_model_from_a_file_has_maps_basins_diagrams_and_orbits() {
     run(&folder, "check out/my-map").code(0);
 }
 
+/// A ball that falls from 1 m with e = 0.7: its state after 1 s is known. It comes to rest after 2.56 s.
+#[test]
+fn an_unforced_motion_does_not_depend_on_the_frequency() {
+    let folder = empty();
+    for frequency in ["1", "0.3", "7.0", "2*pi"] {
+        let text = toml(4).replace("motion.frequency = 1", &format!("motion.frequency = \"{frequency}\""));
+        fs::write(folder.path().join("ball.toml"), text).unwrap();
+        let orbit: Value =
+            serde_json::from_str(&stdout(&folder, "orbit --model ball.toml --start 1,0 --time 1 --json"))
+                .unwrap();
+        let off = |i: usize, exact: f64| (orbit["state"][i].as_f64().unwrap() - exact).abs();
+        assert!(off(0, 0.2250597607) < 1e-10 && off(1, -2.2799402393) < 1e-10, "{frequency}: {orbit}");
+        assert_eq!(
+            (&orbit["class"], &orbit["period"]),
+            (&"periodic".into(), &1.into()),
+            "{frequency}: {orbit}"
+        );
+    }
+}
+
 #[test]
 fn a_start_needs_as_many_numbers_as_the_models_state() {
     let start = |model: &str, start: &str| {

@@ -9,13 +9,14 @@ use crate::common::closed_form::Walled;
 use crate::common::gpu::open;
 use crate::cycle::{eigenvalues, followed};
 use crate::elastic::{backlash, bilinear, soft};
+use crate::loose_gear::gear;
 use crate::single_impact::stable;
 use rattlemap::gpu::{Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Oscillator, State};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
 use rattlemap_dynamics::stability::multipliers;
 
@@ -30,6 +31,8 @@ struct Known {
     /// Modulus of the largest multiplier.
     radius: f64,
     impacts: f64,
+    /// Whether it is in contact all the time.
+    stays: bool,
 }
 
 fn known_cycles() -> Vec<Known> {
@@ -38,7 +41,16 @@ fn known_cycles() -> Vec<Known> {
         let (orbit, (oscillator, law)) = (stop.orbits(period)[0], stop.walled().oscillator());
         let radius = eigenvalues(orbit.monodromy)[0].norm();
         let what = format!("one stop, omega = {}, n = {period}", stop.omega);
-        list.push(Known { what, oscillator, law, period, strobe: orbit.strobe, radius, impacts: 1.0 });
+        list.push(Known {
+            what,
+            oscillator,
+            law,
+            period,
+            strobe: orbit.strobe,
+            radius,
+            impacts: 1.0,
+            stays: false,
+        });
     }
     for e in [0.3, 0.5, 0.8] {
         let [born, doubles] = window(e);
@@ -47,45 +59,50 @@ fn known_cycles() -> Vec<Known> {
             // Below G = 1 a ball that sticks is never released.
             let ((strobe, matrix), (oscillator, law)) = (bounce(shaking, e), ball(shaking, e).oscillator());
             let (radius, what) = (eigenvalues(matrix)[0].norm(), format!("ball, e = {e}, G = {shaking:.3}"));
-            list.push(Known { what, oscillator, law, period: 1, strobe, radius, impacts: 1.0 });
+            list.push(Known { what, oscillator, law, period: 1, strobe, radius, impacts: 1.0, stays: false });
         }
     }
-    for omega in [0.7, 0.8, 1.5] {
-        let (oscillator, law) = clearance::pair(omega);
-        for orbit in clearance::symmetric(omega) {
+    for (what, (oscillator, law)) in clearance::clearances() {
+        for orbit in clearance::symmetric(&(oscillator, law)) {
             let monodromy: Matrix4<f64> = orbit.half * orbit.half;
             let [re, im] = multipliers(&monodromy).unwrap()[0];
             let radius = re.hypot(im);
             if orbit.is_free_between && radius < 1.0 {
-                let what = format!("two masses, omega = {omega}");
                 list.push(Known {
-                    what,
+                    what: what.clone(),
                     oscillator,
                     law,
                     period: 1,
                     strobe: orbit.strobe,
                     radius,
                     impacts: 2.0,
+                    stays: false,
                 });
             }
         }
     }
-    let springs = [
-        ("bilinear", bilinear(1.7, 1.0), [0.0, 0.0]),
-        ("soft impacts", soft(0.85, 0.7), [0.0, 0.0]),
+    let settling = [
+        ("bilinear", bilinear(1.7, 1.0), [0.0, 0.0], 0),
+        ("soft impacts", soft(0.85, 0.7), [0.0, 0.0], 0),
         // Between the folds there are two cycles, with and without separation.
-        ("backlash, together", backlash(0.78), [1.1, 0.0]),
-        ("backlash, parting", backlash(0.78), [0.8, 0.0]),
-        ("backlash", backlash(1.1), [0.8, 0.0]),
+        ("backlash, together", backlash(0.78), [1.1, 0.0], 0),
+        ("backlash, parting", backlash(0.78), [0.8, 0.0], 0),
+        ("backlash", backlash(1.1), [0.8, 0.0], 0),
+        ("loose gear, two impacts", gear(3.0, 5e-3, 0.6), [0.0, 0.0], 2),
+        ("loose gear, three impacts", gear(5.0, 2e-3, 0.8), [0.0, 0.0], 3),
+        ("loose gear, in contact", gear(0.99, 1e-4, 0.6), [0.0, 0.0], 0),
     ];
-    for (what, walled, start) in springs {
+    for (what, walled, start, impacts) in settling {
         let ([x, v], period) = settled(&walled, start);
         let (oscillator, law) = walled.oscillator();
-        // The multipliers are a complex pair. Their product is the change of the phase volume, which the damper
-        // determines.
-        let radius = (-0.5 * walled.free.c * f64::from(period) * walled.free.period()).exp();
-        let (what, strobe) = (what.to_owned(), [x, v, 0.0, 0.0]);
-        list.push(Known { what, oscillator, law, period, strobe, radius, impacts: 0.0 });
+        let stays = ["together", "in contact"].iter().any(|end| what.ends_with(end));
+        let is_stuck = stays && oscillator.contacts[0] == Contact::Rigid;
+        // The multipliers are a complex pair, except on a rigid wall, where they are 0. The product of a pair is the change of the
+        // phase volume, which the damper and the impacts determine.
+        let damped = (-0.5 * walled.free.c / walled.free.m * f64::from(period) * walled.free.period()).exp();
+        let radius = if is_stuck { 0.0 } else { damped * law.restitution[0].powi(impacts) };
+        let (what, strobe, impacts) = (what.to_owned(), [x, v, 0.0, 0.0], f64::from(impacts));
+        list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays });
     }
     list
 }
@@ -124,11 +141,16 @@ fn off(known: &Known, record: &Record) -> [f64; 2] {
     assert_eq!(record.period, known.period, "{}: {record:?}", known.what);
     let impacts = known.impacts / f64::from(known.period);
     assert!((record.impacts_per_period - impacts).abs() < 1e-9, "{}: {record:?}", known.what);
+    assert_eq!(record.is_always_in_contact(), known.stays, "{}: {record:?}", known.what);
     let at = |n: u32| followed(&known.oscillator, known.law, known.strobe, n).end;
     let near = (0..known.period).map(|n| apart(record.strobe, at(n))).fold(f64::INFINITY, f64::min);
-    let scale = known.strobe.iter().fold(1.0f64, |m, x| m.max(x.abs()));
+    let size = known.strobe.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let span = f64::from(known.period) * known.oscillator.period();
-    [near / scale, (record.lyapunov * span - known.radius.ln()).abs()]
+    if known.radius == 0.0 {
+        assert_eq!((near, record.lyapunov), (0.0, f64::NEG_INFINITY), "{}: {record:?}", known.what);
+        return [0.0; 2];
+    }
+    [near / size, (record.lyapunov * span - known.radius.ln()).abs()]
 }
 
 fn worst(known_cycles: &[Known], records: &[Record], engine: &str) -> [f64; 2] {

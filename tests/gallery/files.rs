@@ -4,6 +4,7 @@ use crate::ball::ball;
 use crate::clearance;
 use crate::common::closed_form::Walled;
 use crate::elastic::{backlash, bilinear, soft};
+use crate::loose_gear;
 use crate::single_impact::{COCO, STOP};
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::model::{Contact, Domain, Law, Model, Oscillator};
@@ -51,6 +52,15 @@ fn model_files_define_the_models_of_the_closed_forms() {
     agrees("kahraman-singh", &[("omega", 0.9)], walled(backlash(0.9)));
     agrees("shaking-table", &[("A", 1.2), ("e", 0.3)], walled(ball(1.2, 0.3)));
     agrees("two-masses", &[("omega", 0.8)], clearance::pair(0.8));
+    agrees("shaken-container", &[("d", 1.2), ("e", 0.3)], clearance::container(1.2, 0.3));
+    agrees(
+        "impact-damper",
+        &[("d", 0.06)],
+        clearance::Damper { clearance: 0.06, ..clearance::DAMPER }.pair(),
+    );
+    agrees("energy-sink", &[("d", 0.08)], clearance::Damper { clearance: 0.16, ..clearance::SINK }.pair());
+    let sets = [("swing", loose_gear::swing(1.5)), ("backlash", 2e-4), ("e", 0.3)];
+    agrees("loose-gear", &sets, walled(loose_gear::gear(1.5, 2e-4, 0.3)));
     // These are all built-in models except the gear pair, which is compared with the paper.
-    assert_eq!(FileModel::all_built_in().len(), 8);
+    assert_eq!(FileModel::all_built_in().len(), 12);
 }

@@ -12,5 +12,6 @@ mod clearance;
 mod elastic;
 mod engines;
 mod files;
+mod loose_gear;
 mod random;
 mod single_impact;

@@ -5,7 +5,7 @@ use crate::record::classify::classify;
 use crate::record::{Record, Spelling, valid, word_hash};
 use rattlemap_dynamics::orbit::Class;
 
-/// Class, period and whether there is contact; symmetry and word or pattern if their changes are borders. In a map of
+/// Class, period and whether there is no contact, contact all the time, or both; symmetry and word or pattern if their changes are borders. In a map of
 /// basins the attractor instead.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Label {
@@ -23,7 +23,11 @@ impl Label {
             Class::Chaotic => 3,
             Class::Periodic { period } => 3 + period,
         };
-        let free = u32::from(record.is_contact_free());
+        let contact = match (record.is_contact_free(), record.is_always_in_contact()) {
+            (true, _) => 1,
+            (_, true) => 2,
+            _ => 0,
+        };
         let knows_symmetry = needs.symmetric && record.valid & valid::SYMMETRIC != 0;
         let symmetry = if knows_symmetry { 1 + record.symmetric } else { 0 };
         let word = match (needs.pattern, needs.word) {
@@ -31,7 +35,7 @@ impl Label {
             (false, true) => word_of(record),
             (false, false) => 0,
         };
-        Label { word, kind: 8 * class + 4 * free + symmetry }
+        Label { word, kind: 16 * class + 4 * contact + symmetry }
     }
 
     /// Builds a label from a kind alone.
@@ -60,4 +64,18 @@ fn lesser(hash: u64, spelling: Option<Spelling>) -> u64 {
         Some(Spelling::Whole(word)) => hash.min(word_hash(word.mirrored().symbols())),
         Some(Spelling::Hashed { .. }) | None => hash,
     }
+}
+
+#[test]
+fn motion_with_some_contact_without_any_and_always_in_contact_has_different_labels() {
+    let label = |impacts_per_period: f64, mesh_fraction: f64| {
+        let valid = valid::PERIOD | valid::IMPACTS | valid::MESH;
+        let record = Record { period: 1, valid, impacts_per_period, mesh_fraction, ..Record::default() };
+        Label::of(&record, &Needs::EVERYTHING).kind
+    };
+    let contact = label(0.0, 0.5);
+    assert_eq!([label(1.0, 0.0), label(1.0, 1.0), label(0.0, 1.0 - 1e-6)], [contact; 3]);
+    let [none, always] = [0.0, 1.0].map(|mesh| label(0.0, mesh));
+    assert!(none != contact && always != contact && none != always);
+    assert_eq!(label(0.0, 1.0 - 1e-12), always);
 }

@@ -9,13 +9,13 @@ use crate::show::cells::Cells;
 use crate::show::color::Color;
 use crate::show::layers::bar::{Bar, count_beyond, round_bound};
 use crate::show::layers::colors::{
-    self, FAILED, NO_CONTACT, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, UNSYMMETRIC, chaos,
+    self, ALWAYS_IN_CONTACT, FAILED, NO_CONTACT, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, UNSYMMETRIC, chaos,
 };
 use crate::show::layers::layer::{Layer, NamedColor, legend};
 use rattlemap_dynamics::orbit::Class;
 
-/// Indices into the palette: four kinds of period 1, periods 2 to 64, undecided, failed, then shades of chaos.
-const FIRST_PERIOD: u8 = 4;
+/// Indices into the palette: five kinds of period 1, periods 2 to 64, undecided, failed, then shades of chaos.
+const FIRST_PERIOD: u8 = 5;
 const EXCEPTIONS: u8 = FIRST_PERIOD + 63;
 const FIRST_SHADE: u8 = EXCEPTIONS + 2;
 const SHADES: u8 = 64;
@@ -70,6 +70,8 @@ fn first_period(record: &Record, shows_symmetry: bool) -> u8 {
     let measured = |bit| record.valid & bit != 0;
     if record.is_contact_free() {
         0
+    } else if record.is_always_in_contact() {
+        4
     } else if shows_symmetry && !measured(valid::SYMMETRIC) {
         3
     } else if shows_symmetry && record.symmetric == 0 {
@@ -80,7 +82,7 @@ fn first_period(record: &Record, shows_symmetry: bool) -> u8 {
 }
 
 fn palette() -> Vec<Color> {
-    let mut palette = vec![NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN];
+    let mut palette = vec![NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN, ALWAYS_IN_CONTACT];
     palette.extend((2..=64).map(colors::period));
     palette.extend([UNDECIDED, FAILED]);
     palette.extend((0..SHADES).map(|shade| chaos(f64::from(shade) / f64::from(SHADES - 1))));
@@ -92,7 +94,7 @@ fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool, shows_symmetry:
     let mut counts = [0usize; 256];
     indices.iter().for_each(|&index| counts[usize::from(index)] += 1);
     let entry = |index: usize, text: String| NamedColor { color: palette[index], text, cells: counts[index] };
-    let has_several_kinds = counts[0] + counts[2] + counts[3] > 0;
+    let has_several_kinds = counts[0] + counts[2] + counts[3] + counts[4] > 0;
     let with_contact = match (has_several_kinds, shows_symmetry) {
         (true, true) => "period 1, symmetric",
         (true, false) => "period 1, contact",
@@ -100,6 +102,7 @@ fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool, shows_symmetry:
     };
     let mut list = vec![
         entry(0, "period 1, no contact".to_owned()),
+        entry(4, "period 1, always in contact".to_owned()),
         entry(1, with_contact.to_owned()),
         entry(2, "period 1, unsymmetric".to_owned()),
         entry(3, "period 1, symmetry unknown".to_owned()),

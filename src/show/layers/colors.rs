@@ -13,6 +13,9 @@ pub(crate) const UNSYMMETRIC: Color = hex(0x8bb3f5);
 /// Period 1 of unknown symmetry, because the motion converges too slowly.
 pub(crate) const SYMMETRY_UNKNOWN: Color = hex(0x546f90);
 
+/// Period 1 that never leaves contact.
+pub(crate) const ALWAYS_IN_CONTACT: Color = hex(0xebaac8);
+
 /// Colours of the items of a list, such as periods from 2 on, or words by frequency. An annealing search chose them so that
 /// neighbours in a legend differ, also for people who cannot see red or green. A test measures the differences.
 #[rustfmt::skip]
@@ -125,7 +128,15 @@ mod tests {
     #[test]
     fn periods_have_different_colours() {
         let mut colors: Vec<Color> = (2..=64).map(period).collect();
-        colors.extend([NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, FAILED]);
+        colors.extend([
+            NO_CONTACT,
+            ALWAYS_IN_CONTACT,
+            SYMMETRIC,
+            UNSYMMETRIC,
+            SYMMETRY_UNKNOWN,
+            UNDECIDED,
+            FAILED,
+        ]);
         let count = colors.len();
         colors.sort_unstable();
         colors.dedup();
@@ -140,7 +151,7 @@ mod tests {
                 assert!(difference >= 10.0, "{a:02x?} {b:02x?}: {difference}");
             }
         };
-        let kinds = [NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN];
+        let kinds = [NO_CONTACT, ALWAYS_IN_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN];
         let legend: Vec<Color> = kinds.into_iter().chain((2..=64).map(period)).collect();
         // A legend lists only periods that occur. Periods up to 12 may be neighbours of any other, longer ones only of those
         // that differ by up to 4.

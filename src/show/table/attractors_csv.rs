@@ -21,6 +21,7 @@ pub(crate) fn attractor_name(label: usize, attractor: &Attractor) -> String {
         _ => "chaos".to_owned(),
     };
     let word = match &attractor.word {
+        Some(word) if word.is_empty() && attractor.meshes => ", always in contact".to_owned(),
         Some(word) if word.is_empty() => ", no contact".to_owned(),
         Some(word) => format!(", word {}", Spelling::new(word).text()),
         None => String::new(),

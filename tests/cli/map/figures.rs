@@ -99,6 +99,33 @@ fn a_legend_does_not_mention_symmetry_that_was_not_requested() {
     assert!(has("period 1, no contact") && has("period 1, contact") && !has("symmetric"), "{figure}");
 }
 
+/// A shaft drives a loose gear. The flanks stay in contact while the drag exceeds the inertia, up to swing = 8.106. The driving
+/// flank of a gear with elastic teeth stays in contact if its mean load exceeds the amplitude of the linear response.
+#[test]
+fn a_legend_names_motion_that_never_leaves_contact() {
+    let folder = folder();
+    let scene = |model: &str, axes: &str| {
+        format!(
+            "model = '{model}'\n{axes}[outputs]\nquantities = ['class', 'impacts', 'mesh']\nfiles = ['svg', 'html']\n"
+        )
+    };
+    let axis = |name: &str, values: &str| format!("[[axis]]\nparameter = '{name}'\nvalues = {values}\n");
+    let gear = axis("swing", "[4.0, 8.10, 8.11]") + &axis("e", "[0.0, 0.5]");
+    let teeth = axis("F_m", "[0.01, 0.2]") + &axis("omega", "[0.4, 0.5]");
+    for (name, text, cells) in
+        [("gear", scene("loose-gear", &gear), 4), ("teeth", scene("kahraman-singh", &teeth), 2)]
+    {
+        fs::write(folder.path().join(format!("{name}.toml")), text).unwrap();
+        succeeds(&folder, &format!("map {name}.toml --engine cpu --out {name} --quiet"));
+        let [figure, report] = ["map.svg", "report.html"]
+            .map(|file| fs::read_to_string(folder.path().join(name).join(file)).unwrap());
+        let has = |text: &str| figure.contains(text);
+        assert!(has("period 1, always in contact") && has("period 1, contact"), "{figure}");
+        let entry = format!(r#""color":"ebaac8","text":"period 1, always in contact","cells":{cells}"#);
+        assert!(report.contains(&entry), "{report}");
+    }
+}
+
 #[test]
 fn figures_of_diagrams_and_orbits_come_in_each_format() {
     let folder = folder();
