@@ -14,7 +14,8 @@ use super::stdout::print;
 use crate::cli::say;
 use crate::job::model_choice;
 use crate::map::scene;
-use crate::show::orbit_summary::summary;
+use crate::show::orbit_json::history_to_json;
+use crate::show::orbit_summary::{history_summary, summary};
 use crate::store;
 use crate::store::folder::Folder;
 use crate::store::orbit::OrbitRequest;
@@ -28,6 +29,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let model = scene::single_cell(&model, &arguments.set)?;
     let flow = Flow::of(&*model)?;
     check_time(arguments.time, flow.period)?;
+    let request = arguments.history().map_err(|text| Failure::Usage(anyhow!(text)))?;
     let interrupt = Interrupt::listen(true)?;
     let folder = arguments.out.as_ref().map(|dir| Folder::open(dir, arguments.force)).transpose()?;
     if let Some(folder) = &folder {
@@ -35,13 +37,30 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     }
     let clock = Instant::now();
     let (start, settings) = (arguments.start(), arguments.settings());
+    let formats = FigureFormat::scene(&arguments.format);
     let stopped = || {
-        let text = "interrupted before the class was decided; nothing was written";
-        interrupt.failure(text.to_owned())
+        let result = if request.is_some() { "motion was computed" } else { "class was decided" };
+        interrupt.failure(format!("interrupted before the {result}; nothing was written"))
     };
     let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(stopped);
     let instant =
         arguments.time.map(|time| at(time).map(|state| store::orbit::Instant { time, state })).transpose()?;
+    if let Some(request) = request {
+        let history = request.compute(&*model, &flow, interrupt.raised());
+        let stops = |stopped| Failure::Run(anyhow!("--from-start {}: {stopped}", request.periods));
+        let history = history.map_err(stops)?.ok_or_else(stopped)?;
+        let place = (&start, request.skipped + 1, request.last());
+        print(&match arguments.json {
+            true => history_to_json(&*model, &history, place, instant),
+            false => history_summary(&*model, &history, place, instant),
+        })?;
+        if let Some(folder) = folder {
+            let files =
+                store::orbit::write_history(&folder, &*model, &history, &request, clock.elapsed(), &formats)?;
+            say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
+        }
+        return Ok(());
+    }
     let (shown, halt) = (orbit::EVENT_PERIODS, interrupt.raised());
     let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(stopped)?;
     print(&match arguments.json {
@@ -51,7 +70,6 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
         let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
-        let formats = FigureFormat::scene(&arguments.format);
         let files = store::orbit::write(&folder, &*model, &orbit, &request, &formats)?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
     }

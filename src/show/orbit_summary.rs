@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use crate::show::instant::Instant;
 use crate::show::names;
-use rattlemap_dynamics::model::Model;
-use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
+use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::orbit::{Class, Event, History, Orbit, Status};
 
 /// Number of decimals: one more than in the tables of the paper.
 const DECIMALS: usize = 5;
@@ -32,6 +32,31 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         }
         _ => events(model, &orbit.events),
     });
+    text
+}
+
+/// Returns a summary of a motion from the start: its first state, its last one and its events. Periods are numbered from 1.
+pub fn history_summary(
+    model: &dyn Model,
+    history: &History,
+    (start, first, last): (&State, u64, u64),
+    instant: Option<Instant>,
+) -> String {
+    let mut facts = vec![
+        ("parameters", parameters(model)),
+        ("start", state(model, Instant { time: 0.0, state: *start })),
+        ("forcing periods", format!("{first} to {last} (T = {:.DECIMALS$})", history.forcing_period)),
+    ];
+    let end = history.samples.last().map(|sample| Instant { time: sample.t, state: sample.state });
+    facts.extend(end.map(|end| ("end", state(model, end))));
+    facts.extend(instant.map(|instant| ("state", state(model, instant))));
+    let mut text: String = facts.iter().map(|(label, value)| format!("{label:<22}{value}\n")).collect();
+    text += &match history.meshing {
+        Some(side) if history.events.is_empty() => {
+            format!("\nno events: always in contact with the {} wall\n", names::side(side))
+        }
+        _ => format!("\nevents\n{}", events(model, &history.events)),
+    };
     text
 }
 

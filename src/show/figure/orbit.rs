@@ -17,6 +17,15 @@ use crate::show::error::WriteError;
 use plot::ORBIT_WIDTH;
 pub use plot::OrbitPlot;
 
+/// Name of the file of [`write_history`] without its extension.
+pub(crate) const HISTORY: &str = "history";
+
+/// Draws the gap and the displacements of a motion from the start against time, and writes the figure.
+pub fn write_history(out: impl Write, format: Format, plot: &OrbitPlot<'_>) -> Result<(), WriteError> {
+    let height = 760 + 380 * plot.other_displacements().len() as u32;
+    write_figure(out, format, (ORBIT_WIDTH, height), |canvas| plot.draw_history(canvas))
+}
+
 /// A figure of an orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OrbitFigure {

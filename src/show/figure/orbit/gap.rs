@@ -3,7 +3,7 @@
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::draw_head;
-use crate::show::drawing::{Align, Canvas, DARK, MEDIUM, MESHING, Rect, SMALL, wall_color};
+use crate::show::drawing::{Align, Canvas, DARK, MEDIUM, MESHING, Point, Rect, SMALL, wall_color};
 use crate::show::figure::orbit::flights;
 use crate::show::figure::orbit::motion::Piece;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
@@ -14,6 +14,8 @@ use rattlemap_dynamics::model::{Contact, Side, State};
 /// Room for the walls' names right of the panel, and the room for their text, which includes the margin.
 const WALL_NAMES: f64 = 97.0;
 const WALL_TEXT: f64 = 135.0;
+/// Distance between the panels of a motion from the start.
+const PANEL_GAP: f64 = 30.0;
 /// Distance between a symbol of the word and its flight.
 const SYMBOL_AWAY: f64 = 30.0;
 /// A single wall is shown if its distance from the motion is less than this many times the motion's extent.
@@ -23,29 +25,69 @@ const MOTION_MARGIN: f64 = 0.15;
 
 impl OrbitPlot<'_> {
     pub(crate) fn draw_gap(&self, canvas: &Canvas) {
-        let is_coordinate = self.names.iter().any(|name| name == self.walls.gap());
-        let free = if is_coordinate { "free motion" } else { "gap in free motion" };
+        let free = if self.gap_coordinate().is_some() { "free motion" } else { "gap in free motion" };
         let legend = self.legend(self.motion_entries(free), false);
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
         let panel = canvas.panel(ORBIT_LEFT, top);
         let panel = Rect { right: panel.right - WALL_NAMES, ..panel };
         let bottom = panel.bottom;
         let split = if self.has_depth() { top + 0.64 * (bottom - top) } else { bottom };
-        let label = match is_coordinate {
-            true => format!("displacement, {}", self.walls.gap()),
-            false => format!("gap, z = {}", self.gap_expression()),
-        };
-        let frame =
-            Frame { rect: Rect { bottom: split, ..panel }, x: self.time_axis(), y: self.gap_axis(&label) };
-        self.draw_walls(canvas, &frame);
-        let at = |t: f64, state: &State| (t, self.gap(state));
-        self.draw_lines(canvas, &frame, (DARK, MESHING), at);
-        self.draw_markers(canvas, &frame, false, at);
+        let frame = self.draw_gap_panel(canvas, Rect { bottom: split, ..panel });
         self.draw_symbols(canvas, &frame);
         frame.draw_axes(canvas, split == bottom);
         if split < bottom {
             self.draw_penetration(canvas, Rect { top: split + 30.0, ..panel });
         }
+    }
+
+    /// Draws the gap and the displacements of a motion from the start, one below the other.
+    pub(crate) fn draw_history(&self, canvas: &Canvas) {
+        let legend = self.legend(self.motion_entries("free motion"), false);
+        let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
+        let panel = canvas.panel(ORBIT_LEFT, top);
+        let panel = Rect { right: panel.right - WALL_NAMES, ..panel };
+        let displacements = self.other_displacements();
+        let height = (panel.bottom - top + PANEL_GAP) / (1 + displacements.len()) as f64;
+        let row = |n: usize| {
+            let top = top + n as f64 * height;
+            Rect { top, bottom: top + height - PANEL_GAP, ..panel }
+        };
+        self.draw_gap_panel(canvas, row(0)).draw_axes(canvas, displacements.is_empty());
+        for (n, &index) in displacements.iter().enumerate() {
+            let label = format!("displacement, {}", self.names[index]);
+            let y = self.state_axis(&label, &[index], 1.0);
+            let frame = Frame { rect: row(n + 1), x: self.time_axis(), y };
+            frame.draw_grid(canvas);
+            self.draw_motion(canvas, &frame, |t, state| (t, state[index]));
+            frame.draw_axes(canvas, n + 1 == displacements.len());
+        }
+    }
+
+    /// Returns the indices of the displacements in the state, without the one that is the gap.
+    pub(crate) fn other_displacements(&self) -> Vec<usize> {
+        (0..self.names.len()).step_by(2).filter(|index| self.gap_coordinate() != Some(*index)).collect()
+    }
+
+    /// Returns the index in the state of the displacement that is the gap.
+    fn gap_coordinate(&self) -> Option<usize> {
+        self.names.iter().position(|name| name == self.walls.gap())
+    }
+
+    /// Draws the gap between its walls, and returns the frame of the panel, whose axes are not yet drawn.
+    fn draw_gap_panel(&self, canvas: &Canvas, rect: Rect) -> Frame {
+        let label = match self.gap_coordinate() {
+            Some(_) => format!("displacement, {}", self.walls.gap()),
+            None => format!("gap, z = {}", self.gap_expression()),
+        };
+        let frame = Frame { rect, x: self.time_axis(), y: self.gap_axis(&label) };
+        self.draw_walls(canvas, &frame);
+        self.draw_motion(canvas, &frame, |t, state| (t, self.gap(state)));
+        frame
+    }
+
+    fn draw_motion(&self, canvas: &Canvas, frame: &Frame, at: impl Fn(f64, &State) -> Point + Copy) {
+        self.draw_lines(canvas, frame, (DARK, MESHING), at);
+        self.draw_markers(canvas, frame, false, at);
     }
 
     /// Whether the motion meshes with a wall of impacts, so that a panel shows the depth, which is too small to be visible in the
