@@ -161,7 +161,12 @@ impl HistoryRequest {
     ///
     /// # Errors
     /// [`Stopped`] if the motion cannot be followed to the end.
-    pub fn compute(&self, model: &dyn Model, flow: &Flow, halt: &AtomicBool) -> Result<Option<History>, Stopped> {
+    pub fn compute(
+        &self,
+        model: &dyn Model,
+        flow: &Flow,
+        halt: &AtomicBool,
+    ) -> Result<Option<History>, Stopped> {
         let samples = self.samples.div_ceil(self.periods.max(1) as usize);
         history(flow, model.law(), self.start, (self.skipped, self.periods), samples, halt)
     }
