@@ -37,6 +37,10 @@ fn close_chatter(side: u32, u: Real) {
     if lasts <= 0.0 || lasts >= steps_to_stop_phase(next_stop_phase()) {
         return;
     }
+    if MEASURE {
+        // The series takes the energy with which the gap leaves the wall.
+        add(SUM_LOST, u * u);
+    }
     let across = here.x_row;
     let v_by_x = across[2] + kick * row[2];
     let v_by_v = across[3] + kick * row[3];

@@ -108,10 +108,16 @@ fn contact(side: u32, settling: bool) -> Jump {
     if is_rigid(side) && leaving <= mesh_speed(side) {
         let at_rest = stick(side);
         if at_rest.event {
+            if MEASURE {
+                measure_contact(approach, 0.0);
+            }
             return at_rest;
         }
     }
     jump.event = true;
+    if MEASURE {
+        measure_contact(approach, leaving);
+    }
     if !pressed && approach < GRAZING_SPEED * speed {
         tally.grazes += 1u;
     }
@@ -156,6 +162,9 @@ fn end_meshing(side: u32, settling: bool, tau: Real) -> Jump {
 // Ends the contact onset because the load no longer presses, `tau` after the expansion point. The event function is
 // the acceleration.
 fn end_onset(side: u32, tau: Real) -> Jump {
+    if MEASURE {
+        measure_release(side);
+    }
     let row = here.gap_row;
     let normal = array<Real, 4>(row[0], here.share * row[1], row[2], here.share * row[3]);
     motion.q[0] += walls[side];

@@ -314,6 +314,9 @@ fn careful() -> bool {
         tally.status = STATUS_TOO_STIFF;
     }
     tally.passes_in_period += 1u;
+    if MEASURE {
+        measure_flight(found.tau);
+    }
     motion.q = state_at(found.tau, substeps);
     let held = sticks();
     if held {

@@ -19,6 +19,9 @@ struct Domain {
     angle: Real,
     turn_half: Real,
     turn_sin: Real,
+    // Form of the power of dampers on the rates of gap and x, in the units of measure.wgsl: factors of rate^2, rate *
+    // x_rate, x_rate^2.
+    damping: array<Real, 3>,
     // Free steps per step of this domain: a power of two, at most 1.
     share: Real,
     // Steps of this domain per free step.
@@ -50,6 +53,11 @@ struct Flow {
     pressing: array<array<Real, 6>, 2>,
     // Change of the rates of the gap and of x per displacement of the gap, where the motion enters an elastic wall.
     damper: array<array<Real, 2>, 2>,
+    // Contact force of the right and of the left wall per displacement and per rate of the gap, in the units of
+    // measure.wgsl.
+    springs: array<array<Real, 2>, 2>,
+    // Both displacements of the model as factors of gap and x.
+    displacements: array<array<Real, 2>, 2>,
 }
 
 // Whole numbers of a flow.
@@ -115,6 +123,8 @@ struct Settings {
     max_period: u32,
     // 1: lanes end once they are decided.
     early_stop: u32,
+    // Periods over which aperiodic motion is measured; 0 measures nothing.
+    measured_periods: u32,
     // 1: compaction selects the lanes that have ended. 0: it selects those that this variant has work for.
     ended: u32,
 }
@@ -165,6 +175,13 @@ struct Motion {
     vector: array<Real, 4>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
+    // The last state of a lane that is being measured.
+    ended: MotionNow,
+    // What was measured in the present period, and in all (measure.wgsl).
+    sums: array<Real, SUMS>,
+    totals: array<Real, SUMS>,
+    highs: array<Real, EXTREMES>,
+    lows: array<Real, EXTREMES>,
 }
 
 // Counters and flags.
@@ -283,6 +300,9 @@ struct Tally {
     pattern_length: u32,
     pattern_hash: array<u32, 2>,
     pattern_recent: u32,
+    // The last counters of a lane that is being measured; and 1 if it is or was.
+    ended: TallyNow,
+    is_measured: u32,
 }
 
 // Results of a lane: real numbers.
@@ -293,6 +313,16 @@ struct Reading {
     growth: Real,
     growth_error: Real,
     mesh_fraction: Real,
+}
+
+// What was measured on a lane, and the columns of its monodromy matrix.
+struct Measured {
+    totals: array<Real, SUMS>,
+    highs: array<Real, EXTREMES>,
+    lows: array<Real, EXTREMES>,
+    tangents: array<Real, 16>,
+    // 1 if a cycle was read; the columns mean nothing otherwise.
+    has_read: Real,
 }
 
 // Results of a lane: whole numbers.
@@ -334,6 +364,7 @@ const STAGE_RUNNING: u32 = 0u;
 const STAGE_READING: u32 = 1u; // a period was found, and its cycle is being read
 const STAGE_READ: u32 = 2u; // the cycle has been read and must be judged
 const STAGE_DONE: u32 = 3u;
+const STAGE_MEASURING: u32 = 4u; // the lane is decided, and its motion is measured
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read> flows: array<Flow>;
@@ -348,6 +379,7 @@ const STAGE_DONE: u32 = 3u;
 @group(0) @binding(10) var<storage, read_write> readings: array<Reading>;
 @group(0) @binding(11) var<storage, read_write> findings: array<Finding>;
 @group(0) @binding(12) var<storage, read_write> block_starts: array<u32>;
+@group(0) @binding(13) var<storage, read_write> measured: array<Measured>;
 
 // What governs the motion. All modes but the first are followed by the side: mode + SIDE_*.
 const MODE_FREE: u32 = 0u;

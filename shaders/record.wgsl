@@ -8,6 +8,10 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     load_lane(selected_lane(i));
     load_strobe_state();
+    if tallies[lane].is_measured == 1u {
+        motion = motions[lane].ended;
+        tally = tallies[lane].ended;
+    }
     var reading: Reading;
     var finding: Finding;
     finding.slot = lane;

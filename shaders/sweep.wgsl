@@ -25,13 +25,17 @@ fn check_finite() {
 }
 
 fn is_over() -> bool {
-    return tally.status != STATUS_OK || tally.stage >= STAGE_READ;
+    return tally.status != STATUS_OK || tally.stage == STAGE_READ || tally.stage == STAGE_DONE;
 }
 
 // Whether this variant has work for the lane. The variant without the exponent's tangent vector carries a lane until
 // it needs the vector, and finishes a cycle that is being read; the other variant then has the lane for good. The
 // choice must not depend on where a dispatch ends, because the variants round differently.
 fn has_work() -> bool {
+    let measures = tally.stage == STAGE_MEASURING;
+    if MEASURE || measures {
+        return MEASURE && measures && tally.status == STATUS_OK;
+    }
     if is_over() || !EXPONENT {
         return !is_over();
     }
@@ -127,6 +131,10 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     // Scans, events and strobes are in separate loops, so that lanes do the same work at the same time.
     while has_work() && iterations < settings.iterations {
         if fly_to_stop_phase() {
+            if MEASURE {
+                measure_period();
+                continue;
+            }
             load_strobe_state();
             if tally.step >= shape.steps {
                 begin_period();
@@ -140,6 +148,9 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         load_strobe_state();
         judge_cycle();
         store_strobe_state();
+    }
+    if settings.measured_periods > 0u && tally.stage == STAGE_DONE && tally.status == STATUS_OK && !MEASURE {
+        begin_measuring();
     }
     store_tangent_now();
     store_lane();

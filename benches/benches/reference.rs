@@ -121,6 +121,7 @@ fn per_period_of_a_map(c: &mut Criterion) {
         undecided_periods: 0,
         exponent: true,
         shows_exponent: false,
+        quantities: false,
     };
     let work = || -> u64 {
         let periods = |cell: &Cell| measure(&cell.flow, cell.pair.law(), [0.0; 4], &budget).periods_run;

@@ -96,6 +96,11 @@ pub struct Flow {
     other: usize,
     pub(crate) degrees: usize,
     mass: [[f64; 2]; 2],
+    /// Damping matrices of free motion and of contact with the right and the left wall.
+    damping: [[[f64; 2]; 2]; 3],
+    /// Stiffness and damping along the gap that each wall adds in contact.
+    wall_forces: [[f64; 2]; 2],
+    compliance: f64,
     symmetric: bool,
     non_impacting: Option<NonImpacting>,
     free: LinearFlow,
@@ -144,6 +149,10 @@ impl Flow {
             };
             [damping * compliance, damping * pushed]
         };
+        let damping = |side: Side| match oscillator.contacts[side.index()] {
+            Contact::Rigid => oscillator.free.damping,
+            Contact::Impact | Contact::Elastic => oscillator.meshing[side.index()].damping,
+        };
         let meshing = Side::BOTH.map(behind);
         let length = oscillator.length_scale();
         Flow {
@@ -160,6 +169,9 @@ impl Flow {
             other,
             degrees: oscillator.degrees,
             mass: oscillator.mass,
+            damping: [oscillator.free.damping, damping(Side::Right), damping(Side::Left)],
+            wall_forces: Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)),
+            compliance,
             symmetric: oscillator.mirror_symmetric(),
             non_impacting: NonImpacting::new(oscillator)
                 .or_else(|| NonImpacting::with_one_at_rest(oscillator)),
@@ -202,6 +214,29 @@ impl Flow {
             Side::Right => self.walls[0],
             Side::Left => self.walls[1],
         }
+    }
+
+    /// Returns the damping matrix of a domain.
+    pub(crate) fn damping(&self, kind: DomainKind) -> [[f64; 2]; 2] {
+        match kind {
+            DomainKind::Free => self.damping[0],
+            DomainKind::Meshing(side) => self.damping[1 + side.index()],
+        }
+    }
+
+    /// Returns the stiffness and the damping, along the gap, of the contact with a wall; 0 for a rigid wall.
+    pub(crate) fn wall_force(&self, side: Side) -> [f64; 2] {
+        self.wall_forces[side.index()]
+    }
+
+    /// Whether motion can continue behind a wall.
+    pub(crate) fn is_compliant(&self, side: Side) -> bool {
+        self.contacts[side.index()] != Contact::Rigid
+    }
+
+    /// Returns `g M^-1 g`, the change of the gap's rate by a unit impulse of a contact.
+    pub fn compliance(&self) -> f64 {
+        self.compliance
     }
 
     /// Converts a state to gap coordinates.

@@ -12,6 +12,7 @@ mod cell;
 mod history;
 mod instant;
 mod itinerary;
+mod quantities;
 mod reading;
 mod recurrence;
 mod search_filter;
@@ -20,13 +21,15 @@ mod tests;
 mod trace;
 
 pub use analysis::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, analyse, analyse_flow, analyse_until, status_of,
+    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, analyse, analyse_flow, analyse_until,
+    status_of,
 };
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
 pub use cell::{Measurement, NEUTRAL_ORDER, measure, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
+pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
 pub use trace::trace;
 
@@ -177,6 +180,9 @@ pub struct Orbit {
     pub impacts_per_period: f64,
     /// Fraction of the time spent meshing.
     pub mesh_fraction: f64,
+    /// Quantities over the cycle, or over the observed periods that follow aperiodic motion; none if they are not
+    /// requested or the motion cannot be continued.
+    pub quantities: Option<Quantities>,
     /// State at the phase 0 that precedes the first of `events`.
     pub strobe: State,
     /// The wall of the contact that lasts at that instant, if one does.

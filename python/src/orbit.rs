@@ -89,7 +89,8 @@ pub(crate) fn orbit(
     };
     let own = Arc::clone(&model);
     let orbit = worker::run(py, None, move |watch| {
-        Ok(analysis::analyse_until(&*own, state, &settings, analysis::EVENT_PERIODS, watch.halt())?)
+        let [longest, shown] = [analysis::LONGEST_WINDOW, analysis::EVENT_PERIODS];
+        Ok(analysis::analyse_until(&*own, state, &settings, longest, shown, watch.halt())?)
     })?;
     Ok(Orbit { model, orbit: Arc::new(orbit), start: state })
 }

@@ -10,6 +10,7 @@ use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
 use crate::map::scene::{Along, Format};
 use crate::map::shard::Shard;
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
+use crate::store::inventory::figure_formats;
 use crate::store::orbit::{HistoryRequest, TABLED};
 use crate::text::printable::is_printable;
 use crate::text::shell::quoted;
@@ -18,7 +19,7 @@ use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use rattlemap_dynamics::model::{REST, State};
-use rattlemap_dynamics::orbit::Settings;
+use rattlemap_dynamics::orbit::{LONGEST_WINDOW, Settings};
 
 /// Version and commit, as `--version` prints them.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("RATTLEMAP_COMMIT"), ")");
@@ -187,7 +188,8 @@ pub(crate) struct Map {
     pub(crate) engine: EngineOptions,
 
     /// Continue an interrupted run of the same scene. Without stored records the map starts from its first cell. A finished
-    /// shard is not computed again
+    /// map is not computed again: its files are written again, in the formats of the scene and those that the folder has,
+    /// and validation.json stays. A finished shard is not computed again
     #[arg(long, conflicts_with = "force")]
     pub(crate) resume: bool,
 
@@ -272,7 +274,8 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
+    /// Replace the files of an earlier run in the folder, of this or another command; files that are not written again are
+    /// removed and named. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
 
@@ -281,7 +284,8 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 
-    /// Formats of figures, instead of those in the scene (outputs.files): png, svg, pdf. Example: --format png,pdf
+    /// Formats of figures, instead of those in the scene (outputs.files): png, svg, pdf. Figures of other formats that the
+    /// folder has are drawn again, too. Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
 
@@ -315,6 +319,15 @@ impl FigureFormat {
         let [png, svg, pdf] = Format::FIGURES;
         let all = [(FigureFormat::Png, png), (FigureFormat::Svg, svg), (FigureFormat::Pdf, pdf)];
         all.into_iter().filter(|(named, _)| formats.contains(named)).map(|(_, format)| format).collect()
+    }
+
+    /// The formats of a command without a scene: the requested ones and those that the command has written into its folder
+    /// before. Without a request, png.
+    pub(crate) fn added(formats: &[FigureFormat], folder: &Path, command: &str) -> Vec<Format> {
+        if formats.is_empty() {
+            return vec![Format::Png];
+        }
+        [FigureFormat::scene(formats), figure_formats(folder, command)].concat()
     }
 }
 
@@ -398,12 +411,11 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "X1,V1,X2,V2", allow_hyphen_values = true, value_parser = state)]
     pub(crate) start: Option<StartState>,
 
-    /// Number of forcing periods in the first analysis after the transient, at least 2. It finds cycles of up to N/2
-    /// periods, at most 64. While the class is undecided, the analysis is repeated with twice as many periods, up to
-    /// 32768, or N if that is larger. Example: --periods 256
-    #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
-          value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
-    pub(crate) periods: u32,
+    /// Number of forcing periods to analyse after the transient, at least 2. Cycles of up to N/2 periods, at most 64, are
+    /// found. If the class is not decided then, the motion is undecided [default: 128; while the class is undecided, the
+    /// analysis is repeated with twice as many periods, up to 32768]. Example: --periods 256
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    pub(crate) periods: Option<u32>,
 
     /// Length of the transient, in forcing periods, at least 1. All of it is integrated. Example: --transient 1000
     #[arg(long, value_name = "N", default_value_t = Settings::default().transient_periods,
@@ -434,18 +446,12 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Formats of figures: png, svg, pdf. Example: --format png,pdf
-    #[arg(
-        long,
-        value_name = "FORMAT,...",
-        value_enum,
-        value_delimiter = ',',
-        default_value = "png",
-        requires = "out"
-    )]
+    /// Formats of figures: png, svg, pdf [default: png]. Figures of other formats that the folder has are drawn again, too.
+    /// Example: --format png,pdf
+    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', requires = "out")]
     pub(crate) format: Vec<FigureFormat>,
 
-    /// Write even if the folder is not empty
+    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long, requires = "out")]
     pub(crate) force: bool,
 }
@@ -498,11 +504,15 @@ impl Orbit {
 
     /// The integration settings. The longest period is half the observed periods, because a cycle must be observed twice.
     pub(crate) fn settings(&self) -> Settings {
-        Settings {
-            transient_periods: self.transient,
-            observed_periods: self.periods,
-            max_period: Settings::default().max_period.min(self.periods / 2),
-        }
+        let Settings { observed_periods, max_period, .. } = Settings::default();
+        let observed_periods = self.periods.unwrap_or(observed_periods);
+        let max_period = max_period.min(observed_periods / 2);
+        Settings { transient_periods: self.transient, observed_periods, max_period }
+    }
+
+    /// Forcing periods of the longest analysis of an undecided motion.
+    pub(crate) fn longest_window(&self) -> u32 {
+        self.periods.unwrap_or(LONGEST_WINDOW)
     }
 }
 
@@ -635,11 +645,12 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Formats of the figure: png, svg, pdf. Example: --format png,pdf
-    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', default_value = "png")]
+    /// Formats of the figure: png, svg, pdf [default: png]. Figures of other formats that the folder has are drawn again, too.
+    /// Example: --format png,pdf
+    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
 
-    /// Replace the files of an earlier comparison. Without this option the folder must be empty
+    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
 
@@ -661,7 +672,7 @@ pub(crate) struct Compare {
 #[command(after_help = "Example:\n  \
     rattlemap check out/e_omega --repair")]
 pub(crate) struct Check {
-    /// Folder of a finished map, diagram or orbit
+    /// Folder of a finished map, diagram, orbit or comparison
     #[arg(value_name = "DIR")]
     pub(crate) folder: PathBuf,
 

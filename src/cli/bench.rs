@@ -60,6 +60,7 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
     }
     if !ask.run.quiet && !files.is_empty() {
         say::notes(format_args!("{}\n{}: {}", summary(&all), say::path(&out), files.join(", ")));
+        say::removed(&folder);
     }
     verdict(&all)
 }

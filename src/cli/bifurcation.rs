@@ -17,6 +17,7 @@ use crate::map::{bifurcation, plan};
 use crate::store;
 use crate::store::bifurcation::DiagramArguments;
 use crate::store::folder::Folder;
+use crate::store::inventory::figure_formats;
 
 /// Largest number of ranges that a message lists; the manifest lists all.
 const LISTED_RANGES: usize = 6;
@@ -26,11 +27,13 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     let (along, options) = (arguments.along(), &arguments.run);
     let along = along.as_ref();
     let file = SceneFile { purpose: Purpose::Bifurcation, along, ..SceneFile::map(&options.scene) };
-    let sets = file.with_figures(options.set.clone(), &FigureFormat::scene(&options.format))?;
+    let (out, figures) = (arguments.out(), FigureFormat::scene(&options.format));
+    let stored = if figures.is_empty() { Vec::new() } else { figure_formats(&out, "bifurcation") };
+    let sets = file.with_formats(options.set.clone(), &figures, &stored)?;
     let scene = file.load(&sets)?;
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(options.quiet)?;
-    let folder = Folder::open(&arguments.out(), options.force)?;
+    let folder = Folder::open(&out, options.force)?;
     folder.refuse_links(store::bifurcation::names())?;
     let cells = scene.line();
     let count = bifurcation::column_count(cells.len(), scene.start());
@@ -70,6 +73,9 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
         say::path(folder.path()),
         files.join(", ")
     ));
+    if !options.quiet {
+        say::removed(&folder);
+    }
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);
     fail_if(all_failed, "the motion failed in every column; `status` in bifurcation_columns.csv says why")
 }

@@ -33,11 +33,12 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let Some(result) = result.filter(|_| interrupt.wait_for(None)) else { return Err(stopped()) };
     let cells = result.cells();
     let pair = result.pair(&cells);
-    let formats = FigureFormat::scene(&arguments.format);
+    let formats = FigureFormat::added(&arguments.format, folder.path(), "compare");
     let files = store::compare::write(&folder, &pair, &formats, clock.elapsed())?;
     if !arguments.quiet {
         let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
         say::notes(format_args!("{}\n{files}", summary(&pair, job.scene())));
+        say::removed(&folder);
     }
     if arguments.json {
         print_json(&store::compare::object(folder.path(), &files, &pair))?;

@@ -19,9 +19,12 @@ use crate::cli::stdout::print_json;
 use crate::job::error::JobError;
 use crate::job::map::{ComputedMap, MapJob, MapRun, OpenMap, require_engine};
 use crate::job::observer::Observer;
-use crate::job::scene_file::SceneFile;
+use crate::job::scene_file::{FILES, SceneFile};
+use crate::map::scene::Format;
 use crate::map::sweep::SweepError;
 use crate::store;
+use crate::store::folder::Folder;
+use crate::store::inventory::figure_formats;
 use crate::store::map::LIST;
 use crate::store::run_records::open_folder;
 use crate::store::shard;
@@ -35,7 +38,11 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     let (out, quiet) = (arguments.out(), options.quiet);
     let list_copy = resume.then(|| out.join(LIST));
     let file = SceneFile { list_copy: list_copy.as_deref(), ..SceneFile::map(&options.scene) };
-    let sets = file.with_figures(options.set.clone(), &FigureFormat::scene(&options.format))?;
+    let sets = file.with_formats(
+        options.set.clone(),
+        &FigureFormat::scene(&options.format),
+        &formats_of_folder(arguments, &out),
+    )?;
     let scene = file.load(&sets)?;
     let job = MapJob { scene: &scene, sets: &sets, engine, shard: *shard, resume: *resume };
     let free = job.check(Some(&out))?;
@@ -60,19 +67,45 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     if !reason.is_empty() {
         console.note(&format!("{} ({}): {reason}", engine.name(), engine.precision()));
     }
+    let computed = compute(opened, &restart, &interrupt, &folder, &console);
+    if !quiet {
+        say::removed(&folder);
+    }
+    computed
+}
+
+/// Formats that the run writes because the folder has them. A list that the user gave with `--set` is complete.
+fn formats_of_folder(arguments: &Map, out: &Path) -> Vec<Format> {
+    let Map { run: options, resume, .. } = arguments;
+    if *resume {
+        let is_given = options.set.iter().any(|set| set.starts_with(FILES));
+        return if is_given { Vec::new() } else { store::map::formats(out) };
+    }
+    if options.format.is_empty() { Vec::new() } else { figure_formats(out, "map") }
+}
+
+/// Computes the map or shard, and writes its files.
+fn compute(
+    opened: OpenMap<'_>,
+    restart: &Restart<'_>,
+    interrupt: &Interrupt,
+    folder: &Folder,
+    console: &Console,
+) -> Result<(), Failure> {
+    let arguments = restart.arguments;
     let mut run = opened.begin()?;
-    if *resume && run.done() == 0 && !run.is_damaged() {
+    if arguments.resume && run.done() == 0 && !run.is_damaged() {
         console.note(&format!(
             "{}: the folder has no records; the map starts from its first cell",
-            out.display()
+            folder.path().display()
         ));
     }
-    integrate(&mut run, &restart, &interrupt)?;
+    integrate(&mut run, restart, interrupt)?;
     let clock = Instant::now();
     interrupt.ends_at_once(restart.text(run.done()), || {});
-    match shard {
-        Some(_) => finish_shard(&run, folder.path(), arguments, &console),
-        None => finish_map(&run.finish(), clock, folder.path(), arguments, &console),
+    match arguments.shard {
+        Some(_) => finish_shard(&run, folder.path(), arguments, console),
+        None => finish_map(&run.finish(), clock, folder.path(), arguments, console),
     }
 }
 

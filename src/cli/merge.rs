@@ -52,6 +52,9 @@ pub(crate) fn run(arguments: &Merge) -> Result<(), Failure> {
         say::path(folder.path()),
         merged.files.join(", ")
     ));
+    if !arguments.quiet {
+        say::removed(&folder);
+    }
     if arguments.json {
         print_json(&merged.object)?;
     }

@@ -13,10 +13,11 @@ use super::interrupt::Interrupt;
 use super::stdout::print;
 use crate::cli::say;
 use crate::job::model_choice;
-use crate::map::scene;
+use crate::map::scene::{self, Format};
 use crate::show::orbit_json::history_to_json;
 use crate::show::orbit_summary::{history_summary, summary};
 use crate::store;
+use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::orbit::OrbitRequest;
 
@@ -37,7 +38,6 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     }
     let clock = Instant::now();
     let (start, settings) = (arguments.start(), arguments.settings());
-    let formats = FigureFormat::scene(&arguments.format);
     let stopped = || {
         let result = if request.is_some() { "motion was computed" } else { "class was decided" };
         interrupt.failure(format!("interrupted before the {result}; nothing was written"))
@@ -54,26 +54,37 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
             true => history_to_json(&*model, &history, place, instant),
             false => history_summary(&*model, &history, place, instant),
         })?;
-        if let Some(folder) = folder {
-            let files =
-                store::orbit::write_history(&folder, &*model, &history, &request, clock.elapsed(), &formats)?;
-            say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
-        }
-        return Ok(());
+        let write = |folder: &Folder, formats: &[Format]| {
+            store::orbit::write_history(folder, &*model, &history, &request, clock.elapsed(), formats)
+        };
+        return finish(arguments, folder, write);
     }
-    let (shown, halt) = (orbit::EVENT_PERIODS, interrupt.raised());
-    let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(stopped)?;
+    let (shown, longest, halt) = (orbit::EVENT_PERIODS, arguments.longest_window(), interrupt.raised());
+    let orbit = orbit::analyse_until(&*model, start, &settings, longest, shown, halt)?.ok_or_else(stopped)?;
     print(&match arguments.json {
         true => store::orbit::json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),
     })?;
-    let failed = orbit.class == Class::Failed;
+    let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
+    finish(arguments, folder, |folder, formats| {
+        store::orbit::write(folder, &*model, &orbit, &request, formats)
+    })?;
+    fail_if(orbit.class == Class::Failed, "the integration failed; `status` says why")
+}
+
+/// Writes the files into the folder, if there is one, and names them.
+fn finish(
+    arguments: &Orbit,
+    folder: Option<Folder>,
+    write: impl FnOnce(&Folder, &[Format]) -> Result<Vec<&'static str>, OutputError>,
+) -> Result<(), Failure> {
     if let Some(folder) = folder {
-        let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
-        let files = store::orbit::write(&folder, &*model, &orbit, &request, &formats)?;
+        let formats = FigureFormat::added(&arguments.format, folder.path(), "orbit");
+        let files = write(&folder, &formats)?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
+        say::removed(&folder);
     }
-    fail_if(failed, "the integration failed; `status` says why")
+    Ok(())
 }
 
 /// Refuses a time that takes longer than a minute to compute.

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::io::{Write, stderr};
 use std::path::Path;
 
+use crate::store::folder::Folder;
 use crate::text::printable;
 
 /// Prints a line on stderr; line feeds in it are escaped. If stderr is closed or full, the line is dropped and the run
@@ -15,6 +16,18 @@ pub fn note(line: impl Display) {
 /// Prints several lines on stderr. Text from outside must have passed [`path`] or [`quoted`].
 pub(crate) fn notes(lines: impl Display) {
     write(&printable::lines(&lines.to_string()));
+}
+
+/// Names the results of an earlier run that a command has removed. Nothing is printed if there are none.
+pub(crate) fn removed(folder: &Folder) {
+    let removed = folder.removed();
+    if !removed.is_empty() {
+        note(format_args!(
+            "{}: removed files of an earlier run: {}",
+            folder.path().display(),
+            removed.join(", ")
+        ));
+    }
 }
 
 fn write(text: &str) {

@@ -6,7 +6,7 @@ use nalgebra::SMatrix;
 use super::coordinates::Coordinates;
 use super::layout::{Domain, Flow};
 use crate::record::limits::MOST_STEPS;
-use rattlemap_dynamics::model::{self, Contact};
+use rattlemap_dynamics::model::{self, Contact, Side};
 use rattlemap_dynamics::reference::CLOSING_ANGLE;
 
 /// Largest angle, in radians, by which the fastest mode turns in one step. The shaders' Taylor series and bounds are
@@ -85,6 +85,8 @@ impl Constants {
             transient_growth: 0.0,
             pressing: walls.map(held),
             damper: oscillator.meshing.each_ref().map(damper),
+            springs: Side::BOTH.map(|side| springs(oscillator, side, h)),
+            displacements: coordinates.displacements(),
         };
         if let Some(motion) = non_impacting(oscillator) {
             constants.flow.steady = constants.to_lane(motion.steady());
@@ -112,6 +114,11 @@ impl Constants {
             q[0] = q[0].max(left);
         }
         q
+    }
+
+    /// Returns the change of the gap's rate by a unit impulse of a contact.
+    pub(super) fn compliance(&self) -> f64 {
+        self.coordinates.compliance()
     }
 
     /// Returns the state from lane units.
@@ -220,9 +227,24 @@ fn domain(
         angle,
         turn_half: (0.5 * angle).tan(),
         turn_sin: angle.sin(),
+        damping: power_form(oscillator, domain, free_step),
         share: substeps.recip(),
         substeps,
     }
+}
+
+/// Returns the power of a domain's dampers as a form on rates per step `h`. A rate w of the gap has the energy w^2.
+fn power_form(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> [f64; 3] {
+    let coordinates = Coordinates::new(oscillator);
+    let unit = 2.0 * coordinates.compliance() * h;
+    coordinates.form(domain.damping).map(|x| x * unit)
+}
+
+/// Returns the acceleration of the gap, per step `h` squared, that a contact gives per displacement and per rate.
+fn springs(oscillator: &model::Oscillator, side: Side, h: f64) -> [f64; 2] {
+    let [stiffness, damping] = oscillator.wall_stiffness_and_damping(side);
+    let compliance = Coordinates::new(oscillator).compliance();
+    [stiffness * compliance * h * h, damping * compliance * h]
 }
 
 /// Returns the domain of the other displacement while the gap sticks to a rigid wall. The wall takes up the gap's
@@ -244,6 +266,7 @@ fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
         angle,
         turn_half: (0.5 * angle).tan(),
         turn_sin: angle.sin(),
+        damping: power_form(oscillator, &oscillator.free, h),
         share: 1.0,
         substeps: 1.0,
     }

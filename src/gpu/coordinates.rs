@@ -75,6 +75,14 @@ impl Coordinates {
         y
     }
 
+    /// Returns both displacements of the model as factors of `(z, x)`.
+    pub(super) fn displacements(&self) -> [[f64; 2]; 2] {
+        let (o, p) = (self.other, 1 - self.other);
+        let mut rows = [[0.0, 1.0]; 2];
+        rows[p] = [1.0 / self.gap[p], -self.gap[o] / self.gap[p]];
+        rows
+    }
+
     /// Returns the equations in `(z, x)`, with the gap measured from `wall`.
     pub(super) fn equations(&self, domain: &Domain, force: [f64; 2], wall: f64) -> Equations {
         let (o, p) = (self.other, 1 - self.other);

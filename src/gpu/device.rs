@@ -9,8 +9,9 @@ use super::panics::{PanicFree, catch_panic};
 use super::{Gpu, GpuError, Precision};
 
 /// Whether the shader writes to each storage binding, from 1 on: flows, shapes, phasors, laws, cells, motions,
-/// tallies, queue, starts, readings, findings, blocks.
-const WRITES: [bool; 12] = [false, false, false, false, false, true, true, true, false, true, true, true];
+/// tallies, queue, starts, readings, findings, blocks, measured.
+const WRITES: [bool; 13] =
+    [false, false, false, false, false, true, true, true, false, true, true, true, true];
 
 /// An entry point of the shader and its storage bindings: at most eight, which every adapter supports.
 #[derive(Clone, Copy, Debug)]
@@ -32,12 +33,16 @@ pub(super) const COMPACT: [EntryPoint; 3] = [
 /// Writes the results of lanes.
 pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 8, 10, 11] };
 
+/// Copies what was measured on lanes.
+pub(super) const GATHER: EntryPoint = EntryPoint { name: "gather", storage: &[6, 7, 8, 13] };
+
 /// The pipelines of one variant.
 pub(super) struct Pipelines {
     pub(super) begin: wgpu::ComputePipeline,
     pub(super) sweep: wgpu::ComputePipeline,
     pub(super) compact: [wgpu::ComputePipeline; 3],
     pub(super) conclude: wgpu::ComputePipeline,
+    pub(super) gather: wgpu::ComputePipeline,
 }
 
 /// First failure of a device outside any error scope: its loss, or a command that it refused. Without these callbacks
@@ -150,6 +155,7 @@ pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipe
         sweep: pipeline(gpu, &module, SWEEP),
         compact: COMPACT.map(|entry_point| pipeline(gpu, &module, entry_point)),
         conclude: pipeline(gpu, &module, CONCLUDE),
+        gather: pipeline(gpu, &module, GATHER),
     });
     let mut refused = None;
     for scope in scopes.into_iter().rev() {

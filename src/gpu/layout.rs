@@ -58,6 +58,7 @@ structs! {
         angle: f64,
         turn_half: f64,
         turn_sin: f64,
+        damping: [f64; 3],
         share: f64,
         substeps: f64,
     }
@@ -75,6 +76,8 @@ structs! {
         transient_growth: f64,
         pressing: [[f64; 6]; 2],
         damper: [[f64; 2]; 2],
+        springs: [[f64; 2]; 2],
+        displacements: [[f64; 2]; 2],
     }
 
     /// Whole numbers of a [`Flow`].
@@ -119,6 +122,7 @@ structs! {
         exponent_block: u32,
         max_period: u32,
         early_stop: u32,
+        measured_periods: u32,
         ended: u32,
     }
 
@@ -140,6 +144,11 @@ structs! {
         tangents: [f64; 16],
         vector: [f64; 4],
         trail: [[f64; 4]; TRAIL],
+        ended: [f64; 11],
+        sums: [f64; SUMS],
+        totals: [f64; SUMS],
+        highs: [f64; EXTREMES],
+        lows: [f64; EXTREMES],
     }
 
     /// Counters and flags that a lane carries between dispatches.
@@ -206,6 +215,8 @@ structs! {
         pattern_length: u32,
         pattern_hash: [u32; 2],
         pattern_recent: u32,
+        ended: [u32; 26],
+        is_measured: u32,
     }
 
     /// Results of a lane: real numbers.
@@ -214,6 +225,15 @@ structs! {
         growth: f64,
         growth_error: f64,
         mesh_fraction: f64,
+    }
+
+    /// What was measured on a lane.
+    Measured of f64 {
+        totals: [f64; SUMS],
+        highs: [f64; EXTREMES],
+        lows: [f64; EXTREMES],
+        tangents: [f64; 16],
+        has_read: f64,
     }
 
     /// Results of a lane: whole numbers.
@@ -235,6 +255,10 @@ structs! {
         pattern: [u32; 7],
     }
 }
+
+/// Sums and extremes that a lane measures; `shaders/measure.wgsl` has their places.
+pub(super) const SUMS: usize = 16;
+pub(super) const EXTREMES: usize = 5;
 
 /// Lanes of a workgroup that compacts.
 pub(super) const BLOCK: u32 = 256;

@@ -18,6 +18,7 @@ mod dispatch_policy;
 mod error;
 mod guard;
 pub mod layout;
+mod measured;
 mod panics;
 mod pool;
 mod precision;
@@ -109,6 +110,10 @@ pub struct LaneSettings {
     pub chatter: bool,
     /// Whether flows may have elastic or rigid walls.
     pub kinds: bool,
+    /// What is measured on lanes whose class is decided.
+    pub measures: Option<Measures>,
+    /// Whether records contain the largest multiplier of cycles.
+    pub multiplier: bool,
     /// Periods before the exponent of aperiodic cells is accumulated.
     pub exponent_from: u32,
     /// First period at which a lane may stop as chaotic, with early stops.
@@ -134,6 +139,24 @@ pub struct LaneSettings {
     pub most_events: u32,
 }
 
+impl LaneSettings {
+    /// Whether results contain what was measured.
+    pub(super) fn gathers(&self) -> bool {
+        self.multiplier || self.measures.is_some()
+    }
+}
+
+/// What is measured on lanes whose class is decided. Impacts are always measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Measures {
+    /// Forcing periods over which aperiodic motion is measured, at least 1. Periodic motion is measured over a cycle.
+    pub periods: u32,
+    /// Whether extremes are searched: amplitudes and the largest contact force.
+    pub extremes: bool,
+    /// Whether integrals are computed: means, root mean squares, harmonics, and dissipated energy.
+    pub moments: bool,
+}
+
 impl Default for LaneSettings {
     fn default() -> Self {
         LaneSettings {
@@ -149,6 +172,8 @@ impl Default for LaneSettings {
             symmetry: true,
             chatter: true,
             kinds: true,
+            measures: None,
+            multiplier: false,
             exponent_from: 100,
             chaos_from: 198,
             chaos_errors: 6.0,
@@ -401,9 +426,24 @@ impl Gpu {
             symmetry,
             chatter,
             kinds,
+            measures: None,
             keep,
         };
-        let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();
+        let measuring = settings.measures.map(|measures| Variant {
+            // The number of periods does not change the shader.
+            measures: Some(Measures { periods: 1, ..measures }),
+            keep,
+            kinds,
+            exponent: false,
+            growth: false,
+            word: false,
+            pattern: false,
+            mesh: false,
+            symmetry: false,
+            chatter: false,
+            ..variant(false)
+        });
+        let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).chain(measuring).collect();
         let missing: Vec<Variant> =
             variants.iter().copied().filter(|variant| !self.pipelines.contains_key(variant)).collect();
         for &variant in &missing {

@@ -159,20 +159,22 @@ impl Pool {
         gpu.call(|| buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings))?;
         let device = rounds.run(&variants, until as u32, &mut self.iterations).await?;
         gpu.report(Stage::Integrated { device });
-        let last = variants[variants.len() - 1];
-        let results = buffers.conclude(gpu, last, &bindings, self.active_list.len()).await?;
+        // The last variant that decides classes.
+        let decided = self.variants.iter().rposition(|variant| variant.measures.is_none()).unwrap_or(0);
+        let (active_lanes, gathers) = (self.active_list.len(), self.settings.gathers());
+        let results = buffers.conclude(gpu, variants[decided], &bindings, active_lanes, gathers).await?;
         if results.is_empty() && !gpu.is_halted() {
             let message = "it returned no results of the lanes that have ended".into();
             return Err(gpu.failure(GpuError::Lost { message }));
         }
         let mut ended = Vec::with_capacity(results.len());
-        for &(reading, finding) in &results {
+        for &(reading, finding, measured) in &results {
             let (number, Lane { flow, .. }) = self.lanes[finding.slot as usize];
-            ended.push(LaneResult { number, flow, reading, finding });
+            ended.push(LaneResult { number, flow, reading, finding, measured });
             self.free.push(finding.slot);
         }
         // Results and active list have the same order.
-        let mut slots = results.iter().map(|(_, finding)| finding.slot).peekable();
+        let mut slots = results.iter().map(|(_, finding, _)| finding.slot).peekable();
         self.active_list.retain(|&slot| slots.next_if_eq(&slot).is_none());
         gpu.report(Stage::Read);
         Ok(ended)
@@ -190,7 +192,7 @@ impl Pool {
         // Doubles the slots, so that lanes move rarely; makes only those that are needed if memory is too small.
         let ample = needed.max(2 * had).min(self.most);
         let make = async |slots| {
-            with_error_scopes(gpu, "lanes", slots, || Slots::new(gpu, slots, self.settings.workgroup)).await
+            with_error_scopes(gpu, "lanes", slots, || Slots::new(gpu, slots, &self.settings)).await
         };
         let (slots, buffers) = match make(ample).await {
             Err(GpuError::OutOfMemory { .. }) if needed < ample => (needed, make(needed).await?),

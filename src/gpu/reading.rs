@@ -1,8 +1,10 @@
 //! Conversion of a lane's results to a record.
 
 use super::constants::Constants;
-use super::layout::{Finding, Reading, SYMBOLS_PER_NUMBER};
+use super::layout::{Finding, Measured, Reading, SYMBOLS_PER_NUMBER};
+use super::measured;
 use crate::record::{Record, WORD_SYMBOLS, joined, valid};
+use rattlemap_dynamics::orbit::Quantities;
 use rattlemap_dynamics::word::Word;
 
 /// Growth per period, natural logarithms, below which all multipliers of a cycle are zero. WGSL has no infinity.
@@ -15,6 +17,7 @@ pub struct LaneResult {
     pub(super) flow: u32,
     pub(super) reading: Reading,
     pub(super) finding: Finding,
+    pub(super) measured: Option<Measured>,
 }
 
 impl LaneResult {
@@ -26,6 +29,18 @@ impl LaneResult {
     /// Returns the index of its flow.
     pub fn flow(&self) -> u32 {
         self.flow
+    }
+
+    /// Returns what was measured along the motion.
+    pub fn quantities(&self, constants: &[Option<Constants>]) -> Option<Quantities> {
+        measured::quantities(constants[self.flow as usize].as_ref()?, &self.measured?)
+    }
+
+    /// Returns modulus and argument of the largest multiplier of a cycle.
+    pub fn multiplier(&self, constants: &[Option<Constants>]) -> Option<[f64; 2]> {
+        let (constants, measured) = (constants[self.flow as usize].as_ref()?, self.measured?);
+        let is_cycle = self.finding.valid & valid::LYAPUNOV != 0 && self.finding.period > 0;
+        is_cycle.then(|| measured::multiplier(constants, &measured))
     }
 
     /// Returns its record. `constants` are those of the tables on which it ran. A million records take most of a

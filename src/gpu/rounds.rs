@@ -19,9 +19,12 @@ const FEWEST_ITERATIONS: u32 = 250;
 /// unknown, is no longer.
 const FEWEST_ITERATIONS_FOR: u32 = 1 << 14;
 
-/// Byte offsets in a check. It begins with the lanes left for each of two variants; the counter of compactions and
-/// the timestamps follow.
-const BEAT: u64 = 8;
+/// Most variants of a pool.
+const VARIANTS: usize = 3;
+
+/// Byte offsets in a check. It begins with the lanes left for each variant; the counter of compactions and the
+/// timestamps follow.
+const BEAT: u64 = 4 * VARIANTS as u64;
 const TIMES: u64 = 16;
 
 /// Byte offset of the iterations in the shader's settings.
@@ -97,14 +100,14 @@ impl Rounds<'_> {
                 if let Some(clock) = &clock {
                     device = device.and(clock.times(&bytes[TIMES as usize..], &mut device_end));
                 }
-                bytemuck::pod_read_unaligned::<[u32; 3]>(&bytes[..12])
+                bytemuck::pod_read_unaligned::<[u32; VARIANTS + 1]>(&bytes[..TIMES as usize])
             };
-            let [first, second, beat] = read(gpu, sent.check, sent.bytes, sent.submission, take).await?;
+            let [counts @ .., beat] = read(gpu, sent.check, sent.bytes, sent.submission, take).await?;
             if beat <= last_beat {
                 return Err(gpu.failure(GpuError::Lost { message: "it executes no commands".into() }));
             }
             last_beat = beat;
-            for (left, (now, ran)) in left.iter_mut().zip([first, second].into_iter().zip(sent.ran)) {
+            for (left, (now, ran)) in left.iter_mut().zip(counts.into_iter().zip(sent.ran)) {
                 *left = if ran { now } else { 0 };
             }
             let all_left = left.iter().sum::<u32>();

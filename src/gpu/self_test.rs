@@ -36,6 +36,8 @@ pub(super) async fn check(
         max_period: 0,
         undecided_periods: 0,
         steps_per_period: None,
+        multiplier: false,
+        measures: None,
         batch: None,
         ..*settings
     };

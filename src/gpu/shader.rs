@@ -1,6 +1,7 @@
 //! Shader variants: one source, composed of small files.
 
-use super::layout::{BLOCK, CONTACTS, SYMBOLS_PER_NUMBER};
+use super::Measures;
+use super::layout::{BLOCK, CONTACTS, EXTREMES, SUMS, SYMBOLS_PER_NUMBER};
 use super::precision::Precision;
 use super::rules;
 use super::unroll::unroll;
@@ -30,6 +31,8 @@ pub struct Variant {
     pub chatter: bool,
     /// Whether walls may be elastic or rigid.
     pub kinds: bool,
+    /// What this variant measures on lanes whose class is decided; none in a variant that decides classes.
+    pub measures: Option<Measures>,
     /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
     pub keep: bool,
 }
@@ -57,6 +60,7 @@ const BODY: &str = concat!(
     include_str!("../../shaders/cycle.wgsl"),
     include_str!("../../shaders/refine.wgsl"),
     include_str!("../../shaders/approach.wgsl"),
+    include_str!("../../shaders/measure.wgsl"),
     include_str!("../../shaders/sweep.wgsl"),
     include_str!("../../shaders/compact.wgsl"),
     include_str!("../../shaders/begin.wgsl"),
@@ -77,6 +81,7 @@ impl Variant {
             symmetry: true,
             chatter: true,
             kinds: true,
+            measures: None,
             keep: false,
         }
     }
@@ -95,6 +100,8 @@ impl Variant {
         let sizes = [
             ("WORKGROUP", self.workgroup),
             ("BLOCK", BLOCK),
+            ("SUMS", SUMS as u32),
+            ("EXTREMES", EXTREMES as u32),
             ("WORD_SYMBOLS", WORD_SYMBOLS as u32),
             ("SYMBOLS_PER_NUMBER", SYMBOLS_PER_NUMBER as u32),
         ]
@@ -111,6 +118,9 @@ impl Variant {
             ("SYMMETRY", self.symmetry),
             ("CHATTER", self.chatter),
             ("KINDS", self.kinds),
+            ("MEASURE", self.measures.is_some()),
+            ("EXTREME", self.measures.is_some_and(|measures| measures.extremes)),
+            ("MOMENTS", self.measures.is_some_and(|measures| measures.moments)),
             ("KEEP", self.keep),
         ]
         .map(|(name, value)| format!("const {name}: bool = {value};\n"))

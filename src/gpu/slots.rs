@@ -1,8 +1,8 @@
 //! The buffers of a pool: the state of each slot on the device, and the transfers to and from the host.
 
 use super::averaging::Averaging;
-use super::device::{COMPACT, CONCLUDE, Pipelines};
-use super::layout::{COUNT_AT, Cell, Finding, Motion, QUEUE_HEAD, Reading, Settings, Tally};
+use super::device::{COMPACT, CONCLUDE, GATHER, Pipelines};
+use super::layout::{COUNT_AT, Cell, Finding, Measured, Motion, QUEUE_HEAD, Reading, Settings, Tally};
 use super::rounds::{bind, compacting, dispatch, row};
 use super::tables::Tables;
 use super::transfer::{buffer, from_reals, read, readback, upload};
@@ -27,6 +27,8 @@ pub(super) struct Slots {
     blocks: wgpu::Buffer,
     readings: wgpu::Buffer,
     findings: wgpu::Buffer,
+    /// What was measured on lanes, and the buffer in which the host reads it; of one lane if nothing is measured.
+    measured: [wgpu::Buffer; 2],
     /// Buffers in which the host reads `readings` and `findings`; and the number of results.
     readbacks: [wgpu::Buffer; 2],
     count_readback: wgpu::Buffer,
@@ -43,12 +45,19 @@ pub(super) fn bytes(slots: usize, precision: Precision) -> u64 {
 }
 
 impl Slots {
-    pub(super) fn new(gpu: &Gpu, slots: usize, workgroup: u32) -> Slots {
+    pub(super) fn new(gpu: &Gpu, slots: usize, settings: &LaneSettings) -> Slots {
+        let workgroup = settings.workgroup;
         let of_reals = |label, bytes: usize| {
             buffer(gpu, label, slots * bytes / size_of::<f64>() * gpu.precision.bytes())
         };
         let readings = of_reals("readings", size_of::<Reading>());
         let findings = buffer(gpu, "findings", slots * size_of::<Finding>());
+        let places = if settings.gathers() { slots } else { 1 };
+        let measured = buffer(
+            gpu,
+            "measured",
+            places * size_of::<Measured>() / size_of::<f64>() * gpu.precision.bytes(),
+        );
         Slots {
             count: slots,
             workgroup,
@@ -61,6 +70,7 @@ impl Slots {
             blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
             readbacks: [&readings, &findings].map(|buffer| readback(gpu, "results", buffer.size())),
             count_readback: readback(gpu, "count", COUNT_BYTES),
+            measured: [measured.clone(), readback(gpu, "results", measured.size())],
             readings,
             findings,
             row: row(gpu, slots, workgroup),
@@ -68,7 +78,7 @@ impl Slots {
     }
 
     /// Returns all buffers, by binding.
-    pub(super) fn bindings<'a>(&'a self, tables: &'a Tables) -> [&'a wgpu::Buffer; 13] {
+    pub(super) fn bindings<'a>(&'a self, tables: &'a Tables) -> [&'a wgpu::Buffer; 14] {
         [
             &self.settings,
             &tables.flows,
@@ -83,6 +93,7 @@ impl Slots {
             &self.readings,
             &self.findings,
             &self.blocks,
+            &self.measured[0],
         ]
     }
 
@@ -108,7 +119,8 @@ impl Slots {
         pipelines: &Pipelines,
         bindings: &[&wgpu::Buffer],
         active_lanes: usize,
-    ) -> Result<Vec<(Reading, Finding)>, GpuError> {
+        gathers: bool,
+    ) -> Result<Vec<(Reading, Finding, Option<Measured>)>, GpuError> {
         let submission = gpu.call(|| {
             gpu.queue.write_buffer(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -118,6 +130,10 @@ impl Slots {
             }
             let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
             dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(active_lanes as u32), None);
+            if gathers {
+                let gathering = bind(gpu, &pipelines.gather, GATHER, bindings);
+                dispatch(&mut encoder, &pipelines.gather, &gathering, self.grid(active_lanes as u32), None);
+            }
             encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_readback, 0, COUNT_BYTES);
             gpu.queue.submit([encoder.finish()])
         })?;
@@ -132,8 +148,17 @@ impl Slots {
         let [readings, findings] = &self.readbacks;
         let numbers = (count * size_of::<Reading>() / size_of::<f64>() * gpu.precision.bytes()) as u64;
         let counts = (count * size_of::<Finding>()) as u64;
+        let all_measured = if gathers {
+            (count * size_of::<Measured>() / size_of::<f64>() * gpu.precision.bytes()) as u64
+        } else {
+            0
+        };
+        let [on_device, measured] = &self.measured;
         let submission = gpu.call(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            if gathers {
+                encoder.copy_buffer_to_buffer(on_device, 0, measured, 0, all_measured);
+            }
             encoder.copy_buffer_to_buffer(&self.readings, 0, readings, 0, numbers);
             encoder.copy_buffer_to_buffer(&self.findings, 0, findings, 0, counts);
             gpu.queue.submit([encoder.finish()])
@@ -141,8 +166,16 @@ impl Slots {
         let to_readings = |bytes: &[u8]| from_reals::<Reading>(bytes, gpu.precision);
         let readings = read(gpu, readings, numbers, submission.clone(), to_readings).await?;
         let to_findings = bytemuck::pod_collect_to_vec::<u8, Finding>;
-        let findings = read(gpu, findings, counts, submission, to_findings).await?;
-        Ok(readings.into_iter().zip(findings).collect())
+        let findings = read(gpu, findings, counts, submission.clone(), to_findings).await?;
+        let measured = if gathers {
+            let to_measured = |bytes: &[u8]| from_reals::<Measured>(bytes, gpu.precision);
+            read(gpu, measured, all_measured, submission, to_measured).await?
+        } else {
+            Vec::new()
+        };
+        let measured = measured.into_iter().map(Some).chain(std::iter::repeat(None));
+        let results = readings.into_iter().zip(findings).zip(measured);
+        Ok(results.map(|((reading, finding), measured)| (reading, finding, measured)).collect())
     }
 }
 
@@ -181,6 +214,7 @@ fn uniform(
         exponent_block: averaging.block,
         max_period: settings.max_period.min(LONGEST_CYCLE),
         early_stop: u32::from(early_stop),
+        measured_periods: settings.measures.map_or(0, |measures| measures.periods.max(1)),
         ended: 0,
     }
 }

@@ -14,6 +14,9 @@ use crate::store::record_file::RECORDS;
 /// The command whose folders can be repaired.
 const MAP: &str = "map";
 
+/// Remedy for a wrong folder.
+const WRITTEN: &str = "name a folder that `map`, `bifurcation`, `orbit`, `compare` or `bench` has written";
+
 /// A folder whose files have been compared with its manifest.
 #[derive(Debug)]
 pub struct CheckedFolder {
@@ -28,8 +31,13 @@ pub struct CheckedFolder {
 /// # Errors
 /// [`JobError`] if the folder or its manifest cannot be read.
 pub fn check(dir: &Path) -> Result<CheckedFolder, JobError> {
-    finished::require_folder(dir)?;
     let manifest = finished_map::read_manifest(dir).map_err(|error| match error {
+        FinishedMapError::NoFolder { folder } => {
+            JobError::Usage(format!("{}: there is no such folder; {WRITTEN}", folder.display()))
+        }
+        FinishedMapError::NoManifest { folder } => {
+            JobError::Usage(format!("{}: there is no {MANIFEST}; {WRITTEN}", folder.display()))
+        }
         FinishedMapError::Unreadable { manifest, reason } => JobError::Failed(format!(
             "{} is damaged ({reason}); run the command that wrote the folder again",
             manifest.display()

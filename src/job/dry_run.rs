@@ -11,7 +11,7 @@ use crate::job::observer::Observer;
 use crate::job::size::{Free, Size};
 use crate::map::plan::Plan;
 use crate::map::sweep::SweepError;
-use crate::store::folder::Folder;
+use crate::store::folder::{Folder, FolderError};
 use crate::store::map;
 use crate::store::record_file::{Identity, RECORDS};
 use crate::store::run_records::{self, Work};
@@ -19,6 +19,8 @@ use crate::store::run_records::{self, Work};
 /// Estimate of a map's memory, disk space and time.
 #[derive(Clone, Debug)]
 pub struct DryRun {
+    /// Whether the folder contains files, and the run needs `--resume` or `--force`.
+    pub is_taken: bool,
     /// Number of runs of the map or shard.
     pub runs: usize,
     /// Number of runs whose records are already in the folder.
@@ -64,7 +66,10 @@ impl DryRun {
         if job.resume {
             run_records::require_records(out)?;
         }
-        Folder::check(out, force || job.resume, map::names())?;
+        let is_taken = match Folder::check(out, force || job.resume, map::names()) {
+            Err(FolderError::NotEmpty { .. }) => true,
+            checked => checked.map(|()| false)?,
+        };
         let job = MapJob { engine: job.engine_request(Some(out)), ..job.clone() };
         let OpenMap { mut engine, reason, opening, .. } = job.open(plan, None, observer)?;
         let stored = if job.resume {
@@ -82,6 +87,7 @@ impl DryRun {
         let size = Size::of(job.scene, job.shard);
         let kind = if engine.device_bytes().is_some() { EngineKind::Gpu } else { EngineKind::Cpu };
         Ok(DryRun {
+            is_taken,
             runs,
             stored,
             engine: engine.name(),

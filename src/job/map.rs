@@ -57,8 +57,8 @@ impl<'a> MapJob<'a> {
     /// Checks the request, and that the map fits this machine. Returns the free memory and disk space.
     ///
     /// # Errors
-    /// [`JobError`] if the scene is not a map's, no engine can satisfy the request, a shard's engine is not named, or
-    /// memory or disk are too small.
+    /// [`JobError`] if the scene is not a map's, no engine can satisfy the request, a shard's engine is not named, the folder
+    /// cannot be written, or memory or disk are too small.
     pub fn check(&self, out: Option<&Path>) -> Result<Free, JobError> {
         let axes = self.scene.axes().len();
         if axes != 2 && self.scene.list().is_none() {
@@ -68,6 +68,7 @@ impl<'a> MapJob<'a> {
         }
         require_engine(self.shard, self.engine.kind)?;
         engine_choice::check(&self.engine)?;
+        out.map_or(Ok(()), |out| Folder::check(out, true, []))?;
         let free = Free::for_output(out);
         size::check_map(self.scene, self.shard, self.engine.kind, &free).map(|()| free)
     }

@@ -10,8 +10,8 @@ use crate::store::plain_file::read_text;
 /// Largest size of a model's file, in bytes.
 const MOST_OF_MODEL: u64 = 1_000_000;
 
-/// The `--set` argument that lists the output files.
-const FILES: &str = "outputs.files=";
+/// Begins the `--set` argument that lists the output files.
+pub const FILES: &str = "outputs.files=";
 
 /// File of a scene, and settings for reading it.
 #[derive(Clone, Copy, Debug)]
@@ -55,20 +55,33 @@ impl SceneFile<'_> {
         Scene::parse_with_files(&text, &name, sets, self.purpose, self.along, &find)
     }
 
-    /// Returns the `--set` arguments. If formats are given, adds an argument that replaces the scene's formats of
-    /// figures. Manifests list it, and resumed runs compare it.
+    /// Returns the `--set` arguments of a run that writes `figures` instead of the scene's figures, if there are any, and
+    /// `more` formats in addition. Manifests list the arguments, and resumed runs compare them.
     ///
     /// # Errors
     /// [`SceneError`] if there are formats and the scene cannot be loaded.
-    pub fn with_figures(&self, mut sets: Vec<String>, formats: &[Format]) -> Result<Vec<String>, SceneError> {
-        if formats.is_empty() {
+    pub fn with_formats(
+        &self,
+        mut sets: Vec<String>,
+        figures: &[Format],
+        more: &[Format],
+    ) -> Result<Vec<String>, SceneError> {
+        if figures.is_empty() && more.is_empty() {
             return Ok(sets);
         }
-        let files = self.load(&sets)?.outputs().files.clone();
-        let others = files.iter().filter(|format| !Format::FIGURES.contains(format));
-        let names: Vec<String> = others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
-        sets.retain(|set| !set.starts_with(FILES));
-        sets.push(format!("{FILES}[{}]", names.join(",")));
+        let of_scene = self.load(&sets)?.outputs().files.clone();
+        let mut files = of_scene.clone();
+        files.retain(|format| figures.is_empty() || !Format::FIGURES.contains(format));
+        for format in figures.iter().chain(more) {
+            if !files.contains(format) {
+                files.push(*format);
+            }
+        }
+        if files != of_scene {
+            let names: Vec<String> = files.iter().map(|format| format!("{:?}", format.name())).collect();
+            sets.retain(|set| !set.starts_with(FILES));
+            sets.push(format!("{FILES}[{}]", names.join(",")));
+        }
         Ok(sets)
     }
 }

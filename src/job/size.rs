@@ -10,6 +10,7 @@ use crate::map::plan::{Parts, stores_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
 use crate::record::Record;
+use crate::store::folder::Folder;
 use crate::store::map;
 use crate::text::size::bytes;
 
@@ -169,8 +170,9 @@ const LARGER_MACHINE: &str = "use a larger machine";
 /// Checks that a map that is merged from shards fits this machine.
 ///
 /// # Errors
-/// [`JobError::TooLarge`] with the needed and the free amount.
+/// [`JobError`] if the folder cannot be written, or with the needed and the free amount.
 pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
+    out.map_or(Ok(()), |out| Folder::check(out, true, []))?;
     Size::merged(scene).check(scene, EngineKind::Cpu, &Free::for_output(out), LARGER_MACHINE)
 }
 

@@ -181,7 +181,9 @@ impl Run<'_> {
         start: State,
     ) -> Result<Option<(Column, State)>, ModelError> {
         let shown = self.settings.observed_periods;
-        let Some(orbit) = orbit::analyse_until(model, start, self.settings, shown, self.halt)? else {
+        let Some(orbit) =
+            orbit::analyse_until(model, start, self.settings, orbit::LONGEST_WINDOW, shown, self.halt)?
+        else {
             return Ok(None);
         };
         let end = if orbit.class == Class::Failed { REST } else { orbit.strobe };

@@ -139,6 +139,7 @@ impl Plan {
                 undecided_periods: integration.undecided_periods,
                 exponent: needs.exponent,
                 shows_exponent: needs.lyapunov,
+                quantities: false,
             },
             steps: integration.steps_per_period,
             refine: scene.refine(),

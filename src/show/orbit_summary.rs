@@ -10,6 +10,11 @@ use rattlemap_dynamics::orbit::{Class, Event, History, Orbit, Status};
 /// Number of decimals: one more than in the tables of the paper.
 const DECIMALS: usize = 5;
 
+/// Largest number of events in the table, and number of events before those that are left out. The summary above the table
+/// stays on the screen.
+const MOST_ROWS: usize = 24;
+const FIRST_ROWS: usize = 16;
+
 /// Returns a summary of the orbit of a model in lines of aligned text.
 pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
     let mut text = String::new();
@@ -73,15 +78,26 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let mut add = |label: &str, value: String| facts.push((label.to_owned(), value));
     add("parameters", parameters(model));
     add("class", class(orbit));
-    add("status", status(orbit.status).to_owned());
+    let text = match orbit.class {
+        Class::Undecided if orbit.status == Status::Slow => "slow: more periods may decide the class",
+        _ => status(orbit.status),
+    };
+    add("status", text.to_owned());
     if orbit.class == Class::Failed {
         return facts;
     }
-    add("word, in time", or_dash(orbit.word.time_order()));
-    add("word, as printed", or_dash(orbit.word.paper_notation()));
-    let pattern = orbit.word.pattern();
-    if pattern != orbit.word {
-        add("pattern", pattern.time_order());
+    match (orbit.class, orbit.strobe_meshing) {
+        (Class::Periodic { .. }, _) if !orbit.events.is_empty() => {
+            add("word, in time", orbit.word.time_order());
+            add("word, as printed", orbit.word.paper_notation());
+            let pattern = orbit.word.pattern();
+            if pattern != orbit.word {
+                add("pattern", pattern.time_order());
+            }
+        }
+        (Class::Periodic { .. }, None) => add("word", "none: no contact".to_owned()),
+        (Class::Periodic { .. }, Some(_)) => add("word", "none: always in contact".to_owned()),
+        _ => add("word", "none: the motion is not periodic".to_owned()),
     }
     add("Lyapunov exponent", exponent(orbit));
     if let Some(multipliers) = &orbit.floquet {
@@ -117,6 +133,9 @@ fn parameters(model: &dyn Model) -> String {
 fn class(orbit: &Orbit) -> String {
     match orbit.class {
         Class::Periodic { period } => format!("periodic, period {period}"),
+        Class::Undecided => {
+            format!("undecided: neither periodic nor chaotic within {} forcing periods", orbit.periods_run)
+        }
         other => other.name().to_owned(),
     }
 }
@@ -142,17 +161,14 @@ fn status(status: Status) -> &'static str {
 fn exponent(orbit: &Orbit) -> String {
     match orbit.lyapunov_error {
         _ if orbit.lyapunov.is_nan() => "-".to_owned(),
-        Some(error) => format!("{:.DECIMALS$} +- {error:.DECIMALS$}", orbit.lyapunov),
+        Some(error) if error.is_finite() => format!("{:.DECIMALS$} +- {error:.DECIMALS$}", orbit.lyapunov),
+        Some(_) => format!("{:.DECIMALS$}, with unknown error", orbit.lyapunov),
         None => format!("{:.DECIMALS$}", orbit.lyapunov),
     }
 }
 
 fn complex([re, im]: [f64; 2]) -> String {
     if im == 0.0 { format!("{re:.DECIMALS$}") } else { format!("{re:.DECIMALS$}{im:+.DECIMALS$}i") }
-}
-
-fn or_dash(text: String) -> String {
-    if text.is_empty() { "-".to_owned() } else { text }
 }
 
 fn numbers(state: &[f64]) -> String {
@@ -174,7 +190,16 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
         format!(" before ({listed})"),
         width = 10 * count
     );
-    for event in events {
+    let hidden =
+        if events.len() > MOST_ROWS { FIRST_ROWS..FIRST_ROWS + events.len() - MOST_ROWS } else { 0..0 };
+    for (nth, event) in events.iter().enumerate() {
+        if hidden.contains(&nth) {
+            if nth == hidden.start {
+                let count = hidden.len();
+                let _ = writeln!(text, "... {count} more events; --json and --out list all of them");
+            }
+            continue;
+        }
         let side = names::side(event.side);
         let _ = writeln!(
             text,

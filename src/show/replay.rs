@@ -10,7 +10,7 @@ use rattlemap_dynamics::orbit::Settings;
 pub const MODEL: &str = "model.toml";
 
 /// Returns the arguments that are the same for all cells: the model, values that differ from the defaults of `orbit`, the
-/// start and the length of the integration.
+/// start and the transient. `orbit` analyses as many periods as the class needs.
 pub(crate) fn arguments(scene: &Scene) -> String {
     let mut words = Vec::new();
     let base = scene.base();
@@ -29,9 +29,6 @@ pub(crate) fn arguments(scene: &Scene) -> String {
     let (settings, default) = (scene.orbit_settings(), Settings::default());
     if settings.transient_periods != default.transient_periods {
         words.push(format!(" --transient {}", settings.transient_periods));
-    }
-    if settings.observed_periods != default.observed_periods {
-        words.push(format!(" --periods {}", settings.observed_periods));
     }
     words.concat()
 }

@@ -45,7 +45,7 @@ pub fn write(
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
     // The manifest does not list files of an earlier run.
-    folder.remove(&names().collect::<Vec<_>>())?;
+    inventory::clear_for(folder, names())?;
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
     let mut files = Vec::new();

@@ -82,7 +82,7 @@ pub fn write(
     reading: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
-    folder.remove(&names().collect::<Vec<_>>())?;
+    inventory::clear_for(folder, names())?;
     folder.replace(DIFFERENCES, |out| compare_csv::write(out, compared))?;
     let mut files = vec![DIFFERENCES];
     let has_figure = compared.sides[0].cells.scene().list().is_none();

@@ -3,16 +3,19 @@
 
 mod lock;
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::show::error::WriteError;
 use crate::store::error::OutputError;
-use crate::store::plain_file::{partial, refuse_link};
+use crate::store::file_names::UNFINISHED;
+use crate::store::plain_file::{PARTIAL, partial, refuse_link};
 pub(crate) use lock::LOCK;
 use lock::Lock;
 
@@ -45,6 +48,8 @@ pub enum FolderError {
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
+    /// Names of the results that were removed.
+    removed: Mutex<BTreeSet<String>>,
     lock: Lock,
     // Dropped after the lock, whose file is in the folder.
     created: NewFolders,
@@ -92,7 +97,7 @@ impl Folder {
             Ok((Some(lock), created)) => match is_empty(&path) {
                 Err(reason) => Err(FolderError::NotWritable { path, reason }),
                 Ok(false) if !force => Err(FolderError::NotEmpty { path }),
-                Ok(_) => Ok(Folder { path, lock, created }),
+                Ok(_) => Ok(Folder { path, removed: Mutex::default(), lock, created }),
             },
         }
     }
@@ -208,15 +213,25 @@ impl Folder {
     /// [`OutputError::Replace`] if one exists and cannot be removed.
     pub fn remove<N: AsRef<str>>(&self, names: &[N]) -> Result<(), OutputError> {
         for name in names {
-            let path = self.path.join(name.as_ref());
+            let name = name.as_ref();
+            let path = self.path.join(name);
             match fs::remove_file(&path) {
-                Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
-                    return Err(OutputError::Replace { path, reason });
+                Ok(()) if name.starts_with(PARTIAL) || name == UNFINISHED => {}
+                Ok(()) => {
+                    let mut removed = self.removed.lock().unwrap_or_else(PoisonError::into_inner);
+                    removed.insert(name.to_owned());
                 }
-                _ => {}
+                Err(reason) if reason.kind() == io::ErrorKind::NotFound => {}
+                Err(reason) => return Err(OutputError::Replace { path, reason }),
             }
         }
         Ok(())
+    }
+
+    /// Names of the results that were removed since the folder was opened, and not written again.
+    pub fn removed(&self) -> Vec<String> {
+        let removed = self.removed.lock().unwrap_or_else(PoisonError::into_inner);
+        removed.iter().filter(|name| !self.path.join(name).exists()).cloned().collect()
     }
 }
 
@@ -255,7 +270,10 @@ mod tests {
         drop(folder);
         assert_eq!(fs::read_dir(&path).unwrap().count(), 1, "the lock is gone");
         assert!(matches!(Folder::open(&path, false), Err(FolderError::NotEmpty { .. })));
-        Folder::open(&path, true).unwrap().remove(&["x.txt", "absent.txt"]).unwrap();
+        let folder = Folder::open(&path, true).unwrap();
+        folder.remove(&["x.txt", "absent.txt"]).unwrap();
+        assert_eq!(folder.removed(), ["x.txt"]);
+        drop(folder);
         Folder::open(&path, false).unwrap();
     }
 

@@ -9,10 +9,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+use crate::map::scene::Format;
 use crate::show::error::WriteError;
+use crate::show::replay::MODEL;
 use crate::store::error::OutputError;
-use crate::store::file_names::MANIFEST;
+use crate::store::file_names::{LIST, MANIFEST};
 use crate::store::folder::{Folder, LOCK};
+use crate::store::plain_file::PARTIAL;
 
 /// Field of the manifest's own hash.
 const SEAL: &str = "manifest_sha256";
@@ -100,13 +103,59 @@ pub fn entries<N: AsRef<str> + Sync>(folder: &Folder, names: &[N]) -> Result<Vec
     names.par_iter().map(of).collect()
 }
 
-/// Whether the manifest of a folder lists a file.
-pub(crate) fn lists(folder: &Folder, name: &str) -> bool {
-    let text = fs::read_to_string(folder.path().join(MANIFEST)).unwrap_or_default();
-    let mut manifest: Value = serde_json::from_str(&text).unwrap_or_default();
-    let listed = manifest.get_mut("files").map(Value::take).unwrap_or_default();
-    let listed: Vec<FileEntry> = serde_json::from_value(listed).unwrap_or_default();
-    listed.iter().any(|entry| entry.name == name)
+/// Reads the manifest of a folder; null if there is none or it is not JSON.
+pub(crate) fn stored(folder: &Path) -> Value {
+    let text = fs::read_to_string(folder.join(MANIFEST)).unwrap_or_default();
+    serde_json::from_str(&text).unwrap_or_default()
+}
+
+/// Returns the files that a manifest lists.
+pub(crate) fn listed(manifest: &Value) -> Vec<FileEntry> {
+    Vec::deserialize(&manifest["files"]).unwrap_or_default()
+}
+
+/// Returns the formats of the figures in a folder, if this command wrote its manifest.
+pub fn figure_formats(folder: &Path, command: &str) -> Vec<Format> {
+    let manifest = stored(folder);
+    let files = if manifest["command"] == command { listed(&manifest) } else { Vec::new() };
+    let has = |format: &Format| files.iter().any(|file| file.name.ends_with(&format!(".{}", format.name())));
+    Format::FIGURES.into_iter().filter(has).collect()
+}
+
+/// Removes the results of an earlier run of any command: the manifest first, the files that it lists, and the files `names`.
+/// Files for which `keeps` holds stay. Incomplete files of `names` are removed, too.
+///
+/// # Errors
+/// [`OutputError::Replace`] if a file cannot be removed.
+pub(crate) fn clear<'n>(
+    folder: &Folder,
+    names: impl IntoIterator<Item = &'n str>,
+    keeps: impl Fn(&str) -> bool,
+) -> Result<(), OutputError> {
+    let is_result = |name: &String| is_in_folder(name) && !folder.path().join(name).is_dir();
+    let listed = listed(&stored(folder.path())).into_iter().map(|file| file.name).filter(is_result);
+    let own: Vec<String> = names.into_iter().map(str::to_owned).collect();
+    let partial: Vec<String> = own.iter().map(|name| format!("{PARTIAL}{name}")).collect();
+    let all = [MANIFEST.to_owned()].into_iter().chain(listed).chain(own);
+    folder.remove(&all.filter(|name| !keeps(name)).collect::<Vec<_>>())?;
+    folder.remove(&partial)
+}
+
+/// Removes the results of an earlier run, like [`clear`], before a command other than `map` writes its own. The list and the
+/// model of a map stay: they may be the files that the user wrote.
+///
+/// # Errors
+/// As [`clear`].
+pub(crate) fn clear_for<'n>(
+    folder: &Folder,
+    names: impl IntoIterator<Item = &'n str>,
+) -> Result<(), OutputError> {
+    clear(folder, names, |name| [LIST, MODEL].contains(&name))
+}
+
+/// Whether a name in a manifest, which may come from an unknown source, is that of a file in its folder.
+fn is_in_folder(name: &str) -> bool {
+    !name.contains(['/', '\\', ':']) && !name.starts_with('.') && !name.is_empty()
 }
 
 /// Compares a folder's files with the list in its manifest. Differences are sorted: the manifest, listed files, others.
@@ -139,8 +188,7 @@ pub fn check(folder: &Path, listed: &[FileEntry]) -> io::Result<Vec<Finding>> {
 
 /// Compares a file with its entry.
 fn fault(folder: &Path, listed: &FileEntry) -> Option<Fault> {
-    // A manifest may come from an unknown source; only names of files in its folder are accepted.
-    if listed.name.contains(['/', '\\']) || [".", "..", ""].contains(&listed.name.as_str()) {
+    if !is_in_folder(&listed.name) {
         return Some(Fault::Damaged("this is no name of a file in the folder".to_owned()));
     }
     let damaged = |why: String| Some(Fault::Damaged(why));

@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
+use std::path::Path;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
@@ -21,7 +22,7 @@ use crate::show::{layers, names, report};
 use crate::store::error::OutputError;
 use crate::store::file_names::{RECORDS, UNFINISHED};
 use crate::store::folder::Folder;
-use crate::store::plain_file::PARTIAL;
+use crate::store::inventory::FileEntry;
 use crate::store::{inventory, manifest, unfinished, validation_json};
 use crate::validate::Validation;
 
@@ -55,60 +56,70 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     ALL.iter().map(String::as_str).chain([LIST, MODEL, RECORDS, UNFINISHED])
 }
 
-/// Removes the files of an earlier run except its records. A list and a model are removed if the manifest lists them;
-/// otherwise they may be the user's own.
-///
-/// # Errors
-/// If a file cannot be removed.
-pub fn clear(folder: &Folder) -> Result<(), OutputError> {
-    for copy in [LIST, MODEL].into_iter().filter(|copy| inventory::lists(folder, copy)) {
-        folder.remove(&[copy])?;
-    }
-    clear_made(folder)
-}
-
-/// Removes the files that are made from records, and incomplete files.
-fn clear_made(folder: &Folder) -> Result<(), OutputError> {
-    folder.remove(&ALL)?;
-    let names = ALL.iter().map(String::as_str).chain([LIST, MODEL]);
-    folder.remove(&names.map(|name| format!("{PARTIAL}{name}")).collect::<Vec<_>>())
-}
-
 /// Prepares the folder for a run: removes the files of an earlier one except its records, and writes the copy of the list
 /// of cells. An interrupted run can then resume without the scene's own table, which may be this very file.
 ///
 /// # Errors
 /// If a file cannot be removed or written.
 pub fn begin(folder: &Folder, scene: &Scene) -> Result<(), OutputError> {
-    match scene.list() {
-        // The copy is replaced, never removed, so that a list exists at any time.
-        Some(list) => {
-            write_list(folder, list)?;
-            clear_made(folder)
-        }
-        None => clear(folder),
+    // The copies are replaced, never removed: they may be the scene's own files.
+    let keeps = |name: &str| match name {
+        RECORDS => true,
+        LIST => scene.list().is_some(),
+        MODEL => own_model(scene).is_some(),
+        _ => false,
+    };
+    if let Some(list) = scene.list() {
+        write_list(folder, list)?;
     }
+    inventory::clear(folder, ALL.iter().map(String::as_str), keeps)
 }
 
 fn write_list(folder: &Folder, list: &List) -> Result<(), OutputError> {
     folder.replace(LIST, |out| Ok(out.write_all(list.to_csv().as_bytes())?))
 }
 
-/// Writes the files that the scene asks for, and the manifest last. Returns the names of the files.
+/// Returns the formats of the files in the folder of a finished map.
+pub fn formats(folder: &Path) -> Vec<Format> {
+    let listed = inventory::listed(&inventory::stored(folder));
+    let has = |name: &str| listed.iter().any(|file| file.name == name);
+    let tables = [(Format::Csv, CSV), (Format::Npy, NPY), (Format::Html, HTML)];
+    let tables = tables.into_iter().filter(|(_, name)| has(name)).map(|(format, _)| format);
+    tables.chain(inventory::figure_formats(folder, "map")).collect()
+}
+
+/// Writes the files that the scene asks for, and the manifest last. Removes other files of an earlier run, but keeps the
+/// validation of the same records. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
 pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<String>, OutputError> {
     let clock = Instant::now();
-    clear(folder)?;
-    let mut files = write_files(folder, cells, None, &|_| true)?;
-    let has_records = folder.path().join(RECORDS).is_file();
-    let listed: Vec<&str> = files.iter().map(String::as_str).chain(has_records.then_some(RECORDS)).collect();
-    let listed = inventory::entries(folder, &listed)?;
-    inventory::write_manifest(folder, &manifest::map::map(cells, run, clock.elapsed(), &listed))?;
+    let earlier = inventory::stored(folder.path());
+    let records = if folder.path().join(RECORDS).is_file() { &[RECORDS][..] } else { &[] };
+    let records = inventory::entries(folder, records)?;
+    let validation = validation_of(folder, &inventory::listed(&earlier), &records);
+    let mut files = write_files(folder, cells, validation.as_ref(), &|_| true)?;
+    files.extend(validation.is_some().then(|| VALIDATION.to_owned()));
+    let keeps = |name: &str| [MANIFEST, RECORDS].contains(&name) || files.iter().any(|file| file == name);
+    inventory::clear(folder, ALL.iter().map(String::as_str), keeps)?;
+    let listed = [inventory::entries(folder, &files)?, records].concat();
+    let mut manifest = manifest::map::map(cells, run, clock.elapsed(), &listed);
+    if validation.is_some() {
+        manifest["timings"]["validate"] = earlier["timings"]["validate"].clone();
+    }
+    inventory::write_manifest(folder, &manifest)?;
     files.push(MANIFEST.to_owned());
     unfinished::clear(folder)?;
     Ok(files)
+}
+
+/// Returns the validation in a folder, if it is undamaged and the records are those that were validated.
+fn validation_of(folder: &Folder, earlier: &[FileEntry], records: &[FileEntry]) -> Option<Value> {
+    let entry = inventory::entry(folder.path(), VALIDATION).ok()?;
+    let is_same = records.iter().chain([&entry]).all(|entry| earlier.contains(entry));
+    let text = fs::read_to_string(folder.path().join(VALIDATION)).ok().filter(|_| is_same)?;
+    serde_json::from_str(&text).ok()
 }
 
 /// Writes `validation.json`, the report with a section on the validation if the map has one, and the manifest. `again` is
@@ -194,12 +205,16 @@ pub(crate) fn write_copies(
         write_list(folder, list)?;
         files.push(LIST.to_owned());
     }
-    let own = scene.base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in());
-    if let Some(model) = own.filter(|_| wanted(MODEL)) {
+    if let Some(model) = own_model(scene).filter(|_| wanted(MODEL)) {
         folder.replace(MODEL, |out| Ok(out.write_all(model.definition().text.as_bytes())?))?;
         files.push(MODEL.to_owned());
     }
     Ok(files)
+}
+
+/// The scene's model, if its file is the user's own.
+fn own_model(scene: &Scene) -> Option<&FileModel> {
+    scene.base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in())
 }
 
 fn write_tables(

@@ -77,7 +77,7 @@ pub fn write(
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Clock::now();
     // The manifest does not list files of an earlier orbit.
-    folder.remove(&names().collect::<Vec<_>>())?;
+    inventory::clear_for(folder, names())?;
     let json = to_json(model, orbit, request.instant);
     folder.replace(JSON, |out| Ok(writeln!(out, "{json}")?))?;
     let mut files = vec![JSON];

@@ -117,7 +117,7 @@ pub struct RunRecords<'f> {
 
 impl<'f> RunRecords<'f> {
     /// Creates the record file of a run; with `resume` takes up the records of an existing one. Tables and figures of an
-    /// earlier run are removed.
+    /// earlier run are removed, unless all records are there.
     ///
     /// # Errors
     /// [`RunRecordsError`] if the records belong to another run, or a file cannot be read or written.
@@ -147,7 +147,10 @@ impl<'f> RunRecords<'f> {
         } else {
             unfinished::store_elapsed(folder, elapsed_before)?;
         }
-        map::begin(folder, scene)?;
+        // A finished run keeps its files until they are written again.
+        if !resume || file.damage().is_some() || !work.schedule.is_finished() {
+            map::begin(folder, scene)?;
+        }
         let resumed = file.count();
         let unit = work.plan.unit();
         Ok(RunRecords { file, folder, resumed, unit, elapsed_before, clock: Instant::now() })

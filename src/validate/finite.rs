@@ -39,6 +39,7 @@ mod tests {
         undecided_periods: 0,
         exponent: true,
         shows_exponent: true,
+        quantities: false,
     };
 
     #[test]

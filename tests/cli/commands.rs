@@ -220,6 +220,53 @@ fn orbit_prints_a_summary() {
     ]));
 }
 
+/// A period, a word and a pattern belong to periodic motion with contact.
+#[test]
+fn an_orbit_without_a_word_says_why() {
+    for (line, parts) in [
+        (
+            "orbit --set e=0.7",
+            ["class                 chaotic", "word                  none: the motion is not periodic\n"],
+        ),
+        (
+            "orbit --model impact-oscillator --set sigma=5",
+            ["class                 periodic, period 1\n", "word                  none: no contact\n"],
+        ),
+    ] {
+        let run = run(&folder(), line).success();
+        let text = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+        assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+        assert!(!text.contains("P_{") && !text.contains("pattern"), "{text}");
+    }
+}
+
+/// A ball comes to rest in more than a hundred impacts.
+#[test]
+fn a_long_table_of_events_leaves_the_summary_on_the_screen() {
+    let line = "orbit --model shaking-table --set e=0.7 --set A=1.35";
+    let printed = |line: &str| run(&folder(), line).success().get_output().stdout.clone();
+    let orbit: serde_json::Value = serde_json::from_slice(&printed(&format!("{line} --json"))).unwrap();
+    let events = orbit["events"].as_array().unwrap().len();
+    let text = String::from_utf8(printed(line)).unwrap();
+    assert!(events > 100 && text.lines().count() < 45, "{events} events\n{text}");
+    let hidden = format!("... {} more events; --json and --out list all of them\n", events - 24);
+    assert!(text.contains(&hidden), "{text}");
+}
+
+#[test]
+fn requested_periods_are_a_limit() {
+    let printed = |line: &str| run(&folder(), line).success().get_output().stdout.clone();
+    let object = printed("orbit --transient 1 --periods 2 --json");
+    let orbit: serde_json::Value = serde_json::from_slice(&object).unwrap();
+    // The transient, the alignment of a tangent vector, and the analysis.
+    assert_eq!((&orbit["class"], &orbit["periods_run"]), (&"undecided".into(), &5.into()));
+    let text = String::from_utf8(printed("orbit --transient 1 --periods 2")).unwrap();
+    assert!(text.contains("undecided: neither periodic nor chaotic within 5 forcing periods\n"), "{text}");
+    // Without a limit the analysis goes on.
+    let orbit: serde_json::Value = serde_json::from_slice(&printed("orbit --transient 1 --json")).unwrap();
+    assert_eq!(orbit["class"], "periodic");
+}
+
 /// The time counts from the start, not from the end of the transient.
 #[test]
 fn orbit_prints_the_state_at_a_time() {
@@ -263,7 +310,9 @@ fn orbit_folder_is_written_once_and_again_with_force() {
 #[test]
 fn bifurcation_writes_table_figure_and_manifest() {
     let folder = folder();
-    let run = rattlemap(&folder).args(["bifurcation", SMOKE, "--set", "omega=5.6"]).assert();
+    // As many periods as `orbit` analyses first.
+    let sets = ["--set", "omega=5.6", "--set", "integration.observed_periods=128"];
+    let run = rattlemap(&folder).args(["bifurcation", SMOKE]).args(sets).assert();
     run.success().stdout("").stderr(says(&["5 of 5 columns", "bifurcation.csv"]));
     let out = folder.path().join("out/smoke");
     assert_eq!(names(&out), DIAGRAM);
@@ -274,7 +323,7 @@ fn bifurcation_writes_table_figure_and_manifest() {
     assert!(!manifest.contains(env!("CARGO_MANIFEST_DIR")), "a path of this machine: {manifest}");
     let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
     assert_eq!(manifest["scene"], fs::read_to_string(SMOKE).unwrap());
-    assert_eq!(manifest["set"], serde_json::json!(["omega=5.6"]));
+    assert_eq!(manifest["set"], serde_json::json!([sets[1], sets[3]]));
     assert_eq!(manifest["engine"], "reference f64");
     assert_eq!(manifest["crate_version"], env!("CARGO_PKG_VERSION"));
     assert_eq!(manifest["start"]["policy"], "rest");
@@ -292,7 +341,7 @@ fn check_columns(path: &Path) {
     assert_eq!((&*header, rows.len()), (columns, 5));
     for row in &rows {
         let set = format!("e={}", &row[0]);
-        let run = run(&folder(), &format!("orbit --json --set {set} --transient 200 --periods 64")).success();
+        let run = run(&folder(), &format!("orbit --json --set {set} --transient 200")).success();
         let orbit: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
         let is_periodic = &row[1] == "periodic";
         assert_eq!(orbit["class"], *row[1]);
@@ -350,7 +399,9 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
 
 #[test]
 fn orbit_help_explains_periods_and_transient() {
-    run(&folder(), "orbit --help")
-        .success()
-        .stdout(says(&["up to N/2 periods, at most 64", "All of it is integrated"]));
+    run(&folder(), "orbit --help").success().stdout(says(&[
+        "up to N/2",
+        "periods, at most 64",
+        "All of it is integrated",
+    ]));
 }

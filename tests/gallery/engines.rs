@@ -109,6 +109,7 @@ fn budget() -> Budget {
         undecided_periods: 0,
         exponent: true,
         shows_exponent: true,
+        quantities: false,
     }
 }
 

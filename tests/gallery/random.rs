@@ -143,6 +143,7 @@ pub(crate) fn budget() -> Budget {
         undecided_periods: 0,
         exponent: true,
         shows_exponent: true,
+        quantities: false,
     }
 }
 

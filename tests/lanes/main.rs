@@ -11,6 +11,7 @@ mod early_stops;
 mod engines_agree;
 mod independence;
 mod kinds;
+mod measures;
 mod shaders;
 mod stored;
 mod work;

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use rattlemap::gpu::{Precision, Variant, layout};
+use rattlemap::gpu::{Measures, Precision, Variant, layout};
 
 fn module(variant: Variant) -> (naga::Module, ModuleInfo) {
     let source = variant.source();
@@ -28,9 +28,9 @@ fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
         .find(|(_, ty)| ty.name.as_deref() == Some(name))
         .unwrap_or_else(|| panic!("the shader has no struct {name}"));
     let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
-    // Members of an inner struct count as members of the outer one.
+    // Members of an inner struct count as members of the outer one; a copy of an inner struct counts as one member.
     let flat = members.iter().flat_map(|m| match &module.types[m.ty].inner {
-        naga::TypeInner::Struct { members, .. } => {
+        naga::TypeInner::Struct { members, .. } if m.name.as_deref() != Some("ended") => {
             members.iter().map(|inner| (inner.name.clone(), m.offset + inner.offset)).collect()
         }
         _ => vec![(m.name.clone(), m.offset)],
@@ -39,8 +39,15 @@ fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
 }
 
 /// Returns variants with all quantities, with the class alone, and with some quantities.
-fn variants(precision: Precision) -> [Variant; 12] {
+fn variants(precision: Precision) -> [Variant; 15] {
     let everything = Variant::of(precision);
+    let measuring = |extremes, moments| Variant {
+        measures: Some(Measures { periods: 1, extremes, moments }),
+        exponent: false,
+        growth: false,
+        chatter: false,
+        ..everything
+    };
     let class = Variant { word: false, pattern: false, mesh: false, symmetry: false, ..everything };
     [
         Variant { keep: true, ..everything },
@@ -55,6 +62,9 @@ fn variants(precision: Precision) -> [Variant; 12] {
         Variant { mesh: true, keep: true, ..class },
         Variant { word: true, growth: false, ..class },
         Variant { pattern: true, ..class },
+        Variant { keep: true, ..measuring(true, true) },
+        measuring(false, true),
+        measuring(true, false),
     ]
 }
 
@@ -66,13 +76,13 @@ static MODULES: LazyLock<Vec<(usize, naga::Module)>> = LazyLock::new(|| {
 
 #[test]
 fn every_variant_is_valid() {
-    assert_eq!(MODULES.len(), 24);
+    assert_eq!(MODULES.len(), 30);
 }
 
 /// Offsets on the host are scaled by the size of the shader's numbers.
 #[test]
 fn structs_have_the_same_layout_on_host_and_device() {
-    assert_eq!(layout::STRUCTS.len(), 10);
+    assert_eq!(layout::STRUCTS.len(), 11);
     for (real_bytes, module) in &*MODULES {
         for host in layout::STRUCTS {
             let (bytes, host_bytes) = if host.is_real { (*real_bytes, 8) } else { (4, 4) };

@@ -146,6 +146,7 @@ pub(super) fn budget() -> Budget {
         undecided_periods: 0,
         exponent: true,
         shows_exponent: true,
+        quantities: false,
     }
 }
 

@@ -80,6 +80,7 @@ fn time(seed: u64, n: u64) -> (Status, f64) {
         undecided_periods: 0,
         exponent: true,
         shows_exponent: true,
+        quantities: false,
     };
     let clock = ThreadTime::now();
     let flow = flow_of(&pair);

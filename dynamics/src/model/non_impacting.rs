@@ -26,7 +26,8 @@ pub struct NonImpacting {
     stiffness: Matrix2<f64>,
     /// Largest `sqrt(2 E)` of a transient that touches no wall.
     reach: f64,
-    exponent: f64,
+    /// Eigenvalue of free motion with the largest real part.
+    slowest: Complex<f64>,
     resting: Option<usize>,
 }
 
@@ -46,7 +47,7 @@ impl NonImpacting {
         let gap = Vector2::from(oscillator.gap);
         let compliance = stiffness.cholesky()?.inverse();
         let inverse_mass = matrix(oscillator.inverse_mass());
-        let exponent = exponent(&(inverse_mass * stiffness), &(inverse_mass * damping));
+        let slowest = slowest(&(inverse_mass * stiffness), &(inverse_mass * damping));
         let inertia = matrix(mass) * (omega * omega);
         let dynamic =
             (stiffness - inertia).map(Complex::from) + damping.map(|c| Complex::new(0.0, omega * c));
@@ -55,12 +56,12 @@ impl NonImpacting {
         let swing = gap.map(Complex::from).dot(&amplitude).norm();
         let room = (walls[0] - gap.dot(&middle)).min(gap.dot(&middle) - walls[1]) - swing;
         let reach = (room - MARGIN * 2.0 * oscillator.length_scale()) / gap.dot(&(compliance * gap)).sqrt();
-        if !(reach > 0.0 && exponent < -MARGIN * omega) {
+        if !(reach > 0.0 && slowest.re < -MARGIN * omega) {
             return None;
         }
         let steady = [0, 1].map(|i| [amplitude[i].re + middle[i], -omega * amplitude[i].im]);
         let steady = [steady[0][0], steady[0][1], steady[1][0], steady[1][1]];
-        Some(NonImpacting { steady, mass, stiffness, reach, exponent, resting: None })
+        Some(NonImpacting { steady, mass, stiffness, reach, slowest, resting: None })
     }
 
     /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
@@ -110,7 +111,13 @@ impl NonImpacting {
 
     /// Returns the Lyapunov exponent per unit time: the slowest decay rate of free motion.
     pub fn exponent(&self) -> f64 {
-        self.exponent
+        self.slowest.re
+    }
+
+    /// Returns the largest Floquet multiplier of a forcing period, `(re, im)`.
+    pub fn multiplier(&self, period: f64) -> [f64; 2] {
+        let multiplier = (self.slowest * period).exp();
+        [multiplier.re, multiplier.im]
     }
 }
 
@@ -125,13 +132,16 @@ fn with_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
     copied
 }
 
-/// Returns the largest real part of the eigenvalues of free motion.
-fn exponent(stiffness: &Matrix2<f64>, damping: &Matrix2<f64>) -> f64 {
+/// Returns the eigenvalue of free motion with the largest real part, in the upper half plane.
+fn slowest(stiffness: &Matrix2<f64>, damping: &Matrix2<f64>) -> Complex<f64> {
     let mut generator = Matrix4::zeros();
     generator.fixed_view_mut::<2, 2>(0, 2).fill_with_identity();
     generator.fixed_view_mut::<2, 2>(2, 0).copy_from(&-stiffness);
     generator.fixed_view_mut::<2, 2>(2, 2).copy_from(&-damping);
-    generator.complex_eigenvalues().iter().map(|mu| mu.re).fold(f64::NEG_INFINITY, f64::max)
+    let eigenvalues = generator.complex_eigenvalues();
+    let slowest =
+        eigenvalues.iter().copied().max_by(|a, b| a.re.total_cmp(&b.re).then(a.im.total_cmp(&b.im)));
+    slowest.expect("there are four")
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::approach::{BRANCH_CYCLES, HULL_CYCLES, LINEAR_TOLERANCE, stays};
 use super::itinerary::Recorder;
+use super::quantities::{Meter, Quantities};
 use super::reading::Reading;
 use super::recurrence::{Candidate, Metric, candidates};
 use super::{Class, Orbit, Settings, Status};
@@ -19,9 +20,8 @@ pub const EVENT_PERIODS: u32 = 8;
 /// Standard errors by which an exponent must exceed zero for chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
 
-/// Forcing periods of the longest window, unless more are requested. An undecided motion is observed in windows that
-/// double in length.
-const LONGEST_WINDOW: u32 = 32_768;
+/// Default number of forcing periods in the longest window. An undecided motion is observed in windows that double in length.
+pub const LONGEST_WINDOW: u32 = 32_768;
 
 /// Logarithm of the growth of a tangent vector that is too large for an escape from an unstable cycle: more than the
 /// ratio of the size of the motion to rounding.
@@ -65,8 +65,8 @@ pub fn analyse(model: &dyn Model, start: State, settings: &Settings) -> Result<O
     Ok(analyse_flow(&Flow::of(model)?, model.law(), start, settings, EVENT_PERIODS))
 }
 
-/// Classifies a motion like [`analyse`], and lists the events of the last `event_periods` of aperiodic motion.
-/// Returns none if `halt` was raised.
+/// Classifies a motion like [`analyse`], with windows of at most `longest_window` forcing periods after the first one, and
+/// lists the events of the last `event_periods` of aperiodic motion. Returns none if `halt` was raised.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -74,11 +74,20 @@ pub fn analyse_until(
     model: &dyn Model,
     start: State,
     settings: &Settings,
+    longest_window: u32,
     event_periods: u32,
     halt: &AtomicBool,
 ) -> Result<Option<Orbit>, ModelError> {
     let (flow, allowance) = (Flow::of(model)?, ALLOWANCE.until(halt));
-    let analysis = Analysis { flow: &flow, law: model.law(), settings, event_periods, allowance };
+    let analysis = Analysis {
+        flow: &flow,
+        law: model.law(),
+        settings,
+        longest_window,
+        event_periods,
+        measures: true,
+        allowance,
+    };
     let orbit = analysis.orbit(start);
     Ok((!allowance.is_halted()).then_some(orbit))
 }
@@ -86,7 +95,8 @@ pub fn analyse_until(
 /// Classifies a motion like [`analyse`], with a flow that the caller has computed, and lists the events of the last
 /// `event_periods` of aperiodic motion.
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, event_periods: u32) -> Orbit {
-    Analysis { flow, law, settings, event_periods, allowance: ALLOWANCE }.orbit(start)
+    let (longest_window, allowance) = (LONGEST_WINDOW, ALLOWANCE);
+    Analysis { flow, law, settings, longest_window, event_periods, measures: true, allowance }.orbit(start)
 }
 
 /// Returns the status of a motion that a stop has ended.
@@ -110,6 +120,7 @@ fn failed(status: Status, strobe: State, forcing_period: f64) -> Orbit {
         word: Word::default(),
         impacts_per_period: f64::NAN,
         mesh_fraction: f64::NAN,
+        quantities: None,
         strobe,
         strobe_meshing: None,
         events: Vec::new(),
@@ -133,7 +144,10 @@ pub(super) struct Analysis<'a> {
     pub(super) flow: &'a Flow,
     pub(super) law: Law,
     pub(super) settings: &'a Settings,
+    pub(super) longest_window: u32,
     pub(super) event_periods: u32,
+    /// Whether quantities are measured.
+    pub(super) measures: bool,
     /// Work that the motion may take.
     pub(super) allowance: Allowance<'a>,
 }
@@ -157,7 +171,7 @@ impl Analysis<'_> {
             return Ok(orbit);
         }
         let mut length = self.settings.observed_periods.max(2);
-        let last = length.max(LONGEST_WINDOW);
+        let last = length.max(self.longest_window);
         loop {
             let window = self.observe(&mut trajectory, length, periods_run)?;
             let found = candidates(&window.strobes, &window.metric, self.settings.max_period);
@@ -371,12 +385,12 @@ impl Analysis<'_> {
     pub(super) fn read(&self, seed: &Trajectory<'_>, cycle: &Cycle) -> Result<Reading, Stop> {
         let mut trajectory = seed.at(cycle.state, []);
         let first = trajectory.clone();
-        let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
+        let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         let closes = trajectory.is_in_domain_of(&first) || reading.on_strobe;
         // The symbol of the first flight depends on the wall that `seed` came from. If the cycle comes from another
         // wall, a second turn has the right symbol.
         if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
-            reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
+            reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         }
         Ok(Reading { closes, ..reading })
     }
@@ -402,6 +416,7 @@ impl Analysis<'_> {
             word: reading.word.clone(),
             impacts_per_period: reading.impacts_per_period,
             mesh_fraction: reading.mesh_fraction,
+            quantities: reading.quantities,
             strobe: cycle.state,
             strobe_meshing: reading.strobe_meshing,
             events: reading.events.clone(),
@@ -409,6 +424,21 @@ impl Analysis<'_> {
             forcing_period: self.flow.period,
             periods_run: 0,
         }
+    }
+
+    /// Measures the observed periods that follow a trajectory; none if they are not requested or it cannot be
+    /// continued.
+    pub(super) fn quantities(&self, trajectory: &Trajectory<'_>) -> Option<Quantities> {
+        let measure =
+            || Meter::measure(self.flow, &mut trajectory.clone(), self.settings.observed_periods.max(1));
+        self.measures.then(measure)?.ok()
+    }
+
+    /// Measures a period of contact-free motion in its steady response.
+    pub(super) fn steady_quantities(&self, motion: &NonImpacting) -> Option<Quantities> {
+        let steady =
+            || Meter::measure(self.flow, &mut Trajectory::new(self.flow, self.law, motion.steady()), 1);
+        self.measures.then(steady)?.ok()
     }
 
     /// Builds the orbit of aperiodic motion.
@@ -419,7 +449,8 @@ impl Analysis<'_> {
         class: Class,
         status: Status,
     ) -> Result<Orbit, Stop> {
-        let reading = Reading::take(self.flow, &mut trajectory, self.event_periods)?;
+        let quantities = self.quantities(&trajectory);
+        let reading = Reading::take(self.flow, &mut trajectory, self.event_periods, false)?;
         Ok(Orbit {
             class,
             status: if status == Status::Ok && reading.on_strobe { Status::StrobeOnEvent } else { status },
@@ -430,6 +461,7 @@ impl Analysis<'_> {
             word: reading.word,
             impacts_per_period: window.impacts_per_period,
             mesh_fraction: window.mesh_fraction,
+            quantities,
             strobe: reading.strobe,
             strobe_meshing: reading.strobe_meshing,
             events: reading.events,

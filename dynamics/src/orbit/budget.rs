@@ -50,6 +50,8 @@ pub struct Budget {
     pub exponent: bool,
     /// Whether the exponent is reported. Otherwise it only distinguishes chaos, and may be less accurate.
     pub shows_exponent: bool,
+    /// Whether [`Quantities`](super::Quantities) are measured: on the cycle, or over further observed periods.
+    pub quantities: bool,
 }
 
 impl Budget {

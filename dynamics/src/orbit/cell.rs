@@ -10,6 +10,7 @@ use super::CHAOS_ERRORS;
 use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, status_of};
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
+use super::quantities::Quantities;
 use super::reading::Reading;
 use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
@@ -59,6 +60,10 @@ pub struct Measurement {
     pub symmetric: Option<bool>,
     /// Word of the cycle.
     pub word: Option<Word>,
+    /// Modulus and argument of the largest multiplier of the cycle.
+    pub multiplier: Option<[f64; 2]>,
+    /// Quantities over the cycle, or over the observed periods that follow aperiodic motion, if requested.
+    pub quantities: Option<Quantities>,
     /// The last strobe state; a state of the cycle if the cell stopped early.
     pub strobe: State,
     /// Forcing periods of the motion itself.
@@ -100,7 +105,15 @@ fn measure_within(
     allowance: Allowance<'_>,
 ) -> Measurement {
     let settings = &budget.settings;
-    let analysis = Analysis { flow, law, settings, event_periods: 0, allowance };
+    let analysis = Analysis {
+        flow,
+        law,
+        settings,
+        longest_window: 0,
+        event_periods: 0,
+        measures: budget.quantities,
+        allowance,
+    };
     let mut run = CellRun {
         analysis: &analysis,
         budget,
@@ -116,6 +129,11 @@ fn measure_within(
         reading_periods: Cell::new(0),
     };
     run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)))
+}
+
+/// Returns modulus and argument of a complex number.
+fn polar([re, im]: [f64; 2]) -> [f64; 2] {
+    [re.hypot(im), im.atan2(re)]
 }
 
 /// A cycle that Newton's method has found.
@@ -218,7 +236,13 @@ impl<'a> CellRun<'a> {
                 Some(self.aperiodic(self.budget.chaos_errors())).filter(Measurement::is_decided)
             }
             _ => None,
-        })
+        }
+        .map(|measured| match measured.period {
+            Some(_) => measured,
+            None => {
+                Measurement { quantities: self.analysis.quantities(&trajectory.carrying([])), ..measured }
+            }
+        }))
     }
 
     /// Whether the motion certainly has no further event.
@@ -236,6 +260,8 @@ impl<'a> CellRun<'a> {
             lyapunov: flow.non_impacting().map(|motion| [motion.exponent(), 0.0]),
             symmetric: flow.mirror_symmetric(&self.analysis.law).then_some(true),
             word: Some(Word::default()),
+            multiplier: flow.non_impacting().map(|motion| polar(motion.multiplier(flow.period))),
+            quantities: flow.non_impacting().and_then(|motion| self.analysis.steady_quantities(motion)),
             ..self.without_results(Status::Ok)
         }
     }
@@ -391,6 +417,8 @@ impl<'a> CellRun<'a> {
             mesh_fraction: orbit.mesh_fraction,
             symmetric: orbit.symmetric,
             word: Some(orbit.word),
+            multiplier: orbit.floquet.and_then(|multipliers| multipliers.first().copied()).map(polar),
+            quantities: orbit.quantities,
             strobe,
             ..self.without_results(orbit.status)
         }
@@ -440,6 +468,8 @@ impl<'a> CellRun<'a> {
             mesh_fraction: 0.0,
             symmetric: None,
             word: None,
+            multiplier: None,
+            quantities: None,
             strobe: self.strobes[self.strobes.len() - 1],
             periods_run: self.strobes.len() as u32 - 1,
             search_periods: self.newton.periods() + self.reading_periods.get(),

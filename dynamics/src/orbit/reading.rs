@@ -2,9 +2,10 @@
 
 use super::Event;
 use super::itinerary::{Itinerary, Recorder};
+use super::quantities::{Meter, Quantities};
 use crate::flow::Flow;
 use crate::model::{Side, State};
-use crate::reference::{EventKind, GapEvent, Stop, Trajectory};
+use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
 use crate::word::Word;
 
 /// Largest distance from phase 0, in turns, of an event that lies on the strobe.
@@ -21,6 +22,8 @@ pub(super) struct Reading {
     pub(super) word: Word,
     pub(super) impacts_per_period: f64,
     pub(super) mesh_fraction: f64,
+    /// Measured quantities, if the caller requests them.
+    pub(super) quantities: Option<Quantities>,
     /// Whether the motion ends in the domain in which it started. The state alone may recur in another domain.
     pub(super) closes: bool,
     pub(super) near_grazing: bool,
@@ -28,7 +31,7 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// Advances the trajectory by `periods` forcing periods and collects the events.
+    /// Advances the trajectory by `periods` forcing periods and collects the events; measures them if `measures`.
     ///
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
@@ -36,6 +39,7 @@ impl Reading {
         flow: &Flow,
         trajectory: &mut Trajectory<'_, 0>,
         periods: u32,
+        measures: bool,
     ) -> Result<Reading, Stop> {
         let (strobe, strobe_meshing) = (trajectory.state(), trajectory.meshing());
         let first = trajectory.clone();
@@ -46,6 +50,11 @@ impl Reading {
         for _ in 0..periods {
             trajectory.advance_period(&mut events)?;
         }
+        let quantities = measures.then(|| {
+            let mut meter = Meter::new(flow, &first);
+            events.iter().for_each(|event| meter.event(event));
+            meter.finish(trajectory.period())
+        });
         let symbols: Vec<u8> = events.iter().filter_map(|event| event.symbol).collect();
         let span = f64::from(periods);
         Ok(Reading {
@@ -54,6 +63,7 @@ impl Reading {
             word: Word::cyclic(&symbols),
             impacts_per_period: (trajectory.work().impacts - impacts_start) as f64 / span,
             mesh_fraction: (trajectory.meshing_time() - mesh_start) / (span * flow.period),
+            quantities,
             itineraries: Recorder::list(flow, &events, start, periods),
             closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),

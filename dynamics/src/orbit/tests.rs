@@ -11,6 +11,7 @@ fn budget(early_stop: bool, transient_periods: u32) -> Budget {
         undecided_periods: 1584,
         exponent: true,
         shows_exponent: true,
+        quantities: false,
     }
 }
 

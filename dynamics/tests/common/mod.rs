@@ -19,6 +19,7 @@ pub(crate) const BUDGET: Budget = Budget {
     undecided_periods: 1584,
     exponent: true,
     shows_exponent: true,
+    quantities: false,
 };
 
 /// Whether two numbers differ by at most `within`.

@@ -13,6 +13,7 @@ mod one_wall;
 mod orbits;
 mod paper;
 mod properties;
+mod quantities;
 mod single_stop;
 mod sticking;
 mod stops;

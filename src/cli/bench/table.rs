@@ -30,7 +30,7 @@ pub(super) fn write(
     all: &[Series],
     budget_seconds: f64,
 ) -> Result<[&'static str; 3], OutputError> {
-    folder.remove(&[MANIFEST, TABLE, FIGURE])?;
+    inventory::clear_for(folder, [TABLE, FIGURE])?;
     folder.replace(TABLE, |out| write_table(out, all))?;
     folder.replace(FIGURE, |out| figure::write(out, all, &processor::described()))?;
     let files = inventory::entries(folder, &[TABLE, FIGURE])?;

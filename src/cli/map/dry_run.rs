@@ -62,7 +62,10 @@ fn text(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> String {
             dry.forecast.sampled,
             seconds(dry.open_seconds)
         ),
-        "nothing was written".to_owned(),
+        match dry.is_taken {
+            true => "folder   not empty: the run needs --resume or --force; nothing was written".to_owned(),
+            false => "nothing was written".to_owned(),
+        },
     ]
     .join("\n")
 }
@@ -70,6 +73,7 @@ fn text(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> String {
 fn object(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> Value {
     json!({
         "folder": out.to_string_lossy(),
+        "needs_resume_or_force": dry.is_taken,
         "cells": plan.cell_count(),
         "runs": dry.runs,
         "shard": job.shard,

@@ -7,7 +7,7 @@ use crate::map::engine::CardReport;
 use crate::map::plan::count_classes;
 use crate::map::schedule::{Deviation, Errors, Refined};
 use crate::show::cells::Cells;
-use crate::store::map::Run;
+use crate::store::map::{Provenance, Run};
 use crate::store::shard::FinishedShard;
 
 /// Counts, speed and classes of a map. `finishing` is the time from the last cell to the last file, in seconds.
@@ -15,51 +15,50 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
     let (count, [columns, rows]) = (cells.runs(), cells.counts());
     let unit = if count > columns * rows { "runs" } else { "cells" };
     let integrated = cells.refinement().map_or(count, |refined| refined.integrated);
-    let seconds = run.elapsed.as_secs_f64().max(1e-9);
-    let here = (integrated - run.resumed_cells) as f64;
-    let periods = cells.periods() as f64 * here / integrated as f64;
     let per_step = lane_steps.filter(|&steps| steps > 0).map_or(String::new(), |steps| {
-        format!(", {} ns per step", three_digits(1e9 * seconds / steps as f64))
+        format!(", {} ns per step", three_digits(1e9 * run.elapsed.as_secs_f64() / steps as f64))
     });
+    let share = (integrated - run.resumed_cells) as f64 / integrated as f64;
+    let periods = per_second(cells.periods() as f64 * share, run);
+    let speed = speed(integrated, unit, run, &format!(", {periods:.0} forcing periods/s{per_step}"));
     format!(
-        "{integrated} {unit}{} in {seconds:.3} s on {} ({}): {:.0} {unit}/s, {:.0} forcing periods/s{per_step}; files \
-         written in {finishing:.3} s\n{}{}{}",
-        resumed(run),
-        run.made.engine,
-        run.made.precision,
-        here / seconds,
-        periods / seconds,
+        "{integrated} {unit}{speed}; files written in {finishing:.3} s\n{}{}{}",
         cards(&run.cards, unit),
         cells.refinement().map_or(String::new(), |refined| refinement(refined, count)),
         classes(count_classes(cells.classes())),
     )
 }
 
+/// Time and speed of a run; without them if earlier runs have done everything. `more` ends the speed.
+fn speed(count: usize, unit: &str, run: &Run<'_>, more: &str) -> String {
+    let resumed = match run.resumed_cells {
+        0 => String::new(),
+        cells if cells == count => return ", all by earlier runs".to_owned(),
+        cells => format!(", {cells} of them by earlier runs,"),
+    };
+    let rate = per_second((count - run.resumed_cells) as f64, run);
+    let (seconds, Provenance { engine, precision, .. }) = (run.elapsed.as_secs_f64(), run.made);
+    format!("{resumed} in {seconds:.3} s on {engine} ({precision}): {rate:.0} {unit}/s{more}")
+}
+
+fn per_second(count: f64, run: &Run<'_>) -> f64 {
+    count / run.elapsed.as_secs_f64().max(1e-9)
+}
+
 /// Counts, speed and classes of a shard, its files, and the next command.
 pub(super) fn shard(finished: &FinishedShard<'_>, folder: &Path, files: &[String]) -> String {
     let FinishedShard { shard, plan, run, tally, .. } = finished;
-    let (count, unit, seconds) = (shard.run_count(plan), plan.unit(), run.elapsed.as_secs_f64().max(1e-9));
+    let (count, unit) = (shard.run_count(plan), plan.unit());
     format!(
-        "shard {shard}: {count} of {} {unit}{} in {seconds:.3} s on {} ({}): {:.0} {unit}/s\n{}{}\n{}: {}; \
-         `rattlemap merge OUT PART...` combines all {} shards",
+        "shard {shard}: {count} of {} {unit}{}\n{}{}\n{}: {}; `rattlemap merge OUT PART...` combines all {} shards",
         plan.run_count(),
-        resumed(run),
-        run.made.engine,
-        run.made.precision,
-        (count - run.resumed_cells) as f64 / seconds,
+        speed(count, unit, run, ""),
         cards(&run.cards, unit),
         classes(tally.classes),
         path(folder),
         files.join(", "),
         shard.count()
     )
-}
-
-fn resumed(run: &Run<'_>) -> String {
-    match run.resumed_cells {
-        0 => String::new(),
-        cells => format!(", {cells} of them by earlier runs,"),
-    }
 }
 
 fn classes([periodic, chaotic, undecided, failed]: [usize; 4]) -> String {

@@ -182,7 +182,9 @@ fn damaged_manifests_are_refused() {
     }
     fs::remove_file(&path).unwrap();
     check(2, &["the run is unfinished", "--resume"]);
-    fails(&folder, "check nowhere", 2, &["there is no such folder"]);
+    let written = "name a folder that `map`, `bifurcation`, `orbit`, `compare` or `bench` has written";
+    fails(&folder, "check nowhere", 2, &["nowhere: there is no such folder; ", written]);
+    fails(&folder, "check .", 2, &["there is no manifest.json; ", written]);
 }
 
 /// No run stores filled records, or periods that take hours to integrate.

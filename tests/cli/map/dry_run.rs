@@ -12,7 +12,8 @@ fn a_dry_run_predicts_and_writes_nothing() {
     let object = predicted(&folder, "");
     let mut fields: Vec<&String> = object.as_object().unwrap().keys().collect();
     fields.sort();
-    let contract = "cells device disk_bytes engine folder is_upper_bound kept memory_bytes precision runs sampled seconds shard why";
+    let contract = "cells device disk_bytes engine folder is_upper_bound kept memory_bytes needs_resume_or_force precision \
+                    runs sampled seconds shard why";
     assert_eq!(fields, words(contract));
     assert_eq!((&object["cells"], &object["runs"], &object["kept"]), (&320.into(), &320.into(), &0.into()));
     assert_eq!((&object["engine"], &object["is_upper_bound"]), (&"cpu".into(), &false.into()));
@@ -39,10 +40,14 @@ fn a_dry_run_refuses_what_a_run_refuses() {
     refused("--out s.toml", &["there is a file of this name"]);
     map(&folder, &format!("{FEW} --quiet")).success();
     let before = names(&folder.path().join("out/s"));
-    refused(FEW, &["out/s: the folder is not empty"]);
     refused(&format!("{FEW} --resume --set k=900"), &["holds another run"]);
     map(&folder, &format!("{FEW} --quiet --dry-run --force")).success();
     let resumed = predicted(&folder, &format!("{FEW} --resume"));
     assert_eq!((&resumed["kept"], &resumed["seconds"]["integrate"]), (&12.into(), &0.0.into()));
+    assert_eq!(resumed["needs_resume_or_force"], false);
+    // A folder with files is no reason to refuse: nothing is written.
+    assert_eq!(predicted(&folder, FEW)["needs_resume_or_force"], true);
+    let text = map(&folder, &format!("{FEW} --dry-run")).success();
+    text.stdout(says(&["folder   not empty: the run needs --resume or --force; nothing was written\n"]));
     assert_eq!(names(&folder.path().join("out/s")), before);
 }

@@ -30,12 +30,59 @@ fn figures_of_a_map_come_in_each_format() {
     let run = succeeds(&folder, "check out/s --repair");
     run.stderr(says(&["map.svg was recreated", "word.pdf was recreated"]));
     assert_eq!(["map.svg", "word.pdf"].map(|name| fs::read(out.join(name)).unwrap()), good);
-    // Resuming with other formats replaces the figures.
+    // Resuming adds formats; so does a new run with --format.
     map(&folder, &format!("{FEW} --quiet --format png --resume")).success();
-    assert_eq!(figures(&out), of_layers(&["png"]));
-    map(&folder, &format!("{FEW} --quiet --set outputs.files=[\"svg\"] --force")).success();
+    assert_eq!(figures(&out), of_layers(&["pdf", "png", "svg"]));
+    map(&folder, &format!("{FEW} --quiet --set outputs.files=[\"csv\",\"svg\"] --resume")).success();
+    assert_eq!(figures(&out), of_layers(&["svg"]));
+    map(&folder, &format!("{FEW} --quiet --format pdf --force")).success();
+    assert_eq!(figures(&out), of_layers(&["pdf", "svg"]));
+    // A new run without it writes the scene's formats, and names what it removes.
+    let files = "--set outputs.files=[\"svg\"] --force";
+    let removed = "out/s: removed files of an earlier run: cells.csv, cells.npy, impacts.pdf, lyapunov.pdf, map.pdf, \
+                   mesh.pdf, pattern.pdf, report.html, word.pdf, words.csv\n";
+    map(&folder, &format!("{FEW} {files}")).success().stderr(says(&[removed]));
     assert_eq!(figures(&out), of_layers(&["svg"]));
     assert!(!out.join("cells.csv").exists());
+}
+
+/// A finished map is drawn again without losing what belongs to its records.
+#[test]
+fn redrawing_a_map_keeps_its_validation_and_its_other_files() {
+    let folder = folder();
+    map(&folder, &format!("{FEW} --quiet")).success();
+    succeeds(&folder, "validate out/s --samples 4 --quiet");
+    let out = folder.path().join("out/s");
+    let before = names(&out);
+    let validation = fs::read(out.join("validation.json")).unwrap();
+    let report = fs::read_to_string(out.join("report.html")).unwrap();
+    let run = map(&folder, &format!("{FEW} --resume --format svg --set title=Other")).success();
+    let text = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+    assert!(!text.contains("removed") && !text.contains("cells/s"), "{text}");
+    assert!(text.contains("12 cells, all by earlier runs; files written in "), "{text}");
+    let after: Vec<String> = names(&out).into_iter().filter(|name| !name.ends_with(".svg")).collect();
+    assert_eq!(after, before);
+    assert_eq!(figures(&out), of_layers(&["png", "svg"]));
+    assert!(fs::read(out.join("validation.json")).unwrap() == validation);
+    // The page has the new title and the validation.
+    let redrawn = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(redrawn.contains("Other") && redrawn != report);
+    let manifest = json(&out.join("manifest.json"));
+    assert!(manifest["timings"]["validate"].as_f64().unwrap() > 0.0, "{manifest}");
+    succeeds(&folder, "check out/s").stderr(says(&["files are as manifest.json says"]));
+    // Without options the same files are written again.
+    map(&folder, &format!("{FEW} --quiet --resume")).success();
+    assert_eq!(figures(&out), of_layers(&["png", "svg"]));
+    assert!(fs::read_to_string(out.join("report.html")).unwrap() == report);
+    // A damaged validation is removed, as is one of other records.
+    for damaged in ["validation.json", "records.bin"] {
+        succeeds(&folder, "validate out/s --samples 4 --quiet");
+        damage(&out.join(damaged), 1);
+        let run = map(&folder, &format!("{FEW} --resume")).success();
+        run.stderr(says(&["out/s: removed files of an earlier run: validation.json\n"]));
+        assert!(!out.join("validation.json").exists());
+        succeeds(&folder, "check out/s --quiet");
+    }
 }
 
 /// A model with one wall has no symmetric motion.
@@ -62,13 +109,20 @@ fn figures_of_diagrams_and_orbits_come_in_each_format() {
     let b = folder.path().join("b");
     assert_eq!(figures(&b), ["bifurcation.pdf", "bifurcation.png"]);
     run("bifurcation line.toml --out b --quiet --format svg --force");
-    assert_eq!(figures(&b), ["bifurcation.svg"]);
+    assert_eq!(figures(&b), ["bifurcation.pdf", "bifurcation.png", "bifurcation.svg"]);
+    let removed = "b: removed files of an earlier run: bifurcation.pdf, bifurcation.svg\n";
+    run("bifurcation line.toml --out b --force").stderr(says(&[removed]));
+    assert_eq!(figures(&b), ["bifurcation.png"]);
     assert!(["bifurcation.csv", "bifurcation_columns.csv"].iter().all(|name| b.join(name).is_file()));
     run("orbit --out o --format svg");
     let o = folder.path().join("o");
     assert_eq!(figures(&o), ["gap.svg", "phase_plane.svg", "spectrum.svg", "time_history.svg"]);
     run("check o --quiet");
-    run("orbit --out o --force");
+    run("orbit --out o --force --format png").stderr(predicate::str::contains("removed").not());
+    assert_eq!(figures(&o).len(), 8);
+    let removed =
+        "o: removed files of an earlier run: gap.svg, phase_plane.svg, spectrum.svg, time_history.svg\n";
+    run("orbit --out o --force").stderr(says(&[removed]));
     assert_eq!(figures(&o), ["gap.png", "phase_plane.png", "spectrum.png", "time_history.png"]);
     fails(&folder, "orbit --format svg", 2, &["--out"]);
     fails(&folder, "map s.toml --format eps", 2, &["eps", "png, svg, pdf"]);

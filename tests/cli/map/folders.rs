@@ -65,3 +65,48 @@ fn files_are_not_written_through_symbolic_links() {
     map(&folder, &format!("{FEW} --quiet --out link --force")).success();
     assert!(out.join("cells.csv").is_file());
 }
+
+/// `--force` removes what any command has written, and nothing else.
+#[test]
+fn force_removes_the_files_of_another_command_and_names_them() {
+    let folder = finished();
+    let out = folder.path().join("o");
+    let map = names(&out);
+    fs::write(out.join("notes.txt"), "precious").unwrap();
+    let run = succeeds(&folder, "orbit --out o --force");
+    let removed: Vec<String> = map.into_iter().filter(|name| name != "manifest.json").collect();
+    let removed = format!("o: removed files of an earlier run: {}\n", removed.join(", "));
+    run.stderr(says(&[&removed]));
+    assert_eq!(
+        names(&out),
+        [
+            "gap.png",
+            "manifest.json",
+            "notes.txt",
+            "orbit.json",
+            "phase_plane.png",
+            "spectrum.csv",
+            "spectrum.png",
+            "time_history.png",
+            "trajectory.csv"
+        ]
+    );
+    let run = succeeds(&folder, "bifurcation line.toml --out o --force");
+    run.stderr(says(&["removed files of an earlier run: gap.png, orbit.json,"]));
+    assert!(!out.join("orbit.json").exists() && out.join("notes.txt").exists());
+    // A manifest of unknown origin cannot name a file elsewhere.
+    let text = fs::read_to_string(out.join("manifest.json")).unwrap();
+    fs::write(out.join("manifest.json"), text.replace("bifurcation.csv", "../line.toml")).unwrap();
+    succeeds(&folder, "orbit --out o --force");
+    assert!(folder.path().join("line.toml").exists());
+}
+
+/// The system reports no free space there.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_that_cannot_be_written_is_refused_for_this_reason() {
+    let folder = folder();
+    for line in ["map s.toml --engine cpu --out /proc/x", "map s.toml --engine cpu --out /proc/x --dry-run"] {
+        fails(&folder, line, 2, &["/proc/x: cannot write there (/proc cannot be written)", "another folder"]);
+    }
+}

@@ -61,7 +61,7 @@ fn incomplete_files_are_resumed_to_the_same_bytes() {
     // A finished run only writes its files again.
     fs::remove_file(cut.join("map.png")).unwrap();
     let run = map(&folder, "--out cut --resume").success();
-    run.stderr(says(&["320 cells, 320 of them by earlier runs, in "]));
+    run.stderr(says(&["320 cells, all by earlier runs; files written in "]));
     assert!(bytes(&cut) == expected);
 }
 

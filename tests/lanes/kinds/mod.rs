@@ -163,6 +163,7 @@ fn records_agree_with_the_reference() {
         undecided_periods: 0,
         exponent: true,
         shows_exponent: true,
+        quantities: false,
     };
     let measured = |(oscillator, law, start): &Cell| measure(&Flow::new(oscillator), *law, *start, &budget);
     let expected: Vec<_> =

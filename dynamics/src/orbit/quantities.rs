@@ -1,0 +1,376 @@
+//! What people measure on a motion: impacts, contact forces, amplitudes, harmonics, dissipated energy.
+//!
+//! A [`Meter`] receives the events of a trajectory. Between two events the motion is one flight in one linear domain,
+//! and the meter evaluates the exact flow there: integrals by Gauss-Legendre quadrature of order 16 over pieces of at
+//! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
+
+use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor};
+use crate::model::Contact;
+use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
+
+/// Nodes in `(0, 1)` and weights of the Gauss-Legendre quadrature on `[-1, 1]`; the other half is symmetric.
+const GAUSS: [(f64, f64); 4] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
+    (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
+];
+
+/// Largest number of iterations that locate an extreme.
+const EXTREME_ITERATIONS: usize = 60;
+
+/// Quantities of one motion over a whole number of forcing periods, in the units of the model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quantities {
+    /// Approach speeds at the right and the left wall, and at both.
+    pub approaches: [Approaches; 3],
+    /// Energy that contacts take at an instant, per unit time: `(1 - e^2) w^2 / (2 g M^-1 g)` of each impact, and the
+    /// energy of a contact spring that is released before it relaxes.
+    pub impact_energy: f64,
+    /// Largest and root mean square force of compliant contacts, positive if it presses; none without such contact.
+    pub contact_force: Option<[f64; 2]>,
+    /// Both displacements and the gap.
+    pub displacements: [Displacement; 3],
+    /// Energy that all dampers take per unit time.
+    pub dissipated: f64,
+}
+
+/// Approach speeds of the contacts to which the law of restitution applies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Approaches {
+    /// Number of contacts.
+    pub count: u64,
+    /// Mean approach speed; 0 without contacts.
+    pub mean: f64,
+    /// Largest approach speed; 0 without contacts.
+    pub largest: f64,
+}
+
+/// Averages and extremes of a displacement.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Displacement {
+    /// Half the difference of maximum and minimum.
+    pub amplitude: f64,
+    /// Average over time.
+    pub mean: f64,
+    /// Root mean square.
+    pub rms: f64,
+    /// Amplitude `a > 0` and phase `phi` in `(-pi, pi]` of the component `a cos(omega t + phi)`.
+    pub harmonic: [f64; 2],
+}
+
+/// Approach speeds so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Contacts {
+    count: u64,
+    sum: f64,
+    largest: f64,
+}
+
+impl Contacts {
+    fn and(self, other: Contacts) -> Contacts {
+        Contacts {
+            count: self.count + other.count,
+            sum: self.sum + other.sum,
+            largest: self.largest.max(other.largest),
+        }
+    }
+
+    fn approaches(self) -> Approaches {
+        let mean = if self.count > 0 { self.sum / self.count as f64 } else { 0.0 };
+        Approaches { count: self.count, mean, largest: self.largest }
+    }
+}
+
+/// Integrals and extremes of a displacement.
+#[derive(Clone, Copy, Debug)]
+struct Moments {
+    value: f64,
+    square: f64,
+    cos: f64,
+    sin: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Moments {
+    const NONE: Moments =
+        Moments { value: 0.0, square: 0.0, cos: 0.0, sin: 0.0, low: f64::INFINITY, high: f64::NEG_INFINITY };
+
+    fn integrate(&mut self, weight: f64, value: f64, [cos, sin]: Phasor) {
+        self.value += weight * value;
+        self.square += weight * value * value;
+        self.cos += weight * value * cos;
+        self.sin += weight * value * sin;
+    }
+
+    fn include(&mut self, value: f64) {
+        self.low = self.low.min(value);
+        self.high = self.high.max(value);
+    }
+
+    fn over(&self, time: f64) -> Displacement {
+        let [cos, sin] = [self.cos, self.sin].map(|x| 2.0 * x / time);
+        Displacement {
+            amplitude: 0.5 * (self.high - self.low),
+            mean: self.value / time,
+            rms: (self.square / time).sqrt(),
+            harmonic: [cos.hypot(sin), (-sin).atan2(cos)],
+        }
+    }
+}
+
+/// Measures a trajectory from its events.
+#[derive(Clone, Debug)]
+pub(super) struct Meter<'f> {
+    flow: &'f Flow,
+    /// Domain, state and time since phase 0 at the beginning of the present flight.
+    kind: DomainKind,
+    q: Gap,
+    t: f64,
+    first_period: u64,
+    period: u64,
+    contacts: [Contacts; 2],
+    lost: f64,
+    dissipated: f64,
+    displacements: [Moments; 3],
+    force: Moments,
+    contact_time: f64,
+}
+
+impl<'f> Meter<'f> {
+    /// Begins at phase 0, at the present state of a trajectory.
+    pub(super) fn new(flow: &'f Flow, trajectory: &Trajectory<'_>) -> Meter<'f> {
+        let kind = trajectory.meshing().map_or(DomainKind::Free, DomainKind::Meshing);
+        Meter {
+            flow,
+            kind,
+            q: flow.to_gap(trajectory.state()),
+            t: 0.0,
+            first_period: trajectory.period(),
+            period: trajectory.period(),
+            contacts: Default::default(),
+            lost: 0.0,
+            dissipated: 0.0,
+            displacements: [Moments::NONE; 3],
+            force: Moments::NONE,
+            contact_time: 0.0,
+        }
+    }
+
+    /// Advances a trajectory by `periods` forcing periods and measures it.
+    ///
+    /// # Errors
+    /// A [`Stop`] if the trajectory cannot be continued.
+    pub(super) fn measure(
+        flow: &'f Flow,
+        trajectory: &mut Trajectory<'_>,
+        periods: u32,
+    ) -> Result<Quantities, Stop> {
+        let mut meter = Meter::new(flow, trajectory);
+        for _ in 0..periods {
+            trajectory.advance_period(&mut meter)?;
+        }
+        Ok(meter.finish(trajectory.period()))
+    }
+
+    /// Returns the quantities from the beginning to phase 0 of `period`.
+    pub(super) fn finish(mut self, period: u64) -> Quantities {
+        self.complete_periods(period);
+        let time = (period - self.first_period) as f64 * self.flow.period;
+        let [right, left] = self.contacts;
+        Quantities {
+            approaches: [right, left, right.and(left)].map(Contacts::approaches),
+            impact_energy: self.lost / time,
+            contact_force: (self.contact_time > 0.0)
+                .then(|| [self.force.high, (self.force.square / self.contact_time).sqrt()]),
+            displacements: self.displacements.map(|moments| moments.over(time)),
+            dissipated: self.dissipated / time,
+        }
+    }
+
+    /// Continues the present flight to phase 0 of `period`.
+    fn complete_periods(&mut self, period: u64) {
+        while self.period < period {
+            self.q = self.fly(self.flow.period - self.t);
+            self.t = 0.0;
+            self.period += 1;
+        }
+    }
+
+    /// Measures the present flight over a time, and returns its end.
+    fn fly(&mut self, duration: f64) -> Gap {
+        let (flow, kind) = (self.flow, self.kind);
+        let linear = flow.domain(kind);
+        let pieces = (duration * linear.per_unit).ceil().max(1.0);
+        let piece = duration / pieces;
+        let mut q = self.q;
+        for i in 0..pieces as u64 {
+            let (sin, cos) = (flow.omega * (self.t + i as f64 * piece)).sin_cos();
+            q = self.fly_piece(&Piece { linear, q, phasor: [cos, sin], length: piece });
+        }
+        q
+    }
+
+    /// Measures a piece of at most one Taylor step, and returns its end.
+    fn fly_piece(&mut self, piece: &Piece<'_>) -> Gap {
+        let below = GAUSS.iter().rev().map(|&(node, weight)| (-node, weight));
+        let nodes = below.chain(GAUSS).map(|(node, weight)| (0.5 + 0.5 * node, 0.5 * weight * piece.length));
+        let mut before = (0.0, piece.q, piece.phasor);
+        self.include(&before.1);
+        for (share, weight) in nodes {
+            let (q, phasor) = piece.at(share);
+            self.integrate(weight, &q, phasor);
+            self.find_extremes(piece, &before, &(share, q, phasor));
+            before = (share, q, phasor);
+        }
+        let (end, phasor) = piece.at(1.0);
+        self.include(&end);
+        self.find_extremes(piece, &before, &(1.0, end, phasor));
+        end
+    }
+
+    fn integrate(&mut self, weight: f64, q: &Gap, phasor: Phasor) {
+        let [x1, v1, x2, v2] = self.flow.to_state(*q);
+        for (moments, value) in self.displacements.iter_mut().zip([x1, x2, q[0]]) {
+            moments.integrate(weight, value, phasor);
+        }
+        let [[c1, c], [_, c2]] = self.flow.damping(self.kind);
+        self.dissipated += weight * (c1 * v1 * v1 + 2.0 * c * v1 * v2 + c2 * v2 * v2);
+        if let Some(force) = self.compliant_force(q) {
+            self.force.square += weight * force * force;
+            self.contact_time += weight;
+        }
+    }
+
+    /// Includes a state in the extremes.
+    fn include(&mut self, q: &Gap) {
+        let [x1, _, x2, _] = self.flow.to_state(*q);
+        for (moments, value) in self.displacements.iter_mut().zip([x1, x2, q[0]]) {
+            moments.include(value);
+        }
+        if let Some(force) = self.compliant_force(q) {
+            self.force.include(force);
+        }
+    }
+
+    /// Includes the extremes between two instants of a piece.
+    fn find_extremes(&mut self, piece: &Piece<'_>, from: &Instant, to: &Instant) {
+        for which in 0..4 {
+            let rate = |(_, q, phasor): &Instant| self.rate(which, piece.linear, q, phasor);
+            if rate(from) * rate(to) < 0.0 {
+                let extreme = piece.root(from.0, to.0, rate);
+                self.include(&extreme);
+            }
+        }
+    }
+
+    /// Returns the rate of a displacement, of the gap, or of the contact force.
+    fn rate(&self, which: usize, linear: &LinearFlow, q: &Gap, phasor: &Phasor) -> f64 {
+        match which {
+            0 | 1 => self.flow.to_state(*q)[2 * which + 1],
+            2 => q[1],
+            _ => match self.kind {
+                DomainKind::Meshing(side) if self.flow.is_compliant(side) => {
+                    let [stiffness, damping] = self.flow.wall_force(side);
+                    stiffness * q[1] + damping * linear.acceleration(q, phasor)
+                }
+                _ => 0.0,
+            },
+        }
+    }
+
+    /// Returns the force of a compliant contact, positive if it presses.
+    fn compliant_force(&self, q: &Gap) -> Option<f64> {
+        let DomainKind::Meshing(side) = self.kind else { return None };
+        let [stiffness, damping] = self.flow.wall_force(side);
+        let depth = q[0] - self.flow.wall(side);
+        self.flow.is_compliant(side).then(|| side.sign() * (stiffness * depth + damping * q[1]))
+    }
+
+    /// Counts the energy that a contact takes at an instant.
+    fn contact(&mut self, event: &GapEvent) {
+        let (side, flow) = (event.side, self.flow);
+        let kinetic = |w: f64| 0.5 * w * w / flow.compliance();
+        if event.kind == EventKind::MeshEnd {
+            let depth = event.before[0] - flow.wall(side);
+            self.lost += 0.5 * flow.wall_force(side)[0] * depth * depth;
+        } else if flow.contacts[side.index()] != Contact::Elastic {
+            let is_end_of_series = event.before == event.after;
+            if is_end_of_series {
+                // The series has taken the energy with which the gap left the wall.
+                self.lost += kinetic(self.q[1]);
+                return;
+            }
+            let approach = side.sign() * event.before[1];
+            self.lost += kinetic(approach) - kinetic(event.after[1]);
+            let of_side = &mut self.contacts[side.index()];
+            *of_side = of_side.and(Contacts { count: 1, sum: approach, largest: approach });
+        }
+    }
+}
+
+impl Observer for Meter<'_> {
+    fn event(&mut self, event: &GapEvent) {
+        self.complete_periods(event.period);
+        let duration = event.t - self.t;
+        if duration > 0.0 {
+            self.fly(duration);
+        }
+        self.contact(event);
+        self.kind = match event.kind {
+            EventKind::MeshStart => DomainKind::Meshing(event.side),
+            EventKind::Impact | EventKind::MeshEnd => DomainKind::Free,
+        };
+        self.q = event.after;
+        self.t = event.t;
+        self.include(&event.after);
+    }
+}
+
+/// Time as a share of a piece, state and phasor.
+type Instant = (f64, Gap, Phasor);
+
+/// A part of a flight, at most one Taylor step long.
+struct Piece<'f> {
+    linear: &'f LinearFlow,
+    q: Gap,
+    phasor: Phasor,
+    length: f64,
+}
+
+impl Piece<'_> {
+    fn at(&self, share: f64) -> (Gap, Phasor) {
+        let u = share * self.length * self.linear.per_unit;
+        let expansion = self.linear.grid.expansion(&self.q, &self.phasor, u);
+        let v = u - expansion.start;
+        (expansion.state(v), expansion.phasor(self.linear.turn * v))
+    }
+
+    /// Returns the state at a zero of `rate` between two instants at which it has opposite signs, by the method of
+    /// regula falsi with Anderson and Bjorck's weights (BIT 13, 1973).
+    fn root(&self, mut a: f64, mut b: f64, rate: impl Fn(&Instant) -> f64) -> Gap {
+        let at = |share| {
+            let (q, phasor) = self.at(share);
+            (q, rate(&(share, q, phasor)))
+        };
+        let (mut fa, mut fb) = (at(a).1, at(b).1);
+        let mut best = self.q;
+        for _ in 0..EXTREME_ITERATIONS {
+            let c = b - fb * (b - a) / (fb - fa);
+            let (q, fc) = at(c);
+            best = q;
+            if fc == 0.0 || (c - b).abs() <= f64::EPSILON {
+                break;
+            }
+            if fc * fb < 0.0 {
+                (a, fa) = (b, fb);
+            } else {
+                let weight = 1.0 - fc / fb;
+                fa *= if weight > 0.0 { weight } else { 0.5 };
+            }
+            (b, fb) = (c, fc);
+        }
+        best
+    }
+}

@@ -1,0 +1,257 @@
+// Measures a lane whose class is decided: over one cycle, or over further periods of aperiodic motion. The variant
+// MEASURE moves by careful steps alone. On each it integrates the Taylor series by Gauss-Legendre quadrature, whose
+// error is below 1e-12 on a step of at most a radian, and searches for extremes where a rate changes its sign.
+//
+// Units: time in free steps, rates per free step. Energies are multiplied by `2 g M^-1 g h^2`, so that a rate w of the
+// gap has the energy w^2, and forces by `g M^-1 g h^2`.
+
+const NODES: u32 = 6u;
+// Iterations that locate an extreme. Its error is quadratic in that of its time.
+const EXTREME_ITERATIONS: u32 = 6u;
+
+// Places in `sums`: integrals of gap, x, their products, and their products with the phasor; energy of dampers; square
+// of the contact force, and contact time; approach speeds, energy lost at events, number of contacts; periods measured.
+const SUM_Z: u32 = 0u;
+const SUM_X: u32 = 1u;
+const SUM_ZZ: u32 = 2u;
+const SUM_ZX: u32 = 3u;
+const SUM_XX: u32 = 4u;
+const SUM_ZC: u32 = 5u;
+const SUM_ZS: u32 = 6u;
+const SUM_XC: u32 = 7u;
+const SUM_XS: u32 = 8u;
+const SUM_DISSIPATED: u32 = 9u;
+const SUM_FORCE: u32 = 10u;
+const SUM_CONTACT: u32 = 11u;
+const SUM_APPROACH: u32 = 12u;
+const SUM_LOST: u32 = 13u;
+const SUM_COUNT: u32 = 14u;
+const SUM_PERIODS: u32 = 15u;
+// Places in `highs` and `lows`: both displacements, the gap, the contact force; and the largest approach speed.
+const FORCE: u32 = 3u;
+const APPROACH: u32 = 4u;
+
+// Begins to measure a lane that has ended. The lane's last state is stored for its results.
+fn begin_measuring() {
+    motions[lane].ended = motion;
+    tallies[lane].ended = tally;
+    tallies[lane].is_measured = 1u;
+    motions[lane].sums = array<Real, SUMS>();
+    motions[lane].totals = array<Real, SUMS>();
+    motions[lane].highs = array<Real, EXTREMES>(-HUGE, -HUGE, -HUGE, -HUGE, 0.0);
+    motions[lane].lows = array<Real, EXTREMES>(HUGE, HUGE, HUGE, HUGE, 0.0);
+    tally.stage = STAGE_MEASURING;
+    tally.periods_to_read = select(settings.measured_periods, search.cycle, search.cycle > 0u);
+    if search.cycle > 0u && search.has_read == 0u {
+        // Contact-free motion is measured in its steady state.
+        motion.q = flows[cell.flow_index].steady;
+        motion.bound = 0.0;
+        tally.order = 0u;
+    }
+}
+
+// Completes a measured period. Each period has a sum of its own, so that rounding errors do not add up.
+fn measure_period() {
+    tally.step = 0u;
+    motion.theta = 0.0;
+    motion.phasor = array<Real, 2>(1.0, 0.0);
+    tally.passes_in_period = 0u;
+    tally.events_in_period = 0u;
+    for (var k = 0u; k < SUMS; k++) {
+        motions[lane].totals[k] += motions[lane].sums[k];
+    }
+    motions[lane].sums = array<Real, SUMS>();
+    motions[lane].totals[SUM_PERIODS] += 1.0;
+    tally.periods_to_read -= 1u;
+    if tally.periods_to_read == 0u {
+        tally.stage = STAGE_DONE;
+    }
+}
+
+fn add(place: u32, value: Real) {
+    motions[lane].sums[place] += value;
+}
+
+fn is_compliant() -> bool {
+    return tally.mode != MODE_FREE && !sticks();
+}
+
+// Returns the state at `tau` of the expansion.
+fn measured_state(tau: Real) -> array<Real, 4> {
+    var q = state_at(tau, here.substeps);
+    if sticks() {
+        q[0] = 0.0;
+        q[1] = 0.0;
+    }
+    return q;
+}
+
+// Returns the force of a compliant contact, positive if it presses. The gap is measured from the wall.
+fn contact_force(q: array<Real, 4>) -> Real {
+    let side = side_of(tally.mode);
+    let wall = flows[cell.flow_index].springs[side];
+    return sign_of(side) * (wall[0] * q[0] + wall[1] * q[1]);
+}
+
+fn include_one(place: u32, value: Real) {
+    motions[lane].highs[place] = max(motions[lane].highs[place], value);
+    motions[lane].lows[place] = min(motions[lane].lows[place], value);
+}
+
+// Includes a state of the present flight in the extremes.
+fn include(q: array<Real, 4>) {
+    let f = cell.flow_index;
+    var z = q[0];
+    if tally.mode != MODE_FREE {
+        z += walls[side_of(tally.mode)];
+    }
+    for (var i = 0u; i < 2u; i++) {
+        include_one(i, flows[f].displacements[i][0] * z + flows[f].displacements[i][1] * q[2]);
+    }
+    include_one(2u, z);
+    if is_compliant() {
+        include_one(FORCE, contact_force(q));
+    }
+}
+
+// Returns the rate of a displacement, of the gap or of the contact force at `tau`.
+fn measured_rate(place: u32, tau: Real) -> Real {
+    let q = measured_state(tau);
+    if place < 2u {
+        let row = flows[cell.flow_index].displacements[place];
+        return row[0] * q[1] + row[1] * q[3];
+    }
+    if place == 2u {
+        return q[1];
+    }
+    if !is_compliant() {
+        return 0.0;
+    }
+    let wall = flows[cell.flow_index].springs[side_of(tally.mode)];
+    let bend = here.substeps * here.substeps * gap_jet(tau).z;
+    return wall[0] * q[1] + wall[1] * bend;
+}
+
+// Includes the extreme between two instants at which the rate has opposite signs (regula falsi, Illinois form).
+fn find_extreme(place: u32, begin_at: Real, end_at: Real) {
+    var a = begin_at;
+    var b = end_at;
+    var fa = measured_rate(place, a);
+    var fb = measured_rate(place, b);
+    if !(fa * fb < 0.0) {
+        return;
+    }
+    for (var n = 0u; n < EXTREME_ITERATIONS && fb != 0.0; n++) {
+        iterations += 1u;
+        let c = b - fb * (b - a) / (fb - fa);
+        let fc = measured_rate(place, c);
+        if fc * fb < 0.0 {
+            a = b;
+            fa = fb;
+        } else {
+            fa *= 0.5;
+        }
+        b = c;
+        fb = fc;
+    }
+    include(measured_state(b));
+}
+
+// Measures the flight over the first `tau` steps of the expansion. The phasor is that of the expansion point.
+fn measure_flight(tau: Real) {
+    if EXTREME {
+        include(measured_state(0.0));
+        include(measured_state(tau));
+    }
+    if !(tau > 0.0) {
+        return;
+    }
+    var nodes = array<Real, NODES>(-0.9324695142031521, -0.6612093864662645, -0.2386191860831969,
+        0.2386191860831969, 0.6612093864662645, 0.9324695142031521);
+    if EXTREME {
+        for (var place = 0u; place <= FORCE; place++) {
+            var before: Real = 0.0;
+            for (var k = 0u; k <= NODES; k++) {
+                iterations += 1u;
+                var t = tau;
+                if k < NODES {
+                    t = 0.5 * (1.0 + nodes[k]) * tau;
+                }
+                find_extreme(place, before, t);
+                before = t;
+            }
+        }
+    }
+    if MOMENTS {
+        var weights = array<Real, NODES>(0.17132449237917036, 0.3607615730481386, 0.46791393457269104,
+            0.46791393457269104, 0.3607615730481386, 0.17132449237917036);
+        let begun = motion.phasor;
+        var sum = array<Real, SUMS>();
+        var wall: Real = 0.0;
+        if tally.mode != MODE_FREE {
+            wall = walls[side_of(tally.mode)];
+        }
+        let damping = flows[cell.flow_index].domains[domain_of(tally.mode)].damping;
+        for (var k = 0u; k < NODES; k++) {
+            iterations += 1u;
+            let t = 0.5 * (1.0 + nodes[k]) * tau;
+            let weight = 0.5 * weights[k] * tau * here.share;
+            let q = measured_state(t);
+            motion.phasor = begun;
+            turn_phasor(t);
+            let z = weight * (q[0] + wall);
+            let x = weight * q[2];
+            sum[SUM_Z] += z;
+            sum[SUM_X] += x;
+            sum[SUM_ZZ] += z * (q[0] + wall);
+            sum[SUM_ZX] += z * q[2];
+            sum[SUM_XX] += x * q[2];
+            sum[SUM_ZC] += z * motion.phasor[0];
+            sum[SUM_ZS] += z * motion.phasor[1];
+            sum[SUM_XC] += x * motion.phasor[0];
+            sum[SUM_XS] += x * motion.phasor[1];
+            sum[SUM_DISSIPATED] += weight * ((damping[0] * q[1] * q[1] + damping[1] * q[1] * q[3]) + damping[2] * q[3] * q[3]);
+            if is_compliant() {
+                let force = contact_force(q);
+                sum[SUM_FORCE] += weight * force * force;
+                sum[SUM_CONTACT] += weight;
+            }
+        }
+        motion.phasor = begun;
+        for (var k = 0u; k <= SUM_CONTACT; k++) {
+            add(k, sum[k]);
+        }
+    }
+}
+
+// Measures a contact to which the law of restitution applies.
+fn measure_contact(approach: Real, leaving: Real) {
+    add(SUM_APPROACH, approach);
+    add(SUM_LOST, approach * approach - leaving * leaving);
+    add(SUM_COUNT, 1.0);
+    include_one(APPROACH, approach);
+}
+
+// Measures the release of a contact spring that is not relaxed. The gap is measured from the wall.
+fn measure_release(side: u32) {
+    add(SUM_LOST, flows[cell.flow_index].springs[side][0] * motion.q[0] * motion.q[0]);
+}
+
+// Copies what was measured to the place of each result.
+@compute @workgroup_size(WORKGROUP)
+fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = id.y * settings.row + id.x;
+    if i >= queue.count {
+        return;
+    }
+    let from = selected_lane(i);
+    var result: Measured;
+    if tallies[from].is_measured == 1u && tallies[from].now.status == STATUS_OK {
+        result.totals = motions[from].totals;
+        result.highs = motions[from].highs;
+        result.lows = motions[from].lows;
+    }
+    result.tangents = motions[from].tangents;
+    result.has_read = Real(tallies[from].search.has_read);
+    measured[i] = result;
+}

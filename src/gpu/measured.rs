@@ -1,0 +1,72 @@
+//! Conversion of what a lane measured to quantities in the model's units.
+
+use nalgebra::{Matrix2, Matrix4};
+
+use super::constants::Constants;
+use super::layout::{Measured, SUMS};
+use rattlemap_dynamics::orbit::{Approaches, Displacement, Quantities};
+
+/// Coefficients of gap and x in a displacement.
+type Row = [f64; 2];
+
+/// Returns the quantities of a lane; none if it was not measured. `shaders/measure.wgsl` has the places of the sums.
+pub(super) fn quantities(constants: &Constants, measured: &Measured) -> Option<Quantities> {
+    let Measured { totals, highs, lows, .. } = measured;
+    let [.., dissipated, force, contact, approach, lost, count, periods]: [f64; SUMS] = *totals;
+    if periods < 1.0 {
+        return None;
+    }
+    let h = constants.flow.h;
+    let steps = periods * f64::from(constants.steps);
+    // A rate of w per step has the energy w^2 in the shader's units.
+    let energy = 1.0 / (2.0 * constants.compliance() * h * h);
+    let force_unit = 2.0 * energy;
+    let both = Approaches {
+        count: count.round() as u64,
+        mean: if count > 0.0 { approach / count / h } else { 0.0 },
+        largest: highs[4] / h,
+    };
+    let rows = [constants.flow.displacements[0], constants.flow.displacements[1], [1.0, 0.0]];
+    let displacement = |i: usize| displacement(rows[i], totals, steps, 0.5 * (highs[i] - lows[i]));
+    Some(Quantities {
+        approaches: [Approaches::default(), Approaches::default(), both],
+        impact_energy: lost * energy / (steps * h),
+        contact_force: (contact > 0.0)
+            .then(|| [highs[3] * force_unit, (force / contact).max(0.0).sqrt() * force_unit]),
+        displacements: [0, 1, 2].map(displacement),
+        dissipated: dissipated * energy / (steps * h),
+    })
+}
+
+fn displacement([a, b]: Row, totals: &[f64; SUMS], steps: f64, amplitude: f64) -> Displacement {
+    let [z, x, zz, zx, xx, zc, zs, xc, xs, ..] = *totals;
+    let square = a * a * zz + 2.0 * a * b * zx + b * b * xx;
+    let [cos, sin] = [a * zc + b * xc, a * zs + b * xs].map(|sum| 2.0 * sum / steps);
+    Displacement {
+        amplitude,
+        mean: (a * z + b * x) / steps,
+        rms: (square / steps).max(0.0).sqrt(),
+        harmonic: [cos.hypot(sin), (-sin).atan2(cos)],
+    }
+}
+
+/// Returns modulus and argument of the largest multiplier of a cycle. The columns of the monodromy matrix are the
+/// tangents of a cycle that was read; other cycles are free of contact.
+pub(super) fn multiplier(constants: &Constants, measured: &Measured) -> [f64; 2] {
+    let (z, x) = (constants.flow.domains[0].gap_row, constants.flow.domains[0].x_row);
+    let generator = [0.0, z[0], 0.0, x[0], 1.0, z[1], 0.0, x[1], 0.0, z[2], 0.0, x[2], 0.0, z[3], 1.0, x[3]];
+    let (columns, steps) = match measured.has_read {
+        0.0 => (generator, Some(f64::from(constants.steps))),
+        _ => (measured.tangents, None),
+    };
+    let eigenvalues = if constants.degrees == 1 {
+        let block = Matrix2::new(columns[0], columns[4], columns[1], columns[5]);
+        block.complex_eigenvalues().as_slice().to_vec()
+    } else {
+        Matrix4::from_column_slice(&columns).complex_eigenvalues().as_slice().to_vec()
+    };
+    let multipliers = eigenvalues.into_iter().map(|mu| steps.map_or(mu, |steps| (mu * steps).exp()));
+    let largest = multipliers.max_by(|a, b| a.norm().total_cmp(&b.norm())).expect("a matrix has eigenvalues");
+    // Of a complex pair, the one in the upper half plane.
+    [largest.norm(), largest.arg().abs()]
+}
