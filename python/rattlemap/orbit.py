@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from . import _native, dataset, scenes
+from .engine import interruptible
 from .errors import SceneError
 from .model import Model, require_model
 
@@ -29,7 +30,8 @@ class Orbit:
 
     def __init__(self, model: Model, transient: int, periods: int, start: list[float] | None) -> None:
         self._arguments = (model, transient, periods, start)
-        self._native = _native.orbit(model._model, transient, periods, start)
+        with interruptible(None, resumable=False):
+            self._native = _native.orbit(model._model, transient, periods, start)
         self._facts: dict[str, Any] = json.loads(self._native.json())
         self.model = model
         """The model with the values of this orbit."""

@@ -78,3 +78,5 @@ def test_attractors_and_single_variables(ds: xr.Dataset, axes: Axes) -> None:
         rm.plot(ds["class"].isel(e=0), ax=axes)
     with pytest.raises(ValueError, match="neither"):
         rm.plot(ds.drop_vars("class"), ax=axes)
+    with pytest.raises(ValueError, match=r'no variable "period".*rm.plot\(ds\["class"\]\)'):
+        rm.plot(ds.drop_vars("period"), ax=axes)
