@@ -244,14 +244,14 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     if i >= queue.count {
         return;
     }
-    let from = selected_lane(i);
+    let slot = selected_lane(i);
     var result: Measured;
-    if tallies[from].is_measured == 1u && tallies[from].now.status == STATUS_OK {
-        result.totals = motions[from].totals;
-        result.highs = motions[from].highs;
-        result.lows = motions[from].lows;
+    if tallies[slot].is_measured == 1u && tallies[slot].now.status == STATUS_OK {
+        result.totals = motions[slot].totals;
+        result.highs = motions[slot].highs;
+        result.lows = motions[slot].lows;
     }
-    result.tangents = motions[from].tangents;
-    result.has_read = Real(tallies[from].search.has_read);
+    result.tangents = motions[slot].tangents;
+    result.has_read = Real(tallies[slot].search.has_read);
     measured[i] = result;
 }

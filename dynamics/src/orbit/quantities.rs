@@ -288,6 +288,13 @@ impl<'f> Meter<'f> {
         self.flow.is_compliant(side).then(|| side.sign() * (stiffness * depth + damping * q[1]))
     }
 
+    /// Whether an event ends an infinite series of impacts that the trajectory has jumped over.
+    fn ends_series(&self, event: &GapEvent) -> bool {
+        event.kind == EventKind::MeshStart
+            && event.before == event.after
+            && self.flow.contacts[event.side.index()] != Contact::Elastic
+    }
+
     /// Counts the energy that a contact takes at an instant.
     fn contact(&mut self, event: &GapEvent) {
         let (side, flow) = (event.side, self.flow);
@@ -296,8 +303,7 @@ impl<'f> Meter<'f> {
             let depth = event.before[0] - flow.wall(side);
             self.lost += 0.5 * flow.wall_force(side)[0] * depth * depth;
         } else if flow.contacts[side.index()] != Contact::Elastic {
-            let is_end_of_series = event.before == event.after;
-            if is_end_of_series {
+            if self.ends_series(event) {
                 // The series has taken the energy with which the gap left the wall.
                 self.lost += kinetic(self.q[1]);
                 return;
@@ -314,7 +320,11 @@ impl Observer for Meter<'_> {
     fn event(&mut self, event: &GapEvent) {
         self.complete_periods(event.period);
         let duration = event.t - self.t;
-        if duration > 0.0 {
+        if self.ends_series(event) {
+            // The gap is closed, and the series too short for a difference.
+            let (sin, cos) = (self.flow.omega * self.t).sin_cos();
+            self.integrate(duration, &event.after, [cos, sin]);
+        } else if duration > 0.0 {
             self.fly(duration);
         }
         self.contact(event);
