@@ -30,7 +30,9 @@ fn close_chatter(side: u32, u: Real) {
         return;
     }
     let row = here.gap_row;
-    let change = sign * (row[2] * rate + row[3] * v_rate - row[4] * here.angle * motion.phasor[1]);
+    let sine_rate = here.angle * motion.phasor[0];
+    let change =
+        sign * with_sine(row[2] * rate + row[3] * v_rate - row[4] * here.angle * motion.phasor[1], row[6], sine_rate);
     let damping = kick * row[3] - row[1];
     let lasts = whole * (1.0 - (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole);
     // A sequence that a stop phase interrupts continues impact by impact, until it fits before the next one.
@@ -44,7 +46,8 @@ fn close_chatter(side: u32, u: Real) {
     let across = here.x_row;
     let v_by_x = across[2] + kick * row[2];
     let v_by_v = across[3] + kick * row[3];
-    let v_jerk = (v_by_x * rate + v_by_v * v_rate) - (across[4] + kick * row[4]) * here.angle * motion.phasor[1];
+    let unforced = v_by_x * rate + v_by_v * v_rate;
+    let v_jerk = with_sine(unforced - (across[4] + kick * row[4]) * here.angle * motion.phasor[1], across[6] + kick * row[6], sine_rate);
     if EXPONENT {
         // A neighbour leaves at another time, and so at another speed and under another pressing acceleration: its
         // sequence ends later by `late_by`.

@@ -15,10 +15,18 @@ fn sign_of(side: u32) -> Real {
     return select(Real(-1.0), Real(1.0), side == SIDE_RIGHT);
 }
 
+// Adds the force's sine term `factor * s`, where any oscillator has one.
+fn with_sine(rest: Real, factor: Real, s: Real) -> Real {
+    if SINE {
+        return rest + factor * s;
+    }
+    return rest;
+}
+
 // Returns an acceleration from its row, in units of the domain's step. `q` is in lane units.
-fn acceleration(row: array<Real, 6>, share: Real, q: array<Real, 4>) -> Real {
+fn acceleration(row: array<Real, 7>, share: Real, q: array<Real, 4>) -> Real {
     return (row[0] * q[0] + row[2] * q[2]) + share * (row[1] * q[1] + row[3] * q[3])
-        + (row[4] * motion.phasor[0] + row[5]);
+        + (row[4] * motion.phasor[0] + with_sine(row[5], row[6], motion.phasor[1]));
 }
 
 // Whether the gap is pressed into the wall: the first nonzero derivative, from the second on, points into it.
@@ -33,9 +41,9 @@ fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
 // Returns the size up to which an acceleration of a gap at rest counts as zero. Where its terms cancel, its sign is
 // rounding, and depends on the order of summation and on the domain. If two domains disagreed, the gap would leave its
 // wall and be pressed back for ever.
-fn balance(row: array<Real, 6>, share: Real, q: array<Real, 4>) -> Real {
+fn balance(row: array<Real, 7>, share: Real, q: array<Real, 4>) -> Real {
     return 4.0 * ULP * ((abs(row[0] * q[0]) + abs(row[2] * q[2])) + share * abs(row[3] * q[3])
-        + (abs(row[4] * motion.phasor[0]) + abs(row[5])));
+        + (abs(row[4] * motion.phasor[0]) + with_sine(abs(row[5]), abs(row[6]), abs(motion.phasor[1]))));
 }
 
 // Returns the first nonzero derivative of the gap from the third to the fifth.
@@ -52,8 +60,8 @@ fn later_derivative(pull: Pull, q: array<Real, 4>) -> Real {
     var s = pull.angle * motion.phasor[0];
     //% for k in 3..6
     {
-        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + g[4] * c;
-        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + r[4] * c;
+        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + with_sine(g[4] * c, g[6], s);
+        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + with_sine(r[4] * c, r[6], s);
         first = select(first, a, first == 0.0);
         z = w;
         w = a;

@@ -68,8 +68,8 @@ fn propagator() -> array<Real, 28> {
 
 // Constants of the accelerations in a domain.
 struct Pull {
-    gap_row: array<Real, 6>,
-    x_row: array<Real, 6>,
+    gap_row: array<Real, 7>,
+    x_row: array<Real, 7>,
     share: Real,
     angle: Real,
 }

@@ -53,7 +53,7 @@ fn scan() -> u32 {
     var theta = motion.theta;
     var n = tally.step;
     var bound = motion.bound;
-    var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + (row[4] * c + row[5]);
+    var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + (row[4] * c + with_sine(row[5], row[6], s));
     if tally.is_scan_interrupted == 1u {
         a = motion.bend;
     }
@@ -88,7 +88,7 @@ fn scan() -> u32 {
         let sheared = c - half * s;
         let s1 = s + sine * sheared;
         let c1 = sheared - half * s1;
-        let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + row[5]);
+        let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + with_sine(row[5], row[6], s1));
         let bound1 = bound + growth;
         if !(clearance(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
             break;

@@ -7,9 +7,9 @@ struct Domain {
     // Propagator of one step minus the identity. Rows: gap, its rate, x, its rate. Columns: these four, then cos,
     // sin, 1.
     step: array<Real, 28>,
-    // Accelerations of the gap and of x: factors of gap, rate, x, rate, cos, 1.
-    gap_row: array<Real, 6>,
-    x_row: array<Real, 6>,
+    // Accelerations of the gap and of x: factors of gap, rate, x, rate, cos, 1, sin. Only variants with SINE read the last.
+    gap_row: array<Real, 7>,
+    x_row: array<Real, 7>,
     // Quadratic form of the n-th derivatives that bounds |(n+1)-th derivative of the gap|^2: factors of rate^2, rate
     // * x_rate, x_rate^2, gap^2, gap * x, x^2.
     energy: array<Real, 6>,
@@ -50,7 +50,7 @@ struct Flow {
     transient_growth: Real,
     // Acceleration of a gap that rests on the right and on the left wall: a `gap_row` that measures the gap from that
     // wall.
-    pressing: array<array<Real, 6>, 2>,
+    pressing: array<array<Real, 7>, 2>,
     // Change of the rates of the gap and of x per displacement of the gap, where the motion enters an elastic wall.
     damper: array<array<Real, 2>, 2>,
     // Contact force of the right and of the left wall per displacement and per rate of the gap, in the units of

@@ -69,9 +69,9 @@ fn expand_stuck() {
     //% for k in 0..TERMS
     {
         x_terms[$k] = x;
-        gap_terms[$k] = (p[2] * x + p[3] * v) + (p[4] * c + load_gap);
+        gap_terms[$k] = (p[2] * x + p[3] * v) + (p[4] * c + with_sine(load_gap, p[6], s));
         let turn: Real = 1.0 / $(k+1).0;
-        let next = turn * ((r[2] * x + r[3] * v) + (r[4] * c + load_x));
+        let next = turn * ((r[2] * x + r[3] * v) + (r[4] * c + with_sine(load_x, r[6], s)));
         x = turn * v;
         v = next;
         load_gap = 0.0;
@@ -92,8 +92,8 @@ fn stuck_bound() -> Real {
     let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
     let square = here.angle * here.angle;
     let fifth = square * square * here.angle;
-    let growth = abs(here.x_row[4]) * fifth;
+    let growth = with_sine(abs(here.x_row[4]), abs(here.x_row[6]), 1.0) * fifth;
     let x = growth + derivative_bound(0.0, 0.0, 120.0 * x_terms[5], 720.0 * x_terms[6]);
     let v = growth * here.angle + derivative_bound(0.0, 0.0, 720.0 * x_terms[6], 5040.0 * x_terms[7]);
-    return (abs(p[2]) * x + abs(p[3]) * v) + abs(p[4]) * (fifth * here.angle);
+    return (abs(p[2]) * x + abs(p[3]) * v) + with_sine(abs(p[4]), abs(p[6]), 1.0) * (fifth * here.angle);
 }

@@ -28,8 +28,8 @@ fn expand() {
         let x = x_terms[$k];
         let v = $(k+1).0 * x_terms[$(k+1)];
         let next: Real = 1.0 / ($(k+1).0 * $(k+2).0);
-        gap_terms[$(k+2)] = next * (((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + load_gap));
-        x_terms[$(k+2)] = next * (((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + load_x));
+        gap_terms[$(k+2)] = next * (((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + with_sine(load_gap, g[6], s)));
+        x_terms[$(k+2)] = next * (((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + with_sine(load_x, r[6], s)));
         load_gap = 0.0;
         load_x = 0.0;
         let turn = angle * (1.0 / $(k+1).0);
@@ -63,8 +63,8 @@ fn renew_bound() {
     var load_x = r[5];
     //% for k in 0..5
     {
-        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + load_gap);
-        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + load_x);
+        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + with_sine(load_gap, g[6], s));
+        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + with_sine(load_x, r[6], s));
         z = w;
         w = a;
         x = v;

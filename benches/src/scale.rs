@@ -101,7 +101,8 @@ pub fn write_shards(sizes: Sizes, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Cost>
             file.append(&batch)?;
             tally.take(&plan, &batch);
         }
-        let engine = Provenance { engine: "cpu", precision: "f64", device: "event-driven reference" };
+        let device = "event-driven reference";
+        let engine = Provenance { engine: "cpu", precision: "f64", device, commit: "unknown" };
         let run = Run::new(engine, &[], "none: the records are invented");
         shard::write(
             &folder,

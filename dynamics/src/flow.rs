@@ -2,10 +2,11 @@
 //!
 //! # Coordinates
 //!
-//! Each domain is `M x'' + C x' + K x = force cos(omega t) + load`. The flow uses the coordinates `q = (z, w, x, v)`:
-//! the gap `z = g . x`, its rate `w`, and the displacement [`Oscillator::other`] with its velocity. Because the gap
-//! is a coordinate, a contact puts it on the wall exactly, and no event depends on a small difference of large
-//! numbers. Together with the forcing phasor and a constant, `q` obeys an autonomous linear system
+//! Each domain is `M x'' + C x' + K x = force cos(omega t) + force_sin sin(omega t) + load`. The flow uses the
+//! coordinates `q = (z, w, x, v)`: the gap `z = g . x`, its rate `w`, and the displacement [`Oscillator::other`] with
+//! its velocity. Because the gap is a coordinate, a contact puts it on the wall exactly, and no event depends on a
+//! small difference of large numbers. Together with the forcing phasor and a constant, `q` obeys an autonomous linear
+//! system
 //!
 //! ```text
 //! a = (z, w, x, v, cos, sin, 1),     a' = G a
@@ -27,7 +28,7 @@
 //! and no load. Damping cannot increase its energy `2 E = v M v + x K x`, so
 //!
 //! ```text
-//! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(force M^-1 force)
+//! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(force M^-1 force + force_sin M^-1 force_sin)
 //! |z^(n+1)(t + s)|   <= sqrt(g M^-1 g) sqrt(2 E_n(t + s))        (Cauchy-Schwarz)
 //! ```
 //!

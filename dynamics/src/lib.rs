@@ -8,11 +8,13 @@
 //! - [`mod@reference`]: the trajectory from event to event;
 //! - [`stability`]: cycles, Floquet multipliers and Lyapunov exponents;
 //! - [`orbit`]: the class of a motion;
-//! - [`word`]: the symbols of a cycle.
+//! - [`word`]: the symbols of a cycle;
+//! - [`number`]: numbers in messages.
 
 #![warn(clippy::print_stderr, clippy::print_stdout, reason = "a library writes nothing to the terminal")]
 
 pub mod fused;
+pub mod number;
 
 pub mod model;
 

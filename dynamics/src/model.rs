@@ -15,7 +15,7 @@ mod traits;
 pub use gear_pair::GearPair;
 pub use non_impacting::NonImpacting;
 pub use oscillator::{Contact, Domain, Law, Oscillator, OscillatorError};
-pub use parameter::{Parameter, ParameterError, Range, Shapes};
+pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};
 pub use stops::Stops;
 pub use traits::{CloneModel, Model, ModelError};
 

@@ -1,6 +1,6 @@
 """Parameter maps of vibro-impact oscillators: the program `rattlemap` as a package.
 
-All quantities are dimensionless. Results are identical to those of the program, to the bit.
+Quantities have the units of the model. Results are identical to those of the program, to the bit.
 """
 
 from pathlib import Path as _Path

@@ -47,7 +47,7 @@ def bifurcation(
         ``"rest"`` or a state. With ``"up"``, ``"down"`` or ``"both"`` each column starts from the last state of its neighbour.
     **names
         One axis, a tuple ``(min, max, count)`` or an array of increasing values; values of single parameters; settings of
-        ``[integration]``. All quantities are dimensionless.
+        ``[integration]``. Quantities have the units of the model.
 
     Returns
     -------

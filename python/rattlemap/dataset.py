@@ -84,6 +84,21 @@ def attributes(manifest: Mapping[str, Any]) -> dict[str, Any]:
     return {name: plain(value) for name, value in manifest.items() if name not in left_out and value is not None}
 
 
+def described(name: str, manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """Return ``long_name`` and, if the model gives one, ``units`` of a parameter or a component of the state.
+
+    ``x_before`` is the component ``x`` before an event. Manifests of other programs' versions may have no meanings.
+    """
+    model = manifest.get("model")
+    meanings, units = (model.get(key, {}) if isinstance(model, Mapping) else {} for key in ("meanings", "units"))
+    component = name if name in meanings else name.removesuffix("_before")
+    when = "" if component == name else " before the event"
+    found = {"long_name": meanings.get(component, component) + when}
+    if component in units:
+        found["units"] = units[component]
+    return found
+
+
 def variable_attributes(
     name: str, codes: Mapping[str, Mapping[str, int]], manifest: Mapping[str, Any]
 ) -> dict[str, Any]:
@@ -117,12 +132,14 @@ def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable
         columns, rows = (int(axis["count"]) for axis in axes)
         dims, shape = (second, first), (rows, columns)
         coords = {
-            second: column(second)[::columns].copy(),
-            first: column(first)[:columns].copy(),
+            second: ((second,), column(second)[::columns].copy(), described(second, manifest)),
+            first: ((first,), column(first)[:columns].copy(), described(first, manifest)),
         }
     else:
         dims, shape = (CELL,), (int(manifest["cells"]),)
-        coords = {name: ((CELL,), column(name)) for name in manifest["list"]["columns"]}
+        coords = {
+            name: ((CELL,), column(name), described(name, manifest)) for name in manifest["list"]["columns"]
+        }
     variables = {}
     for name in fields:
         if name in INDICES or name in coords:
@@ -216,21 +233,25 @@ def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, 
     coords: dict[str, Any]
     dims: tuple[str, ...]
     if direction is None:
-        dims, place, coords = (axis,), np.argsort(value, kind="stable"), {axis: np.sort(value)}
+        dims, place, values = (axis,), np.argsort(value, kind="stable"), np.sort(value)
+        coords = {}
     else:
         names = ("up", "down")
         rows = [np.flatnonzero(direction == name) for name in names]
         place = np.stack([of_name[np.argsort(value[of_name], kind="stable")] for of_name in rows])
-        dims, coords = ("direction", axis), {"direction": np.array(names), axis: value[place[0]]}
+        dims, values, coords = ("direction", axis), value[place[0]], {"direction": np.array(names)}
+    coords[axis] = ((axis,), values, described(axis, manifest))
     codes = {"symmetric": {"absent": -1, "false": 0, "true": 1}}
     variables = {
-        name: xr.Variable(dims, values[place], variable_attributes(name, codes, manifest))
-        for name, values in data.items()
+        name: xr.Variable(dims, column[place], variable_attributes(name, codes, manifest))
+        for name, column in data.items()
     }
     # A row without a side has no section point.
-    for name, values in table_columns(points[points["side"] != ""]).items():
-        if name in (axis, "direction"):
-            coords[f"point_{name}"] = (("point",), values)
+    for name, column in table_columns(points[points["side"] != ""]).items():
+        if name == "direction":
+            coords[f"point_{name}"] = (("point",), column)
+        elif name == axis:
+            coords[f"point_{name}"] = (("point",), column, described(name, manifest))
         elif name not in ("class", "period", "status"):
-            variables[name] = xr.Variable(("point",), values)
+            variables[name] = xr.Variable(("point",), column, described(name, manifest))
     return xr.Dataset(variables, coords, attributes(manifest))

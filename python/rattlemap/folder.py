@@ -39,7 +39,7 @@ def open(folder: str | os.PathLike[str]) -> xr.Dataset:  # noqa: A001
         A map has the dimensions (second axis, first axis) and the values of the axes as coordinates. Its variables are
         the columns of ``cells.npy``. ``class``, ``status`` and ``source`` are text of fixed width. ``word`` and
         ``pattern`` are Python strings that begin with ``w``. Absent values are NaN for floats, 0 for ``period``, -1 for
-        ``symmetric`` and the empty string for words. All quantities are dimensionless.
+        ``symmetric`` and the empty string for words. Quantities have the units of the model.
 
         A list of cells has the dimension ``cell``, with its parameters as coordinates. A basin map has the variable
         ``attractor``, the label of the attractor (-1 without one), and the table of attractors over the dimension

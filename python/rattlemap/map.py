@@ -60,7 +60,7 @@ def map(  # noqa: A001
         Others are not computed. ``docs/scenes.md`` explains them.
     start
         The start of cells at phase 0: ``"rest"``, ``"up"``, ``"down"``, a state ``[x1, v1, x2, v2]``, or some of its
-        components by name.
+        components by name. ``settings={"start.phase": 1.57}`` starts at another phase of the force.
     settings
         Any other setting of a scene by its path: ``{"start.count": 5, "refine.max_error": 0.01}``. ``docs/scenes.md`` lists
         them.
@@ -79,7 +79,7 @@ def map(  # noqa: A001
         Two axes in order. Each is a tuple ``(min, max, count)`` with both ends included, or an array of increasing values.
         Arrays are used exactly; those of ``np.linspace`` differ from tuples in the last digits. Also values of single
         parameters, components of the start, and settings of ``[integration]`` such as ``max_period=32``. An axis of a component
-        of the start (``v1=(-2, 2, 64)``) makes a map of basins. All quantities are dimensionless.
+        of the start (``v1=(-2, 2, 64)``) makes a map of basins. Quantities have the units of the model.
 
     Returns
     -------

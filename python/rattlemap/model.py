@@ -13,7 +13,7 @@ from .toml import assignments
 class Model:
     """An oscillator with walls, and values of its parameters. It is immutable: :meth:`replace` returns another model.
 
-    :func:`gear_pair` and :func:`load_model` return it. All quantities are dimensionless.
+    :func:`gear_pair` and :func:`load_model` return it. Quantities have the units of the model.
     """
 
     __slots__ = ("_model",)
@@ -85,10 +85,10 @@ class Model:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Model):
             return NotImplemented
-        return self.text == other.text and self.parameters == other.parameters
+        return self.text == other.text and self._model.changed == other._model.changed
 
     def __hash__(self) -> int:
-        return hash((self.text, tuple(self.parameters.items())))
+        return hash((self.text, tuple(self._model.changed.items())))
 
     def __repr__(self) -> str:
         changed = "".join(f", {name}={value!r}" for name, value in self._model.changed.items())

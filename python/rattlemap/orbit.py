@@ -22,8 +22,8 @@ _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
 class Orbit:
     """A motion after its transient: its class, its cycle and every event. :func:`orbit` returns it.
 
-    A periodic motion is described over one cycle, any other over its last 8 forcing periods. All quantities are
-    dimensionless.
+    A periodic motion is described over one cycle, any other over its last 8 forcing periods. Quantities have
+    the units of the model, :attr:`units`.
     """
 
     def __init__(self, model: Model, transient: int, periods: int, start: list[float] | None) -> None:
@@ -51,6 +51,11 @@ class Orbit:
     def parameters(self) -> dict[str, float]:
         """The value of every parameter."""
         return dict(self._facts["parameters"])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units by name: parameters, components of the state, the gap and the time ``t``. Empty if the model has none."""
+        return dict(self._facts.get("units", {}))
 
     @property
     def period(self) -> int | None:
@@ -204,6 +209,7 @@ def orbit(
     periods: int = 128,
     transient: int = 400,
     start: Sequence[float] | Mapping[str, float] | None = None,
+    phase: float | None = None,
     **names: float,
 ) -> Orbit:
     """Compute one motion after its transient, like ``rattlemap orbit``.
@@ -221,6 +227,8 @@ def orbit(
         Forcing periods before the first analysis, 1 to 1,000,000,000.
     start
         The state at phase 0: all components, or some by name (the others are 0); by default rest.
+    phase
+        The phase of the force at the start, in radians, 0 by default. It is then phase 0 of the results.
     **names
         Values of parameters; the others keep the values of the model.
 
@@ -248,7 +256,10 @@ def orbit(
         is_whole = isinstance(value, (int, np.integer)) or (isinstance(value, float) and value.is_integer())
         if not is_whole or not least <= value <= most:
             raise SceneError(f"{name} = {value!r}: it must be a whole number from {least} to {most}")
-    model = require_model(model).replace(**scenes.all_names(names, None, parameters))
+    changes = scenes.all_names(names, None, parameters)
+    if phase is not None:
+        changes["start.phase"] = phase
+    model = require_model(model).replace(**changes)
     state = None if start is None else _state(model, start)
     return Orbit(model, int(transient), int(periods), state)
 

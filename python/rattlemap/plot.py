@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,14 +14,27 @@ from . import _native
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
 
 #: Names of cells without a cycle, in the order of legends.
 _WITHOUT_CYCLE = ("chaotic", "undecided", "failed")
 
+#: Units of a width, in inches; smallest and largest width; type size of figures with a width, in points.
+_UNITS = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0, "pt": 1 / 72}
+_WIDTHS = (60 / 25.4 - 1e-9, 300 / 25.4 + 1e-9)
+_POINTS = 7.4
+
 Texts = npt.NDArray[Any]
 
 
-def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int = 16, legend: bool = True) -> Axes:
+def plot(
+    data: xr.Dataset | xr.DataArray,
+    *,
+    ax: Axes | None = None,
+    most: int = 16,
+    legend: bool = True,
+    width: str | None = None,
+) -> Axes:
     """Draw a map whose cells have names, in the colours of the program's figures.
 
     Use ``.plot()`` of xarray for numbers, such as ``ds["lyapunov"]``.
@@ -38,6 +52,9 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
         names share one.
     legend
         Whether to list the names and their shares of the cells.
+    width
+        Width of a new figure, such as ``"85mm"``, also in cm, in or pt. Its text has at least 7 points, and the legend is below
+        the map. Without it the map is drawn on the current figure.
 
     Returns
     -------
@@ -46,7 +63,8 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     Raises
     ------
     ValueError
-        If the data does not have two dimensions, or a Dataset has neither classes nor attractors.
+        If the data does not have two dimensions, a Dataset has neither classes nor attractors, ``width`` is not a length, or both
+        ``width`` and ``ax`` are given.
 
     Examples
     --------
@@ -57,6 +75,7 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     import matplotlib.pyplot as plt
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
+    from matplotlib.text import Text
 
     cells = _cell_names(data) if isinstance(data, xr.Dataset) else data
     if cells.ndim != 2:
@@ -65,15 +84,52 @@ def plot(data: xr.Dataset | xr.DataArray, *, ax: Axes | None = None, most: int =
     colors = [_color(name, place, str(cells.name)) for place, name in enumerate(names)]
     # The type stubs of xarray do not describe the method `plot`.
     image: Any = cells.copy(data=places)
-    axes = plt.gca() if ax is None else ax
+    inches = None if width is None else _inches(width)
+    if inches is None:
+        axes = plt.gca() if ax is None else ax
+    elif ax is not None:
+        raise ValueError("width is for a new figure; give either width or ax, and set the size of your own figure with figsize")
+    else:
+        axes = plt.figure(figsize=(inches, inches), layout="constrained").add_subplot()
     image.plot(ax=axes, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(names) - 0.5, add_colorbar=False)
     axes.set_title("")
     if legend:
         shares = np.bincount(places.ravel(), minlength=len(names)) / max(places.size, 1)
         lines = [f"{_label(name)}  {_percent(share)}" for name, share in zip(names, shares, strict=True)]
         handles = [Patch(facecolor=color, edgecolor="0.4", linewidth=0.5) for color in colors]
-        axes.legend(handles, lines, loc="upper left", bbox_to_anchor=(1.01, 1), title=str(cells.name), fontsize="small")
+        if inches is None:
+            axes.legend(handles, lines, loc="upper left", bbox_to_anchor=(1.01, 1), title=str(cells.name), fontsize="small")
+        else:
+            _legend_below(axes, handles, lines, inches)
+    if inches is not None:
+        for text in axes.figure.findobj(Text):
+            text.set_fontsize(_POINTS)
     return axes
+
+
+def _inches(width: str) -> float:
+    """Return a width in inches."""
+    length = re.fullmatch(r"\s*([0-9.]+)\s*(mm|cm|in|pt)\s*", width)
+    try:
+        inches = float(length[1]) * _UNITS[length[2]] if length else 0.0
+    except ValueError:
+        inches = 0.0
+    if not _WIDTHS[0] <= inches <= _WIDTHS[1]:
+        raise ValueError(f'width={width!r}: it must be a length from 60 mm to 300 mm with its unit, such as "85mm"')
+    return inches
+
+
+def _legend_below(axes: Axes, handles: list[Patch], lines: list[str], inches: float) -> None:
+    """Draw the legend below the map, and make the figure higher by its height. Long words are cut in the middle."""
+    # In millimetres: a patch with its margins, and a character.
+    patch, character, page = 12, 1.7, inches * 25.4
+    most = int((page - patch) / character)
+    lines = [line if len(line) <= most else f"{line[: most - 12]}…{line[-11:]}" for line in lines]
+    columns = max(1, int(page / (character * max(map(len, lines)) + patch)))
+    rows = -(-len(lines) // columns)
+    figure: Any = axes.figure
+    figure.legend(handles, lines, loc="outside lower center", ncols=columns, fontsize=_POINTS, frameon=False)
+    figure.set_figheight(inches + rows * 1.5 * _POINTS / 72)
 
 
 def _cell_names(ds: xr.Dataset) -> xr.DataArray:

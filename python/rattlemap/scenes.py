@@ -100,6 +100,7 @@ def _of_keywords(
     native = model._model
     parameters, components = model.parameters, model.state_names
     fixed: toml.Table = dict(native.changed)
+    phase = fixed.pop("start.phase", None)
     swept: list[toml.Table] = []
     integration: toml.Table = {}
     states: dict[str, float] = {}
@@ -129,6 +130,8 @@ def _of_keywords(
         document["cells"] = {"file": "cells.csv"}
     document["integration"] = integration
     document["start"] = _start_table(model, start, states)
+    if phase is not None:
+        document["start"]["phase"] = phase
     document["outputs"] = {} if quantities is None else {"quantities": _list_of(quantities)}
     for path, value in settings.items():
         _put(document, path, value)

@@ -49,6 +49,11 @@ class Validation:
     failure: str | None
     data: dict[str, Any] = field(repr=False)
 
+    @property
+    def verdict(self) -> str:
+        """Conclusion of the validation: whether the map stands, and the rate of wrong cells."""
+        return self.data["verdict"]
+
 
 def validate(
     folder: str | os.PathLike[str], samples: int = 400, seed: int = 1, *, progress: bool | Report = True

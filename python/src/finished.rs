@@ -86,7 +86,7 @@ pub(crate) fn validate(
         let (lanes, count) = (lanes?, job.sample_count());
         let report = |done| observer.progress(done, count);
         let Some(validation) = job.replay(&lanes, &report, watch.halt()) else { return Ok(None) };
-        let written = job.write(&lanes, &validation, clock.elapsed())?;
+        let written = job.write(&job.validated(&lanes, &validation), clock.elapsed())?;
         let failure = job.require_valid(&validation, &written).err().map(|error| error.to_string());
         Ok(Some((failure, observer.lines())))
     })

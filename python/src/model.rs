@@ -92,7 +92,7 @@ impl Model {
         Ok(values)
     }
 
-    /// Parameter values that differ from the defaults.
+    /// Parameter values that differ from the defaults, and `start.phase` if it is not 0.
     #[getter]
     fn changed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
@@ -102,6 +102,9 @@ impl Model {
                 values.set_item(&*parameter.name, value)?;
             }
         }
+        if self.model.start_phase() != 0.0 {
+            values.set_item("start.phase", self.model.start_phase())?;
+        }
         Ok(values)
     }
 
@@ -110,8 +113,10 @@ impl Model {
     fn meanings(&self) -> Vec<(String, String, String, Option<f64>)> {
         let parameters = self.model.parameters().iter();
         let meanings = parameters.map(|parameter| {
+            let unit = parameter.unit.as_ref().map_or(String::new(), |unit| format!(" [{unit}]"));
+            let meaning = format!("{}{unit}", parameter.meaning);
             let range = parameter.range.requirement().into_owned();
-            (parameter.name.to_string(), parameter.meaning.to_string(), range, parameter.default)
+            (parameter.name.to_string(), meaning, range, parameter.default)
         });
         meanings.collect()
     }

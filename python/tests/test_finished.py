@@ -41,6 +41,7 @@ def test_a_validation_is_the_programs(program: Program, tmp_path: Path) -> None:
     data, expected = (json.loads((tmp_path / name / "validation.json").read_text()) for name in ("python", "program"))
     assert data == expected == found.data
     assert (found.samples, found.faults) == (data["samples"], [])
+    assert found.verdict == data["verdict"] and found.verdict.startswith("The map stands: 0 of ")
     assert found.strata.index.tolist() == [stratum["name"] for stratum in data["strata"]]
     first = data["strata"][0]
     row = found.strata.iloc[0]

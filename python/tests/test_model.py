@@ -32,3 +32,24 @@ def test_errors_name_the_remedy(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text('name = "mine"\n')
     with pytest.raises(rm.ModelError, match="mine.toml"):
         rm.load_model(tmp_path / "mine.toml")
+
+
+def test_units_of_a_model_are_attributes(tmp_path: Path) -> None:
+    text = rm.load_model("bilinear").text.replace('name = "bilinear"', 'name = "mine"')
+    text = text.replace('meaning = "damping ratio"', 'meaning = "damping", unit = "kg/s"')
+    text = text.replace("[motion]", '[motion]\nunits = ["mm"]\ntime_unit = "s"')
+    (tmp_path / "mine.toml").write_text(text)
+    model = rm.load_model(tmp_path / "mine.toml")
+    assert "zeta = 0.05: damping [kg/s]; " in model.help
+    assert rm.orbit(model).units == {"zeta": "kg/s", "x": "mm", "v": "mm/s", "z": "mm", "w": "mm/s", "t": "s"}
+    line = rm.bifurcation(model, zeta=(0.1, 0.2, 2))
+    for name, meaning, unit in (
+        ("zeta", "damping", "kg/s"),
+        ("point_zeta", "damping", "kg/s"),
+        ("x", "displacement", "mm"),
+        ("v_before", "velocity before the event", "mm/s"),
+    ):
+        assert line[name].attrs == {"long_name": meaning, "units": unit}, name
+    basins = rm.map(model, x=(-1, 1, 2), omega=(1.0, 1.1, 2), engine="cpu")
+    assert basins["x"].attrs == {"long_name": "displacement", "units": "mm"}
+    assert basins["omega"].attrs == {"long_name": "excitation frequency"}

@@ -68,6 +68,18 @@ def test_orbits_of_other_models_and_states_by_name(program: Program) -> None:
     assert rm.orbit(model, start=[0, 0.5]).events["before"].shape[1] == 2
 
 
+def test_an_orbit_can_start_at_another_phase(program: Program) -> None:
+    printed = program("orbit", "--set", "e=0.605", "--set", "omega=5.6", "--set", "start.phase=1.5", "--json")
+    orbit = rm.orbit(rm.gear_pair(), e=0.605, omega=5.6, phase=1.5)
+    assert orbit.to_dict() == json.loads(printed.stdout) and orbit.to_dict()["start_phase"] == 1.5
+    assert pickle.loads(pickle.dumps(orbit)).model == orbit.model != rm.gear_pair(e=0.605, omega=5.6)
+    axes = {"e": (0.6, 0.7, 2), "omega": (5.5, 5.6, 2)}
+    by_model = rm.map(rm.gear_pair().replace(**{"start.phase": 1.5}), axes=axes, engine="cpu")
+    by_setting = rm.map(rm.gear_pair(), axes=axes, engine="cpu", settings={"start.phase": 1.5})
+    assert by_model.equals(by_setting)
+    assert not by_model.equals(rm.map(rm.gear_pair(), axes=axes, engine="cpu"))
+
+
 def test_errors_name_the_remedy() -> None:
     with pytest.raises(rm.SceneError, match="it must be between 0 and 1"):
         rm.orbit(rm.gear_pair(), e=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -11,6 +12,7 @@ import rattlemap as rm
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
+from matplotlib.text import Text
 
 
 @pytest.fixture(scope="module")
@@ -78,3 +80,34 @@ def test_attractors_and_single_variables(ds: xr.Dataset, axes: Axes) -> None:
         rm.plot(ds["class"].isel(e=0), ax=axes)
     with pytest.raises(ValueError, match="neither"):
         rm.plot(ds.drop_vars("class"), ax=axes)
+
+
+def test_a_figure_of_a_given_width_holds_all_its_texts_in_type_of_seven_points(ds: xr.Dataset) -> None:
+    for data, width in [(ds, "85mm"), (ds["pattern"], "85mm"), (ds, "180mm")]:
+        axes = rm.plot(data, width=width)
+        figure: Any = axes.figure
+        figure.canvas.draw()
+        page = figure.bbox
+        assert page.width / figure.dpi * 25.4 == pytest.approx(float(width[:-2]))
+        # Matplotlib keeps labels of ticks beyond the axes, and does not draw them.
+        drawn: list[Text] = []
+        for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            drawn += [tick.label1 for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+        drawn += [*figure.legends[0].get_texts(), axes.xaxis.label, axes.yaxis.label]
+        for text in figure.findobj(Text):
+            assert not text.get_text() or text.get_fontsize() >= 7, text
+            if text in drawn:
+                box = text.get_window_extent()
+                assert box.x0 >= 0 and box.x1 <= page.x1 and box.y0 >= 0 and box.y1 <= page.y1, (text, box, page)
+        assert len(figure.legends) == 1
+        plt.close("all")
+    assert not rm.plot(ds, width="85mm", legend=False).figure.legends
+    plt.close("all")
+
+
+def test_a_wrong_width_is_refused(ds: xr.Dataset, axes: Axes) -> None:
+    for width in ("85", "85 m", "5mm", "1.2.3mm"):
+        with pytest.raises(ValueError, match="a length from 60 mm"):
+            rm.plot(ds, width=width)
+    with pytest.raises(ValueError, match="either width or ax"):
+        rm.plot(ds, ax=axes, width="85mm")

@@ -4,17 +4,19 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::cli::failure::Failure;
 use crate::cli::say;
 use crate::gpu::Precision;
 use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
-use crate::map::scene::{Along, Format};
+use crate::map::scene::{Along, FigureStyle, Format, toml};
 use crate::map::shard::Shard;
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
 use crate::store::inventory::figure_formats;
 use crate::text::printable::is_printable;
 use crate::text::shell::quoted;
 use crate::validate::DEFAULT_SAMPLES;
-use clap::error::ContextValue;
+use anyhow::anyhow;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use rattlemap_dynamics::model::{REST, State};
@@ -28,7 +30,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("RATTLEMAP_C
 /// Between contacts the motion follows the exact solution, and every contact is located to rounding error. Each motion is
 /// described by its class, period, word (the sequence of its flights) and Lyapunov exponent.
 ///
-/// All quantities are dimensionless.
+/// Quantities have the units of the model; those of the gear pair are dimensionless.
 ///
 /// Exit codes: 0 done; 1 the run or a validation failed; 2 wrong usage or scene, nothing was computed; 130 interrupted by
 /// Ctrl-C; 143 by SIGTERM.
@@ -58,6 +60,7 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
 pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
     P::try_parse_from(arguments).map_err(|mut error| {
         if error.use_stderr() {
+            advise_set(&mut error);
             quote(&mut error);
             // Colours are removed, because a quoted argument could contain some.
             say::notes(error.render().to_string().trim_end());
@@ -67,6 +70,25 @@ pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsStrin
         }
         error.exit_code() as u8
     })
+}
+
+/// Adds advice to the error for an argument `NAME=VALUE` without `--set`.
+fn advise_set(error: &mut clap::Error) {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        Some(ContextValue::StyledStr(text)) => Some(text.to_string()),
+        _ => None,
+    };
+    let (argument, usage) = (text(ContextKind::InvalidArg), text(ContextKind::Usage));
+    let sets = ["map", "bifurcation", "orbit"].map(|command| format!("rattlemap {command} "));
+    let takes_sets = usage.is_some_and(|usage| sets.iter().any(|command| usage.contains(command)));
+    let is_assignment = |argument: &String| !argument.starts_with('-') && argument.contains('=');
+    if let (ErrorKind::UnknownArgument, Some(argument), true) =
+        (error.kind(), argument.filter(is_assignment), takes_sets)
+    {
+        let advice = format!("a parameter is set by an option: --set {argument}");
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
+    }
 }
 
 /// Escapes arguments that an error quotes.
@@ -151,6 +173,9 @@ pub(crate) struct BenchOptions {
     /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long)]
     pub(crate) force: bool,
+
+    #[command(flatten)]
+    pub(crate) figure: FigureOptions,
 
     /// Use tiny maps, to check that everything works. The measured speeds are meaningless
     #[arg(long)]
@@ -288,6 +313,9 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
 
+    #[command(flatten)]
+    pub(crate) figure: FigureOptions,
+
     /// Print only errors and warnings
     #[arg(long)]
     pub(crate) quiet: bool,
@@ -298,6 +326,64 @@ impl SceneOptions {
     pub(crate) fn out(&self) -> PathBuf {
         let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
         self.out.clone().unwrap_or_else(default)
+    }
+}
+
+/// Appearance of figures.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct FigureOptions {
+    /// Width of figures, 60mm to 300mm, in mm, cm, in or pt. All type then has at least 7.4 points, or the size of --font-size.
+    /// PNG files have 600 dots per inch. Example: --width 85mm
+    #[arg(long, value_name = "LENGTH", value_parser = width, allow_hyphen_values = true)]
+    width: Option<String>,
+
+    /// Size of tick labels and legends in points, 7 to 24; the width must be at least 21 times as large
+    #[arg(long, value_name = "POINTS", value_parser = font_size, allow_hyphen_values = true)]
+    font_size: Option<f64>,
+
+    /// Title of figures, instead of their own; --title "" removes the heading
+    #[arg(long, value_name = "TEXT")]
+    title: Option<String>,
+
+    /// Draw figures without legends and colour bars
+    #[arg(long)]
+    no_legend: bool,
+}
+
+fn width(text: &str) -> Result<String, String> {
+    FigureStyle::width(text).map(|_| text.trim().to_owned()).map_err(|reason| format!("it must be {reason}"))
+}
+
+fn font_size(text: &str) -> Result<f64, String> {
+    let size = text.trim().parse().unwrap_or(f64::NAN);
+    FigureStyle::font_size(size).map_err(|reason| format!("it must be {reason}"))
+}
+
+impl FigureOptions {
+    /// The `--set` arguments with the same effect.
+    pub(crate) fn sets(&self) -> Vec<String> {
+        let width = self.width.as_ref().map(|width| format!("figure.width={}", toml(width)));
+        let font_size = self.font_size.map(|size| format!("figure.font_size={size:?}"));
+        let title = self.title.as_ref().map(|title| format!("figure.title={}", toml(title)));
+        let legend = self.no_legend.then(|| "figure.legend=false".to_owned());
+        [width, font_size, title, legend].into_iter().flatten().collect()
+    }
+
+    /// The style of the figures.
+    ///
+    /// # Errors
+    /// A text that names the option and the remedy.
+    pub(crate) fn style(&self) -> Result<FigureStyle, Failure> {
+        let style = FigureStyle {
+            width: self.width.as_deref().and_then(|text| FigureStyle::width(text).ok()),
+            font_size: self.font_size,
+            title: self.title.clone(),
+            legend: !self.no_legend,
+        };
+        match style.check() {
+            Ok(()) => Ok(style),
+            Err(reason) => Err(Failure::Usage(anyhow!("--font-size: it must be {reason}"))),
+        }
     }
 }
 
@@ -400,7 +486,8 @@ pub(crate) struct Orbit {
     pub(crate) model: String,
 
     /// Set a parameter of the model; the others keep the model's defaults. The gear pair has the parameters m1 m2 r1 r2 k1 k2
-    /// r k F omega b e mesh_speed, with the values of the paper's Table 1 and e = 0.605. May be repeated
+    /// r k F omega b e mesh_speed, with the values of the paper's Table 1 and e = 0.605. start.phase=P starts at the phase P of
+    /// the force, in radians, instead of 0; this is then phase 0. May be repeated
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 
@@ -437,6 +524,9 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', requires = "out")]
     pub(crate) format: Vec<FigureFormat>,
 
+    #[command(flatten)]
+    pub(crate) figure: FigureOptions,
+
     /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long, requires = "out")]
     pub(crate) force: bool,
@@ -456,7 +546,8 @@ fn state(text: &str) -> Result<StartState, String> {
         Some(&[x, v]) => Ok(StartState { state: [x, v, 0.0, 0.0], count: 2 }),
         Some(&[x1, v1, x2, v2]) => Ok(StartState { state: [x1, v1, x2, v2], count: 4 }),
         _ => Err(
-            "it must be four finite numbers, such as 0.1,0,-0.2,1.5, or two for a model of one coordinate"
+            "it must be finite numbers: two, such as 0.1,0, for a model of one coordinate; four, such as \
+             0.1,0,-0.2,1.5, for a model of two"
                 .to_owned(),
         ),
     }
@@ -622,6 +713,9 @@ pub(crate) struct Compare {
     /// Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<FigureFormat>,
+
+    #[command(flatten)]
+    pub(crate) figure: FigureOptions,
 
     /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long)]

@@ -34,6 +34,7 @@ const CHECK_SHARE: f64 = 0.15;
 
 /// Measures every engine, writes the folder after each, and prints a summary.
 pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
+    let style = ask.run.figure.style()?;
     let adapters = pollster::block_on(gpu::adapters());
     let adapters = match &ask.adapter {
         Some(wanted) => wanted.among(&adapters).map_err(|error| Failure::Usage(error.into()))?,
@@ -53,7 +54,7 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
             Ok(series) => {
                 all.push(series);
                 // If the run is stopped, the results of the finished engines remain.
-                files = table::write(&folder, &all, f64::from(ask.budget))?.to_vec();
+                files = table::write(&folder, &all, f64::from(ask.budget), &style)?.to_vec();
             }
             Err(error) => note(ask, &format!("{} is left out: {error:#}", target.label())),
         }

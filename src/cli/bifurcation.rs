@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::Class;
 
 use super::arguments::{Bifurcation, FigureFormat};
@@ -29,7 +30,7 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     let file = SceneFile { purpose: Purpose::Bifurcation, along, ..SceneFile::map(&options.scene) };
     let (out, figures) = (arguments.out(), FigureFormat::scene(&options.format));
     let stored = if figures.is_empty() { Vec::new() } else { figure_formats(&out, "bifurcation") };
-    let sets = file.with_formats(options.set.clone(), &figures, &stored)?;
+    let sets = file.with_formats([options.set.clone(), options.figure.sets()].concat(), &figures, &stored)?;
     let scene = file.load(&sets)?;
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(options.quiet)?;
@@ -103,8 +104,8 @@ fn described(found: &Hysteresis, name: &str) -> String {
 
 fn listed(ranges: &[[f64; 2]]) -> String {
     let range = |[first, last]: &[f64; 2]| match first == last {
-        true => format!("{first:?}"),
-        false => format!("{first:?} to {last:?}"),
+        true => significant(*first),
+        false => format!("{} to {}", significant(*first), significant(*last)),
     };
     let mut list: Vec<String> = ranges.iter().take(LISTED_RANGES).map(range).collect();
     if ranges.len() > LISTED_RANGES {

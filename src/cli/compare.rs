@@ -21,6 +21,7 @@ use crate::store::folder::Folder;
 /// Reads both maps, compares them, and writes the result.
 pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let clock = Instant::now();
+    let style = arguments.figure.style()?;
     let interrupt = Interrupt::listen(arguments.quiet)?;
     let job = CompareJob::open([&arguments.a, &arguments.b])?;
     let out = arguments.out(job.names());
@@ -34,7 +35,7 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let cells = result.cells();
     let pair = result.pair(&cells);
     let formats = FigureFormat::added(&arguments.format, folder.path(), "compare");
-    let files = store::compare::write(&folder, &pair, &formats, clock.elapsed())?;
+    let files = store::compare::write(&folder, &pair, (&formats, &style), clock.elapsed())?;
     if !arguments.quiet {
         let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
         say::notes(format_args!("{}\n{files}", summary(&pair, job.scene())));

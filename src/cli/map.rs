@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     let list_copy = resume.then(|| out.join(LIST));
     let file = SceneFile { list_copy: list_copy.as_deref(), ..SceneFile::map(&options.scene) };
     let sets = file.with_formats(
-        options.set.clone(),
+        [options.set.clone(), options.figure.sets()].concat(),
         &FigureFormat::scene(&options.format),
         &formats_of_folder(arguments, &out),
     )?;

@@ -21,6 +21,7 @@ use crate::store::orbit::OrbitRequest;
 
 /// Computes the motion, prints it, and writes its folder if there is one.
 pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
+    let style = arguments.figure.style()?;
     let model = model_choice::find(&arguments.model)?;
     if let Some(start) = &arguments.start {
         model_choice::check_components(&model, start.count)?;
@@ -52,7 +53,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     if let Some(folder) = folder {
         let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
         let formats = FigureFormat::added(&arguments.format, folder.path(), "orbit");
-        let files = store::orbit::write(&folder, &*model, &orbit, &request, &formats)?;
+        let files = store::orbit::write(&folder, &*model, &orbit, &request, (&formats, &style))?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
         say::removed(&folder);
     }

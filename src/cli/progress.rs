@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 use std::io::{IsTerminal, stderr};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -19,8 +19,8 @@ const TICK: Duration = Duration::from_secs(1);
 pub enum Progress {
     /// Reports nothing.
     Quiet,
-    /// Draws a bar on a terminal.
-    Bar(ProgressBar),
+    /// Draws a bar on a terminal. The number is the largest that was reported as done.
+    Bar(ProgressBar, Mutex<usize>),
     /// Prints lines into a pipe or a log.
     Lines(Lines),
 }
@@ -34,8 +34,8 @@ pub struct Lines {
     from: usize,
     /// Start of this run.
     clock: Instant,
-    /// Number of lines that are due or printed.
-    printed: AtomicUsize,
+    /// Largest number of units that were reported as done, and number of lines that are printed.
+    reported: Mutex<[usize; 2]>,
 }
 
 impl Progress {
@@ -50,41 +50,35 @@ impl Progress {
             return Progress::Quiet;
         }
         if !stderr().is_terminal() {
-            let (clock, printed) = (Instant::now(), AtomicUsize::new(from * LINES / total));
-            return Progress::Lines(Lines { unit, grows, from, clock, printed });
+            let (clock, reported) = (Instant::now(), Mutex::new([from, from * LINES / total]));
+            return Progress::Lines(Lines { unit, grows, from, clock, reported });
         }
         let style = ProgressStyle::with_template(&template(grows, unit));
         let style = style.unwrap_or_else(|_| ProgressStyle::default_bar()).with_key("rate", write_rate);
         let bar = ProgressBar::new(total as u64).with_position(from as u64).with_style(style);
         bar.reset_eta();
         bar.enable_steady_tick(TICK);
-        Progress::Bar(bar)
+        Progress::Bar(bar, Mutex::new(from))
     }
 
     /// Reports that `done` of `total` units are done. Threads may call it in any order. The total may grow.
     pub fn report(&self, done: usize, total: usize) {
         match self {
             Progress::Quiet => {}
-            Progress::Bar(bar) => {
+            Progress::Bar(bar, most) => {
                 bar.set_length(total as u64);
-                if done as u64 > bar.position() {
-                    bar.set_position(done as u64);
-                }
+                let mut most = most.lock().unwrap_or_else(PoisonError::into_inner);
+                *most = done.max(*most);
+                bar.set_position(*most as u64);
             }
-            Progress::Lines(lines) => {
-                // After the total has grown, the same share can be reached again.
-                let part = done * LINES / total;
-                if lines.printed.swap(part, Ordering::Relaxed) < part {
-                    say::note(lines.text(done, total, lines.clock.elapsed()));
-                }
-            }
+            Progress::Lines(lines) => lines.report(done, total, say::note),
         }
     }
 
     /// Removes the bar while `print` prints.
     pub fn suspend(&self, print: impl FnOnce()) {
         match self {
-            Progress::Bar(bar) => bar.suspend(print),
+            Progress::Bar(bar, _) => bar.suspend(print),
             Progress::Quiet | Progress::Lines(_) => print(),
         }
     }
@@ -93,7 +87,7 @@ impl Progress {
     pub fn finish(&self, line: &str) {
         match self {
             Progress::Quiet => {}
-            Progress::Bar(bar) => {
+            Progress::Bar(bar, _) => {
                 bar.finish_and_clear();
                 say::notes(line);
             }
@@ -119,6 +113,22 @@ fn rate(per_second: f64) -> String {
 }
 
 impl Lines {
+    /// Prints a line if a further tenth of the total is done. The lock keeps lines in order.
+    fn report(&self, done: usize, total: usize, print: impl FnOnce(String)) {
+        let mut reported = self.reported.lock().unwrap_or_else(PoisonError::into_inner);
+        let [most, printed] = *reported;
+        if done < most {
+            // Another thread has reported more.
+            return;
+        }
+        // After the total has grown, the same share can be reached again.
+        let part = done * LINES / total;
+        *reported = [done, part];
+        if printed < part {
+            print(self.text(done, total, self.clock.elapsed()));
+        }
+    }
+
     fn text(&self, done: usize, total: usize, elapsed: Duration) -> String {
         let unit = self.unit;
         let at_least = if self.grows { "at least " } else { "" };
@@ -137,10 +147,26 @@ impl Lines {
 mod tests {
     use super::*;
 
+    fn lines(grows: bool) -> Lines {
+        Lines { unit: "cells", grows, from: 0, clock: Instant::now(), reported: Mutex::new([0, 0]) }
+    }
+
     fn text(grows: bool, done: usize) -> String {
-        let lines =
-            Lines { unit: "cells", grows, from: 0, clock: Instant::now(), printed: AtomicUsize::new(0) };
-        lines.text(done, 400, Duration::from_secs(10))
+        lines(grows).text(done, 400, Duration::from_secs(10))
+    }
+
+    #[test]
+    fn progress_never_runs_backwards() {
+        let (lines, mut printed) = (lines(true), Vec::new());
+        let mut report = |done, total| lines.report(done, total, |line| printed.push(line));
+        // Threads report in any order. The last total is larger, so a share of 4 tenths is reached twice.
+        for (done, total) in [(9, 100), (41, 100), (20, 100), (40, 100), (45, 100), (50, 200), (80, 200)] {
+            report(done, total);
+        }
+        assert_eq!(
+            printed,
+            [(41, 100), (80, 200)].map(|(done, total)| format!("{done} of at least {total} cells"))
+        );
     }
 
     #[test]

@@ -193,6 +193,12 @@ impl Basins {
         &self.list
     }
 
+    /// Returns the strobe states of all periodic attractors.
+    pub fn strobes(&self) -> impl Iterator<Item = &State> {
+        let cycles = self.groups.iter().flat_map(|group| group.catalogue.cycles().iter().zip(&group.labels));
+        cycles.filter(|(_, label)| **label != NONE).flat_map(|(entry, _)| &entry.cycle.points)
+    }
+
     /// Returns the label of the attractor that another record of the cell `id` shows; none if the record is undecided
     /// or shows none of the map's attractors.
     pub fn label(&self, id: usize, record: &Record) -> Option<u16> {

@@ -38,6 +38,8 @@ pub struct Constants {
     pub contacts: [Contact; 2],
     /// Whether a wall exists and is elastic or rigid.
     pub(super) has_elastic_or_rigid_wall: bool,
+    /// Whether the force has a sine.
+    pub(super) has_sine: bool,
     coordinates: Coordinates,
 }
 
@@ -71,6 +73,7 @@ impl Constants {
             degrees: oscillator.degrees as u32,
             contacts: oscillator.contacts,
             has_elastic_or_rigid_wall: has_elastic_or_rigid_wall(oscillator),
+            has_sine: has_sine(oscillator),
             coordinates,
         };
         constants.flow = Flow {
@@ -133,6 +136,11 @@ pub fn has_elastic_or_rigid_wall(oscillator: &model::Oscillator) -> bool {
     walls.any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite())
 }
 
+/// Whether the force has a sine.
+pub fn has_sine(oscillator: &model::Oscillator) -> bool {
+    oscillator.force_sin != [0.0; 2]
+}
+
 /// Returns the motion without contacts. With one displacement it may be known only by its rest position.
 fn non_impacting(oscillator: &model::Oscillator) -> Option<model::NonImpacting> {
     let beside_rest = || {
@@ -179,8 +187,8 @@ fn free_rate(oscillator: &model::Oscillator) -> f64 {
 
 /// Returns the accelerations of the gap and of the other displacement in units of a step `h`, with the gap measured
 /// from `wall`.
-fn rows(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64, h: f64) -> [[f64; 6]; 2] {
-    let equations = Coordinates::new(oscillator).equations(domain, oscillator.force, wall);
+fn rows(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64, h: f64) -> [[f64; 7]; 2] {
+    let equations = Coordinates::new(oscillator).equations(oscillator, domain, wall);
     [0, 1].map(|i| {
         let (k, c) = (equations.stiffness[i], equations.damping[i]);
         [
@@ -188,8 +196,9 @@ fn rows(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64, h: f6
             -c[0] * h,
             -k[1] * h * h,
             -c[1] * h,
-            equations.force[i] * h * h,
+            equations.cos[i] * h * h,
             equations.load[i] * h * h,
+            equations.sin[i] * h * h,
         ]
     })
 }
@@ -253,12 +262,12 @@ fn springs(oscillator: &model::Oscillator, side: Side, h: f64) -> [f64; 2] {
 fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
     let kick = Coordinates::new(oscillator).kick();
     let [gap, other] = rows(oscillator, &oscillator.free, wall, h);
-    let shared: [f64; 6] = std::array::from_fn(|j| other[j] + kick * gap[j]);
-    let x_row = [0.0, 0.0, shared[2], shared[3], shared[4], shared[5]];
+    let shared: [f64; 7] = std::array::from_fn(|j| other[j] + kick * gap[j]);
+    let x_row = [0.0, 0.0, shared[2], shared[3], shared[4], shared[5], shared[6]];
     let angle = oscillator.omega * h;
     Domain {
-        step: step(&[0.0; 6], &x_row, angle),
-        gap_row: [0.0; 6],
+        step: step(&[0.0; 7], &x_row, angle),
+        gap_row: [0.0; 7],
         x_row,
         // Twice the energy of a derivative of x per mass: factors of its rate squared and of itself squared.
         energy: [0.0, 0.0, 1.0, 0.0, 0.0, (-shared[2]).max(0.0)],
@@ -273,12 +282,12 @@ fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
 }
 
 /// Returns the first four rows of `exp(G) - 1` for the generator G on `(z, z', x, x', cos, sin, 1)`.
-pub(crate) fn step(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> [f64; 28] {
+pub(crate) fn step(gap_row: &[f64; 7], x_row: &[f64; 7], angle: f64) -> [f64; 28] {
     let propagator = propagator(gap_row, x_row, angle);
     std::array::from_fn(|i| propagator[(i / 7, i % 7)])
 }
 
-fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
+fn propagator(gap_row: &[f64; 7], x_row: &[f64; 7], angle: f64) -> Generator {
     let mut g = Generator::zeros();
     g[(0, 1)] = 1.0;
     g[(2, 3)] = 1.0;
@@ -286,6 +295,8 @@ fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
         for j in 0..5 {
             g[(i, j)] = row[j];
         }
+        // A missing sine is +0, whatever the signs of the factors.
+        g[(i, 5)] = row[6] + 0.0;
         g[(i, 6)] = row[5];
     }
     g[(4, 5)] = -angle;
@@ -304,7 +315,7 @@ fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
 /// grows by the force alone. With `c^2 = g M^-1 g`:
 ///
 /// ```text
-/// |z^(n+1)| <= c sqrt(2 E_n),   d sqrt(2 E_n) / dt <= omega^n sqrt(force M^-1 force).
+/// |z^(n+1)| <= c sqrt(2 E_n),   d sqrt(2 E_n) / dt <= omega^n sqrt(force M^-1 force + force_sin M^-1 force_sin).
 /// ```
 ///
 /// The result is the form `c^2 2 E` on `(w^2, w v, v^2, z^2, z x, x^2)`, and the growth of its root per step without
@@ -315,7 +326,8 @@ fn gap_bound(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> 
     let kinetic = coordinates.form(oscillator.mass).map(|x| x * compliance);
     let potential = coordinates.form(domain.stiffness).map(|x| x * compliance * h * h);
     let form = [kinetic[0], kinetic[1], kinetic[2], potential[0], potential[1], potential[2]];
-    (form, compliance.sqrt() * coordinates.pull(oscillator.force) * h * h)
+    let pull = coordinates.pull(oscillator.force).hypot(coordinates.pull(oscillator.force_sin));
+    (form, compliance.sqrt() * pull * h * h)
 }
 
 #[cfg(test)]

@@ -11,11 +11,13 @@ pub(super) struct Coordinates {
     other: usize,
 }
 
-/// Second-order form of a domain's equations in `(z, x)`: `y'' = -stiffness y - damping y' + force cos + load`.
+/// Second-order form of a domain's equations in `(z, x)`: `y'' = -stiffness y - damping y' + cos + sin + load`, where `cos`
+/// and `sin` multiply cosine and sine of the phase.
 pub(super) struct Equations {
     pub(super) stiffness: [[f64; 2]; 2],
     pub(super) damping: [[f64; 2]; 2],
-    pub(super) force: [f64; 2],
+    pub(super) cos: [f64; 2],
+    pub(super) sin: [f64; 2],
     pub(super) load: [f64; 2],
 }
 
@@ -84,7 +86,7 @@ impl Coordinates {
     }
 
     /// Returns the equations in `(z, x)`, with the gap measured from `wall`.
-    pub(super) fn equations(&self, domain: &Domain, force: [f64; 2], wall: f64) -> Equations {
+    pub(super) fn equations(&self, oscillator: &Oscillator, domain: &Domain, wall: f64) -> Equations {
         let (o, p) = (self.other, 1 - self.other);
         let [g0, g1] = self.gap;
         // x_p = (z - g_o x_o) / g_p transforms columns, z = g . x transforms rows.
@@ -103,7 +105,8 @@ impl Coordinates {
         let load = projected(domain.load);
         Equations {
             damping: turned(domain.damping),
-            force: projected(force),
+            cos: projected(oscillator.force),
+            sin: projected(oscillator.force_sin),
             load: [load[0] - stiffness[0][0] * wall, load[1] - stiffness[1][0] * wall],
             stiffness,
         }

@@ -73,11 +73,15 @@ pub enum GpuError {
         /// Bytes that the adapter allows.
         allowed: u64,
     },
-    /// A flow has a kind of wall that the settings exclude.
-    #[error("flow {flow} has an elastic or a rigid wall, but the settings exclude these walls; set `kinds`")]
+    /// A flow has a feature that the settings exclude.
+    #[error("flow {flow} has {feature}, which the settings exclude; set `{setting}`")]
     NotCompiled {
         /// Index of the flow.
         flow: usize,
+        /// The feature in words.
+        feature: &'static str,
+        /// The setting that includes it.
+        setting: &'static str,
     },
     /// A lane refers to a flow or a law that is not in the tables.
     #[error("lane {lane} refers to flow {flow} and law {law}, but there are {flows} flows and {laws} laws")]

@@ -51,8 +51,8 @@ structs! {
     /// One linear domain in units of its own step.
     Domain of f64 {
         step: [f64; 28],
-        gap_row: [f64; 6],
-        x_row: [f64; 6],
+        gap_row: [f64; 7],
+        x_row: [f64; 7],
         energy: [f64; 6],
         growth: f64,
         angle: f64,
@@ -74,7 +74,7 @@ structs! {
         steady: [f64; 4],
         contact_free_size: f64,
         transient_growth: f64,
-        pressing: [[f64; 6]; 2],
+        pressing: [[f64; 7]; 2],
         damper: [[f64; 2]; 2],
         springs: [[f64; 2]; 2],
         displacements: [[f64; 2]; 2],

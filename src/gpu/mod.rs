@@ -42,7 +42,7 @@ pub(crate) use adapter::no_adapter;
 pub use adapter::{
     AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
 };
-pub use constants::{Constants, has_elastic_or_rigid_wall};
+pub use constants::{Constants, has_elastic_or_rigid_wall, has_sine};
 pub use error::GpuError;
 pub use pool::Pool;
 pub use precision::Precision;
@@ -110,6 +110,8 @@ pub struct LaneSettings {
     pub chatter: bool,
     /// Whether flows may have elastic or rigid walls.
     pub kinds: bool,
+    /// Whether forces may have a sine.
+    pub sine: bool,
     /// What is measured on lanes whose class is decided.
     pub measures: Option<Measures>,
     /// Whether records contain the largest multiplier of cycles.
@@ -172,6 +174,7 @@ impl Default for LaneSettings {
             symmetry: true,
             chatter: true,
             kinds: true,
+            sine: true,
             measures: None,
             multiplier: false,
             exponent_from: 100,
@@ -405,8 +408,8 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::WrongAnswer`] if the device computes something else; other errors of the device.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
-        let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, chatter, kinds, .. } =
-            *settings;
+        let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, .. } = *settings;
+        let LaneSettings { chatter, kinds, sine, .. } = *settings;
         let keep = self.policy.keep;
         // Where it saves time, lanes run without the tangent vector until they need it.
         let growths: &[bool] = match (exponent, self.policy.late_tangent) {
@@ -426,6 +429,7 @@ impl Gpu {
             symmetry,
             chatter,
             kinds,
+            sine,
             measures: None,
             keep,
         };

@@ -91,8 +91,13 @@ impl Pool {
         if lanes.is_empty() {
             return Ok(());
         }
-        if let Some(flow) = tables.flow_of_another_kind.filter(|_| !self.settings.kinds) {
-            return Err(GpuError::NotCompiled { flow });
+        let LaneSettings { kinds, sine, .. } = self.settings;
+        if let Some(flow) = tables.flow_of_another_kind.filter(|_| !kinds) {
+            let feature = "an elastic or a rigid wall";
+            return Err(GpuError::NotCompiled { flow, feature, setting: "kinds" });
+        }
+        if let Some(flow) = tables.flow_with_sine.filter(|_| !sine) {
+            return Err(GpuError::NotCompiled { flow, feature: "a force with a sine", setting: "sine" });
         }
         self.make_room(gpu, lanes.len()).await?;
         // A few lanes had long dispatches; with many more lanes the same dispatches would take longer in proportion.

@@ -31,6 +31,8 @@ pub struct Variant {
     pub chatter: bool,
     /// Whether walls may be elastic or rigid.
     pub kinds: bool,
+    /// Whether forces may have a sine.
+    pub sine: bool,
     /// What this variant measures on lanes whose class is decided; none in a variant that decides classes.
     pub measures: Option<Measures>,
     /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
@@ -81,6 +83,7 @@ impl Variant {
             symmetry: true,
             chatter: true,
             kinds: true,
+            sine: true,
             measures: None,
             keep: false,
         }
@@ -118,6 +121,7 @@ impl Variant {
             ("SYMMETRY", self.symmetry),
             ("CHATTER", self.chatter),
             ("KINDS", self.kinds),
+            ("SINE", self.sine),
             ("MEASURE", self.measures.is_some()),
             ("EXTREME", self.measures.is_some_and(|measures| measures.extremes)),
             ("MOMENTS", self.measures.is_some_and(|measures| measures.moments)),

@@ -15,6 +15,8 @@ pub struct Tables {
     pub(super) is_even: Vec<bool>,
     /// Index of a flow with an elastic or a rigid wall, if there is one.
     pub(super) flow_of_another_kind: Option<usize>,
+    /// The first flow whose force has a sine.
+    pub(super) flow_with_sine: Option<usize>,
     pub(super) flows: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
     pub(super) phasors: wgpu::Buffer,
@@ -91,8 +93,9 @@ impl Tables {
         if needed > allowed {
             return Err(GpuError::TooManyFlows { flows, needed, allowed });
         }
-        let is_other = |c: &Option<Constants>| c.as_ref().is_some_and(|c| c.has_elastic_or_rigid_wall);
-        let flow_of_another_kind = constants.iter().position(is_other);
+        let first = |has: fn(&Constants) -> bool| constants.iter().position(|c| c.as_ref().is_some_and(has));
+        let flow_of_another_kind = first(|c| c.has_elastic_or_rigid_wall);
+        let flow_with_sine = first(|c| c.has_sine);
         let make = || Tables {
             flows: upload(gpu, "flows", &tables),
             shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
@@ -101,6 +104,7 @@ impl Tables {
             constants,
             is_even: laws.iter().map(Law::is_symmetric).collect(),
             flow_of_another_kind,
+            flow_with_sine,
         };
         with_error_scopes(gpu, "flows", flows, make).await
     }

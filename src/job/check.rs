@@ -130,7 +130,13 @@ impl CheckedFolder {
         let survey = loaded.survey();
         let has_validation =
             map.manifest().files.iter().any(|file| file.name == VALIDATION) && !lost.contains(&VALIDATION);
-        Ok(map::repair(folder, &loaded.cells(&scene, &survey), &lost, has_validation)?)
+        Ok(map::repair(
+            folder,
+            &loaded.cells(&scene, &survey),
+            &map.manifest().provenance(),
+            &lost,
+            has_validation,
+        )?)
     }
 
     /// Checks that no file is damaged or missing, except the repaired ones. `repaired` is none if no repair was requested.

@@ -13,8 +13,7 @@ use crate::map::scene::{Points, Quantity, Scene};
 use crate::record::Record;
 use crate::show::cells::{Cells, Survey};
 use crate::show::map_pair::{MapPair, MapSide};
-use crate::store::finished_map::{FinishedMap, StoredManifest};
-use crate::store::map::Provenance;
+use crate::store::finished_map::FinishedMap;
 
 /// Two finished maps that can be compared.
 pub struct CompareJob<'a> {
@@ -116,14 +115,12 @@ impl MapComparison<'_> {
     /// The comparison, for tables and figures.
     pub fn pair<'a>(&'a self, cells: &'a [Cells<'a>; 2]) -> MapPair<'a> {
         let sides = [0, 1].map(|i| {
-            let StoredManifest { engine, precision, device, crate_version, commit, .. } =
-                self.job.maps[i].manifest();
+            let manifest = self.job.maps[i].manifest();
             MapSide {
                 name: &self.job.names[i],
                 cells: &cells[i],
-                provenance: Provenance { engine, precision, device },
-                crate_version,
-                commit,
+                provenance: manifest.provenance(),
+                crate_version: &manifest.crate_version,
             }
         });
         MapPair { sides, comparison: &self.comparison }

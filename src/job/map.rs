@@ -27,6 +27,7 @@ use crate::store::finished_map::FinishedMap;
 use crate::store::folder::Folder;
 use crate::store::in_memory;
 use crate::store::inventory::{self, Finding};
+use crate::store::manifest::OWN_COMMIT;
 use crate::store::map::{Provenance, Run};
 use crate::store::record_file::{Identity, RECORDS};
 use crate::store::run_records::{RunRecords, Work};
@@ -297,8 +298,12 @@ impl<'p> MapRun<'p> {
     /// Describes the run for manifests.
     pub fn description(&self) -> Run<'_> {
         let OpenMap { job, engine, opening, .. } = &self.open;
-        let provenance =
-            Provenance { engine: engine.name(), precision: engine.precision(), device: &self.device };
+        let provenance = Provenance {
+            engine: engine.name(),
+            precision: engine.precision(),
+            device: &self.device,
+            commit: OWN_COMMIT,
+        };
         Run {
             opening: *opening,
             elapsed: self.elapsed,

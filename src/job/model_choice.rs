@@ -43,8 +43,9 @@ pub fn check_components(model: &dyn Model, count: usize) -> Result<(), JobError>
     match count == names.len() {
         true => Ok(()),
         false => Err(JobError::Usage(format!(
-            "--start: it must be {number} finite numbers, the model's {}; {count} were given",
-            names.join(", ")
+            "--start: it must be {number} finite numbers, the model's {}; {count} were given, and the model is {}",
+            names.join(", "),
+            model.name()
         ))),
     }
 }

@@ -4,8 +4,10 @@ use std::fmt::Write;
 
 use rattlemap_dynamics::model::{Contact, Model, Parameter, Side};
 use rattlemap_dynamics::orbit::Status;
+use rattlemap_dynamics::word::Word;
 
-use crate::model_file::{FileModel, Wall, WallLaw, factor};
+use crate::model_file::{FileModel, Wall, WallLaw, factor, gap_names};
+use crate::show::symbols::with_unit;
 
 /// Returns the name and a summary of every built-in model.
 pub fn list() -> Vec<(String, String)> {
@@ -26,19 +28,23 @@ pub fn page(model: &FileModel) -> String {
     let _ = writeln!(
         text,
         "\n    The state is {}; the forcing period is 2 pi over {}.",
-        model.state_names().join(", "),
+        components(model).join(", "),
         definition.motion.frequency.text()
     );
     let _ = writeln!(text, "\nContact\n");
     for side in Side::BOTH {
         if let Some(wall) = definition.wall(side) {
-            text += &contact(side, wall);
+            text += &contact(side, wall, gap_names(model));
         }
     }
     let _ = writeln!(text, "\nParameters\n");
-    text += &format!("    {:<11} {:<9} {:<25} {}\n", "symbol", "default", "range", "meaning");
+    let units = model.parameters().iter().filter_map(|parameter| parameter.unit.as_ref());
+    // Without units there is no such column.
+    let width = units.map(|unit| unit.chars().count().max("unit".len()) + 2).max().unwrap_or(0);
+    let unit = |text: &str| format!("{:<width$}", if width > 0 { text } else { "" });
+    text += &format!("    {:<11} {:<9} {}{:<25} {}\n", "symbol", "default", unit("unit"), "range", "meaning");
     for parameter in model.parameters() {
-        text += &line(parameter);
+        text += &line(parameter, &unit(parameter.unit.as_deref().unwrap_or_default()));
     }
     text += &format!(
         "\n{}\n{CLASSES}\n\nStatus: how the integration of a cell ended\n\n",
@@ -52,12 +58,13 @@ pub fn page(model: &FileModel) -> String {
 }
 
 /// Describes a wall and its contact law.
-fn contact(side: Side, wall: &Wall) -> String {
+fn contact(side: Side, wall: &Wall, [z, w]: [&str; 2]) -> String {
     let (name, at) = (if side == Side::Right { "right" } else { "left" }, wall.at.text());
-    let mut text = format!("    The {name} wall is at z = {at}. ");
+    let mut text = format!("    The {name} wall is at {z} = {at}. ");
     match &wall.law {
         WallLaw::Elastic => {
-            text += "There is no impact: the motion continues behind the wall until z returns.\n";
+            let _ =
+                writeln!(text, "There is no impact: the motion continues behind the wall until {z} returns.");
         }
         WallLaw::Impact { restitution, mesh_speed } => {
             let lasts = match mesh_speed.as_number() {
@@ -66,20 +73,21 @@ fn contact(side: Side, wall: &Wall) -> String {
             };
             let _ = writeln!(
                 text,
-                "An impact multiplies the rate w by -{}, with an\n    impulse along the gap row. After the impact the contact is sustained if {lasts}\n    and the load \
-                 presses the gap to the wall; otherwise the motion is free again. A contact at\n    w = 0 is \
+                "An impact multiplies the rate {w} by -{}, with an\n    impulse along the gap row. After the impact the contact is sustained if {lasts}\n    and the load \
+                 presses the gap to the wall; otherwise the motion is free again. A contact at\n    {w} = 0 is \
                  grazing if the load pulls the gap off the wall: nothing happens.",
                 factor(restitution)
             );
             text += match wall.contact() {
-                Contact::Rigid => {
-                    "    In a sustained contact z and w are fixed until the load pulls the gap off the wall.\n"
-                }
-                _ => {
-                    "    In a sustained contact the motion continues behind the wall until z returns to it; the state \
-                     stays continuous.\n"
-                }
-            };
+                Contact::Rigid => format!(
+                    "    In a sustained contact {z} and {w} are fixed until the load pulls the gap off the wall.\n"
+                ),
+                _ => format!(
+                    "    In a sustained contact the motion continues behind the wall until {z} returns to it; the \
+                     state stays continuous.\n"
+                ),
+            }
+            .as_str();
         }
     }
     text
@@ -100,13 +108,33 @@ fn words([right, left]: [bool; 2]) -> String {
         .into_iter()
         .filter(|(is_there, _)| *is_there)
         .for_each(|(_, line)| text += &format!("        {line}\n"));
-    text + READING
+    let example = Word::cyclic(match (left, right) {
+        (true, true) => b"13554622",
+        (false, _) => b"1222",
+        (true, false) => b"4555",
+    });
+    let (word, literature) = (example.time_order(), example.paper_notation());
+    let pattern = example.pattern().time_order();
+    text += &format!(
+        "    A word is the cyclic sequence of a cycle's flights in order of time, rotated to the smallest number: {word}.\n    \
+         The literature composes maps from right to left, with powers: {literature} is the same cycle.\n    \
+         Its pattern, {pattern}, writes repeated symbols once: it leaves out the number of bounces before a sustained \
+         contact.\n"
+    );
+    text
 }
 
-fn line(parameter: &Parameter) -> String {
+/// Returns the components of the state with their units.
+fn components(model: &FileModel) -> Vec<String> {
+    let units = model.units();
+    let names = model.state_names().into_iter().enumerate();
+    names.map(|(i, name)| with_unit(name, units.component(i).as_deref())).collect()
+}
+
+fn line(parameter: &Parameter, unit: &str) -> String {
     let default = parameter.default.map_or("-".to_owned(), |value| value.to_string());
     let Parameter { name, meaning, range, .. } = parameter;
-    format!("    {name:<11} {default:<9} {:<25} {meaning}\n", range.requirement())
+    format!("    {name:<11} {default:<9} {unit}{:<25} {meaning}\n", range.requirement())
 }
 
 /// Explains a status.
@@ -126,16 +154,11 @@ fn meaning(status: Status) -> &'static str {
     }
 }
 
-const READING: &str = "    A word is the cyclic sequence of a cycle's flights in order of time, rotated to the smallest number: 13554622.
-    The literature composes maps from right to left, with powers: P_{1 2^2 6 4 5^2 3} is the same cycle.
-    Its pattern, 135462, writes repeated symbols once: it leaves out the number of bounces before a sustained contact.
-";
-
 const CLASSES: &str = "\
 Class
 
     periodic    a stable cycle; the period is its number of forcing periods
-    chaotic     no cycle, and the Lyapunov exponent exceeds 0 by three standard errors (six for an early stop)
+    chaotic     no cycle, and the Lyapunov exponent exceeds 0 by three standard errors
     undecided   neither was found within the budget: long transients, bifurcations near by, tori
     failed      the integration stopped; the status gives the reason";
 

@@ -40,7 +40,7 @@ impl SceneFile<'_> {
         let name = self.path.display().to_string();
         let text = fs::read_to_string(self.path).map_err(|error| SceneError {
             place: Place::File { file: name.as_str().into() },
-            problem: Problem::Unreadable { reason: error.to_string() },
+            problem: Problem::Unreadable { reason: error.to_string(), example: self.purpose.example() },
         })?;
         let find = |what, file: &str| {
             let path = self.path.parent().unwrap_or(Path::new("")).join(file);
@@ -118,6 +118,6 @@ mod tests {
     fn the_error_for_an_unreadable_scene_gives_an_example() {
         let message = SceneFile::map(Path::new("no/such.toml")).load(&[]).unwrap_err().to_string();
         assert!(message.starts_with("no/such.toml: cannot read the scene ("), "{message}");
-        assert!(message.contains("scenes/smoke.toml"), "{message}");
+        assert!(message.contains("scenes/e_omega.toml"), "{message}");
     }
 }

@@ -5,18 +5,20 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use crate::gpu::{self, AdapterChoice, Gpu, Precision};
+use crate::gpu::{AdapterChoice, Gpu, Precision};
 use crate::job::check;
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap, damage, repair_command};
 use crate::job::observer::Observer;
+use crate::job::processor;
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::show::cells::Survey;
+use crate::show::validation::Validated;
 use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::inventory::Finding;
-use crate::store::map::{self, MANIFEST, Provenance, VALIDATION};
+use crate::store::map::{self, MANIFEST, VALIDATION};
 use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
 
 /// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
@@ -32,20 +34,15 @@ pub struct ValidateJob {
     precision: Precision,
     sample: Sample,
     findings: Vec<Finding>,
+    /// This machine's processor.
+    processor: String,
 }
 
 /// Cells of the sample that were computed again as lanes.
 pub struct SampleLanes {
     lanes: Lanes,
-    /// Remark on the device, if it is not the map's own.
-    pub note: Option<String>,
-}
-
-impl SampleLanes {
-    /// The device that computed them. None if no device did.
-    pub fn device(&self) -> Option<&str> {
-        self.lanes.device.as_deref()
-    }
+    /// Why the map's own device did not run its lanes again.
+    not_own: Option<String>,
 }
 
 impl ValidateJob {
@@ -75,7 +72,8 @@ impl ValidateJob {
         let precision = precision(map.manifest())?;
         let survey = loaded.survey();
         let sample = validate::sample(&loaded.plan, &loaded.stored.records, samples, seed);
-        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, findings })
+        let processor = processor::described();
+        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, findings, processor })
     }
 
     /// The locked folder.
@@ -107,16 +105,12 @@ impl ValidateJob {
         let open =
             |precision: Precision, choice: &AdapterChoice| pollster::block_on(Gpu::open(precision, choice));
         let (own, any) = (AdapterChoice::named(&self.map.manifest().device), AdapterChoice::default());
-        let (mut gpu, note) = match subject.is_lane.then(|| open(subject.precision, &own)) {
+        let (mut gpu, not_own) = match subject.is_lane.then(|| open(subject.precision, &own)) {
             None => (None, None),
             Some(Ok(gpu)) => (Some(gpu), None),
             Some(Err(why)) => match open(subject.precision, &any) {
-                Ok(gpu) => {
-                    let device = gpu::describe(gpu.adapter());
-                    let note = format!("lanes ran again on {device}, not on the map's own device: {why}");
-                    (Some(gpu), Some(note))
-                }
-                Err(_) => (None, Some(format!("lanes did not run again: {why}"))),
+                Ok(gpu) => (Some(gpu), Some(why.to_string())),
+                Err(_) => (None, Some(why.to_string())),
             },
         };
         let is_double = subject.is_lane && subject.precision == Precision::F64;
@@ -128,7 +122,7 @@ impl ValidateJob {
         let lanes = pollster::block_on(Lanes::run(&subject, &self.sample, gpu.as_mut(), double.as_mut()));
         let lanes = lanes
             .map_err(|error| JobError::Failed(format!("cannot compute the sample's lanes again: {error}")))?;
-        Ok(SampleLanes { lanes, note })
+        Ok(SampleLanes { lanes, not_own })
     }
 
     /// Replays the sample without early stops, and compares it with the map. `report` receives the number of replayed cells.
@@ -143,20 +137,26 @@ impl ValidateJob {
         validate::replay_until(&self.subject(), basins, &self.sample, &lanes.lanes, report, halt)
     }
 
+    /// Returns the validation with the devices that took part.
+    pub fn validated<'a>(&'a self, lanes: &'a SampleLanes, validation: &'a Validation) -> Validated<'a> {
+        let manifest = self.map.manifest();
+        Validated {
+            validation,
+            made: manifest.provenance(),
+            processors: [&manifest.processor, &self.processor],
+            own_lanes: lanes.lanes.device.as_deref(),
+            not_own: lanes.not_own.as_deref(),
+            double_lanes: lanes.lanes.double_device.as_deref(),
+        }
+    }
+
     /// Writes [`VALIDATION`] and its section of the report. Returns the files' names.
     ///
     /// # Errors
     /// [`JobError::Output`] if a file cannot be written.
-    pub fn write(
-        &self,
-        lanes: &SampleLanes,
-        validation: &Validation,
-        elapsed: Duration,
-    ) -> Result<Vec<&'static str>, JobError> {
+    pub fn write(&self, validated: &Validated<'_>, elapsed: Duration) -> Result<Vec<&'static str>, JobError> {
         let cells = self.loaded.cells(&self.scene, &self.survey);
-        let StoredManifest { engine, precision, device, .. } = self.map.manifest();
-        let provenance = Provenance { engine, precision, device };
-        Ok(map::write_validation(&self.folder, &cells, &provenance, lanes.device(), validation, elapsed)?)
+        Ok(map::write_validation(&self.folder, &cells, validated, elapsed)?)
     }
 
     /// Checks that the map is valid, and that no file of the folder is damaged or missing, except the `written` ones.
@@ -210,7 +210,7 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), JobEr
         false => format!("; all such cells: {}{more}", named.join(" ")),
     };
     Err(JobError::Failed(format!(
-        "{}{cells}; {} lists them, each with the command that replays it",
+        "do not trust this map: {}{cells}; {} lists them, each with the command that replays it",
         faults.join("; "),
         dir.join(VALIDATION).display()
     )))
@@ -234,7 +234,8 @@ mod tests {
         let validation = validate::replay(&subject, &sample, &Lanes::default(), &|_| {});
         let error = verdict(Path::new("o"), &plan, &validation).unwrap_err();
         assert!(
-            !error.is_usage() && error.to_string().starts_with("none of 4 cells was compared"),
+            !error.is_usage()
+                && error.to_string().starts_with("do not trust this map: none of 4 cells was compared"),
             "{error}"
         );
     }

@@ -8,6 +8,7 @@ mod along;
 mod axis;
 mod builder;
 mod derived;
+mod figure;
 mod identity;
 mod keys;
 mod limits;
@@ -24,8 +25,9 @@ mod tests;
 pub use crate::text::error::{Fault, Place, Problem, SceneError};
 pub use along::Along;
 pub use axis::{Axis, Scale, Target};
-pub use builder::SceneBuilder;
+pub use builder::{SceneBuilder, quoted as toml};
 pub(crate) use derived::Rule;
+pub use figure::{FigureStyle, MapLine};
 pub use keys::{KEYS, Key, KeyDefault, Takes};
 pub use limits::MAX_COUNT;
 pub use list::{CompanionFile, FileText, FindFile, List};
@@ -33,18 +35,22 @@ pub(crate) use points::Points;
 pub use settings::{Continuous, DEFAULT_AUDIT, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, Start};
 
+use crate::model_file::{FileModel, MODEL_FILE};
 use crate::text::document::{self, Node};
 use crate::text::error;
 use crate::text::section::{self, Section};
 use derived::Derived;
+use figure::Figure;
 use parameters::ParameterSources;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, Parameter, ParameterError};
 use rattlemap_dynamics::orbit;
 
 /// Keys outside of any table, and the names of the tables.
-const TOP_LEVEL: [&str; 10] =
-    ["title", "model", "parameters", "derived", "axis", "cells", "integration", "start", "refine", "outputs"];
+#[rustfmt::skip]
+const TOP_LEVEL: [&str; 11] = [
+    "title", "model", "parameters", "derived", "axis", "cells", "integration", "start", "refine", "outputs", "figure",
+];
 
 /// Purpose for which a scene is read. It decides the number of axes and the kinds of output files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,12 +69,22 @@ impl Purpose {
             Purpose::Bifurcation => ("bifurcation", 1),
         }
     }
+
+    /// Returns a scene of this program for the purpose, as an example in messages.
+    #[cfg(feature = "job")]
+    pub(crate) fn example(self) -> &'static str {
+        match self {
+            Purpose::Map => "scenes/e_omega.toml",
+            Purpose::Bifurcation => "scenes/paper_fig5.toml",
+        }
+    }
 }
 
 /// A scene without errors.
 #[derive(Clone, Debug)]
 pub struct Scene {
     text: String,
+    settings: String,
     title: String,
     points: Points,
     integration: Integration,
@@ -76,6 +92,7 @@ pub struct Scene {
     draw: Option<Draw>,
     refine: Option<Refine>,
     outputs: Outputs,
+    figure: Figure,
 }
 
 impl Scene {
@@ -132,6 +149,7 @@ impl Scene {
         along: Option<&Along>,
         find: FindFile<'_>,
     ) -> Result<Scene, SceneError> {
+        refuse_model(&document)?;
         for set in sets {
             overrides::apply(&mut document, set)?;
         }
@@ -172,18 +190,21 @@ impl Scene {
         };
         let derived = derived::read(&root, model, is_swept)?;
         let sources = ParameterSources { axes: &axes, list: list.as_ref(), derived: &derived };
-        let base = parameters::read(&root, model, sources)?;
+        let mut base = parameters::read(&root, model, sources)?;
+        start::read_phase(&root.section("start", &keys::names("start"))?, &mut *base)?;
         let title = root.get("title").map(|title| settings::read_title(&title)).transpose()?;
         let is_list = list.is_some();
         let points = Points::new(base, axes, list, derived);
         let scene = Scene {
             text,
+            settings: settings_of(document, model),
             title: title.unwrap_or_else(|| default_title(model, &points)),
             integration: settings::read_integration(&root)?,
             start: start::read(&root, model, purpose)?,
             draw: start::read_draw(&root, purpose)?,
             refine: settings::read_refine(&root, purpose)?,
             outputs: settings::read_outputs(&root, purpose, is_list)?,
+            figure: figure::read(&root, &points)?,
             points,
         };
         start::check(&root, &scene)?;
@@ -242,6 +263,12 @@ impl Scene {
         &self.text
     }
 
+    /// Returns the scene as TOML without its axes, with the `--set` arguments applied. A model from a file is named
+    /// `model.toml`, as in the folder of a map.
+    pub fn settings(&self) -> &str {
+        &self.settings
+    }
+
     /// Returns the heading of figures and reports.
     pub fn title(&self) -> &str {
         &self.title
@@ -293,13 +320,13 @@ impl Scene {
         self.points.derived().rules().iter().map(|rule| (rule.parameter(), rule.text()))
     }
 
-    /// Returns names and values of the parameters that are neither swept nor derived.
-    pub fn fixed(&self) -> impl Iterator<Item = (&str, f64)> {
+    /// Returns the parameters that are neither swept nor derived, with their values.
+    pub fn fixed(&self) -> impl Iterator<Item = (&Parameter, f64)> {
         let base = self.base();
         let all = base.parameters().iter().enumerate();
         let is_swept = |index| self.points.targets().any(|target| target == Target::Parameter(index));
         let fixed = all.filter(move |&(index, _)| !is_swept(index) && !self.points.derived().has(index));
-        fixed.map(|(index, parameter)| (&*parameter.name, base.value(index)))
+        fixed.map(|(index, parameter)| (parameter, base.value(index)))
     }
 
     /// Returns how long each cell is integrated.
@@ -332,6 +359,16 @@ impl Scene {
         &self.outputs
     }
 
+    /// Returns the appearance of the figures.
+    pub fn figure_style(&self) -> &FigureStyle {
+        &self.figure.style
+    }
+
+    /// Returns the lines that figures of maps show.
+    pub fn lines(&self) -> &[MapLine] {
+        &self.figure.lines
+    }
+
     /// Returns the number of cells.
     pub fn cell_count(&self) -> u64 {
         self.points.counts().iter().map(|&count| count as u64).product()
@@ -362,11 +399,11 @@ impl Scene {
     }
 }
 
-/// Sets parameters of a model by `NAME=VALUE` arguments.
+/// Sets parameters and the start phase of a model by `NAME=VALUE` arguments.
 ///
 /// # Errors
-/// [`SceneError`] for an unknown parameter, a value out of its range, a setting that is not a parameter, or values for
-/// which the model has no motion.
+/// [`SceneError`] for an unknown parameter, a value out of its range, any other setting, or values for which the
+/// model has no motion.
 pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>, SceneError> {
     let values = model.parameters().iter().enumerate();
     let values = values.map(|(index, parameter)| format!("{} = {:?}\n", parameter.name, model.value(index)));
@@ -375,9 +412,10 @@ pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>,
     for set in sets {
         overrides::apply(&mut document, set)?;
     }
-    let root = Section::open(&document, "", &["parameters"])?;
+    let root = Section::open(&document, "", &["parameters", "start"])?;
     let sources = ParameterSources { axes: &[], list: None, derived: &Derived::default() };
-    let cell = parameters::read(&root, model, sources)?;
+    let mut cell = parameters::read(&root, model, sources)?;
+    start::read_phase(&root.section("start", &["phase"])?, &mut *cell)?;
     Flow::validate(&*cell).map_err(|error| {
         // The defaults have a motion, so the error is in the arguments.
         let error = root.no_motion("", &error);
@@ -387,6 +425,28 @@ pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>,
         }
     })?;
     Ok(cell)
+}
+
+/// Refuses the text of a model.
+fn refuse_model(document: &Node) -> Result<(), SceneError> {
+    let motion = Section::open_any(document, "").and_then(|root| root.get("motion"));
+    motion.map_or(Ok(()), |motion| {
+        Err(motion.misplaced(
+            "this file is a model, but a scene is needed: write one with model = \"FILE\" and [[axis]] tables; \
+             `rattlemap models FILE` describes the model, `rattlemap orbit --model FILE` computes one motion",
+        ))
+    })
+}
+
+/// Writes the tree of a scene as TOML without its axes.
+fn settings_of(document: &Node, model: &dyn Model) -> String {
+    let Some(toml::Value::Table(mut fields)) = document.to_toml() else { return String::new() };
+    fields.remove("axis");
+    if model.downcast_ref().is_some_and(|file: &FileModel| !file.is_built_in()) {
+        fields.insert("model".to_owned(), MODEL_FILE.into());
+    }
+    // A table of TOML values can always be written.
+    toml::to_string(&fields).unwrap_or_default()
 }
 
 fn default_title(model: &dyn Model, points: &Points) -> String {

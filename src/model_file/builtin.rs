@@ -6,6 +6,9 @@ use rattlemap_dynamics::model::Model;
 
 use super::FileModel;
 
+/// Name of the copy of the model's file in the folder of a map whose model is not built in.
+pub const MODEL_FILE: &str = "model.toml";
+
 /// The default model of scenes and commands.
 pub const DEFAULT: &str = "gear-pair";
 

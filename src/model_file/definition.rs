@@ -8,7 +8,7 @@ use super::contact::{self, Wall, WallLaw};
 use super::entry::Names;
 use super::motion::{self, Motion};
 use super::{FileModel, parameters};
-use crate::text::document::{self, Value};
+use crate::text::document::{self, Node, Value};
 use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
@@ -61,6 +61,7 @@ impl PartialEq for Definition {
 /// Reads a model file and checks that the model has a motion at its defaults.
 pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let document = document::read(text, file)?;
+    refuse_scene(&document)?;
     let root = Section::open(&document, "", &MODEL_KEYS)?;
     let name = root.require("name", "name the model, such as name = \"my-model\"")?;
     let name = read_name(&name)?;
@@ -68,9 +69,10 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let notes = root.get("notes").map(|field| field.lines(LONGEST_NOTES)).transpose()?;
     let written = parameters::read(&root)?;
     let names: Vec<&str> = written.iter().map(|parameter| parameter.name.as_str()).collect();
-    let names = Names(&names);
+    let names = Names { parameters: &names, states: &[] };
     let motion = motion::read(&root, names)?;
-    let walls = contact::read(&root, names)?;
+    let states: Vec<&str> = motion.state_names().collect();
+    let walls = contact::read(&root, Names { states: &states, ..names })?;
     let shapes = |index: usize| {
         let uses = |entry: &Expression| entry.uses().contains(&index);
         let at_walls = walls.iter().flatten();
@@ -99,6 +101,17 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     match rattlemap_dynamics::flow::Flow::validate(&model) {
         Ok(_) => Ok(model),
         Err(error) => Err(no_motion(&root, &model.definition, &error)),
+    }
+}
+
+/// Refuses the text of a scene.
+fn refuse_scene(document: &Node) -> Result<(), SceneError> {
+    let Some(root) = Section::open_any(document, "") else { return Ok(()) };
+    match ["axis", "cells"].into_iter().find_map(|key| root.get(key)) {
+        Some(field) if root.get("motion").is_none() => Err(field.misplaced(
+            "this file is a scene, but a model is needed: give the model's name or file, as the scene does under `model`",
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -163,7 +176,7 @@ fn blame(error: &ModelError) -> (Table, &str) {
     };
     match quantity.split(' ').next().unwrap_or_default() {
         "entry" | "the" => (Table::Motion, "gap"),
-        "omega" => (Table::Motion, "frequency"),
+        "excitation" => (Table::Motion, "frequency"),
         "position" => (Table::Wall(side), "at"),
         "load" if side.is_some() => (Table::Wall(side), "at"),
         "mesh" => (Table::Wall(side), "mesh_speed"),
@@ -202,6 +215,7 @@ impl Definition {
             contacts: [Contact::Rigid; 2],
             omega: of(&motion.frequency),
             force: vector(&motion.force, of),
+            force_sin: vector(&motion.force_sin, of),
             free,
             meshing: [free; 2],
         };

@@ -1,21 +1,50 @@
 //! Entries of vectors and matrices: numbers or expressions in parameters.
 
+use crate::text::document::Value;
 use crate::text::error::SceneError;
-use crate::text::expression::Expression;
+use crate::text::expression::{Expression, ExpressionError};
 use crate::text::section::{Field, Section};
 
-/// Names of the parameters in the order of their values.
+/// What entries are, for messages.
+const CONSTANT: &str =
+    "entries are constants of a cell; time enters only through `frequency`, coordinates do not enter";
+
+/// Names in entries.
 #[derive(Clone, Copy)]
-pub(super) struct Names<'a>(pub(super) &'a [&'a str]);
+pub(super) struct Names<'a> {
+    /// Names of the parameters in the order of their values.
+    pub(super) parameters: &'a [&'a str],
+    /// Names of the state's components, each displacement before its velocity. Entries must not contain them.
+    pub(super) states: &'a [&'a str],
+}
 
 impl Names<'_> {
     /// Reads one entry.
     pub(super) fn entry(self, field: &Field<'_>) -> Result<Expression, SceneError> {
-        let all = match self.0 {
+        if let Value::Text(text) = &field.node.value
+            && let Err(ExpressionError::Unknown { name }) = Expression::parse(text, self.parameters)
+            && let Some(remedy) = self.remedy(&name)
+        {
+            return Err(field.conflict(remedy));
+        }
+        let all = match self.parameters {
             [] => "the model has no parameters".to_owned(),
             names => names.join(", "),
         };
-        field.expression(self.0, &all, "\"2*zeta\"")
+        field.expression(self.parameters, &all, "\"2*zeta\"")
+    }
+
+    /// Returns the remedy for a name that is the time, a coordinate or a velocity; none for any other name.
+    fn remedy(self, name: &str) -> Option<String> {
+        let (what, remedy) = match self.states.iter().position(|state| *state == name) {
+            Some(i) if i % 2 == 0 => ("a coordinate", format!("write the factor of {name} in `stiffness`")),
+            Some(_) => ("a velocity", format!("write the factor of {name} in `damping`")),
+            None if name == "t" || name == "time" => {
+                ("the time", "write the amplitude of the harmonic force in `force`".to_owned())
+            }
+            None => return None,
+        };
+        Some(format!("`{name}` is {what}, and {CONSTANT}; {remedy}"))
     }
 
     /// Reads a list of one entry per coordinate. `what` names it in messages.

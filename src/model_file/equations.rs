@@ -5,13 +5,13 @@ use rattlemap_dynamics::model::{Contact, Side};
 use super::definition::Definition;
 use crate::text::expression::Expression;
 
-/// Returns the equations as lines: free motion, then contact with each wall.
-pub(super) fn lines(definition: &Definition) -> Vec<String> {
+/// Returns the equations as lines: free motion, then contact with each wall. `z` and `w` name the gap and its velocity.
+pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
     let motion = &definition.motion;
     let mut lines = vec![
-        format!("gap   {}", gap(definition)),
-        format!("rate  {}", row(&motion.gap, &motion.velocities, "w")),
-        format!("free, {}", between(definition)),
+        format!("gap   {}", row(&motion.gap, &motion.coordinates, z)),
+        format!("rate  {}", row(&motion.gap, &motion.velocities, w)),
+        format!("free, {}", between(definition, z)),
     ];
     lines.extend(equations(definition, None).map(|line| format!("    {line}")));
     for side in Side::BOTH {
@@ -19,13 +19,13 @@ pub(super) fn lines(definition: &Definition) -> Vec<String> {
         let name = name(side);
         match (wall.contact(), &wall.spring) {
             (Contact::Impact | Contact::Elastic, Some(spring)) => {
-                let elastic = product(&spring.stiffness, &format!("({})", minus("z", &wall.at)));
-                let force = sum([elastic, product(&spring.damping, "w")]);
+                let elastic = product(&spring.stiffness, &format!("({})", minus(z, &wall.at)));
+                let force = sum([elastic, product(&spring.damping, w)]);
                 lines.push(format!("behind the {name} wall, with N = {force}"));
                 lines.extend(equations(definition, Some("N")).map(|line| format!("    {line}")));
             }
             _ => lines
-                .push(format!("on the {name} wall: z stays {}, as long as it is pressed", text(&wall.at))),
+                .push(format!("on the {name} wall: {z} stays {}, as long as it is pressed", text(&wall.at))),
         }
     }
     lines
@@ -39,21 +39,17 @@ pub(super) fn name(side: Side) -> &'static str {
     }
 }
 
-fn gap(definition: &Definition) -> String {
-    row(&definition.motion.gap, &definition.motion.coordinates, "z")
-}
-
 fn row(entries: &[Expression], names: &[String], result: &str) -> String {
     format!("{result} = {}", sum(entries.iter().zip(names).map(|(entry, name)| product(entry, name))))
 }
 
 /// Returns the range of the gap in free motion.
-fn between(definition: &Definition) -> String {
+fn between(definition: &Definition, z: &str) -> String {
     let at = |side| definition.wall(side).map(|wall| text(&wall.at));
     match (at(Side::Left), at(Side::Right)) {
-        (Some(left), Some(right)) => format!("{left} < z < {right}"),
-        (None, Some(right)) => format!("z < {right}"),
-        (Some(left), None) => format!("z > {left}"),
+        (Some(left), Some(right)) => format!("{left} < {z} < {right}"),
+        (None, Some(right)) => format!("{z} < {right}"),
+        (Some(left), None) => format!("{z} > {left}"),
         (None, None) => "everywhere".to_owned(),
     }
 }
@@ -76,8 +72,12 @@ fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Ite
             terms(&motion.stiffness[i], &displacements),
             vec![along],
         ];
-        let harmonic = format!("cos({})", product(&motion.frequency, "t").unwrap_or_else(|| "0".to_owned()));
-        let right = [product(&motion.force[i], &harmonic), constant(&motion.load[i])];
+        let phase = product(&motion.frequency, "t").unwrap_or_else(|| "0".to_owned());
+        let right = [
+            product(&motion.force[i], &format!("cos({phase})")),
+            product(&motion.force_sin[i], &format!("sin({phase})")),
+            constant(&motion.load[i]),
+        ];
         format!("{} = {}", sum(left.into_iter().flatten()), sum(right))
     })
 }

@@ -1,7 +1,7 @@
 //! Model files: names, parameters and matrices in TOML, read into a [`Model`]. Pure.
 //!
-//! A file defines `M x'' + C x' + K x = force cos(frequency t) + load` in one or two coordinates, a gap `z = g . x`,
-//! and one or two walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
+//! A file defines `M x'' + C x' + K x = force cos(frequency t) + force_sin sin(frequency t) + load` in one or two
+//! coordinates, a gap `z = g . x`, and one or two walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
 //! f64. `docs/models.md` describes each key.
 
 mod builtin;
@@ -16,9 +16,9 @@ mod tests;
 
 use std::sync::Arc;
 
-use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter};
+use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter, Units};
 
-pub use builtin::{BUILT_IN, DEFAULT};
+pub use builtin::{BUILT_IN, DEFAULT, MODEL_FILE};
 pub use contact::{Wall, WallLaw, WallSpring};
 pub use definition::Definition;
 #[cfg(feature = "job")]
@@ -26,11 +26,12 @@ pub(crate) use equations::factor;
 
 use crate::text::error::SceneError;
 
-/// A model from a file, with values of its parameters. Clones share everything but the values.
+/// A model from a file, with values of its parameters and a start phase. Clones share everything else.
 #[derive(Clone, Debug)]
 pub struct FileModel {
     definition: Arc<Definition>,
     values: Vec<f64>,
+    start_phase: f64,
 }
 
 impl FileModel {
@@ -64,18 +65,31 @@ impl FileModel {
 
     /// Writes the equations of motion as lines: free motion, then contact with each wall.
     pub fn equations(&self) -> Vec<String> {
-        equations::lines(&self.definition)
+        equations::lines(&self.definition, gap_names(self))
     }
 
     fn new(definition: Definition) -> FileModel {
-        FileModel { values: definition.defaults.clone(), definition: Arc::new(definition) }
+        FileModel { values: definition.defaults.clone(), definition: Arc::new(definition), start_phase: 0.0 }
     }
 }
 
-/// Models are equal if their texts and values are.
+/// Returns the names of the gap and its velocity in texts and tables: `z` and `w`, or `gap` and `gap_rate` if the model
+/// has a parameter, a coordinate or a velocity called `z` or `w`.
+pub fn gap_names(model: &dyn Model) -> [&'static str; 2] {
+    let states = model.state_names();
+    let parameters = model.parameters().iter().map(|parameter| &*parameter.name);
+    match parameters.chain(states).any(|name| ["z", "w"].contains(&name)) {
+        true => ["gap", "gap_rate"],
+        false => ["z", "w"],
+    }
+}
+
+/// Models are equal if their texts, values and start phases are.
 impl PartialEq for FileModel {
     fn eq(&self, other: &FileModel) -> bool {
-        self.values == other.values && self.definition == other.definition
+        self.values == other.values
+            && self.start_phase == other.start_phase
+            && self.definition == other.definition
     }
 }
 
@@ -110,7 +124,7 @@ impl Model for FileModel {
 
     fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
-        let oscillator = self.definition.oscillator(&self.values)?;
+        let oscillator = self.definition.oscillator(&self.values)?.at_phase(self.start_phase);
         oscillator.validate()?;
         Ok(oscillator)
     }
@@ -119,8 +133,21 @@ impl Model for FileModel {
         self.definition.law(&self.values)
     }
 
+    fn start_phase(&self) -> f64 {
+        self.start_phase
+    }
+
+    fn set_start_phase(&mut self, phase: f64) -> bool {
+        self.start_phase = phase;
+        true
+    }
+
     fn state_names(&self) -> Vec<&str> {
         self.definition.motion.state_names().collect()
+    }
+
+    fn units(&self) -> Units {
+        self.definition.motion.units.clone()
     }
 
     fn bodies(&self) -> Vec<&str> {

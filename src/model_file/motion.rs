@@ -1,17 +1,18 @@
 //! `[motion]`: coordinates, matrices, forcing and the gap.
 
 use super::entry::Names;
-use super::parameters::check_name;
+use super::parameters::{check_name, read_unit};
 use crate::text::document::Value;
 use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
+use rattlemap_dynamics::model::Units;
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
-const MOTION_KEYS: [&str; 10] = [
-    "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "load", "frequency",
-    "gap",
+const MOTION_KEYS: [&str; 14] = [
+    "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "force_sin", "load", "frequency",
+    "gap", "units", "gap_unit", "time_unit",
 ];
 
 /// Limits of all models, for messages.
@@ -35,14 +36,18 @@ pub struct Motion {
     pub damping: Vec<Vec<Expression>>,
     /// Stiffness matrix.
     pub stiffness: Vec<Vec<Expression>>,
-    /// Amplitudes of the harmonic force.
+    /// Factors of the cosine in the harmonic force.
     pub force: Vec<Expression>,
+    /// Factors of the sine.
+    pub force_sin: Vec<Expression>,
     /// Constant load.
     pub load: Vec<Expression>,
     /// Excitation frequency.
     pub frequency: Expression,
     /// Gap row: the gap is `gap . x`.
     pub gap: Vec<Expression>,
+    /// Units of coordinates, gap and time.
+    pub units: Units,
 }
 
 impl Motion {
@@ -59,7 +64,7 @@ impl Motion {
     /// Returns all entries.
     pub(super) fn entries(&self) -> impl Iterator<Item = &Expression> {
         let matrices = [&self.mass, &self.damping, &self.stiffness].into_iter().flatten().flatten();
-        let vectors = [&self.force, &self.load, &self.gap].into_iter().flatten();
+        let vectors = [&self.force, &self.force_sin, &self.load, &self.gap].into_iter().flatten();
         matrices.chain(vectors).chain([&self.frequency])
     }
 }
@@ -88,11 +93,13 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         None if count == 1 => vec!["v".to_owned()],
         None => vec!["v1".to_owned(), "v2".to_owned()],
     };
-    let all: Vec<&String> = coordinates.iter().chain(&velocities).collect();
-    for (i, name) in all.iter().enumerate() {
-        if names.0.contains(&name.as_str()) || all[..i].contains(name) {
+    let pairs = coordinates.iter().zip(&velocities);
+    let states: Vec<&str> = pairs.flat_map(|(x, v)| [x.as_str(), v.as_str()]).collect();
+    for (i, name) in states.iter().enumerate() {
+        if names.parameters.contains(name) || states[..i].contains(name) {
             return Err(field.conflict(format!(
-                "`{name}` is already the name of a parameter, a coordinate or a velocity; rename one of them"
+                "`{name}` is already the name of a parameter, a coordinate or a velocity; rename one of them (`motion.velocities` names the \
+                 velocities)"
             )));
         }
     }
@@ -106,28 +113,54 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         }
         None => coordinates.clone(),
     };
+    let names = Names { states: &states, ..names };
     let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
     let gap = section.require("gap", "write the gap row, such as gap = [\"1\"]: z = gap . x")?;
+    let gap = names.vector(&gap, count, "one gap row")?;
     Ok(Motion {
+        units: read_units(&section, &gap)?,
         mass: names.matrix(&mass, count)?,
         damping: names.matrix_or_zeros(&section, "damping", count)?,
         stiffness: names.matrix_or_zeros(&section, "stiffness", count)?,
         force: names.vector_or_zeros(&section, "force", count)?,
+        force_sin: names.vector_or_zeros(&section, "force_sin", count)?,
         load: names.vector_or_zeros(&section, "load", count)?,
         frequency: read_frequency(&section, names)?,
-        gap: names.vector(&gap, count, "one gap row")?,
+        gap,
         coordinates,
         velocities,
         bodies,
     })
 }
 
+/// Reads the units. The gap has the unit of the coordinates in its row, if they have the same one and plain numbers as
+/// factors, unless the file gives another.
+fn read_units(section: &Section<'_>, gap: &[Expression]) -> Result<Units, SceneError> {
+    let each = "a list of units, one for each coordinate, such as [\"mm\"]";
+    let coordinates = match section.get("units") {
+        Some(field) => {
+            let items = field.list(each)?;
+            if items.len() != gap.len() {
+                return Err(field.out_of_range(each));
+            }
+            items.iter().map(|item| read_unit(item).map(Some)).collect::<Result<_, _>>()?
+        }
+        None => vec![None; gap.len()],
+    };
+    let unit = |key| section.get(key).map(|field| read_unit(&field)).transpose();
+    let (given, time) = (unit("gap_unit")?, unit("time_unit")?);
+    let used = gap.iter().zip(&coordinates).filter(|(entry, _)| entry.as_number() != Some(0.0));
+    let mut used = used.map(|(entry, unit)| entry.as_number().and(unit.clone()));
+    let common = used.next().flatten().filter(|first| used.all(|unit| unit.as_ref() == Some(first)));
+    Ok(Units { coordinates, gap: given.or(common), time })
+}
+
 fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {
     let field = section.require("frequency", "name it, such as frequency = \"omega\"")?;
     match field.node.value {
-        Value::List(_) => {
-            Err(field.wrong_type("one entry: the force is force cos(frequency t), one harmonic"))
-        }
+        Value::List(_) => Err(field.wrong_type(
+            "one entry: the force is one harmonic, force cos(frequency t) + force_sin sin(frequency t)",
+        )),
         _ => names.entry(&field),
     }
 }

@@ -10,7 +10,7 @@ use crate::text::expression;
 use crate::text::section::{Field, Section};
 
 /// Keys of a parameter's own table.
-const PARAMETER_KEYS: [&str; 6] = ["default", "min", "max", "open", "meaning", "required"];
+const PARAMETER_KEYS: [&str; 7] = ["default", "min", "max", "open", "meaning", "unit", "required"];
 
 /// Largest number of characters of a parameter's name, which occurs in tables and figures.
 const LONGEST_PARAMETER_NAME: usize = 32;
@@ -18,18 +18,26 @@ const LONGEST_PARAMETER_NAME: usize = 32;
 /// Largest number of characters of a meaning, which labels an axis.
 const LONGEST_MEANING: usize = 120;
 
-/// Names of columns of tables, which cannot be names of parameters.
+/// Largest number of characters of a unit.
+const LONGEST_UNIT: usize = 20;
+
+/// Names of columns that stand beside parameters or states in tables. They cannot be names in models. `docs/models.md`
+/// lists them.
 #[rustfmt::skip]
-pub(super) const COLUMNS: [&str; 26] = [
-    "i", "j", "t", "z", "w", "n", "phase", "class", "period", "lyapunov", "lyapunov_error",
-    "impacts_per_period", "mesh_fraction", "symmetric", "word", "pattern", "status", "periods_run",
-    "source", "attractor", "attractors", "domain", "event", "side", "kind", "moment",
+pub(super) const COLUMNS: [&str; 44] = [
+    "i", "j", "t", "phase", "class", "period", "lyapunov", "lyapunov_error", "impacts_per_period", "mesh_fraction",
+    "symmetric", "word", "pattern", "status", "periods_run", "source", "attractor", "attractors", "label",
+    "exponent", "largest_multiplier", "cells", "share", "direction", "domain", "event", "side", "kind", "moment",
+    "t_mod_period", "impact_speed", "impact_speed_max", "impact_energy", "impact_rate", "contact_force_max",
+    "contact_force_rms", "dissipated", "multiplier", "multiplier_argument", "amplitude_gap", "mean_gap", "rms_gap",
+    "harmonic_gap", "harmonic_phase_gap",
 ];
 
 /// A parameter as written in the file. Its use in the model is found later.
 pub(super) struct ParameterEntry {
     pub(super) name: String,
     meaning: String,
+    unit: Option<String>,
     pub(super) default: f64,
     /// Whether a scene must set the parameter.
     is_required: bool,
@@ -42,6 +50,7 @@ impl ParameterEntry {
         Parameter {
             name: Cow::Owned(self.name),
             meaning: Cow::Owned(self.meaning),
+            unit: self.unit.map(Cow::Owned),
             default: (!self.is_required).then_some(self.default),
             range: self.range,
             shapes,
@@ -69,7 +78,8 @@ fn read_one(name: &str, field: &Field<'_>) -> Result<ParameterEntry, SceneError>
             return Err(field.out_of_range("a finite number"));
         }
         let (name, meaning) = (name.to_owned(), name.to_owned());
-        return Ok(ParameterEntry { name, meaning, default, is_required: false, range: Range::Finite });
+        let (unit, range) = (None, Range::Finite);
+        return Ok(ParameterEntry { name, meaning, unit, default, is_required: false, range });
     };
     let section = Section::open(field.node, &field.path, &PARAMETER_KEYS)?;
     let given = section.require("default", "a parameter needs a default: write default = 1.0")?;
@@ -101,7 +111,14 @@ fn read_one(name: &str, field: &Field<'_>) -> Result<ParameterEntry, SceneError>
         Some(field) => field.line(LONGEST_MEANING)?,
         None => name.to_owned(),
     };
-    Ok(ParameterEntry { name: name.to_owned(), meaning, default, is_required: flag("required")?, range })
+    let unit = section.get("unit").map(|field| read_unit(&field)).transpose()?;
+    let is_required = flag("required")?;
+    Ok(ParameterEntry { name: name.to_owned(), meaning, unit, default, is_required, range })
+}
+
+/// Reads a unit.
+pub(super) fn read_unit(field: &Field<'_>) -> Result<String, SceneError> {
+    field.line(LONGEST_UNIT)
 }
 
 /// Checks a name of a parameter, a coordinate or a velocity.
@@ -122,9 +139,10 @@ pub(super) fn check_name(name: &str, field: &Field<'_>) -> Result<(), SceneError
         return Err(field.conflict(format!("`{name}` {meaning} and cannot be used; choose another name")));
     }
     if COLUMNS.contains(&name) {
-        return Err(
-            field.conflict(format!("`{name}` is a column of tables and cannot be used; choose another name"))
-        );
+        return Err(field.conflict(format!(
+            "`{name}` is a column of tables and cannot be used; choose another name, and none of {}",
+            COLUMNS.join(", ")
+        )));
     }
     Ok(())
 }

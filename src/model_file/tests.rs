@@ -146,7 +146,7 @@ fn errors_name_the_field_and_the_limit() {
 ["x"] | [] | at most two degrees of freedom
 gap = [1] | gap = [1]\nforce2 = ["F"] | m.toml:22:1: unknown field `motion.force2 = ["F"]`; did you mean `force`?
 gap = [1] | gap = [1]\nharmonics = 2 | one harmonic force and one gap row
-"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry: the force is force cos(frequency t), one harmonic
+"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry: the force is one harmonic
 gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry
 [[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact = 3 tables` is out of range: it must be one or two tables, [[contact]]: a model has at most two walls
 [[contact]] | [[contact]]\nside = "right"\nat = 1\nlaw = "impact"\nrestitution = 1\n[[contact]] | m.toml:29:8: `contact.1.side = "right"` does not fit: there is already a wall on this side
@@ -155,12 +155,16 @@ gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of 
 restitution = "e" | | m.toml:23:1: `contact.0.restitution` is missing
 "impact" | "sticky" | `contact.0.law = "sticky"` is not known; valid names: impact, elastic
 "2*zeta" | "2*zta" | m.toml:16:13: `motion.damping.0.0 = "2*zta"` has an unknown name, `zta`: did you mean `zeta`?
-"2*zeta" | "2*x" | has an unknown name, `x`
-"2*zeta" | "cos(t)" | has an unknown name, `t`
+"2*zeta" | "2*y" | has an unknown name, `y`
+"2*zeta" | "x^2" | m.toml:16:13: `motion.damping.0.0 = "x^2"` does not fit: `x` is a coordinate, and entries are constants of a cell; time enters only through `frequency`, coordinates do not enter; write the factor of x in `stiffness`
+"2*zeta" | "zeta*v" | `v` is a velocity, and entries are constants of a cell
+"F*omega^2" | "F*cos(omega*t)" | m.toml:18:10: `motion.force.0 = "F*cos(omega*t)"` does not fit: `t` is the time, and entries are constants of a cell
+"F*omega^2" | "time" | `time` is the time
+at = "s" | at = "s + x" | m.toml:25:6: `contact.0.at = "s + x"` does not fit: `x` is a coordinate
 "2*zeta" | "2*" | m.toml:16:13: `motion.damping.0.0 = "2*"` cannot be read to its end
 "2*zeta" | true | must be an expression in quotes
-"2*zeta" | "-zeta" | m.toml:16:11: `motion.damping = [["-zeta"]]` does not fit: at the defaults of stop, damping in free motion
-[["1"]] | [["F-1.5"]] | m.toml:15:8: `motion.mass = [["F-1.5"]]` does not fit: at the defaults of stop, mass 1 = 0
+"2*zeta" | "-zeta" | m.toml:16:11: `motion.damping = [["-zeta"]]` does not fit: at the defaults of stop, damping in free motion = -0.25: it must be at least 0
+[["1"]] | [["F-1.5"]] | m.toml:15:8: `motion.mass = [["F-1.5"]]` does not fit: at the defaults of stop, mass = 0
 gap = [1] | gap = ["F-1.5"] | m.toml:21:7: `motion.gap = ["F-1.5"]` does not fit: at the defaults of stop, the largest entry of the gap row = 0
 "impact"\nrestitution = "e"\n | "elastic"\nstiffness = -0.5\n | m.toml:27:13: `contact.0.stiffness = -0.5` does not fit: at the defaults of stop, stiffness added in contact with the right wall = -0.5: it must be at least 0 where the wall is elastic
 [["1"]] | [["1", "0"]] | `motion.mass.0 = ["1", "0"]` is out of range
@@ -170,7 +174,11 @@ at = "s" | at = "1/0" | m.toml:25:6: `contact.0.at = "1/0"` does not fit: at the
 F = 1.5 | t = 1.5 | m.toml:8:5: `parameters.t = 1.5` does not fit: `t` is the time and cannot be used
 F = 1.5 | pi = 1.5 | `pi` is a number and cannot be used
 F = 1.5 | sqrt = 1.5 | `sqrt` is a function and cannot be used
-F = 1.5 | class = 1.5 | `class` is a column of tables and cannot be used
+F = 1.5 | class = 1.5 | `class` is a column of tables and cannot be used; choose another name, and none of i, j, t, phase, class
+F = 1.5 | F = { default = 1, unit = "a very very long unit" } | `parameters.F.unit = "a very very long unit"` is out of range: it must be at most 20 characters long
+["x"] | ["x"]\nunits = ["mm", "mm"] | `motion.units = ["mm", "mm"]` is out of range: it must be a list of units, one for each coordinate
+"omega"\ngap | "-omega"\ngap | m.toml:20:13: `motion.frequency = "-omega"` does not fit: at the defaults of stop, excitation frequency = -2: it must be
+[motion] | [[axis]]\n[movement] | m.toml:13:3: `axis = [[axis]]` does not fit: this file is a scene, but a model is needed
 F = 1.5 | "F 1" = 1.5 | a name begins with a letter
 F = 1.5 | F = inf | m.toml:8:5: `parameters.F = inf` is out of range: it must be a finite number
 F = 1.5 | F = "2" | `parameters.F = "2"` has the wrong type: it must be a number, its default, or a table
@@ -191,7 +199,7 @@ mass = [["1"]]\n | | m.toml:13:2: `motion.mass` is missing
         TWO_DEGREES,
         r#"
 "-c"], ["-c" | "-c"], ["c" | m.toml:14:11: `motion.damping = [["c", "-c"], ["c", "c + d"]]` does not fit: at the defaults of two, damping in free motion = [[0.5, -0.5], [0.5, 0.75]]: the matrix must be symmetric
-"0.5"], ["0.5" | "5"], ["5" | m.toml:13:8: `motion.mass = [["m", "5"], ["5", "1"]]` does not fit: at the defaults of two, mass = [[2.0, 5.0], [5.0, 1.0]]: the matrix must be positive definite
+"0.5"], ["0.5" | "5"], ["5" | m.toml:13:8: `motion.mass = [["m", "5"], ["5", "1"]]` does not fit: at the defaults of two, mass = [[2, 5], [5, 1]]: the matrix must be positive definite
 at = "-d" | at = "2*d" | `contact.0.at = "2*d"` does not fit: at the defaults of two, walls at 0.25 and 0.5
 ["va", "vb"] | ["va"] | `motion.velocities = ["va"]` is out of range: it must be a list of names, one for each coordinate
 ["va", "vb"] | ["va", "a"] | `a` is already the name of
@@ -202,6 +210,44 @@ at = "-d" | at = "2*d" | `contact.0.at = "2*d"` does not fit: at the defaults of
         .unwrap_err()
         .to_string();
     assert!(none.contains("`contact` is missing; write [[contact]]"), "{none}");
+}
+
+#[test]
+fn common_names_are_free_and_the_gap_gets_another_name() {
+    let renamed =
+        ONE_DEGREE.replace("\"x\"", "\"z\"").replace("F = 1.5", "w = 1.5\nn = 2").replace("F*", "w*n*");
+    let model = read(&renamed);
+    assert_eq!((model.state_names(), gap_names(&model)), (vec!["z", "v"], ["gap", "gap_rate"]));
+    assert_eq!(model.equations()[..3], ["gap   gap = z", "rate  gap_rate = v", "free, gap < s"]);
+    assert_eq!(gap_names(&read(ONE_DEGREE)), ["z", "w"]);
+}
+
+#[test]
+fn reserved_names_are_documented() {
+    let page = include_str!("../../docs/models.md");
+    let (_, section) = page.split_once("## Names\n").unwrap();
+    let (section, _) = section.split_once("\n## ").unwrap();
+    let listed = section.lines().filter(|line| line.starts_with("    ")).flat_map(str::split_whitespace);
+    assert_eq!(listed.collect::<Vec<_>>(), parameters::COLUMNS);
+}
+
+#[test]
+fn velocities_and_the_gap_have_the_units_of_coordinates_and_time() {
+    let units = |of_coordinates: &str, gap: &str| {
+        let with = TWO_DEGREES.replace("[motion]", &format!("[motion]\n{of_coordinates}"));
+        read(&with.replace(r#"["1", "-2"]"#, gap)).units()
+    };
+    let same = units("units = ['mm', 'mm']\ntime_unit = 's'", r#"["1", "-2"]"#);
+    let components: Vec<_> = (0..4).filter_map(|i| same.component(i)).collect();
+    assert_eq!(components, ["mm", "mm/s", "mm", "mm/s"]);
+    assert_eq!((same.gap.as_deref(), same.gap_velocity().as_deref()), (Some("mm"), Some("mm/s")));
+    assert_eq!(units("units = ['mm', 'mm']", "[1, -1]").component(1), None);
+    // A factor with a unit, or coordinates of different units, leave the gap's unit open.
+    assert_eq!(units("units = ['rad', 'rad']", r#"["m", "-2"]"#).gap, None);
+    assert_eq!(units("units = ['mm', 'rad']", "[1, -1]").gap, None);
+    assert_eq!(units("units = ['mm', 'rad']", "[1, 0]").gap.as_deref(), Some("mm"));
+    assert_eq!(units("units = ['mm', 'rad']\ngap_unit = 'um'", "[1, -1]").gap.as_deref(), Some("um"));
+    assert_eq!(read(TWO_DEGREES).units().component(0), None);
 }
 
 #[test]
@@ -256,5 +302,27 @@ fn equations_are_written_in_usual_notation() {
             "    m a'' + 0.5 b'' + c a' - c b' + k a - k b + N = 0",
             "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - 2 N = 0",
         ]
+    );
+}
+
+#[test]
+fn a_force_has_a_cosine_and_a_sine() {
+    let force = "force = [\"F*omega^2\"]";
+    let mut model = read(&ONE_DEGREE.replace(force, &format!("{force}\nforce_sin = [\"-2*F\"]")));
+    let at_zero = model.oscillator().unwrap();
+    assert_eq!((at_zero.force, at_zero.force_sin), ([6.0, 0.0], [-3.0, 0.0]));
+    let [_, _, _, free, ..] = &model.equations()[..] else { panic!("{:?}", model.equations()) };
+    assert!(free.ends_with("= F*omega^2 cos(omega t) - 2*F sin(omega t) - 0.5"), "{free}");
+    assert!(model.parameters()[model.index("F").unwrap()].shapes.oscillator());
+    // A quarter turn later the cosine has become the negative sine.
+    let before = model.clone();
+    assert!(model.set_start_phase(std::f64::consts::FRAC_PI_2));
+    let later = model.oscillator().unwrap();
+    assert!((later.force[0] + 3.0).abs() < 1e-15 && (later.force_sin[0] + 6.0).abs() < 1e-15, "{later:?}");
+    assert_eq!((later.force[1], later.force_sin[1]), (0.0, 0.0));
+    assert_ne!(model, before);
+    check_refusals(
+        ONE_DEGREE,
+        "gap = [1] | force_sin = [1, 2]\ngap = [1] | a list of one entry, one for each coordinate",
     );
 }

@@ -1,11 +1,13 @@
 //! Descriptions of parameters, starts and integration in figures and the report.
 
 use crate::map::scene::{Scene, Start};
+use crate::model_file::FileModel;
 use crate::show::symbols::{equation, number, symbol};
 use rattlemap_dynamics::model::{Model, Parameter};
 
 /// Describes an oscillator: values of parameters without a default, the frequency, values that differ from the defaults, and
-/// whether all others have their defaults. Parameters for which `is_swept` is true are not mentioned.
+/// whether all others have their defaults; then the start phase if it is not 0. For a user's model it lists all values, because
+/// readers cannot look up its defaults. Parameters for which `is_swept` is true are not mentioned.
 pub(crate) fn parameters(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool) -> String {
     parameters_and(model, is_swept, Vec::new())
 }
@@ -14,17 +16,18 @@ fn parameters_and(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool, deri
     let scales = model.frequency();
     let all = model.parameters().iter().enumerate().map(|(i, p)| (p, model.value(i), scales.contains(&i)));
     let fixed: Vec<(&Parameter, f64, bool)> = all.filter(|(parameter, ..)| !is_swept(parameter)).collect();
+    let is_own = model.downcast_ref().is_some_and(|model: &FileModel| !model.is_built_in());
     let rank = |(parameter, value, scales): &(&Parameter, f64, bool)| match parameter.default {
         None => Some(0),
         Some(_) if *scales => Some(1),
-        Some(default) if default != *value => Some(2),
+        Some(default) if is_own || default != *value => Some(2),
         Some(_) => None,
     };
     let of_rank = |wanted| fixed.iter().filter(move |fixed| rank(fixed) == Some(wanted));
     let listed: Vec<String> =
-        (0..3).flat_map(of_rank).map(|(parameter, value, _)| equation(&parameter.name, *value)).collect();
+        (0..3).flat_map(of_rank).map(|(parameter, value, _)| equation(parameter, *value)).collect();
     let is_all = listed.len() == fixed.len();
-    let listed = [listed, derived].concat();
+    let listed = [listed, derived, start_phase(model).into_iter().collect()].concat();
     let rest = match (listed.is_empty(), is_all) {
         (_, true) => "",
         (true, _) => "all other parameters at their defaults",
@@ -35,14 +38,20 @@ fn parameters_and(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool, deri
 
 /// Describes the oscillators of a scene by their fixed and derived parameters.
 pub fn of_scene(scene: &Scene) -> String {
-    let is_fixed = |parameter: &Parameter| scene.fixed().any(|(name, _)| name == parameter.name);
+    let is_fixed = |parameter: &Parameter| scene.fixed().any(|(fixed, _)| fixed.name == parameter.name);
     parameters_and(scene.base(), |parameter| !is_fixed(parameter), derived(scene).collect())
 }
 
-/// Returns all fixed and derived parameters of a scene.
+/// Returns all fixed and derived parameters of a scene, and its start phase if that is not 0.
 pub(crate) fn all_fixed(scene: &Scene) -> String {
-    let fixed = scene.fixed().map(|(name, value)| equation(name, value));
-    fixed.chain(derived(scene)).collect::<Vec<_>>().join(", ")
+    let fixed = scene.fixed().map(|(parameter, value)| equation(parameter, value));
+    fixed.chain(derived(scene)).chain(start_phase(scene.base())).collect::<Vec<_>>().join(", ")
+}
+
+/// Describes the start phase of a model, if it is not 0.
+fn start_phase(model: &dyn Model) -> Option<String> {
+    let phase = model.start_phase();
+    (phase != 0.0).then(|| format!("start phase {} rad", number(phase)))
 }
 
 /// Returns the derived parameters of a scene with their expressions.
@@ -95,6 +104,15 @@ mod tests {
         let rest = "; all other parameters at their defaults";
         assert_eq!(of_scene(&scene), format!("e = 0.5, \u{3c9} = 5.6, k = 500, k\u{2082} = 2/3*k1{rest}"));
         assert!(all_fixed(&scene).ends_with(", k\u{2082} = 2/3*k1"), "{}", all_fixed(&scene));
+    }
+
+    #[test]
+    fn all_parameters_of_a_users_model_are_described() {
+        let text = crate::model_file::FileModel::built_in("bilinear").unwrap().definition().text.clone();
+        let own = FileModel::parse(&text.replace("\"bilinear\"", "\"mine\""), "mine.toml").unwrap();
+        let described = parameters(&own, |_| false);
+        assert_eq!(described.matches(" = ").count(), own.parameters().len(), "{described}");
+        assert!(!described.contains("defaults"), "{described}");
     }
 
     #[test]

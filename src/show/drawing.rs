@@ -1,7 +1,8 @@
 //! Elements that all figures share: canvas, axes, legends, labels, and the file formats PNG, SVG and PDF.
 //!
-//! Positions and sizes are in pixels of the finished picture. A [`Canvas`] stores the drawn items; [`write_figure`]
-//! encodes them.
+//! Positions and sizes are in units of 0.36 points at the default type size: small type has [`SMALL`] units at any type
+//! size, so a larger type makes a page of the same width fewer units wide. In a figure of default width and type size, a
+//! unit is a pixel. A [`Canvas`] stores the drawn items; [`write_figure`] encodes them.
 
 pub mod axis;
 mod canvas;
@@ -22,26 +23,19 @@ use std::io::Write;
 pub use crate::show::color::Color;
 pub use canvas::{Bitmap, Canvas};
 pub use shapes::{Align, Marker, Point, Rect, Shape};
-pub use style::{BELOW, DARK, FAINT, GEAR_1, GEAR_2, GRID, LARGE, MEDIUM, MESHING, SMALL, WHITE, wall_color};
+pub use style::{DARK, FAINT, GEAR_1, GEAR_2, GRID, LARGE, MEDIUM, MESHING, SMALL, WHITE, wall_color};
 
 use crate::map::scene::Format;
 use crate::show::error::WriteError;
 
-/// Draws a picture of `size` pixels on white and writes it as SVG, PDF or, for all other formats, PNG.
+/// Writes a picture as SVG, PDF or, for all other formats, PNG.
 ///
 /// # Errors
 /// [`WriteError`] if the picture cannot be encoded or written.
-pub fn write_figure(
-    mut out: impl Write,
-    format: Format,
-    (width, height): (u32, u32),
-    draw: impl FnOnce(&Canvas),
-) -> Result<(), WriteError> {
-    let canvas = Canvas::empty((width.into(), height.into()));
-    draw(&canvas);
+pub fn write_figure(mut out: impl Write, format: Format, canvas: &Canvas) -> Result<(), WriteError> {
     match format {
-        Format::Svg => svg::write(&mut out, &canvas),
-        Format::Pdf => Ok(out.write_all(&pdf::encoded(&canvas)?)?),
-        _ => Ok(out.write_all(&png::encoded(&canvas)?)?),
+        Format::Svg => svg::write(&mut out, canvas),
+        Format::Pdf => Ok(out.write_all(&pdf::encoded(canvas)?)?),
+        _ => Ok(out.write_all(&png::encoded(canvas)?)?),
     }
 }

@@ -14,12 +14,10 @@ pub struct MapSide<'a> {
     pub name: &'a str,
     /// Cells.
     pub cells: &'a Cells<'a>,
-    /// Engine and device that computed it.
+    /// Engine, device and commit that computed it.
     pub provenance: Provenance<'a>,
     /// Version of the program that computed it.
     pub crate_version: &'a str,
-    /// Commit of that program.
-    pub commit: &'a str,
 }
 
 /// Two maps of one grid and their comparison.

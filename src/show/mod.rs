@@ -25,5 +25,6 @@ pub mod replay;
 pub mod report;
 pub mod symbols;
 pub mod table;
+pub mod validation;
 pub mod wall_labels;
 pub mod words;

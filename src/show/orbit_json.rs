@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
-use crate::show::parameters::Parameters;
+use crate::show::parameters::{self, Parameters};
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{Event, Orbit};
 
@@ -32,6 +32,7 @@ pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
     }
     let properties = json!({
         "parameters": Parameters::of(model),
+        "start_phase": model.start_phase(),
         "class": orbit.class.name(),
         "period": names::period(orbit.class),
         "lyapunov": orbit.lyapunov,
@@ -49,6 +50,7 @@ pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         "events": orbit.events.iter().zip(impulses).map(event).collect::<Vec<Value>>(),
     });
     object.extend(properties.as_object().cloned().into_iter().flatten());
+    object.extend(parameters::units(model).map(|units| ("units".to_owned(), json!(units))));
     if let Some(Instant { time, state }) = instant {
         object.insert("time".to_owned(), time.into());
         object.insert("state".to_owned(), json!(components(state)));

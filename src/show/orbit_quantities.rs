@@ -8,6 +8,7 @@ use crate::show::numbers::Number;
 use crate::show::orbit_spectrum::gap;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, Side};
+use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::{Event, Orbit};
 
 /// Returns all measured quantities by name, and the approach speeds at each wall. A quantity that the motion does not have is
@@ -82,9 +83,4 @@ pub(crate) fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
         first.1.push_str(&sides);
     }
     facts
-}
-
-/// Formats a number with six significant digits.
-pub(crate) fn significant(value: f64) -> String {
-    format!("{value:.5e}").parse().map_or(String::new(), |rounded: f64| format!("{rounded:?}"))
 }

@@ -4,12 +4,11 @@ use std::fmt::Write;
 
 use crate::show::instant::Instant;
 use crate::show::names;
-use crate::show::orbit_quantities::{self, significant};
-use rattlemap_dynamics::model::Model;
+use crate::show::orbit_quantities;
+use crate::show::symbols::with_unit;
+use rattlemap_dynamics::model::{Model, Parameter, State};
+use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
-
-/// Number of decimals: one more than in the tables of the paper.
-const DECIMALS: usize = 5;
 
 /// Largest number of events in the table, and number of events before those that are left out. The summary above the table
 /// stays on the screen.
@@ -32,7 +31,12 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         1 => "1 forcing period".to_owned(),
         periods => format!("{periods} forcing periods"),
     };
-    let _ = writeln!(text, "\nevents over {span} (T = {:.DECIMALS$})", orbit.forcing_period);
+    let units = model.units();
+    let _ = writeln!(
+        text,
+        "\nevents over {span} (T = {})",
+        with_unit(&significant(orbit.forcing_period), units.time.as_deref())
+    );
     text.push_str(&match orbit.strobe_meshing {
         Some(side) if orbit.events.is_empty() => {
             format!("none: always in contact with the {} wall\n", names::side(side))
@@ -54,6 +58,9 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let mut facts = Vec::new();
     let mut add = |label: &str, value: String| facts.push((label.to_owned(), value));
     add("parameters", parameters(model));
+    if model.start_phase() != 0.0 {
+        add("start phase", format!("{:?} rad", model.start_phase()));
+    }
     add("class", class(orbit));
     let text = match orbit.class {
         Class::Undecided if orbit.status == Status::Slow => "slow: more periods may decide the class",
@@ -89,11 +96,10 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
         };
         add("symmetric", text.to_owned());
     }
-    add("impacts per period", format!("{:.DECIMALS$}", orbit.impacts_per_period));
-    add("fraction meshing", format!("{:.DECIMALS$}", orbit.mesh_fraction));
+    add("impacts per period", significant(orbit.impacts_per_period));
+    add("fraction meshing", significant(orbit.mesh_fraction));
     let names = model.state_names();
-    let strobe = numbers(&orbit.strobe[..names.len()]).trim_start().to_owned();
-    add(&format!("strobe {}", names.join(" ")), strobe);
+    add(&format!("strobe {}", names.join(" ")), state_in_units(model, orbit.strobe));
     facts
 }
 
@@ -104,7 +110,10 @@ pub(crate) fn has_mirror_images(model: &dyn Model) -> bool {
 
 fn parameters(model: &dyn Model) -> String {
     let all = model.parameters().iter().enumerate();
-    all.map(|(i, p)| format!("{}={:?}", p.name, model.value(i))).collect::<Vec<_>>().join(" ")
+    let text = |(i, p): (usize, &Parameter)| {
+        with_unit(&format!("{}={:?}", p.name, model.value(i)), p.unit.as_deref())
+    };
+    all.map(text).collect::<Vec<_>>().join(" ")
 }
 
 fn class(orbit: &Orbit) -> String {
@@ -138,58 +147,75 @@ fn status(status: Status) -> &'static str {
 fn exponent(orbit: &Orbit) -> String {
     match orbit.lyapunov_error {
         _ if orbit.lyapunov.is_nan() => "-".to_owned(),
-        Some(error) if error.is_finite() => format!("{:.DECIMALS$} +- {error:.DECIMALS$}", orbit.lyapunov),
-        Some(_) => format!("{:.DECIMALS$}, with unknown error", orbit.lyapunov),
-        None => format!("{:.DECIMALS$}", orbit.lyapunov),
+        Some(error) if error.is_finite() => {
+            format!("{} +- {}", significant(orbit.lyapunov), significant(error))
+        }
+        Some(_) => format!("{}, with unknown error", significant(orbit.lyapunov)),
+        None => significant(orbit.lyapunov),
     }
 }
 
 fn complex([re, im]: [f64; 2]) -> String {
-    if im == 0.0 { format!("{re:.DECIMALS$}") } else { format!("{re:.DECIMALS$}{im:+.DECIMALS$}i") }
+    let [sign, size] = if im < 0.0 { ["-", &significant(-im)] } else { ["+", &significant(im)] };
+    if im == 0.0 { significant(re) } else { format!("{}{sign}{size}i", significant(re)) }
 }
 
-fn numbers(state: &[f64]) -> String {
-    state.iter().map(|x| format!(" {x:>9.DECIMALS$}")).collect()
+/// Formats a state with the units of its components.
+fn state_in_units(model: &dyn Model, state: State) -> String {
+    let (units, count) = (model.units(), model.state_names().len());
+    let values = state[..count].iter().enumerate();
+    let texts = values.map(|(i, x)| with_unit(&significant(*x), units.component(i).as_deref()));
+    texts.collect::<Vec<_>>().join(" ")
 }
 
 fn events(model: &dyn Model, events: &[Event]) -> String {
     if events.is_empty() {
         return "none: the motion does not reach a wall\n".to_owned();
     }
-    let names = model.state_names();
-    let (count, listed) = (names.len(), names.join(", "));
-    let mut text = format!(
-        "{:<11}{:<6} {:>10} {:>10} {:>12}  {:<width$}   after ({listed})\n",
-        "kind",
-        "side",
-        "t",
-        "t mod T",
-        "impulse",
-        format!(" before ({listed})"),
-        width = 10 * count
-    );
-    let hidden =
-        if events.len() > MOST_ROWS { FIRST_ROWS..FIRST_ROWS + events.len() - MOST_ROWS } else { 0..0 };
+    let (names, units) = (model.state_names(), model.units());
+    let (count, time) = (names.len(), units.time.as_deref());
+    let components = |moment: &str| {
+        let names = names.iter().enumerate();
+        names.map(|(i, name)| with_unit(name, units.component(i).as_deref()) + moment).collect::<Vec<_>>()
+    };
+    let head = [
+        "kind".to_owned(),
+        "side".to_owned(),
+        with_unit("t", time),
+        with_unit("t mod T", time),
+        "impulse".to_owned(),
+    ];
+    let head = head.into_iter().chain(components(" before")).chain(components(" after")).collect();
+    let row = |(event, impulse): &(&Event, Option<f64>)| -> Vec<String> {
+        let head = [names::kind(event.kind), names::side(event.side)].map(str::to_owned);
+        let times = [event.t, event.t_mod_period].map(significant);
+        let impulse = impulse.map_or("-".to_owned(), significant);
+        let states = event.before[..count].iter().chain(&event.after[..count]).copied();
+        head.into_iter().chain(times).chain([impulse]).chain(states.map(significant)).collect()
+    };
     let impulses = orbit_quantities::impulses(model, events);
-    for (nth, (event, impulse)) in events.iter().zip(impulses).enumerate() {
-        if hidden.contains(&nth) {
-            if nth == hidden.start {
-                let count = hidden.len();
-                let _ = writeln!(text, "... {count} more events; --json and --out list all of them");
-            }
-            continue;
-        }
-        let side = names::side(event.side);
-        let _ = writeln!(
-            text,
-            "{:<11}{side:<6} {:>10.DECIMALS$} {:>10.DECIMALS$} {:>12}  {}  {}",
-            names::kind(event.kind),
-            event.t,
-            event.t_mod_period,
-            impulse.map_or("-".to_owned(), significant),
-            numbers(&event.before[..count]),
-            numbers(&event.after[..count])
-        );
+    let listed: Vec<(&Event, Option<f64>)> = events.iter().zip(impulses).collect();
+    let hidden = events.len().saturating_sub(MOST_ROWS);
+    let first = if hidden > 0 { FIRST_ROWS } else { events.len() };
+    let shown = listed[..first].iter().chain(&listed[first + hidden..]);
+    let mut lines = aligned(&[head].into_iter().chain(shown.map(row)).collect::<Vec<_>>());
+    if hidden > 0 {
+        lines.insert(1 + first, format!("... {hidden} more events; --json and --out list all of them"));
     }
-    text
+    lines.join("\n") + "\n"
+}
+
+/// Returns the lines of a table. The first two columns, which are texts, are aligned at the left, numbers at the right.
+fn aligned(rows: &[Vec<String>]) -> Vec<String> {
+    let columns = rows.first().map_or(0, Vec::len);
+    let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or_default();
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| match i < 2 {
+            true => format!("{cell:<width$}"),
+            false => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect()
 }

@@ -1,6 +1,6 @@
-//! The engine and device that computed a map.
+//! The engine, device and program that computed a map.
 
-/// Names of the engine, precision and device that computed a map.
+/// Names of the engine, precision and device that computed a map, and the commit of the program.
 #[derive(Clone, Copy, Debug)]
 pub struct Provenance<'a> {
     /// Engine.
@@ -9,4 +9,6 @@ pub struct Provenance<'a> {
     pub precision: &'a str,
     /// Device.
     pub device: &'a str,
+    /// Commit of the program.
+    pub commit: &'a str,
 }

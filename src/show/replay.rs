@@ -1,27 +1,27 @@
 //! The command that replays one cell of a map.
 
 use crate::map::scene::{Scene, Start};
+pub use crate::model_file::MODEL_FILE as MODEL;
 use crate::model_file::{DEFAULT, FileModel};
 use crate::show::cells::Cells;
-use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::orbit::Settings;
 
-/// Name of the copy of the model's file in the folder of a map whose model is not built in.
-pub const MODEL: &str = "model.toml";
-
 /// Returns the arguments that are the same for all cells: the model, values that differ from the defaults of `orbit`, the
-/// start and the transient. `orbit` analyses as many periods as the class needs.
+/// start with its phase, and the transient. `orbit` analyses as many periods as the class needs.
 pub(crate) fn arguments(scene: &Scene) -> String {
     let mut words = Vec::new();
     let base = scene.base();
     if let Some(model) = base.downcast_ref::<FileModel>().and_then(model) {
         words.push(format!(" --model {model}"));
     }
-    for (name, value) in scene.fixed() {
-        let parameter = base.parameters().iter().find(|parameter| parameter.name == name);
-        if parameter.is_some_and(|parameter| parameter.default != Some(value)) {
+    for (Parameter { name, default, .. }, value) in scene.fixed() {
+        if *default != Some(value) {
             words.push(format!(" --set {name}={value:?}"));
         }
+    }
+    if base.start_phase() != 0.0 {
+        words.push(format!(" --set start.phase={:?}", base.start_phase()));
     }
     if let Start::State(state) = scene.start() {
         words.push(start(base, state));

@@ -21,7 +21,8 @@ use crate::show::cells::{Cells, Row, Source};
 use crate::show::color::hex;
 use crate::show::error::WriteError;
 use crate::show::layers::{Bar, Layer, NamedColor};
-use crate::show::symbols::symbol;
+use crate::show::provenance::Provenance;
+use crate::show::symbols::{axis_label, symbol};
 use crate::show::table::attractors_csv::attractor_name;
 use crate::show::words::{MapWords, WordIndex};
 use crate::show::{caption, refinement, replay};
@@ -29,12 +30,21 @@ use rattlemap_dynamics::orbit::{Class, Status};
 
 const PAGE: &str = include_str!("report/page.html");
 const STYLE: &str = include_str!("report/page.css");
-const SCRIPT: &str = include_str!("report/page.js");
+const SCRIPT: &str = concat!(
+    include_str!("report/data.js"),
+    include_str!("report/drawing.js"),
+    include_str!("report/colors.js"),
+    include_str!("report/panel.js"),
+    include_str!("report/input.js"),
+    include_str!("report/checks.js"),
+    include_str!("report/start.js"),
+);
 
 /// Writes the page, with a section on the validation if there was one.
 pub fn write(
     mut page: impl Write,
     cells: &Cells<'_>,
+    made: &Provenance<'_>,
     layers: &[Layer],
     words: &MapWords,
     validation: Option<&Value>,
@@ -47,7 +57,18 @@ pub fn write(
         "title": scene.title(),
         "subtitle": caption::integration(scene),
         "fixed": caption::all_fixed(scene),
+        "made": {
+            "engine": made.engine,
+            "precision": made.precision,
+            "device": made.device,
+            "version": env!("CARGO_PKG_VERSION"),
+            "commit": made.commit,
+        },
+        "model": scene.base().title(),
         "source": scene.base().source(),
+        // The scene without its axes, to which the page adds those of the view, and the command that computes it.
+        "scene": scene.settings(),
+        "compute": compute(made),
         "axes": scene.axes().iter().map(axis).collect::<Vec<_>>(),
         "derived": derived(scene),
         // Arguments of the replay command that are the same for all cells.
@@ -145,13 +166,17 @@ fn derived(scene: &Scene) -> Vec<Value> {
     points.derived().rules().iter().map(object).collect()
 }
 
-/// Returns the arrays of values that the page shows for a cell, by name.
+/// Returns the command that computes a saved view as the map was computed.
+fn compute(made: &Provenance<'_>) -> String {
+    let precision =
+        if made.engine == "gpu" { format!(" --precision {}", made.precision) } else { String::new() };
+    format!("rattlemap map view.toml --engine {}{precision}", made.engine)
+}
+
+/// Returns the arrays of values that the page shows for a cell, by name, in addition to the numbers of layers.
 fn values(cells: &Cells<'_>, words: &MapWords) -> Value {
     let rows = || cells.ids().map(|id| cells.row(id));
     let bytes = |value: fn(&Row) -> u8| packed("u8", &rows().map(|row| value(&row)).collect::<Vec<_>>());
-    let floats = |value: fn(&Row) -> Option<f64>| {
-        packed("f32", &rows().map(|row| value(&row).unwrap_or(f64::NAN) as f32).collect::<Vec<_>>())
-    };
     let mut object = json!({
         "status": bytes(|row| row.status.code() as u8),
         "periods_run": packed("u32", &rows().map(|row| row.periods_run).collect::<Vec<_>>()),
@@ -161,18 +186,9 @@ fn values(cells: &Cells<'_>, words: &MapWords) -> Value {
         object["period"] = bytes(|row| row.period.unwrap_or(0) as u8);
     }
     if cells.has(Quantity::Lyapunov) {
-        object["lyapunov"] = floats(|row| row.lyapunov);
-        object["lyapunov_error"] = floats(|row| row.lyapunov_error);
-    }
-    if cells.has(Quantity::Impacts) {
-        object["impacts_per_period"] = floats(|row| row.impacts_per_period);
-    }
-    if cells.has(Quantity::Mesh) {
-        object["mesh_fraction"] = floats(|row| row.mesh_fraction);
-    }
-    for number in cells.numbers() {
-        let value = |id: usize| number.of_cell(cells, id, &cells.row(id)).unwrap_or(f64::NAN) as f32;
-        object[&*number.name] = packed("f32", &cells.ids().map(value).collect::<Vec<_>>());
+        // The page shows NAME_error beside the number of the layer NAME.
+        let errors: Vec<f32> = rows().map(|row| row.lyapunov_error.unwrap_or(f64::NAN) as f32).collect();
+        object["lyapunov_error"] = packed("f32", &errors);
     }
     if cells.has(Quantity::Symmetric) {
         object["symmetric"] = bytes(|row| row.symmetric.map_or(u8::MAX, u8::from));
@@ -206,7 +222,7 @@ fn axis(axis: &Axis) -> Value {
     let mut object = json!({
         "parameter": parameter.name,
         "symbol": symbol(&parameter.name),
-        "meaning": parameter.meaning,
+        "label": axis_label(parameter),
         "min": axis.min(),
         "max": axis.max(),
         "count": axis.count(),
@@ -234,12 +250,18 @@ fn layer(layer: &Layer) -> Value {
             "left_out": bar.remarks(layer.indices.len()),
         })
     };
-    let mut object = packed("u8", &layer.indices);
-    object["name"] = (*layer.name).into();
-    object["short"] = (*layer.short).into();
-    object["title"] = (*layer.title).into();
-    object["palette"] = layer.palette.iter().copied().map(hex).collect();
-    object["entries"] = layer.entries.iter().map(entry).collect();
-    object["bar"] = layer.bar.as_ref().map(bar).into();
+    let mut object = json!({
+        "name": layer.name,
+        "short": layer.short,
+        "title": layer.title,
+        "palette": layer.palette.iter().copied().map(hex).collect::<Vec<_>>(),
+        "entries": layer.entries.iter().map(entry).collect::<Vec<_>>(),
+        "bar": layer.bar.as_ref().map(bar),
+    });
+    // The page gives numbers their colours, because their range follows the view.
+    match &layer.numbers {
+        Some(numbers) => object["values"] = packed("f32", numbers),
+        None => object["indices"] = packed("u8", &layer.indices),
+    }
     object
 }

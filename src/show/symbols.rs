@@ -28,7 +28,16 @@ pub fn symbol(name: &str) -> String {
 pub fn axis_label(parameter: &Parameter) -> String {
     let symbol = symbol(&parameter.name);
     // A parameter without a description has its name as meaning.
-    if parameter.meaning == parameter.name { symbol } else { format!("{}, {symbol}", parameter.meaning) }
+    let label = match parameter.meaning == parameter.name {
+        true => symbol,
+        false => format!("{}, {symbol}", parameter.meaning),
+    };
+    with_unit(&label, parameter.unit.as_deref())
+}
+
+/// Adds the unit, if there is one, to a label: `excitation frequency, f [Hz]`.
+pub(crate) fn with_unit(label: &str, unit: Option<&str>) -> String {
+    unit.map_or(label.to_owned(), |unit| format!("{label} [{unit}]"))
 }
 
 /// Formats a number with the typographic minus.
@@ -36,9 +45,10 @@ pub(crate) fn number(value: f64) -> String {
     value.to_string().replace('-', "\u{2212}")
 }
 
-/// Formats an equation of a parameter's symbol and its value.
-pub(crate) fn equation(name: &str, value: f64) -> String {
-    format!("{} = {}", symbol(name), number(value))
+/// Formats an equation of a parameter's symbol and its value, with its unit.
+pub(crate) fn equation(parameter: &Parameter, value: f64) -> String {
+    let unit = parameter.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+    format!("{} = {}{unit}", symbol(&parameter.name), number(value))
 }
 
 /// Returns the superscript of a digit or minus.
@@ -59,7 +69,25 @@ pub(crate) fn lowered(sign: char) -> Option<char> {
 
 #[cfg(test)]
 mod tests {
+    use super::{axis_label, equation};
+    use crate::model_file::FileModel;
     use crate::show::symbols::symbol;
+    use rattlemap_dynamics::model::Model;
+
+    #[test]
+    fn labels_and_equations_have_units() {
+        let text = FileModel::built_in("bilinear").unwrap().definition().text.clone();
+        let with =
+            text.replace("meaning = \"excitation frequency\"", "unit = \"rad/s\", meaning = \"frequency\"");
+        let model = FileModel::parse(&with, "m.toml").unwrap();
+        let [omega, zeta] = ["omega", "zeta"].map(|name| &model.parameters()[model.index(name).unwrap()]);
+        assert_eq!(axis_label(omega), "frequency, \u{3c9} [rad/s]");
+        assert_eq!(equation(omega, 1.5), "\u{3c9} = 1.5 rad/s");
+        assert_eq!(
+            (axis_label(zeta), equation(zeta, 0.1)),
+            ("damping ratio, \u{3b6}".into(), "\u{3b6} = 0.1".into())
+        );
+    }
 
     #[test]
     #[rustfmt::skip]

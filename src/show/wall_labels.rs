@@ -2,7 +2,7 @@
 
 use rattlemap_dynamics::model::{Model, Side};
 
-use crate::model_file::{Definition, FileModel};
+use crate::model_file::{Definition, FileModel, gap_names};
 use crate::show::names;
 use crate::show::symbols::{number, symbol};
 use crate::text::expression::Expression;
@@ -13,7 +13,7 @@ const LONGEST_POSITION: usize = 24;
 /// The gap and the positions of the walls, by the symbols of the model.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WallLabels {
-    /// Symbol of the gap: that of the displacement if it is a single one, else `z`.
+    /// Symbol of the gap: that of the displacement if it is a single one, else its name.
     gap: String,
     /// Positions of the right and the left wall: none without a wall, empty if too long for a legend.
     at: [Option<String>; 2],
@@ -24,32 +24,37 @@ impl WallLabels {
     pub(crate) fn of(model: &dyn Model) -> WallLabels {
         // The library's own models are described by the files of the same name.
         let named = FileModel::built_in(model.name());
+        let [gap, _] = gap_names(model);
         match model.downcast_ref::<FileModel>().or(named.as_ref()) {
-            Some(file) => WallLabels::of_file(file.definition()),
-            None => WallLabels::of_values(model),
+            Some(file) => WallLabels::of_file(file.definition(), gap),
+            None => WallLabels::of_values(model, gap),
         }
     }
 
-    fn of_file(definition: &Definition) -> WallLabels {
+    fn of_file(definition: &Definition, gap: &str) -> WallLabels {
         let motion = &definition.motion;
         let is = |entry: &Expression, value: f64| entry.as_number() == Some(value);
         let alone = (0..motion.degrees()).find(|&i| {
             is(&motion.gap[i], 1.0) && (0..motion.degrees()).all(|j| j == i || is(&motion.gap[j], 0.0))
         });
         let at = |side| definition.wall(side).map(|wall| position(&wall.at));
-        WallLabels::new(alone.map(|i| symbol(&motion.coordinates[i])), Side::BOTH.map(at))
+        let alone = alone.map(|i| symbol(&motion.coordinates[i]));
+        WallLabels::new(alone.unwrap_or_else(|| gap.to_owned()), Side::BOTH.map(at))
     }
 
-    fn of_values(model: &dyn Model) -> WallLabels {
-        let Ok(oscillator) = model.oscillator() else { return WallLabels::new(None, [None, None]) };
+    fn of_values(model: &dyn Model, gap: &str) -> WallLabels {
+        let Ok(oscillator) = model.oscillator() else {
+            return WallLabels::new(gap.to_owned(), [None, None]);
+        };
         let alone = [[1.0, 0.0], [0.0, 1.0]].iter().position(|row| *row == oscillator.gap);
         let names = model.state_names();
         let at = oscillator.walls.map(|wall| wall.is_finite().then(|| number(wall)));
-        WallLabels::new(alone.and_then(|i| names.get(2 * i)).map(|name| symbol(name)), at)
+        let alone = alone.and_then(|i| names.get(2 * i)).map(|name| symbol(name));
+        WallLabels::new(alone.unwrap_or_else(|| gap.to_owned()), at)
     }
 
-    fn new(gap: Option<String>, at: [Option<String>; 2]) -> WallLabels {
-        let mut labels = WallLabels { gap: gap.unwrap_or_else(|| "z".to_owned()), at };
+    fn new(gap: String, at: [Option<String>; 2]) -> WallLabels {
+        let mut labels = WallLabels { gap, at };
         if labels.half().is_some() {
             let [right, _] = &mut labels.at;
             *right = right.take().map(|half| format!("+{half}"));

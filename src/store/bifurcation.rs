@@ -66,16 +66,16 @@ pub fn write(
     let panels = Panels::of(scene.base(), fixed, &numbers);
     for (format, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
-        let subtitle =
-            format!("{}{}; {}", line(arguments.along), scene.start().in_words(), caption::of_scene(scene));
+        let title = format!("{}{}", scene.title(), line(arguments.along));
+        let subtitle = format!("{}; {}", scene.start().in_words(), caption::of_scene(scene));
         let scale = match scene.axes()[0].scale() {
             scene::Scale::Log => Scale::Logarithmic,
             scene::Scale::Linear => Scale::Linear,
             scene::Scale::Values => Scale::Listed,
         };
-        let texts = [scene.title(), &subtitle];
+        let (texts, style) = ([&*title, &*subtitle], scene.figure_style());
         folder.replace(name, |out| {
-            figure::bifurcation::write(out, *format, texts, (&label, scale), &panels, columns)
+            figure::bifurcation::write(out, *format, style, texts, (&label, scale), &panels, columns)
         })?;
         files.push(name);
     }
@@ -86,7 +86,7 @@ pub fn write(
     Ok(files)
 }
 
-/// Describes a line through a plane; the title of such a scene describes the plane.
+/// Describes a line through a plane, to complete a title that describes the plane.
 fn line(along: Option<&Along>) -> String {
     let Some(Along { parameter, at }) = along.filter(|along| !along.at.is_empty()) else {
         return String::new();
@@ -96,5 +96,5 @@ fn line(along: Option<&Along>) -> String {
         .filter_map(|at| at.split_once('='))
         .map(|(name, value)| format!("{} = {}", symbol(name.trim()), value.trim()))
         .collect();
-    format!("along {} at {}, ", symbol(parameter), at.join(", "))
+    format!(", along {} at {}", symbol(parameter), at.join(", "))
 }

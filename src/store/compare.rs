@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::findings::compare::{Kind, Tally};
-use crate::map::scene::Format;
+use crate::map::scene::{FigureStyle, Format};
 use crate::show::figure;
 use crate::show::map_pair::MapPair;
 use crate::show::names;
@@ -39,7 +39,7 @@ pub(crate) fn result(compared: &MapPair<'_>) -> Value {
             "precision": side.provenance.precision,
             "device": side.provenance.device,
             "crate_version": side.crate_version,
-            "commit": side.commit,
+            "commit": side.provenance.commit,
         })
     });
     let tally = |Tally { compared, differing }| {
@@ -78,7 +78,7 @@ pub(crate) fn result(compared: &MapPair<'_>) -> Value {
 pub fn write(
     folder: &Folder,
     compared: &MapPair<'_>,
-    formats: &[Format],
+    (formats, style): (&[Format], &FigureStyle),
     reading: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
@@ -87,7 +87,7 @@ pub fn write(
     let mut files = vec![DIFFERENCES];
     let has_figure = compared.sides[0].cells.scene().list().is_none();
     for (format, name) in FIGURES.iter().filter(|(format, _)| has_figure && formats.contains(format)) {
-        folder.replace(name, |out| figure::compare::write(out, *format, compared))?;
+        folder.replace(name, |out| figure::compare::write(out, *format, style, compared))?;
         files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;

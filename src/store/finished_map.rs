@@ -12,6 +12,7 @@ use crate::map::scene::{CompanionFile, FileText, Purpose, Scene, SceneError};
 use crate::map::schedule::Refined;
 use crate::map::shard::Shard;
 use crate::record::Record;
+use crate::show::provenance::Provenance;
 use crate::store::file_names::{LIST, MANIFEST, RECORDS};
 use crate::store::inventory::FileEntry;
 use crate::store::manifest::FORMAT;
@@ -188,6 +189,12 @@ pub struct StoredManifest {
 }
 
 impl StoredManifest {
+    /// Returns how the map was computed.
+    pub fn provenance(&self) -> Provenance<'_> {
+        let StoredManifest { engine, precision, device, commit, .. } = self;
+        Provenance { engine, precision, device, commit }
+    }
+
     /// The smallest and the largest number of free steps that lanes took per forcing period.
     pub(crate) fn lane_grid(&self) -> Option<[u32; 2]> {
         let steps = |name: &str| u32::try_from(self.integration[name].as_u64()?).ok();

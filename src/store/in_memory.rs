@@ -100,7 +100,7 @@ pub fn trajectory(
         Class::Failed => Vec::new(),
         _ => moments(model, orbit, samples_per_period)?,
     };
-    text(|to| orbit_tables::write_trajectory(to, &model.state_names(), &moments))
+    text(|to| orbit_tables::write_trajectory(to, model, &moments))
 }
 
 /// Returns a comparison as JSON, without a folder and its files, and its table `compare.csv`.

@@ -17,6 +17,7 @@ use crate::show::figure;
 use crate::show::layers::Layer;
 use crate::show::table::words_csv::WordRows;
 use crate::show::table::{attractors_csv, cells_csv, cells_npy};
+use crate::show::validation::Validated;
 use crate::show::words::{self, MapWords};
 use crate::show::{layers, names, report};
 use crate::store::error::OutputError;
@@ -24,7 +25,6 @@ use crate::store::file_names::{RECORDS, UNFINISHED};
 use crate::store::folder::Folder;
 use crate::store::inventory::FileEntry;
 use crate::store::{inventory, manifest, unfinished, validation_json};
-use crate::validate::Validation;
 
 pub use crate::show::provenance::Provenance;
 pub use crate::show::replay::MODEL;
@@ -99,7 +99,7 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<St
     let records = if folder.path().join(RECORDS).is_file() { &[RECORDS][..] } else { &[] };
     let records = inventory::entries(folder, records)?;
     let validation = validation_of(folder, &inventory::listed(&earlier), &records);
-    let mut files = write_files(folder, cells, validation.as_ref(), &|_| true)?;
+    let mut files = write_files(folder, cells, &run.made, validation.as_ref(), &|_| true)?;
     files.extend(validation.is_some().then(|| VALIDATION.to_owned()));
     let keeps = |name: &str| [MANIFEST, RECORDS].contains(&name) || files.iter().any(|file| file == name);
     inventory::clear(folder, ALL.iter().map(String::as_str), keeps)?;
@@ -122,24 +122,22 @@ fn validation_of(folder: &Folder, earlier: &[FileEntry], records: &[FileEntry]) 
     serde_json::from_str(&text).ok()
 }
 
-/// Writes `validation.json`, the report with a section on the validation if the map has one, and the manifest. `again` is
-/// the device that ran the sample's lanes again, and `elapsed` the time of the validation. Returns the names of the files.
+/// Writes `validation.json`, the report with a section on the validation if the map has one, and the manifest. `elapsed` is
+/// the time of the validation. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
 pub fn write_validation(
     folder: &Folder,
     cells: &Cells<'_>,
-    made: &Provenance<'_>,
-    again: Option<&str>,
-    validation: &Validation,
+    validated: &Validated<'_>,
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
-    let object = validation_json::object(cells, made, again, validation);
+    let object = validation_json::object(cells, validated);
     folder.write_json(VALIDATION, &object)?;
     let mut files = vec![VALIDATION];
     if folder.path().join(HTML).is_file() {
-        write_files(folder, cells, Some(&object), &|name| name == HTML)?;
+        write_files(folder, cells, &validated.made, Some(&object), &|name| name == HTML)?;
         files.push(HTML);
     }
     inventory::update(folder, &files, ("validate", elapsed.as_secs_f64()))?;
@@ -154,6 +152,7 @@ pub fn write_validation(
 pub fn repair(
     folder: &Folder,
     cells: &Cells<'_>,
+    made: &Provenance<'_>,
     lost: &[&str],
     has_validation: bool,
 ) -> Result<Vec<String>, OutputError> {
@@ -164,7 +163,7 @@ pub fn repair(
         text.map_err(|reason| OutputError::Write { path: path.clone(), reason: reason.into() })
     };
     let validation: Option<Value> = if has_validation { Some(serde_json::from_str(&read()?)?) } else { None };
-    let files = write_files(folder, cells, validation.as_ref(), &|name| lost.contains(&name))?;
+    let files = write_files(folder, cells, made, validation.as_ref(), &|name| lost.contains(&name))?;
     if !files.is_empty() {
         let names: Vec<&str> = files.iter().map(String::as_str).collect();
         inventory::update(folder, &names, ("repair", clock.elapsed().as_secs_f64()))?;
@@ -179,6 +178,7 @@ pub(crate) type Wanted<'w> = &'w (dyn Fn(&str) -> bool + Sync);
 fn write_files(
     folder: &Folder,
     cells: &Cells<'_>,
+    made: &Provenance<'_>,
     validation: Option<&Value>,
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
@@ -186,7 +186,7 @@ fn write_files(
     // In parallel, because both have parts that run on one core.
     let (tables, pictures) = rayon::join(
         || write_tables(folder, cells, &words, wanted),
-        || write_pictures(folder, cells, &words, validation, wanted),
+        || write_pictures(folder, cells, made, &words, validation, wanted),
     );
     let mut files = tables?;
     files.extend(pictures?);
@@ -251,6 +251,7 @@ fn write_tables(
 fn write_pictures(
     folder: &Folder,
     cells: &Cells<'_>,
+    made: &Provenance<'_>,
     words: &MapWords,
     validation: Option<&Value>,
     wanted: Wanted<'_>,
@@ -284,7 +285,7 @@ fn write_pictures(
         files.extend(figures.into_iter().map(|(.., name)| name));
     }
     if wants_page {
-        folder.replace(HTML, |out| report::write(out, cells, &layers, words, validation))?;
+        folder.replace(HTML, |out| report::write(out, cells, made, &layers, words, validation))?;
         files.push(HTML.to_owned());
     }
     Ok(files)

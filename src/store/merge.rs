@@ -42,6 +42,7 @@ use crate::store::error::OutputError;
 use crate::store::finished_map::{FinishedMap, FinishedMapError, StoredManifest, UnfinishedRun};
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry, Finding};
+use crate::store::manifest::OWN_COMMIT;
 use crate::store::map::{self, Run, ShardOrigin};
 use crate::store::record_file::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
 use crate::store::run_records::Work;
@@ -445,7 +446,7 @@ impl MapRecords {
         let survey = Survey::of(plan, records, None);
         let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey);
         let processor = parts.processors();
-        let made = Provenance { engine: &first.engine, precision: &first.precision, device: &first.device };
+        let made = Provenance { commit: OWN_COMMIT, ..first.provenance() };
         // Adapters and cards are in the manifests of the parts.
         let run = Run {
             opening: parts.sum(StoredManifest::opening_seconds),

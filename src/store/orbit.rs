@@ -6,7 +6,7 @@ use std::time::{Duration, Instant as Clock};
 
 use serde_json::json;
 
-use crate::map::scene::Format;
+use crate::map::scene::{FigureStyle, Format};
 use crate::show::figure::orbit::{OrbitFigure, OrbitPlot, spectrum};
 pub use crate::show::instant::Instant;
 use crate::show::names;
@@ -66,7 +66,7 @@ pub fn write(
     model: &dyn Model,
     orbit: &Orbit,
     request: &OrbitRequest,
-    formats: &[Format],
+    (formats, style): (&[Format], &FigureStyle),
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Clock::now();
     // The manifest does not list files of an earlier orbit.
@@ -79,16 +79,16 @@ pub fn write(
         let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
         let plot = OrbitPlot::new(model, orbit, &trace)?;
         for (figure, format, name) in FIGURES.iter().filter(|(_, format, _)| formats.contains(format)) {
-            folder.replace(name, |out| figure.write(out, *format, &plot))?;
+            folder.replace(name, |out| figure.write(out, *format, style, &plot))?;
             files.push(name);
         }
         write_trajectory(folder, model, orbit)?;
         files.push(TRAJECTORY);
         if let Some(spectrum) = Spectrum::of(model, orbit)? {
-            folder.replace(SPECTRUM, |out| orbit_tables::write_spectrum(out, &spectrum))?;
+            folder.replace(SPECTRUM, |out| orbit_tables::write_spectrum(out, model, &spectrum))?;
             files.push(SPECTRUM);
             for (format, name) in SPECTRUM_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {
-                folder.replace(name, |out| spectrum::write(out, *format, model, orbit, &spectrum))?;
+                folder.replace(name, |out| spectrum::write(out, *format, style, model, orbit, &spectrum))?;
                 files.push(name);
             }
         }
@@ -103,6 +103,7 @@ pub fn write(
             "model": manifest::model(model),
             "parameters": Parameters::of(model),
             "start": request.start[..model.state_names().len()],
+            "start_phase": model.start_phase(),
             "transient_periods": transient_periods,
             "observed_periods": observed_periods,
             "max_period": max_period,
@@ -118,7 +119,7 @@ pub fn write(
 fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<(), OutputError> {
     let samples = TABLED.div_ceil(orbit.cycle_periods.max(1) as usize).max(LEAST_TABLED);
     let moments = moments(model, orbit, samples)?;
-    folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, &model.state_names(), &moments))
+    folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, model, &moments))
 }
 
 /// Samples the motion over the periods of the orbit's events, and adds every event.

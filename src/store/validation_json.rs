@@ -5,24 +5,19 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::show::cells::Cells;
-use crate::show::provenance::Provenance;
 use crate::show::replay;
+use crate::show::validation::Validated;
 use crate::store::manifest::{Head, joined};
 use crate::validate::{
-    ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult, Validation,
+    ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult,
 };
 
 /// Describes a validation.
 ///
-/// `again_on` is the device that ran lanes again, if any. `counted` is the unit of all numbers but `cells`, `integrated`
-/// the number of runs from which the sample was drawn, and `identical` the number of records that the same engine
-/// reproduced bit for bit.
-pub(crate) fn object(
-    cells: &Cells<'_>,
-    made: &Provenance<'_>,
-    again_on: Option<&str>,
-    validation: &Validation,
-) -> Value {
+/// `counted` is the unit of all numbers but `cells`, `integrated` the number of runs from which the sample was drawn, and
+/// `identical` the number of records that the same engine reproduced bit for bit.
+pub(crate) fn object(cells: &Cells<'_>, validated: &Validated<'_>) -> Value {
+    let Validated { validation, made, processors, double_lanes, .. } = *validated;
     let agreement = validation
         .agreement
         .iter()
@@ -34,8 +29,10 @@ pub(crate) fn object(
             "engine": made.engine,
             "precision": made.precision,
             "device": made.device,
-            "again_on": again_on,
-            "same_device": again_on.is_none_or(|again| again == made.device),
+            "processor": processors[0],
+            "again_on": validated.again_on(),
+            "same_device": validated.is_same_device(),
+            "lanes_f64_on": double_lanes,
             "judge": match validation.judge {
                 Judge::Reference => "reference",
                 Judge::Lanes => "lanes_f64",
@@ -47,9 +44,12 @@ pub(crate) fn object(
             "runs": validation.runs,
             "integrated": validation.runs - validation.filled,
             "filled": validation.filled,
+            "requested": validation.requested,
             "samples": validation.replayed,
+            "verdict": validated.verdict(),
+            "remarks": validated.remarks(),
             "faults": validation.faults(),
-            "strata": validation.strata.iter().map(stratum).collect::<Vec<_>>(),
+            "strata": validation.strata.iter().map(|result| stratum(result, validation.counted())).collect::<Vec<_>>(),
             "kinds": kinds.collect::<BTreeMap<_, _>>(),
             "agreement": agreement.collect::<BTreeMap<_, _>>(),
             "identical": validation.again[0],
@@ -68,10 +68,11 @@ fn rate(rate: Rate) -> Value {
     json!({ "count": rate.count, "interval": rate.interval, "text": rate.text() })
 }
 
-fn stratum(result: &StratumResult) -> Value {
+fn stratum(result: &StratumResult, counted: &str) -> Value {
     let kinds = Kind::ALL.into_iter().map(|kind| (kind.name(), rate(result.rate(kind))));
     json!({
         "name": result.stratum.name(),
+        "text": result.stratum.describe(counted),
         "runs": result.runs,
         "sampled": result.sampled,
         "differing": rate(result.differing()),
@@ -98,6 +99,7 @@ fn half_mesh(half: &HalfMesh) -> Value {
         json!({ "compared": rate.among, "changed": rate.count, "interval": rate.interval, "text": text })
     };
     json!({
+        "mesh_speed": half.mesh_speed,
         "class": changed(half.classes),
         "period": changed(half.periods),
         "word": changed(half.words),

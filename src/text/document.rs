@@ -69,6 +69,22 @@ pub(crate) fn read_argument(value: &str, argument: &Arc<str>) -> Node {
 }
 
 impl Node {
+    /// Returns the value for writing it as TOML; none for a type that scenes do not use.
+    pub(crate) fn to_toml(&self) -> Option<toml::Value> {
+        Some(match &self.value {
+            Value::Integer(i) => (*i).into(),
+            Value::Float(x) => (*x).into(),
+            Value::Text(text) => text.as_str().into(),
+            Value::Flag(flag) => (*flag).into(),
+            Value::List(items) => toml::Value::Array(items.iter().filter_map(Node::to_toml).collect()),
+            Value::Table(table) => {
+                let fields = table.iter().filter_map(|(name, node)| Some((name.clone(), node.to_toml()?)));
+                toml::Value::Table(fields.collect())
+            }
+            Value::Other => return None,
+        })
+    }
+
     /// Returns the tree with all values at one place.
     pub(crate) fn placed(mut self, place: Place) -> Node {
         (self.place, self.name_place) = (place.clone(), place);

@@ -79,10 +79,12 @@ pub struct SceneError {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Problem {
     /// The file cannot be read.
-    #[error("cannot read the scene ({reason}); give the path of a TOML file such as scenes/smoke.toml")]
+    #[error("cannot read the scene ({reason}); give the path of a TOML file such as {example}")]
     Unreadable {
         /// The operating system's message.
         reason: String,
+        /// A scene that the command can compute.
+        example: &'static str,
     },
     /// The text is not TOML.
     #[error("not valid TOML: {message}; the line reads `{line}`")]

@@ -284,6 +284,12 @@ impl<'a> Field<'a> {
         self.refuse(Fault::Conflict, remedy.into())
     }
 
+    /// Builds the error for a field that belongs to another kind of file.
+    pub(crate) fn misplaced(&self, remedy: &str) -> SceneError {
+        let problem = Problem::value(Fault::Conflict, &self.path, &self.node.excerpt, remedy);
+        SceneError { place: self.node.name_place.clone(), problem }
+    }
+
     /// Builds the error for a value that is none of the `known` names; the message lists them as `list`.
     pub(crate) fn unknown_name(&self, name: &str, known: &[&str], list: &str) -> SceneError {
         self.refuse(Fault::UnknownName, suggest(name, known, list))

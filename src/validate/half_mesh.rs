@@ -14,6 +14,8 @@ use rattlemap_dynamics::orbit::Class;
 /// is periodic with both speeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HalfMesh {
+    /// The meshing speed, if it is the same at all walls of all compared cells.
+    pub mesh_speed: Option<f64>,
     /// Cells whose class changes.
     pub classes: Rate,
     /// Cycles whose period changes.
@@ -24,9 +26,18 @@ pub struct HalfMesh {
     pub patterns: Rate,
 }
 
+impl HalfMesh {
+    /// Whether the map depends on the meshing speed: a class, period or pattern changes. Words always count the bounces
+    /// before meshing.
+    pub fn matters(&self) -> bool {
+        [self.classes, self.periods, self.patterns].iter().any(|rate| rate.count > 0)
+    }
+}
+
 /// Changes in one cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Changes {
+    mesh_speed: [f64; 2],
     class: bool,
     /// Whether period, word and pattern of a cycle change.
     cycle: Option<[bool; 3]>,
@@ -47,14 +58,17 @@ pub(super) fn changes(cell: &Cell<'_>, truth: &Answer) -> Option<Changes> {
         }
         _ => None,
     };
-    Some(Changes { class: before.index() != after.index(), cycle })
+    Some(Changes { mesh_speed: cell.law.mesh_speed, class: before.index() != after.index(), cycle })
 }
 
 /// Computes the rates over all meshing cells; none if there are none.
 pub(super) fn rates(changes: &[Changes]) -> Option<HalfMesh> {
     let cycles: Vec<[bool; 3]> = changes.iter().filter_map(|changes| changes.cycle).collect();
     let of = |k: usize| Rate::new(cycles.iter().filter(|cycle| cycle[k]).count(), cycles.len());
-    (!changes.is_empty()).then(|| HalfMesh {
+    let [first, _] = changes.first()?.mesh_speed;
+    let is_common = changes.iter().flat_map(|changes| changes.mesh_speed).all(|speed| speed == first);
+    Some(HalfMesh {
+        mesh_speed: is_common.then_some(first),
         classes: Rate::new(changes.iter().filter(|changes| changes.class).count(), changes.len()),
         periods: of(0),
         words: of(1),

@@ -15,8 +15,10 @@ use rattlemap_dynamics::orbit::Status;
 /// Results of lanes that were computed again; empty without a device.
 #[derive(Clone, Debug, Default)]
 pub struct Lanes {
-    /// Description of the device.
+    /// The device that ran the map's own lanes again. Only for maps that lanes computed.
     pub device: Option<String>,
+    /// The device that ran lanes in double precision for comparison.
+    pub double_device: Option<String>,
     /// Records with the map's settings, by run. Only for maps that lanes computed.
     again: HashMap<u32, Record>,
     /// Records without early stops, by run. Only if there are lanes in double precision to compare with.
@@ -57,7 +59,7 @@ impl Lanes {
             lanes.states = states(gpu, subject, &sample.states, &brief).await?;
         }
         if let Some(gpu) = double {
-            lanes.device.get_or_insert_with(|| gpu::describe(gpu.adapter()));
+            lanes.double_device = Some(gpu::describe(gpu.adapter()));
             let records = run_lanes(gpu, plan, records, &ids, &whole).await?;
             lanes.double = ids.iter().copied().zip(records).collect();
             if lanes.states.is_empty() {

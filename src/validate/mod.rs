@@ -24,7 +24,8 @@ mod rate;
 mod sample;
 mod states;
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -159,6 +160,8 @@ impl StratumResult {
 pub struct Validation {
     /// Seed of the sample.
     pub seed: u64,
+    /// Number of requested cells.
+    pub requested: usize,
     /// Number of runs of the map, one per cell and start.
     pub runs: usize,
     /// Number of runs that were filled from their neighbours. They are not sampled.
@@ -198,6 +201,18 @@ impl Validation {
         self.mismatches.iter().filter(|mismatch| mismatch.kind == kind).count()
     }
 
+    /// Returns the number and the rate of wrong cells in a stratum: "0 of 200 random cells are wrong (below 1.5 %)".
+    pub fn wrong(&self, stratum: &StratumResult) -> String {
+        let rate = stratum.rate(Kind::Unexplained);
+        let (count, verb) = (rate.count, if rate.count == 1 { "is" } else { "are" });
+        if stratum.sampled == stratum.runs && stratum.stratum == Stratum::Uniform {
+            let integrated = if self.filled > 0 { "integrated " } else { "" };
+            return format!("{count} of all {} {integrated}{} {verb} wrong", stratum.runs, self.counted());
+        }
+        let cells = stratum.stratum.describe(self.counted());
+        format!("{count} of {} {cells} {verb} wrong ({})", rate.among, rate.text())
+    }
+
     /// Describes why the map fails the validation; empty if it passes.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
@@ -211,9 +226,7 @@ impl Validation {
         for stratum in &self.strata {
             let rate = stratum.rate(Kind::Unexplained);
             if rate.is_too_many() {
-                let (name, counted) = (stratum.stratum.name(), self.counted());
-                faults
-                    .push(format!("{} of {} {counted} ({name}) differ, unexplained", rate.count, rate.among));
+                faults.push(self.wrong(stratum));
             }
         }
         faults.extend(self.chaos.iter().filter(|test| test.fails()).map(|test| {
@@ -240,7 +253,7 @@ struct Replayed {
 }
 
 /// Validates a sample. `lanes` are the results of lanes that a device computed again; empty without a device. `report`
-/// receives the number of finished cells and may be called from any thread.
+/// receives the number of finished cells, which rises by one each time; it may be called from any thread.
 pub fn replay(
     subject: &Subject<'_>,
     sample: &Sample,
@@ -276,7 +289,7 @@ fn replay_whole(
     halt: &AtomicBool,
 ) -> Validation {
     let judge = judge(subject, lanes);
-    let (done, ids) = (AtomicUsize::new(0), sample.ids());
+    let (done, ids) = (Mutex::new(0), sample.ids());
     let uniform = &sample.draws.iter().find(|draw| draw.stratum == Stratum::Uniform);
     let uniform: &[u32] = uniform.map_or(&[], |draw| &draw.ids);
     let mut replayed: Vec<Replayed> = ids
@@ -291,7 +304,10 @@ fn replay_whole(
             let cell = Cell::new(subject, id, halt).in_basins(basins, id);
             let replayed = replay_cell(subject, &cell, id, judge, lanes, uniform.binary_search(&id).is_ok());
             (!is_halted()).then(|| {
-                report(done.fetch_add(1, Ordering::Relaxed) + 1);
+                // Reports are made under the lock, so that the number never falls.
+                let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+                *done += 1;
+                report(*done);
                 replayed
             })
         })
@@ -312,6 +328,7 @@ fn replay_whole(
     let has_states = !lanes.states().is_empty();
     Validation {
         seed: sample.seed,
+        requested: sample.requested,
         runs: subject.records.len(),
         filled: subject.records.iter().filter(|record| record.valid & valid::FILLED != 0).count(),
         has_starts: subject.plan.start_count() > 1,

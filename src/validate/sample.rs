@@ -24,6 +24,15 @@ impl Stratum {
     /// All strata, the uniform one first.
     pub const ALL: [Stratum; 3] = [Stratum::Uniform, Stratum::Border, Stratum::Status];
 
+    /// Describes the cells of the stratum; `counted` is the noun for what is counted.
+    pub fn describe(self, counted: &str) -> String {
+        match self {
+            Stratum::Uniform => format!("random {counted}"),
+            Stratum::Border => format!("{counted} next to another class or period"),
+            Stratum::Status => format!("{counted} with a status other than ok"),
+        }
+    }
+
     /// Returns the name in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -50,6 +59,8 @@ pub struct Draw {
 pub struct Sample {
     /// Seed of the random numbers.
     pub seed: u64,
+    /// Number of requested cells.
+    pub requested: usize,
     /// Cells by stratum. A cell may be in several.
     pub draws: Vec<Draw>,
     /// Runs whose states are compared after a few periods, drawn from all integrated runs.
@@ -97,7 +108,7 @@ pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample
     let lists = std::iter::once(all).chain(rare);
     let draws = Stratum::ALL.into_iter().zip(lists).zip(runs.into_iter().zip(counts));
     let draws = draws.map(|((stratum, list), (runs, count))| Draw { stratum, runs, ids: drawn(list, count) });
-    Sample { seed, draws: draws.collect(), states }
+    Sample { seed, requested: size, draws: draws.collect(), states }
 }
 
 /// Lists runs with a neighbour of another class or period, left, right, above or below. A list of cells has no neighbours.

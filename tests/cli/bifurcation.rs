@@ -73,7 +73,7 @@ fn a_line_through_a_plane_equals_a_scene_of_one_axis() {
     fs::write(folder.path().join("line.toml"), line).unwrap();
     run(&folder, "bifurcation plane.toml")
         .code(2)
-        .stderr(says(&["needs 1 axis", "--along e --at omega=VALUE"]));
+        .stderr(says(&["one table for `bifurcation`", "--along e --at omega=VALUE"]));
     run(&folder, "bifurcation plane.toml --along e")
         .code(2)
         .stderr(says(&["--along e: `--at omega=VALUE` is missing"]));
@@ -87,6 +87,33 @@ fn a_line_through_a_plane_equals_a_scene_of_one_axis() {
     assert_eq!((&manifest["along"], &manifest["at"]), (&"e".into(), &serde_json::json!(["omega=5.65"])));
     assert_eq!((&manifest["scene"], &manifest["parameters"]["omega"]), (&plane.into(), &5.65.into()));
     run(&folder, "bifurcation line.toml --at omega=5").code(2);
+}
+
+/// The title of such a scene describes the plane. Options of figures override the scene.
+#[test]
+fn the_figure_of_a_line_names_the_line_and_has_the_requested_width() {
+    let folder = folder();
+    let plane = "title = 'A plane'\n[[axis]]\nparameter = 'e'\nmin = 0.3\nmax = 0.5\ncount = 3\n\
+                 [[axis]]\nparameter = 'omega'\nmin = 5.0\nmax = 6.0\ncount = 2\n[figure]\nwidth = '120mm'\n";
+    fs::write(folder.path().join("plane.toml"), plane).unwrap();
+    let draw = |options: &str| {
+        let line = "bifurcation plane.toml --along e --at omega=5.65 --format svg --out b --force";
+        run(&folder, &format!("{line} {options}")).success();
+        fs::read_to_string(folder.path().join("b/bifurcation.svg")).unwrap()
+    };
+    let (svg, titles) = (draw(""), ["A plane, along e at \u{3c9} = 5.65", "periodic"]);
+    assert!(titles.iter().all(|text| svg.contains(text)) && svg.contains("width=\"4.7244in\""), "{svg:.400}");
+    let svg = draw("--width 85mm --no-legend --title=");
+    assert!(
+        !titles.iter().any(|text| svg.contains(text)) && svg.contains("width=\"3.3465in\""),
+        "{svg:.400}"
+    );
+    for (options, part) in
+        [("--width 85", "such as \"85mm\""), ("--width 60mm --font-size 9", "at most 8 points")]
+    {
+        run(&folder, &format!("orbit --out o {options}")).code(2).stderr(says(&[part]));
+        assert!(!folder.path().join("o").exists());
+    }
 }
 
 /// At sigma = 0.2 the mass hits the stop; at 2 its amplitude of 1/3 does not reach it.

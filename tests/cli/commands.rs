@@ -50,16 +50,16 @@ fn wrong_values_in_a_scene_are_refused_with_their_place() {
 fn scene_for_another_command_is_refused() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/e_omega.toml");
     let run = rattlemap(&folder()).args(["bifurcation", scene]).assert();
-    run.code(2).stderr(says(&["e_omega.toml:17:1", "`axis = 2 tables`", "needs 1 axis"]));
+    run.code(2).stderr(says(&["e_omega.toml:17:1", "`axis = 2 tables`", "one table for `bifurcation`"]));
 }
 
 #[test]
 fn missing_scene_is_refused() {
     let folder = folder();
-    run(&folder, "bifurcation scenes/none.toml")
-        .code(2)
-        .stdout("")
-        .stderr(says(&["scenes/none.toml: cannot read", "give the path of a TOML file"]));
+    run(&folder, "bifurcation scenes/none.toml").code(2).stdout("").stderr(says(&[
+        "scenes/none.toml: cannot read",
+        "give the path of a TOML file such as scenes/paper_fig5.toml",
+    ]));
     assert!(!folder.path().join("out").exists());
 }
 
@@ -81,8 +81,14 @@ fn bad_set_is_refused_and_names_itself() {
 #[test]
 fn bad_orbit_requests_are_refused() {
     let cases: [(&[&str], &str); 12] = [
-        (&["--start", "0,0,0"], "it must be four finite numbers"),
-        (&["--start", "0,0,0,inf"], "it must be four finite numbers"),
+        (
+            &["--start", "0,0,0"],
+            "it must be finite numbers: two, such as 0.1,0, for a model of one coordinate; four",
+        ),
+        (
+            &["--start", "0,0,0,inf"],
+            "it must be finite numbers: two, such as 0.1,0, for a model of one coordinate; four",
+        ),
         (
             &["--set", "e=1.5"],
             "--set e=1.5: `parameters.e = 1.5` is out of range: it must be between 0 and 1",

@@ -88,6 +88,7 @@ fn every_model_has_a_line_and_a_page() {
         one_wall.contains("5  free, from the left to the left") && !one_wall.contains("2  free"),
         "{one_wall}"
     );
+    assert!(one_wall.contains("smallest number: 4555.") && !one_wall.contains("1355"), "{one_wall}");
 }
 
 #[test]
@@ -109,6 +110,81 @@ fn unknown_and_wrong_models_are_refused() {
             "{error}"
         );
     }
+}
+
+/// A ball of 20 g on a table, in SI units, with a coordinate `z`.
+const BALL: &str = r#"name = "ball"
+motion.coordinates = ["z"]
+motion.mass = [["m"]]
+motion.force = ["m*A*(2*pi*f)^2"]
+motion.load = ["-9.81*m"]
+motion.frequency = "2*pi*f"
+motion.gap = [1]
+motion.units = ["m"]
+motion.time_unit = "s"
+contact = [{ side = "left", at = 0, law = "impact", restitution = "e" }]
+[parameters]
+m = { default = 0.02, min = 0.0, open = true, meaning = "mass of the ball", unit = "kg" }
+A = { default = 1.1e-4, meaning = "amplitude of the table", unit = "m" }
+f = { default = 50.0, min = 0.0, open = true, meaning = "frequency of the table", unit = "Hz" }
+e = { default = 0.3, min = 0.0, max = 1.0 }
+"#;
+
+#[test]
+fn units_and_significant_digits_are_printed() {
+    let folder = empty();
+    fs::write(folder.path().join("ball.toml"), BALL).unwrap();
+    let page = stdout(&folder, "models ball.toml");
+    for part in [
+        "The state is z [m], v [m/s]",
+        "f           50        Hz    finite and greater than 0 frequency of the table",
+        "The left wall is at gap = 0.",
+    ] {
+        assert!(page.contains(part), "{part} is not in\n{page}");
+    }
+    let summary = stdout(&folder, "orbit --model ball.toml --start 0.001,0");
+    for part in ["m=0.02 [kg] A=0.00011 [m] f=50.0 [Hz] e=0.3", "(T = 0.02 [s])"] {
+        assert!(summary.contains(part), "{part} is not in\n{summary}");
+    }
+    let (_, table) = summary.split_once("(T = 0.02 [s])\n").unwrap();
+    let heads: Vec<&str> =
+        table.lines().next().unwrap().split("  ").filter(|head| !head.is_empty()).collect();
+    let heads: Vec<&str> = heads.into_iter().map(str::trim).collect();
+    let expected = "kind|side|t [s]|t mod T [s]|z [m] before|v [m/s] before|z [m] after|v [m/s] after";
+    assert_eq!(heads.join("|"), expected);
+    let found: Value =
+        serde_json::from_str(&stdout(&folder, "orbit --model ball.toml --start 0.001,0 --json")).unwrap();
+    let units = &found["units"];
+    let listed: Vec<&str> =
+        ["m", "f", "z", "v", "gap", "gap_rate", "t"].map(|name| units[name].as_str().unwrap()).into();
+    assert_eq!(listed, ["kg", "Hz", "m", "m/s", "m", "m/s", "s"]);
+    assert!(units["e"].is_null());
+    for event in found["events"].as_array().unwrap() {
+        let speed = event["before"][1].as_f64().unwrap();
+        let shown = summary.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
+        assert!(
+            shown.into_iter().any(|x| (x - speed).abs() <= 5e-6 * speed.abs()),
+            "{speed} is not in {summary}"
+        );
+    }
+    run(&folder, "orbit --model ball.toml --out o").code(0);
+    let header = crate::common::rows(&folder.path().join("o/trajectory.csv")).0;
+    assert!(header.starts_with("t,phase,gap,gap_rate,z,v,domain"), "{header}");
+}
+
+#[test]
+fn a_model_in_place_of_a_scene_is_named_and_so_is_a_scene_in_place_of_a_model() {
+    let folder = my_model();
+    let error = refusal(&folder, "map my-bilinear.toml");
+    assert!(error.starts_with("error: my-bilinear.toml:3:1: `motion = "), "{error}");
+    assert!(error.contains("this file is a model, but a scene is needed"), "{error}");
+    let error = refusal(&folder, "orbit --model my-map.toml");
+    assert!(error.contains("this file is a scene, but a model is needed"), "{error}");
+    let error = refusal(&folder, "orbit omega=0.8");
+    assert!(error.contains("a parameter is set by an option: --set omega=0.8"), "{error}");
+    assert!(!refusal(&folder, "models bilinear omega=0.8").contains("--set"));
+    let error = refusal(&folder, "map none.toml");
+    assert!(error.contains("such as scenes/e_omega.toml"), "{error}");
 }
 
 /// The page's commands. A map's folder can be repaired without the model's file.

@@ -126,6 +126,7 @@ impl Walled {
             contacts: [contact(0), contact(1)],
             omega: self.free.omega,
             force: [self.free.force, 0.0],
+            force_sin: [0.0; 2],
             free: self.free.domain(),
             meshing: [self.behind(0).domain(), self.behind(1).domain()],
         };

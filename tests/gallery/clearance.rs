@@ -36,6 +36,7 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
         contacts: [Contact::Rigid; 2],
         omega,
         force: [1.0, 0.0],
+        force_sin: [0.0; 2],
         free: domain,
         meshing: [domain; 2],
     };

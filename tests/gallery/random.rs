@@ -281,7 +281,7 @@ fn validate(
     assert_eq!(plan.oscillator(plan.cell(0).flow), cell.oscillator);
     let subject = Subject { plan: &plan, records: &[record], precision, is_lane: true };
     let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
-    let sample = Sample { seed: 0, draws, states: Vec::new() };
+    let sample = Sample { seed: 0, requested: 1, draws, states: Vec::new() };
     let validation = replay(&subject, &sample, &lanes(&subject, &sample), &|_| ());
     validation.mismatches.first().map(|mismatch| mismatch.kind)
 }

@@ -68,6 +68,7 @@ fn judged(pair: &GearPair, record: &Record) -> Option<Kind> {
     let plan = Plan::new(&Scene::parse(&text, "cell", &sets, Purpose::Map).unwrap());
     let sample = Sample {
         seed: 0,
+        requested: 1,
         draws: vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }],
         states: Vec::new(),
     };

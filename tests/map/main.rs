@@ -15,6 +15,7 @@ mod audit;
 mod axes;
 mod basins;
 mod models;
+mod phase;
 mod runs;
 mod starts;
 

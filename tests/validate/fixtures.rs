@@ -45,8 +45,9 @@ pub(crate) fn read_records(path: &Path, identity: &Identity) -> Vec<(u32, Record
 
 /// Returns a sample of these runs. No states are compared.
 pub(crate) fn sample_of(ids: Vec<u32>) -> Sample {
-    let draws = vec![Draw { stratum: Stratum::Uniform, runs: ids.len(), ids }];
-    Sample { seed: 0, draws, states: Vec::new() }
+    let requested = ids.len();
+    let draws = vec![Draw { stratum: Stratum::Uniform, runs: requested, ids }];
+    Sample { seed: 0, requested, draws, states: Vec::new() }
 }
 
 /// Validates these runs of a map.

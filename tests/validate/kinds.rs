@@ -111,6 +111,7 @@ fn in_coordinates(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
         mass: congruent(o.mass),
         gap: covariant(o.gap),
         force: covariant(o.force),
+        force_sin: covariant(o.force_sin),
         free: domain(&o.free),
         meshing: [domain(&o.meshing[0]), domain(&o.meshing[1])],
         ..*o

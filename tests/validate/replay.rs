@@ -467,12 +467,26 @@ fn a_map_is_validated_and_its_report_says_so() {
     let (folder, out) = finished();
     let run = |arguments: &[&str]| rattlemap(folder.path(), &[&["validate", "o"], arguments].concat());
     let text = said(&run(&["--samples", "150", "--seed", "3"]).success().stdout(""));
-    for part in ["uniform: 0 of ", "unexplained 0 (below ", "judge: lanes in f64 on ", "the same to the bit"]
-    {
+    for part in [
+        " of 576 random cells: 0 differ (below ",
+        " cells next to another class or period: ",
+        "without early stops, and lanes in f64 on ",
+        "ran again on the same kind of processor, ",
+        "are the same to the bit",
+        "o: validation.json, report.html",
+    ] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    assert!(text.contains("o: validation.json, report.html"), "{text}");
+    assert!(!text.contains("not on the map's own device"), "{text}");
+    let verdict = text.lines().last().unwrap();
+    assert!(
+        verdict.starts_with("The map stands: 0 of ") && verdict.contains(" random cells are wrong (below "),
+        "{verdict}"
+    );
     let found = json(&out);
+    assert_eq!((&found["verdict"], &found["requested"]), (&verdict.into(), &150.into()));
+    assert_eq!((&found["again_on"], &found["same_device"]), (&found["processor"], &true.into()));
+    assert_ne!(found["lanes_f64_on"], found["again_on"]);
     assert_eq!(
         (&found["seed"], &found["cells"], &found["judge"]),
         (&3.into(), &576.into(), &"lanes_f64".into())
@@ -518,7 +532,8 @@ fn planted_records_fail_the_validation_by_name() {
     let run = rattlemap(folder.path(), &["validate", "o", "--samples", "576", "--quiet"]).code(1).stdout("");
     let text = said(&run);
     assert!(
-        text.contains(&format!("{} of 576 cells (uniform) differ, unexplained", PLANTED.len())),
+        text.contains("do not trust this map: ")
+            && text.contains(&format!("; {} of all 576 cells are wrong;", PLANTED.len())),
         "{text}"
     );
     // The message names the first cells.
@@ -558,7 +573,7 @@ fn the_result_names_a_device_other_than_the_maps() {
     rattlemap(folder.path(), &map).success();
     let validated = || said(&rattlemap(folder.path(), &["validate", "o"]).success());
     let text = validated();
-    assert!(!text.contains("not on the map's own device"), "{text}");
+    assert!(text.contains("Lanes ran again on the map's own device, "), "{text}");
     let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
     let original: serde_json::Value = serde_json::from_str(&manifest).unwrap();
     let found = json(&out);
@@ -579,7 +594,7 @@ fn the_result_names_a_device_other_than_the_maps() {
     fs::write(out.join("manifest.json"), inventory::sealed(faraway).unwrap()).unwrap();
     let text = validated();
     assert!(
-        text.contains(&format!("lanes ran again on {device}, not on the map's own device: no")),
+        text.contains(&format!("Lanes ran again on {device}, not on the map's own device, Faraway card (no")),
         "{text}"
     );
     assert!(text.contains("called Faraway card"), "{text}");

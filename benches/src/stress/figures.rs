@@ -4,14 +4,15 @@ use std::io::Write;
 
 use super::EngineName::{LanesF32, LanesF64, Reference};
 use super::{EngineName, grazing, grid, long_runs, stiffness};
-use rattlemap::map::scene::Format;
+use rattlemap::map::scene::{FigureStyle, Format};
 use rattlemap::show::drawing::axis::Axis;
-use rattlemap::show::drawing::frame::Frame;
+use rattlemap::show::drawing::frame::single;
 use rattlemap::show::drawing::legend::{Entry, Key, draw_head};
 use rattlemap::show::drawing::{Canvas, Color, DARK, FAINT, Marker, Shape, write_figure};
 use rattlemap::show::error::WriteError;
 
-const SIZE: (u32, u32) = (1500, 1150);
+const WIDTH: f64 = 1500.0;
+const HEIGHT: f64 = 1150.0;
 const LEFT: f64 = 160.0;
 /// Smaller errors, and errors of zero, are drawn here, on the axis.
 const LEAST_ERROR: f64 = 1e-17;
@@ -65,7 +66,9 @@ fn color(engine: EngineName) -> Color {
 }
 
 fn save(out: impl Write, figure: &Figure<'_>, groups: &[Group]) -> Result<(), WriteError> {
-    write_figure(out, Format::Png, SIZE, |canvas| draw(canvas, figure, groups))
+    let canvas = Canvas::new(&FigureStyle::default(), WIDTH);
+    draw(&canvas, figure, groups);
+    write_figure(out, Format::Png, &canvas)
 }
 
 fn draw(canvas: &Canvas, figure: &Figure<'_>, groups: &[Group]) {
@@ -73,11 +76,9 @@ fn draw(canvas: &Canvas, figure: &Figure<'_>, groups: &[Group]) {
     let entries: Vec<Entry> = groups.iter().map(|group| Entry::new(key(group), &group.label)).collect();
     let top = draw_head(canvas, figure.title, figure.subtitle, &entries) + 10.0;
     let points = || groups.iter().flat_map(|group| group.curves.iter().flatten());
-    let frame = Frame {
-        rect: canvas.panel(LEFT, top),
-        x: Axis::decades(figure.labels[0], points().map(|point| point.0)),
-        y: Axis::decades(figure.labels[1], points().map(|point| point.1)),
-    };
+    let x = Axis::decades(figure.labels[0], points().map(|point| point.0));
+    let y = Axis::decades(figure.labels[1], points().map(|point| point.1));
+    let frame = single(canvas, top, HEIGHT, [x, y], LEFT);
     frame.draw_grid(canvas);
     for group in groups {
         for curve in &group.curves {

@@ -3,15 +3,16 @@
 use std::io::Write;
 
 use super::points::Point;
-use rattlemap::map::scene::Format;
+use rattlemap::map::scene::{FigureStyle, Format};
 use rattlemap::show::drawing::axis::Axis;
-use rattlemap::show::drawing::frame::Frame;
+use rattlemap::show::drawing::frame::single;
 use rattlemap::show::drawing::labels::Labels;
 use rattlemap::show::drawing::legend::{Entry, Key, draw_head};
 use rattlemap::show::drawing::{Canvas, Color, DARK, FAINT, Marker, Shape, write_figure};
 use rattlemap::show::error::WriteError;
 
-const SIZE: (u32, u32) = (1500, 1280);
+const WIDTH: f64 = 1500.0;
+const HEIGHT: f64 = 1280.0;
 const LEFT: f64 = 160.0;
 /// Size of the text at the end of a curve.
 const SMALLEST: f64 = 18.0;
@@ -85,7 +86,9 @@ pub(super) struct View {
 /// # Errors
 /// If the figure cannot be written.
 pub(super) fn write(out: impl Write, subtitle: &str, view: View, points: &[Point]) -> Result<(), WriteError> {
-    write_figure(out, Format::Png, SIZE, |canvas| draw(canvas, subtitle, view, points))
+    let canvas = Canvas::new(&FigureStyle::default(), WIDTH);
+    draw(&canvas, subtitle, view, points);
+    write_figure(out, Format::Png, &canvas)
 }
 
 fn draw(canvas: &Canvas, subtitle: &str, view: View, points: &[Point]) {
@@ -109,17 +112,15 @@ fn draw(canvas: &Canvas, subtitle: &str, view: View, points: &[Point]) {
     let error = |point: &Point| (view.error)(point).clamp(ERRORS.0, ERRORS.1);
     let points =
         || present.iter().flat_map(|(style, points)| points.iter().map(move |point| (style, *point)));
-    let frame = Frame {
-        rect: canvas.panel(LEFT, top),
-        x: Axis::decades(
-            "microseconds per lane and forcing period (processor: times cores; graphics card: as a whole)",
-            points().map(|(_, point)| microseconds(point)),
-        ),
-        y: Axis::decades(
-            view.axis,
-            points().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
-        ),
-    };
+    let x = Axis::decades(
+        "microseconds per lane and forcing period (processor: times cores; graphics card: as a whole)",
+        points().map(|(_, point)| microseconds(point)),
+    );
+    let y = Axis::decades(
+        view.axis,
+        points().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
+    );
+    let frame = single(canvas, top, HEIGHT, [x, y], LEFT);
     frame.draw_grid(canvas);
     let place = |point: &Point| frame.at(microseconds(point), error(point));
     let markers: Vec<_> =

@@ -14,7 +14,8 @@ const ENDINGS_PER_PERIOD: u32 = 10_000;
 #[inline(always)]
 fn runge_kutta(field: &Equations, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
     let slope = |y: &Gap, cos: f64| {
-        let [a, b] = field.accelerations(y, cos);
+        // The force of a gear pair has no sine.
+        let [a, b] = field.accelerations(y, [cos, 0.0]);
         [y[1], a, y[3], b]
     };
     let moved = |by: f64, k: &Gap| -> Gap { std::array::from_fn(|i| y[i] + by * k[i]) };

@@ -5,15 +5,17 @@
 //! `t` with `g . t = 0` and the component 1 for `x`:
 //!
 //! ```text
-//! m x'' + c x' + k x = f cos(omega t) + load,    m = t M t, c = t C t, k = t K t, f = t . force
-//! p = a_x x + a_v v + a_cos cos(omega t) + constant
+//! m x'' + c x' + k x = f_cos cos(omega t) + f_sin sin(omega t) + load
+//! p = a_x x + a_v v + a_cos cos(omega t) + a_sin sin(omega t) + constant
+//! m = t M t, c = t C t, k = t K t, f_cos = t . force, f_sin = t . force_sin
 //! ```
 //!
 //! Its energy `2 E_5 = m x^(6)^2 + k x^(5)^2` grows as in [`crate::flow`]. With `x^(7)` from the equation of motion,
 //! the energy bounds the derivative that the certificate needs:
 //!
 //! ```text
-//! |p^(6)| <= reach sqrt(2 E_5) + |a_cos| omega^6 + |a_v f / m| omega^5
+//! |p^(6)| <= reach sqrt(2 E_5) + |a| omega^6 + |a_v f / m| omega^5
+//! f        = |(f_cos, f_sin)|, a = (a_cos, a_sin)
 //! reach    = |a_x - a_v c / m| / sqrt(m) + |a_v| sqrt(k) / m
 //! ```
 //!
@@ -65,8 +67,9 @@ impl ConstrainedMotion {
         // Rounding could make them negative.
         let [damping, stiffness] =
             [oscillator.free.damping, oscillator.free.stiffness].map(|m| square(m).max(0.0));
-        let force = along[0] * oscillator.force[0] + along[1] * oscillator.force[1];
-        let [a_x, a_v, a_cos] = [2, 3, 4].map(|j| free[(1, j)]);
+        let [cos, sin] = [oscillator.force, oscillator.force_sin].map(|f| along[0] * f[0] + along[1] * f[1]);
+        let force = cos.hypot(sin);
+        let [a_x, a_v, a_cos, a_sin] = [2, 3, 4, 5].map(|j| free[(1, j)]);
         ConstrainedMotion {
             generator,
             rate: (damping / mass + (stiffness / mass).sqrt()).max(omega),
@@ -74,9 +77,9 @@ impl ConstrainedMotion {
             omega,
             mass,
             stiffness,
-            force: force.abs(),
+            force,
             reach: (a_x - a_v * damping / mass).abs() / mass.sqrt() + a_v.abs() * stiffness.sqrt() / mass,
-            forced: a_cos.abs() * omega.powi(6) + (a_v * force / mass).abs() * omega.powi(5),
+            forced: a_cos.hypot(a_sin) * omega.powi(6) + (a_v * force / mass).abs() * omega.powi(5),
         }
     }
 
@@ -110,8 +113,9 @@ mod tests {
         };
         let full = Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..pair };
         let single = Oscillator { gap: [1.0, 0.0], force: [5.0, 0.0], ..pair };
+        let sine = Oscillator { force: [0.0; 2], force_sin: [20.0, -40.0], ..full };
         let mut largest = 0.0f64;
-        for oscillator in [pair, full, single] {
+        for oscillator in [pair, full, single, sine] {
             let flow = Flow::new(&oscillator);
             let linear = &flow.meshing[Side::Right.index()];
             for n in 0..2000u32 {

@@ -41,7 +41,8 @@ impl EnergyBound {
     ) -> EnergyBound {
         let reach = oscillator.mobility(oscillator.gap).sqrt();
         let scale = reach * unit.powi(6) / 14400.0;
-        let drive = oscillator.mobility(oscillator.force).sqrt();
+        let [cos, sin] = [oscillator.force, oscillator.force_sin].map(|f| oscillator.mobility(f));
+        let drive = (cos + sin).sqrt();
         let factorial: u32 = (1..=n).product();
         // If the powers overflow, the bound is NaN and certifies no step.
         let power = scale / unit.powi(n as i32) * f64::from(factorial);

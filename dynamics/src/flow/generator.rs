@@ -16,8 +16,8 @@ pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
     let matrix =
         |m: [[f64; 2]; 2]| d * by_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * d_inverse;
     let (damping, stiffness) = (matrix(domain.damping), matrix(domain.stiffness));
-    let force = d * by_mass * Vector2::from(oscillator.force);
-    let load = d * by_mass * Vector2::from(domain.load);
+    let along = |f: [f64; 2]| d * by_mass * Vector2::from(f);
+    let (cos, sin, load) = (along(oscillator.force), along(oscillator.force_sin), along(domain.load));
     let mut g = Generator::zeros();
     for i in 0..2 {
         g[(2 * i, 2 * i + 1)] = 1.0;
@@ -25,7 +25,9 @@ pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
             g[(2 * i + 1, 2 * j)] = -stiffness[(i, j)];
             g[(2 * i + 1, 2 * j + 1)] = -damping[(i, j)];
         }
-        g[(2 * i + 1, 4)] = force[i];
+        g[(2 * i + 1, 4)] = cos[i];
+        // A missing sine is +0, whatever the signs of the factors.
+        g[(2 * i + 1, 5)] = sin[i] + 0.0;
         g[(2 * i + 1, 6)] = load[i];
     }
     g[(4, 5)] = -oscillator.omega;

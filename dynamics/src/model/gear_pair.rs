@@ -58,6 +58,7 @@ impl GearPair {
             contacts: [Contact::Impact; 2],
             omega: self.omega,
             force: [self.force, 0.0],
+            force_sin: [0.0; 2],
             free,
             meshing: [meshing(1.0), meshing(-1.0)],
         };

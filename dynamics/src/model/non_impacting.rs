@@ -51,7 +51,9 @@ impl NonImpacting {
         let inertia = matrix(mass) * (omega * omega);
         let dynamic =
             (stiffness - inertia).map(Complex::from) + damping.map(|c| Complex::new(0.0, omega * c));
-        let amplitude = dynamic.try_inverse()? * Vector2::from(oscillator.force).map(Complex::from);
+        // A zero sine must not change the sign of a zero: 0 - 0 is 0.
+        let force = [0, 1].map(|i| Complex::new(oscillator.force[i], 0.0 - oscillator.force_sin[i]));
+        let amplitude = dynamic.try_inverse()? * Vector2::from(force);
         let middle = compliance * Vector2::from(oscillator.free.load);
         let swing = gap.map(Complex::from).dot(&amplitude).norm();
         let room = (walls[0] - gap.dot(&middle)).min(gap.dot(&middle) - walls[1]) - swing;
@@ -68,11 +70,12 @@ impl NonImpacting {
     /// the walls, stays at rest. The one at rest may be undamped.
     pub fn with_one_at_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
-            let Oscillator { gap, force, free, mass, .. } = *oscillator;
+            let Oscillator { gap, force, force_sin, free, mass, .. } = *oscillator;
             let moving = 1 - resting;
             let is_coupled =
                 [free.stiffness, free.damping, mass].iter().any(|m| m[0][1] != 0.0 || m[1][0] != 0.0);
-            let stays = !is_coupled && force[resting] == 0.0 && free.load[resting] == 0.0;
+            let stays =
+                !is_coupled && [force, force_sin, free.load].iter().all(|pushes| pushes[resting] == 0.0);
             if !stays || gap[moving] == 0.0 {
                 return None;
             }

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::Side;
+use crate::number::significant;
 
 /// Rounding error that checks of a matrix allow, relative to its entries.
 const MATRIX_TOLERANCE: f64 = 1e-12;
@@ -11,7 +12,7 @@ const MATRIX_TOLERANCE: f64 = 1e-12;
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum OscillatorError {
     /// A number that is out of its range.
-    #[error("{quantity} = {value}: it must be {requirement}")]
+    #[error("{quantity} = {}: it must be {requirement}", significant(*.value))]
     OutOfRange {
         /// The quantity.
         quantity: String,
@@ -21,13 +22,13 @@ pub enum OscillatorError {
         requirement: &'static str,
     },
     /// Walls that leave no room between them.
-    #[error("walls at {} and {}: the right one must lie above the left one", .walls[0], .walls[1])]
+    #[error("walls at {} and {}: the right one must lie above the left one", significant(.walls[0]), significant(.walls[1]))]
     Walls {
         /// Positions of the right and the left wall.
         walls: [f64; 2],
     },
     /// A mass, damping or stiffness matrix that is not symmetric.
-    #[error("{quantity} = {matrix:?}: the matrix must be symmetric")]
+    #[error("{quantity} = {}: the matrix must be symmetric", written(.matrix))]
     NotSymmetric {
         /// Name of the matrix.
         quantity: String,
@@ -36,7 +37,8 @@ pub enum OscillatorError {
     },
     /// A matrix behind an elastic wall that differs from that of free motion by more than `c g g^T`.
     #[error(
-        "{quantity} = {matrix:?}: behind an elastic wall it must be that of free motion and a part along the gap row"
+        "{quantity} = {}: behind an elastic wall it must be that of free motion and a part along the gap row",
+        written(.matrix)
     )]
     NotAlongGap {
         /// Name of the matrix.
@@ -45,13 +47,13 @@ pub enum OscillatorError {
         matrix: [[f64; 2]; 2],
     },
     /// A mass matrix that is not positive definite.
-    #[error("mass = {matrix:?}: the matrix must be positive definite")]
+    #[error("mass = {}: the matrix must be positive definite", written(.matrix))]
     NotDefinite {
         /// The matrix.
         matrix: [[f64; 2]; 2],
     },
     /// A damping or stiffness matrix that is not positive semidefinite.
-    #[error("{quantity} = {matrix:?}: the matrix must be positive semidefinite")]
+    #[error("{quantity} = {}: the matrix must be positive semidefinite", written(.matrix))]
     NotSemidefinite {
         /// Name of the matrix.
         quantity: String,
@@ -60,7 +62,13 @@ pub enum OscillatorError {
     },
 }
 
-/// One linear domain: `M x'' + damping x' + stiffness x = force cos(omega t) + load`.
+/// Writes a matrix for a message.
+fn written(matrix: &[[f64; 2]; 2]) -> String {
+    let row = |row: &[f64; 2]| format!("[{}, {}]", significant(row[0]), significant(row[1]));
+    format!("[{}, {}]", row(&matrix[0]), row(&matrix[1]))
+}
+
+/// One linear domain: `M x'' + damping x' + stiffness x = force cos(omega t) + force_sin sin(omega t) + load`.
 ///
 /// Damping and stiffness are symmetric and positive semidefinite. The energy bounds of the event certificate need
 /// that (see [`crate::flow`]).
@@ -106,8 +114,10 @@ pub struct Oscillator {
     pub contacts: [Contact; 2],
     /// Excitation frequency, > 0.
     pub omega: f64,
-    /// Amplitude of the harmonic force `force cos(omega t)`, the same in every domain.
+    /// Factor of `cos(omega t)` in the harmonic force, which is the same in every domain.
     pub force: [f64; 2],
+    /// Factor of `sin(omega t)` in the harmonic force.
+    pub force_sin: [f64; 2],
     /// Motion between the walls.
     pub free: Domain,
     /// Motion in lasting contact with the right and the left wall; ignored for rigid and missing walls.
@@ -118,6 +128,20 @@ impl Oscillator {
     /// Returns the forcing period `2 pi / omega`.
     pub fn period(&self) -> f64 {
         std::f64::consts::TAU / self.omega
+    }
+
+    /// Returns the oscillator whose phase 0 is this phase of the forcing, in radians.
+    pub fn at_phase(&self, phase: f64) -> Oscillator {
+        if phase == 0.0 {
+            return *self;
+        }
+        let (sin, cos) = phase.sin_cos();
+        let turned = |i: usize| {
+            let (f, g) = (self.force[i], self.force_sin[i]);
+            [cos * f + sin * g, cos * g - sin * f]
+        };
+        let [[f1, g1], [f2, g2]] = [turned(0), turned(1)];
+        Oscillator { force: [f1, f2], force_sin: [g1, g2], ..*self }
     }
 
     pub(crate) fn wall(&self, side: Side) -> f64 {
@@ -178,7 +202,8 @@ impl Oscillator {
         require(is_known, || "degrees of freedom".to_owned(), self.degrees as f64, "1 or 2")?;
         let [[m1, m], [other, m2]] = self.mass;
         for (i, mass) in [m1, m2].into_iter().enumerate() {
-            positive(|| format!("mass {}", i + 1), mass)?;
+            let quantity = || if self.degrees == 1 { "mass".to_owned() } else { format!("mass {}", i + 1) };
+            positive(quantity, mass)?;
         }
         if m != other {
             return Err(OscillatorError::NotSymmetric { quantity: "mass".to_owned(), matrix: self.mass });
@@ -187,7 +212,7 @@ impl Oscillator {
         if !is_definite {
             return Err(OscillatorError::NotDefinite { matrix: self.mass });
         }
-        positive(|| "omega".to_owned(), self.omega)?;
+        positive(|| "excitation frequency".to_owned(), self.omega)?;
         for (i, entry) in self.gap.into_iter().enumerate() {
             finite(|| format!("entry {} of the gap row", i + 1), entry)?;
         }
@@ -198,20 +223,22 @@ impl Oscillator {
             largest,
             "different from 0",
         )?;
-        for (i, force) in self.force.into_iter().enumerate() {
-            finite(|| format!("force {}", i + 1), force)?;
+        for (name, force) in [("force", self.force), ("force_sin", self.force_sin)] {
+            for (i, force) in force.into_iter().enumerate() {
+                finite(|| format!("{name} {}", i + 1), force)?;
+            }
         }
         let [right, left] = self.walls;
         let are_apart = right > left && right > f64::NEG_INFINITY && left < f64::INFINITY;
         if !are_apart {
             return Err(OscillatorError::Walls { walls: self.walls });
         }
-        self.free.validate("free motion")?;
+        self.free.validate(self.degrees, "free motion")?;
         for (side, place) in
             [(Side::Right, "contact with the right wall"), (Side::Left, "contact with the left wall")]
         {
             if self.has_motion_behind(side) {
-                self.meshing[side.index()].validate(place)?;
+                self.meshing[side.index()].validate(self.degrees, place)?;
             }
             if self.is_elastic(side) {
                 self.validate_elastic(side, place)?;
@@ -286,6 +313,7 @@ impl Oscillator {
         };
         none("entry 2 of the gap row", self.gap[1])?;
         none("force 2", self.force[1])?;
+        none("force_sin 2", self.force_sin[1])?;
         none("mass 1, 2", self.mass[0][1])?;
         let mass = self.mass[1][1];
         require(mass == 1.0, || "mass 2".to_owned(), mass, "1 where there is one degree of freedom")?;
@@ -309,12 +337,12 @@ impl Oscillator {
     /// max(|wall|, |D force|, |D load|),   D = (K + omega^2 M)^-1
     /// ```
     ///
-    /// over the existing walls and both displacements, with `K` and `load` of free motion. `D force` is the forced
-    /// deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
+    /// over the existing walls and both displacements, with `K` and `load` of free motion. `|D force|` is the amplitude
+    /// of the forced deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
     /// or none it is the distance that the load moves a mass in a radian of the forcing. The scale is finite for
     /// every oscillator.
     ///
-    /// A factor on `walls`, `force` and `load` that is a power of two multiplies the scale exactly. A change of the
+    /// A factor on `walls`, the force and `load` that is a power of two multiplies the scale exactly. A change of the
     /// unit of time does not change it.
     pub fn length_scale(&self) -> f64 {
         let [right, left] = self.walls;
@@ -322,19 +350,20 @@ impl Oscillator {
         if half.is_finite() && half > 0.0 {
             return half;
         }
-        let deflections = [self.force, self.free.load].map(|force| self.deflection(force));
+        let [cos, sin, load] = [self.force, self.force_sin, self.free.load].map(|f| self.deflections(f));
+        let deflections = [0, 1].map(|i| cos[i].hypot(sin[i]).max(load[i].abs()));
         let walls = self.walls.map(f64::abs).into_iter().filter(|wall| wall.is_finite());
         walls.chain(deflections).fold(LEAST_LENGTH, f64::max)
     }
 
-    fn deflection(&self, force: [f64; 2]) -> f64 {
+    fn deflections(&self, force: [f64; 2]) -> [f64; 2] {
         let [[k1, k], [_, k2]] = self.free.stiffness;
         let [[m1, m], [_, m2]] = self.mass;
         let [a, b, m] = [m1, m2, m].map(|m| m * self.omega * self.omega);
         let (a, b, k) = (a + k1, b + k2, m + k);
         let determinant = a * b - k * k;
         let [f1, f2] = force;
-        ((b * f1 - k * f2) / determinant).abs().max(((a * f2 - k * f1) / determinant).abs())
+        [(b * f1 - k * f2) / determinant, (a * f2 - k * f1) / determinant]
     }
 
     /// Whether the walls and the domains behind them are mirror images, so that `(y, t) -> (-y, t + T/2)` maps
@@ -349,11 +378,17 @@ impl Oscillator {
 }
 
 impl Domain {
-    fn validate(&self, place: &str) -> Result<(), OscillatorError> {
+    /// Checks the domain of an oscillator of `degrees` degrees of freedom. `place` names it in messages.
+    fn validate(&self, degrees: usize, place: &str) -> Result<(), OscillatorError> {
         for (name, matrix) in [("damping", self.damping), ("stiffness", self.stiffness)] {
             let quantity = || format!("{name} in {place}");
             matrix.as_flattened().iter().try_for_each(|&entry| finite(quantity, entry))?;
             let [[a, b], [c, d]] = matrix;
+            if degrees == 1 {
+                // The other entries have a check of their own.
+                require(a >= 0.0, quantity, a, "at least 0")?;
+                continue;
+            }
             if b != c {
                 return Err(OscillatorError::NotSymmetric { quantity: quantity(), matrix });
             }
@@ -447,7 +482,10 @@ mod tests {
             oscillator.validate().unwrap_err().to_string()
         };
         assert_eq!(slip(|o| o.mass[1][1] = 0.0), "mass 2 = 0: it must be finite and greater than 0");
-        assert_eq!(slip(|o| o.omega = f64::NAN), "omega = NaN: it must be finite and greater than 0");
+        assert_eq!(
+            slip(|o| o.omega = f64::NAN),
+            "excitation frequency = NaN: it must be finite and greater than 0"
+        );
         assert_eq!(
             slip(|o| o.gap = [0.0; 2]),
             "the largest entry of the gap row = 0: it must be different from 0"
@@ -459,18 +497,28 @@ mod tests {
             "entry 2 of the gap row = -1: it must be 0, since one degree of freedom has no second displacement"
         );
         assert_eq!(slip(|o| o.force[0] = f64::INFINITY), "force 1 = inf: it must be a finite number");
+        assert_eq!(slip(|o| o.force_sin[1] = f64::NAN), "force_sin 2 = NaN: it must be a finite number");
         assert_eq!(
             slip(|o| o.walls = [-0.5, 0.5]),
             "walls at -0.5 and 0.5: the right one must lie above the left one"
         );
         assert_eq!(
             slip(|o| o.free.damping[0][1] = 0.1),
-            "damping in free motion = [[0.6, 0.1], [0.0, 0.6]]: the matrix must be symmetric"
+            "damping in free motion = [[0.6, 0.1], [0, 0.6]]: the matrix must be symmetric"
         );
         assert_eq!(
             slip(|o| o.meshing[1].stiffness = [[1.0, 2.0], [2.0, 1.0]]),
-            "stiffness in contact with the left wall = [[1.0, 2.0], [2.0, 1.0]]: the matrix must be positive \
+            "stiffness in contact with the left wall = [[1, 2], [2, 1]]: the matrix must be positive \
              semidefinite"
+        );
+        let single = Oscillator {
+            degrees: 1,
+            free: Domain { damping: [[-0.1 - 0.2, 0.0], [0.0; 2]], ..good.free },
+            ..good
+        };
+        assert_eq!(
+            single.validate().unwrap_err().to_string(),
+            "damping in free motion = -0.3: it must be at least 0"
         );
         assert_eq!(
             slip(|o| o.meshing[0].load[0] = f64::INFINITY),
@@ -523,6 +571,8 @@ mod tests {
         assert_eq!(with(one, [-16.0, 0.0], [0.0; 2]), 0.5);
         assert_eq!(with(one, [16.0, 0.0], [0.0, 63.0]), 3.0);
         assert_eq!(with([0.0, 0.0], [16.0, 0.0], [0.0; 2]), 0.5);
+        let sine = Oscillator { walls: one, force: [12.0, 0.0], force_sin: [16.0, 0.0], ..pair };
+        assert_eq!(sine.length_scale(), 0.625, "the amplitude is 20");
         assert_eq!(with([f64::INFINITY, f64::NEG_INFINITY], [0.0; 2], [0.0; 2]), LEAST_LENGTH);
     }
 }

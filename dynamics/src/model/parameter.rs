@@ -112,6 +112,8 @@ pub struct Parameter {
     pub name: Cow<'static, str>,
     /// One phrase for `--help` and axis labels.
     pub meaning: Cow<'static, str>,
+    /// Its unit; none if it is dimensionless or not given.
+    pub unit: Option<Cow<'static, str>>,
     /// The default value; none if the user must choose one.
     pub default: Option<f64>,
     /// The values it may take.
@@ -134,6 +136,35 @@ impl Parameter {
     }
 }
 
+/// Units of a model's state and time; none where the model does not give them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Units {
+    /// Unit of each coordinate; empty without units.
+    pub coordinates: Vec<Option<String>>,
+    /// Unit of the gap.
+    pub gap: Option<String>,
+    /// Unit of time.
+    pub time: Option<String>,
+}
+
+impl Units {
+    /// Returns the unit of a component of the state.
+    pub fn component(&self, index: usize) -> Option<String> {
+        let unit = self.coordinates.get(index / 2)?.as_deref()?;
+        if index % 2 == 0 { Some(unit.to_owned()) } else { self.rate(unit) }
+    }
+
+    /// Returns the unit of the gap's velocity.
+    pub fn gap_velocity(&self) -> Option<String> {
+        self.rate(self.gap.as_deref()?)
+    }
+
+    /// Returns `unit` per unit of time.
+    pub fn rate(&self, unit: &str) -> Option<String> {
+        self.time.as_ref().map(|time| format!("{unit}/{time}"))
+    }
+}
+
 /// Defines a model that is a struct of numbers: the struct, its table `PARAMETERS`, its contact law, and a
 /// constructor that takes the restitution `e` and uses the defaults of all other parameters.
 macro_rules! model {
@@ -150,6 +181,7 @@ macro_rules! model {
             pub const PARAMETERS: &'static [Parameter] = &[$(Parameter {
                 name: std::borrow::Cow::Borrowed($name),
                 meaning: std::borrow::Cow::Borrowed($meaning),
+                unit: None,
                 default: $default,
                 range: Range::$range,
                 shapes: Shapes::$shapes,

@@ -43,6 +43,7 @@ impl Stops {
             contacts: [Contact::Impact; 2],
             omega: self.omega,
             force: [self.force, 0.0],
+            force_sin: [0.0; 2],
             free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0] },
             meshing: [stop(1.0), stop(-1.0)],
         };

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 
 use thiserror::Error;
 
-use super::{Law, Oscillator, OscillatorError, Parameter, ParameterError};
+use super::{Law, Oscillator, OscillatorError, Parameter, ParameterError, Units};
 
 /// An error in a model's parameters or in the oscillator that they give.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -64,6 +64,16 @@ pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// Returns the contact law.
     fn law(&self) -> Law;
 
+    /// Returns the start phase: the phase of the forcing, in radians, that the oscillator has as phase 0.
+    fn start_phase(&self) -> f64 {
+        0.0
+    }
+
+    /// Sets the start phase. Returns false if the model has no other than 0.
+    fn set_start_phase(&mut self, phase: f64) -> bool {
+        phase == 0.0
+    }
+
     /// Returns the names of the state's components: displacement and velocity of each degree of freedom. A model of
     /// one degree of freedom uses the first half of a [`State`](super::State); the other half is 0.
     fn state_names(&self) -> Vec<&str>;
@@ -71,6 +81,11 @@ pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// Returns the name of the moving body of each degree of freedom. The default is the displacement's name.
     fn bodies(&self) -> Vec<&str> {
         self.state_names().into_iter().step_by(2).collect()
+    }
+
+    /// Returns the units of state and time. The default has none.
+    fn units(&self) -> Units {
+        Units::default()
     }
 
     /// Returns the index of the parameter called `name`.

@@ -62,6 +62,7 @@ impl Linear {
             contacts: [Contact::Rigid; 2],
             omega: self.omega,
             force: [self.force, 0.0],
+            force_sin: [0.0; 2],
             free,
             meshing: [free; 2],
         }

@@ -4,9 +4,10 @@ use crate::common::linear::with_wall;
 use crate::common::{departure, size};
 use crate::one_wall::in_units;
 use crate::properties::{COMPARABLE_EVENTS, logarithmic, or_zero};
+use nalgebra::Complex;
 use proptest::prelude::*;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Domain, Law, NonImpacting, Oscillator, Side, State};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
@@ -73,8 +74,8 @@ fn laws() -> impl Strategy<Value = Law> {
 
 fn cases() -> impl Strategy<Value = Case> {
     let motion = (masses(), semidefinite(3.0), semidefinite(40.0), gap_rows());
-    let forcing =
-        ([or_none(-20.0..20.0), or_none(-20.0..20.0)], [or_none(-5.0..5.0), or_none(-5.0..5.0)], 0.6..8.0);
+    let pair = |most: f64| [or_none(-most..most), or_none(-most..most)];
+    let forcing = (pair(20.0), pair(20.0), pair(5.0), 0.6..8.0);
     let behind = || (logarithmic(10.0, 3e3), or_none(0.0..5.0)).prop_map(|(k, c)| [k, c]);
     let walls = (walls(), [contacts(), contacts()], [behind(), behind()]);
     let start = prop::array::uniform4(-1.0..1.0f64);
@@ -82,7 +83,7 @@ fn cases() -> impl Strategy<Value = Case> {
         |(
             is_single,
             (mass, damping, stiffness, gap),
-            (force, load, omega),
+            (force, force_sin, load, omega),
             (at, contacts, behind),
             law,
             y,
@@ -96,6 +97,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 contacts,
                 omega,
                 force,
+                force_sin,
                 free,
                 meshing: [free; 2],
             };
@@ -109,6 +111,7 @@ fn cases() -> impl Strategy<Value = Case> {
                     mass: [[mass[0][0], 0.0], [0.0, 1.0]],
                     gap: [if gap[0] == 0.0 { -1.0 } else { gap[0] }, 0.0],
                     force: [force[0], 0.0],
+                    force_sin: [force_sin[0], 0.0],
                     free,
                     meshing: [free; 2],
                     ..oscillator
@@ -324,6 +327,28 @@ proptest! {
         prop_assert!(off < 1e-11 * growth(&carrier) * size(carrier.state()), "off by {off:e}");
     }
 
+    /// The motion from another phase is the motion from phase 0 at a later time.
+    #[test]
+    fn a_start_at_a_later_phase_continues_the_motion(case in cases(), turn in 0.05..0.95f64) {
+        let flow = flow_of(&case);
+        let mut whole = Trajectory::with_tangents(&flow, case.law, case.start, UNIT);
+        let mut events: Vec<GapEvent> = Vec::new();
+        prop_assume!(whole.advance_to(turn * flow.period, &mut ()) != Err(Stop::CapEvents));
+        // State and contact do not determine whether a contact is an onset or sustained.
+        prop_assume!(whole.meshing().is_none_or(|side| case.oscillator.contacts[side.index()] != Contact::Impact));
+        let (then, meshing) = (whole.state(), whole.meshing());
+        prop_assume!(whole.advance_period(&mut events) != Err(Stop::CapEvents));
+        prop_assume!(!whole.near_grazing() && growth(&whole) < GROWTH && !is_narrow(&case, &events));
+        prop_assume!(events.len() <= COMPARABLE_EVENTS);
+        let later = Flow::new(&case.oscillator.at_phase(turn * std::f64::consts::TAU));
+        let mut rest = Trajectory::meshing_from(&later, case.law, then, meshing);
+        let mut others: Vec<GapEvent> = Vec::new();
+        prop_assert_eq!(rest.advance_to((1.0 - turn) * flow.period, &mut others), Ok(()));
+        prop_assert_eq!(kinds(&events), kinds(&others));
+        let off = departure(whole.state(), rest.state());
+        prop_assert!(off < 1e-12 * growth(&whole) * size(whole.state()), "off by {off:e}");
+    }
+
     #[test]
     fn units_that_are_powers_of_two_change_no_bit(case in cases(), length in -20..=20i32, time in -8..=8i32) {
         let (length, rate) = (2f64.powi(length), 2f64.powi(time));
@@ -379,6 +404,7 @@ proptest! {
             gap: row(o.gap),
             walls: [f64::INFINITY, f64::NEG_INFINITY],
             force: row(o.force),
+            force_sin: row(o.force_sin),
             free,
             meshing: [free; 2],
             ..*o
@@ -415,7 +441,7 @@ proptest! {
         let none = [[0.0; 2]; 2];
         let free = Domain { damping: none, ..o.free };
         let contacts = o.contacts.map(|contact| if contact == Contact::Elastic { contact } else { Contact::Impact });
-        let plain = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], force: [0.0; 2], free, meshing: [free; 2], ..*o };
+        let plain = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], force: [0.0; 2], force_sin: [0.0; 2], free, meshing: [free; 2], ..*o };
         let behind = case.behind.map(|[k, _]| [k, 0.0]);
         let conservative = walled(plain, o.walls, contacts, behind);
         let flow = Flow::new(&conservative);
@@ -442,5 +468,61 @@ proptest! {
         let scale = flow.kinetic_energy(y) + energy(y).abs() + before.abs() + size(y).powi(2) * 50.0;
         let steps = 1.0 + events.len() as f64;
         prop_assert!((energy(y) - before).abs() < 1e-13 * steps * scale * 10.0, "{before} to {} over {} events", energy(y), events.len());
+    }
+}
+
+/// Two coupled coordinates whose forces have different phases, without walls. The steady response solves
+/// `(K - omega^2 M + i omega C) X = force - i force_sin`, here by Cramer's rule.
+#[test]
+fn forces_with_different_phases_have_the_closed_form_response() {
+    let free = Domain {
+        damping: [[1.1, -0.3], [-0.3, 0.8]],
+        stiffness: [[9.0, -2.0], [-2.0, 5.0]],
+        load: [0.4, -0.7],
+    };
+    let (force, force_sin, omega) = ([3.0, -1.5], [-2.0, 4.0], 1.7);
+    let mass = [[2.0, 0.3], [0.3, 1.0]];
+    let oscillator = Oscillator {
+        degrees: 2,
+        mass,
+        gap: [1.0, -1.0],
+        walls: [f64::INFINITY, f64::NEG_INFINITY],
+        contacts: [Contact::Rigid; 2],
+        omega,
+        force,
+        force_sin,
+        free,
+        meshing: [free; 2],
+    };
+    oscillator.validate().unwrap();
+    let entry = |i: usize, j: usize| {
+        Complex::new(free.stiffness[i][j] - omega * omega * mass[i][j], omega * free.damping[i][j])
+    };
+    let (a, b, c, d) = (entry(0, 0), entry(0, 1), entry(1, 0), entry(1, 1));
+    let [f, g] = [0, 1].map(|i| Complex::new(force[i], -force_sin[i]));
+    let determinant = a * d - b * c;
+    let amplitudes = [(d * f - b * g) / determinant, (a * g - c * f) / determinant];
+    let ([[k1, k], [_, k2]], [p, q]) = (free.stiffness, free.load);
+    let middle = [(k2 * p - k * q) / (k1 * k2 - k * k), (k1 * q - k * p) / (k1 * k2 - k * k)];
+    let steady = |phase: f64| -> State {
+        let turn = Complex::new(0.0, phase).exp();
+        let of = |i: usize| [middle[i] + (amplitudes[i] * turn).re, -omega * (amplitudes[i] * turn).im];
+        let ([x1, v1], [x2, v2]) = (of(0), of(1));
+        [x1, v1, x2, v2]
+    };
+    let contact_free = NonImpacting::new(&oscillator).unwrap();
+    assert!(departure(contact_free.steady(), steady(0.0)) < 1e-14);
+    let flow = Flow::new(&oscillator);
+    let mut trajectory = Trajectory::<0>::new(&flow, Law::both(0.5, 0.0), [0.0; 4]);
+    for _ in 0..80 {
+        trajectory.advance_period(&mut ()).unwrap();
+    }
+    for part in 0..=8 {
+        let phase = std::f64::consts::TAU * f64::from(part) / 8.0;
+        trajectory.advance_to(phase / omega, &mut ()).unwrap();
+        let off = departure(trajectory.state(), steady(phase));
+        assert!(off < 1e-13, "phase {phase}: off by {off:e}");
+        let moved = NonImpacting::new(&oscillator.at_phase(phase)).unwrap();
+        assert!(departure(moved.steady(), steady(phase)) < 1e-13);
     }
 }

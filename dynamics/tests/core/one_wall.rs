@@ -206,6 +206,7 @@ pub(crate) fn in_units(
         walls: oscillator.walls.map(|wall| length * wall),
         omega: rate * oscillator.omega,
         force: oscillator.force.map(|f| force * f),
+        force_sin: oscillator.force_sin.map(|f| force * f),
         free: domain(&oscillator.free),
         meshing: [domain(&oscillator.meshing[0]), domain(&oscillator.meshing[1])],
         ..*oscillator

@@ -4,16 +4,17 @@ use std::io::Write;
 
 use super::measure::{Point, Run, Series, Target};
 use crate::gpu::Precision;
-use crate::map::scene::Format;
+use crate::map::scene::{FigureStyle, Format};
 use crate::show::drawing::axis::Axis;
-use crate::show::drawing::frame::Frame;
+use crate::show::drawing::frame::{Frame, single};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
 use crate::show::drawing::{Canvas, Color, Marker, Shape, write_figure};
 use crate::show::error::WriteError;
 
-/// Size in pixels.
-const SIZE: (u32, u32) = (1700, 1150);
-/// Left margin in pixels.
+/// Default size.
+const FIGURE_WIDTH: f64 = 1700.0;
+const FIGURE_HEIGHT: f64 = 1150.0;
+/// Least left margin in a figure of default size.
 const LEFT: f64 = 190.0;
 /// Width of curves in pixels.
 const WIDTH: f64 = 3.0;
@@ -31,29 +32,34 @@ const CPU_COLOR: Color = [0x00, 0x5a, 0x3c];
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(super) fn write(out: impl Write, all: &[Series], processor: &str) -> Result<(), WriteError> {
+pub(super) fn write(
+    out: impl Write,
+    style: &FigureStyle,
+    all: &[Series],
+    processor: &str,
+) -> Result<(), WriteError> {
     let rate = |point: &Point| point.spread(Run::rate).median;
     let best = |series: &Series| series.points.iter().map(rate).fold(0.0, f64::max);
     let mut sorted: Vec<&Series> = all.iter().collect();
     sorted.sort_by(|a, b| best(b).total_cmp(&best(a)));
-    write_figure(out, Format::Png, SIZE, |canvas| {
-        let entry = |series: &&Series| {
-            Entry::new(Key::Line { color: color(&series.target), width: WIDTH }, &series.target.label())
-        };
-        let entries: Vec<Entry> = sorted.iter().map(entry).collect();
-        let title = "One map on every engine, forcing periods per second: higher is better";
-        let subtitle = format!(
-            "restitution x frequency, integration and transfer of records; medians, bars from the slowest run to the \
-             fastest; processor: {processor}"
-        );
-        let top = draw_head(canvas, title, &subtitle, &entries) + 10.0;
-        let frame = frame(canvas, top, &sorted);
-        frame.draw_grid(canvas);
-        for series in &sorted {
-            curve(canvas, &frame, series);
-        }
-        frame.draw_axes(canvas, true);
-    })
+    let canvas = Canvas::new(style, FIGURE_WIDTH);
+    let entry = |series: &&Series| {
+        Entry::new(Key::Line { color: color(&series.target), width: WIDTH }, &series.target.label())
+    };
+    let entries: Vec<Entry> = sorted.iter().map(entry).collect();
+    let title = "One map on every engine, forcing periods per second: higher is better";
+    let subtitle = format!(
+        "restitution x frequency, integration and transfer of records; medians, bars from the slowest run to the \
+         fastest; processor: {processor}"
+    );
+    let top = draw_head(&canvas, title, &subtitle, &entries) + 10.0;
+    let frame = single(&canvas, top, FIGURE_HEIGHT, axes(&sorted), LEFT);
+    frame.draw_grid(&canvas);
+    for series in &sorted {
+        curve(&canvas, &frame, series);
+    }
+    frame.draw_axes(&canvas, true);
+    write_figure(out, Format::Png, &canvas)
 }
 
 fn color(target: &Target) -> Color {
@@ -66,15 +72,15 @@ fn color(target: &Target) -> Color {
     }
 }
 
-fn frame(canvas: &Canvas, top: f64, all: &[&Series]) -> Frame {
+/// Returns the horizontal and the vertical axis.
+fn axes(all: &[&Series]) -> [Axis; 2] {
     let points = || all.iter().flat_map(|series| &series.points);
     let lanes = points().map(|point| point.lanes as f64);
     let rates = points().flat_map(|point| point.runs.iter().map(Run::rate));
-    Frame {
-        rect: canvas.panel(LEFT, top),
-        x: Axis::around_logarithms("lanes", lanes, MIN_DECADES),
-        y: Axis::around_logarithms("forcing periods per second, over all lanes", rates, MIN_DECADES),
-    }
+    [
+        Axis::around_logarithms("lanes", lanes, MIN_DECADES),
+        Axis::around_logarithms("forcing periods per second, over all lanes", rates, MIN_DECADES),
+    ]
 }
 
 fn curve(canvas: &Canvas, frame: &Frame, series: &Series) {

@@ -10,6 +10,7 @@ use super::measure::{Run, SCENE, SampleCheck, Series};
 use super::spread::Spread;
 use crate::gpu::DeviceTimes;
 use crate::job::processor;
+use crate::map::scene::FigureStyle;
 use crate::show::error::WriteError;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
@@ -29,10 +30,11 @@ pub(super) fn write(
     folder: &Folder,
     all: &[Series],
     budget_seconds: f64,
+    style: &FigureStyle,
 ) -> Result<[&'static str; 3], OutputError> {
     inventory::clear_for(folder, [TABLE, FIGURE])?;
     folder.replace(TABLE, |out| write_table(out, all))?;
-    folder.replace(FIGURE, |out| figure::write(out, all, &processor::described()))?;
+    folder.replace(FIGURE, |out| figure::write(out, style, all, &processor::described()))?;
     let files = inventory::entries(folder, &[TABLE, FIGURE])?;
     inventory::write_manifest(folder, &manifest(all, budget_seconds, &files))?;
     Ok([TABLE, FIGURE, MANIFEST])

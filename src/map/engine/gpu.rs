@@ -303,6 +303,7 @@ fn settings_after(plan: &Plan, survey: &Survey) -> LaneSettings {
         measures: measures(plan),
         chatter: survey.chatter,
         kinds: survey.kinds,
+        sine: survey.sine,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
         steps_per_period: requested_steps(plan),
         ..default
@@ -340,6 +341,8 @@ struct Survey {
     chatter: bool,
     /// Whether any wall is elastic or rigid.
     kinds: bool,
+    /// Whether any force has a sine.
+    sine: bool,
     /// Least and most free steps per forcing period, of flows that lanes can carry.
     steps: Option<[u32; 2]>,
 }
@@ -351,6 +354,7 @@ impl Survey {
         Survey {
             chatter: self.chatter || other.chatter,
             kinds: self.kinds || other.kinds,
+            sine: self.sine || other.sine,
             steps: steps.reduce(|[least, most], [low, high]| [least.min(low), most.max(high)]),
         }
     }
@@ -377,7 +381,9 @@ fn survey_flows<T: Send>(
             bounces && gpu::follows_chatter(&oscillator, least[side])
         });
         let kinds = gpu::has_elastic_or_rigid_wall(&oscillator);
-        let survey = Survey { chatter, kinds, steps: Constants::steps(&oscillator, steps).map(|n| [n; 2]) };
+        let sine = gpu::has_sine(&oscillator);
+        let steps_used = Constants::steps(&oscillator, steps).map(|n| [n; 2]);
+        let survey = Survey { chatter, kinds, sine, steps: steps_used };
         (of(&oscillator, steps), survey)
     })
 }

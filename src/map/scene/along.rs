@@ -67,10 +67,10 @@ fn unnamed(place: &Place, axes: &[Axis]) -> SceneError {
     let names: Vec<&str> = axes.iter().map(|axis| &*axis.parameter().name).collect();
     let at: String = names[1..].iter().map(|name| format!(" --at {name}=VALUE")).collect();
     let remedy = format!(
-        "`bifurcation` needs 1 axis; take one line of the plane with --along {}{at}, or remove [[axis]] tables",
+        "one table for `bifurcation`; choose a line of the plane with --along {}{at}, or remove an [[axis]] table",
         names[0]
     );
-    let problem = Problem::value(Fault::Conflict, "axis", format!("{} tables", axes.len()), remedy);
+    let problem = Problem::value(Fault::OutOfRange, "axis", format!("{} tables", axes.len()), remedy);
     SceneError { place: place.clone(), problem }
 }
 

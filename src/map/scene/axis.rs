@@ -175,9 +175,14 @@ pub(super) fn read(
     }
     if axes.len() != required {
         let excess = tables.get(required).unwrap_or(&list);
-        let plural = if required == 1 { "axis" } else { "axes" };
+        let one = if required == 1 { "one table" } else { "two tables" };
+        let remedy = match (axes.len() < required, required) {
+            (true, 1) => "add an [[axis]] table",
+            (true, _) => "add an [[axis]] table, or make a diagram over one parameter with `bifurcation`",
+            (false, _) => "remove an [[axis]] table",
+        };
         return Err(Field { path: "axis".into(), node: &count_node(excess.node, axes.len()) }
-            .conflict(format!("`{command}` needs {required} {plural}; add or remove [[axis]] tables")));
+            .out_of_range(&format!("{one} for `{command}`; {remedy}")));
     }
     Ok(axes)
 }
@@ -246,6 +251,7 @@ pub(super) fn component(model: &dyn Model, place: usize) -> Parameter {
     Parameter {
         name: name.into(),
         meaning: meaning.into(),
+        unit: model.units().component(place).map(Into::into),
         default: None,
         range: Range::Finite,
         // Never read for a component of the start.

@@ -121,6 +121,12 @@ impl SceneBuilder {
         self.with("start", "policy", quoted(start.policy()))
     }
 
+    /// Sets the phase of the forcing, in radians, at which cells start. The model must be a
+    /// [`FileModel`](crate::model_file::FileModel).
+    pub fn start_phase(self, phase: f64) -> SceneBuilder {
+        self.with("start", "phase", number(phase))
+    }
+
     /// Adds random starts to each cell.
     pub fn draw(self, draw: Draw) -> SceneBuilder {
         self.with("start", "count", draw.count).with("start", "seed", draw.seed)
@@ -177,6 +183,10 @@ impl SceneBuilder {
     fn text(&self) -> String {
         let mut all = self.clone();
         all.set("", "model", quoted(&super::models::named(&*self.model)));
+        let phase = self.model.start_phase();
+        if phase != 0.0 && !self.fields.contains_key(&("start", "phase".to_owned())) {
+            all.set("start", "phase", number(phase));
+        }
         for (index, parameter) in self.model.parameters().iter().enumerate() {
             let (name, value) = (&*parameter.name, self.model.value(index));
             let has = |table| self.fields.contains_key(&(table, name.to_owned()));
@@ -210,7 +220,7 @@ fn list(items: impl Iterator<Item = String>) -> String {
 }
 
 /// Quotes a TOML string or key.
-fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     let mut quoted = String::from('"');
     for c in text.chars() {
         match c {

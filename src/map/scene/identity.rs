@@ -2,7 +2,7 @@
 
 use super::{Axis, Quantity, Scale, Scene, Start, Steps, list, models};
 use crate::model_file::FileModel;
-use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::model::{Model, Parameter};
 
 /// Largest number of axis values that are listed; longer axes are identified by a hash.
 const MOST_LISTED_VALUES: usize = 32;
@@ -47,7 +47,7 @@ impl Scene {
         for (parameter, expression) in self.derived() {
             add(format!("derived.{}", parameter.name), expression.to_owned());
         }
-        for (name, value) in self.fixed() {
+        for (Parameter { name, .. }, value) in self.fixed() {
             add(format!("parameters.{name}"), format!("{value:?}"));
         }
         let integration = self.integration();
@@ -66,6 +66,9 @@ impl Scene {
             start => start.policy().to_owned(),
         };
         add("start".into(), start);
+        if model.start_phase() != 0.0 {
+            add("start.phase".into(), format!("{:?}", model.start_phase()));
+        }
         if let Some(draw) = self.draw() {
             add("start.count".into(), draw.count.to_string());
             add("start.seed".into(), draw.seed.to_string());

@@ -84,7 +84,8 @@ pub const KEYS: &[Key] = &[
     key("integration", "undecided_periods", Value("0"), Takes::Whole(0, MAX_PERIODS), "additional periods for undecided cells; needs early_stop"),
     key("integration", "max_period", Value("64"), Takes::Whole(1, LONGEST_CYCLE), "longest period that is searched for, at most half of observed_periods; the default is lowered to that half"),
     key("start", "policy", Value("\"rest\""), Takes::OneOf(&["rest", "state", "up", "down", "both"]), "rest or state: every cell starts there; up or down: a cell starts from the final state of its neighbour along the last axis; both: up and down in one `bifurcation`"),
-    key("start", "state", KeyDefault::None, Takes::Words("[x1, v1, x2, v2], finite"), "state at phase 0, for policy = \"state\""),
+    key("start", "state", KeyDefault::None, Takes::Words("[x1, v1, x2, v2], finite"), "state at `phase`, for policy = \"state\""),
+    key("start", "phase", Value("0"), Takes::Words("a finite number of radians, or an expression such as \"pi/2\""), "phase of the forcing at which cells start; strobe states, sections and event times count from it"),
     key("start", "count", Value("1"), Takes::Whole(1, MAX_STARTS), "starts per cell of a map; all except the first are random"),
     key("start", "seed", Value("1"), Takes::Whole(0, u32::MAX), "seed of the random starts, for count above 1"),
     key("refine", "minimum_grid", Value("8"), Takes::Whole(1, 1024), "along each axis, at least every n-th cell is integrated"),
@@ -95,6 +96,11 @@ pub const KEYS: &[Key] = &[
     key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts, mesh fraction and measured quantities of filled cells"),
     key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern", "impact_speed", "impact_speed_max", "impact_energy", "impact_rate", "contact_force_max", "contact_force_rms", "amplitude", "rms", "harmonic", "dissipated", "multiplier", "state"]), "quantities to compute"),
     key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "files to write; png, svg and pdf are figures. `bifurcation` accepts figures and csv; a list of cells accepts csv and npy"),
+    key("figure", "width", Words("depends on the figure"), Takes::Words("\"60mm\" to \"300mm\"; also cm, in, pt"), "width of all figures. PNG files then have 600 dots per inch"),
+    key("figure", "font_size", Words("7.4"), Takes::Words("7 to 24, and at most width / 21"), "size of tick labels and legends, in points. Exponents are smaller; headings and names of axes are at least as large"),
+    key("figure", "title", Words("the scene's title"), Takes::Text(LONGEST_TITLE), "title of figures; \"\" removes the heading, with its lines below the title"),
+    key("figure", "legend", Value("true"), Takes::Flag, "whether figures have a legend. Without it, maps have no colour bar either"),
+    key("figure", "lines", KeyDefault::None, Takes::Words("{ \"name\" = \"expression\", ... } in parameters of the model, also derived ones"), "lines on maps, where an expression is zero"),
 ];
 
 /// Returns the names of the keys in one table.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::axis::{Axis, Target};
 use super::derived::Derived;
 use super::list::List;
+use crate::text::expression::Expression;
 use rattlemap_dynamics::model::{Model, Parameter, State};
+use rattlemap_dynamics::number::significant;
 
 /// All cells of a scene, numbered from 0: along the first axis, then along the second; or in the order of the list.
 #[derive(Clone, Debug)]
@@ -64,6 +66,21 @@ impl Points {
         model
     }
 
+    /// Returns the model at any values of the two axes.
+    pub(crate) fn model_at(&self, values: [f64; 2]) -> Box<dyn Model> {
+        let mut model = self.base.clone();
+        self.targets().zip(values).for_each(|(target, value)| target.set(&mut *model, value));
+        self.derived.apply(&mut *model);
+        model
+    }
+
+    /// Whether an expression depends on the parameter `index`, directly or through derived parameters.
+    pub(crate) fn follows(&self, expression: &Expression, index: usize) -> bool {
+        let uses = expression.uses();
+        let rules = self.derived.rules().iter().filter(|rule| uses.contains(&rule.index()));
+        uses.contains(&index) || rules.into_iter().any(|rule| rule.follows(index))
+    }
+
     /// Returns the start of a cell: `start` with the swept components replaced.
     pub(crate) fn start(&self, cell: usize, mut start: State) -> State {
         self.assignments(cell).for_each(|(target, value)| target.begin(&mut start, value));
@@ -101,7 +118,8 @@ impl Points {
 
     /// Describes a cell by the values of the swept quantities, such as `e = 0.5, omega = 5.6`.
     pub(crate) fn named(&self, cell: usize) -> String {
-        let named = self.swept().zip(self.values(cell)).map(|(p, value)| format!("{} = {value:?}", p.name));
+        let swept = self.swept().zip(self.values(cell));
+        let named = swept.map(|(parameter, value)| format!("{} = {}", parameter.name, significant(value)));
         named.collect::<Vec<_>>().join(", ")
     }
 

@@ -7,7 +7,7 @@ use super::section::{Field, Section};
 use super::{Purpose, Scene};
 use rattlemap_dynamics::model::{Model, REST, State};
 
-/// The state in which cells start at phase 0.
+/// The state in which cells start, at phase 0 of the oscillator: at the start phase of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
     /// At rest.
@@ -89,6 +89,21 @@ pub(super) fn read(root: &Section<'_>, model: &dyn Model, purpose: Purpose) -> R
             Err(field.conflict("it needs start.policy = \"state\"; set that policy or remove the state"))
         }
         (policy, None) => Ok(policy),
+    }
+}
+
+/// Reads `phase`, if it is there, into the model.
+pub(super) fn read_phase(section: &Section<'_>, model: &mut dyn Model) -> Result<(), SceneError> {
+    let Some(field) = section.get("phase") else { return Ok(()) };
+    let takes = "a number of radians, or an expression of numbers and pi";
+    let phase = field.expression(&[], takes, "\"pi/2\"")?.evaluate(&|_| f64::NAN);
+    if !phase.is_finite() {
+        return Err(field.out_of_range("finite, in radians"));
+    }
+    match model.set_start_phase(phase) {
+        true => Ok(()),
+        false => Err(field
+            .conflict("a model in Rust starts at phase 0; write it as a model file, or remove the phase")),
     }
 }
 

@@ -5,6 +5,7 @@ mod axes;
 mod built;
 mod cells;
 mod derived;
+mod figures;
 mod keys;
 mod ranges;
 mod sets;
@@ -129,7 +130,7 @@ fn a_map_takes_two_axes_in_their_order() {
     let scene = Scene::parse(&text, "s.toml", &[], Purpose::Map).unwrap();
     assert_eq!(pair(&*scene.cell(&[3, 1])), GearPair { omega: 6.5, ..GearPair::paper(1.0) });
     let message = Scene::parse(GOOD, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
-    assert_says(&message, &["s.toml:7:", "axis = 1 table", "`map` needs 2 axes"]);
+    assert_says(&message, &["s.toml:7:", "axis = 1 table", "two tables for `map`; add an [[axis]] table"]);
 }
 
 #[test]
@@ -222,7 +223,7 @@ count = 4\n | | s.toml:7: && `axis.0.count` is missing; say how many
 "#,
     );
     let message = parse("axis = []", &[]).unwrap_err().to_string();
-    assert_says(&message, &["s.toml:1:1: `axis = 0 tables`", "needs 1 axis"]);
+    assert_says(&message, &["s.toml:1:1: `axis = 0 tables`", "one table for `bifurcation`; add"]);
     assert_says(&parse("", &[]).unwrap_err().to_string(), &["s.toml:1:1: `axis` is missing"]);
 }
 
@@ -239,7 +240,7 @@ fn contradicting_values_are_refused() {
     let two = format!("{GOOD}{SECOND_AXIS}");
     assert_says(
         &parse(&two, &[]).unwrap_err().to_string(),
-        &["s.toml:27:", "`axis = 2 tables` does not fit: `bifurcation` needs 1 axis"],
+        &["s.toml:27:", "`axis = 2 tables` is out of range: it must be one table for `bifurcation`"],
     );
     check_refusals(
         r#"

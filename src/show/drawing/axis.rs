@@ -83,6 +83,21 @@ impl Axis {
         Axis { scale: Scale::Logarithmic, ..axis }
     }
 
+    /// Returns the value at a position on the scale. Between two listed values it is interpolated.
+    pub(crate) fn value(&self, place: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => place,
+            Scale::Logarithmic => 10f64.powf(place),
+            Scale::Listed => {
+                let last = self.listed.len() - 1;
+                let place = place.clamp(0.0, last as f64);
+                let before = (place as usize).min(last.saturating_sub(1));
+                let [from, to] = [before, last.min(before + 1)].map(|i| self.listed[i]);
+                from + (place - before as f64) * (to - from)
+            }
+        }
+    }
+
     /// Returns the position of a value on the scale. Values beyond an end of a logarithmic axis are moved to that end.
     /// Values between two listed ones are moved to the upper one.
     pub(crate) fn place(&self, value: f64) -> f64 {

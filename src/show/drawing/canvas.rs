@@ -1,16 +1,19 @@
 //! The picture under construction: a list of areas, lines, texts and images.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
+use crate::map::scene::FigureStyle;
 use crate::show::color::Color;
 use crate::show::drawing::shapes::{Align, Marker, Point, Rect, Shape};
-use crate::show::drawing::style::{BELOW, DARK, RIGHT, WHITE};
+use crate::show::drawing::style::{DARK, PER_INCH, SMALL, WHITE};
 use crate::show::drawing::typeface::Typeface;
 
 /// Points of a line that are closer to the previous one than this many pixels are skipped.
 const THIN: f64 = 0.1;
 /// Coordinates are clamped to this many pixels from the origin.
 const FAR: f64 = 1e5;
+/// Dots per inch of a PNG file whose width or type size is given.
+const STYLED_DOTS: f64 = 600.0;
 
 /// The shape of an area.
 #[derive(Debug)]
@@ -82,23 +85,57 @@ impl Bitmap {
 #[derive(Debug)]
 pub struct Canvas {
     pub(crate) items: RefCell<Vec<Item>>,
-    size: (f64, f64),
+    size: Cell<(f64, f64)>,
+    pub(crate) style: FigureStyle,
+    /// Units per inch of the printed figure.
+    pub(crate) per_inch: f64,
 }
 
 impl Canvas {
-    /// Returns a white picture.
-    pub(crate) fn empty(size: (f64, f64)) -> Canvas {
-        Canvas { items: RefCell::default(), size }
+    /// Returns a white picture. `width` is its width in units if the style has none. Its height is 0 until
+    /// [`Canvas::set_height`].
+    pub fn new(style: &FigureStyle, width: f64) -> Canvas {
+        let default = Typeface::of_figures().em(SMALL) / PER_INCH * 72.0;
+        let per_inch = PER_INCH * default / style.font_size.unwrap_or(default);
+        let canvas =
+            Canvas { items: RefCell::default(), size: Cell::default(), style: style.clone(), per_inch };
+        canvas.set_width(width);
+        canvas
+    }
+
+    /// Changes the width in units that the picture has if its style has none.
+    pub(crate) fn set_width(&self, width: f64) {
+        let width = match self.style.width {
+            Some(points) => points / 72.0 * self.per_inch,
+            None => width * (self.per_inch / PER_INCH),
+        };
+        self.size.set((width, self.size.get().1));
     }
 
     /// Returns width and height.
     pub fn size(&self) -> (f64, f64) {
-        self.size
+        self.size.get()
     }
 
-    /// Returns the room for panels below `top`, `left` pixels from the left edge.
-    pub fn panel(&self, left: f64, top: f64) -> Rect {
-        Rect { left, top, right: self.size.0 - RIGHT, bottom: self.size.1 - BELOW }
+    /// Sets the height.
+    pub fn set_height(&self, height: f64) {
+        self.size.set((self.size.get().0, height));
+    }
+
+    /// Whether there is a title.
+    pub(crate) fn has_heading(&self) -> bool {
+        self.style.title.as_deref() != Some("")
+    }
+
+    /// Whether the figure has its default width and type size. Then it also has its default height and margins; otherwise
+    /// they follow from its content.
+    pub fn is_default(&self) -> bool {
+        self.style.width.is_none() && self.style.font_size.is_none()
+    }
+
+    /// Returns dots per inch of a PNG file.
+    pub(crate) fn dots(&self) -> f64 {
+        if self.is_default() { PER_INCH } else { STYLED_DOTS }
     }
 
     fn add(&self, item: Item) {
@@ -206,6 +243,60 @@ impl Canvas {
             self.add(Item::Image { rect, bitmap });
         }
     }
+}
+
+/// The geometry of the items, for tests.
+#[cfg(test)]
+impl Canvas {
+    /// Returns every text with its place and type size. The place spans from the baseline to the height of capitals.
+    pub(crate) fn texts(&self) -> Vec<(String, Rect, f64)> {
+        let face = Typeface::of_figures();
+        let text = |item: &Item| match item {
+            Item::Text { text, at, em, align, .. } => {
+                let (width, height) = (face.set(text, *em).1, face.cap_height(*em));
+                let ((x, y), (dx, dy)) = crate::show::drawing::typeface::beginning(*at, width, *align);
+                let end = (x + width * dx + height * dy, y + width * dy - height * dx);
+                let place =
+                    Rect { left: x.min(end.0), top: y.min(end.1), right: x.max(end.0), bottom: y.max(end.1) };
+                Some((text.clone(), place, *em))
+            }
+            _ => None,
+        };
+        self.items.borrow().iter().filter_map(text).collect()
+    }
+
+    /// Returns the outlined rectangles: panels, colour bars, patches of legends.
+    pub(crate) fn outlines(&self) -> Vec<Rect> {
+        let outline = |item: &Item| match item {
+            Item::Line { path, .. } if path.len() == 5 && path[0] == path[4] => Some(extent(path)),
+            _ => None,
+        };
+        self.items.borrow().iter().filter_map(outline).collect()
+    }
+
+    /// Returns the rectangles around all items except texts.
+    pub(crate) fn extents(&self) -> Vec<Rect> {
+        let around = |item: &Item| match item {
+            Item::Area { outline: Outline::Rect(rect), .. } | Item::Image { rect, .. } => Some(*rect),
+            Item::Area { outline: Outline::Circle { center, radius }, .. } => {
+                Some(Rect::around(*center, (*radius, *radius)))
+            }
+            Item::Area { outline: Outline::Polygon(path), .. } | Item::Line { path, .. } => {
+                Some(extent(path))
+            }
+            Item::Text { .. } => None,
+        };
+        self.items.borrow().iter().filter_map(around).collect()
+    }
+}
+
+#[cfg(test)]
+fn extent(path: &[Point]) -> Rect {
+    let ends = |coordinate: fn(&Point) -> f64| {
+        path.iter().map(coordinate).fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)))
+    };
+    let ((left, right), (top, bottom)) = (ends(|p| p.0), ends(|p| p.1));
+    Rect { left, top, right, bottom }
 }
 
 /// Returns a path without points that are not finite or too close to the previous one. Its last point is always kept.

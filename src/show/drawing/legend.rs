@@ -6,14 +6,18 @@ use crate::show::drawing::shapes::{Align, Marker, Point, Rect};
 use crate::show::drawing::style::{DARK, LARGE, MEDIUM, SMALL};
 
 /// Width of a legend key.
-const KEY: f64 = 38.0;
+pub(crate) const KEY: f64 = 38.0;
 /// Room between a key and its text, between entries, and from one row to the next.
 const AFTER_KEY: f64 = 10.0;
 const BETWEEN: f64 = 34.0;
 const LEGEND_ROW: f64 = 34.0;
-/// Smallest type of a title that is too long, and the margin at its sides.
-const SMALLEST_TITLE: f64 = 16.0;
+/// Margin at the sides of title and legend: in a figure of default size, and in others.
 const SIDE_MARGIN: f64 = 40.0;
+const NARROW_MARGIN: f64 = 10.0;
+/// Height of the middle of the first line, if it is not that of the title in a figure of default size.
+const FIRST_ROW: f64 = 24.0;
+/// Height that is left out without a legend.
+const NO_ROW: f64 = 20.0;
 
 /// The symbol of a legend entry.
 #[derive(Clone, Copy, Debug)]
@@ -62,22 +66,32 @@ impl Entry {
     }
 }
 
-/// Draws title, subtitle (any number of lines) and legend. Returns the y coordinate below them.
+/// Draws title, subtitle (any number of lines) and legend, as far as the figure's style has them. Returns the y coordinate
+/// below them.
 pub fn draw_head(canvas: &Canvas, title: &str, subtitle: &str, entries: &[Entry]) -> f64 {
-    let mut y = 40.0;
-    draw_fitted(canvas, title, y, LARGE);
-    for (i, line) in subtitle.lines().enumerate() {
-        y += if i == 0 { 40.0 } else { 34.0 };
-        draw_fitted(canvas, line, y, MEDIUM);
+    let entries = if canvas.style.legend { entries } else { &[] };
+    let title = canvas.style.title.as_deref().unwrap_or(title);
+    let is_usual = canvas.is_default() && canvas.has_heading();
+    let mut y = if is_usual { 40.0 } else { FIRST_ROW };
+    if canvas.has_heading() {
+        y = draw_lines(canvas, title, y, LARGE);
+        for (i, line) in subtitle.lines().enumerate() {
+            y += if i == 0 { 40.0 } else { 34.0 };
+            y = draw_lines(canvas, line, y, if canvas.is_default() { MEDIUM } else { SMALL });
+        }
+        y += 44.0;
     }
-    y += 44.0;
+    if entries.is_empty() && !is_usual {
+        y -= NO_ROW;
+    }
     for row in rows(canvas, entries).into_iter().filter(|row| !row.is_empty()) {
         let widths: Vec<f64> = row.iter().map(|e| width(canvas, e)).collect();
         let total = widths.iter().sum::<f64>() + BETWEEN * (row.len() - 1) as f64;
         let mut x = (canvas.size().0 - total) / 2.0;
         for (entry, width) in row.iter().zip(widths) {
             draw_key(canvas, entry.key, (x, y));
-            canvas.text(&entry.text, (x + KEY + AFTER_KEY, y), SMALL, Align::Left, DARK);
+            let text = canvas.fitted(&entry.text, SMALL, width + 1.0 - KEY - AFTER_KEY);
+            canvas.text(&text, (x + KEY + AFTER_KEY, y), SMALL, Align::Left, DARK);
             x += width + BETWEEN;
         }
         y += LEGEND_ROW;
@@ -85,21 +99,29 @@ pub fn draw_head(canvas: &Canvas, title: &str, subtitle: &str, entries: &[Entry]
     y
 }
 
-/// Draws a centred line, in smaller type if it is too long, and cut if that is not enough.
-fn draw_fitted(canvas: &Canvas, text: &str, y: f64, size: f64) {
-    let room = canvas.size().0 - 2.0 * SIDE_MARGIN;
-    let size = (size * room / canvas.text_width(text, size).max(1.0)).clamp(SMALLEST_TITLE, size);
-    let text = canvas.fitted(text, size, room + 1.0);
-    canvas.text(&text, (canvas.size().0 / 2.0, y), size, Align::Center, DARK);
+/// Returns the width between the side margins.
+fn room(canvas: &Canvas) -> f64 {
+    let margin = if canvas.is_default() { SIDE_MARGIN } else { NARROW_MARGIN };
+    canvas.size().0 - 2.0 * margin
+}
+
+/// Draws a centred text, in smaller type or in several lines if it is too long. Returns the y coordinate of the last line.
+fn draw_lines(canvas: &Canvas, text: &str, y: f64, size: f64) -> f64 {
+    let fitted = canvas.lines(text, size, room(canvas));
+    for (i, line) in fitted.lines.iter().enumerate() {
+        let y = y + fitted.pitch() * i as f64;
+        canvas.text(line, (canvas.size().0 / 2.0, y), fitted.size, Align::Center, DARK);
+    }
+    y + fitted.more()
 }
 
 fn width(canvas: &Canvas, entry: &Entry) -> f64 {
-    KEY + AFTER_KEY + canvas.text_width(&entry.text, SMALL)
+    (KEY + AFTER_KEY + canvas.text_width(&entry.text, SMALL)).min(room(canvas))
 }
 
 /// Splits the legend into the smallest number of rows, of about equal length.
 fn rows<'e>(canvas: &Canvas, entries: &'e [Entry]) -> Vec<&'e [Entry]> {
-    let room = canvas.size().0 - 2.0 * SIDE_MARGIN;
+    let room = room(canvas);
     let widths: Vec<f64> = entries.iter().map(|e| width(canvas, e) + BETWEEN).collect();
     let total: f64 = widths.iter().sum();
     let count = (total / room).ceil().max(1.0);
@@ -119,7 +141,8 @@ fn rows<'e>(canvas: &Canvas, entries: &'e [Entry]) -> Vec<&'e [Entry]> {
     rows
 }
 
-fn draw_key(canvas: &Canvas, key: Key, (x, y): Point) {
+/// Draws the symbol of an entry, whose left end and middle height are given.
+pub(crate) fn draw_key(canvas: &Canvas, key: Key, (x, y): Point) {
     let middle = x + KEY / 2.0;
     match key {
         Key::Line { color, width } => canvas.stroke(&[(x, y), (x + KEY, y)], width, color),

@@ -14,12 +14,10 @@ use subsetter::GlyphRemapper;
 use crate::show::color::Color;
 use crate::show::drawing::canvas::{Bitmap, Canvas, Item, Outline};
 use crate::show::drawing::shapes::{Point, Rect};
-use crate::show::drawing::style::{DASH, PER_INCH};
+use crate::show::drawing::style::DASH;
 use crate::show::drawing::typeface::{Glyph, Typeface, beginning};
 use crate::show::error::WriteError;
 
-/// PDF points per pixel.
-const SCALE: f64 = 72.0 / PER_INCH;
 const FONT: Name<'static> = Name(b"F");
 /// Offset of the control points of a quarter circle's Bezier curve, over the radius.
 const HANDLE: f64 = 0.552_284_75;
@@ -35,13 +33,15 @@ pub(crate) fn encoded(canvas: &Canvas) -> Result<Vec<u8>, WriteError> {
         opacities: BTreeMap::new(),
         images: Vec::new(),
     };
-    // Coordinates are pixels from the upper left corner.
-    let (scale, height) = (SCALE as f32, canvas.size().1 * SCALE);
-    page.content.transform([scale, 0.0, 0.0, -scale, 0.0, height as f32]);
+    // Coordinates are units from the upper left corner.
+    let points = 72.0 / canvas.per_inch;
+    let (scale, size) =
+        (points as f32, [canvas.size().0, canvas.size().1].map(|side| (side * points) as f32));
+    page.content.transform([scale, 0.0, 0.0, -scale, 0.0, size[1]]);
     page.content.set_line_cap(LineCapStyle::RoundCap).set_line_join(LineJoinStyle::RoundJoin);
     let items = canvas.items.borrow();
     items.iter().for_each(|item| page.draw(item));
-    page.finish(canvas.size())
+    page.finish(size)
 }
 
 /// A page under construction and the resources that it uses.
@@ -161,7 +161,7 @@ impl<'c> Page<'c> {
         self.content.set_text_matrix([a, b, c, d, hundredths(x), hundredths(y)]).show(Str(&numbers));
     }
 
-    fn finish(self, (width, height): (f64, f64)) -> Result<Vec<u8>, WriteError> {
+    fn finish(self, [width, height]: [f32; 2]) -> Result<Vec<u8>, WriteError> {
         let mut pdf = Pdf::new();
         let mut last = 0;
         let mut next = || {
@@ -175,7 +175,6 @@ impl<'c> Page<'c> {
         pdf.catalog(catalog).pages(pages);
         pdf.pages(pages).kids([page]).count(1);
         let mut sheet = pdf.page(page);
-        let [width, height] = [width, height].map(|side| (side * SCALE) as f32);
         sheet.media_box(PdfRect::new(0.0, 0.0, width, height)).parent(pages).contents(content);
         let mut resources = sheet.resources();
         resources.fonts().pair(FONT, font);

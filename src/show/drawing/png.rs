@@ -12,31 +12,33 @@ use ttf_parser::{GlyphId, OutlineBuilder};
 use crate::show::color::Color;
 use crate::show::drawing::canvas::{Bitmap, Canvas, Item, Outline};
 use crate::show::drawing::shapes::{Point, Rect};
-use crate::show::drawing::style::{DASH, PER_INCH};
+use crate::show::drawing::style::DASH;
 use crate::show::drawing::typeface::{Glyph, Typeface, beginning};
 use crate::show::error::WriteError;
 
 /// Returns the bytes of the file.
 pub(crate) fn encoded(canvas: &Canvas) -> Result<Vec<u8>, WriteError> {
-    let (width, height) = (canvas.size().0 as u32, canvas.size().1 as u32);
+    let scale = canvas.dots() / canvas.per_inch;
+    let [width, height] = [canvas.size().0, canvas.size().1].map(|side| (side * scale).round() as u32);
     let mut page = Pixmap::new(width, height).ok_or(WriteError::Size { width, height })?;
     page.fill(SkiaColor::WHITE);
     for item in canvas.items.borrow().iter() {
-        draw(&mut page, item);
+        draw(&mut page, item, Transform::from_scale(scale as f32, scale as f32));
     }
     let mut rgb = Vec::with_capacity(3 * page.pixels().len());
     page.pixels().iter().for_each(|pixel| rgb.extend([pixel.red(), pixel.green(), pixel.blue()]));
     drop(page);
-    bitmap(&Bitmap { size: [width as usize, height as usize], rgb, alpha: None, is_smooth: false })
+    let size = [width as usize, height as usize];
+    bitmap(&Bitmap { size, rgb, alpha: None, is_smooth: false }, canvas.dots())
 }
 
-/// Returns a file of these pixels alone, with a palette if they have at most 256 colours.
-pub(crate) fn bitmap(bitmap: &Bitmap) -> Result<Vec<u8>, WriteError> {
+/// Returns a file of these pixels alone, with a palette if they have at most 256 colours. `dots` is its resolution per inch.
+pub(crate) fn bitmap(bitmap: &Bitmap, dots: f64) -> Result<Vec<u8>, WriteError> {
     let [width, height] = bitmap.size.map(|side| side as u32);
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, width, height);
     encoder.set_depth(BitDepth::Eight);
-    let per_metre = (PER_INCH / 0.0254).round() as u32;
+    let per_metre = (dots / 0.0254).round() as u32;
     encoder.set_pixel_dims(Some(PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }));
     let (color, data) = match (&bitmap.alpha, palette(&bitmap.rgb)) {
         (Some(alpha), _) => {
@@ -78,13 +80,12 @@ fn paint([r, g, b]: Color, opacity: f64) -> Paint<'static> {
     paint
 }
 
-fn draw(page: &mut Pixmap, item: &Item) {
-    let at_rest = Transform::identity();
+fn draw(page: &mut Pixmap, item: &Item, scale: Transform) {
     // Shapes without extent have no path.
     match item {
         Item::Area { outline, color, opacity } => {
             if let Some(path) = path_of(outline) {
-                page.fill_path(&path, &paint(*color, *opacity), FillRule::Winding, at_rest, None);
+                page.fill_path(&path, &paint(*color, *opacity), FillRule::Winding, scale, None);
             }
         }
         Item::Line { path, width, color, is_dashed } => {
@@ -97,7 +98,7 @@ fn draw(page: &mut Pixmap, item: &Item) {
                 ..Stroke::default()
             };
             if let Some(path) = polyline(path, false) {
-                page.stroke_path(&path, &paint(*color, 1.0), &stroke, at_rest, None);
+                page.stroke_path(&path, &paint(*color, 1.0), &stroke, scale, None);
             }
         }
         Item::Text { text, at, em, align, color } => {
@@ -112,14 +113,14 @@ fn draw(page: &mut Pixmap, item: &Item) {
                 let _ = typeface.face().outline_glyph(GlyphId(glyph.id), &mut outlines);
             }
             if let Some(path) = outlines.path.finish() {
-                page.fill_path(&path, &paint(*color, 1.0), FillRule::Winding, at_rest, None);
+                page.fill_path(&path, &paint(*color, 1.0), FillRule::Winding, scale, None);
             }
         }
         Item::Image { rect, bitmap } => {
             let [columns, rows] = bitmap.size;
-            let scale = [(rect.right - rect.left) / columns as f64, (rect.bottom - rect.top) / rows as f64];
-            let [sx, sy, left, top] = [scale[0], scale[1], rect.left, rect.top].map(|v| v as f32);
-            let place = Transform::from_row(sx, 0.0, 0.0, sy, left, top);
+            let pixel = [(rect.right - rect.left) / columns as f64, (rect.bottom - rect.top) / rows as f64];
+            let [sx, sy, left, top] = [pixel[0], pixel[1], rect.left, rect.top].map(|v| v as f32);
+            let place = Transform::from_row(sx, 0.0, 0.0, sy, left, top).post_concat(scale);
             let quality = if bitmap.is_smooth { FilterQuality::Bilinear } else { FilterQuality::Nearest };
             let paint = PixmapPaint { quality, ..PixmapPaint::default() };
             if let Some(pixels) = premultiplied(bitmap) {

@@ -81,7 +81,7 @@ pub struct Marker {
 
 impl Marker {
     /// Returns a filled circle.
-    pub fn dot(color: Color, radius: f64) -> Marker {
+    pub const fn dot(color: Color, radius: f64) -> Marker {
         Marker { shape: Shape::Circle, color, radius, hollow: false }
     }
 }

@@ -1,4 +1,4 @@
-//! Colours, type sizes and margins that all figures share. Lengths are in pixels.
+//! Colours and type sizes that all figures share. Lengths are in units of the [drawing](super).
 
 use crate::show::color::Color;
 use rattlemap_dynamics::model::Side;
@@ -25,12 +25,7 @@ pub const MEDIUM: f64 = 26.0;
 /// Type size of titles.
 pub const LARGE: f64 = 32.0;
 
-/// Margin right of the panels: room for half of the last tick label.
-pub(crate) const RIGHT: f64 = 58.0;
-/// Margin below the panels: room for tick labels and the name of the axis.
-pub const BELOW: f64 = 105.0;
-
-/// Pixels per inch of the printed figure. Small text is then about 7 points high.
+/// Units per inch of a figure with the default type size. Small type then has 7.4 points.
 pub(crate) const PER_INCH: f64 = 200.0;
 /// Length of dashes and of the gaps between them.
 pub(crate) const DASH: f64 = 5.0;

@@ -25,8 +25,8 @@ pub(crate) fn write(svg: &mut impl Write, canvas: &Canvas) -> Result<(), WriteEr
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}in\" height=\"{}in\" viewBox=\"0 0 {} {}\" \
          font-family=\"{FAMILIES}\" font-weight=\"300\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n\
          <rect{} fill=\"#ffffff\"/>",
-        rounded(width / PER_INCH),
-        rounded(height / PER_INCH),
+        inches(width / canvas.per_inch),
+        inches(height / canvas.per_inch),
         rounded(width),
         rounded(height),
         place(page),
@@ -72,7 +72,7 @@ fn draw(svg: &mut impl Write, item: &Item) -> Result<(), WriteError> {
             } else {
                 " image-rendering=\"optimizeSpeed\" style=\"image-rendering:pixelated\""
             };
-            let (place, data) = (place(*rect), STANDARD.encode(png::bitmap(bitmap)?));
+            let (place, data) = (place(*rect), STANDARD.encode(png::bitmap(bitmap, PER_INCH)?));
             writeln!(
                 svg,
                 "<image{place} preserveAspectRatio=\"none\"{rendering} href=\"data:image/png;base64,{data}\"/>"
@@ -119,6 +119,11 @@ fn write_text(
 /// Rounds to two decimals. Zero becomes positive, because a negative zero would have a sign.
 fn rounded(value: f64) -> f64 {
     (value * 100.0).round() / 100.0 + 0.0
+}
+
+/// Rounds to a ten-thousandth.
+fn inches(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
 }
 
 fn points(points: &[Point]) -> String {

@@ -8,10 +8,10 @@ mod panels;
 use std::io::Write;
 
 use crate::map::bifurcation::{Column, Direction};
-use crate::map::scene::Format;
+use crate::map::scene::{FigureStyle, Format};
 use crate::show::color::Color;
 use crate::show::drawing::axis::{Axis, Scale};
-use crate::show::drawing::frame::Frame;
+use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
 use crate::show::drawing::{Bitmap, Canvas, FAINT, Marker, Rect, wall_color, write_figure};
 use crate::show::error::WriteError;
@@ -21,12 +21,12 @@ pub use panels::Panels;
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::Class;
 
-const DIAGRAM_SIZE: (u32, u32) = (1600, 1750);
+/// Default size, and least distance of the panels from the left edge.
+const WIDTH: f64 = 1600.0;
+const HEIGHT: f64 = 1750.0;
 /// Height that a panel of a measured quantity adds.
-const MEASURED_HEIGHT: u32 = 420;
-/// Distance of the panels from the left edge, and between panels.
+const MEASURED_HEIGHT: f64 = 420.0;
 const PANEL_LEFT: f64 = 130.0;
-const PANEL_GAP: f64 = 30.0;
 /// Height of the panel of exponents, as a share of the height of another panel.
 const EXPONENTS_HEIGHT: f64 = 0.6;
 /// Height of the marks of columns that are undecided or failed.
@@ -48,51 +48,64 @@ const CURVE_DOT: f64 = 1.3;
 pub fn write(
     out: impl Write,
     format: Format,
-    [title, subtitle]: [&str; 2],
+    style: &FigureStyle,
+    texts: [&str; 2],
     axis: (&str, Scale),
     panels: &Panels,
     columns: &[Column],
 ) -> Result<(), WriteError> {
-    let (width, height) = DIAGRAM_SIZE;
-    let size = (width, height + MEASURED_HEIGHT * panels.measured() as u32);
-    write_figure(out, format, size, |canvas| draw(canvas, [title, subtitle], axis, panels, columns))
+    write_figure(out, format, &draw(style, texts, axis, panels, columns))
 }
 
-fn draw(
-    canvas: &Canvas,
+pub(super) fn draw(
+    style: &FigureStyle,
     [title, subtitle]: [&str; 2],
     axis: (&str, Scale),
     panels: &Panels,
     columns: &[Column],
-) {
+) -> Canvas {
+    let drawn = Canvas::new(style, WIDTH);
+    let canvas = &drawn;
     let marked: Vec<f64> = columns.iter().filter(|c| is_marked(c)).map(|c| c.value).collect();
     let coloring = Coloring::of(columns);
     let top = draw_head(canvas, title, subtitle, &legend(columns, panels, coloring)) + 14.0;
-    let whole = canvas.panel(PANEL_LEFT, top);
-    let count = panels.list.len() as f64;
-    let height = (whole.bottom - top - count * PANEL_GAP) / (count + EXPONENTS_HEIGHT);
     let x = value_axis(axis, columns);
-    for (i, panel) in panels.list.iter().enumerate() {
-        let top = top + i as f64 * (height + PANEL_GAP);
-        let bottom = top + height;
-        let y = quantity_axis(panel, columns);
-        let mut frame = Frame { rect: Rect { top, bottom, ..whole }, x: x.clone(), y };
+    // Strips of classes need more of a low panel.
+    let is_low = !canvas.is_default() && coloring.strips() > 0;
+    let exponents = if is_low { 1.0 } else { EXPONENTS_HEIGHT };
+    let shares = [vec![1.0; panels.list.len()], vec![exponents]].concat();
+    let height = HEIGHT + MEASURED_HEIGHT * panels.measured() as f64;
+    let edges = stacked(canvas, top, height, &shares);
+    let axis = |(i, edges): (usize, [f64; 2])| {
+        let height = edges[1] - edges[0];
+        let Some(panel) = panels.list.get(i) else {
+            return (edges, exponents::axis(columns, coloring.strips(), height));
+        };
+        let mut y = quantity_axis(panel, columns);
         // Leaves room for the marks below the data.
-        frame.y.low -= (frame.y.high - frame.y.low) * MARKS / height;
+        y.low -= (y.high - y.low) * MARKS / height;
+        (edges, y)
+    };
+    let placed = edges.into_iter().enumerate().map(axis).collect();
+    let beside = exponents::beside(canvas, coloring);
+    let mut frames = column(canvas, placed, &x, PANEL_LEFT, beside);
+    let last = frames.pop();
+    for (frame, panel) in frames.iter().zip(&panels.list) {
         frame.draw_grid(canvas);
-        draw_points(canvas, &frame, panel, columns, coloring);
+        draw_points(canvas, frame, panel, columns, coloring);
+        let bottom = frame.rect.bottom;
         for value in marked.iter().filter(|v| v.is_finite()) {
             let x = frame.at(*value, 0.0).0;
             canvas.stroke(&[(x, bottom - MARKS + 2.0), (x, bottom)], 1.2, FAINT);
         }
         frame.draw_axes(canvas, false);
     }
-    let rect = Rect { top: top + count * (height + PANEL_GAP), ..whole };
-    let y = exponents::axis(columns, coloring.strips(), rect.bottom - rect.top);
-    let frame = Frame { rect, x, y };
-    frame.draw_grid(canvas);
-    exponents::draw(canvas, &frame, columns, coloring);
-    frame.draw_axes(canvas, true);
+    if let Some(frame) = last {
+        frame.draw_grid(canvas);
+        exponents::draw(canvas, &frame, columns, coloring);
+        frame.draw_axes(canvas, true);
+    }
+    drawn
 }
 
 /// Whether a column is undecided or failed.
@@ -163,7 +176,7 @@ fn value_axis((label, scale): (&str, Scale), columns: &[Column]) -> Axis {
     Axis { scale, ..Axis::exact(label, low - room, high + room) }
 }
 
-/// Pixels of the image of points per pixel of the figure, in each direction.
+/// Pixels of the image of points per unit of the figure, in each direction.
 const FINE: f64 = 2.0;
 
 /// Counts the dots on every pixel of the image, then sets the colour of each pixel.

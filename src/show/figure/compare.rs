@@ -1,25 +1,22 @@
-//! The differences of two maps as a picture. Cells that agree have pale colours. Lengths are in pixels.
+//! The differences of two maps as a picture. Cells that agree have pale colours.
 
 use std::io::Write;
 
 use crate::findings::compare::Kind;
-use crate::map::scene::Format;
+use crate::map::scene::{FigureStyle, Format};
 use crate::show::caption;
 use crate::show::color::Color;
-use crate::show::drawing::legend::draw_head;
-use crate::show::drawing::{Align, Canvas, DARK, SMALL, write_figure};
+use crate::show::drawing::{Canvas, write_figure};
 use crate::show::error::WriteError;
-use crate::show::figure::map_layout::{MapLayout, ROW};
+use crate::show::figure::map_layout::{MapFigure, Row, RowKey};
 use crate::show::map_pair::{MapPair, MapSide, SceneDifference};
 use crate::show::symbols::symbol;
 use rattlemap_dynamics::orbit::Class;
 
 /// Prefix of the names of a scene's parameters.
 const PARAMETERS: &str = "parameters.";
-/// Width of the legend.
-const COUNTS_WIDTH: f64 = 560.0;
-/// Height of the legend.
-const COUNTS_HEIGHT: f64 = 460.0;
+/// Width and height of the legend.
+const LEGEND: (f64, f64) = (560.0, 460.0);
 
 /// A colour and the cells that it represents.
 struct CellColor {
@@ -63,25 +60,32 @@ fn color_index(classes: [Class; 2]) -> usize {
 }
 
 /// Draws the comparison and writes it.
-pub fn write(out: impl Write, format: Format, pair: &MapPair<'_>) -> Result<(), WriteError> {
+pub fn write(
+    out: impl Write,
+    format: Format,
+    style: &FigureStyle,
+    pair: &MapPair<'_>,
+) -> Result<(), WriteError> {
+    write_figure(out, format, &draw(style, pair))
+}
+
+pub(super) fn draw(style: &FigureStyle, pair: &MapPair<'_>) -> Canvas {
     let index = |(classes, kind): ([Class; 2], &Option<Kind>)| match kind {
         Some(kind) if !kind.is_decisive() => OTHER_PATTERN,
         _ => color_index(classes),
     };
     let indices: Vec<usize> = pair.classes().zip(&pair.comparison.kinds).map(index).collect();
     let [a, b] = pair.sides;
-    let layout = MapLayout::new(a.cells, COUNTS_WIDTH, COUNTS_HEIGHT);
-    write_figure(out, format, layout.size, |canvas| {
-        let title = format!("Where two maps differ: A is {}, B is {}", a.name, b.name);
-        draw_head(canvas, &title, &subtitle(pair), &[]);
-        layout.draw_map(canvas, a.cells, |id| COLORS[indices[id]].color);
-        let other_pattern = match [Kind::Pattern, Kind::Word].map(|kind| pair.comparison.count(kind)) {
-            [_, 0] => COLORS[OTHER_PATTERN].text,
-            [0, _] => "both periodic, other word",
-            _ => "both periodic, other pattern or word",
-        };
-        draw_legend(canvas, &indices, other_pattern, &layout);
-    })
+    let title = format!("Where two maps differ: A is {}, B is {}", a.name, b.name);
+    let other_pattern = match [Kind::Pattern, Kind::Word].map(|kind| pair.comparison.count(kind)) {
+        [_, 0] => COLORS[OTHER_PATTERN].text,
+        [0, _] => "both periodic, other word",
+        _ => "both periodic, other pattern or word",
+    };
+    let (subtitle, rows) = (subtitle(pair), rows(&indices, other_pattern));
+    let figure =
+        MapFigure { cells: a.cells, title: &title, subtitle: &subtitle, rows, bar: None, legend: LEGEND };
+    figure.draw(style, |id| COLORS[indices[id]].color, |_, _| {})
 }
 
 /// Describes the differences of scenes, engines and versions.
@@ -97,9 +101,10 @@ fn subtitle(pair: &MapPair<'_>) -> String {
     if engine(a) != engine(b) {
         parts.push(format!("A on {}, B on {}", engine(a), engine(b)));
     }
-    if (a.crate_version, a.commit) != (b.crate_version, b.commit) {
+    if (a.crate_version, a.provenance.commit) != (b.crate_version, b.provenance.commit) {
         let short = |commit: &str| commit.chars().take(7).collect::<String>();
-        let version = |side: MapSide<'_>| format!("{} ({})", side.crate_version, short(side.commit));
+        let version =
+            |side: MapSide<'_>| format!("{} ({})", side.crate_version, short(side.provenance.commit));
         parts.push(format!("A by version {}, B by {}", version(a), version(b)));
     }
     let text = match parts.is_empty() {
@@ -111,12 +116,12 @@ fn subtitle(pair: &MapPair<'_>) -> String {
     if is_one { format!("{text}\n{}", caption::of_scene(a.cells.scene())) } else { text }
 }
 
-/// Draws the colours with numbers and shares of cells, below the sum of their kind.
-fn draw_legend(canvas: &Canvas, indices: &[usize], other_pattern: &str, layout: &MapLayout) {
+/// Returns the rows of the legend: colours with numbers and shares of cells, below the sum of their kind.
+fn rows(indices: &[usize], other_pattern: &str) -> Vec<Row> {
     let mut counts = [0usize; COLORS.len()];
     indices.iter().for_each(|&index| counts[index] += 1);
     let count = |cells: usize| format!("{cells}  ({:.2} %)", 100.0 * cells as f64 / indices.len() as f64);
-    let mut y = layout.top + ROW / 2.0;
+    let mut rows = Vec::new();
     for (kind, text) in [
         (None, "class and period the same"),
         (Some(Kind::Class), "class differs"),
@@ -125,16 +130,14 @@ fn draw_legend(canvas: &Canvas, indices: &[usize], other_pattern: &str, layout: 
         let entries =
             || COLORS.iter().zip(counts).enumerate().filter(move |(_, (entry, _))| entry.kind == kind);
         let sum: usize = entries().map(|(_, (_, cells))| cells).sum();
-        canvas.text(text, (layout.left, y), SMALL, Align::Left, DARK);
-        canvas.text(&count(sum), (layout.right, y), SMALL, Align::Right, DARK);
-        y += ROW;
+        let (is_apart, text) = (!rows.is_empty(), text.to_owned());
+        rows.push(Row { key: RowKey::Heading, text, cells: count(sum), is_apart });
         for (index, (entry, cells)) in entries().filter(|(_, (_, cells))| *cells > 0) {
             let text = if index == OTHER_PATTERN { other_pattern } else { entry.text };
-            layout.draw_entry(canvas, y, entry.color, text, &count(cells));
-            y += ROW;
+            rows.push(Row::of_color(entry.color, text, count(cells)));
         }
-        y += ROW / 2.0;
     }
+    rows
 }
 
 #[cfg(test)]

@@ -1,91 +1,102 @@
-//! A layer of a map as a picture: cells, axes, legend, colour bar. Lengths are in pixels.
+//! A layer of a map as a picture: cells, lines, attractors, legend, colour bar.
 
 use std::io::Write;
 
-use crate::map::scene::Format;
+use crate::map::scene::{Format, Target};
 use crate::show::caption;
 use crate::show::cells::Cells;
-use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::Frame;
-use crate::show::drawing::legend::draw_head;
-use crate::show::drawing::{Align, Canvas, DARK, Rect, SMALL, write_figure};
+use crate::show::drawing::legend::Key;
+use crate::show::drawing::{Canvas, Color, DARK, Marker, Point, WHITE, wall_color, write_figure};
 use crate::show::error::WriteError;
-use crate::show::figure::map_layout::{MapLayout, ROW};
-use crate::show::layers::{Bar, Layer, share};
+use crate::show::figure::map_layout::{MapFigure, Row};
+use crate::show::figure::map_lines;
+use crate::show::layers::{Layer, NamedColor, share};
+use rattlemap_dynamics::model::Side;
 
-/// Width of the legend.
-const LEGEND_WIDTH: f64 = 460.0;
-/// Least height of map and legend.
-const LEAST_HEIGHT: f64 = 700.0;
-/// Size of the colour bar.
-const BAR_WIDTH: f64 = 34.0;
-const BAR_HEIGHT: f64 = 260.0;
-/// Length of the arrow at an end of the bar beyond which there are values.
-const ARROW: f64 = 18.0;
-/// Room for the bar's name, and between it and the entries above.
-const BAR_HEAD: f64 = 50.0;
-const ABOVE_BAR: f64 = 26.0;
+/// Width of the legend, and least height of map and legend.
+const LEGEND: (f64, f64) = (460.0, 700.0);
+/// Colours of lines, repeated for more lines; width of a line and of its white rim.
+const LINE_COLORS: [fn() -> Color; 3] = [|| DARK, || wall_color(Side::Right), || wall_color(Side::Left)];
+const LINE: f64 = 3.0;
+const RIM: f64 = 7.0;
+/// Marker of a strobe state of an attractor.
+const ATTRACTOR: Marker = Marker { hollow: true, ..Marker::dot(DARK, 8.0) };
+/// Largest distance of an attractor from the plane of the starts, relative to its size.
+const IN_PLANE: f64 = 1e-9;
 
 /// Draws a layer and writes it.
 pub fn write(out: impl Write, format: Format, cells: &Cells<'_>, layer: &Layer) -> Result<(), WriteError> {
-    let layout = MapLayout::new(cells, LEGEND_WIDTH, legend_height(layer).max(LEAST_HEIGHT));
-    write_figure(out, format, layout.size, |canvas| draw(canvas, cells, layer, &layout))
+    write_figure(out, format, &draw(cells, layer))
 }
 
-/// Returns the height of the legend: entries, then the bar.
-fn legend_height(layer: &Layer) -> f64 {
-    let entries = ROW * layer.entries.len() as f64;
-    let below = |bar: &Bar| match bar.remarks(1).len() {
-        0 => 0.0,
-        lines => ARROW + ROW * lines as f64,
-    };
-    layer.bar.as_ref().map_or(entries, |bar| bar_top(layer) + BAR_HEAD + BAR_HEIGHT + below(bar))
-}
-
-/// Returns the distance of the bar from the top of the legend.
-fn bar_top(layer: &Layer) -> f64 {
-    let entries = ROW * layer.entries.len() as f64;
-    if layer.entries.is_empty() { 0.0 } else { entries + ABOVE_BAR }
-}
-
-fn draw(canvas: &Canvas, cells: &Cells<'_>, layer: &Layer, layout: &MapLayout) {
+pub(super) fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
     let scene = cells.scene();
     let subtitle = format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
-    draw_head(canvas, scene.title(), &subtitle, &[]);
-    layout.draw_map(canvas, cells, |id| layer.palette[usize::from(layer.indices[id])]);
-    for (row, entry) in layer.entries.iter().enumerate() {
-        let share = share(entry.cells, cells.count());
-        let text = canvas.fitted(&entry.text, SMALL, layout.text_room(canvas, &share));
-        let y = layout.top + ROW * (row as f64 + 0.5);
-        layout.draw_entry(canvas, y, entry.color, &text, &share);
+    let row = |entry: &NamedColor| Row::of_color(entry.color, &entry.text, share(entry.cells, cells.count()));
+    let mut rows: Vec<Row> = layer.entries.iter().map(row).collect();
+    let color = |nth: usize| LINE_COLORS[nth % LINE_COLORS.len()]();
+    rows.extend(
+        scene
+            .lines()
+            .iter()
+            .enumerate()
+            .map(|(nth, line)| Row::drawn(Key::Line { color: color(nth), width: LINE }, &line.name)),
+    );
+    let attractors = attractors(cells);
+    if !attractors.is_empty() {
+        rows.push(Row::drawn(Key::Marker(ATTRACTOR), "attractor, at phase 0"));
     }
-    if let Some(bar) = &layer.bar {
-        draw_bar(canvas, bar, (layout.left, layout.top + bar_top(layer)), cells.count());
+    let figure = MapFigure {
+        cells,
+        title: scene.title(),
+        subtitle: &subtitle,
+        rows,
+        bar: layer.bar.as_ref(),
+        legend: LEGEND,
+    };
+    figure.draw(
+        scene.figure_style(),
+        |id| layer.palette[usize::from(layer.indices[id])],
+        |canvas, frame| {
+            for (nth, line) in scene.lines().iter().enumerate() {
+                draw_line(
+                    canvas,
+                    frame,
+                    &map_lines::zeros([&frame.x, &frame.y], line.function(scene.points())),
+                    color(nth),
+                );
+            }
+            let inside = attractors.iter().filter(|(x, y)| {
+                (frame.x.low..=frame.x.high).contains(x) && (frame.y.low..=frame.y.high).contains(y)
+            });
+            inside.for_each(|(x, y)| canvas.marker(frame.at(*x, *y), ATTRACTOR));
+        },
+    )
+}
+
+/// Draws a line with a white rim, which separates it from cells of its own colour.
+fn draw_line(canvas: &Canvas, frame: &Frame, parts: &[Vec<Point>], color: Color) {
+    let parts: Vec<Vec<Point>> =
+        parts.iter().map(|part| part.iter().map(|(x, y)| frame.at(*x, *y)).collect()).collect();
+    for (width, color) in [(RIM, WHITE), (LINE, color)] {
+        parts.iter().for_each(|part| canvas.stroke(part, width, color));
     }
 }
 
-fn draw_bar(canvas: &Canvas, bar: &Bar, (left, top): (f64, f64), total: usize) {
-    canvas.text(&bar.label, (left, top + 12.0), SMALL, Align::Left, DARK);
-    let top = top + BAR_HEAD;
-    let rect = Rect { left, top, right: left + BAR_WIDTH, bottom: top + BAR_HEIGHT };
-    canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row]);
-    canvas.outline(rect, 1.0);
-    let frame = Frame { rect, x: Axis::exact("", 0.0, 1.0), y: Axis::exact("", bar.low, bar.high) };
-    frame.draw_scale(canvas);
-    let [below, above] = bar.beyond;
-    let arrows =
-        [(below, bar.colors.first(), rect.bottom, ARROW), (above, bar.colors.last(), rect.top, -ARROW)];
-    for (cells, color, end, length) in arrows {
-        if let (Some(&color), true) = (color, cells > 0) {
-            let corners = [(left, end), (left + BAR_WIDTH / 2.0, end + length), (rect.right, end)];
-            canvas.polygon(&corners, color);
-            canvas.stroke(&corners, 1.0, DARK);
-        }
-    }
-    for (row, text) in bar.remarks(total).iter().enumerate() {
-        let y = rect.bottom + ARROW + ROW * (row as f64 + 0.5);
-        canvas.text(text, (left, y), SMALL, Align::Left, DARK);
-    }
+/// Returns the strobe states of all attractors that lie in the plane of a map whose axes are both components of the start.
+pub(super) fn attractors(cells: &Cells<'_>) -> Vec<Point> {
+    let targets: Vec<Target> = cells.scene().axes().iter().map(|axis| axis.target()).collect();
+    let (Some(basins), &[Target::Start(x), Target::Start(y)]) = (cells.basins(), &targets[..]) else {
+        return Vec::new();
+    };
+    let plane = cells.start(0);
+    let lies_in_plane = |state: &&[f64; 4]| {
+        let size = state.iter().map(|component| component.abs()).fold(0.0, f64::max);
+        let is_near = |i: usize| (state[i] - plane[i]).abs() <= IN_PLANE * size;
+        (0..state.len()).filter(|i| ![x, y].contains(i)).all(is_near)
+    };
+    basins.strobes().filter(lies_in_plane).map(|state| (state[x], state[y])).collect()
 }
 
 #[cfg(test)]
@@ -94,7 +105,8 @@ mod tests {
     use crate::map::plan::Plan;
     use crate::map::scene::{Purpose, Scene};
     use crate::record::Record;
-    use crate::show::layers::NamedColor;
+    use crate::show::figure::map_layout::{ARROW, BAR_HEIGHT, BAR_WIDTH};
+    use crate::show::layers::Bar;
 
     const LOW: [u8; 3] = [1, 2, 3];
     const HIGH: [u8; 3] = [4, 5, 6];
@@ -123,6 +135,7 @@ mod tests {
             title: "a map".into(),
             indices: (0..CELLS).map(|id| u8::from(id % 7 == 3)).collect(),
             palette: vec![[255, 254, 250], [9, 99, 199]],
+            numbers: None,
             entries: (0..entries).map(entry).collect(),
             bar: Some(Bar { label: "exponent".into(), colors, low: -0.4, high: 1.0, beyond }),
         }

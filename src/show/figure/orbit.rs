@@ -11,8 +11,8 @@ mod time_history;
 
 use std::io::Write;
 
-use crate::map::scene::Format;
-use crate::show::drawing::write_figure;
+use crate::map::scene::{FigureStyle, Format};
+use crate::show::drawing::{Canvas, write_figure};
 use crate::show::error::WriteError;
 use plot::ORBIT_WIDTH;
 pub use plot::OrbitPlot;
@@ -42,16 +42,23 @@ impl OrbitFigure {
     }
 
     /// Draws the figure of an orbit and writes it.
-    pub fn write(self, out: impl Write, format: Format, plot: &OrbitPlot<'_>) -> Result<(), WriteError> {
-        let height = match self {
-            OrbitFigure::PhasePlane => 980,
-            OrbitFigure::TimeHistory => 1150,
-            OrbitFigure::Gap => 1050,
-        };
-        write_figure(out, format, (ORBIT_WIDTH, height), |canvas| match self {
-            OrbitFigure::PhasePlane => plot.draw_phase_planes(canvas),
-            OrbitFigure::TimeHistory => plot.draw_time_history(canvas),
-            OrbitFigure::Gap => plot.draw_gap(canvas),
-        })
+    pub fn write(
+        self,
+        out: impl Write,
+        format: Format,
+        style: &FigureStyle,
+        plot: &OrbitPlot<'_>,
+    ) -> Result<(), WriteError> {
+        write_figure(out, format, &self.draw(style, plot))
+    }
+
+    pub(super) fn draw(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {
+        let canvas = Canvas::new(style, ORBIT_WIDTH);
+        match self {
+            OrbitFigure::PhasePlane => plot.draw_phase_planes(&canvas),
+            OrbitFigure::TimeHistory => plot.draw_time_history(&canvas),
+            OrbitFigure::Gap => plot.draw_gap(&canvas),
+        }
+        canvas
     }
 }

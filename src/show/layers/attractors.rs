@@ -31,6 +31,7 @@ pub(crate) fn layer(counts: &[u8]) -> Layer {
         palette,
         entries: legend(entries),
         bar: None,
+        numbers: None,
     }
 }
 

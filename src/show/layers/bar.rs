@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use crate::show::color::Color;
+use crate::show::drawing::axis::Axis;
 use crate::show::symbols::number;
 
 /// Largest share of the values that may lie beyond an end of a bar. A few extreme values must not take the contrast from
@@ -21,6 +22,11 @@ pub struct Bar {
 }
 
 impl Bar {
+    /// Returns the axis of the numbers.
+    pub(crate) fn axis(&self) -> Axis {
+        Axis::exact(&self.label, self.low, self.high)
+    }
+
     /// Returns one sentence for each end of the bar beyond which cells lie. `total` is the number of all cells.
     pub(crate) fn remarks(&self, total: usize) -> Vec<String> {
         let [below, above] = self.beyond;

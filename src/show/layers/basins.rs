@@ -1,6 +1,6 @@
 //! The main layer of a map of basins: the attractor that each start leads to.
 
-use crate::findings::attractors::{Basins, NONE};
+use crate::findings::attractors::{Attractor, Basins, NONE};
 use crate::show::color::Color;
 use crate::show::layers::colors::{self, CHAOTIC, NO_VALUE, SYMMETRIC, UNDECIDED};
 use crate::show::layers::layer::{Layer, NamedColor, legend};
@@ -36,12 +36,19 @@ pub(crate) fn layer(basins: &Basins) -> Layer {
         text: attractor_name(label, attractor),
         cells: attractor.cells,
     };
-    let mut entries: Vec<NamedColor> = list.iter().enumerate().take(LISTED_ATTRACTORS).map(entry).collect();
-    let rest = &list[entries.len()..];
-    if !rest.is_empty() {
-        let cells = rest.iter().map(|attractor| attractor.cells).sum();
-        let text = format!("{} more attractors", rest.len());
-        entries.push(NamedColor { color: color(LISTED_ATTRACTORS), text, cells });
+    let is_listed = |(label, attractor): &(usize, &Attractor)| {
+        *label < LISTED_ATTRACTORS || attractor.class == Class::Chaotic
+    };
+    let mut entries: Vec<NamedColor> = list.iter().enumerate().filter(is_listed).map(entry).collect();
+    let is_colored = |label: usize| label < COLORED_ATTRACTORS;
+    for (kind, colored, colors) in [("other", true, "a colour each"), ("rare", false, "one colour")] {
+        let all = list.iter().enumerate().filter(|some| !is_listed(some) && is_colored(some.0) == colored);
+        let some: Vec<(usize, &Attractor)> = all.collect();
+        if let Some((first, _)) = some.first() {
+            let text = format!("{} {kind} attractors, {colors}", some.len());
+            let cells = some.iter().map(|(_, attractor)| attractor.cells).sum();
+            entries.push(NamedColor { color: color(*first), text, cells });
+        }
     }
     let cells = labels.iter().filter(|&&label| label == NONE).count();
     entries.push(NamedColor { color: UNDECIDED, text: "undecided or failed".to_owned(), cells });
@@ -53,5 +60,6 @@ pub(crate) fn layer(basins: &Basins) -> Layer {
         palette,
         entries: legend(entries),
         bar: None,
+        numbers: None,
     }
 }

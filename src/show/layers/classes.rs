@@ -61,6 +61,7 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         bar: (has_chaos && shows_chaos).then_some(bar),
         indices,
         palette,
+        numbers: None,
     }
 }
 

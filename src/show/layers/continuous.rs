@@ -141,6 +141,7 @@ impl Continuous<'_> {
             short: self.short,
             title: self.title,
             indices: values.par_iter().map(index).collect(),
+            numbers: Some(values.iter().map(|&value| value as f32).collect()),
             palette: colors.iter().copied().chain([NO_VALUE]).collect(),
             entries: legend([NamedColor { color: NO_VALUE, text: "no value".to_owned(), cells: absent }]),
             bar: Some(Bar { label, colors, low, high, beyond: count_beyond(numbers(), low, high) }),

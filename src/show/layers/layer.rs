@@ -16,6 +16,8 @@ pub struct Layer {
     pub(crate) title: Cow<'static, str>,
     /// Index into the palette of each cell, by id.
     pub(crate) indices: Vec<u8>,
+    /// Numbers that the colours represent, by id, in a layer of a continuous quantity. NaN where there is none.
+    pub(crate) numbers: Option<Vec<f32>>,
     /// Colours.
     pub(crate) palette: Vec<Color>,
     /// Named colours, in the order of the legend.

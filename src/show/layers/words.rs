@@ -69,6 +69,7 @@ fn layer(words: &WordIndex, texts: &Texts) -> Layer {
         entries: entries(words, texts, &spellings, |number| palette[usize::from(indices[number])]),
         palette,
         bar: None,
+        numbers: None,
     }
 }
 
@@ -84,9 +85,15 @@ fn entries(
         cells: words.list[number].1,
     };
     let mut list: Vec<NamedColor> = spellings.iter().enumerate().take(LISTED_WORDS).map(entry).collect();
-    let rest = words.list.iter().skip(LISTED_WORDS);
-    let text = format!("{} other {}", rest.len(), texts.plural);
-    list.push(NamedColor { color: RARE, text, cells: rest.map(|(_, cells)| cells).sum() });
+    let ends = [LISTED_WORDS, COLORED_WORDS, usize::MAX].map(|end| end.min(words.list.len()));
+    let other = [("other", ", a colour each"), ("rare", ", one colour")];
+    for ((kind, colors), ends) in other.into_iter().zip(ends.windows(2)).filter(|(_, ends)| ends[0] < ends[1])
+    {
+        let some = &words.list[ends[0]..ends[1]];
+        let text = format!("{} {kind} {}{colors}", some.len(), texts.plural);
+        let cells = some.iter().map(|(_, cells)| cells).sum();
+        list.push(NamedColor { color: color(ends[0]), text, cells });
+    }
     let count = |number: u32| words.numbers.iter().filter(|&&other| other == number).count();
     let text = format!("{} not known", texts.name);
     list.push(NamedColor { color: NOT_KNOWN, text, cells: count(UNKNOWN) });
@@ -97,7 +104,27 @@ fn entries(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::Spelling;
     use crate::show::color_difference::least_difference;
+
+    /// The legend once showed one grey for cells that had colours of their own.
+    #[test]
+    fn every_colour_of_the_legend_is_that_of_its_cells() {
+        for count in [3, LISTED_WORDS + 1, 100, COLORED_WORDS + 50] {
+            let word = |n: usize| (Spelling::Hashed { hash: n as u64, length: 70 }, count - n);
+            let list: Vec<_> = (0..count).map(word).collect();
+            let cells = list.iter().enumerate().flat_map(|(n, (_, cells))| vec![n as u32; *cells]);
+            let layer = words(&WordIndex { numbers: cells.collect(), list });
+            let colors = layer.indices.iter().map(|index| layer.palette[usize::from(*index)]);
+            let colors: Vec<Color> = colors.collect();
+            let mut cell = 0;
+            for entry in &layer.entries {
+                assert_eq!(entry.color, colors[cell], "{count} words: {}", entry.text);
+                cell += entry.cells;
+            }
+            assert_eq!(cell, colors.len());
+        }
+    }
 
     #[test]
     fn neighbours_in_a_legend_differ_also_for_colour_blind_people() {

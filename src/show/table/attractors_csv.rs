@@ -10,9 +10,9 @@ use crate::show::names::{self, float, optional};
 use rattlemap_dynamics::orbit::Class;
 
 /// Columns before and after the strobe state.
-const FIELDS_BEFORE: [&str; 7] =
+pub(super) const FIELDS_BEFORE: [&str; 7] =
     ["label", "class", "period", "word", "exponent", "largest_multiplier", "symmetric"];
-const FIELDS_AFTER: [&str; 2] = ["cells", "share"];
+pub(super) const FIELDS_AFTER: [&str; 2] = ["cells", "share"];
 
 /// Returns the name of an attractor in legends.
 pub(crate) fn attractor_name(label: usize, attractor: &Attractor) -> String {

@@ -11,10 +11,10 @@ use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::word::Word;
 
 /// Columns of a point before its states.
-const POINT_FIELDS: [&str; 3] = ["side", "kind", "t_mod_period"];
+pub(super) const POINT_FIELDS: [&str; 3] = ["side", "kind", "t_mod_period"];
 
 /// Columns of the table of columns after value and direction.
-const COLUMN_FIELDS: [&str; 11] = [
+pub(super) const COLUMN_FIELDS: [&str; 11] = [
     "class",
     "period",
     "word",

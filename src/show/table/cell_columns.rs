@@ -186,6 +186,25 @@ fn all(cells: &Cells<'_>) -> Vec<CellColumn> {
     columns
 }
 
+/// Returns the names of all columns after indices and swept values, without those that contain a component of the state.
+#[cfg(test)]
+pub(super) fn all_names() -> Vec<String> {
+    use crate::map::plan::Plan;
+    use crate::map::scene::{Purpose, Scene};
+    use crate::record::Record;
+
+    let axis = |name: &str| format!("[[axis]]\nparameter = '{name}'\nmin = 0.1\nmax = 1.0\ncount = 2\n");
+    let quantities: Vec<&str> = Quantity::measured().into_iter().map(Quantity::name).collect();
+    let text = format!("{}{}[outputs]\nquantities = {quantities:?}\n", axis("e"), axis("omega"));
+    let scene = Scene::parse(&text, "s", &[], Purpose::Map).unwrap();
+    let plan = Plan::new(&scene);
+    let records = vec![Record::default(); plan.run_count()];
+    let names = all(&Cells::new(&scene, &plan, &records)).into_iter().map(|column| column.name.into_owned());
+    let fixed =
+        names.filter(|name| !["x1", "v1", "x2", "v2"].iter().any(|of| name.ends_with(&format!("_{of}"))));
+    fixed.chain(["attractors".to_owned(), "attractor".to_owned()]).collect()
+}
+
 // `Source::ALL` gives the codes.
 const _: () = assert!(Source::Integrated as i8 == 0 && Source::Filled as i8 == 1);
 

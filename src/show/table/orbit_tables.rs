@@ -2,10 +2,11 @@
 
 use std::io::Write;
 
+use crate::model_file::gap_names;
 use crate::show::error::WriteError;
 use crate::show::names;
 use crate::show::orbit_spectrum::{Spectrum, gap};
-use rattlemap_dynamics::model::{Oscillator, Side, State};
+use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Event, EventKind, Orbit, Sample};
 
 /// A row of the motion: a sample, or the state before or after an event.
@@ -61,9 +62,10 @@ pub fn moments(
 }
 
 /// Writes `trajectory.csv`, one row per moment.
-pub fn write_trajectory(out: impl Write, state_names: &[&str], moments: &[Moment]) -> Result<(), WriteError> {
+pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
-    let head = ["t", "phase", "z", "w"].into_iter().chain(state_names.iter().copied());
+    let (state_names, gap_names) = (model.state_names(), gap_names(model));
+    let head = ["t", "phase"].into_iter().chain(gap_names).chain(state_names.iter().copied());
     table.write_record(head.chain(["domain", "event", "side", "moment"]))?;
     for Moment { t, phase, gap, state, domain, event } in moments {
         let numbers = [*t, *phase].into_iter().chain(*gap).chain(state[..state_names.len()].iter().copied());
@@ -88,9 +90,9 @@ fn domain_name(meshing: Option<Side>) -> &'static str {
 }
 
 /// Writes `spectrum.csv`, one row per line of the spectrum.
-pub fn write_spectrum(out: impl Write, spectrum: &Spectrum) -> Result<(), WriteError> {
+pub fn write_spectrum(out: impl Write, model: &dyn Model, spectrum: &Spectrum) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
-    table.write_record(["frequency", "z", "w"])?;
+    table.write_record(["frequency"].into_iter().chain(gap_names(model)))?;
     for line in &spectrum.lines {
         let [z, w] = line.amplitudes;
         table.write_record([line.frequency, z, w].map(|x| format!("{x:?}")))?;

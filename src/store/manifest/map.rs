@@ -149,7 +149,7 @@ pub(crate) fn run_and_scene(
 
 /// Describes the engine and its graphics adapters.
 pub(crate) fn engine_and_cards(run: &Run<'_>) -> Value {
-    let Provenance { engine, precision, device } = run.made;
+    let Provenance { engine, precision, device, .. } = run.made;
     let adapter = run.adapter.as_ref();
     let cards: Vec<Value> = run.cards.iter().map(card).collect();
     joined([

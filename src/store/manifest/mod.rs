@@ -11,12 +11,16 @@ use serde_json::{Value, json};
 use crate::map::scene::{Axis, Scale, Scene, Start};
 use crate::model_file::FileModel;
 use crate::show::numbers::Number;
+use crate::show::parameters;
 use rattlemap_dynamics::model::Model;
 
 pub use crate::store::file_names::MANIFEST;
 
 /// Version of the manifest. It is raised when a field changes its meaning.
 pub const FORMAT: u32 = 2;
+
+/// Commit of this program.
+pub const OWN_COMMIT: &str = env!("RATTLEMAP_COMMIT");
 
 /// First fields of a manifest: its format, the command, and the program that wrote it.
 #[derive(Serialize)]
@@ -32,12 +36,7 @@ pub struct Head {
 impl Head {
     /// Returns the first fields of a manifest that `command` writes.
     pub fn of(command: &'static str) -> Head {
-        Head {
-            format: FORMAT,
-            command,
-            crate_version: env!("CARGO_PKG_VERSION"),
-            commit: env!("RATTLEMAP_COMMIT"),
-        }
+        Head { format: FORMAT, command, crate_version: env!("CARGO_PKG_VERSION"), commit: OWN_COMMIT }
     }
 }
 
@@ -56,10 +55,19 @@ pub(crate) fn without_nulls(mut object: Value) -> Value {
 }
 
 /// Describes a model. `text` is the text of its file, which makes the folder independent of that file; it is null for a
-/// model in code.
+/// model in code. `meanings` and `units` are those of its parameters and of the state's components, by name.
 pub(crate) fn model(model: &dyn Model) -> Value {
     let text = model.downcast_ref().map(|file: &FileModel| &file.definition().text);
-    json!({ "name": model.name(), "title": model.title(), "source": model.source(), "text": text })
+    joined([
+        json!({
+            "name": model.name(),
+            "title": model.title(),
+            "source": model.source(),
+            "text": text,
+            "meanings": parameters::meanings(model),
+        }),
+        without_nulls(json!({ "units": parameters::units(model) })),
+    ])
 }
 
 /// Describes the columns of measured quantities; none if the scene requests none.
@@ -108,7 +116,7 @@ pub(crate) fn derived(scene: &Scene) -> Option<BTreeMap<String, Value>> {
     Some(described.collect())
 }
 
-/// Describes the initial states of a scene; `count` and `seed` belong to random ones.
+/// Describes the initial states of a scene and their phase; `count` and `seed` belong to random states.
 pub(crate) fn start(scene: &Scene) -> Value {
     let (policy, state) = match scene.start() {
         Start::Rest => ("rest", None),
@@ -118,5 +126,6 @@ pub(crate) fn start(scene: &Scene) -> Value {
         Start::Both => ("both", None),
     };
     let drawn = scene.draw().map(|draw| json!({ "count": draw.count, "seed": draw.seed }));
-    joined([json!({ "policy": policy, "state": state }), drawn.unwrap_or_default()])
+    let phase = scene.base().start_phase();
+    joined([json!({ "policy": policy, "state": state, "phase": phase }), drawn.unwrap_or_default()])
 }

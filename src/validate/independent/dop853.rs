@@ -165,7 +165,10 @@ impl Solver {
         watch: impl FnMut(f64, &Gap) -> bool,
     ) -> Option<Gap> {
         let integration = Integration { tolerance: self.tolerance, longest, samples: None };
-        let field = |t: f64, y: &Gap| field.accelerations(y, (self.omega * t).cos());
+        let field = |t: f64, y: &Gap| {
+            let (sin, cos) = (self.omega * t).sin_cos();
+            field.accelerations(y, [cos, sin])
+        };
         Some(integration.run(&y, t, duration, field, watch)?.last()?.1)
     }
 }

@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use rattlemap_dynamics::flow::Gap;
+use rattlemap_dynamics::flow::{Gap, Phasor};
 use rattlemap_dynamics::model::{Domain, Oscillator, State};
 
 /// Conversion between displacements and gap coordinates.
@@ -55,7 +55,8 @@ fn inverse(m: [[f64; 2]; 2]) -> Matrix2<f64> {
 pub struct Equations {
     /// Coefficients of `(z, w, x, v)` in the accelerations of the gap and of the displacement.
     rows: [[f64; 4]; 2],
-    force: [f64; 2],
+    /// Factors of cosine and sine of the forcing's phase.
+    force: [[f64; 2]; 2],
     load: [f64; 2],
 }
 
@@ -80,7 +81,7 @@ impl Equations {
         let vector = |f: [f64; 2]| (per_mass * Vector2::from(f)).into();
         Equations {
             rows: [0, 1].map(|i| [k[(i, 0)], c[(i, 0)], k[(i, 1)], c[(i, 1)]]),
-            force: vector(oscillator.force),
+            force: [vector(oscillator.force), vector(oscillator.force_sin)],
             load: vector(domain.load),
         }
     }
@@ -91,22 +92,25 @@ impl Equations {
         let of = |pair: [f64; 2]| [0.0, pair[1] - kick * pair[0]];
         let [gap, kept] = self.rows;
         let row = std::array::from_fn(|j| kept[j] - kick * gap[j]);
-        Equations { rows: [[0.0; 4], row], force: of(self.force), load: of(self.load) }
+        Equations { rows: [[0.0; 4], row], force: self.force.map(of), load: of(self.load) }
     }
 
-    /// Returns the accelerations of gap and displacement, given the cosine of the forcing's phase.
+    /// Returns the accelerations of gap and displacement, given the cosine and the sine of the forcing's phase.
     #[inline(always)]
-    pub fn accelerations(&self, q: &Gap, cos: f64) -> [f64; 2] {
+    pub fn accelerations(&self, q: &Gap, [cos, sin]: Phasor) -> [f64; 2] {
+        let [by_cos, by_sin] = &self.force;
         [0, 1].map(|i| {
             let r = &self.rows[i];
-            (r[0] * q[0] + r[1] * q[1]) + (r[2] * q[2] + r[3] * q[3]) + (self.force[i] * cos + self.load[i])
+            let drive = by_cos[i] * cos + (self.load[i] + by_sin[i] * sin);
+            (r[0] * q[0] + r[1] * q[1]) + (r[2] * q[2] + r[3] * q[3]) + drive
         })
     }
 
-    /// Returns the rate of the gap's acceleration, given the rates of the state and of the forcing's cosine.
-    pub(super) fn gap_rate(&self, rates: &Gap, cos_rate: f64) -> f64 {
+    /// Returns the rate of the gap's acceleration, given the rates of the state and of the forcing's cosine and sine.
+    pub(super) fn gap_rate(&self, rates: &Gap, [cos, sin]: Phasor) -> f64 {
         let row = self.rows[0].iter().zip(rates);
-        row.map(|(a, rate)| a * rate).sum::<f64>() + self.force[0] * cos_rate
+        let [by_cos, by_sin] = &self.force;
+        row.map(|(a, rate)| a * rate).sum::<f64>() + by_cos[0] * cos + by_sin[0] * sin
     }
 
     /// Returns an upper bound of the undamped frequencies.
@@ -126,7 +130,8 @@ mod tests {
     fn any_gap_row_obeys_the_equations_of_motion() {
         let pair = GearPair::paper(0.5).oscillator().unwrap();
         for gap in [[1.0, -1.0], [0.3, 2.0], [0.0, -1.5], [-2.0, 0.5]] {
-            let oscillator = Oscillator { mass: [[2.0, 0.7], [0.7, 1.0]], gap, ..pair };
+            let oscillator =
+                Oscillator { mass: [[2.0, 0.7], [0.7, 1.0]], gap, force_sin: [-20.0, 30.0], ..pair };
             let coordinates = Coordinates::new(&oscillator);
             let y = [0.3, -1.2, 0.9, 2.1];
             let q = coordinates.gap(&y);
@@ -134,15 +139,15 @@ mod tests {
             let off = (0..4).map(|i| (back[i] - y[i]).abs()).fold(0.0, f64::max);
             assert!(off < 1e-15, "{gap:?}: {back:?}");
             for domain in [oscillator.free, oscillator.meshing[0]] {
-                let cos = 0.6;
-                let [a, b] = Equations::new(&oscillator, &domain).accelerations(&q, cos);
+                let [cos, sin] = [0.6, 0.8];
+                let [a, b] = Equations::new(&oscillator, &domain).accelerations(&q, [cos, sin]);
                 let x = coordinates.state(&[a, 0.0, b, 0.0]);
                 let (acceleration, k, c) = ([x[0], x[2]], domain.stiffness, domain.damping);
                 for i in 0..2 {
                     let inertia =
                         oscillator.mass[i][0] * acceleration[0] + oscillator.mass[i][1] * acceleration[1];
                     let rest = c[i][0] * y[1] + c[i][1] * y[3] + k[i][0] * y[0] + k[i][1] * y[2];
-                    let drive = oscillator.force[i] * cos + domain.load[i];
+                    let drive = oscillator.force[i] * cos + oscillator.force_sin[i] * sin + domain.load[i];
                     let off = inertia + rest - drive;
                     assert!(off.abs() < 1e-11 * (1.0 + rest.abs()), "{gap:?}: {off:e}");
                 }

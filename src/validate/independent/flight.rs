@@ -2,7 +2,7 @@
 //! The equations of motion are in gap coordinates `(z, w, x, v)`, in which a gap can be set exactly to a wall.
 
 use super::field::{Coordinates, Equations};
-use rattlemap_dynamics::flow::Gap;
+use rattlemap_dynamics::flow::{Gap, Phasor};
 use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::reference::EventKind;
 
@@ -200,7 +200,7 @@ impl Flight {
     /// Returns the acceleration of the gap into a wall by the equations of a domain.
     #[inline]
     fn pressing(&self, field: &Equations, side: Side, q: &Gap, t: f64) -> f64 {
-        side.sign() * field.accelerations(q, self.cos(t))[0]
+        side.sign() * field.accelerations(q, self.phasor(t))[0]
     }
 
     /// Whether the equations of a domain press a gap at rest into a wall. The first derivative that is not zero decides.
@@ -211,9 +211,9 @@ impl Flight {
 
     /// Returns the rate of the acceleration into a wall by the equations `of`, along the motion by the equations `along`.
     fn pressing_rate(&self, of: &Equations, along: &Equations, side: Side, q: &Gap, t: f64) -> f64 {
-        let (sin, cos) = (self.omega * t).sin_cos();
-        let [a, b] = along.accelerations(q, cos);
-        side.sign() * of.gap_rate(&[q[1], a, q[3], b], -self.omega * sin)
+        let [cos, sin] = self.phasor(t);
+        let [a, b] = along.accelerations(q, [cos, sin]);
+        side.sign() * of.gap_rate(&[q[1], a, q[3], b], [-self.omega * sin, self.omega * cos])
     }
 
     /// Lists the endings that are possible now. The list may repeat one.
@@ -246,8 +246,9 @@ impl Flight {
     }
 
     #[inline]
-    fn cos(&self, t: f64) -> f64 {
-        (self.omega * t).cos()
+    fn phasor(&self, t: f64) -> Phasor {
+        let (sin, cos) = (self.omega * t).sin_cos();
+        [cos, sin]
     }
 
     /// Finds the earliest ending in a step of length `h` from `q0` at time `t` to `q1`. The distance is tested at the end
@@ -299,7 +300,7 @@ impl Flight {
         // The polynomial only predicts the minimum; the equations decide.
         if ending.is_of_gap() {
             let q = after(turn);
-            let [acceleration, _] = self.field().accelerations(&q, self.cos(t + turn));
+            let [acceleration, _] = self.field().accelerations(&q, self.phasor(t + turn));
             turn = (turn - q[1] / acceleration).clamp(0.0, h);
         } else {
             let (mut lo, mut hi) = (0.0, h);
@@ -341,7 +342,7 @@ impl Flight {
                 let step = -f / slope;
                 let next = tau + step;
                 // The error of a Newton step is of second order in the step.
-                let [acceleration, _] = self.field().accelerations(&q, self.cos(t + tau));
+                let [acceleration, _] = self.field().accelerations(&q, self.phasor(t + tau));
                 let remainder = acceleration.abs() * step * step;
                 let is_remainder = ending.is_of_gap() && remainder <= 0.5 * f64::EPSILON * tau * rate.abs();
                 let within_rounding = is_remainder || step.abs() <= 2.0 * f64::EPSILON * tau;

@@ -87,6 +87,7 @@ impl March {
         g.fixed_view_mut::<2, 2>(2, 0).copy_from(&(-push * matrix(domain.stiffness)));
         g.fixed_view_mut::<2, 2>(2, 2).copy_from(&(-push * matrix(domain.damping)));
         g.fixed_view_mut::<2, 1>(2, 4).copy_from(&(push * Vector2::from(self.oscillator.force)));
+        g.fixed_view_mut::<2, 1>(2, 5).copy_from(&(push * Vector2::from(self.oscillator.force_sin)));
         g.fixed_view_mut::<2, 1>(2, 6).copy_from(&(push * Vector2::from(domain.load)));
         g[(4, 5)] = -self.oscillator.omega;
         g[(5, 4)] = self.oscillator.omega;

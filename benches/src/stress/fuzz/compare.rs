@@ -80,7 +80,7 @@ fn explain(precision: Precision, (pair, start): Start, record: Record) -> Option
     records[0] = record;
     let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
     let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
-    let sample = Sample { seed: 0, draws, states: Vec::new() };
+    let sample = Sample { seed: 0, requested: 1, draws, states: Vec::new() };
     let mismatch = replay(&subject, &sample, &Lanes::default(), &|_| ()).mismatches.into_iter().next()?;
     let (differences, kind) = (mismatch.differences, mismatch.kind);
     Some(Mismatch { engine: precision.into(), pair, start, differences, kind })

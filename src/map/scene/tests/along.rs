@@ -78,7 +78,7 @@ fn the_error_for_a_plane_shows_the_option_along() {
     let message = Scene::parse(PLANE, "s.toml", &[], Purpose::Bifurcation).unwrap_err().to_string();
     assert_says(
         &message,
-        &["s.toml:7:1: ", "`axis = 2 tables`", "needs 1 axis", "--along e --at omega=VALUE"],
+        &["s.toml:7:1: ", "`axis = 2 tables`", "one table for `bifurcation`", "--along e --at omega=VALUE"],
     );
 }
 

@@ -76,7 +76,7 @@ fn errors_of_built_scenes_name_the_field() {
         (built().parameter("mass", 1.0), "scene: unknown field `parameters.mass = 1.0`"),
         (built().parameter("k", f64::NAN), "scene: `parameters.k = nan` is out of range"),
         (built().parameter("e", 0.5), "scene: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`"),
-        (built().axis("k", 1.0..=2.0, 2), "`map` needs 2 axes"),
+        (built().axis("k", 1.0..=2.0, 2), "two tables for `map`; remove"),
         (built().quantities(&[]), "scene: `outputs.quantities = []` is out of range"),
         (
             built().integration(Integration { observed_periods: 10, ..Integration::default() }),
@@ -114,7 +114,7 @@ fn cells_without_motion_are_named_before_anything_is_computed() {
     let corner = scene("omega - 1.2").unwrap_err();
     assert_says(
         &corner.to_string(),
-        &["scene: at F = 1.0, omega = 1.0: damping in free motion", "semidefinite"],
+        &["scene: at F = 1, omega = 1: damping in free motion = -0.2: it must be at least 0"],
     );
     let plan = Plan::new(&scene("(omega - 1.8)*(omega - 2.2)").unwrap());
     let inside = plan.check().unwrap_err();

@@ -30,7 +30,7 @@ fn a_list_defines_the_cells() {
     assert_eq!(pair(&*scene.cell(&[1])), GearPair { force: 40.0, omega: 4.0, ..GearPair::paper(0.25) });
     assert_eq!(scene.outputs().files, [Format::Csv, Format::Npy]);
     assert_eq!(scene.title(), "Gear pair: the cells of points.csv");
-    assert!(scene.fixed().all(|(name, _)| name != "e" && name != "omega"));
+    assert!(scene.fixed().all(|(parameter, _)| parameter.name != "e" && parameter.name != "omega"));
     // The list is stored in this form in the folder of a map.
     let text = list.to_csv();
     assert_eq!(text, "e,omega\n0.5,5.6\n0.25,4.0\n0.5,5.6\n0.5,7.0\n");
@@ -61,7 +61,7 @@ fn cells_of_a_list_share_flows_and_laws() {
     let bad = Plan::new(&read(&format!("{SCENE}[derived]\nk2 = \"omega - 5\"\n"), TABLE, &[]).unwrap());
     assert_says(
         &bad.check().unwrap_err().to_string(),
-        &["at e = 0.25, omega = 4.0: `k2 = -1` is out of range"],
+        &["at e = 0.25, omega = 4: `k2 = -1` is out of range"],
     );
 }
 

@@ -28,7 +28,7 @@ fn derived_parameters_follow_the_cell() {
         assert_eq!(model.get("m2"), Ok(1.5));
     }
     assert_eq!(scene.base().get("k2"), Ok(5.0));
-    let fixed: Vec<&str> = scene.fixed().map(|(name, _)| name).collect();
+    let fixed: Vec<&str> = scene.fixed().map(|(parameter, _)| &*parameter.name).collect();
     assert_eq!(fixed, ["m1", "r1", "r", "k", "omega", "b", "e", "mesh_speed"]);
     let derived: Vec<(&str, &str)> = scene.derived().map(|(p, text)| (&*p.name, text)).collect();
     // Each rule comes after those that it needs.
@@ -96,7 +96,7 @@ k2 = "m2"\nm2 = "m2 + k1" | `derived.m2 = "m2 + k1"` does not fit: it depends on
     assert!(coupled(text, &["derived.e=k1/100"]).is_ok());
     assert_says(
         &refused(text, &["derived.e=k1/10"]),
-        &["--set derived.e=k1/10: at F = 10.0, k1 = 40.0: `e = 4`"],
+        &["--set derived.e=k1/10: at F = 10, k1 = 40: `e = 4`"],
     );
 }
 
@@ -106,12 +106,12 @@ fn values_out_of_range_are_named_with_their_cell() {
     let message = refused("k2 = \"k1 - 20\"", &[]);
     assert_says(
         &message,
-        &["s.toml:4:6: at F = 10.0, k1 = 10.0: `k2 = -10` is out of range: it must be finite and"],
+        &["s.toml:4:6: at F = 10, k1 = 10: `k2 = -10` is out of range: it must be finite and"],
     );
     assert_says(&refused("m2 = \"1/(k1-10)\"", &[]), &["`m2 = inf` is out of range"]);
     let inside = Plan::new(&coupled("k2 = \"(k1 - 15)*(k1 - 35)\"", &[]).unwrap()).check().unwrap_err();
     assert_says(
         &inside.to_string(),
-        &["at F = 10.0, k1 = 20.0: `k2 = -75` is out of range: it must be finite and at least 0"],
+        &["at F = 10, k1 = 20: `k2 = -75` is out of range: it must be finite and at least 0"],
     );
 }

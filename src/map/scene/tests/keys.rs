@@ -27,7 +27,9 @@ fn written_defaults_change_nothing() {
     let mut count = 0;
     for key in KEYS {
         if let KeyDefault::Value(value) = key.default {
-            let [written, silent] = [with(key, Some(value)), with(key, None)].map(|scene| scene.unwrap());
+            // The settings repeat what was written.
+            let read = |scene: Result<Scene, _>| Scene { settings: String::new(), ..scene.unwrap() };
+            let [written, silent] = [with(key, Some(value)), with(key, None)].map(read);
             assert_eq!(format!("{written:?}"), format!("{silent:?}"), "{}.{} = {value}", key.table, key.name);
             count += 1;
         }

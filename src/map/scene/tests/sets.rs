@@ -54,6 +54,42 @@ fn a_single_cell_is_set_by_arguments() {
         &sets(&["start.policy=up"]).unwrap_err().to_string(),
         &["--set start.policy=up: unknown field"],
     );
+    let phase = sets(&["start.phase=pi/2"]).unwrap();
+    assert_eq!(phase.start_phase(), std::f64::consts::FRAC_PI_2);
+    assert_ne!(*phase, *sets(&[]).unwrap());
+    // A later change keeps it.
+    assert_eq!(single_cell(&*phase, &["e=0.1".to_owned()]).unwrap().start_phase(), phase.start_phase());
+}
+
+#[test]
+fn the_start_phase_turns_the_force_of_every_cell() {
+    let (plain, turned) = (parse(GOOD, &[]).unwrap(), parse(GOOD, &["start.phase=0.5*pi"]).unwrap());
+    for i in 0..4 {
+        let [plain, turned] = [&plain, &turned].map(|scene| scene.cell(&[i]).oscillator().unwrap());
+        assert!(turned.force[0].abs() < 1e-14 && (turned.force_sin[0] + plain.force[0]).abs() < 1e-14);
+    }
+    let more: Vec<_> =
+        turned.identity().into_iter().filter(|entry| !plain.identity().contains(entry)).collect();
+    assert_eq!(more, [("start.phase".to_owned(), "1.5707963267948966".to_owned())]);
+    assert_eq!(parse(GOOD, &["start.phase=0"]).unwrap().identity(), plain.identity());
+    for (set, expected) in [
+        ("start.phase=inf", "`start.phase = inf` is out of range: it must be finite"),
+        (
+            "start.phase=2*e",
+            "unknown name, `e`: valid names: a number of radians, or an expression of numbers and pi",
+        ),
+        ("start.phase=[1]", "has the wrong type"),
+    ] {
+        assert_says(&parse(GOOD, &[set]).expect_err(set).to_string(), &[expected]);
+    }
+    let builder = || Scene::builder(FileModel::built_in("gear-pair").unwrap()).start_phase(1.0);
+    let built = builder().axis("e", 0.1..=0.9, 2).axis("omega", 1.0..=2.0, 2).build().unwrap();
+    assert_eq!(built.base().start_phase(), 1.0);
+    let command = crate::show::replay::arguments(&built);
+    assert!(command.contains(" --set start.phase=1.0"), "{command}");
+    let gears = Scene::builder(GearPair::paper(0.5)).start_phase(1.0);
+    let error = gears.axis("e", 0.1..=0.9, 2).axis("omega", 1.0..=2.0, 2).build().unwrap_err();
+    assert_says(&error.to_string(), &["`start.phase = 1.0` does not fit: a model in Rust starts at phase 0"]);
 }
 
 /// An axis whose parameter is named by an argument overrides the value of the parameter in the text.

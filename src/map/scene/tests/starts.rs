@@ -44,7 +44,7 @@ fn one_axis_may_be_a_parameter() {
     assert_eq!(plan.cell(9).start, [0.0, 2.0, 0.0, 0.0]);
     assert_eq!(plan.model(9).get("omega"), Ok(4.0));
     assert!(scene.is_basin());
-    assert!(scene.fixed().all(|(name, _)| name != "omega"));
+    assert!(scene.fixed().all(|(parameter, _)| parameter.name != "omega"));
     // An argument can also replace a parameter by a component of the start.
     let text =
         START_PLANE.replace("start = 'x2'\nvalues = [-0.5, 0.25]", "parameter = 'omega'\nvalues = [2, 4]");

@@ -4,11 +4,12 @@ use crate::map::bifurcation::{Column, Direction};
 use crate::show::color::Color;
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::Frame;
-use crate::show::drawing::{Canvas, DARK, Marker, Rect};
+use crate::show::drawing::{Align, Canvas, DARK, Marker, Rect, SMALL};
 use crate::show::figure::bifurcation::coloring::{Coloring, both_directions, class_color, direction_color};
 
-/// Height of the strip of classes of one pass.
-const STRIP: f64 = 9.0;
+/// Height of the strip of classes of one pass, with room for its name beside it; distance from the strip to its name.
+const STRIP: f64 = 24.0;
+const STRIP_NAME: f64 = 10.0;
 /// Opacity of the band of the standard error.
 pub(crate) const ERROR_BAND: f64 = 0.28;
 /// Least and largest radius of a dot. Dots are larger where columns are farther apart.
@@ -19,6 +20,21 @@ const SAME_EXPONENT: f64 = 1.5;
 /// are drawn at the lower edge.
 const DEPTH: f64 = 4.0;
 const LEAST_DEPTH: f64 = 0.5;
+
+/// Returns the name of the strip of a pass.
+fn strip_name(direction: Direction) -> &'static str {
+    match direction {
+        Direction::Up => "upward",
+        Direction::Down => "downward",
+    }
+}
+
+/// Returns the room for the names of strips right of the panel.
+pub(crate) fn beside(canvas: &Canvas, coloring: Coloring) -> f64 {
+    let passes = coloring.passes().iter().take(coloring.strips()).flatten();
+    let widest = passes.map(|pass| canvas.text_width(strip_name(*pass), SMALL)).fold(0.0, f64::max);
+    if widest > 0.0 { widest + STRIP_NAME } else { 0.0 }
+}
 
 /// Returns the vertical axis.
 pub(crate) fn axis(columns: &[Column], strips: usize, height: f64) -> Axis {
@@ -33,7 +49,8 @@ pub(crate) fn axis(columns: &[Column], strips: usize, height: f64) -> Axis {
     let label = if is_clipped { "exponent \u{3bb}, cut below" } else { "largest exponent \u{3bb}" };
     let mut axis = Axis::around(label, finite.iter().map(|x| x.max(floor)).chain([0.0]), 1e-3);
     // Leaves room for the strips below the data.
-    axis.low -= (axis.high - axis.low) * STRIP * strips as f64 / height;
+    let share = STRIP * strips as f64 / height;
+    axis.low -= (axis.high - axis.low) * share / (1.0 - share);
     axis
 }
 
@@ -64,11 +81,20 @@ pub(crate) fn draw(canvas: &Canvas, frame: &Frame, columns: &[Column], coloring:
         draw_pass(canvas, frame, &pass);
     }
     for (row, &pass) in coloring.passes().iter().rev().enumerate().take(coloring.strips()) {
-        let pass: Vec<&Column> = of(pass).collect();
+        let columns: Vec<&Column> = of(pass).collect();
         let bottom = frame.rect.bottom - STRIP * row as f64;
-        for (column, [from, to]) in pass.iter().zip(spans(frame, &pass)) {
-            let rect = Rect { left: from, right: to, top: bottom - STRIP + 1.0, bottom };
-            canvas.fill(rect, class_color(column.class), 1.0);
+        let spans = spans(frame, &columns);
+        let colored: Vec<_> =
+            columns.iter().zip(spans).map(|(c, span)| (class_color(c.class), span)).collect();
+        // One rectangle for neighbours of one class: seams between rectangles would look like stripes.
+        for run in colored.chunk_by(|a, b| a.0 == b.0) {
+            let (from, to) = (run[0].1[0], run[run.len() - 1].1[1]);
+            let rect = Rect { left: from, right: to, top: bottom - STRIP + 2.0, bottom };
+            canvas.fill(rect, run[0].0, 1.0);
+        }
+        if let Some(direction) = pass {
+            let at = (right + STRIP_NAME, bottom - STRIP / 2.0 + 1.0);
+            canvas.text(strip_name(direction), at, SMALL, Align::Left, DARK);
         }
     }
 }

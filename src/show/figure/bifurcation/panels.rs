@@ -3,7 +3,7 @@
 use crate::map::bifurcation::Column;
 use crate::map::scene::Quantity;
 use crate::show::numbers::Number;
-use crate::show::symbols::symbol;
+use crate::show::symbols::{symbol, with_unit};
 use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::{Model, Side, State};
 use rattlemap_dynamics::orbit::EventKind;
@@ -46,7 +46,13 @@ impl Panels {
         let walls = WallLabels::of(model);
         let names: Vec<String> = model.state_names().into_iter().map(symbol).collect();
         let displacements = || (0..names.len()).step_by(2);
-        let panel = |label, component, states| Panel { label, component, states, number: None };
+        let units = model.units();
+        let panel = |label: String, component, states| Panel {
+            label: with_unit(&label, units.component(component).as_deref()),
+            component,
+            states,
+            number: None,
+        };
         let mut list: Vec<Panel> = match fixed.map(|i| 2 * i + 1).filter(|velocity| *velocity < names.len()) {
             None => {
                 let label = |i: usize| format!("{} at {}", names[i], walls.section());

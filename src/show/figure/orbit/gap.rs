@@ -1,25 +1,39 @@
 //! The gap against time between its walls, with the symbols of the word, and the depth of penetration. Lengths are in pixels.
 
 use crate::show::drawing::axis::Axis;
-use crate::show::drawing::frame::Frame;
+use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::draw_head;
-use crate::show::drawing::{Align, Canvas, DARK, MEDIUM, MESHING, Rect, SMALL, wall_color};
+use crate::show::drawing::{Align, Canvas, DARK, MEDIUM, MESHING, Point, Rect, SMALL, wall_color};
 use crate::show::figure::orbit::flights;
 use crate::show::figure::orbit::motion::Piece;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
 use crate::show::names;
-use crate::show::symbols::number;
+use crate::show::symbols::{number, with_unit};
 use rattlemap_dynamics::model::{Contact, Side, State};
 
-/// Room for the walls' names right of the panel, and the room for their text, which includes the margin.
+/// Default height, and shares of the panels of gap and depth.
+const HEIGHT: f64 = 1050.0;
+const SHARES: [f64; 2] = [1.4, 0.75];
+/// Room for the walls' names right of the panel in a figure of default size, and the room for their text, which includes the
+/// margin.
 const WALL_NAMES: f64 = 97.0;
 const WALL_TEXT: f64 = 135.0;
+/// Distance from the panel to the walls' names.
+const WALL_AWAY: f64 = 14.0;
 /// Distance between a symbol of the word and its flight.
 const SYMBOL_AWAY: f64 = 30.0;
+/// Width of a symbol.
+const SYMBOL_WIDTH: f64 = 13.0;
+/// Least distance of the middle of a symbol from the edges of the panel.
+const SYMBOL_HALF: f64 = 14.0;
 /// A single wall is shown if its distance from the motion is less than this many times the motion's extent.
 const FAR_WALL: f64 = 2.0;
 /// Margin beyond the motion's ends, as a share of its extent, unless two walls bound it.
 const MOTION_MARGIN: f64 = 0.15;
+
+fn wall_name(side: Side) -> String {
+    format!("{} wall", names::side(side))
+}
 
 impl OrbitPlot<'_> {
     pub(crate) fn draw_gap(&self, canvas: &Canvas) {
@@ -27,25 +41,35 @@ impl OrbitPlot<'_> {
         let free = if is_coordinate { "free motion" } else { "gap in free motion" };
         let legend = self.legend(self.motion_entries(free), false);
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
-        let panel = canvas.panel(ORBIT_LEFT, top);
-        let panel = Rect { right: panel.right - WALL_NAMES, ..panel };
-        let bottom = panel.bottom;
-        let split = if self.has_depth() { top + 0.64 * (bottom - top) } else { bottom };
+        let shares = if self.has_depth() { &SHARES[..] } else { &SHARES[..1] };
         let label = match is_coordinate {
             true => format!("displacement, {}", self.walls.gap()),
-            false => format!("gap, z = {}", self.gap_expression()),
+            false => format!("gap, {} = {}", self.walls.gap(), self.gap_expression()),
         };
-        let frame =
-            Frame { rect: Rect { bottom: split, ..panel }, x: self.time_axis(), y: self.gap_axis(&label) };
-        self.draw_walls(canvas, &frame);
+        let label = with_unit(&label, self.units.gap.as_deref());
+        let axes = [self.gap_axis(&label), self.depth_axis()];
+        let panels = stacked(canvas, top, HEIGHT, shares).into_iter().zip(axes).collect();
+        let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, self.wall_names(canvas));
+        let frame = &frames[0];
+        self.draw_walls(canvas, frame);
         let at = |t: f64, state: &State| (t, self.gap(state));
-        self.draw_lines(canvas, &frame, (DARK, MESHING), at);
-        self.draw_markers(canvas, &frame, false, at);
-        self.draw_symbols(canvas, &frame);
-        frame.draw_axes(canvas, split == bottom);
-        if split < bottom {
-            self.draw_penetration(canvas, Rect { top: split + 30.0, ..panel });
+        self.draw_lines(canvas, frame, (DARK, MESHING), at);
+        self.draw_markers(canvas, frame, false, at);
+        self.draw_symbols(canvas, frame);
+        frame.draw_axes(canvas, frames.len() == 1);
+        if let Some(frame) = frames.get(1) {
+            self.draw_penetration(canvas, frame);
         }
+    }
+
+    /// Returns the room for the walls' names right of the panels, beyond half a label.
+    fn wall_names(&self, canvas: &Canvas) -> f64 {
+        if canvas.is_default() {
+            return WALL_NAMES;
+        }
+        let walls = Side::BOTH.into_iter().filter(|side| self.contact(*side).is_some());
+        let texts = walls.flat_map(|side| [Some(wall_name(side)), self.position(canvas, side)]).flatten();
+        WALL_AWAY + texts.map(|text| canvas.text_width(&text, SMALL)).fold(0.0, f64::max)
     }
 
     /// Whether the motion meshes with a wall of impacts, so that a panel shows the depth, which is too small to be visible in the
@@ -79,10 +103,12 @@ impl OrbitPlot<'_> {
         Axis::around(label, gaps().chain(ends), least_span)
     }
 
-    /// Draws the symbols of the word: behind the wall of a flight that returns to it, else beside the flight.
+    /// Draws the symbols of the word: behind the wall of a flight that returns to it, else beside the flight. Symbols that
+    /// would overlap an earlier one are left out.
     fn draw_symbols(&self, canvas: &Canvas, frame: &Frame) {
         let walls = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
         let is_elastic = |side: Side| self.contact(side) == Some(Contact::Elastic);
+        let mut drawn: Vec<Point> = Vec::new();
         for (t, symbol) in flights::symbols(&self.motion.events, self.cycle) {
             let nearest = self.motion.points().min_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
             let Some((_, state)) = nearest else { continue };
@@ -101,6 +127,14 @@ impl OrbitPlot<'_> {
                 '3' => (x + SYMBOL_AWAY, y - 0.5 * SYMBOL_AWAY),
                 _ => (x - SYMBOL_AWAY, y - 0.5 * SYMBOL_AWAY),
             };
+            let Rect { top, bottom, .. } = frame.rect;
+            let at = (at.0, at.1.max(top + SYMBOL_HALF).min(bottom - SYMBOL_HALF));
+            let is_close =
+                |(x, y): &Point| (x - at.0).abs() < SYMBOL_WIDTH && (y - at.1).abs() < SYMBOL_WIDTH;
+            if drawn.iter().any(is_close) {
+                continue;
+            }
+            drawn.push(at);
             canvas.text(&symbol.to_string(), at, MEDIUM, Align::Center, DARK);
         }
     }
@@ -119,7 +153,7 @@ impl OrbitPlot<'_> {
             canvas.fill(behind, DARK, 0.08);
         }
         frame.draw_grid(canvas);
-        let x = rect.right + 14.0;
+        let x = rect.right + WALL_AWAY;
         for side in walls() {
             let color = wall_color(side);
             let (y, beyond) = match (is_visible(side), side) {
@@ -130,7 +164,7 @@ impl OrbitPlot<'_> {
             if is_visible(side) {
                 canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, color);
             }
-            let lines = [Some(format!("{} wall", names::side(side))), self.position(canvas, side)];
+            let lines = [Some(wall_name(side)), self.position(canvas, side)];
             let lines = lines.into_iter().flatten().chain(beyond.map(str::to_owned));
             for (line, text) in lines.enumerate() {
                 canvas.text(&text, (x, y - 14.0 + 28.0 * line as f64), SMALL, Align::Left, color);
@@ -145,31 +179,35 @@ impl OrbitPlot<'_> {
         expression.into_iter().chain([value]).find(|text| canvas.text_width(text, SMALL) <= WALL_TEXT)
     }
 
-    /// Draws the depth of penetration into the walls.
-    fn draw_penetration(&self, canvas: &Canvas, rect: Rect) {
-        let depth = |piece: &Piece, state: &State| {
-            piece
-                .meshing
-                .map_or(0.0, |side| side.sign() * (self.gap(state) - self.oscillator.walls[side.index()]))
-        };
-        let depths = self.motion.pieces.iter().flat_map(|p| p.points.iter().map(move |(_, s)| depth(p, s)));
+    /// Returns the depth of penetration into a wall.
+    fn depth(&self, piece: &Piece, state: &State) -> f64 {
+        piece
+            .meshing
+            .map_or(0.0, |side| side.sign() * (self.gap(state) - self.oscillator.walls[side.index()]))
+    }
+
+    fn depth_axis(&self) -> Axis {
+        let pieces = self.motion.pieces.iter();
+        let depths = pieces.flat_map(|p| p.points.iter().map(move |(_, s)| self.depth(p, s)));
         let label = match self.walls.half() {
             Some(half) => format!("depth, |{}| \u{2212} {half}", self.walls.gap()),
             None => "depth behind the wall".to_owned(),
         };
-        let frame = Frame {
-            rect,
-            x: self.time_axis(),
-            y: Axis::around(&label, depths, 1e-6 * self.oscillator.length_scale()),
-        };
+        let label = with_unit(&label, self.units.gap.as_deref());
+        Axis::around(&label, depths, 1e-6 * self.oscillator.length_scale())
+    }
+
+    /// Draws the depth of penetration into the walls.
+    fn draw_penetration(&self, canvas: &Canvas, frame: &Frame) {
+        let rect = frame.rect;
         frame.draw_grid(canvas);
         let y = frame.at(0.0, 0.0).1;
         canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, DARK);
-        canvas.text("wall", (rect.right + 14.0, y), SMALL, Align::Left, DARK);
+        canvas.text("wall", (rect.right + WALL_AWAY, y), SMALL, Align::Left, DARK);
         for piece in &self.motion.pieces {
             if let Some(side) = piece.meshing {
                 let path: Vec<_> =
-                    piece.points.iter().map(|(t, state)| frame.at(*t, depth(piece, state))).collect();
+                    piece.points.iter().map(|(t, state)| frame.at(*t, self.depth(piece, state))).collect();
                 canvas.stroke(&path, FREE_LINE + 0.6, wall_color(side));
             }
         }

@@ -8,13 +8,13 @@ use crate::show::drawing::{Canvas, DARK, FAINT, MESHING, Marker, Point, Shape, w
 use crate::show::figure::orbit::heading;
 use crate::show::figure::orbit::motion::Motion;
 use crate::show::names;
-use crate::show::symbols::symbol;
+use crate::show::symbols::{symbol, with_unit};
 use crate::show::wall_labels::WallLabels;
-use rattlemap_dynamics::model::{Contact, Model, ModelError, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Model, ModelError, Oscillator, Side, State, Units};
 use rattlemap_dynamics::orbit::{Class, EventKind, Orbit, Sample};
 
-/// Width of all figures of an orbit, and the distance of panels from the left edge.
-pub(crate) const ORBIT_WIDTH: u32 = 1600;
+/// Default width of all figures of an orbit, and least distance of panels from the left edge.
+pub(crate) const ORBIT_WIDTH: f64 = 1600.0;
 pub(crate) const ORBIT_LEFT: f64 = 130.0;
 /// Widths of the lines of free motion and of meshing.
 pub(crate) const FREE_LINE: f64 = 2.2;
@@ -24,6 +24,7 @@ const MESHING_LINE: f64 = 4.0;
 pub struct OrbitPlot<'a> {
     /// Symbols of the state's components.
     pub(crate) names: Vec<String>,
+    pub(crate) units: Units,
     pub(crate) bodies: Vec<&'a str>,
     pub(crate) oscillator: Oscillator,
     pub(crate) walls: WallLabels,
@@ -46,6 +47,7 @@ impl<'a> OrbitPlot<'a> {
     pub fn new(model: &'a dyn Model, orbit: &Orbit, trace: &[Sample]) -> Result<OrbitPlot<'a>, ModelError> {
         Ok(OrbitPlot {
             names: model.state_names().into_iter().map(symbol).collect(),
+            units: model.units(),
             bodies: model.bodies(),
             oscillator: model.oscillator()?,
             walls: WallLabels::of(model),
@@ -183,9 +185,12 @@ impl<'a> OrbitPlot<'a> {
         Axis::exact("time in forcing periods, t / T", first, end)
     }
 
-    /// Returns an axis for components of the state. `scale` is their scale relative to a displacement.
+    /// Returns an axis for components of the state, with their unit if they have the same one. `scale` is their scale
+    /// relative to a displacement.
     pub(crate) fn state_axis(&self, label: &str, components: &[usize], scale: f64) -> Axis {
         let values = self.motion.points().flat_map(|(_, state)| components.iter().map(|i| state[*i]));
-        Axis::around(label, values, self.decayed() * scale)
+        let mut units = components.iter().map(|i| self.units.component(*i));
+        let unit = units.next().flatten().filter(|first| units.all(|unit| unit.as_ref() == Some(first)));
+        Axis::around(&with_unit(label, unit.as_deref()), values, self.decayed() * scale)
     }
 }

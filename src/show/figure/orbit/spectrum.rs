@@ -2,15 +2,17 @@
 
 use std::io::Write;
 
-use crate::map::scene::Format;
+use crate::map::scene::{FigureStyle, Format};
+use crate::model_file::gap_names;
 use crate::show::drawing::axis::Axis;
-use crate::show::drawing::frame::Frame;
+use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::draw_head;
-use crate::show::drawing::{Canvas, DARK, GEAR_2, Marker, Rect, write_figure};
+use crate::show::drawing::{Canvas, DARK, GEAR_2, Marker, write_figure};
 use crate::show::error::WriteError;
 use crate::show::figure::orbit::heading;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, ORBIT_WIDTH};
 use crate::show::orbit_spectrum::Spectrum;
+use crate::show::symbols::with_unit;
 use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::Orbit;
@@ -21,6 +23,9 @@ const SMALLEST_SHARE: f64 = 1e-5;
 /// Spectra of more lines have thinner strokes and smaller dots.
 const THICK_LINES: usize = 200;
 
+/// Default height.
+const HEIGHT: f64 = 1050.0;
+
 /// Name of the figure's file without its extension.
 pub const NAME: &str = "spectrum";
 
@@ -28,48 +33,60 @@ pub const NAME: &str = "spectrum";
 pub fn write(
     out: impl Write,
     format: Format,
+    style: &FigureStyle,
     model: &dyn Model,
     orbit: &Orbit,
     spectrum: &Spectrum,
 ) -> Result<(), WriteError> {
-    let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
-    write_figure(out, format, (ORBIT_WIDTH, 1050), |canvas| {
-        let top = draw_head(canvas, &heading::parameters(model), &subtitle, &[]) + 14.0;
-        let whole = canvas.panel(ORBIT_LEFT, top);
-        let middle = (top + whole.bottom) / 2.0;
-        let labels = WallLabels::of(model);
-        let quantity = if labels.gap() == "z" { "the gap" } else { labels.gap() };
-        let of_gap = format!("amplitude of {quantity}");
-        let panels = [
-            (of_gap.as_str(), top, middle - 15.0),
-            ("amplitude of its velocity", middle + 15.0, whole.bottom),
-        ];
-        for (which, (label, top, bottom)) in panels.into_iter().enumerate() {
-            draw(canvas, Rect { top, bottom, ..whole }, spectrum, which, label);
-        }
-    })
+    write_figure(out, format, &draw(style, model, orbit, spectrum))
 }
 
-/// Draws the lines of the gap, or with `which` 1 those of its velocity.
-fn draw(canvas: &Canvas, rect: Rect, spectrum: &Spectrum, which: usize, label: &str) {
-    let lines = || spectrum.lines.iter().map(|line| (line.frequency, line.amplitudes[which]));
-    let largest = lines().map(|(_, size)| size).fold(0.0, f64::max);
-    let is_visible = |size: f64| size > SMALLEST_SHARE * largest;
+pub(crate) fn draw(style: &FigureStyle, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Canvas {
+    let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
+    let canvas = Canvas::new(style, ORBIT_WIDTH);
+    let top = draw_head(&canvas, &heading::parameters(model), &subtitle, &[]) + 14.0;
+    let labels = WallLabels::of(model);
+    let quantity = if gap_names(model).contains(&labels.gap()) { "the gap" } else { labels.gap() };
+    let units = model.units();
+    let labels = [
+        with_unit(&format!("amplitude of {quantity}"), units.gap.as_deref()),
+        with_unit("amplitude of its velocity", units.gap_velocity().as_deref()),
+    ];
     let end = spectrum.lines.last().map_or(1.0, |line| line.frequency);
-    let frame = Frame {
-        rect,
-        x: Axis::exact("frequency in multiples of the forcing frequency", 0.0, end),
-        y: Axis::decades(label, lines().map(|(_, size)| size).filter(|&size| is_visible(size))),
+    let x = Axis::exact("frequency in multiples of the forcing frequency", 0.0, end);
+    let y = |(which, label): (usize, &String)| {
+        Axis::decades(label, visible(spectrum, which).map(|(_, size)| size))
     };
+    let edges = stacked(&canvas, top, HEIGHT, &[1.0, 1.0]);
+    let panels = edges.into_iter().zip(labels.iter().enumerate().map(y)).collect();
+    for (which, frame) in column(&canvas, panels, &x, ORBIT_LEFT, 0.0).iter().enumerate() {
+        draw_panel(&canvas, frame, spectrum, which);
+    }
+    canvas
+}
+
+/// Returns frequencies and amplitudes of the gap, or with `which` 1 of its velocity.
+fn lines(spectrum: &Spectrum, which: usize) -> impl Iterator<Item = (f64, f64)> {
+    spectrum.lines.iter().map(move |line| (line.frequency, line.amplitudes[which]))
+}
+
+/// Returns those that are drawn.
+fn visible(spectrum: &Spectrum, which: usize) -> impl Iterator<Item = (f64, f64)> {
+    let largest = lines(spectrum, which).map(|(_, size)| size).fold(0.0, f64::max);
+    lines(spectrum, which).filter(move |&(_, size)| size > SMALLEST_SHARE * largest)
+}
+
+fn draw_panel(canvas: &Canvas, frame: &Frame, spectrum: &Spectrum, which: usize) {
     frame.draw_grid(canvas);
     if spectrum.cycle.is_none() {
-        let path: Vec<_> = lines().map(|(frequency, size)| frame.at(frequency, size)).collect();
+        let path: Vec<_> =
+            lines(spectrum, which).map(|(frequency, size)| frame.at(frequency, size)).collect();
         canvas.stroke(&path, 1.4, DARK);
     } else {
         let [width, radius] = if spectrum.lines.len() <= THICK_LINES { [FREE_LINE, 5.0] } else { [1.0, 2.5] };
-        for (frequency, size) in lines().filter(|&(_, size)| is_visible(size)) {
+        for (frequency, size) in visible(spectrum, which) {
             let at = frame.at(frequency, size);
-            canvas.stroke(&[(at.0, rect.bottom), at], width, DARK);
+            canvas.stroke(&[(at.0, frame.rect.bottom), at], width, DARK);
             // Subharmonics have another colour than multiples of the forcing frequency.
             let color = if frequency.fract() == 0.0 { DARK } else { GEAR_2 };
             canvas.marker(at, Marker::dot(color, radius));

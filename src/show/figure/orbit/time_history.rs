@@ -1,13 +1,15 @@
 //! Displacements and velocities of all bodies against time.
 
 use crate::show::color::Color;
-use crate::show::drawing::frame::Frame;
+use crate::show::drawing::frame::{column, stacked};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
-use crate::show::drawing::{Canvas, GEAR_1, GEAR_2, Rect, wall_color};
+use crate::show::drawing::{Canvas, GEAR_1, GEAR_2, wall_color};
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
 use crate::show::names;
 use rattlemap_dynamics::model::{Side, State};
 
+/// Default height.
+const HEIGHT: f64 = 1150.0;
 /// Opacity of the bands that show meshing.
 const MESHING_BAND: f64 = 0.16;
 
@@ -24,19 +26,14 @@ impl OrbitPlot<'_> {
             motion.push(Entry::new(band, &format!("{}, {} wall", self.contact_name(), names::side(side))));
         }
         let top = draw_head(canvas, &self.title, &self.subtitle, &self.legend(motion, true)) + 14.0;
-        let whole = canvas.panel(ORBIT_LEFT, top);
-        let middle = (top + whole.bottom) / 2.0;
-        let panels = [
-            (0, "displacement, x", 1.0, top, middle - 15.0),
-            (1, "velocity, v", self.oscillator.omega, middle + 15.0, whole.bottom),
-        ];
-        for (quantity, label, scale, top, bottom) in panels {
+        let axis = |quantity: usize, label, scale| {
             let components: Vec<usize> = (quantity..self.names.len()).step_by(2).collect();
-            let frame = Frame {
-                rect: Rect { top, bottom, ..whole },
-                x: self.time_axis(),
-                y: self.state_axis(label, &components, scale),
-            };
+            self.state_axis(label, &components, scale)
+        };
+        let axes = [axis(0, "displacement, x", 1.0), axis(1, "velocity, v", self.oscillator.omega)];
+        let panels = stacked(canvas, top, HEIGHT, &[1.0, 1.0]).into_iter().zip(axes).collect();
+        let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, 0.0);
+        for (quantity, frame) in frames.iter().enumerate() {
             for piece in &self.motion.pieces {
                 if let Some(side) = piece.meshing {
                     let (from, to) = piece.span();
@@ -47,9 +44,9 @@ impl OrbitPlot<'_> {
             for (i, (_, color)) in colored() {
                 let index = quantity + 2 * i;
                 let at = |t: f64, state: &State| (t, state[index]);
-                self.draw_jumps(canvas, &frame, at);
-                self.draw_lines(canvas, &frame, (color, color), at);
-                self.draw_markers(canvas, &frame, quantity == 1, at);
+                self.draw_jumps(canvas, frame, at);
+                self.draw_lines(canvas, frame, (color, color), at);
+                self.draw_markers(canvas, frame, quantity == 1, at);
             }
             frame.draw_axes(canvas, quantity == 1);
         }

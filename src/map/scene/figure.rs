@@ -1,0 +1,148 @@
+//! `[figure]`: width, type size, heading and legend of all figures, and lines on maps.
+
+use super::Points;
+use super::axis::{Axis, meanings, names};
+use super::error::SceneError;
+use super::keys;
+use super::section::{Field, Section};
+use super::settings::read_title;
+use crate::text::document::Value;
+use crate::text::expression::Expression;
+use rattlemap_dynamics::model::Model;
+
+/// Units of a width, in points.
+const UNITS: [(&str, f64); 4] = [("mm", 72.0 / 25.4), ("cm", 720.0 / 25.4), ("in", 72.0), ("pt", 1.0)];
+/// Smallest and largest width, in millimetres.
+const WIDTHS: [f64; 2] = [60.0, 300.0];
+/// Smallest and largest type size, in points.
+const FONT_SIZES: [f64; 2] = [7.0, 24.0];
+/// A figure is at least this many times as wide as its type size: room for a panel with its labels.
+const LEAST_WIDTH: f64 = 21.0;
+
+/// Appearance of all figures of a command.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureStyle {
+    /// Width in points. None: each figure has its default width.
+    pub width: Option<f64>,
+    /// Type size of tick labels and legends, in points. None: 7.4.
+    pub font_size: Option<f64>,
+    /// Replaces the title. Empty: no heading at all.
+    pub title: Option<String>,
+    /// Whether there is a legend.
+    pub legend: bool,
+}
+
+impl Default for FigureStyle {
+    fn default() -> Self {
+        FigureStyle { width: None, font_size: None, title: None, legend: true }
+    }
+}
+
+impl FigureStyle {
+    /// Reads a width such as `85mm`, in points.
+    ///
+    /// # Errors
+    /// A text that says what is required.
+    pub fn width(text: &str) -> Result<f64, String> {
+        let [least, most] = WIDTHS;
+        let requirement = || {
+            format!(
+                "a length from {least} mm to {most} mm with its unit (mm, cm, in or pt), such as \"85mm\""
+            )
+        };
+        let unit = UNITS.iter().find_map(|(unit, points)| Some((text.trim().strip_suffix(unit)?, points)));
+        let length = unit.and_then(|(number, points)| Some(number.trim().parse::<f64>().ok()? * points));
+        let (_, millimetre) = UNITS[0];
+        let is_allowed = |points: &f64| (least - 1e-9..=most + 1e-9).contains(&(points / millimetre));
+        length.filter(is_allowed).ok_or_else(requirement)
+    }
+
+    /// Reads a type size in points.
+    ///
+    /// # Errors
+    /// A text that says what is required.
+    pub fn font_size(size: f64) -> Result<f64, String> {
+        let [least, most] = FONT_SIZES;
+        let requirement = || format!("a type size from {least} to {most} points");
+        Some(size).filter(|size| (least..=most).contains(size)).ok_or_else(requirement)
+    }
+
+    /// Checks that the width has room for the type size.
+    ///
+    /// # Errors
+    /// A text that says what is required of the type size.
+    pub fn check(&self) -> Result<(), String> {
+        let (Some(width), Some(size)) = (self.width, self.font_size) else { return Ok(()) };
+        let most = width / LEAST_WIDTH;
+        let requirement = || {
+            let most = (10.0 * most).floor() / 10.0;
+            format!(
+                "a type size of at most {most} points at this width; choose a smaller type or a larger width"
+            )
+        };
+        if size <= most { Ok(()) } else { Err(requirement()) }
+    }
+}
+
+/// A line on maps: the zeros of an expression in the parameters of the model.
+#[derive(Clone, Debug)]
+pub struct MapLine {
+    /// Name in the legend.
+    pub name: String,
+    expression: Expression,
+}
+
+impl MapLine {
+    /// Returns the expression at any values of the two axes. It may be infinite or NaN.
+    pub(crate) fn function<'a>(&'a self, points: &'a Points) -> impl Fn([f64; 2]) -> f64 + 'a {
+        move |values| {
+            let model = points.model_at(values);
+            self.expression.evaluate(&|index| model.value(index))
+        }
+    }
+}
+
+/// The table `[figure]`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Figure {
+    pub(super) style: FigureStyle,
+    pub(super) lines: Vec<MapLine>,
+}
+
+/// Reads `[figure]`.
+pub(super) fn read(root: &Section<'_>, points: &Points) -> Result<Figure, SceneError> {
+    let section = root.section("figure", &keys::names("figure"))?;
+    let mut style = FigureStyle::default();
+    if let Some(field) = section.get("width") {
+        style.width = Some(FigureStyle::width(field.text()?).map_err(|text| field.out_of_range(&text))?);
+    }
+    style.title = section.get("title").map(|field| read_title(&field)).transpose()?;
+    if let Some(field) = section.get("legend") {
+        style.legend = field.flag()?;
+    }
+    if let Some(field) = section.get("font_size") {
+        style.font_size =
+            Some(FigureStyle::font_size(field.number()?).map_err(|text| field.out_of_range(&text))?);
+        style.check().map_err(|text| field.out_of_range(&text))?;
+    }
+    let lines = section.get("lines").map(|field| read_lines(&field, points)).transpose()?;
+    Ok(Figure { style, lines: lines.unwrap_or_default() })
+}
+
+fn read_lines(field: &Field<'_>, points: &Points) -> Result<Vec<MapLine>, SceneError> {
+    let model: &dyn Model = points.base();
+    if !matches!(field.node.value, Value::Table(_)) {
+        return Err(field.wrong_type("names and expressions, such as { \"threshold\" = \"k1 - 2*k2\" }"));
+    }
+    let Some(lines) = Section::open_any(field.node, &field.path) else { return Ok(Vec::new()) };
+    let line = |(name, field): (&str, Field<'_>)| {
+        let expression = field.expression(&names(model), &meanings(model), "\"k1 - 2*k2\"")?;
+        let is_swept =
+            |axis: &Axis| axis.target().parameter().is_some_and(|swept| points.follows(&expression, swept));
+        if points.axes().len() == 2 && !points.axes().iter().any(is_swept) {
+            return Err(field.conflict("it has the same value in all cells; use a parameter of an axis"));
+        }
+        Ok(MapLine { name: name.to_owned(), expression })
+    };
+    lines.fields_as_written().into_iter().map(line).collect()
+}

@@ -1,0 +1,119 @@
+// Tables below and beside the map: the audit of filled cells, and the validation.
+
+const count = (n, one, many = `${one}s`) => `${n} ${n === 1 ? one : many}`;
+const short = (value) => (typeof value === "number" ? Number(value.toPrecision(4)).toString() : String(value ?? "\u2013"));
+const spaced = (name) => name.replaceAll("_", " ");
+const percent = (rate) => `${Number((100 * rate).toPrecision(2))} %`;
+const interval = (rate, [low, high]) => `${percent(rate)} (95 % interval: ${percent(low)} to ${percent(high)})`;
+
+// Shows how many cells were integrated, and the audit of the filled cells.
+function showRefinement({ integrated, filled, rounds, audits }) {
+  byId("refined").hidden = false;
+  const last = audits.at(-1);
+  const share = (100 * integrated / (integrated + filled)).toFixed(1);
+  const wrong = (some, wrong, what) => (some ? ` Of ${count(some, `filled ${what}`)} in the sample, ${wrong} were wrong.` : "");
+  byId("audit").textContent = `${share} % of the cells were integrated in ${count(rounds, "round")}. `
+    + "The others were filled from their neighbours. " + (last
+    ? `A random sample of ${count(last.sampled, "filled cell")} was integrated; ${last.wrong} of them were wrong: `
+      + `${interval(last.rate, last.interval)}.`
+      + wrong(last.words, last.wrong_words, "word") + wrong(last.patterns, last.wrong_patterns, "pattern")
+    : "The scene requests no audit.");
+  if (last) byId("audit-errors").append(...Object.keys(last.errors).filter((name) => last.errors[name])
+    .map((name) => element("li", errorText(spaced(name), last.errors[name]))));
+  if (audits.length > 1) {
+    byId("audits").append(...audits.map((audit, k) => {
+      const row = element("tr");
+      row.append(element("td", `audit ${k + 1}`), element("td", `${audit.wrong} of ${audit.sampled} wrong`, "number"));
+      return row;
+    }));
+  }
+}
+
+// Describes the errors of one quantity of the sampled cells.
+function errorText(name, error) {
+  return `${name}: ${count(error.compared, "filled cell")} compared`
+    + (error.empty ? `, ${error.empty} without a value` : "")
+    + `; median error ${short(error.median)}, 95th percentile ${short(error.p95)}, largest ${short(error.worst)}`
+    + (error.off_by_one_interval
+      ? `; 1 or more in ${error.off_by_one}: ${interval(error.off_by_one_rate, error.off_by_one_interval)}.` : ".");
+}
+
+// Returns a table with a caption. `numbers` are the indices of columns of numbers.
+function table(caption, heads, lines, numbers = []) {
+  const row = (tag, cells, bad) => {
+    const node = element("tr", undefined, bad ? "bad" : undefined);
+    node.append(...cells.map((text, k) => element(tag, text, numbers.includes(k) ? "number" : undefined)));
+    return node;
+  };
+  const body = element("table");
+  body.append(row("th", heads), ...lines.map(({ cells, bad }) => row("td", cells, bad)));
+  const box = element("div");
+  box.append(element("h3", caption), body);
+  return box;
+}
+
+// Fields whose names need an explanation.
+const FIELDS = { word: "word, up to mirror image", pattern: "pattern, up to mirror image", attractor: "attractor of the start",
+  finite: "numbers are finite", again: "record computed again" };
+const fieldName = (name) => FIELDS[name] ?? spaced(name);
+
+// Returns the table of the cells that differ, grouped by kind. Cells without an explanation come first.
+function differing({ kinds, mismatches }) {
+  const difference = ({ field, map, judge }) => `${fieldName(field)}: ${short(map)}, judge ${short(judge)}`;
+  const parameters = map.axes.map((axis) => axis.parameter);
+  const line = ({ i, j, values, differences, kind, replay }) => {
+    const go = element("button", `${i}, ${j}`);
+    go.type = "button";
+    go.title = "show this cell on the map";
+    go.addEventListener("click", () => {
+      choose({ i, j });
+      follow({ i, j });
+      scrollTo({ top: 0, behavior: "smooth" });
+    });
+    return { bad: kind === "unexplained",
+      cells: [go, ...parameters.map((name) => short(values[name])), differences.map(difference).join("; "), element("code", replay)] };
+  };
+  const order = Object.keys(kinds).sort((a, b) => (b === "unexplained") - (a === "unexplained"));
+  const groups = order.map((kind) => [kind, mismatches.filter((mismatch) => mismatch.kind === kind)]);
+  const box = element("div");
+  box.append(element("h3", "Cells that differ, by kind"));
+  for (const [kind, list] of groups.filter(([, list]) => list.length)) {
+    const group = table(`${spaced(kind)}: ${count(list.length, "cell")}`, ["cell", ...parameters, "what differs", "replay"], list.map(line));
+    group.firstChild.after(element("p", kinds[kind], "note"));
+    box.append(group);
+  }
+  return box;
+}
+
+// Shows a validation. One that an earlier program stored may lack texts.
+function showValidation(found) {
+  const section = byId("validation");
+  section.hidden = byId("validated").hidden = false;
+  byId("verdict").textContent = found.verdict;
+  byId("details").addEventListener("click", () => section.scrollIntoView({ behavior: "smooth" }));
+  const tables = element("div");
+  tables.id = "tables";
+  const kinds = Object.keys(found.kinds);
+  const strata = found.strata.filter(({ sampled }) => sampled > 0);
+  tables.append(
+    table("Rates, with their 95 % intervals", ["", "checked", "in the map", "differ", ...kinds.map(spaced)],
+      strata.map(({ name, text = name, sampled, runs, differing: all, kinds: of }) =>
+        ({ cells: [text, sampled, runs, ...[all, ...kinds.map((kind) => of[kind])].map(({ count, text }) => `${count} (${text})`)] })), [1, 2]),
+    table("Agreement", ["", "compared", "agree"], Object.entries(found.agreement).filter(([, { compared }]) => compared)
+      .map(([name, { compared, agreeing }]) => ({ cells: [fieldName(name), compared, agreeing] })), [1, 2]),
+  );
+  if (found.chaos.some(({ cells }) => cells)) {
+    const chaos = table("Averages over chaos, as distributions", ["", found.counted, "distance", "limit"],
+      found.chaos.map(({ name, cells, distance, bar, fails }) =>
+        ({ bad: fails, cells: [spaced(name), cells, short(distance), bar ? short(bar) : "too few"] })), [1, 2, 3]);
+    chaos.append(element("p", "Distance: the largest difference of two distribution functions, from 0 (equal) to 1 (apart). "
+      + "One is that of the map, the other that of a second computation; chance exceeds the limit once in 10,000 tests.", "note"));
+    tables.append(chaos);
+  }
+  section.append(
+    element("h2", "Validation"),
+    element("p", found.verdict, found.faults.length ? "verdict bad" : "verdict"),
+    element("p", `${found.samples} of ${found.integrated} integrated ${found.counted} were checked, drawn with the seed ${found.seed}.`),
+    ...(found.remarks ?? []).map((remark) => element("p", remark)), tables);
+  if (found.mismatches.length) section.append(differing(found));
+}
