@@ -6,6 +6,7 @@ use crate::map::scene::Quantity;
 use crate::show::names;
 use crate::show::numbers::Number;
 use crate::show::orbit_spectrum::gap;
+use crate::show::symbols::with_unit;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, Side};
 use rattlemap_dynamics::number::significant;
@@ -65,7 +66,7 @@ pub(crate) fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let list = |&(label, quantities): &(&str, &[(Quantity, &str)])| {
         let of = |&(quantity, word): &(Quantity, &str)| -> Vec<String> {
             let text = |number: &Number| {
-                let value = significant(number.of_orbit(orbit)?);
+                let value = with_unit(&significant(number.of_orbit(orbit)?), number.unit.as_deref());
                 Some([word, &number.subject, &value].join(" ").trim().to_owned())
             };
             Number::of(model, &[quantity]).iter().filter_map(text).collect()
@@ -75,7 +76,9 @@ pub(crate) fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     };
     let mut facts: Vec<(String, String)> = LINES.iter().filter_map(list).collect();
     let of_side = |side: Side| {
-        let [mean, largest] = approaches(orbit, side)?.map(significant);
+        let unit = model.units().gap_velocity();
+        let [mean, largest] =
+            approaches(orbit, side)?.map(|speed| with_unit(&significant(speed), unit.as_deref()));
         Some(format!("; {} mean {mean}, largest {largest}", names::side(side)))
     };
     let sides: String = Side::BOTH.into_iter().filter_map(of_side).collect();
