@@ -140,8 +140,8 @@ def variable_attributes(
 def finished(ds: xr.Dataset) -> xr.Dataset:
     """Add what no table contains: long names, and how files store text."""
     for name, variable in ds.variables.items():
-        if name in _MORE_LONG_NAMES:
-            variable.attrs.setdefault("long_name", _MORE_LONG_NAMES[str(name)])
+        if name in _MORE_LONG_NAMES and variable.attrs.get("long_name", name) == name:
+            variable.attrs["long_name"] = _MORE_LONG_NAMES[str(name)]
         if variable.dtype.kind == "U":
             variable.encoding.update(_AS_TEXT)
     return ds
