@@ -151,7 +151,7 @@ impl Units {
     /// Returns the unit of a component of the state.
     pub fn component(&self, index: usize) -> Option<String> {
         let unit = self.coordinates.get(index / 2)?.as_deref()?;
-        if index % 2 == 0 { Some(unit.to_owned()) } else { self.rate(unit) }
+        if index.is_multiple_of(2) { Some(unit.to_owned()) } else { self.rate(unit) }
     }
 
     /// Returns the unit of the gap's velocity.

@@ -13,12 +13,15 @@ use crate::show::layers::colors::{NO_VALUE, cyclic, diverging, sequential, signe
 use crate::show::layers::layer::{Layer, NamedColor, legend};
 use crate::show::numbers::Number;
 
+/// Returns the value of a cell by its id and its row.
+type Value<'c> = dyn Fn(usize, &Row) -> Option<f64> + Sync + 'c;
+
 /// A continuous quantity and its colours.
 struct Continuous<'c> {
     name: Cow<'static, str>,
     short: Cow<'static, str>,
     title: Cow<'static, str>,
-    value: Box<dyn Fn(usize, &Row) -> Option<f64> + Sync + 'c>,
+    value: Box<Value<'c>>,
     colors: Colors,
 }
 
