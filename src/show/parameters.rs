@@ -25,7 +25,7 @@ impl Parameters {
 }
 
 /// Returns the meanings of parameters and components of the state by name.
-pub(crate) fn meanings(model: &dyn Model) -> BTreeMap<String, String> {
+pub fn meanings(model: &dyn Model) -> BTreeMap<String, String> {
     let parameters = model.parameters().iter().map(|p| (p.name.to_string(), p.meaning.to_string()));
     let (names, bodies) = (model.state_names(), model.bodies());
     let states = names.iter().enumerate().map(|(i, name)| {

@@ -18,7 +18,7 @@ use plot::ORBIT_WIDTH;
 pub use plot::OrbitPlot;
 
 /// Name of the file of [`write_history`] without its extension.
-pub(crate) const HISTORY: &str = "history";
+pub const HISTORY: &str = "history";
 
 /// Draws the gap and the displacements of a motion from the start against time, and writes the figure.
 pub fn write_history(
