@@ -9,6 +9,7 @@ mod analysis;
 mod approach;
 mod budget;
 mod cell;
+mod history;
 mod instant;
 mod itinerary;
 mod quantities;
@@ -26,7 +27,8 @@ pub use analysis::{
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
 pub use cell::{Measurement, NEUTRAL_ORDER, measure, measure_until};
-pub use instant::{LONGEST_TIME, state_at};
+pub use history::{History, Stopped, history};
+pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
 pub use trace::trace;
@@ -43,7 +45,7 @@ pub struct Event {
     pub kind: EventKind,
     /// The wall at which it happened.
     pub side: Side,
-    /// Time since phase 0 of the first period of the cycle or window.
+    /// Time since phase 0 of the first period of the cycle or window; in a [`History`] since the start.
     pub t: f64,
     /// Time since the last phase 0, in `[0, T)`.
     pub t_mod_period: f64,

@@ -11,6 +11,7 @@ from typing import Any
 import xarray as xr
 
 from . import _native, dataset, scenes
+from .engine import interruptible
 from .model import Model
 from .progress import Report, reporter
 
@@ -81,7 +82,7 @@ def bifurcation(
         start=start,
         settings=settings,
     )
-    with reporter(progress, "columns") as report:
+    with interruptible(None, resumable=False), reporter(progress, "columns") as report:
         manifest, *tables = _native.bifurcation(request, report)
     columns, points = (dataset.text_table(StringIO(table)) for table in tables)
     return dataset.diagram(columns, points, json.loads(manifest))

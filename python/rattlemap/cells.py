@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from . import _native, dataset, scenes, toml
-from .engine import Adapter, Engine, Precision, adapter_text, map_dataset, no_display, warn
+from .engine import Adapter, Engine, Precision, adapter_text, interruptible, map_dataset, no_display, warn
 from .errors import SceneError
 from .model import Model, require_model
 from .progress import Report, reporter
@@ -80,7 +80,7 @@ def cells(
         settings=settings,
         cells=_csv(frame, used),
     )
-    with no_display(), reporter(progress, "cells") as report:
+    with interruptible(None, resumable=False), no_display(), reporter(progress, "cells") as report:
         result = _native.map(request, engine, precision, None, False, False, report, adapter_text(adapter))
     warn(result["warnings"])
     variables = map_dataset(result).data_vars

@@ -45,6 +45,31 @@ _LONG_NAMES = {
     "attractor": "label of the attractor",
 }
 
+#: Long names of coordinates and of variables of attractors and section points.
+_MORE_LONG_NAMES = {
+    "label": "label of the attractor",
+    "component": "component of the state",
+    "direction": "direction in which the attractor is followed",
+    "side": "wall: 1 right, -1 left",
+    "kind": "kind of the event",
+    "t_mod_period": "time since phase 0",
+    "attractor_class": "class of the attractor",
+    "attractor_period": "forcing periods per cycle of the attractor",
+    "attractor_word": "word of the attractor",
+    "attractor_pattern": "pattern of the attractor",
+    "attractor_exponent": "largest Lyapunov exponent of the attractor",
+    "attractor_largest_multiplier": "largest modulus of the attractor's multipliers",
+    "attractor_symmetric": "whether the attractor is its own mirror image",
+    "attractor_cells": "cells that lead to the attractor",
+    "attractor_share": "share of the cells that lead to the attractor",
+    "attractor_strobe": "state of the attractor at phase 0",
+}
+
+#: Type of Python strings. The metadata are xarray's, which then need not read all values to know that they are text.
+STRINGS = np.dtype("O", metadata={"element_type": str})
+#: Encoding of text of fixed width. Files store it as text of any length, which all readers of zarr know.
+_AS_TEXT = {"dtype": STRINGS}
+
 #: Names of the results of a cell.
 RESULTS = frozenset(_LONG_NAMES)
 
@@ -60,7 +85,7 @@ def code_names(codes: Mapping[str, int]) -> Array:
 
 def text_array(texts: Iterable[str]) -> Array:
     """Return texts as Python strings, dtype object, because lengths of words differ by a factor of 60."""
-    return np.array([*texts], dtype=object)
+    return np.array([*texts], dtype=STRINGS)
 
 
 def look_up(table: Array, rows: Array) -> Array:
@@ -112,6 +137,16 @@ def variable_attributes(
     return found
 
 
+def finished(ds: xr.Dataset) -> xr.Dataset:
+    """Add what no table contains: long names, and how files store text."""
+    for name, variable in ds.variables.items():
+        if name in _MORE_LONG_NAMES and variable.attrs.get("long_name", name) == name:
+            variable.attrs["long_name"] = _MORE_LONG_NAMES[str(name)]
+        if variable.dtype.kind == "U":
+            variable.encoding.update(_AS_TEXT)
+    return ds
+
+
 #: Returns the data of a variable from the name of the column, the shape, and the table that its codes refer to, or None.
 Reader = Callable[[str, tuple[int, ...], "str | None"], Any]
 
@@ -146,7 +181,7 @@ def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable
             continue
         table = "words" if name in TEXT_COLUMNS else name if name in CODE_COLUMNS else None
         variables[name] = xr.Variable(dims, read(name, shape, table), variable_attributes(name, codes, manifest))
-    return xr.Dataset(variables, coords, attributes(manifest))
+    return finished(xr.Dataset(variables, coords, attributes(manifest)))
 
 
 def from_columns(columns: Mapping[str, Array], manifest: Mapping[str, Any], texts: Iterable[str] = ("",)) -> xr.Dataset:
@@ -219,7 +254,7 @@ def with_attractors(ds: xr.Dataset, table: pd.DataFrame) -> xr.Dataset:
     strobe = np.stack([columns[name] for name in states], axis=-1) if states else np.empty((len(label), 0))
     variables["attractor_strobe"] = (("label", "component"), strobe)
     component = np.array([name.removeprefix("strobe_") for name in states], dtype=str)
-    return ds.assign(variables).assign_coords(label=label, component=component)
+    return finished(ds.assign(variables).assign_coords(label=label, component=component))
 
 
 def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, Any]) -> xr.Dataset:
@@ -254,4 +289,4 @@ def diagram(columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, 
             coords[f"point_{name}"] = (("point",), column, described(name, manifest))
         elif name not in ("class", "period", "status"):
             variables[name] = xr.Variable(("point",), column, described(name, manifest))
-    return xr.Dataset(variables, coords, attributes(manifest))
+    return finished(xr.Dataset(variables, coords, attributes(manifest)))

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import xarray as xr
 
 from . import _native, dataset
+from .terms import in_python
 
 Engine = Literal["auto", "cpu", "gpu"]
 Precision = Literal["f32", "f64"]
@@ -44,10 +45,25 @@ def no_display() -> Iterator[None]:
             os.environ[name] = before
 
 
+@contextmanager
+def interruptible(folder: str | None, *, resumable: bool = True) -> Iterator[None]:
+    """Add to a KeyboardInterrupt what is stored and how to continue. ``folder`` receives the finished cells."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not resumable:
+            text = "interrupted; nothing is stored, so the same call starts from the beginning"
+        elif folder is None:
+            text = "interrupted; nothing is stored; to be able to continue a map, give out=FOLDER, and later resume=True"
+        else:
+            text = f"interrupted; the finished cells are in {folder}; the same call with resume=True continues"
+        raise KeyboardInterrupt(text) from None
+
+
 def warn(lines: Iterable[str]) -> None:
     """Issue warnings that point to the caller of the public function, which must call this one directly."""
     for line in lines:
-        warnings.warn(line, RuntimeWarning, stacklevel=3)
+        warnings.warn(in_python(line), RuntimeWarning, stacklevel=3)
 
 
 def map_dataset(result: _native.MapResult) -> xr.Dataset:

@@ -1,10 +1,15 @@
-"""Exceptions of the package. Their messages are the program's."""
+"""Exceptions of the package. Their messages are the program's, in the terms of Python."""
+
+from .terms import in_python
 
 __all__ = ["EngineError", "FolderError", "ModelError", "RattlemapError", "SceneError"]
 
 
 class RattlemapError(Exception):
     """Base class of all exceptions of this package."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(in_python(message))
 
 
 class SceneError(RattlemapError, ValueError):

@@ -181,7 +181,7 @@ class _Column(BackendArray):
         if table is None:
             self.dtype = cells.array.dtype[name]
         else:
-            self.dtype = np.dtype(object) if codes is None else dataset.code_names(codes).dtype
+            self.dtype = dataset.STRINGS if codes is None else dataset.code_names(codes).dtype
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> npt.NDArray[Any]:
         raw = indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._raw)

@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 
 from . import _native, scenes
-from .engine import Adapter, Engine, Precision, adapter_text, map_dataset, no_display, warn
+from .engine import Adapter, Engine, Precision, adapter_text, interruptible, map_dataset, no_display, warn
 from .errors import SceneError
 from .model import Model
 from .progress import Report, reporter
@@ -98,7 +98,7 @@ def map(  # noqa: A001
     FolderError
         If ``out`` cannot be used.
     KeyboardInterrupt
-        Within a second of Ctrl-C. ``out`` keeps the finished cells.
+        Within a second of Ctrl-C. ``out`` keeps the finished cells, and the message says how to continue.
 
     Examples
     --------
@@ -123,13 +123,13 @@ def map(  # noqa: A001
             raise SceneError("resume: a map on a cluster cannot be resumed; use force=True to compute it again")
         from .cluster import compute_shards
 
-        with reporter(progress, "shards") as report:
+        with interruptible(None, resumable=False), reporter(progress, "shards") as report:
             choice = (engine, precision, adapter_text(adapter))
             result = compute_shards(request, client, choice=choice, shards=shards, out=folder, force=force, report=report)
     elif shards is not None:
         raise SceneError(f"shards = {shards}: only a cluster computes shards; give its client, too")
     else:
-        with no_display(), reporter(progress, "cells") as report:
+        with interruptible(folder), no_display(), reporter(progress, "cells") as report:
             result = _native.map(request, engine, precision, folder, force, resume, report, adapter_text(adapter))
     warn(result["warnings"])
     return map_dataset(result)

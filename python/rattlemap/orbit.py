@@ -12,11 +12,13 @@ import numpy.typing as npt
 import pandas as pd
 
 from . import _native, dataset, scenes
+from .engine import interruptible
 from .errors import SceneError
 from .model import Model, require_model
 
 #: Ranges of the arguments, as in the program.
 _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
+_HISTORY, _LAST = (1, 10_000), 30_000_000
 
 
 class Orbit:
@@ -28,7 +30,8 @@ class Orbit:
 
     def __init__(self, model: Model, transient: int, periods: int, start: list[float] | None) -> None:
         self._arguments = (model, transient, periods, start)
-        self._native = _native.orbit(model._model, transient, periods, start)
+        with interruptible(None, resumable=False):
+            self._native = _native.orbit(model._model, transient, periods, start)
         self._facts: dict[str, Any] = json.loads(self._native.json())
         self.model = model
         """The model with the values of this orbit."""
@@ -182,6 +185,45 @@ class Orbit:
         table = StringIO(self._native.trajectory(-(-points // periods)))
         return pd.DataFrame(dataset.table_columns(dataset.text_table(table)))
 
+    def history(self, periods: int, *, to_period: int | None = None, points: int = 2000) -> pd.DataFrame:
+        """Return the motion from its start, which :meth:`trajectory` leaves out as transient.
+
+        Parameters
+        ----------
+        periods
+            Number of forcing periods, 1 to 10,000: the first ones, unless ``to_period`` is given.
+        to_period
+            Number of the last forcing period, counted from 1. ``history(5, to_period=100)`` returns periods 96 to 100.
+        points
+            Least number of evenly spaced samples. Each forcing period has the same number.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The columns of :meth:`trajectory`, with ``t`` since the start. At the exact time of an event the last row is the
+            state after the event.
+
+        Raises
+        ------
+        ValueError
+            If a number is out of its range.
+        EngineError
+            If the motion cannot be computed up to the last period.
+        KeyboardInterrupt
+            Within a second of Ctrl-C.
+
+        Examples
+        --------
+        >>> first = rm.orbit(rm.gear_pair(), e=0.605).history(20)
+        >>> plt.plot(first["t"], first["z"])
+        """
+        last = periods if to_period is None else to_period
+        _check_whole("periods", periods, _HISTORY)
+        _check_whole("to_period", last, (int(periods), _LAST))
+        _check_whole("points", points, (1, 10_000_000))
+        table = StringIO(self._native.history(int(last) - int(periods), int(periods), int(points)))
+        return pd.DataFrame(dataset.table_columns(dataset.text_table(table)))
+
     def to_dict(self) -> dict[str, Any]:
         """Return the object that ``rattlemap orbit --json`` prints; absent values are None."""
         facts: dict[str, Any] = json.loads(self._native.json())
@@ -196,6 +238,14 @@ class Orbit:
         if self.class_ != "failed":
             facts.append(f"exponent {self.lyapunov:.4g}")
         return f"<Orbit: {', '.join(facts)}; {len(self._facts['events'])} events>"
+
+
+def _check_whole(name: str, value: float, bounds: tuple[int, int]) -> None:
+    """Raise an error unless a value is a whole number within bounds, which are included."""
+    least, most = bounds
+    is_whole = isinstance(value, (int, np.integer)) or (isinstance(value, float) and value.is_integer())
+    if not is_whole or not least <= value <= most:
+        raise SceneError(f"{name} = {value!r}: it must be a whole number from {least} to {most}")
 
 
 def _number(value: float | None) -> float:
@@ -252,10 +302,8 @@ def orbit(
     >>> bool((abs(o.multipliers) < 1).all())
     True
     """
-    for name, value, (least, most) in (("periods", periods, _PERIODS), ("transient", transient, _TRANSIENT)):
-        is_whole = isinstance(value, (int, np.integer)) or (isinstance(value, float) and value.is_integer())
-        if not is_whole or not least <= value <= most:
-            raise SceneError(f"{name} = {value!r}: it must be a whole number from {least} to {most}")
+    _check_whole("periods", periods, _PERIODS)
+    _check_whole("transient", transient, _TRANSIENT)
     changes = scenes.all_names(names, None, parameters)
     if phase is not None:
         changes["start.phase"] = phase

@@ -63,8 +63,8 @@ def plot(
     Raises
     ------
     ValueError
-        If the data does not have two dimensions, a Dataset has neither classes nor attractors, ``width`` is not a length, or both
-        ``width`` and ``ax`` are given.
+        If the data does not have two dimensions, a Dataset has neither classes with periods nor attractors, ``width`` is not a
+        length, or both ``width`` and ``ax`` are given.
 
     Examples
     --------
@@ -138,6 +138,8 @@ def _cell_names(ds: xr.Dataset) -> xr.DataArray:
         return ds["attractor"]
     if "class" not in ds:
         raise ValueError("the map has neither classes nor attractors; compute it with the quantity class, or draw one variable")
+    if "period" not in ds:
+        raise ValueError('the map has no variable "period", which colours periodic cells; draw its classes with rm.plot(ds["class"])')
     classes, periods = ds["class"].values, ds["period"].values
     known = {period: f"period {period}" for period in np.unique(periods)}
     texts = np.array([known[period] for period in periods.ravel()], dtype=object).reshape(periods.shape)

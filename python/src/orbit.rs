@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use rattlemap::flow::Flow;
 use rattlemap::job;
-use rattlemap::model::{Model as _, REST};
+use rattlemap::model::{Model as _, REST, State};
 use rattlemap::model_file::FileModel;
 use rattlemap::orbit::{self as analysis, Settings};
 use rattlemap::store;
 use rattlemap::store::in_memory;
+use rattlemap::store::orbit::HistoryRequest;
 
 use crate::model::Model;
 use crate::problem::Problem;
@@ -19,6 +21,7 @@ use crate::worker;
 pub(crate) struct Orbit {
     model: Arc<FileModel>,
     orbit: Arc<analysis::Orbit>,
+    start: State,
 }
 
 #[pymethods]
@@ -49,6 +52,18 @@ impl Orbit {
         let (model, orbit) = (Arc::clone(&self.model), Arc::clone(&self.orbit));
         worker::run(py, None, move |_| Ok(Some(in_memory::trajectory(&*model, &orbit, samples_per_period)?)))
     }
+
+    /// Returns `trajectory.csv` of the motion from its start: `periods` forcing periods after the first `skipped`, with at least
+    /// this number of samples.
+    fn history(&self, py: Python<'_>, skipped: u64, periods: u32, samples: usize) -> PyResult<String> {
+        let (model, start) = (Arc::clone(&self.model), self.start);
+        worker::run(py, None, move |watch| {
+            let request = HistoryRequest { start, skipped, periods, samples };
+            let history = request.compute(&*model, &Flow::of(&*model)?, watch.halt());
+            let history = history.map_err(Problem::engine)?;
+            history.map(|history| Ok(in_memory::history(&*model, &history)?)).transpose()
+        })
+    }
 }
 
 /// Computes the orbit of a model from a state at phase 0, by default from rest.
@@ -77,5 +92,5 @@ pub(crate) fn orbit(
         let [longest, shown] = [analysis::LONGEST_WINDOW, analysis::EVENT_PERIODS];
         Ok(analysis::analyse_until(&*own, state, &settings, longest, shown, watch.halt())?)
     })?;
-    Ok(Orbit { model, orbit: Arc::new(orbit) })
+    Ok(Orbit { model, orbit: Arc::new(orbit), start: state })
 }

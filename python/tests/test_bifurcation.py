@@ -30,7 +30,7 @@ def test_errors_name_the_remedy() -> None:
         rm.bifurcation(rm.gear_pair())
     with pytest.raises(rm.SceneError, match="did you mean `e`|valid names"):
         rm.bifurcation(rm.gear_pair(), ee=(0, 1, 5))
-    with pytest.raises(rm.SceneError, match="with --along e --at omega=VALUE"):
+    with pytest.raises(rm.SceneError, match='with along="e" at={"omega": VALUE}'):
         rm.bifurcation(scene=SCENES / "e_omega.toml")
 
 

@@ -6,9 +6,12 @@ import csv
 import json
 import pickle
 import shutil
+import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import rattlemap as rm
@@ -95,14 +98,52 @@ def test_all_selections_of_xarray_work(map_folder: Path) -> None:
     assert ((chunks["class"] == "chaotic").sum() == (whole["class"] == "chaotic").sum()).compute()
 
 
-def test_a_map_is_stored_as_netcdf(map_folder: Path, tmp_path: Path) -> None:
+def assert_stored(stored: xr.Dataset, ds: xr.Dataset) -> None:
+    """A file returns every value, text as text, and the descriptions."""
+    assert stored.attrs == ds.attrs
+    for name in ds.variables:
+        values, expected = stored[name].values, ds[name].values
+        if expected.dtype.kind == "f":
+            assert np.array_equal(values, expected, equal_nan=True), name
+        else:
+            assert values.tolist() == expected.tolist(), name
+        assert stored[name].attrs.get("long_name") == ds[name].attrs.get("long_name"), name
+    if ds["class"].ndim == 2 and "direction" not in ds.dims:
+        assert ((stored["class"] == "chaotic").values == (ds["class"] == "chaotic").values).all()
+        plt.close(rm.plot(stored["class"]).figure)
+
+
+@pytest.fixture(scope="module", params=["a map", "chunks", "basins", "a diagram"])
+def stored_example(request: pytest.FixtureRequest, map_folder: Path) -> xr.Dataset:
+    model = rm.load_model("impact-oscillator", omega=2.8)
+    if request.param == "basins":
+        return rm.basins(model, x=(-1, 1, 4), v=(-1, 1, 4), engine="cpu")
+    if request.param == "a diagram":
+        return rm.bifurcation(rm.gear_pair(), e=(0.5, 0.6, 4), start="both")
     ds = rm.open(map_folder)
-    ds.to_netcdf(tmp_path / "map.nc", engine="scipy")
-    with xr.open_dataset(tmp_path / "map.nc", engine="scipy") as stored:
-        assert stored.attrs["scene"] == ds.attrs["scene"]
-        for name in ds.data_vars:
-            assert stored[name].values.tolist() == ds[name].values.tolist() or ds[name].dtype.kind == "f", name
-            assert ds[name].dtype.kind != "f" or np.array_equal(stored[name], ds[name], equal_nan=True), name
+    return ds.chunk({"e": 8}) if request.param == "chunks" else ds
+
+
+@pytest.mark.parametrize("engine", ["netcdf4", "scipy"])
+def test_datasets_are_stored_as_netcdf(stored_example: xr.Dataset, engine: Any, tmp_path: Path) -> None:
+    stored_example.to_netcdf(tmp_path / "stored.nc", engine=engine)
+    with xr.open_dataset(tmp_path / "stored.nc", engine=engine) as stored:
+        assert_stored(stored, stored_example)
+
+
+def test_datasets_are_stored_as_zarr(stored_example: xr.Dataset, tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        # Zarr warns of types that other readers do not know, and xarray of text that it must load to know its type.
+        warnings.filterwarnings("error", message="The data type|variable .* has data in the form of a dask array")
+        stored_example.to_zarr(tmp_path / "stored.zarr", consolidated=False)
+    with xr.open_zarr(tmp_path / "stored.zarr", consolidated=False) as stored:
+        assert_stored(stored, stored_example)
+
+
+def test_coordinates_have_long_names() -> None:
+    basins = rm.basins(rm.load_model("impact-oscillator", omega=2.8), x=(-1, 1, 3), v=(-1, 1, 3), engine="cpu")
+    for name in ("label", "component", "attractor_share", "attractor_strobe"):
+        assert len(basins[name].attrs["long_name"]) > len(name) / 2, name
 
 
 def test_a_list_has_one_dimension(program: Program, tmp_path: Path) -> None:
@@ -178,15 +219,15 @@ def keep_manifest_alone(folder: Path) -> None:
 
 DAMAGES: list[tuple[Callable[[Path], object], str]] = [
     (shutil.rmtree, "there is no such folder"),
-    (lambda folder: (folder / "manifest.json").unlink(), "the run is unfinished: resume it with `rattlemap map SCENE --out "),
+    (lambda folder: (folder / "manifest.json").unlink(), "the run is unfinished: resume it with `rm.map(..., out="),
     (lambda folder: (folder / "manifest.json").write_text("{}"), "this is not the manifest of a map"),
     (lambda folder: edit_manifest(folder, format=1), "of format 1, and this version reads format 2"),
     (lambda folder: edit_manifest(folder, command="orbit"), "not the manifest of a map, but of `orbit`"),
     (lambda folder: edit_manifest(folder, shard={"index": 3, "count": 16}), "`rattlemap merge OUT PART...` makes the map"),
     (mark_unlisted, "outputs.files of the scene lacks 'npy'"),
-    (lambda folder: (folder / "cells.npy").unlink(), "cells.npy is missing; `rattlemap check"),
-    (keep_manifest_alone, "cells.npy is missing; `rattlemap map SCENE --out "),
-    (lambda folder: (folder / "words.csv").unlink(), "words.csv is missing; `rattlemap check"),
+    (lambda folder: (folder / "cells.npy").unlink(), "cells.npy is missing; `rm.check("),
+    (keep_manifest_alone, "cells.npy is missing; `rm.map(..., out="),
+    (lambda folder: (folder / "words.csv").unlink(), "words.csv is missing; `rm.check("),
     (lambda folder: truncate(folder / "cells.npy"), "cells.npy is damaged"),
 ]
 

@@ -13,6 +13,15 @@ import rattlemap as rm
 from conftest import Program, assert_same_columns
 
 
+def moments(folder: Path) -> pd.DataFrame:
+    """Reads the table of a motion."""
+    table = pd.read_csv(folder / "trajectory.csv", dtype=str, keep_default_na=False)
+    for name in table.columns.difference(["domain", "event", "moment", "side"]):
+        table[name] = [float(text) for text in table[name]]
+    table["side"] = [int(text or 0) for text in table["side"]]
+    return table
+
+
 @pytest.mark.parametrize(
     ("sets", "more"),
     [
@@ -38,11 +47,7 @@ def test_an_orbit_is_the_programs(
     assert len(events) == len(expected["events"])
     for name in events.dtype.names:
         assert events[name].tolist() == [event[name] for event in expected["events"]], name
-    table = pd.read_csv(tmp_path / "orbit/trajectory.csv", dtype=str, keep_default_na=False)
-    for name in table.columns.difference(["domain", "event", "moment", "side"]):
-        table[name] = [float(text) for text in table[name]]
-    table["side"] = [int(text or 0) for text in table["side"]]
-    assert_same_columns(orbit.trajectory(), table)
+    assert_same_columns(orbit.trajectory(), moments(tmp_path / "orbit"))
 
 
 def test_a_trajectory_has_the_requested_points() -> None:
@@ -53,6 +58,21 @@ def test_a_trajectory_has_the_requested_points() -> None:
     assert len(samples) == 401 and samples["t"].iloc[-1] == pytest.approx(orbit.forcing_period)
     assert len(path) == 401 + 2 * len(orbit.events)
     assert "periodic, period 1, word 36" in repr(orbit)
+
+
+def test_a_history_is_the_programs(program: Program, tmp_path: Path) -> None:
+    orbit = rm.orbit(rm.gear_pair(), e=0.06, start=[0.1, 0.0, -0.2, 1.5])
+    line = ["orbit", "--set", "e=0.06", "--start", "0.1,0,-0.2,1.5", "--from-start"]
+    program(*line, "5", "--out", tmp_path / "first")
+    first = orbit.history(5)
+    assert_same_columns(first, moments(tmp_path / "first"))
+    assert first.iloc[0][["x1", "v1", "x2", "v2"]].tolist() == [0.1, 0.0, -0.2, 1.5]
+    program(*line, "2", "--to-period", "9", "--out", tmp_path / "later")
+    assert_same_columns(orbit.history(2, to_period=9), moments(tmp_path / "later"))
+    assert (orbit.history(2, points=10)["moment"] == "").sum() == 11
+    for periods, to_period, part in ((0, None, "periods = 0"), (5, 4, "to_period = 4"), (1.5, None, "periods = 1.5")):
+        with pytest.raises(ValueError, match=part):
+            orbit.history(periods, to_period=to_period)
 
 
 def test_an_orbit_can_be_pickled() -> None:

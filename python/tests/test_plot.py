@@ -80,6 +80,8 @@ def test_attractors_and_single_variables(ds: xr.Dataset, axes: Axes) -> None:
         rm.plot(ds["class"].isel(e=0), ax=axes)
     with pytest.raises(ValueError, match="neither"):
         rm.plot(ds.drop_vars("class"), ax=axes)
+    with pytest.raises(ValueError, match=r'no variable "period".*rm.plot\(ds\["class"\]\)'):
+        rm.plot(ds.drop_vars("period"), ax=axes)
 
 
 def test_a_figure_of_a_given_width_holds_all_its_texts_in_type_of_seven_points(ds: xr.Dataset) -> None:

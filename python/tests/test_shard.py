@@ -29,7 +29,7 @@ def test_all_shards_are_the_map(tmp_path: Path) -> None:
 def test_wrong_shards_are_refused(tmp_path: Path) -> None:
     axes = {"e": (0, 1, 4), "omega": (1, 12, 4)}
     scene = scenes.scene_of(rm.gear_pair(), None, axes, purpose="map", axes=2)
-    with pytest.raises(rm.EngineError, match="auto may choose different engines on different machines"):
+    with pytest.raises(rm.EngineError, match='engine="auto" may choose different engines on different machines'):
         _native.shard(scene, 1, 2, "auto", None, str(tmp_path / "part"))
-    with pytest.raises(rm.SceneError, match="--shard 0/2: shards are counted from 1"):
+    with pytest.raises(rm.SceneError, match='shard="0/2": shards are counted from 1'):
         _native.shard(scene, 0, 2, "cpu", None, str(tmp_path / "part"))

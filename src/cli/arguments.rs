@@ -12,6 +12,7 @@ use crate::map::scene::{Along, FigureStyle, Format, toml};
 use crate::map::shard::Shard;
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
 use crate::store::inventory::figure_formats;
+use crate::store::orbit::{HistoryRequest, TABLED};
 use crate::text::printable::is_printable;
 use crate::text::shell::quoted;
 use crate::validate::DEFAULT_SAMPLES;
@@ -479,7 +480,9 @@ pub(crate) enum EngineChoice {
     The gear pair with meshing on both sides, with figures:\n  \
     rattlemap orbit --set e=0.06 --out out/meshing\n\n\
     A motion of another model:\n  \
-    rattlemap orbit --model impact-oscillator --set omega=2.8")]
+    rattlemap orbit --model impact-oscillator --set omega=2.8\n\n\
+    The first 20 forcing periods, from a given state:\n  \
+    rattlemap orbit --start 0.1,0,-0.2,1.5 --from-start 20 --out out/first")]
 pub(crate) struct Orbit {
     /// Model: a name that `rattlemap models` lists, or the path of a model's file
     #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_MODEL)]
@@ -506,10 +509,21 @@ pub(crate) struct Orbit {
           value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     pub(crate) transient: u32,
 
-    /// Also print the state at time T; the motion starts at time 0 and phase 0. The state is exact to rounding, but
-    /// rounding errors grow with time if the motion is chaotic. Example: --time 10
+    /// Also print the state at time T; the motion starts at time 0 and phase 0. At the time of an event it is the state after
+    /// the event. The state is exact to rounding, but rounding errors grow with time if the motion is chaotic. Example: --time 10
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = time)]
     pub(crate) time: Option<f64>,
+
+    /// Show the motion from its start instead of the motion after its transient: N forcing periods, the first ones unless
+    /// --to-period is given. With --out writes trajectory.csv, events.csv and the figure history. Example: --from-start 20
+    #[arg(long, value_name = "N", conflicts_with_all = ["periods", "transient"],
+          value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(crate) from_start: Option<u32>,
+
+    /// Number of the last forcing period that --from-start shows, counted from 1. Example: --from-start 5 --to-period 100 shows
+    /// periods 96 to 100 [default: N]
+    #[arg(long, value_name = "M", requires = "from_start", value_parser = clap::value_parser!(u64).range(1..=30_000_000))]
+    pub(crate) to_period: Option<u64>,
 
     /// Print a JSON object instead of a summary
     #[arg(long)]
@@ -564,6 +578,19 @@ impl Orbit {
     /// The state to start from.
     pub(crate) fn start(&self) -> State {
         self.start.map_or(REST, |start| start.state)
+    }
+
+    /// The requested motion from the start.
+    ///
+    /// # Errors
+    /// If the last period comes before the number of periods is complete.
+    pub(crate) fn history(&self) -> Result<Option<HistoryRequest>, String> {
+        let Some(periods) = self.from_start else { return Ok(None) };
+        let last = self.to_period.unwrap_or(periods.into());
+        let skipped = last.checked_sub(periods.into()).ok_or_else(|| {
+            format!("--to-period {last}: {periods} periods end at period {periods} or later; give --from-start {last} or less")
+        })?;
+        Ok(Some(HistoryRequest { start: self.start(), skipped, periods, samples: TABLED }))
     }
 
     /// The integration settings. The longest period is half the observed periods, because a cycle must be observed twice.

@@ -13,9 +13,11 @@ use super::interrupt::Interrupt;
 use super::stdout::print;
 use crate::cli::say;
 use crate::job::model_choice;
-use crate::map::scene;
-use crate::show::orbit_summary::summary;
+use crate::map::scene::{self, Format};
+use crate::show::orbit_json::history_to_json;
+use crate::show::orbit_summary::{history_summary, summary};
 use crate::store;
+use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::orbit::OrbitRequest;
 
@@ -29,6 +31,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let model = scene::single_cell(&model, &arguments.set)?;
     let flow = Flow::of(&*model)?;
     check_time(arguments.time, flow.period)?;
+    let request = arguments.history().map_err(|text| Failure::Usage(anyhow!(text)))?;
     let interrupt = Interrupt::listen(true)?;
     let folder = arguments.out.as_ref().map(|dir| Folder::open(dir, arguments.force)).transpose()?;
     if let Some(folder) = &folder {
@@ -37,27 +40,56 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let clock = Instant::now();
     let (start, settings) = (arguments.start(), arguments.settings());
     let stopped = || {
-        let text = "interrupted before the class was decided; nothing was written";
-        interrupt.failure(text.to_owned())
+        let result = if request.is_some() { "motion was computed" } else { "class was decided" };
+        interrupt.failure(format!("interrupted before the {result}; nothing was written"))
     };
     let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(stopped);
     let instant =
         arguments.time.map(|time| at(time).map(|state| store::orbit::Instant { time, state })).transpose()?;
+    if let Some(request) = request {
+        let history = request.compute(&*model, &flow, interrupt.raised());
+        let stops = |stopped| Failure::Run(anyhow!("--from-start {}: {stopped}", request.periods));
+        let history = history.map_err(stops)?.ok_or_else(stopped)?;
+        let place = (&start, request.skipped + 1, request.last());
+        print(&match arguments.json {
+            true => history_to_json(&*model, &history, place, instant),
+            false => history_summary(&*model, &history, place, instant),
+        })?;
+        let write = |folder: &Folder, figures: Figures<'_>| {
+            store::orbit::write_history(folder, &*model, &history, &request, clock.elapsed(), figures)
+        };
+        return finish(arguments, folder, &style, write);
+    }
     let (shown, longest, halt) = (orbit::EVENT_PERIODS, arguments.longest_window(), interrupt.raised());
     let orbit = orbit::analyse_until(&*model, start, &settings, longest, shown, halt)?.ok_or_else(stopped)?;
     print(&match arguments.json {
         true => store::orbit::json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),
     })?;
-    let failed = orbit.class == Class::Failed;
+    let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
+    finish(arguments, folder, &style, |folder, figures| {
+        store::orbit::write(folder, &*model, &orbit, &request, figures)
+    })?;
+    fail_if(orbit.class == Class::Failed, "the integration failed; `status` says why")
+}
+
+/// Formats and style of figures.
+type Figures<'a> = (&'a [Format], &'a scene::FigureStyle);
+
+/// Writes the files into the folder, if there is one, and names them.
+fn finish(
+    arguments: &Orbit,
+    folder: Option<Folder>,
+    style: &scene::FigureStyle,
+    write: impl FnOnce(&Folder, Figures<'_>) -> Result<Vec<&'static str>, OutputError>,
+) -> Result<(), Failure> {
     if let Some(folder) = folder {
-        let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
         let formats = FigureFormat::added(&arguments.format, folder.path(), "orbit");
-        let files = store::orbit::write(&folder, &*model, &orbit, &request, (&formats, &style))?;
+        let files = write(&folder, (&formats, style))?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
         say::removed(&folder);
     }
-    fail_if(failed, "the integration failed; `status` says why")
+    Ok(())
 }
 
 /// Refuses a time that takes longer than a minute to compute.

@@ -324,6 +324,6 @@ fn a_force_has_a_cosine_and_a_sine() {
     assert_ne!(model, before);
     check_refusals(
         ONE_DEGREE,
-        "gap = [1] | force_sin = [1, 2]\ngap = [1] | a list of one entry, one for each coordinate",
+        "gap = [1] | force_sin = [1, 2]\\ngap = [1] | a list of one entry, one for each coordinate",
     );
 }

@@ -4,8 +4,8 @@ use crate::map::bifurcation::Column;
 use crate::map::scene::Quantity;
 use crate::record::measures::{Dimension, MEASURES, Measure, Measured};
 use crate::show::cells::{Cells, Row};
-use crate::show::symbols::symbol;
-use rattlemap_dynamics::model::{Model, State};
+use crate::show::symbols::{symbol, with_unit};
+use rattlemap_dynamics::model::{Model, State, Units};
 use rattlemap_dynamics::orbit::Orbit;
 
 /// A number of a motion, as a column of tables, a layer of maps, a panel of diagrams, and a variable in Python.
@@ -15,13 +15,15 @@ pub struct Number {
     pub name: String,
     /// Heading in plain text.
     pub title: String,
-    /// Heading with mathematical symbols, for figures.
+    /// Heading with mathematical symbols and unit, for figures.
     pub label: String,
     /// Name of the displacement or state component, or the word that distinguishes it from other numbers of its quantity;
     /// else empty.
     pub subject: String,
     /// Physical dimension.
     pub dimension: Dimension,
+    /// Unit, if the model gives one.
+    pub unit: Option<String>,
     /// Quantity that the scene must request.
     pub quantity: Quantity,
     /// Index of the state component that the number describes, if it describes one.
@@ -41,8 +43,14 @@ impl Number {
     pub fn of(model: &dyn Model, quantities: &[Quantity]) -> Vec<Number> {
         let mut quantities = quantities.to_vec();
         quantities.sort_unstable();
-        let names = model.state_names();
-        quantities.into_iter().flat_map(|quantity| of_quantity(quantity, &names)).collect()
+        let (names, units) = (model.state_names(), model.units());
+        let mut numbers: Vec<Number> =
+            quantities.into_iter().flat_map(|quantity| of_quantity(quantity, &names)).collect();
+        for number in &mut numbers {
+            number.unit = unit(number, &units);
+            number.label = with_unit(&number.label, number.unit.as_deref());
+        }
+        numbers
     }
 
     /// Whether the number is an angle, so that minus pi and pi are equal.
@@ -81,6 +89,18 @@ impl Number {
     }
 }
 
+/// Returns the unit of a number; none for forces and powers, for which models give no unit.
+fn unit(number: &Number, units: &Units) -> Option<String> {
+    match (number.dimension, number.component) {
+        (Dimension::Length | Dimension::Speed, Some(component)) => units.component(component),
+        (Dimension::Length, None) => units.gap.clone(),
+        (Dimension::Speed, None) => units.gap_velocity(),
+        (Dimension::Rate, _) => units.rate("1"),
+        (Dimension::Angle, _) => Some("rad".to_owned()),
+        (Dimension::Force | Dimension::Power | Dimension::None, _) => None,
+    }
+}
+
 fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
     match quantity {
         Quantity::ImpactRate => vec![Number {
@@ -89,6 +109,7 @@ fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
             label: "impacts per unit time".to_owned(),
             subject: String::new(),
             dimension: Dimension::Rate,
+            unit: None,
             quantity,
             component: None,
             source: Source::ImpactRate,
@@ -100,6 +121,7 @@ fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
                 label: format!("final state, {}", symbol(name)),
                 subject: name.to_owned(),
                 dimension: if i % 2 == 0 { Dimension::Length } else { Dimension::Speed },
+                unit: None,
                 quantity,
                 component: Some(i),
                 source: Source::State(i),
@@ -115,6 +137,7 @@ fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
                     label: measure.title(&symbol(subject)),
                     subject: [measure.part(), subject].join(" ").trim().to_owned(),
                     dimension: measure.dimension(),
+                    unit: None,
                     quantity,
                     component: measure.coordinate().map(|i| 2 * i),
                     source: Source::Measure(measure),
@@ -122,5 +145,32 @@ fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
             };
             quantity.group().into_iter().flat_map(|group| group.measures()).filter_map(of).collect()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model_file::FileModel;
+
+    #[test]
+    fn numbers_have_the_units_of_their_displacement_and_of_time() {
+        let text = FileModel::built_in("impact-oscillator").unwrap().definition().text.clone();
+        let units = "units = [\"mm\"]\ntime_unit = \"s\"\n";
+        let model =
+            FileModel::parse(&text.replace("[motion]\n", &format!("[motion]\n{units}")), "m.toml").unwrap();
+        let of = |quantity| -> Vec<String> {
+            Number::of(&model, &[quantity])
+                .into_iter()
+                .map(|number| number.unit.unwrap_or_default())
+                .collect()
+        };
+        assert_eq!(of(Quantity::State), ["mm", "mm/s"]);
+        assert_eq!(of(Quantity::Harmonic)[..2], ["mm", "rad"]);
+        assert_eq!(
+            (of(Quantity::ImpactRate), of(Quantity::Dissipated)),
+            (vec!["1/s".to_owned()], vec![String::new()])
+        );
+        assert_eq!(Number::of(&model, &[Quantity::Rms])[0].label, "root mean square of x [mm]");
     }
 }

@@ -7,32 +7,12 @@ use crate::show::names;
 use crate::show::orbit_quantities;
 use crate::show::parameters::{self, Parameters};
 use rattlemap_dynamics::model::{Model, State};
-use rattlemap_dynamics::orbit::{Event, Orbit};
+use rattlemap_dynamics::orbit::{Event, History, Orbit};
 
 /// Returns the orbit of a model as a JSON object of several lines. Numbers are the shortest decimals that read back as the
 /// same number; numbers that are not finite become null.
 pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
-    let count = model.state_names().len();
-    let components = |state: State| state[..count].to_vec();
-    let event = |(event, impulse): (&Event, Option<f64>)| {
-        json!({
-            "kind": names::kind(event.kind),
-            "side": names::side_code(event.side),
-            "t": event.t,
-            "t_mod_period": event.t_mod_period,
-            "before": components(event.before),
-            "after": components(event.after),
-            "impulse": impulse,
-        })
-    };
-    let impulses = orbit_quantities::impulses(model, &orbit.events);
-    let mut object = Map::new();
-    for name in ["e", "omega"] {
-        object.extend(model.get(name).map(|value| (name.to_owned(), value.into())));
-    }
     let properties = json!({
-        "parameters": Parameters::of(model),
-        "start_phase": model.start_phase(),
         "class": orbit.class.name(),
         "period": names::period(orbit.class),
         "lyapunov": orbit.lyapunov,
@@ -45,15 +25,63 @@ pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         "mesh_fraction": orbit.mesh_fraction,
         "status": orbit.status.name(),
         "periods_run": orbit.periods_run,
-        "strobe": components(orbit.strobe),
         "quantities": orbit_quantities::object(model, orbit),
-        "events": orbit.events.iter().zip(impulses).map(event).collect::<Vec<Value>>(),
+        "strobe": components(model, &orbit.strobe),
+        "events": events(model, &orbit.events),
     });
+    object(model, properties, instant)
+}
+
+/// Returns a motion from the start as a JSON object of several lines. Periods are numbered from 1.
+pub fn history_to_json(
+    model: &dyn Model,
+    history: &History,
+    (start, first, last): (&State, u64, u64),
+    instant: Option<Instant>,
+) -> String {
+    let properties = json!({
+        "start": components(model, start),
+        "first_period": first,
+        "last_period": last,
+        "forcing_period": history.forcing_period,
+        "end": history.samples.last().map(|sample| components(model, &sample.state)),
+        "events": events(model, &history.events),
+    });
+    object(model, properties, instant)
+}
+
+fn components(model: &dyn Model, state: &State) -> Vec<f64> {
+    state[..model.state_names().len()].to_vec()
+}
+
+fn events(model: &dyn Model, events: &[Event]) -> Vec<Value> {
+    let event = |(event, impulse): (&Event, Option<f64>)| {
+        json!({
+            "kind": names::kind(event.kind),
+            "side": names::side_code(event.side),
+            "t": event.t,
+            "t_mod_period": event.t_mod_period,
+            "before": components(model, &event.before),
+            "after": components(model, &event.after),
+            "impulse": impulse,
+        })
+    };
+    events.iter().zip(orbit_quantities::impulses(model, events)).map(event).collect()
+}
+
+/// Returns an object of the parameters, these properties, and the state at a requested time.
+fn object(model: &dyn Model, properties: Value, instant: Option<Instant>) -> String {
+    let mut object = Map::new();
+    for name in ["e", "omega"] {
+        object.extend(model.get(name).map(|value| (name.to_owned(), value.into())));
+    }
+    object.insert("parameters".to_owned(), json!(Parameters::of(model)));
+    object.insert("start_phase".to_owned(), model.start_phase().into());
     object.extend(properties.as_object().cloned().into_iter().flatten());
     object.extend(parameters::units(model).map(|units| ("units".to_owned(), json!(units))));
     if let Some(Instant { time, state }) = instant {
         object.insert("time".to_owned(), time.into());
-        object.insert("state".to_owned(), json!(components(state)));
+        object.insert("state".to_owned(), json!(components(model, &state)));
     }
     format!("{:#}", Value::Object(object))
 }

@@ -6,6 +6,7 @@ use crate::map::scene::Quantity;
 use crate::show::names;
 use crate::show::numbers::Number;
 use crate::show::orbit_spectrum::gap;
+use crate::show::symbols::with_unit;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, Side};
 use rattlemap_dynamics::number::significant;
@@ -43,21 +44,46 @@ pub(crate) fn impulses(model: &dyn Model, events: &[Event]) -> Vec<Option<f64>> 
     events.iter().map(of).collect()
 }
 
-/// Returns labels and values of the lines of a summary, one per quantity that the motion has.
+/// Lines of a summary: their quantities, each with the word before its numbers.
+const LINES: [(&str, &[(Quantity, &str)]); 6] = [
+    ("impact speed", &[(Quantity::ImpactSpeed, "mean"), (Quantity::ImpactSpeedMax, "largest")]),
+    ("contact force", &[(Quantity::ContactForceMax, "largest"), (Quantity::ContactForceRms, "rms")]),
+    (
+        "per unit time",
+        &[
+            (Quantity::ImpactRate, "impacts"),
+            (Quantity::ImpactEnergy, "energy of impacts"),
+            (Quantity::Dissipated, "energy of dampers"),
+        ],
+    ),
+    ("amplitude", &[(Quantity::Amplitude, "")]),
+    ("root mean square", &[(Quantity::Rms, "")]),
+    ("first harmonic", &[(Quantity::Harmonic, "")]),
+];
+
+/// Returns labels and values of the lines of a summary with the quantities that the motion has.
 pub(crate) fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
-    let list = |quantity: Quantity| {
-        let of =
-            |number: &Number| Some(format!("{} {}", number.subject, significant(number.of_orbit(orbit)?)));
-        let texts: Vec<String> = Number::of(model, &[quantity]).iter().filter_map(of).collect();
-        (quantity.name().replace('_', " "), texts.join(", ").trim().to_owned())
+    let list = |&(label, quantities): &(&str, &[(Quantity, &str)])| {
+        let of = |&(quantity, word): &(Quantity, &str)| -> Vec<String> {
+            let text = |number: &Number| {
+                let value = with_unit(&significant(number.of_orbit(orbit)?), number.unit.as_deref());
+                Some([word, &number.subject, &value].join(" ").trim().to_owned())
+            };
+            Number::of(model, &[quantity]).iter().filter_map(text).collect()
+        };
+        let texts: Vec<String> = quantities.iter().flat_map(of).collect();
+        (!texts.is_empty()).then(|| (label.to_owned(), texts.join(", ").replace("  ", " ")))
     };
-    let mut facts: Vec<(String, String)> = Quantity::measured().into_iter().map(list).collect();
+    let mut facts: Vec<(String, String)> = LINES.iter().filter_map(list).collect();
     let of_side = |side: Side| {
-        let [mean, largest] = approaches(orbit, side)?.map(significant);
-        Some(format!("{} {mean} (largest {largest})", names::side(side)))
+        let unit = model.units().gap_velocity();
+        let [mean, largest] =
+            approaches(orbit, side)?.map(|speed| with_unit(&significant(speed), unit.as_deref()));
+        Some(format!("; {} mean {mean}, largest {largest}", names::side(side)))
     };
-    let sides: Vec<String> = Side::BOTH.into_iter().filter_map(of_side).collect();
-    facts.insert(0, ("impact speed by wall".to_owned(), sides.join(", ")));
-    facts.retain(|(_, text)| !text.is_empty());
+    let sides: String = Side::BOTH.into_iter().filter_map(of_side).collect();
+    if let (Some(first), false) = (facts.first_mut(), sides.is_empty()) {
+        first.1.push_str(&sides);
+    }
     facts
 }

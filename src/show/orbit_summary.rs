@@ -8,7 +8,7 @@ use crate::show::orbit_quantities;
 use crate::show::symbols::with_unit;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::number::significant;
-use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
+use rattlemap_dynamics::orbit::{Class, Event, History, Orbit, Status};
 
 /// Largest number of events in the table, and number of events before those that are left out. The summary above the table
 /// stays on the screen.
@@ -43,6 +43,34 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         }
         _ => events(model, &orbit.events),
     });
+    text
+}
+
+/// Returns a summary of a motion from the start: its first state, its last one and its events. Periods are numbered from 1.
+pub fn history_summary(
+    model: &dyn Model,
+    history: &History,
+    (start, first, last): (&State, u64, u64),
+    instant: Option<Instant>,
+) -> String {
+    let mut facts = vec![
+        ("parameters", parameters(model)),
+        ("start", state(model, Instant { time: 0.0, state: *start })),
+        ("forcing periods", {
+            let period = with_unit(&significant(history.forcing_period), model.units().time.as_deref());
+            format!("{first} to {last} (T = {period})")
+        }),
+    ];
+    let end = history.samples.last().map(|sample| Instant { time: sample.t, state: sample.state });
+    facts.extend(end.map(|end| ("end", state(model, end))));
+    facts.extend(instant.map(|instant| ("state", state(model, instant))));
+    let mut text: String = facts.iter().map(|(label, value)| format!("{label:<22}{value}\n")).collect();
+    text += &match history.meshing {
+        Some(side) if history.events.is_empty() => {
+            format!("\nno events: always in contact with the {} wall\n", names::side(side))
+        }
+        _ => format!("\nevents\n{}", events(model, &history.events)),
+    };
     text
 }
 

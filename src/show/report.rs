@@ -84,7 +84,6 @@ pub fn write(
         "words": spellings(&words.words),
         "patterns": spellings(&words.patterns),
         "attractors": attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect::<Vec<_>>(),
-        "numbers": cells.numbers().iter().map(|number| json!([number.name, number.label])).collect::<Vec<_>>(),
         "refinement": refinement::object(cells),
         "validation": validation,
     });

@@ -19,7 +19,7 @@ use crate::store::manifest::bifurcation::{DiagramArguments, bifurcation};
 use crate::store::manifest::map::{self, Run};
 use crate::store::orbit::moments;
 use rattlemap_dynamics::model::Model;
-use rattlemap_dynamics::orbit::{Class, Orbit};
+use rattlemap_dynamics::orbit::{Class, History, Orbit};
 
 /// A map in memory.
 #[derive(Clone, Debug)]
@@ -100,6 +100,15 @@ pub fn trajectory(
         Class::Failed => Vec::new(),
         _ => moments(model, orbit, samples_per_period)?,
     };
+    text(|to| orbit_tables::write_trajectory(to, model, &moments))
+}
+
+/// Returns `trajectory.csv` of a motion from the start.
+///
+/// # Errors
+/// [`OutputError`] if the model is not valid.
+pub fn history(model: &dyn Model, history: &History) -> Result<String, OutputError> {
+    let moments = orbit_tables::moments(&model.oscillator()?, history);
     text(|to| orbit_tables::write_trajectory(to, model, &moments))
 }
 

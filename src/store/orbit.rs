@@ -2,12 +2,13 @@
 
 use std::io::Write;
 use std::sync::LazyLock;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant as Clock};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::map::scene::{FigureStyle, Format};
-use crate::show::figure::orbit::{OrbitFigure, OrbitPlot, spectrum};
+use crate::show::figure::orbit::{self as figure, OrbitFigure, OrbitPlot, spectrum};
 pub use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_json::to_json;
@@ -18,15 +19,17 @@ use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::{self, Head, MANIFEST, joined};
+use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, State};
-use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
+use rattlemap_dynamics::orbit::{Class, History, Orbit, Settings, Stopped, history, trace};
 
 const JSON: &str = "orbit.json";
 const TRAJECTORY: &str = "trajectory.csv";
+const EVENTS: &str = "events.csv";
 const SPECTRUM: &str = "spectrum.csv";
 
 /// Number of samples in the table of the motion, and smallest number of samples per forcing period.
-const TABLED: usize = 2000;
+pub const TABLED: usize = 2000;
 const LEAST_TABLED: usize = 50;
 
 /// Settings of an orbit, and the time of its computation.
@@ -51,10 +54,14 @@ static FIGURES: LazyLock<Vec<(OrbitFigure, Format, String)>> = LazyLock::new(|| 
 /// Files of the figure of the spectrum.
 static SPECTRUM_FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures(spectrum::NAME));
 
+/// Files of the figure of a motion from the start.
+static HISTORY_FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures(figure::HISTORY));
+
 /// Names of all files that an orbit may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    let figures = FIGURES.iter().map(|(.., name)| name).chain(SPECTRUM_FIGURES.iter().map(|(_, name)| name));
-    [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures.map(String::as_str))
+    let alone = SPECTRUM_FIGURES.iter().chain(HISTORY_FIGURES.iter()).map(|(_, name)| name);
+    let figures = FIGURES.iter().map(|(.., name)| name).chain(alone);
+    [MANIFEST, JSON, TRAJECTORY, EVENTS, SPECTRUM].into_iter().chain(figures.map(String::as_str))
 }
 
 /// Writes the orbit, its tables and figures unless it failed, and the manifest last. Returns the names of the files.
@@ -93,20 +100,36 @@ pub fn write(
             }
         }
     }
-    let listed = inventory::entries(folder, &files)?;
     let Settings { transient_periods, observed_periods, max_period } = request.settings;
-    let (elapsed, writing) = (request.elapsed.as_secs_f64(), clock.elapsed().as_secs_f64());
+    let settings = json!({
+        "transient_periods": transient_periods,
+        "observed_periods": observed_periods,
+        "max_period": max_period,
+    });
+    finish(folder, model, (&request.start, settings), (request.elapsed, clock), files)
+}
+
+/// Writes the manifest, and returns the names of all files.
+fn finish(
+    folder: &Folder,
+    model: &dyn Model,
+    (start, settings): (&State, Value),
+    (elapsed, clock): (Duration, Clock),
+    mut files: Vec<&'static str>,
+) -> Result<Vec<&'static str>, OutputError> {
+    let listed = inventory::entries(folder, &files)?;
+    let (elapsed, writing) = (elapsed.as_secs_f64(), clock.elapsed().as_secs_f64());
     let manifest = joined([
         json!(Head::of("orbit")),
         json!({
             "engine": "reference f64",
             "model": manifest::model(model),
             "parameters": Parameters::of(model),
-            "start": request.start[..model.state_names().len()],
+            "start": start[..model.state_names().len()],
             "start_phase": model.start_phase(),
-            "transient_periods": transient_periods,
-            "observed_periods": observed_periods,
-            "max_period": max_period,
+        }),
+        settings,
+        json!({
             "timings": { "integrate": elapsed, "write": writing },
             "files": listed,
         }),
@@ -114,6 +137,67 @@ pub fn write(
     inventory::write_manifest(folder, &manifest)?;
     files.push(MANIFEST);
     Ok(files)
+}
+
+/// A motion from the start, and the forcing periods to write.
+#[derive(Clone, Copy, Debug)]
+pub struct HistoryRequest {
+    /// Initial state, at phase 0 and time 0.
+    pub start: State,
+    /// Forcing periods that are integrated, but not written.
+    pub skipped: u64,
+    /// Forcing periods that are written.
+    pub periods: u32,
+    /// Least number of samples.
+    pub samples: usize,
+}
+
+impl HistoryRequest {
+    /// Number of the last period, from 1.
+    pub fn last(&self) -> u64 {
+        self.skipped + u64::from(self.periods)
+    }
+
+    /// Integrates the motion; none if `halt` was raised.
+    ///
+    /// # Errors
+    /// [`Stopped`] if the motion cannot be followed to the end.
+    pub fn compute(
+        &self,
+        model: &dyn Model,
+        flow: &Flow,
+        halt: &AtomicBool,
+    ) -> Result<Option<History>, Stopped> {
+        let samples = self.samples.div_ceil(self.periods.max(1) as usize);
+        history(flow, model.law(), self.start, (self.skipped, self.periods), samples, halt)
+    }
+}
+
+/// Writes a motion from the start: tables, figure and manifest. Returns the names of the files.
+///
+/// # Errors
+/// [`OutputError`] if a file cannot be written.
+pub fn write_history(
+    folder: &Folder,
+    model: &dyn Model,
+    history: &History,
+    request: &HistoryRequest,
+    elapsed: Duration,
+    (formats, style): (&[Format], &FigureStyle),
+) -> Result<Vec<&'static str>, OutputError> {
+    let (clock, states) = (Clock::now(), model.state_names());
+    inventory::clear_for(folder, names())?;
+    let moments = orbit_tables::moments(&model.oscillator()?, history);
+    folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, model, &moments))?;
+    folder.replace(EVENTS, |out| orbit_tables::write_events(out, &states, &history.events))?;
+    let mut files = vec![TRAJECTORY, EVENTS];
+    let plot = OrbitPlot::of_history(model, &request.start, history)?;
+    for (format, name) in HISTORY_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {
+        folder.replace(name, |out| figure::write_history(out, *format, style, &plot))?;
+        files.push(name);
+    }
+    let settings = json!({ "from_start": request.periods, "to_period": request.last() });
+    finish(folder, model, (&request.start, settings), (elapsed, clock), files)
 }
 
 fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<(), OutputError> {
@@ -131,8 +215,15 @@ pub(crate) fn moments(
     orbit: &Orbit,
     samples_per_period: usize,
 ) -> Result<Vec<Moment>, ModelError> {
-    let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples_per_period)?;
-    Ok(orbit_tables::moments(&model.oscillator()?, orbit, &trace, samples_per_period))
+    let samples = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples_per_period)?;
+    let history = History {
+        meshing: orbit.strobe_meshing,
+        samples,
+        events: orbit.events.clone(),
+        samples_per_period,
+        forcing_period: orbit.forcing_period,
+    };
+    Ok(orbit_tables::moments(&model.oscillator()?, &history))
 }
 
 /// Returns the object that `orbit --json` prints.

@@ -43,6 +43,7 @@ fn the_page_lists_the_columns_of_all_files() {
     run(&folder, "validate out/plane --quiet").code(0);
     run(&folder, "bifurcation line.toml --quiet --set start.policy=both").code(0);
     run(&folder, "orbit --set e=0.3 --out out/orbit").code(0);
+    run(&folder, "orbit --from-start 2 --out out/first").code(0);
     run(&folder, "compare out/plane out/plane --quiet").code(0);
     assert_eq!(header(&dir.join("out/compare/plane-plane/compare.csv")), listed("compare.csv"));
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed("cells.csv and cells.npy"));
@@ -74,6 +75,8 @@ fn the_page_lists_the_columns_of_all_files() {
     assert_eq!(header(&dir.join("out/stop").join(strobe)), listed(strobe));
     assert_eq!(sorted(fields(&dir.join("out/orbit/orbit.json"))), sorted(listed("orbit.json")));
     assert_eq!(header(&dir.join("out/orbit/trajectory.csv")), listed("trajectory.csv"));
+    assert_eq!(header(&dir.join("out/first/trajectory.csv")), listed("trajectory.csv"));
+    assert_eq!(header(&dir.join("out/first/events.csv")), listed("events.csv"));
     assert_eq!(header(&dir.join("out/orbit/spectrum.csv")), listed("spectrum.csv"));
     assert_eq!(sorted(fields(&dir.join("out/plane/validation.json"))), sorted(listed("validation.json")));
 }

@@ -10,6 +10,7 @@ mod common;
 mod compare;
 #[cfg(unix)]
 mod faults;
+mod from_start;
 #[cfg(unix)]
 mod interrupts;
 mod known_faults;

@@ -4,14 +4,19 @@ use std::sync::atomic::AtomicBool;
 
 use super::analysis::ALLOWANCE;
 use crate::flow::Flow;
-use crate::model::{Law, State};
-use crate::reference::{Stop, Trajectory};
+use crate::model::{Law, Side, State};
+use crate::reference::{GapEvent, Stop, Trajectory};
 
 /// Forcing periods that take about a minute if the motion is not stiff.
 pub const LONGEST_TIME: f64 = 3e7;
 
+/// Largest distance from the time of an event that counts as its time, in roundings of the time: the event itself is
+/// located to a few roundings.
+const EVENT_ROUNDINGS: f64 = 16.0;
+
 /// Returns the state at `time` of the motion that starts from `start` at phase 0 and time 0, or none if `halt` was
-/// raised. Whole periods are integrated one by one, so that the phase has no rounding error.
+/// raised. Whole periods are integrated one by one, so that the phase has no rounding error. At the time of an event,
+/// within 16 roundings (3.6e-15 of the time), it is the state after the event.
 ///
 /// # Errors
 /// A [`Stop`] if the motion cannot be continued up to `time`, or needs more than about a minute.
@@ -34,10 +39,32 @@ pub fn state_at(
             trajectory.advance_period(&mut ())?;
         }
         trajectory.advance_to(rest, &mut ())?;
-        Ok(trajectory.state())
+        Ok(at_present(&trajectory, time).0)
     };
     let state = advance();
     if allowance.is_halted() { Ok(None) } else { state.map(Some) }
+}
+
+/// Whether a time is that of an event or a later one, within rounding.
+pub fn is_reached(event: f64, time: f64) -> bool {
+    event - time <= EVENT_ROUNDINGS * f64::EPSILON * time.abs()
+}
+
+/// Returns the state of a trajectory at the present time, and the wall of the contact that lasts. `time` is the time
+/// since its start. If rounding has put an event just behind this time, it is the state after the event.
+pub(super) fn at_present(trajectory: &Trajectory<'_, 0>, time: f64) -> (State, Option<Side>) {
+    let (flow, mut ahead, mut events) = (trajectory.flow(), trajectory.clone(), Vec::<GapEvent>::new());
+    let until = trajectory.time_in_period() + EVENT_ROUNDINGS * f64::EPSILON * time;
+    let advanced = if until <= flow.period {
+        ahead.advance_to(until, &mut events)
+    } else {
+        let next = ahead.advance_period(&mut events);
+        next.and_then(|()| ahead.advance_to(until - flow.period, &mut events))
+    };
+    match (advanced, events.last()) {
+        (Ok(()), Some(event)) => (flow.to_state(event.after), ahead.meshing()),
+        _ => (trajectory.state(), trajectory.meshing()),
+    }
 }
 
 /// Splits a time into whole periods and a remainder, to one rounding.

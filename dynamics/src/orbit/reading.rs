@@ -77,7 +77,7 @@ impl Reading {
 }
 
 /// Converts an event to states; `start` is the first period.
-fn in_states(flow: &Flow, event: &GapEvent, start: u64) -> Event {
+pub(super) fn in_states(flow: &Flow, event: &GapEvent, start: u64) -> Event {
     // An event at the end of a period, by rounding, is at phase 0 of the next one.
     let within = if event.t < flow.period { event.t } else { 0.0 };
     let after = if event.kind == EventKind::MeshEnd { event.before } else { event.after };

@@ -189,7 +189,7 @@ F =  | omgea =  | s.toml:5:1: unknown field `parameters.omgea = 50.0`; did you m
 F =  | f =  | did you mean `F`? valid names: m1 (equivalent mass of gear 1), m2 (
 count = | cuont = | s.toml:11:1: unknown field `axis.0.cuont = 4`; did you mean `count`?
 max_period | max_periods | s.toml:18:1: unknown field `integration.max_periods = 4`
-policy | begin | unknown field `start.begin = "rest"`; valid names: policy, state, count, seed
+policy | begin | unknown field `start.begin = "rest"`; valid names: policy, state, phase, count, seed
 files | file | s.toml:25:1: unknown field `outputs.file = ["csv"]`; did you mean `files`?
 "#,
     );

@@ -17,6 +17,25 @@ use crate::show::error::WriteError;
 use plot::ORBIT_WIDTH;
 pub use plot::OrbitPlot;
 
+/// Name of the file of [`write_history`] without its extension.
+pub(crate) const HISTORY: &str = "history";
+
+/// Draws the gap and the displacements of a motion from the start against time, and writes the figure.
+pub fn write_history(
+    out: impl Write,
+    format: Format,
+    style: &FigureStyle,
+    plot: &OrbitPlot<'_>,
+) -> Result<(), WriteError> {
+    write_figure(out, format, &draw_history(style, plot))
+}
+
+pub(super) fn draw_history(style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {
+    let canvas = Canvas::new(style, ORBIT_WIDTH);
+    plot.draw_history(&canvas);
+    canvas
+}
+
 /// A figure of an orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OrbitFigure {

@@ -1,4 +1,4 @@
-//! Tables of an orbit: its motion in time and its spectrum.
+//! Tables of an orbit: its motion in time, its events and its spectrum.
 
 use std::io::Write;
 
@@ -7,7 +7,7 @@ use crate::show::error::WriteError;
 use crate::show::names;
 use crate::show::orbit_spectrum::{Spectrum, gap};
 use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
-use rattlemap_dynamics::orbit::{Event, EventKind, Orbit, Sample};
+use rattlemap_dynamics::orbit::{Event, EventKind, History, is_reached};
 
 /// A row of the motion: a sample, or the state before or after an event.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,39 +26,47 @@ pub struct Moment {
     pub event: Option<(&'static str, i8, &'static str)>,
 }
 
-/// Merges the samples of `trace` with the states before and after every event.
-///
-/// `trace` has `samples_per_period` samples per forcing period, begins at phase 0 and spans the events.
-pub fn moments(
-    oscillator: &Oscillator,
-    orbit: &Orbit,
-    trace: &[Sample],
-    samples_per_period: usize,
-) -> Vec<Moment> {
-    let mut moments = Vec::with_capacity(trace.len() + 2 * orbit.events.len());
+/// Merges samples with the states before and after every event. A sample at the time of an event would repeat it.
+pub fn moments(oscillator: &Oscillator, history: &History) -> Vec<Moment> {
+    let History { samples, events, samples_per_period, forcing_period, .. } = history;
+    let mut moments = Vec::with_capacity(samples.len() + 2 * events.len());
     let mut add = |t, phase, state: &State, domain, event| {
         let gap = [0, 1].map(|velocity| gap(oscillator, state, velocity));
         moments.push(Moment { t, phase, gap, state: *state, domain: domain_name(domain), event });
     };
-    let mut events = orbit.events.iter().peekable();
-    let (mut domain, mut last) = (orbit.strobe_meshing, f64::NEG_INFINITY);
-    for (i, sample) in trace.iter().enumerate() {
-        while let Some(event) = events.next_if(|event| event.t <= sample.t) {
-            let phase = event.t_mod_period / orbit.forcing_period;
+    let mut events = events.iter().peekable();
+    let (mut domain, mut last) = (history.meshing, f64::NEG_INFINITY);
+    for (i, sample) in samples.iter().enumerate() {
+        while let Some(event) = events.next_if(|event| is_reached(event.t, sample.t)) {
+            let phase = event.t_mod_period / forcing_period;
             let mark = |moment| Some((names::kind(event.kind), names::side_code(event.side), moment));
             add(event.t, phase, &event.before, domain, mark("before"));
             domain = domain_after(event);
             add(event.t, phase, &event.after, domain, mark("after"));
             last = event.t;
         }
-        // A sample at the time of an event repeats it.
         if sample.t > last {
-            let phase = (i % samples_per_period) as f64 / samples_per_period as f64;
+            let phase = (i % samples_per_period) as f64 / *samples_per_period as f64;
             domain = sample.meshing;
             add(sample.t, phase, &sample.state, domain, None);
         }
     }
     moments
+}
+
+/// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`.
+pub fn write_events(out: impl Write, state_names: &[&str], events: &[Event]) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(out);
+    let states = ["before", "after"].into_iter();
+    let states = states.flat_map(|moment| state_names.iter().map(move |name| format!("{moment}_{name}")));
+    table.write_record(["kind", "side", "t", "t_mod_period"].map(str::to_owned).into_iter().chain(states))?;
+    for event in events {
+        let texts = [names::kind(event.kind).to_owned(), names::side_code(event.side).to_string()];
+        let states = [&event.before, &event.after].into_iter().flat_map(|state| &state[..state_names.len()]);
+        let numbers = [event.t, event.t_mod_period].into_iter().chain(states.copied());
+        table.write_record(texts.into_iter().chain(numbers.map(|x| format!("{x:?}"))))?;
+    }
+    Ok(table.flush()?)
 }
 
 /// Writes `trajectory.csv`, one row per moment.

@@ -73,7 +73,10 @@ pub(crate) fn model(model: &dyn Model) -> Value {
 /// Describes the columns of measured quantities; none if the scene requests none.
 pub(crate) fn measured(scene: &Scene) -> Option<Value> {
     let numbers = Number::of(scene.base(), &scene.outputs().quantities);
-    let described = |number: &Number| (number.name.clone(), json!({ "long_name": number.title }));
+    let described = |number: &Number| {
+        let described = json!({ "long_name": number.title, "units": number.unit });
+        (number.name.clone(), without_nulls(described))
+    };
     let all: BTreeMap<String, Value> = numbers.iter().map(described).collect();
     (!all.is_empty()).then(|| json!(all))
 }

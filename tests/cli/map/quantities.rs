@@ -87,7 +87,7 @@ fn numbers_of_a_map_are_those_of_its_orbits() {
 
 #[test]
 fn an_adaptive_map_fills_and_audits_measured_quantities() {
-    let refine = "[refine]\nminimum_grid = 4\n";
+    let refine = "[refine]\nminimum_grid = 4\n[parameters]\ne = 0.6\n";
     let folder = measured("gear-pair", [("k", 100.0, 200.0), ("omega", 9.0, 10.0)], [17, 17], refine);
     succeeds(&folder, "map s.toml --engine cpu --quiet");
     let out = folder.path().join("out/s");

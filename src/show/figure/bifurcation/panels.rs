@@ -41,7 +41,7 @@ pub(crate) enum States {
 impl Panels {
     /// Returns the panels of a model: displacements at the walls. If the walls [fix](crate::map::bifurcation::fixed) one of the
     /// displacements, the panels show its velocity before contact and the displacements at phase 0 instead. Below them, each of
-    /// the `numbers` except states has a panel.
+    /// the `numbers` has a panel, except states and the gap if it is one displacement.
     pub fn of(model: &dyn Model, fixed: Option<usize>, numbers: &[Number]) -> Panels {
         let walls = WallLabels::of(model);
         let names: Vec<String> = model.state_names().into_iter().map(symbol).collect();
@@ -65,7 +65,11 @@ impl Panels {
                 [first].into_iter().chain(displacements().map(strobe)).collect()
             }
         };
-        let measured = numbers.iter().filter(|number| number.quantity != Quantity::State);
+        // Where the gap is one displacement, it would be shown twice.
+        let is_shown = |number: &&Number| {
+            number.quantity != Quantity::State && (fixed.is_none() || !number.name.ends_with("_gap"))
+        };
+        let measured = numbers.iter().filter(is_shown);
         list.extend(measured.map(|number| Panel {
             label: number.label.clone(),
             component: 0,

@@ -20,6 +20,8 @@ const WALL_NAMES: f64 = 97.0;
 const WALL_TEXT: f64 = 135.0;
 /// Distance from the panel to the walls' names.
 const WALL_AWAY: f64 = 14.0;
+/// Default height of a figure of a motion from the start: without displacements, and of each.
+const HISTORY_HEIGHT: [f64; 2] = [760.0, 380.0];
 /// Distance between a symbol of the word and its flight.
 const SYMBOL_AWAY: f64 = 30.0;
 /// Width of a symbol.
@@ -37,29 +39,70 @@ fn wall_name(side: Side) -> String {
 
 impl OrbitPlot<'_> {
     pub(crate) fn draw_gap(&self, canvas: &Canvas) {
-        let is_coordinate = self.names.iter().any(|name| name == self.walls.gap());
-        let free = if is_coordinate { "free motion" } else { "gap in free motion" };
+        let free = if self.gap_coordinate().is_some() { "free motion" } else { "gap in free motion" };
         let legend = self.legend(self.motion_entries(free), false);
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
         let shares = if self.has_depth() { &SHARES[..] } else { &SHARES[..1] };
-        let label = match is_coordinate {
-            true => format!("displacement, {}", self.walls.gap()),
-            false => format!("gap, {} = {}", self.walls.gap(), self.gap_expression()),
-        };
-        let label = with_unit(&label, self.units.gap.as_deref());
-        let axes = [self.gap_axis(&label), self.depth_axis()];
+        let axes = [self.gap_axis(&self.gap_label()), self.depth_axis()];
         let panels = stacked(canvas, top, HEIGHT, shares).into_iter().zip(axes).collect();
         let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, self.wall_names(canvas));
         let frame = &frames[0];
-        self.draw_walls(canvas, frame);
-        let at = |t: f64, state: &State| (t, self.gap(state));
-        self.draw_lines(canvas, frame, (DARK, MESHING), at);
-        self.draw_markers(canvas, frame, false, at);
+        self.draw_gap_panel(canvas, frame);
         self.draw_symbols(canvas, frame);
         frame.draw_axes(canvas, frames.len() == 1);
         if let Some(frame) = frames.get(1) {
             self.draw_penetration(canvas, frame);
         }
+    }
+
+    /// Draws the gap and the displacements of a motion from the start, one below the other.
+    pub(crate) fn draw_history(&self, canvas: &Canvas) {
+        let legend = self.legend(self.motion_entries("free motion"), false);
+        let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
+        let displacements = self.other_displacements();
+        let label = |index: &usize| format!("displacement, {}", self.names[*index]);
+        let others = displacements.iter().map(|index| self.state_axis(&label(index), &[*index], 1.0));
+        let axes: Vec<Axis> = [self.gap_axis(&self.gap_label())].into_iter().chain(others).collect();
+        let height = HISTORY_HEIGHT[0] + HISTORY_HEIGHT[1] * displacements.len() as f64;
+        let panels = stacked(canvas, top, height, &vec![1.0; axes.len()]).into_iter().zip(axes).collect();
+        let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, self.wall_names(canvas));
+        self.draw_gap_panel(canvas, &frames[0]);
+        for (frame, &index) in frames[1..].iter().zip(&displacements) {
+            frame.draw_grid(canvas);
+            self.draw_motion(canvas, frame, |t, state| (t, state[index]));
+        }
+        for (n, frame) in frames.iter().enumerate() {
+            frame.draw_axes(canvas, n + 1 == frames.len());
+        }
+    }
+
+    /// Returns the indices of the displacements in the state, without the one that is the gap.
+    fn other_displacements(&self) -> Vec<usize> {
+        (0..self.names.len()).step_by(2).filter(|index| self.gap_coordinate() != Some(*index)).collect()
+    }
+
+    /// Returns the index in the state of the displacement that is the gap.
+    fn gap_coordinate(&self) -> Option<usize> {
+        self.names.iter().position(|name| name == self.walls.gap())
+    }
+
+    fn gap_label(&self) -> String {
+        let label = match self.gap_coordinate() {
+            Some(_) => format!("displacement, {}", self.walls.gap()),
+            None => format!("gap, {} = {}", self.walls.gap(), self.gap_expression()),
+        };
+        with_unit(&label, self.units.gap.as_deref())
+    }
+
+    /// Draws the gap between its walls.
+    fn draw_gap_panel(&self, canvas: &Canvas, frame: &Frame) {
+        self.draw_walls(canvas, frame);
+        self.draw_motion(canvas, frame, |t, state| (t, self.gap(state)));
+    }
+
+    fn draw_motion(&self, canvas: &Canvas, frame: &Frame, at: impl Fn(f64, &State) -> Point + Copy) {
+        self.draw_lines(canvas, frame, (DARK, MESHING), at);
+        self.draw_markers(canvas, frame, false, at);
     }
 
     /// Returns the room for the walls' names right of the panels, beyond half a label.

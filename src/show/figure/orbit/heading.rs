@@ -2,8 +2,8 @@
 
 use crate::show::caption;
 use crate::show::orbit_summary::has_mirror_images;
-use crate::show::symbols::superscript;
-use rattlemap_dynamics::model::Model;
+use crate::show::symbols::{number, superscript, symbol};
+use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{Class, Orbit};
 
 /// Largest number of symbols of a word in a heading.
@@ -30,6 +30,14 @@ pub(crate) fn character(model: &dyn Model, orbit: &Orbit) -> String {
         parts.push(format!("\u{3bb} = {:.4}{error}", orbit.lyapunov).replace('-', "\u{2212}"));
     }
     parts.join("  \u{b7}  ")
+}
+
+/// Returns the subtitle of a motion from the start: its first state.
+pub(crate) fn from_start(model: &dyn Model, start: &State) -> String {
+    let components = model.state_names().into_iter().zip(start);
+    let values: Vec<String> =
+        components.map(|(name, value)| format!("{} = {}", symbol(name), number(*value))).collect();
+    format!("motion from {}", values.join(", "))
 }
 
 fn flights(orbit: &Orbit) -> String {

@@ -3,34 +3,34 @@
 use std::collections::BTreeSet;
 
 use rattlemap_dynamics::model::{Side, State};
-use rattlemap_dynamics::orbit::{Event, EventKind, Orbit, Sample};
+use rattlemap_dynamics::orbit::{Event, EventKind, Sample, is_reached};
 
 /// The motion between two events.
 pub(crate) struct Piece {
     /// Wall that the teeth mesh on; none in free motion.
     pub(crate) meshing: Option<Side>,
-    /// Times in forcing periods and states in order, at least one.
+    /// Times and states in order, at least one.
     pub(crate) points: Vec<(f64, State)>,
 }
 
 impl Piece {
-    /// Returns start and end in forcing periods.
+    /// Returns the times of start and end.
     pub(crate) fn span(&self) -> (f64, f64) {
         (self.points[0].0, self.points[self.points.len() - 1].0)
     }
 }
 
-/// The motion of an orbit.
+/// The motion of an orbit. Its times are in forcing periods, or in the model's unit for a motion from the start.
 pub(crate) struct Motion {
     pub(crate) pieces: Vec<Piece>,
-    /// Events within the trace, with their times in forcing periods.
+    /// Events within the trace, with their times.
     pub(crate) events: Vec<(f64, Event)>,
 }
 
 impl Motion {
-    /// Merges trace and events. States that are not finite are skipped.
-    pub(crate) fn new(orbit: &Orbit, trace: &[Sample]) -> Motion {
-        let period = if orbit.forcing_period > 0.0 { orbit.forcing_period } else { 1.0 };
+    /// Merges trace and events, and divides times by `unit`. States that are not finite are skipped.
+    pub(crate) fn new(events: &[Event], trace: &[Sample], unit: f64) -> Motion {
+        let unit = if unit > 0.0 { unit } else { 1.0 };
         let finite = |t: f64, state: &State| t.is_finite() && state.iter().all(|v| v.is_finite());
         // The events of a chaotic orbit may continue after the trace. Those up to one sample after its end belong to it.
         let end = match trace {
@@ -39,16 +39,14 @@ impl Motion {
             [.., previous, last] => last.t + (last.t - previous.t),
         };
         let on_trace = |e: &&Event| e.t <= end && finite(e.t, &e.before) && finite(e.t, &e.after);
-        let events: Vec<(f64, Event)> =
-            orbit.events.iter().filter(on_trace).map(|e| (e.t / period, *e)).collect();
+        let events: Vec<(f64, Event)> = events.iter().filter(on_trace).map(|e| (e.t / unit, *e)).collect();
         let mut pieces = Pieces::starting_in(trace.first().and_then(|s| s.meshing));
         let mut next = events.iter().peekable();
         for sample in trace.iter().filter(|s| finite(s.t, &s.state)) {
-            let t = sample.t / period;
-            while let Some((at, event)) = next.next_if(|(at, _)| *at <= t) {
+            while let Some((at, event)) = next.next_if(|(_, event)| is_reached(event.t, sample.t)) {
                 pieces.cross(*at, event);
             }
-            pieces.push(t, sample);
+            pieces.push(sample.t / unit, sample);
         }
         next.for_each(|(at, event)| pieces.cross(*at, event));
         Motion { pieces: pieces.finished(), events }
@@ -71,7 +69,7 @@ impl Motion {
         self.events.iter().map(|(_, e)| e.side).chain(meshing).collect()
     }
 
-    /// Returns all states with their times in forcing periods.
+    /// Returns all states with their times.
     pub(crate) fn points(&self) -> impl Iterator<Item = (f64, &State)> {
         self.pieces.iter().flat_map(|piece| piece.points.iter().map(|(t, state)| (*t, state)))
     }
@@ -118,14 +116,6 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::model::{GearPair, REST};
-    use rattlemap_dynamics::orbit::{Settings, analyse};
-
-    fn orbit(events: Vec<Event>) -> Orbit {
-        let orbit = analyse(&GearPair::paper(0.605), REST, &Settings::default()).unwrap();
-        Orbit { events, strobe_meshing: None, forcing_period: 2.0, ..orbit }
-    }
-
     fn event(kind: EventKind, t: f64) -> Event {
         let (before, after) = ([0.5, 1.0, 0.0, 0.0], [0.5, 0.2, 0.0, 0.8]);
         Event { kind, side: Side::Right, t, t_mod_period: t % 2.0, before, after }
@@ -150,7 +140,7 @@ mod tests {
             sample(1.5, meshing),
             sample(2.0, None),
         ];
-        let motion = Motion::new(&orbit(events), &trace);
+        let motion = Motion::new(&events, &trace, 2.0);
         let modes: Vec<_> = motion.pieces.iter().map(|p| p.meshing).collect();
         assert_eq!(modes, [None, None, meshing, None]);
         assert_eq!(motion.pieces[0].points.last().unwrap().1, [0.5, 1.0, 0.0, 0.0]);
@@ -162,14 +152,14 @@ mod tests {
 
     #[test]
     fn incomplete_data_are_accepted() {
-        assert!(Motion::new(&orbit(vec![]), &[]).pieces.is_empty());
+        assert!(Motion::new(&[], &[], 2.0).pieces.is_empty());
         let late =
-            Motion::new(&orbit(vec![event(EventKind::Impact, 9.0)]), &[sample(0.0, None), sample(1.0, None)]);
+            Motion::new(&[event(EventKind::Impact, 9.0)], &[sample(0.0, None), sample(1.0, None)], 2.0);
         assert!(late.events.is_empty());
         let without_event = [sample(0.0, None), sample(1.0, Some(Side::Left)), sample(2.0, None)];
-        assert_eq!(Motion::new(&orbit(vec![]), &without_event).pieces.len(), 3);
+        assert_eq!(Motion::new(&[], &without_event, 2.0).pieces.len(), 3);
         let mut broken = sample(1.0, None);
         broken.state[2] = f64::NAN;
-        assert_eq!(Motion::new(&orbit(vec![]), &[sample(0.0, None), broken]).points().count(), 1);
+        assert_eq!(Motion::new(&[], &[sample(0.0, None), broken], 2.0).points().count(), 1);
     }
 }

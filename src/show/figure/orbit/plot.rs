@@ -11,7 +11,7 @@ use crate::show::names;
 use crate::show::symbols::{symbol, with_unit};
 use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::{Contact, Model, ModelError, Oscillator, Side, State, Units};
-use rattlemap_dynamics::orbit::{Class, EventKind, Orbit, Sample};
+use rattlemap_dynamics::orbit::{Class, EventKind, History, Orbit, Sample};
 
 /// Default width of all figures of an orbit, and least distance of panels from the left edge.
 pub(crate) const ORBIT_WIDTH: f64 = 1600.0;
@@ -29,6 +29,8 @@ pub struct OrbitPlot<'a> {
     pub(crate) oscillator: Oscillator,
     pub(crate) walls: WallLabels,
     pub(crate) motion: Motion,
+    /// Label of the axis of time.
+    time: &'static str,
     /// Length of the cycle in forcing periods; none if the motion is not periodic.
     pub(crate) cycle: Option<f64>,
     pub(crate) title: String,
@@ -45,16 +47,38 @@ impl<'a> OrbitPlot<'a> {
     /// # Errors
     /// [`ModelError`] if the model is not valid.
     pub fn new(model: &'a dyn Model, orbit: &Orbit, trace: &[Sample]) -> Result<OrbitPlot<'a>, ModelError> {
+        let cycle = matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods));
+        let motion = Motion::new(&orbit.events, trace, orbit.forcing_period);
+        let plot = OrbitPlot::of(model, motion, heading::character(model, orbit))?;
+        Ok(OrbitPlot { cycle, ..plot })
+    }
+
+    /// Prepares the figure of a motion from `start`. Its times are not divided by the forcing period.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the model is not valid.
+    pub fn of_history(
+        model: &'a dyn Model,
+        start: &State,
+        history: &History,
+    ) -> Result<OrbitPlot<'a>, ModelError> {
+        let motion = Motion::new(&history.events, &history.samples, 1.0);
+        let plot = OrbitPlot::of(model, motion, heading::from_start(model, start))?;
+        Ok(OrbitPlot { time: "time, t", ..plot })
+    }
+
+    fn of(model: &'a dyn Model, motion: Motion, subtitle: String) -> Result<OrbitPlot<'a>, ModelError> {
         Ok(OrbitPlot {
             names: model.state_names().into_iter().map(symbol).collect(),
             units: model.units(),
             bodies: model.bodies(),
             oscillator: model.oscillator()?,
             walls: WallLabels::of(model),
-            motion: Motion::new(orbit, trace),
-            cycle: matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods)),
+            motion,
+            time: "time in forcing periods, t / T",
+            cycle: None,
             title: heading::parameters(model),
-            subtitle: heading::character(model, orbit),
+            subtitle,
         })
     }
 
@@ -180,9 +204,11 @@ impl<'a> OrbitPlot<'a> {
 
     /// Returns the axis of time.
     pub(crate) fn time_axis(&self) -> Axis {
-        let (first, last) = self.motion.points().fold((0f64, 0f64), |(a, b), (t, _)| (a.min(t), b.max(t)));
+        let mut times = self.motion.points().map(|(t, _)| t);
+        let first = times.next().unwrap_or(0.0);
+        let last = times.fold(first, f64::max);
         let end = if last > first { last } else { first + 1.0 };
-        Axis::exact("time in forcing periods, t / T", first, end)
+        Axis::exact(self.time, first, end)
     }
 
     /// Returns an axis for components of the state, with their unit if they have the same one. `scale` is their scale

@@ -1,0 +1,156 @@
+//! `orbit --from-start`, and states at the exact time of an event.
+
+use std::fs;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::common::{empty, json, names, rattlemap, rows, run, says};
+
+const GRAVITY: f64 = 9.81;
+const RESTITUTION: f64 = 0.7;
+
+/// Returns a folder with the model `ball.toml` of a ball above a floor.
+fn ball() -> TempDir {
+    let folder = empty();
+    let text = "name = 'ball'\n[parameters]\ng = 9.81\ne = 0.7\n[motion]\ncoordinates = ['h']\nmass = [[1]]\n\
+        load = ['-g']\nfrequency = 1.0\ngap = [1]\n[[contact]]\nside = 'left'\nat = 0\nlaw = 'impact'\n\
+        restitution = 'e'\n";
+    fs::write(folder.path().join("ball.toml"), text).unwrap();
+    folder
+}
+
+/// Returns time and approach speed of the impacts of a ball that falls from the height `h`.
+fn impacts(h: f64) -> impl Iterator<Item = [f64; 2]> {
+    let first = [(2.0 * h / GRAVITY).sqrt(), (2.0 * GRAVITY * h).sqrt()];
+    std::iter::successors(Some(first), |[t, w]| Some([t + 2.0 * RESTITUTION * w / GRAVITY, RESTITUTION * w]))
+}
+
+/// Returns height and speed of this ball at a time.
+fn exact(h: f64, time: f64) -> [f64; 2] {
+    let Some([t, w]) = impacts(h).take(80).take_while(|[t, _]| *t <= time).last() else {
+        return [h - 0.5 * GRAVITY * time * time, -GRAVITY * time];
+    };
+    let (s, leaving) = (time - t, RESTITUTION * w);
+    if w < 1e-9 { [0.0; 2] } else { [leaving * s - 0.5 * GRAVITY * s * s, leaving - GRAVITY * s] }
+}
+
+fn numbers(row: &[String]) -> Vec<f64> {
+    row.iter().filter_map(|text| text.parse().ok()).collect()
+}
+
+fn state(folder: &TempDir, line: &str) -> Vec<f64> {
+    let run = run(folder, &format!("orbit --model ball.toml --from-start 1 --json {line}")).success();
+    let object: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    object["state"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn a_ball_is_followed_from_its_start_to_rest() {
+    let folder = ball();
+    let line = "orbit --model ball.toml --start 1,0 --from-start 1 --format png,svg --out o";
+    run(&folder, line)
+        .success()
+        .stdout(says(&["start                 h=1.0", "end                   h=0.0"]));
+    let out = folder.path().join("o");
+    let files = ["events.csv", "history.png", "history.svg", "manifest.json", "trajectory.csv"];
+    assert_eq!(names(&out), files);
+    let manifest = json(&out.join("manifest.json"));
+    assert_eq!((&manifest["from_start"], &manifest["to_period"]), (&1.into(), &1.into()));
+
+    let (header, events) = rows(&out.join("events.csv"));
+    assert!(header.starts_with("kind,side,t,t_mod_period,before_h,before_"), "{header}");
+    for (event, [t, w]) in events.iter().zip(impacts(1.0)).take(20) {
+        let [side, at, _, _, before, _, after] = numbers(event)[..] else { panic!("{event:?}") };
+        assert_eq!((&*event[0], side), ("impact", -1.0));
+        assert!((at - t).abs() < 1e-13, "{event:?}: {t}");
+        assert!((before + w).abs() < 1e-12 && (after - RESTITUTION * w).abs() < 1e-12, "{event:?}: {w}");
+    }
+    let last = events.last().unwrap();
+    assert_eq!(&*last[0], "mesh_start");
+    assert!((numbers(last)[1] - (2.0 / GRAVITY).sqrt() * 1.7 / 0.3).abs() < 1e-9, "{last:?}");
+
+    let moments = rows(&out.join("trajectory.csv")).1;
+    assert_eq!(moments.iter().filter(|row| row[9] == "after").count(), events.len());
+    assert_eq!(moments.len(), 2001 + 2 * events.len());
+    for pair in moments.windows(2) {
+        let [earlier, later] = [0, 1].map(|i| numbers(&pair[i])[0]);
+        assert!(earlier < later || pair[0][9] == "before" && pair[1][9] == "after", "{pair:?}");
+    }
+    for row in moments.iter().filter(|row| row[9].is_empty()) {
+        let [t, _, z, w, h, v, ..] = numbers(row)[..] else { panic!("{row:?}") };
+        let [height, speed] = exact(1.0, t);
+        assert!((h - height).abs() < 1e-9 && (v - speed).abs() < 1e-6, "{row:?}: {height} {speed}");
+        assert_eq!([z, w], [h, v]);
+    }
+    // A later run without the option leaves no file of this one.
+    run(&folder, "orbit --model ball.toml --start 1,0 --periods 4 --out o --force").success();
+    assert!(!names(&out).iter().any(|name| name == "events.csv" || name.starts_with("history")));
+}
+
+#[test]
+fn states_of_a_ball_at_rest_and_before_it_are_exact() {
+    let folder = ball();
+    for (start, time) in [(1.0, 0.3), (1.0, 1.0), (1.0, 3.0), (10.0, 8.05), (10.0, 9.0), (10.0, 60.0)] {
+        let found = state(&folder, &format!("--start {start},0 --time {time}"));
+        let [height, speed] = exact(start, time);
+        assert!(
+            (found[0] - height).abs() < 1e-10 && (found[1] - speed).abs() < 1e-10,
+            "{start} {time}: {found:?}"
+        );
+    }
+}
+
+/// A ball falls from the height 9 for 3 and returns every 6, because gravity is 2 and no energy is lost.
+#[test]
+fn the_state_at_the_time_of_an_impact_is_the_one_after_it() {
+    let folder = ball();
+    for time in [3.0, 9.0, 15.0, 21.0, 603.0] {
+        let [h, v] = state(&folder, &format!("--set g=2 --set e=1 --start 9,0 --time {time}"))[..] else {
+            panic!("two components")
+        };
+        assert!(h.abs() < 1e-10 && (v - 6.0).abs() < 1e-10, "t = {time}: {h} {v}");
+    }
+}
+
+#[test]
+fn a_window_of_later_periods_is_a_part_of_the_whole() {
+    let folder = empty();
+    let orbit = |arguments: &str| -> Value {
+        let line = format!("orbit --set e=0.06 --start 0.1,0,-0.2,1.5 --json {arguments}");
+        serde_json::from_slice(&run(&folder, &line).success().get_output().stdout).unwrap()
+    };
+    let (whole, last) =
+        (orbit("--from-start 12 --out whole"), orbit("--from-start 4 --to-period 12 --out last"));
+    let [all, some] = [&whole, &last].map(|object| object["events"].as_array().unwrap());
+    assert!(some.len() >= 8 && all.ends_with(some), "{some:?}");
+    assert_eq!((&last["first_period"], &last["last_period"]), (&9.into(), &12.into()));
+    assert_eq!(whole["start"], serde_json::json!([0.1, 0.0, -0.2, 1.5]));
+    let table = rows(&folder.path().join("last/events.csv")).1;
+    assert_eq!(table.len(), some.len());
+    for (row, event) in table.iter().zip(some) {
+        assert_eq!(
+            (&*row[0], numbers(row)[1]),
+            (event["kind"].as_str().unwrap(), event["t"].as_f64().unwrap())
+        );
+    }
+    let moments = rows(&folder.path().join("last/trajectory.csv")).1;
+    let period = whole["forcing_period"].as_f64().unwrap();
+    let ends = [&moments[0], moments.last().unwrap()].map(|row| numbers(row)[0] / period);
+    assert!((ends[0] - 8.0).abs() < 1e-12 && (ends[1] - 12.0).abs() < 1e-12, "{ends:?}");
+}
+
+#[test]
+fn impossible_windows_are_refused() {
+    let cases: [(&[&str], &str); 5] = [
+        (&["--from-start", "0"], "1..=10000"),
+        (&["--to-period", "3"], "--from-start <N>"),
+        (&["--from-start", "5", "--to-period", "3"], "--to-period 3: 5 periods end at period 5 or later"),
+        (&["--from-start", "5", "--periods", "3"], "cannot be used with"),
+        (&["--from-start", "5", "--transient", "3"], "cannot be used with"),
+    ];
+    for (arguments, part) in cases {
+        let run = rattlemap(&empty()).arg("orbit").args(arguments).assert();
+        run.code(2).stdout("").stderr(says(&[part]));
+    }
+}
