@@ -156,7 +156,10 @@ fn read_units(section: &Section<'_>, gap: &[Expression]) -> Result<Units, SceneE
 }
 
 fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {
-    let field = section.require("frequency", "name it, such as frequency = \"omega\"")?;
+    let field = section.require(
+        "frequency",
+        "name it, such as frequency = \"omega\"; without a force any value works, such as 1",
+    )?;
     match field.node.value {
         Value::List(_) => Err(field.wrong_type(
             "one entry: the force is one harmonic, force cos(frequency t) + force_sin sin(frequency t)",

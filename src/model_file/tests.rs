@@ -192,6 +192,7 @@ F = 1.5 | x = 1.5\nF = 1.5 | `x` is already the name of
 "stop" | "a b" | m.toml:1:8: `name = "a b"` is out of range
 name = "stop" | | m.toml:1:1: `name` is missing
 [motion] | [movement] | unknown field `movement = { ... }`; valid names: name, title
+frequency = "omega"\n | | `motion.frequency` is missing; name it, such as frequency = "omega"; without a force any value works
 mass = [["1"]]\n | | m.toml:13:2: `motion.mass` is missing
 "#,
     );

@@ -55,7 +55,8 @@ fn every_model_has_a_line_and_a_page() {
         for parameter in model.parameters() {
             let default = parameter.default.map_or("-".to_owned(), |value| value.to_string());
             let (range, meaning) = (parameter.range.requirement(), &parameter.meaning);
-            let line = format!("{} {default} {range} {meaning}", parameter.name);
+            let unit = parameter.unit.as_deref().unwrap_or_default();
+            let line = format!("{} {default} {unit} {range} {meaning}", parameter.name);
             has(&line.split_whitespace().collect::<Vec<_>>());
         }
         Status::ALL.into_iter().for_each(|status| has(&[status.name()]));

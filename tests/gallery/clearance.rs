@@ -231,22 +231,21 @@ fn closing(oscillator: &Oscillator, y: &Vector4<f64>) -> f64 {
 pub(crate) fn clearances() -> Vec<(String, (Oscillator, Law))> {
     let two_masses = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.5, 1.8]
         .map(|omega| (format!("two masses, omega = {omega}"), pair(omega)));
-    let dampers = [(9.8, 0.055), (10.0, 0.05), (10.2, 0.045), (10.5, 0.05)].map(|(hertz, clearance)| {
+    let dampers = [(10.0, 0.05), (10.2, 0.045), (10.5, 0.05)].map(|(hertz, clearance)| {
         let damper = Damper { omega: 2.0 * PI * hertz, clearance, ..DAMPER };
         (format!("impact damper, {hertz} Hz, {clearance} m"), damper.pair())
     });
-    let sinks = [(1.005, 0.2), (1.01, 0.18), (1.04, 0.14)].map(|(omega, clearance)| {
-        (format!("energy sink, omega = {omega}, {clearance}"), Damper { omega, clearance, ..SINK }.pair())
-    });
+    let sink = Damper { omega: 1.01, clearance: 0.18, ..SINK }.pair();
     let containers = [(1.7, 0.5), (1.8, 0.5), (2.0, 0.6), (4.0, 0.8)]
         .map(|(d, e)| (format!("container, d = {d}, e = {e}"), container(d, e)));
-    [two_masses.to_vec(), dampers.to_vec(), sinks.to_vec(), containers.to_vec()].concat()
+    [two_masses.to_vec(), dampers.to_vec(), vec![("energy sink, omega = 1.01".to_owned(), sink)], containers.to_vec()].concat()
 }
 
 #[test]
 fn symmetric_orbits_agree_with_the_closed_form() {
     let mut stable: BTreeMap<String, usize> = BTreeMap::new();
-    for (what, (oscillator, law)) in clearances() {
+    let default = ("energy sink, as in the gallery".to_owned(), SINK.pair());
+    for (what, (oscillator, law)) in clearances().into_iter().chain([default]) {
         for orbit in symmetric(&(oscillator, law)).iter().filter(|orbit| orbit.is_free_between) {
             let found = followed(&oscillator, law, orbit.strobe, 1);
             assert_eq!(found.events.len(), 2);
