@@ -185,11 +185,11 @@ pub fn write_history(
     elapsed: Duration,
     (formats, style): (&[Format], &FigureStyle),
 ) -> Result<Vec<&'static str>, OutputError> {
-    let (clock, states) = (Clock::now(), model.state_names());
+    let clock = Clock::now();
     inventory::clear_for(folder, names())?;
     let moments = orbit_tables::moments(&model.oscillator()?, history);
     folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, model, &moments))?;
-    folder.replace(EVENTS, |out| orbit_tables::write_events(out, &states, &history.events))?;
+    folder.replace(EVENTS, |out| orbit_tables::write_events(out, model, &history.events))?;
     let mut files = vec![TRAJECTORY, EVENTS];
     let plot = OrbitPlot::of_history(model, &request.start, history)?;
     for (format, name) in HISTORY_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {

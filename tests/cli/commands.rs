@@ -10,7 +10,7 @@ const SMOKE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/smoke.toml");
 /// Asserts that a parsed `orbit --json` object has exactly the fields of the contract.
 fn assert_orbit_fields(orbit: &serde_json::Value) {
     let fields = "class e events floquet impacts_per_period lyapunov lyapunov_error mesh_fraction omega \
-                  parameters pattern period periods_run quantities status strobe symmetric word";
+                  parameters pattern period periods_run quantities start_phase status strobe symmetric word";
     assert_eq!(keys(orbit), fields);
     for event in orbit["events"].as_array().expect("events is a list") {
         assert_eq!(keys(event), "after before impulse kind side t t_mod_period");

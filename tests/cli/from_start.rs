@@ -61,10 +61,11 @@ fn a_ball_is_followed_from_its_start_to_rest() {
     let (header, events) = rows(&out.join("events.csv"));
     assert!(header.starts_with("kind,side,t,t_mod_period,before_h,before_"), "{header}");
     for (event, [t, w]) in events.iter().zip(impacts(1.0)).take(20) {
-        let [side, at, _, _, before, _, after] = numbers(event)[..] else { panic!("{event:?}") };
+        let [side, at, _, _, before, _, after, impulse] = numbers(event)[..] else { panic!("{event:?}") };
         assert_eq!((&*event[0], side), ("impact", -1.0));
         assert!((at - t).abs() < 1e-13, "{event:?}: {t}");
         assert!((before + w).abs() < 1e-12 && (after - RESTITUTION * w).abs() < 1e-12, "{event:?}: {w}");
+        assert!((impulse.abs() - 1.7 * w).abs() < 1e-12, "{event:?}: {w}");
     }
     let last = events.last().unwrap();
     assert_eq!(&*last[0], "mesh_start");

@@ -5,6 +5,7 @@ use std::io::Write;
 use crate::model_file::gap_names;
 use crate::show::error::WriteError;
 use crate::show::names;
+use crate::show::orbit_quantities;
 use crate::show::orbit_spectrum::{Spectrum, gap};
 use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Event, EventKind, History, is_reached};
@@ -55,16 +56,19 @@ pub fn moments(oscillator: &Oscillator, history: &History) -> Vec<Moment> {
 }
 
 /// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`.
-pub fn write_events(out: impl Write, state_names: &[&str], events: &[Event]) -> Result<(), WriteError> {
+pub fn write_events(out: impl Write, model: &dyn Model, events: &[Event]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
+    let names = model.state_names();
     let states = ["before", "after"].into_iter();
-    let states = states.flat_map(|moment| state_names.iter().map(move |name| format!("{moment}_{name}")));
-    table.write_record(["kind", "side", "t", "t_mod_period"].map(str::to_owned).into_iter().chain(states))?;
-    for event in events {
+    let states = states.flat_map(|moment| names.iter().map(move |name| format!("{moment}_{name}")));
+    let head = ["kind", "side", "t", "t_mod_period"].map(str::to_owned).into_iter().chain(states);
+    table.write_record(head.chain(["impulse".to_owned()]))?;
+    for (event, impulse) in events.iter().zip(orbit_quantities::impulses(model, events)) {
         let texts = [names::kind(event.kind).to_owned(), names::side_code(event.side).to_string()];
-        let states = [&event.before, &event.after].into_iter().flat_map(|state| &state[..state_names.len()]);
+        let states = [&event.before, &event.after].into_iter().flat_map(|state| &state[..names.len()]);
         let numbers = [event.t, event.t_mod_period].into_iter().chain(states.copied());
-        table.write_record(texts.into_iter().chain(numbers.map(|x| format!("{x:?}"))))?;
+        let texts = texts.into_iter().chain(numbers.map(|x| format!("{x:?}")));
+        table.write_record(texts.chain([impulse.map_or(String::new(), |x| format!("{x:?}"))]))?;
     }
     Ok(table.flush()?)
 }

@@ -30,7 +30,7 @@ pub struct OrbitPlot<'a> {
     pub(crate) walls: WallLabels,
     pub(crate) motion: Motion,
     /// Label of the axis of time.
-    time: &'static str,
+    time: String,
     /// Length of the cycle in forcing periods; none if the motion is not periodic.
     pub(crate) cycle: Option<f64>,
     pub(crate) title: String,
@@ -64,7 +64,7 @@ impl<'a> OrbitPlot<'a> {
     ) -> Result<OrbitPlot<'a>, ModelError> {
         let motion = Motion::new(&history.events, &history.samples, 1.0);
         let plot = OrbitPlot::of(model, motion, heading::from_start(model, start))?;
-        Ok(OrbitPlot { time: "time, t", ..plot })
+        Ok(OrbitPlot { time: with_unit("time, t", plot.units.time.as_deref()), ..plot })
     }
 
     fn of(model: &'a dyn Model, motion: Motion, subtitle: String) -> Result<OrbitPlot<'a>, ModelError> {
@@ -75,7 +75,7 @@ impl<'a> OrbitPlot<'a> {
             oscillator: model.oscillator()?,
             walls: WallLabels::of(model),
             motion,
-            time: "time in forcing periods, t / T",
+            time: "time in forcing periods, t / T".to_owned(),
             cycle: None,
             title: heading::parameters(model),
             subtitle,
@@ -208,7 +208,7 @@ impl<'a> OrbitPlot<'a> {
         let first = times.next().unwrap_or(0.0);
         let last = times.fold(first, f64::max);
         let end = if last > first { last } else { first + 1.0 };
-        Axis::exact(self.time, first, end)
+        Axis::exact(&self.time, first, end)
     }
 
     /// Returns an axis for components of the state, with their unit if they have the same one. `scale` is their scale
