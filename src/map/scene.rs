@@ -438,10 +438,16 @@ fn refuse_model(document: &Node) -> Result<(), SceneError> {
     })
 }
 
-/// Writes the tree of a scene as TOML without its axes.
+/// Writes the tree of a scene as TOML without its axes and its list of files, which a later command may extend.
 fn settings_of(document: &Node, model: &dyn Model) -> String {
     let Some(toml::Value::Table(mut fields)) = document.to_toml() else { return String::new() };
     fields.remove("axis");
+    if let Some(toml::Value::Table(outputs)) = fields.get_mut("outputs") {
+        outputs.remove("files");
+        if outputs.is_empty() {
+            fields.remove("outputs");
+        }
+    }
     if model.downcast_ref().is_some_and(|file: &FileModel| !file.is_built_in()) {
         fields.insert("model".to_owned(), MODEL_FILE.into());
     }
