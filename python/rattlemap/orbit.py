@@ -28,7 +28,7 @@ class Orbit:
     the units of the model, :attr:`units`.
     """
 
-    def __init__(self, model: Model, transient: int, periods: int, start: list[float] | None) -> None:
+    def __init__(self, model: Model, transient: int, periods: int | None, start: list[float] | None) -> None:
         self._arguments = (model, transient, periods, start)
         with interruptible(None, resumable=False):
             self._native = _native.orbit(model._model, transient, periods, start)
@@ -36,7 +36,7 @@ class Orbit:
         self.model = model
         """The model with the values of this orbit."""
 
-    def __reduce__(self) -> tuple[type[Orbit], tuple[Model, int, int, list[float] | None]]:
+    def __reduce__(self) -> tuple[type[Orbit], tuple[Model, int, int | None, list[float] | None]]:
         """Return the arguments, from which another process computes the same orbit in milliseconds, to the bit."""
         return Orbit, self._arguments
 
@@ -256,7 +256,7 @@ def orbit(
     model: Model,
     *,
     parameters: scenes.Parameters | None = None,
-    periods: int = 128,
+    periods: int | None = None,
     transient: int = 400,
     start: Sequence[float] | Mapping[str, float] | None = None,
     phase: float | None = None,
@@ -271,8 +271,9 @@ def orbit(
     parameters
         Values by name, for parameters whose names are keywords of this function.
     periods
-        Forcing periods of the first analysis, 2 to 10,000,000. While the motion is undecided, the analysis is repeated with
-        twice as many, up to 32,768 or this number. Cycles of up to half this number, at most 64, are found.
+        Forcing periods to analyse after the transient, 2 to 10,000,000. If the class is not decided then, the motion is
+        undecided. By default 128; while the motion is undecided, the analysis is repeated with twice as many, up to 32,768.
+        Cycles of up to half this number, at most 64, are found.
     transient
         Forcing periods before the first analysis, 1 to 1,000,000,000.
     start
@@ -302,14 +303,15 @@ def orbit(
     >>> bool((abs(o.multipliers) < 1).all())
     True
     """
-    _check_whole("periods", periods, _PERIODS)
+    if periods is not None:
+        _check_whole("periods", periods, _PERIODS)
     _check_whole("transient", transient, _TRANSIENT)
     changes = scenes.all_names(names, None, parameters)
     if phase is not None:
         changes["start.phase"] = phase
     model = require_model(model).replace(**changes)
     state = None if start is None else _state(model, start)
-    return Orbit(model, int(transient), int(periods), state)
+    return Orbit(model, int(transient), None if periods is None else int(periods), state)
 
 
 def _state(model: Model, start: Sequence[float] | Mapping[str, float]) -> list[float]:

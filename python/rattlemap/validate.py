@@ -52,7 +52,7 @@ class Validation:
     @property
     def verdict(self) -> str:
         """Conclusion of the validation: whether the map stands, and the rate of wrong cells."""
-        return self.data["verdict"]
+        return str(self.data["verdict"])
 
 
 def validate(

@@ -66,14 +66,15 @@ impl Orbit {
     }
 }
 
-/// Computes the orbit of a model from a state at phase 0, by default from rest.
+/// Computes the orbit of a model from a state at phase 0, by default from rest. `periods` limits the analysis, as `--periods` of
+/// the program does.
 #[pyfunction]
-#[pyo3(signature = (model, transient, periods, start=None))]
+#[pyo3(signature = (model, transient, periods=None, start=None))]
 pub(crate) fn orbit(
     py: Python<'_>,
     model: &Model,
     transient: u32,
-    periods: u32,
+    periods: Option<u32>,
     start: Option<Vec<f64>>,
 ) -> PyResult<Orbit> {
     let model = Arc::new(model.model.clone());
@@ -82,14 +83,14 @@ pub(crate) fn orbit(
         job::model_choice::check_components(&*model, start.len()).map_err(Problem::from)?;
         state[..start.len()].copy_from_slice(&start);
     }
-    let settings = Settings {
-        transient_periods: transient,
-        observed_periods: periods,
-        max_period: Settings::default().max_period.min(periods / 2),
-    };
+    let Settings { observed_periods, max_period, .. } = Settings::default();
+    let observed_periods = periods.unwrap_or(observed_periods);
+    let max_period = max_period.min(observed_periods / 2);
+    let settings = Settings { transient_periods: transient, observed_periods, max_period };
+    let longest = periods.unwrap_or(analysis::LONGEST_WINDOW);
     let own = Arc::clone(&model);
     let orbit = worker::run(py, None, move |watch| {
-        let [longest, shown] = [analysis::LONGEST_WINDOW, analysis::EVENT_PERIODS];
+        let shown = analysis::EVENT_PERIODS;
         Ok(analysis::analyse_until(&*own, state, &settings, longest, shown, watch.halt())?)
     })?;
     Ok(Orbit { model, orbit: Arc::new(orbit), start: state })

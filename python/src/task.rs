@@ -64,10 +64,10 @@ impl Out {
     /// Opens the folder. Waits while an abandoned computation of this process may still use it.
     pub(crate) fn open(&self, watch: &Watch) -> Result<Folder, Problem> {
         loop {
+            // Read first: the abandoned computation may end between a failed attempt and its evaluation.
+            let may_wait = worker::has_abandoned_work();
             match open_folder(&self.path, self.force, self.resume) {
-                Err(RunRecordsError::Folder(FolderError::InUse { .. }))
-                    if worker::has_abandoned_work() && !watch.is_halted() =>
-                {
+                Err(RunRecordsError::Folder(FolderError::InUse { .. })) if may_wait && !watch.is_halted() => {
                     thread::sleep(worker::TICK);
                 }
                 opened => return Ok(opened?),

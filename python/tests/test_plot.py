@@ -56,7 +56,7 @@ def test_periods_and_classes_of_a_map(ds: xr.Dataset, axes: Axes) -> None:
         cell = ds.isel(omega=place[0], e=place[1])
         name = f"period {cell['period'].item()}" if cell["class"] == "periodic" else cell["class"].item()
         assert cell_color(axes, place) == lines[name][1], place
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("e", "omega")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("coefficient of restitution", "excitation frequency")
 
 
 def test_the_most_frequent_words_have_names(ds: xr.Dataset, axes: Axes) -> None:
