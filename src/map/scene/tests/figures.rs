@@ -25,20 +25,20 @@ fn widths_have_a_unit_and_become_points() {
 #[test]
 fn wrong_styles_are_refused_with_their_place_and_the_remedy() {
     for (figure, place, part) in [
-        ("width = 85", "s.toml:16:9: figure.width", "text in quotes"),
-        ("width = \"85\"", "s.toml:16:9: figure.width", "such as \"85mm\""),
-        ("width = \"5mm\"", "s.toml:16:9: figure.width", "from 60 mm to 300 mm"),
-        ("font_size = 6", "s.toml:16:13: figure.font_size", "from 7 to 24 points"),
+        ("width = 85", "s.toml:16:9: `figure.width", "text in quotes"),
+        ("width = \"85\"", "s.toml:16:9: `figure.width", "such as \"85mm\""),
+        ("width = \"5mm\"", "s.toml:16:9: `figure.width", "from 60 mm to 300 mm"),
+        ("font_size = 6", "s.toml:16:13: `figure.font_size", "from 7 to 24 points"),
         (
             "width = \"60mm\"\nfont_size = 9",
-            "s.toml:17:13: figure.font_size",
+            "s.toml:17:13: `figure.font_size",
             "at most 8 points at this width",
         ),
         ("colour = 1", "s.toml:16:1: ", "width, font_size, title, legend, lines"),
-        ("lines = 3", "s.toml:16:9: figure.lines", "names and expressions"),
-        ("lines = { a = \"k1 - q\" }", "s.toml:16:15: figure.lines.a", "`q`"),
-        ("lines = { a = \"k1 -\" }", "s.toml:16:15: figure.lines.a", "cannot be read"),
-        ("lines = { a = \"e - 1\" }", "s.toml:16:15: figure.lines.a", "the same value in all cells"),
+        ("lines = 3", "s.toml:16:9: `figure.lines", "names and expressions"),
+        ("lines = { a = \"k1 - q\" }", "s.toml:16:15: `figure.lines.a", "`q`"),
+        ("lines = { a = \"k1 -\" }", "s.toml:16:15: `figure.lines.a", "cannot be read"),
+        ("lines = { a = \"e - 1\" }", "s.toml:16:15: `figure.lines.a", "the same value in all cells"),
     ] {
         let message = read(figure).unwrap_err().to_string();
         assert!(message.starts_with(place) && message.contains(part), "{figure}: {message}");
