@@ -255,7 +255,7 @@ fn a_long_table_of_events_leaves_the_summary_on_the_screen() {
     let events = orbit["events"].as_array().unwrap().len();
     let text = String::from_utf8(printed(line)).unwrap();
     assert!(events > 100 && text.lines().count() < 45, "{events} events\n{text}");
-    let hidden = format!("... {} more events; --json and --out list all of them\n", events - 24);
+    let hidden = format!("... {} more events; --json and --out list all of them\n", events - 16);
     assert!(text.contains(&hidden), "{text}");
 }
 

@@ -238,7 +238,13 @@ pub(crate) fn clearances() -> Vec<(String, (Oscillator, Law))> {
     let sink = Damper { omega: 1.01, clearance: 0.18, ..SINK }.pair();
     let containers = [(1.7, 0.5), (1.8, 0.5), (2.0, 0.6), (4.0, 0.8)]
         .map(|(d, e)| (format!("container, d = {d}, e = {e}"), container(d, e)));
-    [two_masses.to_vec(), dampers.to_vec(), vec![("energy sink, omega = 1.01".to_owned(), sink)], containers.to_vec()].concat()
+    [
+        two_masses.to_vec(),
+        dampers.to_vec(),
+        vec![("energy sink, omega = 1.01".to_owned(), sink)],
+        containers.to_vec(),
+    ]
+    .concat()
 }
 
 #[test]
