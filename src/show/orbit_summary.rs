@@ -12,8 +12,8 @@ use rattlemap_dynamics::orbit::{Class, Event, History, Orbit, Status};
 
 /// Largest number of events in the table, and number of events before those that are left out. The summary above the table
 /// stays on the screen.
-const MOST_ROWS: usize = 24;
-const FIRST_ROWS: usize = 16;
+const MOST_ROWS: usize = 16;
+const FIRST_ROWS: usize = 10;
 
 /// Returns a summary of the orbit of a model in lines of aligned text.
 pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {

@@ -60,3 +60,15 @@ pub fn command(cells: &Cells<'_>, id: usize) -> String {
     let own = if cells.has_own_start(id) { start(scene.base(), cells.start(id)) } else { String::new() };
     format!("rattlemap orbit{sets}{}{own}", arguments(scene))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_of_a_cell_sets_the_start_phase() {
+        let builder = Scene::builder(FileModel::built_in("gear-pair").unwrap()).start_phase(1.0);
+        let scene = builder.axis("e", 0.1..=0.9, 2).axis("omega", 1.0..=2.0, 2).build().unwrap();
+        assert_eq!(arguments(&scene), " --set start.phase=1.0");
+    }
+}

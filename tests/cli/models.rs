@@ -151,7 +151,8 @@ fn units_and_significant_digits_are_printed() {
     let heads: Vec<&str> =
         table.lines().next().unwrap().split("  ").filter(|head| !head.is_empty()).collect();
     let heads: Vec<&str> = heads.into_iter().map(str::trim).collect();
-    let expected = "kind|side|t [s]|t mod T [s]|z [m] before|v [m/s] before|z [m] after|v [m/s] after";
+    let expected =
+        "kind|side|t [s]|t mod T [s]|impulse|z [m] before|v [m/s] before|z [m] after|v [m/s] after";
     assert_eq!(heads.join("|"), expected);
     let found: Value =
         serde_json::from_str(&stdout(&folder, "orbit --model ball.toml --start 0.001,0 --json")).unwrap();
