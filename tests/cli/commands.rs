@@ -254,8 +254,8 @@ fn a_long_table_of_events_leaves_the_summary_on_the_screen() {
     let orbit: serde_json::Value = serde_json::from_slice(&printed(&format!("{line} --json"))).unwrap();
     let events = orbit["events"].as_array().unwrap().len();
     let text = String::from_utf8(printed(line)).unwrap();
-    assert!(events > 100 && text.lines().count() < 50, "{events} events\n{text}");
-    let hidden = format!("... {} more events; --json and --out list all of them\n", events - 24);
+    assert!(events > 100 && text.lines().count() < 45, "{events} events\n{text}");
+    let hidden = format!("... {} more events; --json and --out list all of them\n", events - 16);
     assert!(text.contains(&hidden), "{text}");
 }
 
