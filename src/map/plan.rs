@@ -150,6 +150,10 @@ impl Plan {
         let mut needs = needs(&scene.outputs().quantities);
         // A map of basins needs the exponent, because chaos is an attractor, too.
         needs.exponent |= scene.is_basin();
+        // An adaptive map must not interpolate between motion with and without contact.
+        let needs_contact = scene.refine().is_some() && needs.measures != 0;
+        needs.impacts |= needs_contact;
+        needs.mesh |= needs_contact;
         let integration = scene.integration();
         Plan {
             flows: Parts::flows(&points),
