@@ -125,10 +125,13 @@ impl Group {
         GROUPS.iter().find(|group| group.name == name)
     }
 
-    /// Returns the distance of the numbers of two records up to mirror image, relative to the larger numbers of the second: the
-    /// largest over all displacements. Amplitude and phase are compared as a complex number.
+    /// Returns the largest distance of the numbers of two records up to mirror image, relative to the largest number of the
+    /// second: a displacement at rest has rounding errors of the others' size. Amplitude and phase are compared as a complex
+    /// number.
     pub fn distance(&self, a: &Record, b: &Record) -> f64 {
         let places: Vec<usize> = self.measures().map(|measure| measure.place).collect();
+        let sizes = self.measures().filter(|measure| !measure.is_angle()).map(|m| b.measures[m.place].abs());
+        let scale = sizes.fold(0.0, f64::max);
         let of_displacement = |places: &[usize]| {
             let [a, b] =
                 [a, b].map(|record| places.iter().map(|&place| record.measures[place]).collect::<Vec<_>>());
@@ -138,9 +141,8 @@ impl Group {
                     let part = |of: &[f64]| of[0] * if i == 0 { of[1].cos() } else { of[1].sin() };
                     apart(part(&a), part(&b))
                 });
-                return relative(x.hypot(y), b[0].abs());
+                return relative(x.hypot(y), scale);
             }
-            let scale = b.iter().fold(0.0, |scale: f64, value| scale.max(value.abs()));
             // The mean of the mirror image has the other sign.
             let distances = a.iter().zip(&b).map(|(a, b)| relative(apart(a.abs(), b.abs()), scale));
             distances.fold(0.0, farther)
