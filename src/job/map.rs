@@ -69,7 +69,7 @@ impl<'a> MapJob<'a> {
         }
         require_engine(self.shard, self.engine.kind)?;
         engine_choice::check(&self.engine)?;
-        out.map_or(Ok(()), |out| Folder::check(out, true, []))?;
+        out.map_or(Ok(()), Folder::check_writable)?;
         let free = Free::for_output(out);
         size::check_map(self.scene, self.shard, self.engine.kind, &free).map(|()| free)
     }

@@ -172,7 +172,7 @@ const LARGER_MACHINE: &str = "use a larger machine";
 /// # Errors
 /// [`JobError`] if the folder cannot be written, or with the needed and the free amount.
 pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
-    out.map_or(Ok(()), |out| Folder::check(out, true, []))?;
+    out.map_or(Ok(()), Folder::check_writable)?;
     Size::merged(scene).check(scene, EngineKind::Cpu, &Free::for_output(out), LARGER_MACHINE)
 }
 

@@ -102,6 +102,27 @@ impl Folder {
         }
     }
 
+    /// Checks whether a folder exists or can be made, as far as can be known without writing.
+    ///
+    /// # Errors
+    /// [`FolderError::NotAFolder`] and [`FolderError::NotWritable`].
+    pub fn check_writable(path: &Path) -> Result<(), FolderError> {
+        let own = || path.to_owned();
+        if path.exists() && !path.is_dir() {
+            return Err(FolderError::NotAFolder { path: own() });
+        }
+        let absolute = std::path::absolute(path).unwrap_or_else(|_| own());
+        let around = absolute.ancestors().find(|folder| folder.exists()).unwrap_or(path);
+        match fs::metadata(around) {
+            Ok(data) if data.is_dir() && !data.permissions().readonly() => Ok(()),
+            Ok(_) => {
+                let reason = io::Error::other(format!("{} cannot be written", around.display()));
+                Err(FolderError::NotWritable { path: own(), reason })
+            }
+            Err(reason) => Err(FolderError::NotWritable { path: own(), reason }),
+        }
+    }
+
     /// Checks whether a folder can be opened and the files `names` be written there, without creating or locking anything.
     ///
     /// # Errors
@@ -111,25 +132,12 @@ impl Folder {
         force: bool,
         names: impl IntoIterator<Item = &'n str>,
     ) -> Result<(), FolderError> {
-        let own = || path.to_owned();
-        if path.exists() && !path.is_dir() {
-            return Err(FolderError::NotAFolder { path: own() });
-        }
-        let absolute = std::path::absolute(path).unwrap_or_else(|_| own());
-        let around = absolute.ancestors().find(|folder| folder.exists()).unwrap_or(path);
-        match fs::metadata(around) {
-            Ok(data) if data.is_dir() && !data.permissions().readonly() => {}
-            Ok(_) => {
-                let reason = io::Error::other(format!("{} cannot be written", around.display()));
-                return Err(FolderError::NotWritable { path: own(), reason });
-            }
-            Err(reason) => return Err(FolderError::NotWritable { path: own(), reason }),
-        }
+        Folder::check_writable(path)?;
         if Lock::is_held(path) {
-            return Err(FolderError::InUse { path: own() });
+            return Err(FolderError::InUse { path: path.to_owned() });
         }
         if !force && path.is_dir() && !is_empty(path).unwrap_or(false) {
-            return Err(FolderError::NotEmpty { path: own() });
+            return Err(FolderError::NotEmpty { path: path.to_owned() });
         }
         refuse_links_in(path, names)
     }

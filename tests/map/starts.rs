@@ -354,7 +354,7 @@ fn files_describe_the_starts_and_resume_to_equal_bytes() {
     let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
     assert_eq!(
         manifest["start"],
-        serde_json::json!({ "policy": "rest", "state": null, "count": 3, "seed": 1 })
+        serde_json::json!({ "policy": "rest", "state": null, "phase": 0.0, "count": 3, "seed": 1 })
     );
     let table = fs::read_to_string(at.join("whole/cells.csv")).unwrap();
     let mut lines = table.lines();
