@@ -169,6 +169,7 @@ fn status(status: Status) -> &'static str {
         Status::BelowResolution => {
             "below_resolution: points of the cycle are closer together than the numerical resolution"
         }
+        Status::Neutral => "neutral: a multiplier has modulus 1; perturbations neither decay nor grow",
     }
 }
 

@@ -33,8 +33,7 @@ impl<'r> Filling<'r> {
         let averages = corners.map(|nearest| {
             let class = classify(&Record { valid, ..*nearest });
             // An average exponent could turn undecided cells into decided ones.
-            let decided = matches!(class, Class::Periodic { .. } | Class::Chaotic);
-            decided && corners.iter().all(|corner| classify(corner) == class)
+            class != Class::Undecided && corners.iter().all(|corner| classify(corner) == class)
         });
         Filling { block: *block, corners, valid, averages }
     }
