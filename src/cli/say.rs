@@ -47,9 +47,7 @@ pub(crate) fn quoted(text: impl Display) -> String {
 }
 
 /// Lists the numbers of cells of each class. Quasi-periodic motion is listed only where it occurs.
-pub(crate) fn classes(
-    [periodic, chaotic, undecided, failed, tori]: [usize; Class::NAMES.len()],
-) -> String {
+pub(crate) fn classes([periodic, chaotic, undecided, failed, tori]: [usize; Class::NAMES.len()]) -> String {
     let tori = if tori > 0 { format!("{tori} quasi-periodic, ") } else { String::new() };
     format!("{periodic} periodic, {chaotic} chaotic, {tori}{undecided} undecided, {failed} failed")
 }

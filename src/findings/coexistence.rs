@@ -35,7 +35,8 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     let count = |id: usize| {
         let runs = (id..records.count()).step_by(cells);
         let cell = plan.cell(id as u32);
-        let mut found = CellAttractors { law: plan.law(cell.law), chaos: false, torus: false, cycles: Vec::new() };
+        let mut found =
+            CellAttractors { law: plan.law(cell.law), chaos: false, torus: false, cycles: Vec::new() };
         flows.with(cell.flow, |flow| runs.for_each(|run| found.take(flow, &records.record(run))));
         found.count()
     };

@@ -148,9 +148,8 @@ pub fn has_sine(oscillator: &model::Oscillator) -> bool {
 /// Returns the motion without contacts. It may require that `x` is at rest, which a lane knows exactly.
 fn non_impacting(oscillator: &model::Oscillator) -> Option<model::NonImpacting> {
     let other = Coordinates::new(oscillator).other;
-    let beside_rest = || {
-        model::NonImpacting::with_one_at_rest(oscillator).filter(|motion| motion.resting() == Some(other))
-    };
+    let beside_rest =
+        || model::NonImpacting::with_one_at_rest(oscillator).filter(|motion| motion.resting() == Some(other));
     model::NonImpacting::new(oscillator).or_else(beside_rest)
 }
 

@@ -151,7 +151,9 @@ fn meaning(status: Status) -> &'static str {
         Status::BelowResolution => {
             "points of the cycle are closer than the engine resolves: the true period may be a divisor"
         }
-        Status::Neutral => "a multiplier has modulus 1 within its error: perturbations neither decay nor grow",
+        Status::Neutral => {
+            "a multiplier has modulus 1 within its error: perturbations neither decay nor grow"
+        }
     }
 }
 

@@ -47,8 +47,8 @@ use crate::store::map::{self, Run, ShardOrigin};
 use crate::store::record_file::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
 use crate::store::run_records::Work;
 use crate::store::{in_memory, map_json, unfinished};
-use rattlemap_dynamics::orbit::Class;
 use crate::text::shell::quoted;
+use rattlemap_dynamics::orbit::Class;
 
 /// Number of records that are written together: the largest batch of a record file.
 const BATCH: usize = 1 << 16;

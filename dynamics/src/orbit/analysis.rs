@@ -244,13 +244,17 @@ impl Analysis<'_> {
     }
 
     /// Returns the status of undecided motion: neutral if Newton's method finds a neutral cycle nearby.
-    fn undecided_status(&self, trajectory: &Trajectory<'_, 0>, metric: &Metric, found: &[Candidate]) -> Status {
+    fn undecided_status(
+        &self,
+        trajectory: &Trajectory<'_, 0>,
+        metric: &Metric,
+        found: &[Candidate],
+    ) -> Status {
         let mut maps = found.iter().flat_map(|candidate| self.maps(candidate.period));
         let is_neutral = maps.any(|map| {
             let cycle = Newton::default().refine(trajectory, map);
             cycle.is_some_and(|cycle| {
-                cycle.is_neutral()
-                    && metric.distance(&trajectory.state(), &cycle.state) < RECURRENCE_DISTANCE
+                cycle.is_neutral() && metric.distance(&trajectory.state(), &cycle.state) < RECURRENCE_DISTANCE
             })
         });
         if is_neutral { Status::Neutral } else { Status::Slow }
@@ -318,8 +322,7 @@ impl Analysis<'_> {
                 // Motion near a neutral cycle neither approaches nor leaves it.
                 false => Some(now).filter(|&now| cycle.is_neutral() && now < ON_CYCLE),
             };
-            if let Some(distance) = distance
-            {
+            if let Some(distance) = distance {
                 let reading = self.read(trajectory, &cycle)?;
                 return Ok(Some(self.periodic(&reading, &cycle, distance)));
             }

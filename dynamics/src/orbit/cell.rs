@@ -318,7 +318,9 @@ impl<'a> CellRun<'a> {
                     self.is_neutral = is_last;
                     if metric.distance(&state, &cycle.state) < ON_CYCLE {
                         let cycle = self.analysis.smallest(newton, seed, cycle, &metric);
-                        let of = |cycle| Ok(self.analysis.periodic(&self.analysis.read(seed, &cycle)?, &cycle, 0.0));
+                        let of = |cycle| {
+                            Ok(self.analysis.periodic(&self.analysis.read(seed, &cycle)?, &cycle, 0.0))
+                        };
                         return cycle.map(of).transpose();
                     }
                 }

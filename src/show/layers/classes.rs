@@ -9,8 +9,8 @@ use crate::show::cells::Cells;
 use crate::show::color::Color;
 use crate::show::layers::bar::{Bar, count_beyond, round_bound};
 use crate::show::layers::colors::{
-    self, ALWAYS_IN_CONTACT, FAILED, NO_CONTACT, QUASI_PERIODIC, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, UNSYMMETRIC,
-    chaos,
+    self, ALWAYS_IN_CONTACT, FAILED, NO_CONTACT, QUASI_PERIODIC, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED,
+    UNSYMMETRIC, chaos,
 };
 use crate::show::layers::layer::{Layer, NamedColor, legend};
 use rattlemap_dynamics::orbit::Class;
