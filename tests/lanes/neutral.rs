@@ -6,11 +6,11 @@ use crate::common::{BUDGET, REST, paper};
 use crate::kinds::{self, Cell};
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
-use rattlemap::map::plan::{Needs, Plan};
-use rattlemap::map::scene::{Purpose, Scene};
+use rattlemap::map::plan::Needs;
+use rattlemap::model_file::FileModel;
 use rattlemap::record::classify::{classify, status};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, State, Stops};
+use rattlemap_dynamics::model::{GearPair, Model, State, Stops};
 use rattlemap_dynamics::orbit::{Class, Status, measure};
 
 /// Returns a cell of the oscillator `x'' + x = 0.1 cos(omega t)`, which does not reach its walls.
@@ -19,15 +19,11 @@ fn undamped(omega: f64, start: State) -> Cell {
     (model.oscillator().unwrap(), model.law(), start)
 }
 
-/// Returns a cell of the published model of two masses.
-fn two_masses(omega: f64, e: f64) -> Cell {
-    let scene = format!(
-        "model = \"two-masses\"\n[[axis]]\nparameter = \"omega\"\nvalues = [{omega}, 1.0]\n\
-         [[axis]]\nparameter = \"e\"\nvalues = [{e}, 0.5]\n"
-    );
-    let plan = Plan::new(&Scene::parse(&scene, "s", &[], Purpose::Map).unwrap());
-    let cell = plan.cell(0);
-    (plan.oscillator(cell.flow), plan.law(cell.law), REST)
+/// Returns a cell of a model of the gallery, from rest.
+fn gallery(name: &str, sets: [(&str, f64); 2]) -> Cell {
+    let mut model = FileModel::built_in(name).unwrap();
+    sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
+    (model.oscillator().unwrap(), model.law(), REST)
 }
 
 #[test]
@@ -36,11 +32,17 @@ fn every_engine_names_neutral_and_quasi_periodic_motion() {
     let one = Class::Periodic { period: 1 };
     let cases = [
         ("a free body at rest", (free.oscillator().unwrap(), free.law(), REST), one, Status::Neutral),
+        ("a ball at rest", gallery("energy-sink", [("omega", 0.99), ("d", 0.5)]), one, Status::Neutral),
         ("steady motion", undamped(7f64.sqrt(), [-0.1 / 6.0, 0.0, 0.0, 0.0]), one, Status::Neutral),
         ("repeats", undamped(5.0 / 3.0, REST), Class::Periodic { period: 5 }, Status::Neutral),
         ("undamped", undamped(7f64.sqrt(), REST), Class::QuasiPeriodic, Status::Ok),
         ("undamped", undamped(3f64.sqrt(), [0.1, 0.2, 0.0, 0.0]), Class::QuasiPeriodic, Status::Ok),
-        ("a torus with impacts", two_masses(0.625, 1.0), Class::QuasiPeriodic, Status::Ok),
+        (
+            "a torus with impacts",
+            gallery("two-masses", [("omega", 0.625), ("e", 1.0)]),
+            Class::QuasiPeriodic,
+            Status::Ok,
+        ),
     ];
     let cells = cases.map(|case| case.1);
     let expect = |engine: &str, records: &[rattlemap::record::Record]| {
