@@ -307,7 +307,9 @@ impl FinishedMap {
                 return Ok(FileText { name: format!("{name}, model"), text: text.to_owned() });
             }
             if !self.manifest.files.iter().any(|file| file.name == LIST) {
-                return Err(format!("is needed, and {MANIFEST} lists no {LIST}; make the map again with --force"));
+                return Err(format!(
+                    "is needed, and {MANIFEST} lists no {LIST}; make the map again with --force"
+                ));
             }
             let path = self.folder.join(LIST);
             let text = read_text(&path, MOST_LIST_BYTES, "list fewer cells").map_err(|error| {

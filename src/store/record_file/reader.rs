@@ -96,7 +96,8 @@ impl Identity {
 
 /// Opens a file for reading.
 pub(crate) fn open(path: &Path) -> Result<File, RecordFileError> {
-    plain_file::open(path, OpenOptions::new().read(true)).map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })
+    plain_file::open(path, OpenOptions::new().read(true))
+        .map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })
 }
 
 /// A record file whose header has been read.
@@ -186,11 +187,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the batch at an offset; its number must be at least `least`. The inner error describes the damage.
-    fn batch_at(
-        &self,
-        at: u64,
-        least: u32,
-    ) -> io::Result<Result<(BatchHead, Vec<(u32, Record)>), Bad>> {
+    fn batch_at(&self, at: u64, least: u32) -> io::Result<Result<(BatchHead, Vec<(u32, Record)>), Bad>> {
         let bad = |what| Ok(Err(Bad { what, body: 0 }));
         const CUT: &str = "a batch is cut short";
         let mut head = [0; HEAD];
