@@ -84,7 +84,9 @@ class FolderBackend(BackendEntrypoint):
         return ds.drop_vars(left_out, errors="ignore")
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
-        if not isinstance(filename_or_obj, (str, os.PathLike)):
+        is_path = isinstance(filename_or_obj, (str, os.PathLike))
+        # Opening a pipe would block.
+        if not is_path or not (Path(os.fspath(filename_or_obj)) / _MANIFEST).is_file():
             return False
         manifest = Path(os.fspath(filename_or_obj)) / _MANIFEST
         try:

@@ -6,9 +6,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use crate::gpu::{AdapterChoice, Gpu, Precision};
-use crate::job::check;
+use crate::job::check::CheckedFolder;
 use crate::job::error::JobError;
-use crate::job::finished::{self, LoadedMap, damage, repair_command};
+use crate::job::finished::{self, LoadedMap};
 use crate::job::observer::Observer;
 use crate::job::processor;
 use crate::map::plan::Plan;
@@ -17,7 +17,6 @@ use crate::show::cells::Survey;
 use crate::show::validation::Validated;
 use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
-use crate::store::inventory::Finding;
 use crate::store::map::{self, MANIFEST, VALIDATION};
 use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
 
@@ -33,7 +32,7 @@ pub struct ValidateJob {
     survey: Survey,
     precision: Precision,
     sample: Sample,
-    findings: Vec<Finding>,
+    checked: CheckedFolder,
     /// This machine's processor.
     processor: String,
 }
@@ -60,10 +59,10 @@ impl ValidateJob {
         finished::require_folder(dir)?;
         // The lock comes first: another run must not replace the map between reading and writing.
         let folder = Folder::open(dir, true)?;
-        folder.refuse_links(map::names())?;
+        folder.prepare(map::names())?;
         let map = FinishedMap::open_own(dir)?;
-        let findings = check::findings(dir, &map.manifest().files)?;
-        for finding in &findings {
+        let checked = CheckedFolder::of(dir, "map", &map.manifest().files)?;
+        for finding in checked.findings() {
             let text = format!("{}: {finding}", dir.display());
             if finding.is_lost() { observer.warn(&text) } else { observer.note(&text) }
         }
@@ -73,7 +72,7 @@ impl ValidateJob {
         let survey = loaded.survey();
         let sample = validate::sample(&loaded.plan, &loaded.stored.records, samples, seed);
         let processor = processor::described();
-        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, findings, processor })
+        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, checked, processor })
     }
 
     /// The locked folder.
@@ -164,18 +163,8 @@ impl ValidateJob {
     /// # Errors
     /// [`JobError::Failed`].
     pub fn require_valid(&self, validation: &Validation, written: &[&str]) -> Result<(), JobError> {
-        let dir = self.folder.path();
-        verdict(dir, &self.loaded.plan, validation)?;
-        let is_left = |finding: &&Finding| finding.is_lost() && !written.contains(&finding.name.as_str());
-        let left: Vec<&Finding> = self.findings.iter().filter(is_left).collect();
-        match left.is_empty() {
-            true => Ok(()),
-            false => Err(JobError::Failed(format!(
-                "{}; `{}` recreates tables, figures and report from the records",
-                damage(dir, left),
-                repair_command(dir)
-            ))),
-        }
+        verdict(self.folder.path(), &self.loaded.plan, validation)?;
+        self.checked.require_good(written, false)
     }
 }
 

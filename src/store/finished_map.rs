@@ -1,6 +1,5 @@
 //! Reads the folder of a finished map or of a finished shard: its manifest, its scene and its records.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -14,7 +13,7 @@ use crate::map::shard::Shard;
 use crate::record::Record;
 use crate::show::provenance::Provenance;
 use crate::store::file_names::{LIST, MANIFEST, RECORDS};
-use crate::store::inventory::FileEntry;
+use crate::store::inventory::{self, FileEntry};
 use crate::store::manifest::FORMAT;
 use crate::store::plain_file::read_text;
 use crate::store::record_file::{Damage, Extent, Identity, Order, RecordFile, RecordFileError};
@@ -118,7 +117,7 @@ pub fn read_manifest(folder: &Path) -> Result<Value, FinishedMapError> {
             None => FinishedMapError::NoManifest { folder: folder.to_owned() },
         });
     }
-    let text = fs::read_to_string(&manifest).map_err(|error| unreadable(folder, error))?;
+    let text = inventory::text(folder).map_err(|error| unreadable(folder, error))?;
     serde_json::from_str(&text).map_err(|error| unreadable(folder, error))
 }
 
@@ -306,6 +305,11 @@ impl FinishedMap {
                 let text = self.manifest.model["text"].as_str();
                 let text = text.ok_or("is not in the manifest; make the map again with --force")?;
                 return Ok(FileText { name: format!("{name}, model"), text: text.to_owned() });
+            }
+            if !self.manifest.files.iter().any(|file| file.name == LIST) {
+                return Err(format!(
+                    "is needed, and {MANIFEST} lists no {LIST}; make the map again with --force"
+                ));
             }
             let path = self.folder.join(LIST);
             let text = read_text(&path, MOST_LIST_BYTES, "list fewer cells").map_err(|error| {
