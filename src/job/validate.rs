@@ -18,6 +18,7 @@ use crate::show::validation::Validated;
 use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::map::{self, MANIFEST, VALIDATION};
+use crate::store::record_file::Identity;
 use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
 
 /// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
@@ -132,8 +133,11 @@ impl ValidateJob {
         report: &(impl Fn(usize) + Sync),
         halt: &AtomicBool,
     ) -> Option<Validation> {
-        let basins = self.survey.basins();
-        validate::replay_until(&self.subject(), basins, &self.sample, &lanes.lanes, report, halt)
+        let (basins, subject) = (self.survey.basins(), self.subject());
+        let StoredManifest { sources, target, .. } = self.map.manifest();
+        let is_exact =
+            !subject.is_lane && sources == Identity::own_sources() && target == Identity::own_target();
+        validate::replay_until(&subject, basins, is_exact, &self.sample, &lanes.lanes, report, halt)
     }
 
     /// Returns the validation with the devices that took part.

@@ -266,6 +266,11 @@ pub fn is_sealed(text: &str) -> bool {
     manifest.is_ok_and(|manifest| manifest.is_object() && sealed(manifest).is_ok_and(|sealed| sealed == text))
 }
 
+/// Whether a manifest that was read has the right seal.
+pub(crate) fn has_seal(manifest: &Value) -> bool {
+    pretty(manifest).is_ok_and(|text| is_sealed(&text))
+}
+
 fn pretty(manifest: &Value) -> serde_json::Result<String> {
     Ok(serde_json::to_string_pretty(manifest)? + "\n")
 }

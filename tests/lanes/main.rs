@@ -13,5 +13,6 @@ mod independence;
 mod kinds;
 mod measures;
 mod shaders;
+mod standard_errors;
 mod stored;
 mod work;
