@@ -42,16 +42,22 @@ fn begin_period() {
     let decided = settings.max_period > 0u && recurs();
     // The budget includes the periods in which the cycle is read.
     let read_by = tally.period + tally.candidate;
-    let is_last = read_by == settings.periods || read_by == settings.longest;
+    let is_last = read_by == settings.periods || read_by == settings.decided_by || read_by == settings.longest;
     // A chance contraction in growing motion has not settled.
     let is_due = is_last && search.streak >= STREAK && (search.is_settled == 1u || !grows(DOUBT));
     let early = settings.early_stop == 1u;
-    if read_by <= settings.longest && (is_due || (decided && early)) {
+    if read_by <= settings.longest && (is_due || (decided && (early || search.confirms_chaos == 1u))) {
         begin_reading();
     } else if early && is_non_impacting() {
         end_non_impacting();
     } else if tally.period >= settings.longest || (early && is_chaos()) {
         tally.stage = STAGE_DONE;
+    } else if tally.period >= settings.decided_by && search.confirms_chaos == 0u {
+        if is_chaotic(CHAOS_ERRORS) {
+            search.confirms_chaos = 1u;
+        } else {
+            tally.stage = STAGE_DONE;
+        }
     }
 }
 
