@@ -92,7 +92,9 @@ pub(crate) fn integration(scene: &Scene) -> String {
         Some(_) => "; refined at borders, the rest filled and audited",
         None => "",
     };
-    format!("every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{confirmed}{filled}")
+    format!(
+        "every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{confirmed}{filled}"
+    )
 }
 
 #[cfg(test)]
