@@ -55,7 +55,7 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         beyond: count_beyond(exponents(), 0.0, high),
     };
     let chaos = match cells.chaos_ends() {
-        Some(rate) => format!("chaos ({} ends in {PERIODS} periods)", rate.text_within(PERIODS)),
+        Some(rate) => format!("chaos ({} end in {PERIODS} periods)", rate.text_within(PERIODS)),
         None => "chaos".to_owned(),
     };
     let entries = entries(&indices, &palette, chaos, shows_chaos, cells.has(Quantity::Symmetric));
