@@ -20,7 +20,7 @@ const EXCEPTIONS: u8 = FIRST_PERIOD + 63;
 const FIRST_SHADE: u8 = EXCEPTIONS + 2;
 const SHADES: u8 = 64;
 
-/// Forcing periods to which the legend refers the rate at which chaos ends.
+/// Forcing periods T to which the legend refers the rate at which chaos ends.
 const PERIODS: u32 = 1000;
 
 /// Number of periods in the legend before the others are combined in one entry.
@@ -55,7 +55,12 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         beyond: count_beyond(exponents(), 0.0, high),
     };
     let chaos = match cells.chaos_ends() {
-        Some(rate) => format!("chaos ({} end in {PERIODS} periods)", rate.text_within(PERIODS)),
+        // The legend has no room for the interval, which `map` prints.
+        Some(rate) => {
+            let text = rate.text_within(PERIODS).replace("below", "<");
+            let share = text.split(',').next().unwrap_or_default();
+            format!("chaos, {share} end in {PERIODS} T")
+        }
         None => "chaos".to_owned(),
     };
     let entries = entries(&indices, &palette, chaos, shows_chaos, cells.has(Quantity::Symmetric));

@@ -112,7 +112,7 @@ fn chaos_that_ends_is_counted_by_maps_and_by_validations() {
     run.stderr(says(&["chaos: ", " of these cells in 1000 periods"]));
     let out = folder.path().join("out/s");
     let page = fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(page.contains("end in 1000 periods)\""), "the legend states the rate");
+    assert!(page.contains(" % end in 1000 T\""), "the legend states the rate");
     assert_eq!(json(&out.join("manifest.json"))["integration"]["confirm_chaos"], 2000);
     fails(&folder, &format!("map s.toml {few} --resume"), 2, &["integration.confirm_chaos"]);
     // A map whose chaotic cells do not continue states no rate.
