@@ -48,7 +48,10 @@ impl Validated<'_> {
         let is_doubtful = random.rate(Kind::Unexplained).count > 0;
         let stands = if is_doubtful { "The map stands with a reservation" } else { "The map stands" };
         let mut sentences = vec![format!("{stands}: {}.", validation.wrong(random))];
-        if is_doubtful {
+        let is_whole = random.sampled >= random.runs;
+        if is_doubtful && is_whole {
+            sentences.push("Its computations are in validation.json.".to_owned());
+        } else if is_doubtful {
             sentences.push(
                 "This sample is too small to tell whether more than one in 10,000 is wrong: validate again with ten times as \
                  many samples."
