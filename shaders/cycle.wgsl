@@ -109,7 +109,6 @@ fn spectral_growth() -> Real {
 // left: chaos stays near unstable cycles, and near places where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
-    let is_last = tally.period >= settings.longest;
     if !EXPONENT {
         // The divisor's distance is as small as the cycle's: a multiple of the period has been read.
         if search.divisor > 0u && search.divisor_distance + 8u >= search.return_distance && reads_divisor() {
@@ -119,6 +118,8 @@ fn judge_cycle() {
         return;
     }
     carry_vector();
+    confirm_chaos();
+    let is_last = tally.period >= last_period();
     measures.cycle_growth = spectral_growth();
     store_branch();
     let to = fixed_point();
@@ -171,7 +172,7 @@ fn judge_cycle() {
 
 // Starts to read the divisor of the period. Returns false if too few periods are left.
 fn reads_divisor() -> bool {
-    if tally.period + search.divisor > settings.longest {
+    if tally.period + search.divisor > last_period() {
         return false;
     }
     tally.candidate = search.divisor;

@@ -96,8 +96,9 @@ struct Settings {
     // Length of the active list, and the place in it from which lanes have yet to begin.
     active_lanes: u32,
     first_new: u32,
-    // Forcing periods to integrate, and the number that undecided lanes get.
+    // Forcing periods to integrate, the number that undecided lanes get, and the number that chaotic lanes get.
     periods: u32,
+    decided_by: u32,
     longest: u32,
     // First period at which a lane may stop as chaotic.
     chaos_from: u32,
@@ -286,6 +287,8 @@ struct Search {
     matching_cycles: u32,
     // Events of all whole periods.
     all_events: u32,
+    // 1 once only further periods of chaos are left.
+    confirms_chaos: u32,
 }
 
 // All counters of a lane.

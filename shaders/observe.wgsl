@@ -42,17 +42,34 @@ fn begin_period() {
     let decided = settings.max_period > 0u && recurs();
     // The budget includes the periods in which the cycle is read.
     let read_by = tally.period + tally.candidate;
-    let is_last = read_by == settings.periods || read_by == settings.longest;
+    let is_last = read_by == settings.periods || read_by == last_period();
     // A chance contraction in growing motion has not settled.
     let is_due = is_last && search.streak >= STREAK && (search.is_settled == 1u || !grows(DOUBT));
     let early = settings.early_stop == 1u;
-    if read_by <= settings.longest && (is_due || (decided && early)) {
+    if read_by <= last_period() && (is_due || (decided && (early || search.confirms_chaos == 1u))) {
         begin_reading();
     } else if early && is_non_impacting() {
         end_non_impacting();
     } else if tally.period >= settings.longest || (early && is_chaos()) {
         tally.stage = STAGE_DONE;
+    } else {
+        confirm_chaos();
+        if tally.period >= last_period() {
+            tally.stage = STAGE_DONE;
+        }
     }
+}
+
+// Gives a chaotic lane the periods that confirm chaos.
+fn confirm_chaos() {
+    if settings.longest > settings.decided_by && tally.period >= settings.decided_by && search.confirms_chaos == 0u {
+        search.confirms_chaos = select(0u, 1u, is_chaotic(CHAOS_ERRORS));
+    }
+}
+
+// Returns the period after which the lane ends if it is not decided before.
+fn last_period() -> u32 {
+    return select(settings.decided_by, settings.longest, search.confirms_chaos == 1u);
 }
 
 // Whether the energy of the transient keeps the gap off the walls from now on.

@@ -9,7 +9,7 @@ fn refine(to: array<Real, 4>) -> bool {
         search.newton_start_origin = tally.origin;
     }
     let stalls = search.newton_steps > 0u && search.return_distance < search.earlier_return_distance + SHRUNK;
-    let is_over = search.newton_steps >= MOST_NEWTON_STEPS || tally.period + tally.candidate > settings.longest;
+    let is_over = search.newton_steps >= MOST_NEWTON_STEPS || tally.period + tally.candidate > last_period();
     if stalls || is_over || is_onset() || tally.order > 0u {
         return false;
     }

@@ -97,6 +97,8 @@ pub struct LaneSettings {
     pub early_stop: bool,
     /// Further periods for lanes that are undecided after `periods`; only with early stops.
     pub undecided_periods: u32,
+    /// Further periods for lanes that are chaotic after all others; only with exponents.
+    pub confirm_chaos: u32,
     /// Whether records contain exponents.
     pub exponent: bool,
     /// Whether records contain words.
@@ -168,6 +170,7 @@ impl Default for LaneSettings {
             max_period: 64,
             early_stop: true,
             undecided_periods: 0,
+            confirm_chaos: 0,
             exponent: true,
             word: true,
             pattern: true,
@@ -201,6 +204,7 @@ impl LaneSettings {
             max_period: budget.settings.max_period,
             early_stop: budget.early_stop,
             undecided_periods: budget.undecided_periods,
+            confirm_chaos: budget.confirm_chaos,
             exponent: budget.exponent,
             exponent_from: budget.exponent_from(),
             chaos_from: budget.chaos_from(),

@@ -184,6 +184,8 @@ fn uniform(
 ) -> Settings {
     let LaneSettings { periods, early_stop, .. } = *settings;
     let more = if early_stop { settings.undecided_periods } else { 0 };
+    let decided_by = periods.saturating_add(more);
+    let confirm_chaos = if settings.exponent { settings.confirm_chaos } else { 0 };
     // Lanes that stop early may stop before a long transient is over.
     let transient_periods = if early_stop {
         settings.transient_periods.min(settings.exponent_from)
@@ -196,7 +198,8 @@ fn uniform(
         active_lanes: active_lanes as u32,
         first_new: first_new as u32,
         periods,
-        longest: periods.saturating_add(more),
+        decided_by,
+        longest: decided_by.saturating_add(confirm_chaos),
         chaos_from: settings.chaos_from,
         chaos_errors: settings.chaos_errors,
         iterations: settings.iterations,

@@ -11,7 +11,7 @@
 //!   exponent is clearly negative, on tori (quasi-periodic motion), and if a multiplier is 1, as for pairs without
 //!   supports.
 //!
-//! Two motions are wrongly called chaotic: transient chaos that outlasts the budget, and motion that grows without
+//! Two motions are wrongly called chaotic: transient chaos that outlasts the budget (`confirm_chaos` extends it), and motion that grows without
 //! bound, as of undamped elastic pairs.
 
 use crate::record::{Record, valid};

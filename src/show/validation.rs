@@ -1,7 +1,8 @@
 //! What a validation says in sentences. The console, `validation.json` and the report show the same ones.
 
 use crate::show::provenance::Provenance;
-use crate::validate::{HORIZON, HalfMesh, Judge, Kind, StratumResult, Validation};
+use crate::validate::{ChaosEnds, HORIZON, HalfMesh, Judge, Kind, StratumResult, Validation};
+use rattlemap_dynamics::orbit::Class;
 
 /// A validation with the devices that took part.
 #[derive(Clone, Copy, Debug)]
@@ -105,6 +106,7 @@ impl Validated<'_> {
                 states.rate().text()
             )
         }));
+        remarks.extend(validation.chaos_ends.as_ref().map(|ends| chaos_ends(ends, validation.counted())));
         remarks.extend(validation.half_mesh.as_ref().map(|half| half_mesh(half, validation.counted())));
         if validation.filled > 0 {
             let (filled, runs, counted) = (validation.filled, validation.runs, validation.counted());
@@ -231,6 +233,34 @@ fn rates(stratum: &StratumResult, counted: &str) -> String {
     )
 }
 
+/// Largest number of cells that a sentence names.
+const NAMED_CELLS: usize = 8;
+
+/// Says in how many cells chaos ends, in which, and how to find all of them.
+fn chaos_ends(ends: &ChaosEnds, counted: &str) -> String {
+    let ChaosEnds { periods, runs, rate, ended } = ends;
+    if rate.among == 0 {
+        return format!("No {counted} are chaotic, so none was followed to see whether chaos ends.");
+    }
+    let followed = format!(
+        "Chaos was followed in {} of {runs} chaotic {counted} for {periods} further periods: it ends in {} ({})",
+        rate.among,
+        rate.count,
+        rate.text()
+    );
+    if ended.is_empty() {
+        return followed + ".";
+    }
+    let periodic = ended.iter().filter(|end| matches!(end.class, Class::Periodic { .. })).count();
+    let named = ended.iter().take(NAMED_CELLS).map(|end| format!("({}, {})", end.indices[0], end.indices[1]));
+    let more = if ended.len() > NAMED_CELLS { ", ..." } else { "" };
+    format!(
+        "{followed}; {periodic} of these become periodic. They are {}{more}. Set integration.confirm_chaos = {periods} to continue all \
+         chaotic {counted} of the map.",
+        named.collect::<Vec<_>>().join(", ")
+    )
+}
+
 /// Says what half the meshing speed changes, what this means, and which meshing speed to use.
 fn half_mesh(half: &HalfMesh, counted: &str) -> String {
     let HalfMesh { classes, periods, words, patterns, .. } = half;
@@ -291,6 +321,7 @@ mod tests {
             is_exact: false,
             agreement: Vec::new(),
             chaos: Vec::new(),
+            chaos_ends: None,
             half_mesh: None,
             states: None,
             mismatches: Vec::new(),

@@ -12,6 +12,7 @@
 
 mod cell;
 mod chaos;
+mod chaos_ends;
 mod compare;
 mod explain;
 mod finite;
@@ -30,6 +31,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 pub use chaos::ChaosTest;
+pub use chaos_ends::{CHAOS_PERIODS, ChaosEnd, ChaosEnds, draw_chaos, follow_chaos};
 pub use compare::{Difference, Field, Value};
 pub use half_mesh::HalfMesh;
 pub use lanes::{Lanes, run_lanes};
@@ -182,6 +184,8 @@ pub struct Validation {
     pub agreement: Vec<Agreement>,
     /// Comparison of averages of chaotic motion in the uniform stratum.
     pub chaos: Vec<ChaosTest>,
+    /// Further periods of chaotic cells; none if they were not requested.
+    pub chaos_ends: Option<ChaosEnds>,
     /// Dependence on the meshing speed in the uniform stratum; none if no cell meshes.
     pub half_mesh: Option<HalfMesh>,
     /// Comparison of lanes' states; none if no lanes ran.
@@ -352,6 +356,7 @@ fn replay_whole(
         is_exact,
         agreement,
         chaos: chaos::tests(&chaos),
+        chaos_ends: None,
         half_mesh: half_mesh::rates(&changes),
         states: has_states.then(|| states::check(subject, lanes.states(), halt)),
         mismatches,

@@ -5,6 +5,7 @@ mod common;
 
 mod chatter;
 mod classes;
+mod confirm_chaos;
 mod counters;
 mod counting;
 mod early_stops;

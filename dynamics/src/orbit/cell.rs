@@ -176,7 +176,8 @@ impl<'a> CellRun<'a> {
         let last = self.budget.longest();
         let exponent_from = self.budget.exponent_from();
         let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
-        let mut next_check = if self.budget.early_stop { FIRST_CHECK.min(budget) } else { last };
+        let decided_by = self.budget.decided_by();
+        let mut next_check = if self.budget.early_stop { FIRST_CHECK.min(budget) } else { decided_by };
         let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start).allowing(self.allowance);
         while bare.period() < u64::from(turning_from) {
             if let Some(measured) = self.period(&mut bare, &mut next_check, last)? {
@@ -216,10 +217,12 @@ impl<'a> CellRun<'a> {
             return Ok(None);
         }
         let (budget, chaos_from) = (self.budget.periods(), self.budget.chaos_from());
+        let decided_by = self.budget.decided_by();
         let next = now + now.div_ceil(CHECK_DIVISOR);
-        let stages = [chaos_from, budget, last].into_iter().filter(|&stage| now < stage && stage <= last);
+        let stages = [chaos_from, budget, decided_by, last];
+        let stages = stages.into_iter().filter(|&stage| now < stage && stage <= last);
         *next_check = next.min(stages.min().unwrap_or(last));
-        let is_last = now == budget || now == last;
+        let is_last = [budget, decided_by, last].contains(&now);
         if let Some(orbit) = self.confirmed_orbit(&trajectory.carrying([]), is_last)? {
             let strobe = if is_last { trajectory.state() } else { orbit.strobe };
             return Ok(Some(self.periodic(orbit, strobe)));
@@ -229,8 +232,11 @@ impl<'a> CellRun<'a> {
         self.allowance.covers(work)?;
         Ok(match now {
             // Newton's method does not find this cycle if the degree of freedom at rest is undamped.
-            _ if now == last && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
+            _ if now >= decided_by && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
+            // Only chaos continues until the last period.
+            _ if now == decided_by => Some(self.aperiodic(CHAOS_ERRORS)).filter(|cell| !cell.is_decided()),
+            _ if decided_by < last => None,
             _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measurement::is_decided),
             _ if now >= chaos_from && !self.approaches => {
                 Some(self.aperiodic(self.budget.chaos_errors())).filter(Measurement::is_decided)
@@ -340,7 +346,9 @@ impl<'a> CellRun<'a> {
         let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_strobe_of(found));
         let distance = |back: usize| metric.distance(&self.strobes[now - back * period], &cycle.state);
         let present = distance(0);
-        let left = f64::from(self.budget.periods()) - (self.strobes.len() - 1) as f64;
+        let is_confirming = self.strobes.len() as u32 - 1 > self.budget.decided_by();
+        let end = if is_confirming { self.budget.longest() } else { self.budget.periods() };
+        let left = f64::from(end) - (self.strobes.len() - 1) as f64;
         // The predicted distance at the end of the budget gives the same status with and without early stops.
         let radius = cycle.spectral_radius();
         let at_last = present * radius.powf(left / f64::from(cycle.period));
