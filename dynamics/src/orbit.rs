@@ -15,6 +15,7 @@ mod itinerary;
 mod quantities;
 mod reading;
 mod recurrence;
+mod resolution;
 mod search_filter;
 #[cfg(test)]
 mod tests;
