@@ -126,6 +126,7 @@ fn check_columns() {
     motions[lane].stretch[0] = smallest;
     motions[lane].stretch[1] = max(motions[lane].stretch[1], size / smallest);
     if size * LARGE < 1.0 {
+        iterations += 16u;
         for (var k = 0u; k < 16u; k++) {
             motions[lane].tangents[k] *= LARGE;
         }
@@ -137,13 +138,13 @@ fn check_columns() {
 // Returns the largest entry of the columns, with rates divided by the forcing frequency.
 fn size_of_columns() -> Real {
     let angle = flows[cell.flow_index].domains[0].angle;
-    var size: Real = 0.0;
-    for (var k = 0u; k < 16u; k++) {
+    var sizes: array<Real, 4>;
+    for (var i = 0u; i < 4u; i++) {
         iterations += 1u;
-        let unit = select(Real(1.0), angle, (k / 4u) % 2u == 1u) / select(Real(1.0), angle, k % 2u == 1u);
-        size = max(size, abs(motions[lane].tangents[k]) * unit);
+        let u = tangent(i);
+        sizes[i] = max(max(abs(u[0]), abs(u[2])), max(abs(u[1]), abs(u[3])) / angle);
     }
-    return size;
+    return max(max(sizes[0], sizes[2]), max(sizes[1], sizes[3]) * angle);
 }
 
 // Returns the largest growth of a perturbation between two instants of the cycle that was read; the second may be in the
