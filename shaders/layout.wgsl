@@ -169,6 +169,12 @@ struct Measures {
     rate_scale: Real,
     // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
     cycle_growth: Real,
+    // Largest growth of a perturbation between two instants of that cycle, and from an instant to a strobe.
+    cycle_stretch: Real,
+    strobe_stretch: Real,
+    // Growth and distance from the cycle at the reading before.
+    earlier_growth: Real,
+    earlier_distance: Real,
 }
 
 struct Motion {
@@ -178,6 +184,9 @@ struct Motion {
     tangents: array<Real, 16>,
     // The exponent's tangent vector while the matrix takes its place.
     vector: array<Real, 4>,
+    // Growth of perturbations on the cycle that is read (check_columns in tangent.wgsl): smallest size of the columns so
+    // far, largest ratio of a size to a smaller one before it, largest size, and largest ratio at a strobe.
+    stretch: array<Real, 4>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
     // The last state of a lane that is being measured.
@@ -282,6 +291,13 @@ struct Search {
     rejected_divisor: u32,
     // Distance of the lane from the fixed point of the linearised strobe map, in quarter octaves below 1.
     linear_distance: u32,
+    // Distance of the motion itself from that point, and of the cycle's start from the nearest other strobe of the cycle,
+    // in quarter octaves below 1.
+    motion_distance: u32,
+    nearest: u32,
+    // Hash of the events of the reading before; and 1 if the exponents of the two readings differ by too much.
+    earlier_branch: u32,
+    is_uncertain: u32,
     // Strobes of the motion so far, and its latest cycles that have the same events as the cycle that is read.
     strobe_count: u32,
     matching_cycles: u32,
@@ -300,6 +316,10 @@ struct Tally {
     last_distances: array<u32, 16>,
     // Hashes of the events of the trail's periods.
     itineraries: array<u32, TRAIL>,
+    // The columns of the monodromy matrix: how often they were multiplied by LARGE; and 1 if an event has made them zero,
+    // after which they start again.
+    column_scalings: u32,
+    is_superstable: u32,
     // Symbols of the word, ten to a number.
     word: array<u32, 7>,
     // The pattern: one symbol for every run of equal symbols. Stored and hashed like the word.

@@ -23,13 +23,18 @@ fn begin_period() {
         widen_scales(strobe_state());
         let read = tally.candidate - tally.periods_to_read;
         if EXPONENT {
+            check_columns();
+            motions[lane].stretch[3] = max(motions[lane].stretch[3], size_of_columns() / motions[lane].stretch[0]);
             compare_itineraries(itinerary, read);
         }
         let distance = octaves(distance_between(strobe_state(), measures.anchor));
         if tally.periods_to_read == 0u {
             search.return_distance = distance;
             tally.stage = STAGE_READ;
-        } else if tally.candidate % read == 0u && distance > search.divisor_distance {
+            return;
+        }
+        search.nearest = max(search.nearest, distance);
+        if tally.candidate % read == 0u && distance > search.divisor_distance {
             search.divisor = read;
             search.divisor_distance = distance;
         }
@@ -123,15 +128,17 @@ fn begin_reading() {
     search.mirror = 0u;
     search.divisor = 0u;
     search.divisor_distance = 0u;
+    search.nearest = 0u;
     search.matching_cycles = TRAIL;
     measures.anchor = strobe_state();
     narrow_scales(measures.anchor);
     if EXPONENT {
         save_vector();
         tally.tangent_count = 4u;
-        // With one displacement, x has no neighbours.
-        let x = select(Real(0.0), Real(1.0), shapes[cell.flow_index].degrees > 1u);
-        motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, x, 0.0, 0.0, 0.0, 0.0, x);
+        begin_columns();
+        motions[lane].stretch = array<Real, 4>(1.0, 1.0, 1.0, 1.0);
+        tallies[lane].column_scalings = 0u;
+        tallies[lane].is_superstable = 0u;
     }
 }
 

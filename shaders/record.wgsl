@@ -60,7 +60,7 @@ fn last_status() -> u32 {
     if tally.on_strobe > 0u {
         return STATUS_STROBE_ON_EVENT;
     }
-    if !is_near_cycle() {
+    if is_slow() {
         return STATUS_SLOW;
     }
     return select(STATUS_OK, STATUS_BELOW_RESOLUTION, hides_period());

@@ -15,6 +15,7 @@ mod itinerary;
 mod quantities;
 mod reading;
 mod recurrence;
+mod resolution;
 mod search_filter;
 #[cfg(test)]
 mod tests;
@@ -110,7 +111,7 @@ pub enum Status {
     TooStiff,
     /// The state is not finite.
     NonFinite,
-    /// Points of the cycle lie closer together than the engine resolves: the true period may be a divisor.
+    /// Rounding decides the period: rounding errors grow to the distance between points of the cycle.
     BelowResolution,
 }
 

@@ -41,6 +41,23 @@ pub(crate) const MIRROR_DISTANCE: f64 = 2.44e-4;
 /// Largest distance of a settled lane from its cycle, relative to the motion.
 pub(crate) const ON_CYCLE: f64 = 1e-4;
 
+/// Returns the largest distance from its cycle, relative to the motion, at which a motion counts as settled at the end of
+/// its budget. In f64 it is that of the reference.
+pub(crate) const fn settled_distance(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => ON_CYCLE,
+        Precision::F64 => 1e-8,
+    }
+}
+
+/// Returns the distance of a symmetric cycle from its mirror image, relative to the motion, that rounding explains.
+pub(crate) const fn symmetric(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 3e-5,
+        Precision::F64 => 1e-8,
+    }
+}
+
 /// Returns [`RECURRENCE_LIMIT`] as a distance relative to the motion.
 pub(crate) fn recurrence_distance() -> f64 {
     (-f64::from(RECURRENCE_LIMIT) / f64::from(PARTS_PER_OCTAVE)).exp2()
@@ -90,6 +107,8 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("MIRROR_DISTANCE", MIRROR_DISTANCE),
         ("NOISE", noise),
         ("ON_CYCLE", ON_CYCLE),
+        ("SETTLED_DISTANCE", settled_distance(precision)),
+        ("SYMMETRIC", symmetric(precision)),
     ];
     let reals = [
         ("CHAOS_ERRORS", CHAOS_ERRORS),

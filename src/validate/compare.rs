@@ -288,8 +288,8 @@ impl Bars<'_> {
         Some(compared(Field::Attractor, ours == theirs, || (shown(ours), shown(theirs))))
     }
 
-    /// Whether two statuses of one class agree. Lanes report `slow` at distances above 1e-4 from the cycle, the reference
-    /// above 1e-8, so `ok` and `slow` agree for motion that settles slowly.
+    /// Whether two statuses of one class agree. Lanes in f32 report `slow` at distances above 1e-4 from the cycle, other
+    /// engines above 1e-8, so `ok` and `slow` agree for motion that settles slowly.
     fn is_same_status(&self, class: Class, statuses: [Status; 2], judge: &Record) -> bool {
         match class {
             // For these classes the status adds nothing.

@@ -7,6 +7,7 @@ use super::itinerary::Recorder;
 use super::quantities::{Meter, Quantities};
 use super::reading::Reading;
 use super::recurrence::{Candidate, Metric, candidates};
+use super::resolution::is_below_resolution;
 use super::{Class, Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, Model, ModelError, NonImpacting, State};
@@ -392,7 +393,8 @@ impl Analysis<'_> {
         if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         }
-        Ok(Reading { closes, ..reading })
+        let below_resolution = is_below_resolution(seed, cycle, &reading.events)?;
+        Ok(Reading { closes, below_resolution, ..reading })
     }
 
     /// Builds the orbit of a cycle; `distance` is that of the motion from the cycle.
@@ -403,6 +405,8 @@ impl Analysis<'_> {
             Status::StrobeOnEvent
         } else if distance > ON_CYCLE {
             Status::Slow
+        } else if reading.below_resolution {
+            Status::BelowResolution
         } else {
             Status::Ok
         };

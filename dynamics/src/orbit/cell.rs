@@ -380,7 +380,8 @@ impl<'a> CellRun<'a> {
         if let Some(reading) = found.reading.get() {
             return Ok(reading);
         }
-        self.reading_periods.set(self.reading_periods.get() + found.cycle.period);
+        // Once for the events, once for the growth of rounding errors.
+        self.reading_periods.set(self.reading_periods.get() + 2 * found.cycle.period);
         let reading = self.analysis.read(&found.seed, &found.cycle)?;
         Ok(found.reading.get_or_init(|| reading))
     }
