@@ -138,6 +138,14 @@ fn judge_cycle() {
     search.motion_distance = select(octaves(distance_between(trail(search.strobe_count), to)), search.linear_distance, search.newton_steps == 0u);
     compare_growth();
     let is_stable = measures.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    search.is_neutral = select(0u, 1u, abs(measures.cycle_growth) <= NEUTRAL * Real(tally.candidate));
+    // Motion on a neutral cycle neither approaches nor leaves it.
+    if search.is_neutral == 1u && search.newton_steps == 0u && search.return_distance >= AT_REST {
+        if search.divisor == 0u || search.divisor_distance < AT_REST || !reads_divisor() {
+            search.cycle = tally.candidate;
+        }
+        return;
+    }
     // Near a graze the strobe map has no derivative that locates the cycle.
     let is_smooth = tally.grazes == 0u || search.newton_steps > 0u;
     // Where rounding is amplified, it moves the lane away from the fixed point: such cycles are only waited for.
@@ -243,6 +251,7 @@ fn restart_search() {
         motion.q[1] += Real(PERTURBATION * exp2(-f32(AT_REST) / PARTS_PER_OCTAVE)) * measures.rate_scale;
         motion.bound = 0.0;
         search.strobe_count = 0u;
+        search.average_length = 0u;
         // Growth there was that of the unstable cycle, not of chaos.
         search.blocks = 0u;
         search.block_periods = 0u;

@@ -68,6 +68,8 @@ struct FlowShape {
     phasors: u32,
     // Number of displacements. With one, the second rests at 0.
     degrees: u32,
+    // 1 if contact-free motion also requires that x rests at 0.
+    must_rest: u32,
     // CONTACT_* of the right and of the left wall.
     contacts: array<u32, 2>,
 }
@@ -189,6 +191,8 @@ struct Motion {
     stretch: array<Real, 4>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
+    // Weighted averages of gap, rate, x, its rate and their squares: the first window less the second (regularity.wgsl).
+    averages: array<Real, 5>,
     // The last state of a lane that is being measured.
     ended: MotionNow,
     // What was measured in the present period, and in all (measure.wgsl).
@@ -305,6 +309,11 @@ struct Search {
     all_events: u32,
     // 1 once only further periods of chaos are left.
     confirms_chaos: u32,
+    // Strobe after which the windows of the averages begin, and their length; 0 if they have not begun.
+    average_start: u32,
+    average_length: u32,
+    // 1 if the cycle that was read last has a multiplier of modulus 1.
+    is_neutral: u32,
 }
 
 // All counters of a lane.

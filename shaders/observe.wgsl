@@ -55,7 +55,7 @@ fn begin_period() {
         begin_reading();
     } else if early && is_non_impacting() {
         end_non_impacting();
-    } else if tally.period >= settings.longest || (early && is_chaos()) {
+    } else if tally.period >= settings.longest || (early && is_chaos()) || (early && tally.period >= settings.periods && is_quasi_periodic()) {
         tally.stage = STAGE_DONE;
     } else {
         confirm_chaos();
@@ -84,6 +84,9 @@ fn is_non_impacting() -> bool {
     }
     let s = flows[cell.flow_index].steady;
     let q = motion.q;
+    if shapes[cell.flow_index].must_rest == 1u && (q[2] != 0.0 || q[3] != 0.0) {
+        return false;
+    }
     return derivative_bound(q[0] - s[0], q[1] - s[1], q[2] - s[2], q[3] - s[3]) < flows[cell.flow_index].contact_free_size;
 }
 

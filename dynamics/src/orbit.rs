@@ -15,6 +15,7 @@ mod itinerary;
 mod quantities;
 mod reading;
 mod recurrence;
+mod regularity;
 mod resolution;
 mod search_filter;
 #[cfg(test)]
@@ -22,16 +23,17 @@ mod tests;
 mod trace;
 
 pub use analysis::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, analyse, analyse_flow, analyse_until,
-    status_of,
+    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, NEUTRAL_ORDER, analyse, analyse_flow,
+    analyse_until, status_of,
 };
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
-pub use cell::{Measurement, NEUTRAL_ORDER, measure, measure_until};
+pub use cell::{Measurement, measure, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
+pub use regularity::{LARGEST_DIFFERENCE, LEAST_WINDOW};
 pub use trace::trace;
 
 use crate::model::{Side, State};
@@ -70,11 +72,13 @@ pub enum Class {
     Undecided,
     /// The integration ended early; the status gives the reason.
     Failed,
+    /// Regular motion on a torus: neither periodic nor chaotic.
+    QuasiPeriodic,
 }
 
 impl Class {
     /// Names of all classes, in the order of their indices.
-    pub const NAMES: [&'static str; 4] = ["periodic", "chaotic", "undecided", "failed"];
+    pub const NAMES: [&'static str; 5] = ["periodic", "chaotic", "undecided", "failed", "quasi-periodic"];
 
     /// Returns the index of the class in [`Class::NAMES`].
     pub fn index(self) -> usize {
@@ -83,6 +87,7 @@ impl Class {
             Class::Chaotic => 1,
             Class::Undecided => 2,
             Class::Failed => 3,
+            Class::QuasiPeriodic => 4,
         }
     }
 
@@ -113,11 +118,13 @@ pub enum Status {
     NonFinite,
     /// Rounding decides the period: rounding errors grow to the distance between points of the cycle.
     BelowResolution,
+    /// A Floquet multiplier of the cycle has modulus 1 within its error: perturbations neither decay nor grow.
+    Neutral,
 }
 
 impl Status {
     /// Every status, in the order of its code in records and tables.
-    pub const ALL: [Status; 9] = [
+    pub const ALL: [Status; 10] = [
         Status::Ok,
         Status::Slow,
         Status::NearGrazing,
@@ -127,6 +134,7 @@ impl Status {
         Status::TooStiff,
         Status::NonFinite,
         Status::BelowResolution,
+        Status::Neutral,
     ];
 
     /// Returns the name in tables and on the command line.
@@ -141,6 +149,7 @@ impl Status {
             Status::TooStiff => "too_stiff",
             Status::NonFinite => "non_finite",
             Status::BelowResolution => "below_resolution",
+            Status::Neutral => "neutral",
         }
     }
 

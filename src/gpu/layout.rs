@@ -85,6 +85,7 @@ structs! {
         steps: u32,
         phasors: u32,
         degrees: u32,
+        must_rest: u32,
         contacts: [u32; 2],
     }
 
@@ -153,6 +154,7 @@ structs! {
         vector: [f64; 4],
         stretch: [f64; 4],
         trail: [[f64; 4]; TRAIL],
+        averages: [f64; 5],
         ended: [f64; 11],
         sums: [f64; SUMS],
         totals: [f64; SUMS],
@@ -221,6 +223,9 @@ structs! {
         matching_cycles: u32,
         all_events: u32,
         confirms_chaos: u32,
+        average_start: u32,
+        average_length: u32,
+        is_neutral: u32,
         distances: [u32; 16],
         last_distances: [u32; 16],
         itineraries: [u32; TRAIL],

@@ -2,7 +2,8 @@
 
 use super::precision::Precision;
 use rattlemap_dynamics::orbit::{
-    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR_TOLERANCE, NEUTRAL_ORDER, ON_STROBE_TURNS,
+    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LARGEST_DIFFERENCE, LEAST_WINDOW, LINEAR_TOLERANCE,
+    NEUTRAL_ORDER, ON_STROBE_TURNS,
 };
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 use rattlemap_dynamics::stability::CORRELATION_MARGIN;
@@ -98,6 +99,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("MOST_FAILED_SEARCHES", MOST_FAILED_SEARCHES),
         ("TRAIL", TRAIL as u32),
         ("REQUIRED_CYCLES", BRANCH_CYCLES as u32),
+        ("LEAST_WINDOW_STROBES", LEAST_WINDOW as u32),
         ("WINDOW_SHARE", WINDOW_SHARE),
     ];
     let singles = [
@@ -118,6 +120,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("GRAZING_SPEED", GRAZING_SPEED),
         ("NO_SPEED", NO_SPEED),
         ("NO_THRESHOLD", NO_THRESHOLD),
+        ("LARGEST_DIFFERENCE", LARGEST_DIFFERENCE),
         ("LINEAR", LINEAR_TOLERANCE),
         ("ON_STROBE", on_strobe),
     ];

@@ -43,6 +43,8 @@ pub mod valid {
     /// `pattern`, `pattern_length` and `pattern_hash`.
     pub const PATTERN: u32 = 1 << 8;
     // The bits from 9 on belong to the groups of [`measures`](super::measures::GROUPS).
+    /// Motion without a period is quasi-periodic.
+    pub const QUASI_PERIODIC: u32 = 1 << 31;
 }
 
 /// Results of one cell, in one fixed layout for all engines, precisions and variants.

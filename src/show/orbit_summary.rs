@@ -169,6 +169,7 @@ fn status(status: Status) -> &'static str {
         Status::BelowResolution => {
             "below_resolution: rounding decides the period; points of the cycle cannot be told apart"
         }
+        Status::Neutral => "neutral: a multiplier has modulus 1; perturbations neither decay nor grow",
     }
 }
 

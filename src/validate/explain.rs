@@ -121,7 +121,11 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
     };
     // An undecided claim contradicts nothing if the motion is too slow to be decided. A slow approach cannot distinguish
     // a cycle from one that has just bifurcated from it.
-    let is_undecided = classify(claim) == Class::Undecided;
+    let is_undecided = match classify(claim) {
+        // The averages of an engine converge later than those of the other.
+        Class::QuasiPeriodic => classify(&truth.record) == Class::Undecided,
+        class => class == Class::Undecided,
+    };
     let cannot_decide = |answer: &Answer| {
         let claims_nothing =
             is_undecided || status(claim) == Status::Slow && is_multiple(cell, claim, answer);

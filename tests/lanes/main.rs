@@ -13,6 +13,7 @@ mod engines_agree;
 mod independence;
 mod kinds;
 mod measures;
+mod neutral;
 mod shaders;
 mod standard_errors;
 mod stored;
