@@ -16,6 +16,7 @@ mod quantities;
 mod reading;
 mod recurrence;
 mod search_filter;
+mod section;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -31,6 +32,7 @@ pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
+pub use section::Section;
 pub use trace::trace;
 
 use crate::model::{Side, State};

@@ -11,10 +11,10 @@ use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, status_
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::Quantities;
-use super::reading::Reading;
+use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
-use super::{Budget, Orbit, Status};
+use super::{Budget, Orbit, Section, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Allowance, Stop, Trajectory};
@@ -68,7 +68,8 @@ pub struct Measurement {
     pub strobe: State,
     /// Forcing periods of the motion itself.
     pub periods_run: u32,
-    /// Forcing periods of searches: of Newton's method, with four tangent vectors, and of the readings of cycles.
+    /// Forcing periods of searches: of Newton's method, with four tangent vectors, of the readings of cycles, and of the
+    /// comparison at another phase.
     pub search_periods: u32,
 }
 
@@ -97,7 +98,34 @@ pub fn measure_until(
     (!allowance.is_halted()).then_some(measured)
 }
 
+/// Integrates one cell. If an event of its cycle lies at phase 0, states are compared at another phase, within a second
+/// budget.
 fn measure_within(
+    flow: &Flow,
+    law: Law,
+    start: State,
+    budget: &Budget,
+    allowance: Allowance<'_>,
+) -> Measurement {
+    let first = measure_by_strobes(flow, law, start, budget, allowance);
+    let Some(period) = first.period.filter(|_| first.status == Status::StrobeOnEvent) else { return first };
+    let by_section = || {
+        let section = Section::of(flow, law, first.strobe, period, allowance)?;
+        let second = measure_by_strobes(&section.flow, law, section.start, budget, allowance);
+        second.period?;
+        Some(Measurement {
+            quantities: second.quantities.map(|quantities| section.quantities(quantities)),
+            strobe: section.strobe(law, second.strobe, ON_STROBE_TURNS)?.0,
+            periods_run: first.periods_run,
+            search_periods: first.search_periods + second.periods_run + second.search_periods,
+            ..second
+        })
+    };
+    by_section().unwrap_or(first)
+}
+
+/// Integrates one cell and compares its states at phase 0.
+fn measure_by_strobes(
     flow: &Flow,
     law: Law,
     start: State,
