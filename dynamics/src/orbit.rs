@@ -30,6 +30,7 @@ pub use budget::Budget;
 pub use cell::{Measurement, NEUTRAL_ORDER, measure, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
+pub use itinerary::NEAR_STROBE_TURNS;
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
 pub use section::Section;

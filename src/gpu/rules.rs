@@ -2,7 +2,8 @@
 
 use super::precision::Precision;
 use rattlemap_dynamics::orbit::{
-    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR_TOLERANCE, NEUTRAL_ORDER, ON_STROBE_TURNS,
+    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR_TOLERANCE, NEAR_STROBE_TURNS, NEUTRAL_ORDER,
+    ON_STROBE_TURNS,
 };
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 
@@ -89,6 +90,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("MIRROR_DISTANCE", MIRROR_DISTANCE),
         ("NOISE", noise),
         ("ON_CYCLE", ON_CYCLE),
+        ("NEAR_STROBE", NEAR_STROBE_TURNS),
     ];
     let reals = [
         ("CHAOS_ERRORS", CHAOS_ERRORS),

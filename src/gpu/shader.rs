@@ -134,7 +134,7 @@ impl Variant {
 }
 
 /// The records' validity bits, by their names in the shader.
-const VALID: [(&str, u32); 8] = [
+const VALID: [(&str, u32); 9] = [
     ("PERIOD", valid::PERIOD),
     ("LYAPUNOV", valid::LYAPUNOV),
     ("IMPACTS", valid::IMPACTS),
@@ -143,6 +143,7 @@ const VALID: [(&str, u32); 8] = [
     ("WORD", valid::WORD),
     ("STROBE", valid::STROBE),
     ("PATTERN", valid::PATTERN),
+    ("NEAR_STROBE", valid::NEAR_STROBE),
 ];
 
 /// Returns a number that a precision's file declares.

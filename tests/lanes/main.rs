@@ -12,6 +12,7 @@ mod engines_agree;
 mod independence;
 mod kinds;
 mod measures;
+mod resonance;
 mod shaders;
 mod stored;
 mod work;

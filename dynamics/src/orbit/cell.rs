@@ -107,11 +107,13 @@ fn measure_within(
     budget: &Budget,
     allowance: Allowance<'_>,
 ) -> Measurement {
-    let first = measure_by_strobes(flow, law, start, budget, allowance);
-    let Some(period) = first.period.filter(|_| first.status == Status::StrobeOnEvent) else { return first };
+    let (first, is_on_strobe) = measure_by_strobes(flow, law, start, budget, allowance);
+    if !is_on_strobe {
+        return first;
+    }
     let by_section = || {
-        let section = Section::of(flow, law, first.strobe, period, allowance)?;
-        let second = measure_by_strobes(&section.flow, law, section.start, budget, allowance);
+        let section = Section::of(flow, law, first.strobe, first.period.unwrap_or(2), allowance)?;
+        let (second, _) = measure_by_strobes(&section.flow, law, section.start, budget, allowance);
         second.period?;
         Some(Measurement {
             quantities: second.quantities.map(|quantities| section.quantities(quantities)),
@@ -124,14 +126,15 @@ fn measure_within(
     by_section().unwrap_or(first)
 }
 
-/// Integrates one cell and compares its states at phase 0.
+/// Integrates one cell and compares its states at phase 0. Also returns whether an event at phase 0 makes that
+/// comparison uncertain.
 fn measure_by_strobes(
     flow: &Flow,
     law: Law,
     start: State,
     budget: &Budget,
     allowance: Allowance<'_>,
-) -> Measurement {
+) -> (Measurement, bool) {
     let settings = &budget.settings;
     let analysis = Analysis {
         flow,
@@ -152,11 +155,18 @@ fn measure_by_strobes(
         approaches: false,
         counts: vec![[0.0; 2]],
         itineraries: Vec::new(),
+        near_strobe: 0,
         history: SearchHistory::default(),
         newton: Newton::default(),
         reading_periods: Cell::new(0),
     };
-    run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)))
+    let measured = run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)));
+    let is_on_strobe = match measured.status {
+        Status::StrobeOnEvent => true,
+        Status::Slow => measured.period.is_none() && run.has_events_at_strobes(),
+        _ => false,
+    };
+    (measured, is_on_strobe)
 }
 
 /// Returns modulus and argument of a complex number.
@@ -192,6 +202,8 @@ struct CellRun<'a> {
     counts: Vec<[f64; 2]>,
     /// Itinerary of each period.
     itineraries: Vec<Itinerary>,
+    /// One bit for each of the last periods: whether it has an event near phase 0.
+    near_strobe: u16,
     history: SearchHistory,
     newton: Newton,
     /// Periods of the readings of cycles.
@@ -233,6 +245,7 @@ impl<'a> CellRun<'a> {
         let mut recorder = Recorder::new(self.analysis.flow);
         trajectory.advance_period(&mut recorder)?;
         self.itineraries.push(recorder.itinerary);
+        self.near_strobe = self.near_strobe << 1 | u16::from(recorder.is_near_strobe);
         self.exponent.renormalise(trajectory);
         self.strobes.push(trajectory.state());
         let now = self.strobes.len() as u32 - 1;
@@ -271,6 +284,11 @@ impl<'a> CellRun<'a> {
                 Measurement { quantities: self.analysis.quantities(&trajectory.carrying([])), ..measured }
             }
         }))
+    }
+
+    /// Whether an event stays near phase 0: it may lie before and after the strobe in turn, so every second period has none.
+    fn has_events_at_strobes(&self) -> bool {
+        self.near_strobe.count_ones() >= u16::BITS / 2
     }
 
     /// Whether the motion certainly has no further event.

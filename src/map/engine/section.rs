@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use crate::gpu::{Gpu, GpuError, Lane, LaneSettings, has_sine, rules};
-use crate::record::Record;
 use crate::record::classify::{classify, status};
+use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Oscillator};
 use rattlemap_dynamics::orbit::{Class, Section, Status};
@@ -30,8 +30,8 @@ pub(crate) async fn compare_at_sections(
     settings: &LaneSettings,
 ) -> Result<(), GpuError> {
     let section = |(place, (number, record)): (usize, &(u32, Record))| {
-        let Class::Periodic { period } = classify(record) else { return None };
         let (oscillator, law) = is_on_strobe(record).then(|| of(*number))?;
+        let period = if record.period > 0 { record.period } else { 2 };
         let flow = Flow::new(&oscillator);
         let section = Section::of(&flow, law, record.strobe, period, Allowance::UNLIMITED)?;
         Some((place, section, law))
@@ -53,20 +53,38 @@ pub(crate) async fn compare_at_sections(
         let settings = LaneSettings { sine: settings.sine || flows.iter().any(has_sine), ..*settings };
         let again = gpu.run(&flows, &laws, &lanes, &settings).await?;
         for ((place, section, law), mut second) in batch.iter().zip(again) {
-            let strobe = section.strobe(*law, second.strobe, tolerance);
-            let (true, Some((strobe, _))) = (matches!(classify(&second), Class::Periodic { .. }), strobe)
-            else {
-                continue;
-            };
-            second.turn_harmonics(|phase| section.harmonic_phase(phase));
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "{:?} start {:?} second {:?} {:?} {} {:?}",
+                    records[*place].1.strobe,
+                    section.start,
+                    second.period,
+                    status(&second),
+                    second.periods_run,
+                    second.strobe
+                );
+            }
             let first = &mut records[*place].1;
+            let strobe = section.strobe(*law, second.strobe, tolerance);
+            let Some((strobe, _)) = strobe.filter(|_| replaces(&second, first)) else { continue };
+            second.turn_harmonics(|phase| section.harmonic_phase(phase));
             *first = Record { strobe, periods_run: first.periods_run, ..second };
         }
     }
+    records.iter_mut().for_each(|(_, record)| record.valid &= !valid::NEAR_STROBE);
     Ok(())
 }
 
-/// Whether an event of the record's cycle lies at phase 0.
+/// Whether an event at phase 0 makes the record uncertain.
 pub(crate) fn is_on_strobe(record: &Record) -> bool {
-    status(record) == Status::StrobeOnEvent
+    status(record) == Status::StrobeOnEvent && record.period > 0 || record.valid & valid::NEAR_STROBE != 0
+}
+
+/// Whether a second run replaces a record. The period of a record with the flag may be right.
+fn replaces(second: &Record, first: &Record) -> bool {
+    let is_flagged = first.valid & valid::NEAR_STROBE != 0;
+    let is_shorter =
+        first.period == 0 || first.period > second.period && first.period.is_multiple_of(second.period);
+    matches!(classify(second), Class::Periodic { .. })
+        && (is_shorter || !is_flagged || status(first) == Status::StrobeOnEvent)
 }
