@@ -245,8 +245,8 @@ struct TallyNow {
     hash_low: u32,
     hash_high: u32,
     recent: u32,
-    // Events on the strobe phase.
-    on_strobe: u32,
+    // Distance from phase 0 of the nearest event since counting began, in turns: the bits of an f32.
+    strobe_distance: u32,
     // Hash of the present period's events.
     itinerary: u32,
 }
@@ -395,6 +395,9 @@ struct Queue {
     beat: u32,
     lanes: array<u32>,
 }
+
+// A strobe distance of half a turn: there is no event.
+const FAR_FROM_STROBE: u32 = 0x3f000000u;
 
 const STAGE_RUNNING: u32 = 0u;
 const STAGE_READING: u32 = 1u; // a period was found, and its cycle is being read

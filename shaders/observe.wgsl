@@ -103,7 +103,7 @@ fn begin_counting() {
     tally.impacts = 0u;
     tally.events = 0u;
     tally.grazes = 0u;
-    tally.on_strobe = 0u;
+    tally.strobe_distance = FAR_FROM_STROBE;
     tally.mesh_right = 0u;
     tally.mesh_left = 0u;
     tally.mesh_whole = 0u;

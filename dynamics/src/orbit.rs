@@ -18,6 +18,7 @@ mod recurrence;
 mod regularity;
 mod resolution;
 mod search_filter;
+mod section;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -31,9 +32,11 @@ pub use budget::Budget;
 pub use cell::{Measurement, measure, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
+pub use itinerary::NEAR_STROBE_TURNS;
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_WINDOW};
+pub use section::Section;
 pub use trace::trace;
 
 use crate::model::{Side, State};

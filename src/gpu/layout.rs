@@ -188,7 +188,7 @@ structs! {
         hash_low: u32,
         hash_high: u32,
         recent: u32,
-        on_strobe: u32,
+        strobe_distance: u32,
         itinerary: u32,
         has_read: u32,
         cycle: u32,

@@ -3,7 +3,7 @@
 use super::precision::Precision;
 use rattlemap_dynamics::orbit::{
     BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LARGEST_DIFFERENCE, LEAST_WINDOW, LINEAR_TOLERANCE,
-    NEUTRAL_ORDER, ON_STROBE_TURNS,
+    NEAR_STROBE_TURNS, NEUTRAL_ORDER, ON_STROBE_TURNS,
 };
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 use rattlemap_dynamics::stability::CORRELATION_MARGIN;
@@ -111,6 +111,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("ON_CYCLE", ON_CYCLE),
         ("SETTLED_DISTANCE", settled_distance(precision)),
         ("SYMMETRIC", symmetric(precision)),
+        ("NEAR_STROBE", NEAR_STROBE_TURNS),
     ];
     let reals = [
         ("CHAOS_ERRORS", CHAOS_ERRORS),

@@ -14,6 +14,7 @@ mod independence;
 mod kinds;
 mod measures;
 mod neutral;
+mod resonance;
 mod shaders;
 mod standard_errors;
 mod stored;

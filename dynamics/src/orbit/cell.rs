@@ -11,11 +11,11 @@ use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, neutral
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::Quantities;
-use super::reading::Reading;
+use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
 use super::regularity::is_regular;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
-use super::{Budget, Orbit, Status};
+use super::{Budget, Orbit, Section, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Allowance, Stop, Trajectory};
@@ -70,7 +70,8 @@ pub struct Measurement {
     pub strobe: State,
     /// Forcing periods of the motion itself.
     pub periods_run: u32,
-    /// Forcing periods of searches: of Newton's method, with four tangent vectors, and of the readings of cycles.
+    /// Forcing periods of searches: of Newton's method, with four tangent vectors, of the readings of cycles, and of the
+    /// comparison at another phase.
     pub search_periods: u32,
 }
 
@@ -99,6 +100,8 @@ pub fn measure_until(
     (!allowance.is_halted()).then_some(measured)
 }
 
+/// Integrates one cell. If an event of its cycle lies at phase 0, states are compared at another phase, within a second
+/// budget.
 fn measure_within(
     flow: &Flow,
     law: Law,
@@ -106,6 +109,34 @@ fn measure_within(
     budget: &Budget,
     allowance: Allowance<'_>,
 ) -> Measurement {
+    let (first, is_on_strobe) = measure_by_strobes(flow, law, start, budget, allowance);
+    if !is_on_strobe {
+        return first;
+    }
+    let by_section = || {
+        let section = Section::of(flow, law, first.strobe, first.period.unwrap_or(2), allowance)?;
+        let (second, _) = measure_by_strobes(&section.flow, law, section.start, budget, allowance);
+        second.period?;
+        Some(Measurement {
+            quantities: second.quantities.map(|quantities| section.quantities(quantities)),
+            strobe: section.strobe(law, second.strobe, ON_STROBE_TURNS)?.0,
+            periods_run: first.periods_run,
+            search_periods: first.search_periods + second.periods_run + second.search_periods,
+            ..second
+        })
+    };
+    by_section().unwrap_or(first)
+}
+
+/// Integrates one cell and compares its states at phase 0. Also returns whether an event at phase 0 makes that
+/// comparison uncertain.
+fn measure_by_strobes(
+    flow: &Flow,
+    law: Law,
+    start: State,
+    budget: &Budget,
+    allowance: Allowance<'_>,
+) -> (Measurement, bool) {
     let settings = &budget.settings;
     let analysis = Analysis {
         flow,
@@ -128,11 +159,18 @@ fn measure_within(
         is_neutral: false,
         counts: vec![[0.0; 2]],
         itineraries: Vec::new(),
+        near_strobe: 0,
         history: SearchHistory::default(),
         newton: Newton::default(),
         reading_periods: Cell::new(0),
     };
-    run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)))
+    let measured = run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)));
+    let is_on_strobe = match measured.status {
+        Status::StrobeOnEvent => true,
+        Status::Slow => measured.period.is_none() && run.has_events_at_strobes(),
+        _ => false,
+    };
+    (measured, is_on_strobe)
 }
 
 /// Returns modulus and argument of a complex number.
@@ -170,6 +208,8 @@ struct CellRun<'a> {
     counts: Vec<[f64; 2]>,
     /// Itinerary of each period.
     itineraries: Vec<Itinerary>,
+    /// One bit for each of the last periods: whether it has an event near phase 0.
+    near_strobe: u16,
     history: SearchHistory,
     newton: Newton,
     /// Periods of the readings of cycles.
@@ -212,6 +252,7 @@ impl<'a> CellRun<'a> {
         let mut recorder = Recorder::new(self.analysis.flow);
         trajectory.advance_period(&mut recorder)?;
         self.itineraries.push(recorder.itinerary);
+        self.near_strobe = self.near_strobe << 1 | u16::from(recorder.is_near_strobe);
         self.exponent.renormalise(trajectory);
         self.strobes.push(trajectory.state());
         let now = self.strobes.len() as u32 - 1;
@@ -255,6 +296,11 @@ impl<'a> CellRun<'a> {
                 Measurement { quantities: self.analysis.quantities(&trajectory.carrying([])), ..measured }
             }
         }))
+    }
+
+    /// Whether an event stays near phase 0: it may lie before and after the strobe in turn, so every second period has none.
+    fn has_events_at_strobes(&self) -> bool {
+        self.near_strobe.count_ones() >= u16::BITS / 2
     }
 
     /// Whether the motion certainly has no further event.

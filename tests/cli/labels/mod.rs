@@ -1,6 +1,6 @@
 //! Labels of cells where rounding, a transient or a strobe on an event stands between the motion and its name.
 //!
-//! The right answers come from an independent program in 80-bit arithmetic, that of `resonance` from a closed form.
+//! The right answers come from an independent program in 80-bit arithmetic.
 
 use std::fs;
 use std::path::Path;
@@ -170,17 +170,6 @@ fn labels_of_the_reference_are_right() {
 fn labels_of_lanes_are_right() {
     check_labels(F32);
     check_labels(F64);
-}
-
-/// An undamped oscillator that is forced at its own frequency against a wall. In closed form the motion has period 1 with
-/// one impact, at phase 0 of the force, so that rounding puts the impact before or after the strobe.
-#[test]
-fn an_impact_at_phase_0_changes_the_period() {
-    let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("resonance.toml"), input("resonance")).unwrap();
-    let output = rattlemap(&folder).args(["orbit", "--model", "resonance.toml", "--json"]).assert().success();
-    let orbit: serde_json::Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
-    assert_eq!(orbit["period"], 3, "the right period is 1");
 }
 
 /// The cycle and its mirror image differ by 1.5e-4: y(T/2) + y(0) is not zero. Lanes in f32 do not resolve that.
