@@ -16,7 +16,9 @@ mod quantities;
 mod reading;
 mod recurrence;
 mod regularity;
+mod resolution;
 mod search_filter;
+mod section;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -30,9 +32,11 @@ pub use budget::Budget;
 pub use cell::{Measurement, measure, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
+pub use itinerary::NEAR_STROBE_TURNS;
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_WINDOW};
+pub use section::Section;
 pub use trace::trace;
 
 use crate::model::{Side, State};
@@ -115,7 +119,7 @@ pub enum Status {
     TooStiff,
     /// The state is not finite.
     NonFinite,
-    /// Points of the cycle lie closer together than the engine resolves: the true period may be a divisor.
+    /// Rounding decides the period: rounding errors grow to the distance between points of the cycle.
     BelowResolution,
     /// A Floquet multiplier of the cycle has modulus 1 within its error: perturbations neither decay nor grow.
     Neutral,

@@ -109,7 +109,7 @@ def plot(
 
 def _inches(width: str) -> float:
     """Return a width in inches."""
-    length = re.fullmatch(r"\s*([0-9.]+)\s*(mm|cm|in|pt)\s*", width)
+    length = re.fullmatch(r"\s*([0-9.]+)\s*(mm|cm|in|pt)\s*", str(width))
     try:
         inches = float(length[1]) * _UNITS[length[2]] if length else 0.0
     except ValueError:

@@ -135,7 +135,7 @@ impl Variant {
 }
 
 /// The records' validity bits, by their names in the shader.
-const VALID: [(&str, u32); 9] = [
+const VALID: [(&str, u32); 10] = [
     ("PERIOD", valid::PERIOD),
     ("LYAPUNOV", valid::LYAPUNOV),
     ("IMPACTS", valid::IMPACTS),
@@ -145,6 +145,7 @@ const VALID: [(&str, u32); 9] = [
     ("STROBE", valid::STROBE),
     ("PATTERN", valid::PATTERN),
     ("QUASI_PERIODIC", valid::QUASI_PERIODIC),
+    ("NEAR_STROBE", valid::NEAR_STROBE),
 ];
 
 /// Returns a number that a precision's file declares.

@@ -149,7 +149,7 @@ fn meaning(status: Status) -> &'static str {
         Status::TooStiff => "failed: too stiff for the engine",
         Status::NonFinite => "failed: the state became infinite or not a number",
         Status::BelowResolution => {
-            "points of the cycle are closer than the engine resolves: the true period may be a divisor"
+            "rounding decides the period: errors grow to the distance between points of the cycle"
         }
         Status::Neutral => {
             "a multiplier has modulus 1 within its error: perturbations neither decay nor grow"

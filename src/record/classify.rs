@@ -11,7 +11,7 @@
 //! - `undecided` otherwise: near bifurcations, in long transients, on cycles longer than `max_period`, if the
 //!   exponent is clearly negative, and near cycles with a multiplier of modulus 1 (status `neutral`).
 //!
-//! Two motions are wrongly called chaotic: transient chaos that outlasts the budget, and motion that grows without
+//! Two motions are wrongly called chaotic: transient chaos that outlasts the budget (`confirm_chaos` extends it), and motion that grows without
 //! bound, as of undamped elastic pairs.
 
 use crate::record::{Record, valid};

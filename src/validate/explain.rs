@@ -75,13 +75,16 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
     if is_rounding { Kind::Border } else { Kind::Unexplained }
 }
 
-/// Whether the claim has the status `below_resolution` and the answer's cycle confirms it: it is the same cycle or closes
-/// earlier, within the effect of rounding.
+/// Whether the claim has the status `below_resolution` and the answer confirms it: by the same status, or because its cycle
+/// is the same or closes earlier, within the effect of rounding.
 fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
+    let confirms = |answer: &Answer| {
+        claim.period.is_multiple_of(answer.record.period.max(1))
+            && is_multiple(cell, claim, answer)
+            && cell.closes_earlier(answer.record.strobe, claim.period)
+    };
     status(claim) == Status::BelowResolution
-        && claim.period.is_multiple_of(answer.record.period.max(1))
-        && is_multiple(cell, claim, answer)
-        && cell.closes_earlier(answer.record.strobe, claim.period)
+        && (status(&answer.record) == Status::BelowResolution || confirms(answer))
 }
 
 /// Whether a record agrees once its exponent and status are replaced by those of the cycle itself.

@@ -5,10 +5,11 @@ use std::sync::atomic::AtomicBool;
 use super::approach::{BRANCH_CYCLES, HULL_CYCLES, LINEAR_TOLERANCE, stays};
 use super::itinerary::Recorder;
 use super::quantities::{Meter, Quantities};
-use super::reading::Reading;
+use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Candidate, Metric, RECURRENCE_DISTANCE, candidates};
 use super::regularity::is_regular;
-use super::{Class, Orbit, Settings, Status};
+use super::resolution::is_below_resolution;
+use super::{Class, Orbit, Section, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, Model, ModelError, NonImpacting, State};
 use crate::reference::{Allowance, Stop, Trajectory};
@@ -173,7 +174,33 @@ pub(super) struct Analysis<'a> {
 }
 
 impl Analysis<'_> {
+    /// Classifies the motion from `start`. If an event of its cycle lies at phase 0, states are compared at another
+    /// phase.
     fn orbit(&self, start: State) -> Orbit {
+        let orbit = self.orbit_by_strobes(start);
+        match orbit.status {
+            Status::StrobeOnEvent => self.orbit_by_section(&orbit).unwrap_or(orbit),
+            _ => orbit,
+        }
+    }
+
+    /// Classifies the motion that continues a cycle with an event at phase 0; none if no cycle is found.
+    fn orbit_by_section(&self, first: &Orbit) -> Option<Orbit> {
+        let section = Section::of(self.flow, self.law, first.strobe, first.cycle_periods, self.allowance)?;
+        let second = Analysis { flow: &section.flow, ..*self }.orbit_by_strobes(section.start);
+        let Class::Periodic { period } = second.class else { return None };
+        let (strobe, strobe_meshing) = section.strobe(self.law, second.strobe, ON_STROBE_TURNS)?;
+        Some(Orbit {
+            strobe,
+            strobe_meshing,
+            events: section.events(&second.events, period),
+            quantities: second.quantities.map(|quantities| section.quantities(quantities)),
+            periods_run: first.periods_run + second.periods_run,
+            ..second
+        })
+    }
+
+    fn orbit_by_strobes(&self, start: State) -> Orbit {
         let mut periods_run = 0;
         let run = self.run(start, &mut periods_run);
         let orbit = run.unwrap_or_else(|stop| failed(status_of(stop), start, self.flow.period));
@@ -449,7 +476,8 @@ impl Analysis<'_> {
         if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         }
-        Ok(Reading { closes, ..reading })
+        let below_resolution = is_below_resolution(seed, cycle, &reading.events)?;
+        Ok(Reading { closes, below_resolution, ..reading })
     }
 
     /// Builds the orbit of a cycle; `distance` is that of the motion from the cycle.
@@ -462,6 +490,8 @@ impl Analysis<'_> {
             Status::Neutral
         } else if distance > ON_CYCLE {
             Status::Slow
+        } else if reading.below_resolution {
+            Status::BelowResolution
         } else {
             Status::Ok
         };

@@ -11,11 +11,11 @@ use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, neutral
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::Quantities;
-use super::reading::Reading;
+use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
 use super::regularity::is_regular;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
-use super::{Budget, Orbit, Status};
+use super::{Budget, Orbit, Section, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Allowance, Stop, Trajectory};
@@ -70,7 +70,8 @@ pub struct Measurement {
     pub strobe: State,
     /// Forcing periods of the motion itself.
     pub periods_run: u32,
-    /// Forcing periods of searches: of Newton's method, with four tangent vectors, and of the readings of cycles.
+    /// Forcing periods of searches: of Newton's method, with four tangent vectors, of the readings of cycles, and of the
+    /// comparison at another phase.
     pub search_periods: u32,
 }
 
@@ -99,6 +100,8 @@ pub fn measure_until(
     (!allowance.is_halted()).then_some(measured)
 }
 
+/// Integrates one cell. If an event of its cycle lies at phase 0, states are compared at another phase, within a second
+/// budget.
 fn measure_within(
     flow: &Flow,
     law: Law,
@@ -106,6 +109,34 @@ fn measure_within(
     budget: &Budget,
     allowance: Allowance<'_>,
 ) -> Measurement {
+    let (first, is_on_strobe) = measure_by_strobes(flow, law, start, budget, allowance);
+    if !is_on_strobe {
+        return first;
+    }
+    let by_section = || {
+        let section = Section::of(flow, law, first.strobe, first.period.unwrap_or(2), allowance)?;
+        let (second, _) = measure_by_strobes(&section.flow, law, section.start, budget, allowance);
+        second.period?;
+        Some(Measurement {
+            quantities: second.quantities.map(|quantities| section.quantities(quantities)),
+            strobe: section.strobe(law, second.strobe, ON_STROBE_TURNS)?.0,
+            periods_run: first.periods_run,
+            search_periods: first.search_periods + second.periods_run + second.search_periods,
+            ..second
+        })
+    };
+    by_section().unwrap_or(first)
+}
+
+/// Integrates one cell and compares its states at phase 0. Also returns whether an event at phase 0 makes that
+/// comparison uncertain.
+fn measure_by_strobes(
+    flow: &Flow,
+    law: Law,
+    start: State,
+    budget: &Budget,
+    allowance: Allowance<'_>,
+) -> (Measurement, bool) {
     let settings = &budget.settings;
     let analysis = Analysis {
         flow,
@@ -128,11 +159,18 @@ fn measure_within(
         is_neutral: false,
         counts: vec![[0.0; 2]],
         itineraries: Vec::new(),
+        near_strobe: 0,
         history: SearchHistory::default(),
         newton: Newton::default(),
         reading_periods: Cell::new(0),
     };
-    run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)))
+    let measured = run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)));
+    let is_on_strobe = match measured.status {
+        Status::StrobeOnEvent => true,
+        Status::Slow => measured.period.is_none() && run.has_events_at_strobes(),
+        _ => false,
+    };
+    (measured, is_on_strobe)
 }
 
 /// Returns modulus and argument of a complex number.
@@ -170,6 +208,8 @@ struct CellRun<'a> {
     counts: Vec<[f64; 2]>,
     /// Itinerary of each period.
     itineraries: Vec<Itinerary>,
+    /// One bit for each of the last periods: whether it has an event near phase 0.
+    near_strobe: u16,
     history: SearchHistory,
     newton: Newton,
     /// Periods of the readings of cycles.
@@ -182,7 +222,8 @@ impl<'a> CellRun<'a> {
         let last = self.budget.longest();
         let exponent_from = self.budget.exponent_from();
         let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
-        let mut next_check = if self.budget.early_stop { FIRST_CHECK.min(budget) } else { last };
+        let decided_by = self.budget.decided_by();
+        let mut next_check = if self.budget.early_stop { FIRST_CHECK.min(budget) } else { decided_by };
         let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start).allowing(self.allowance);
         while bare.period() < u64::from(turning_from) {
             if let Some(measured) = self.period(&mut bare, &mut next_check, last)? {
@@ -211,6 +252,7 @@ impl<'a> CellRun<'a> {
         let mut recorder = Recorder::new(self.analysis.flow);
         trajectory.advance_period(&mut recorder)?;
         self.itineraries.push(recorder.itinerary);
+        self.near_strobe = self.near_strobe << 1 | u16::from(recorder.is_near_strobe);
         self.exponent.renormalise(trajectory);
         self.strobes.push(trajectory.state());
         let now = self.strobes.len() as u32 - 1;
@@ -222,10 +264,12 @@ impl<'a> CellRun<'a> {
             return Ok(None);
         }
         let (budget, chaos_from) = (self.budget.periods(), self.budget.chaos_from());
+        let decided_by = self.budget.decided_by();
         let next = now + now.div_ceil(CHECK_DIVISOR);
-        let stages = [chaos_from, budget, last].into_iter().filter(|&stage| now < stage && stage <= last);
+        let stages = [chaos_from, budget, decided_by, last];
+        let stages = stages.into_iter().filter(|&stage| now < stage && stage <= last);
         *next_check = next.min(stages.min().unwrap_or(last));
-        let is_last = now == budget || now == last;
+        let is_last = [budget, decided_by, last].contains(&now);
         if let Some(orbit) = self.confirmed_orbit(&trajectory.carrying([]), is_last)? {
             let strobe = if is_last { trajectory.state() } else { orbit.strobe };
             return Ok(Some(self.periodic(orbit, strobe)));
@@ -235,8 +279,11 @@ impl<'a> CellRun<'a> {
         self.allowance.covers(work)?;
         Ok(match now {
             // Newton's method does not find this cycle if the degree of freedom at rest is undamped.
-            _ if now == last && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
+            _ if now >= decided_by && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
+            // Only chaos continues until the last period.
+            _ if now == decided_by => Some(self.aperiodic(CHAOS_ERRORS)).filter(|cell| !cell.is_decided()),
+            _ if decided_by < last => None,
             _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measurement::is_decided),
             _ if now >= chaos_from && !self.approaches => {
                 Some(self.aperiodic(self.budget.chaos_errors())).filter(Measurement::is_decided)
@@ -249,6 +296,11 @@ impl<'a> CellRun<'a> {
                 Measurement { quantities: self.analysis.quantities(&trajectory.carrying([])), ..measured }
             }
         }))
+    }
+
+    /// Whether an event stays near phase 0: it may lie before and after the strobe in turn, so every second period has none.
+    fn has_events_at_strobes(&self) -> bool {
+        self.near_strobe.count_ones() >= u16::BITS / 2
     }
 
     /// Whether the motion certainly has no further event.
@@ -359,7 +411,9 @@ impl<'a> CellRun<'a> {
         let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_strobe_of(found));
         let distance = |back: usize| metric.distance(&self.strobes[now - back * period], &cycle.state);
         let present = distance(0);
-        let left = f64::from(self.budget.periods()) - (self.strobes.len() - 1) as f64;
+        let is_confirming = self.strobes.len() as u32 - 1 > self.budget.decided_by();
+        let end = if is_confirming { self.budget.longest() } else { self.budget.periods() };
+        let left = f64::from(end) - (self.strobes.len() - 1) as f64;
         // The predicted distance at the end of the budget gives the same status with and without early stops.
         let radius = cycle.spectral_radius();
         let at_last = present * radius.powf(left / f64::from(cycle.period));
@@ -391,7 +445,8 @@ impl<'a> CellRun<'a> {
         if let Some(reading) = found.reading.get() {
             return Ok(reading);
         }
-        self.reading_periods.set(self.reading_periods.get() + found.cycle.period);
+        // Once for the events, once for the growth of rounding errors.
+        self.reading_periods.set(self.reading_periods.get() + 2 * found.cycle.period);
         let reading = self.analysis.read(&found.seed, &found.cycle)?;
         Ok(found.reading.get_or_init(|| reading))
     }

@@ -9,6 +9,7 @@ fn budget(early_stop: bool, transient_periods: u32) -> Budget {
         settings: Settings { transient_periods, ..Settings::default() },
         early_stop,
         undecided_periods: 1584,
+        confirm_chaos: 0,
         exponent: true,
         shows_exponent: true,
         quantities: false,

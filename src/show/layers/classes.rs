@@ -22,6 +22,9 @@ const EXCEPTIONS: u8 = FIRST_PERIOD + 63;
 const FIRST_SHADE: u8 = EXCEPTIONS + 3;
 const SHADES: u8 = 64;
 
+/// Forcing periods T to which the legend refers the rate at which chaos ends.
+const PERIODS: u32 = 1000;
+
 /// Number of periods in the legend before the others are combined in one entry.
 const LISTED_PERIODS: usize = 17;
 
@@ -54,7 +57,16 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         high,
         beyond: count_beyond(exponents(), 0.0, high),
     };
-    let entries = entries(&indices, &palette, shows_chaos, cells.has(Quantity::Symmetric));
+    let chaos = match cells.chaos_ends() {
+        // The legend has no room for the interval, which `map` prints.
+        Some(rate) => {
+            let text = rate.text_within(PERIODS).replace("below", "<");
+            let share = text.split(',').next().unwrap_or_default();
+            format!("chaos, {share} end in {PERIODS} T")
+        }
+        None => "chaos".to_owned(),
+    };
+    let entries = entries(&indices, &palette, chaos, shows_chaos, cells.has(Quantity::Symmetric));
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);
     Layer {
         name: "map".into(),
@@ -93,7 +105,13 @@ fn palette() -> Vec<Color> {
 }
 
 /// Returns the legend: low periods first, then chaos, quasi-periodic, undecided and failed.
-fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool, shows_symmetry: bool) -> Vec<NamedColor> {
+fn entries(
+    indices: &[u8],
+    palette: &[Color],
+    chaos_text: String,
+    shows_chaos: bool,
+    shows_symmetry: bool,
+) -> Vec<NamedColor> {
     let mut counts = [0usize; 256];
     indices.iter().for_each(|&index| counts[usize::from(index)] += 1);
     let entry = |index: usize, text: String| NamedColor { color: palette[index], text, cells: counts[index] };
@@ -124,7 +142,7 @@ fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool, shows_symmetry:
     let chaos = counts[FIRST_SHADE.into()..].iter().sum();
     let middle = if shows_chaos { usize::from(FIRST_SHADE + SHADES / 2) } else { palette.len() - 1 };
     let exceptions = usize::from(EXCEPTIONS);
-    list.push(NamedColor { color: palette[middle], text: "chaos".to_owned(), cells: chaos });
+    list.push(NamedColor { color: palette[middle], text: chaos_text, cells: chaos });
     list.push(entry(exceptions + 2, "quasi-periodic".to_owned()));
     list.push(entry(exceptions, "undecided".to_owned()));
     list.push(entry(exceptions + 1, "failed".to_owned()));
