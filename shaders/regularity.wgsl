@@ -54,6 +54,7 @@ fn is_quasi_periodic() -> bool {
     let rate = flows[cell.flow_index].domains[0].angle / unit_of_rates();
     let displacements = max(abs(d[0]), abs(d[2])) * unit;
     let difference = max(max(displacements, abs(d[4]) * unit * unit), max(abs(d[1]), abs(d[3])) * rate);
+    let growth = mean_growth();
     return difference < LARGEST_DIFFERENCE * Real(exp2(-f32(nearest) / PARTS_PER_OCTAVE))
-        && !exceeds_neutral(abs(mean_growth().x));
+        && growth.x >= -CHAOS_ERRORS * growth.y && !exceeds_neutral(abs(growth.x));
 }

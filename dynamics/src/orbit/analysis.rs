@@ -262,10 +262,11 @@ impl Analysis<'_> {
     }
 
     /// Whether the motion is quasi-periodic: the largest exponent is zero, like the one of the phase, and the section is
-    /// regular. Tangents on a torus may grow like those of neutral motion, but no more.
+    /// regular. Tangents on a torus may grow like those of neutral motion, but no more, and they do not shrink.
     fn is_quasi_periodic(&self, window: &Window) -> bool {
         let count = window.strobes.len() as f64;
-        window.lyapunov.abs() * count * self.flow.period <= neutral_growth(TANGENT_PERIODS, count)
+        window.lyapunov >= -CHAOS_ERRORS * window.lyapunov_error
+            && window.lyapunov.abs() * count * self.flow.period <= neutral_growth(TANGENT_PERIODS, count)
             && is_regular(&window.strobes, &window.metric, self.settings.max_period)
     }
 
