@@ -191,8 +191,8 @@ struct Motion {
     stretch: array<Real, 4>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
-    // Weighted averages of gap, rate, x, its rate and their squares: the first window less the second (regularity.wgsl).
-    averages: array<Real, 5>,
+    // Weighted averages of gap, x and their squares: the first window less the second (regularity.wgsl).
+    averages: array<Real, 3>,
     // The last state of a lane that is being measured.
     ended: MotionNow,
     // What was measured in the present period, and in all (measure.wgsl).

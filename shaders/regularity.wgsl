@@ -10,7 +10,7 @@ fn add_to_averages() {
         if 4u * tally.period >= settings.periods && budget >= tally.period + 4u * LEAST_WINDOW_STROBES {
             search.average_length = (budget - tally.period) / 16u * 7u;
             search.average_start = search.strobe_count;
-            motions[lane].averages = array<Real, 5>();
+            motions[lane].averages = array<Real, 3>();
         }
         return;
     }
@@ -23,15 +23,13 @@ fn add_to_averages() {
     // The integral of the window from 0 to 1 is 1/630. The second window counts as negative.
     let weight = select(Real(-630.0), Real(630.0), n < length) / Real(length) * square * square;
     let q = strobe_state();
-    let rate = 1.0 / flows[cell.flow_index].domains[0].angle;
-    let w = rate * q[1];
-    let v = rate * q[3];
-    let squares = (q[0] * q[0] + q[2] * q[2]) + (w * w + v * v);
-    var values = array<Real, 5>(q[0], w, q[2], v, squares);
-    for (var k = 0u; k < 5u; k++) {
-        motions[lane].averages[k] += weight * values[k];
-    }
+    motions[lane].averages[0] += weight * q[0];
+    motions[lane].averages[1] += weight * q[2];
+    motions[lane].averages[2] += weight * (q[0] * q[0] + q[2] * q[2]);
 }
+
+// Largest rounding error of an average, in units of ULP times the motion.
+const ROUNDING_OF_AVERAGES: Real = 16.0;
 
 // Whether both windows are complete.
 fn has_averages() -> bool {
@@ -51,10 +49,9 @@ fn is_quasi_periodic() -> bool {
     }
     let d = motions[lane].averages;
     let unit = 1.0 / max(measures.position_scale, Real(1e-30));
-    let rate = flows[cell.flow_index].domains[0].angle / unit_of_rates();
-    let displacements = max(abs(d[0]), abs(d[2])) * unit;
-    let difference = max(max(displacements, abs(d[4]) * unit * unit), max(abs(d[1]), abs(d[3])) * rate);
+    let difference = max(max(abs(d[0]), abs(d[1])) * unit, abs(d[2]) * unit * unit);
+    let allowed = LARGEST_DIFFERENCE * Real(exp2(-f32(nearest) / PARTS_PER_OCTAVE)) + ROUNDING_OF_AVERAGES * ULP;
     let growth = mean_growth();
-    return difference < LARGEST_DIFFERENCE * Real(exp2(-f32(nearest) / PARTS_PER_OCTAVE))
+    return difference < allowed
         && growth.x >= -CHAOS_ERRORS * growth.y && !exceeds_neutral(abs(growth.x));
 }

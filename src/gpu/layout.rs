@@ -154,7 +154,7 @@ structs! {
         vector: [f64; 4],
         stretch: [f64; 4],
         trail: [[f64; 4]; TRAIL],
-        averages: [f64; 5],
+        averages: [f64; 3],
         ended: [f64; 11],
         sums: [f64; SUMS],
         totals: [f64; SUMS],
