@@ -36,7 +36,8 @@ fn has_averages() -> bool {
     return search.average_length > 0u && search.strobe_count >= search.average_start + 2u * search.average_length;
 }
 
-// Whether the exponent is that of neutral motion and the section is regular.
+// Whether the exponent is that of neutral motion and the section is regular. Near a cycle the section is too small to show
+// whether it shrinks.
 fn is_quasi_periodic() -> bool {
     if !EXPONENT || search.blocks < 2u || !has_averages() || search.known_lags == 0u
         || 2u * search.known_lags < settings.max_period {
@@ -52,6 +53,6 @@ fn is_quasi_periodic() -> bool {
     let difference = max(max(abs(d[0]), abs(d[1])) * unit, abs(d[2]) * unit * unit);
     let allowed = LARGEST_DIFFERENCE * Real(exp2(-f32(nearest) / PARTS_PER_OCTAVE)) + ROUNDING_OF_AVERAGES * ULP;
     let growth = mean_growth();
-    return difference < allowed
+    return difference < allowed && !escapes(CHAOS_ERRORS)
         && growth.x >= -CHAOS_ERRORS * growth.y && !exceeds_neutral(abs(growth.x));
 }

@@ -6,7 +6,7 @@
 //! Physica D 411 (2020) 132569): of each displacement, and of the sum of their squares, which shows whether a spiral
 //! shrinks. Velocities jump where an impact passes phase 0, and their averages converge slowly.
 
-use super::recurrence::Metric;
+use super::recurrence::{Metric, near_saddle};
 use crate::model::State;
 
 /// Least number of strobe states in a window.
@@ -20,10 +20,11 @@ pub const LARGEST_DIFFERENCE: f64 = 1.0 / 1024.0;
 /// polynomial; for windows of up to 500 strobes its side lobes are lower than those of the exponential window.
 const POWER: i32 = 4;
 
-/// Whether averages over both halves of a sequence of strobe states agree.
+/// Whether averages over both halves of a sequence of strobe states agree, and the states do not stay near a cycle.
 pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) -> bool {
     let length = strobes.len() / 2;
-    if length < LEAST_WINDOW {
+    // Near a cycle the section is too small to show whether it shrinks.
+    if length < LEAST_WINDOW || near_saddle(strobes, metric, max_period) >= length {
         return false;
     }
     let [first, second] = [0, length].map(|from| averages(&strobes[from..][..length], metric));
