@@ -158,6 +158,10 @@ struct Measures {
     // Growth of the tangent vector over whole blocks: its sum, and the sum of squared deviations from its mean.
     growth_sum: Real,
     growth_squares: Real,
+    // Sum of products of consecutive blocks, both relative to the first block; the first and the last whole block.
+    growth_products: Real,
+    first_block: Real,
+    last_block: Real,
     // Strobe state that later strobes are compared with. While a cycle is read, the cycle's start.
     anchor: array<Real, 4>,
     // Largest position and largest rate at strobes: the units of distances.

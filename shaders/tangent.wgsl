@@ -315,6 +315,13 @@ fn count_growth(growth: Real, periods: u32) {
         let deviation = whole - measures.growth_sum / max(blocks, 1.0);
         measures.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
         measures.growth_sum += whole;
+        if search.blocks == 0u {
+            measures.first_block = whole;
+            measures.growth_products = 0.0;
+        } else {
+            measures.growth_products += (measures.last_block - measures.first_block) * (whole - measures.first_block);
+        }
+        measures.last_block = whole;
         motion.block_growth = 0.0;
         search.block_periods = 0u;
         search.blocks += 1u;
@@ -327,6 +334,22 @@ const LN_2: Real = 0.6931471805599453;
 // of blocks.
 fn mean_growth() -> vec2<Real> {
     let blocks = Real(search.blocks);
-    let variance = measures.growth_squares / (blocks * (blocks - 1.0));
-    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(measures.growth_sum / blocks, sqrt(variance));
+    let mean = measures.growth_sum / blocks;
+    let rho = block_correlation(mean);
+    let variance = measures.growth_squares / (blocks * (blocks - 1.0)) * ((1.0 + rho) / (1.0 - rho));
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(mean, sqrt(variance));
+}
+
+// Returns the correlation of neighbouring blocks. It is above zero where blocks are shorter than the correlation time.
+fn block_correlation(mean: Real) -> Real {
+    if search.blocks < FEWEST_BLOCKS || !(measures.growth_squares > 0.0) {
+        return 0.0;
+    }
+    let blocks = Real(search.blocks);
+    let m = mean - measures.first_block;
+    let last = measures.last_block - measures.first_block;
+    let products = measures.growth_products - m * (2.0 * blocks * m - last) + (blocks - 1.0) * m * m;
+    // Deviations from a common mean bias the correlation downwards.
+    let biased = products / measures.growth_squares;
+    return clamp(biased + (1.0 + 3.0 * biased) / blocks, 0.0, 1.0 - CORRELATION_MARGIN / sqrt(blocks));
 }

@@ -10,7 +10,7 @@ mod exponent;
 mod newton;
 mod unit_circle;
 
-pub use exponent::{Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
+pub use exponent::{CORRELATION_MARGIN, Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
 pub use newton::refine;
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 

@@ -1,6 +1,6 @@
 //! Arguments of all commands, and their help texts.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -239,7 +239,7 @@ impl Map {
     /// The folder to write to.
     pub(crate) fn out(&self) -> PathBuf {
         let Some(shard) = self.shard.filter(|_| self.run.out.is_none()) else { return self.run.out() };
-        let mut name = self.run.scene.file_stem().unwrap_or_default().to_owned();
+        let mut name = self.run.stem().to_owned();
         name.push(format!(".shard-{}-of-{}", shard.index(), shard.count()));
         Path::new("out").join(name)
     }
@@ -325,8 +325,13 @@ pub(crate) struct SceneOptions {
 impl SceneOptions {
     /// The folder to write to.
     pub(crate) fn out(&self) -> PathBuf {
-        let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
-        self.out.clone().unwrap_or_else(default)
+        self.out.clone().unwrap_or_else(|| Path::new("out").join(self.stem()))
+    }
+
+    /// The scene's name without its extension. A name that leaves `.` or `..`, which are folders, keeps its extension.
+    fn stem(&self) -> &OsStr {
+        let stem = self.scene.file_stem().filter(|stem| *stem != "." && *stem != "..");
+        stem.or(self.scene.file_name()).unwrap_or_default()
     }
 }
 
@@ -650,7 +655,7 @@ impl Bifurcation {
         };
         let at: String =
             self.at.iter().map(|at| format!(".{}", at.replace(char::is_whitespace, ""))).collect();
-        let mut name = self.run.scene.file_stem().unwrap_or_default().to_owned();
+        let mut name = self.run.stem().to_owned();
         name.push(format!(".{along}{at}"));
         Path::new("out").join(name)
     }

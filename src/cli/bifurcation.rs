@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(options.quiet)?;
     let folder = Folder::open(&out, options.force)?;
-    folder.refuse_links(store::bifurcation::names())?;
+    folder.prepare(store::bifurcation::names())?;
     let cells = scene.line();
     let count = bifurcation::column_count(cells.len(), scene.start());
     let progress = Progress::new(count, 0, "columns", options.quiet);

@@ -15,12 +15,13 @@ use crate::store::merge::{MergeError, Parts, Progress};
 /// Gathers the records of all shards, and writes the map.
 pub(crate) fn run(arguments: &Merge) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(arguments.quiet)?;
+    interrupt.ends_at_once(format!("nothing was written to {}", arguments.out.display()), || {});
     let parts = Parts::open(&arguments.parts)?;
     parts.refuse(&arguments.out)?;
     size::check_merge(parts.scene(), Some(&arguments.out))?;
     // A folder without results may be replaced. A run that was killed at its start leaves one.
     let folder = Folder::open(&arguments.out, arguments.force || !Folder::holds_results(&arguments.out))?;
-    folder.refuse_links(store::map::names())?;
+    folder.prepare(store::map::names())?;
     let (shards, out) = (parts.count(), arguments.out.display());
     let runs = parts.scene().run_count().max(1) as usize;
     let progress = progress::Progress::new(runs, 0, "runs", arguments.quiet);

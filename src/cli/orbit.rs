@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(true)?;
     let folder = arguments.out.as_ref().map(|dir| Folder::open(dir, arguments.force)).transpose()?;
     if let Some(folder) = &folder {
-        folder.refuse_links(store::orbit::names())?;
+        folder.prepare(store::orbit::names())?;
     }
     let clock = Instant::now();
     let (start, settings) = (arguments.start(), arguments.settings());

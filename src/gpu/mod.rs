@@ -37,6 +37,7 @@ mod unroll;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 pub(crate) use adapter::no_adapter;
 pub use adapter::{
@@ -226,10 +227,18 @@ impl LaneSettings {
     }
 }
 
+/// Longest time to wait for the work of a lost device.
+const LONGEST_WAIT: Duration = Duration::from_secs(10);
+
 impl Drop for Gpu {
-    /// Leaves a lost device to the driver: the last owner of a lost device would panic when it is dropped.
+    /// Waits until the driver works no more on a lost device, and leaves the device to the driver. The process may end
+    /// after this, and a driver that still works would use its own destroyed objects. The last owner of a lost device
+    /// would panic when it is dropped.
     fn drop(&mut self) {
         if self.trouble.message().is_some() {
+            let idle = wgpu::PollType::Wait { submission_index: None, timeout: Some(LONGEST_WAIT) };
+            // A driver that reports the loss here has stopped.
+            let _ = catch_panic(|| self.device.poll(idle));
             std::mem::forget((self.device.clone(), (*self.queue).clone()));
         }
     }

@@ -5,6 +5,7 @@ use rattlemap_dynamics::orbit::{
     BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR_TOLERANCE, NEUTRAL_ORDER, ON_STROBE_TURNS,
 };
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
+use rattlemap_dynamics::stability::CORRELATION_MARGIN;
 
 /// Largest meshing speed at which lanes follow chatter by short flights, relative to half the walls' distance times
 /// the rate of free motion. At higher speeds short flights are too few to save time.
@@ -92,6 +93,7 @@ pub(super) fn declarations(precision: Precision) -> String {
     ];
     let reals = [
         ("CHAOS_ERRORS", CHAOS_ERRORS),
+        ("CORRELATION_MARGIN", CORRELATION_MARGIN),
         ("ESCAPE_GROWTH", ESCAPE_GROWTH),
         ("FOLLOWED_MESH_SPEED", FOLLOWED_MESH_SPEED),
         ("GRAZING_SPEED", GRAZING_SPEED),

@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::gpu::{AdapterChoice, Gpu, Precision};
-use crate::job::check;
+use crate::job::check::CheckedFolder;
 use crate::job::error::JobError;
-use crate::job::finished::{self, LoadedMap, damage, repair_command};
+use crate::job::finished::{self, LoadedMap};
 use crate::job::observer::Observer;
 use crate::job::processor;
 use crate::map::plan::Plan;
@@ -17,8 +17,8 @@ use crate::show::cells::Survey;
 use crate::show::validation::Validated;
 use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
-use crate::store::inventory::Finding;
 use crate::store::map::{self, MANIFEST, VALIDATION};
+use crate::store::record_file::Identity;
 use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
 
 /// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
@@ -33,9 +33,9 @@ pub struct ValidateJob {
     survey: Survey,
     precision: Precision,
     sample: Sample,
+    checked: CheckedFolder,
     /// Chaotic runs to follow, the number of chaotic runs, and the further periods.
     chaos: (Vec<u32>, usize, u32),
-    findings: Vec<Finding>,
     /// This machine's processor.
     processor: String,
 }
@@ -63,10 +63,10 @@ impl ValidateJob {
         finished::require_folder(dir)?;
         // The lock comes first: another run must not replace the map between reading and writing.
         let folder = Folder::open(dir, true)?;
-        folder.refuse_links(map::names())?;
+        folder.prepare(map::names())?;
         let map = FinishedMap::open_own(dir)?;
-        let findings = check::findings(dir, &map.manifest().files)?;
-        for finding in &findings {
+        let checked = CheckedFolder::of(dir, "map", &map.manifest().files)?;
+        for finding in checked.findings() {
             let text = format!("{}: {finding}", dir.display());
             if finding.is_lost() { observer.warn(&text) } else { observer.note(&text) }
         }
@@ -79,7 +79,7 @@ impl ValidateJob {
         let (ids, runs) = validate::draw_chaos(&loaded.stored.records, followed, seed);
         let chaos = (ids, runs, chaos_periods);
         let processor = processor::described();
-        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, chaos, findings, processor })
+        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, chaos, checked, processor })
     }
 
     /// The locked folder.
@@ -144,9 +144,12 @@ impl ValidateJob {
         report: &(impl Fn(usize) + Sync),
         halt: &AtomicBool,
     ) -> Option<Validation> {
-        let basins = self.survey.basins();
-        let subject = self.subject();
-        let validation = validate::replay_until(&subject, basins, &self.sample, &lanes.lanes, report, halt)?;
+        let (basins, subject) = (self.survey.basins(), self.subject());
+        let StoredManifest { sources, target, .. } = self.map.manifest();
+        let is_exact =
+            !subject.is_lane && sources == Identity::own_sources() && target == Identity::own_target();
+        let validation =
+            validate::replay_until(&subject, basins, is_exact, &self.sample, &lanes.lanes, report, halt)?;
         let (ids, runs, periods) = &self.chaos;
         let done = Mutex::new(self.sample_count());
         let one_more = || {
@@ -186,18 +189,8 @@ impl ValidateJob {
     /// # Errors
     /// [`JobError::Failed`].
     pub fn require_valid(&self, validation: &Validation, written: &[&str]) -> Result<(), JobError> {
-        let dir = self.folder.path();
-        verdict(dir, &self.loaded.plan, validation)?;
-        let is_left = |finding: &&Finding| finding.is_lost() && !written.contains(&finding.name.as_str());
-        let left: Vec<&Finding> = self.findings.iter().filter(is_left).collect();
-        match left.is_empty() {
-            true => Ok(()),
-            false => Err(JobError::Failed(format!(
-                "{}; `{}` recreates tables, figures and report from the records",
-                damage(dir, left),
-                repair_command(dir)
-            ))),
-        }
+        verdict(self.folder.path(), &self.loaded.plan, validation)?;
+        self.checked.require_good(written, false)
     }
 }
 

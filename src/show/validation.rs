@@ -163,6 +163,12 @@ impl Validated<'_> {
     fn again(&self) -> String {
         let [same, count] = self.validation.again;
         let equal = format!("{same} of {count} records are the same to the bit");
+        let may_differ = match (self.is_gpu(), self.validation.is_exact) {
+            (false, false) => {
+                " Another build of the program computed the map, so records may differ by rounding."
+            }
+            _ => "",
+        };
         match (self.is_gpu(), self.again_on(), self.is_same_device()) {
             (true, Some(device), true) => {
                 format!("Lanes ran again on the map's own device, {device}: {equal}.")
@@ -180,13 +186,12 @@ impl Validated<'_> {
             }
             (false, _, true) => {
                 format!(
-                    "The map's engine, the reference, ran again on the same kind of processor, {}: {equal}.",
+                    "The map's engine, the reference, ran again on the same kind of processor, {}: {equal}.{may_differ}",
                     self.processors[1]
                 )
             }
             (false, _, false) => format!(
-                "The map's engine, the reference, ran again on {}; the map was computed on {}: {equal}. Processors may round \
-                 differently.",
+                "The map's engine, the reference, ran again on {}; the map was computed on {}: {equal}.{may_differ}",
                 self.processors[1], self.processors[0]
             ),
         }
@@ -313,6 +318,7 @@ mod tests {
             ],
             replayed: 397,
             again: [397, 397],
+            is_exact: false,
             agreement: Vec::new(),
             chaos: Vec::new(),
             chaos_ends: None,

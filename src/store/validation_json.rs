@@ -17,7 +17,7 @@ use rattlemap_dynamics::orbit::Class;
 /// Describes a validation.
 ///
 /// `counted` is the unit of all numbers but `cells`, `integrated` the number of runs from which the sample was drawn, and
-/// `identical` the number of records that the same engine reproduced bit for bit.
+/// `identical` the number of records that the same engine reproduced bit for bit. All must be if `must_be_identical`.
 pub(crate) fn object(cells: &Cells<'_>, validated: &Validated<'_>) -> Value {
     let Validated { validation, made, processors, double_lanes, .. } = *validated;
     let agreement = validation
@@ -56,6 +56,7 @@ pub(crate) fn object(cells: &Cells<'_>, validated: &Validated<'_>) -> Value {
             "agreement": agreement.collect::<BTreeMap<_, _>>(),
             "identical": validation.again[0],
             "computed_again": validation.again[1],
+            "must_be_identical": validation.is_exact,
             "chaos": validation.chaos.iter().map(chaos).collect::<Vec<_>>(),
             "chaos_ends": validation.chaos_ends.as_ref().map(|ends| chaos_ends(cells, ends)),
             "half_mesh_speed": validation.half_mesh.as_ref().map(half_mesh),

@@ -14,5 +14,6 @@ mod independence;
 mod kinds;
 mod measures;
 mod shaders;
+mod standard_errors;
 mod stored;
 mod work;
