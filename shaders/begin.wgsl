@@ -11,6 +11,7 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     tally.status = cell.refused;
     tally.mode = MODE_FREE;
     tally.origin = SIDE_NONE;
+    tally.strobe_distance = FAR_FROM_STROBE;
     motion.q = starts[lane];
     motion.phasor = array<Real, 2>(1.0, 0.0);
     let walls = flows[cell.flow_index].walls;

@@ -264,7 +264,5 @@ fn carry_over_short(t: Real, end: End, removed: Real) {
         iterations += 1u;
         set_tangent(i, saltate(glide_short(tangent(i), t)));
     }
-    if tally.tangent_count == 1u {
-        rescale_tangent();
-    }
+    check_range();
 }

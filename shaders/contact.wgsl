@@ -188,7 +188,7 @@ fn onset_ends(side: u32) -> Jump {
 
 fn count_event(side: u32) {
     add_symbol(side);
-    count_on_strobe();
+    keep_strobe_distance();
     // Meshing that ends before the wall is reached belongs to another branch: its mode differs.
     tally.itinerary = mix_bits(tally.itinerary + 2u * tally.mode + side + 1u);
     tally.origin = side;

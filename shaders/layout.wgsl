@@ -68,6 +68,8 @@ struct FlowShape {
     phasors: u32,
     // Number of displacements. With one, the second rests at 0.
     degrees: u32,
+    // 1 if contact-free motion also requires that x rests at 0.
+    must_rest: u32,
     // CONTACT_* of the right and of the left wall.
     contacts: array<u32, 2>,
 }
@@ -169,6 +171,12 @@ struct Measures {
     rate_scale: Real,
     // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
     cycle_growth: Real,
+    // Largest growth of a perturbation between two instants of that cycle, and from an instant to a strobe.
+    cycle_stretch: Real,
+    strobe_stretch: Real,
+    // Growth and distance from the cycle at the reading before.
+    earlier_growth: Real,
+    earlier_distance: Real,
 }
 
 struct Motion {
@@ -178,8 +186,13 @@ struct Motion {
     tangents: array<Real, 16>,
     // The exponent's tangent vector while the matrix takes its place.
     vector: array<Real, 4>,
+    // Growth of perturbations on the cycle that is read (check_columns in tangent.wgsl): smallest size of the columns so
+    // far, largest ratio of a size to a smaller one before it, largest size, and largest ratio at a strobe.
+    stretch: array<Real, 4>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
+    // Weighted averages of gap, rate, x, its rate and their squares: the first window less the second (regularity.wgsl).
+    averages: array<Real, 5>,
     // The last state of a lane that is being measured.
     ended: MotionNow,
     // What was measured in the present period, and in all (measure.wgsl).
@@ -232,8 +245,8 @@ struct TallyNow {
     hash_low: u32,
     hash_high: u32,
     recent: u32,
-    // Events on the strobe phase.
-    on_strobe: u32,
+    // Distance from phase 0 of the nearest event since counting began, in turns: the bits of an f32.
+    strobe_distance: u32,
     // Hash of the present period's events.
     itinerary: u32,
 }
@@ -282,6 +295,13 @@ struct Search {
     rejected_divisor: u32,
     // Distance of the lane from the fixed point of the linearised strobe map, in quarter octaves below 1.
     linear_distance: u32,
+    // Distance of the motion itself from that point, and of the cycle's start from the nearest other strobe of the cycle,
+    // in quarter octaves below 1.
+    motion_distance: u32,
+    nearest: u32,
+    // Hash of the events of the reading before; and 1 if the exponents of the two readings differ by too much.
+    earlier_branch: u32,
+    is_uncertain: u32,
     // Strobes of the motion so far, and its latest cycles that have the same events as the cycle that is read.
     strobe_count: u32,
     matching_cycles: u32,
@@ -289,6 +309,11 @@ struct Search {
     all_events: u32,
     // 1 once only further periods of chaos are left.
     confirms_chaos: u32,
+    // Strobe after which the windows of the averages begin, and their length; 0 if they have not begun.
+    average_start: u32,
+    average_length: u32,
+    // 1 if the cycle that was read last has a multiplier of modulus 1.
+    is_neutral: u32,
 }
 
 // All counters of a lane.
@@ -300,6 +325,10 @@ struct Tally {
     last_distances: array<u32, 16>,
     // Hashes of the events of the trail's periods.
     itineraries: array<u32, TRAIL>,
+    // The columns of the monodromy matrix: how often they were multiplied by LARGE; and 1 if an event has made them zero,
+    // after which they start again.
+    column_scalings: u32,
+    is_superstable: u32,
     // Symbols of the word, ten to a number.
     word: array<u32, 7>,
     // The pattern: one symbol for every run of equal symbols. Stored and hashed like the word.
@@ -366,6 +395,9 @@ struct Queue {
     beat: u32,
     lanes: array<u32>,
 }
+
+// A strobe distance of half a turn: there is no event.
+const FAR_FROM_STROBE: u32 = 0x3f000000u;
 
 const STAGE_RUNNING: u32 = 0u;
 const STAGE_READING: u32 = 1u; // a period was found, and its cycle is being read

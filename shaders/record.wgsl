@@ -33,6 +33,9 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
             finding.valid |= VALID_PERIOD;
             finding.period = search.cycle;
         }
+        if is_near_strobe() {
+            finding.valid |= VALID_NEAR_STROBE;
+        }
         if search.cycle > 0u {
             read_cycle(&reading, &finding);
         } else if EXPONENT && search.blocks > 1u {
@@ -40,6 +43,9 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
             let growth = mean_growth();
             reading.growth = growth.x;
             reading.growth_error = growth.y;
+            if is_quasi_periodic() {
+                finding.valid |= VALID_QUASI_PERIODIC;
+            }
         }
     }
     readings[i] = reading;
@@ -50,20 +56,43 @@ fn last_status() -> u32 {
     if tally.status != STATUS_OK || tally.stage != STAGE_DONE {
         return tally.status;
     }
-    if search.has_read == 0u || search.cycle == 0u {
-        let is_open = settings.max_period > 0u && search.cycle == 0u && EXPONENT && search.blocks > 1u;
-        return select(STATUS_OK, STATUS_SLOW, is_open && (escapes(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
+    if search.cycle == 0u {
+        if is_quasi_periodic() {
+            return STATUS_OK;
+        }
+        let is_open = settings.max_period > 0u && EXPONENT && search.blocks > 1u;
+        let open = select(STATUS_SLOW, STATUS_NEUTRAL, search.is_neutral == 1u);
+        return select(STATUS_OK, open, is_open && (escapes(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
+    }
+    if search.has_read == 0u {
+        return select(STATUS_OK, STATUS_NEUTRAL, measures.cycle_growth >= 0.0);
     }
     if tally.grazes > 0u {
         return STATUS_NEAR_GRAZING;
     }
-    if tally.on_strobe > 0u {
+    if strobe_distance() < f32(ON_STROBE) {
         return STATUS_STROBE_ON_EVENT;
     }
-    if !is_near_cycle() {
+    if search.is_neutral == 1u {
+        return STATUS_NEUTRAL;
+    }
+    if is_slow() {
         return STATUS_SLOW;
     }
     return select(STATUS_OK, STATUS_BELOW_RESOLUTION, hides_period());
+}
+
+fn strobe_distance() -> f32 {
+    return bitcast<f32>(tally.strobe_distance);
+}
+
+// Whether an event near phase 0 makes the comparison of strobe states uncertain although the status does not say so: it
+// may lie before and after the strobe in turn, so that a cycle seems twice as long, or none is found.
+fn is_near_strobe() -> bool {
+    if search.cycle > 1u {
+        return strobe_distance() < NEAR_STROBE;
+    }
+    return search.cycle == 0u && last_status() == STATUS_SLOW && strobe_distance() < f32(ON_STROBE);
 }
 
 fn mesh_fraction(periods: u32) -> Real {

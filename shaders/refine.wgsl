@@ -10,7 +10,9 @@ fn refine(to: array<Real, 4>) -> bool {
     }
     let stalls = search.newton_steps > 0u && search.return_distance < search.earlier_return_distance + SHRUNK;
     let is_over = search.newton_steps >= MOST_NEWTON_STEPS || tally.period + tally.candidate > last_period();
-    if stalls || is_over || is_onset() || tally.order > 0u {
+    // In the contact onset the gap is in front of its wall.
+    let leaves_onset = is_onset() && !(beyond(to) > 0.0);
+    if stalls || is_over || leaves_onset || tally.order > 0u {
         return false;
     }
     if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, trail(search.strobe_count)) < Real(LONGEST_NEWTON_STEP)) {

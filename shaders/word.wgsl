@@ -78,10 +78,9 @@ fn mix_bits(x: u32) -> u32 {
     return h ^ (h >> 16u);
 }
 
-// Counts an event that is so close to phase 0, in turns, that it lies on the strobe.
-fn count_on_strobe() {
+// Keeps the distance of the event that is nearest to phase 0, in turns.
+fn keep_strobe_distance() {
     let turns = (Real(tally.step) + motion.theta) / Real(shapes[cell.flow_index].steps);
-    if turns < ON_STROBE || 1.0 - turns < ON_STROBE {
-        tally.on_strobe += 1u;
-    }
+    // Positive numbers have the order of their bits.
+    tally.strobe_distance = min(tally.strobe_distance, bitcast<u32>(f32(min(turns, abs(1.0 - turns)))));
 }

@@ -83,6 +83,8 @@ pub struct Flow {
     pub walls: [f64; 2],
     /// Scale of length, [`Oscillator::length_scale`].
     pub length: f64,
+    /// The oscillator.
+    pub oscillator: Oscillator,
     /// Scale of speed: the scale of length times the rate of free motion.
     pub(crate) speed: f64,
     /// The largest power of two up to `omega`. Velocities divided by it are comparable with displacements, and the
@@ -161,6 +163,7 @@ impl Flow {
             omega: oscillator.omega,
             walls: oscillator.walls,
             length,
+            oscillator: *oscillator,
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
             contacts: oscillator.contacts,
@@ -179,6 +182,11 @@ impl Flow {
             free,
             meshing,
         }
+    }
+
+    /// Returns the flow whose phase 0 is this phase of the forcing, in turns.
+    pub fn at_phase(&self, turns: f64) -> Flow {
+        Flow::new(&self.oscillator.at_phase(turns * std::f64::consts::TAU))
     }
 
     /// Returns the memory that the flow occupies, in bytes.

@@ -42,7 +42,7 @@ class Orbit:
 
     @property
     def class_(self) -> str:
-        """Class: ``periodic``, ``chaotic``, ``undecided`` or ``failed``. ``class`` itself is a keyword of Python."""
+        """Class: ``periodic``, ``chaotic``, ``quasi-periodic``, ``undecided`` or ``failed``. ``class`` itself is a keyword of Python."""
         return str(self._facts["class"])
 
     @property

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
 #: Names of cells without a cycle, in the order of legends.
-_WITHOUT_CYCLE = ("chaotic", "undecided", "failed")
+_WITHOUT_CYCLE = ("chaotic", "quasi-periodic", "undecided", "failed")
 
 #: Units of a width, in inches; smallest and largest width; type size of figures with a width, in points.
 _UNITS = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0, "pt": 1 / 72}

@@ -62,12 +62,11 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
         &columns,
         elapsed,
     )?;
-    let [periodic, chaotic, undecided, failed] =
-        plan::count_classes(columns.iter().map(|column| column.class));
+    let classes = say::classes(plan::count_classes(columns.iter().map(|column| column.class)));
     let name = &scene.axes()[0].parameter().name;
     let hysteresis = hysteresis::hysteresis(&columns).map(|found| format!("{}\n", described(&found, name)));
     progress.finish(&format!(
-        "{count} columns in {:.3} s: {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
+        "{count} columns in {:.3} s: {classes}\n\
          {}{}: {}",
         elapsed.as_secs_f64(),
         hysteresis.unwrap_or_default(),

@@ -12,6 +12,8 @@ mod flows;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod requested;
+#[cfg(feature = "gpu")]
+mod section;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -30,6 +32,8 @@ pub(crate) use gpu::lane_settings;
 #[cfg(feature = "gpu")]
 pub(crate) use requested::drop_unrequested;
 pub use requested::measured_record;
+#[cfg(feature = "gpu")]
+pub(crate) use section::compare_at_sections;
 
 #[cfg(feature = "gpu")]
 use crate::gpu::AdapterId;

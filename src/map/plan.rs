@@ -409,9 +409,9 @@ fn needs(quantities: &[Quantity]) -> Needs {
     }
 }
 
-/// Counts the classes: periodic, chaotic, undecided, failed.
-pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; 4] {
-    let mut counts = [0; 4];
+/// Counts the classes, in the order of [`Class::NAMES`].
+pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; Class::NAMES.len()] {
+    let mut counts = [0; Class::NAMES.len()];
     for class in classes {
         counts[class.index()] += 1;
     }

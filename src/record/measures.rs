@@ -119,6 +119,17 @@ const DISPLACEMENTS: usize = 3;
 /// Index of the gap among the displacements.
 const GAP: usize = 2;
 
+impl Record {
+    /// Replaces the phases of harmonics.
+    pub(crate) fn turn_harmonics(&mut self, turned: impl Fn(f64) -> f64) {
+        for phase in all().filter(|measure| measure.group.name == "harmonic" && measure.is_angle()) {
+            if let Some(angle) = phase.of(self) {
+                self.measures[phase.place] = turned(angle);
+            }
+        }
+    }
+}
+
 impl Group {
     const fn places(&self) -> usize {
         self.numbers.len() * if self.of_displacements { DISPLACEMENTS } else { 1 }

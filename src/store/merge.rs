@@ -49,6 +49,7 @@ use crate::store::record_file::{Extent, Identity, RECORDS, RecordFile, RecordFil
 use crate::store::run_records::Work;
 use crate::store::{in_memory, map_json, unfinished};
 use crate::text::shell::quoted;
+use rattlemap_dynamics::orbit::Class;
 
 /// Number of records that are written together: the largest batch of a record file.
 const BATCH: usize = 1 << 16;
@@ -410,8 +411,8 @@ pub struct MapRecords {
 pub struct MergedMap {
     /// Names of the files in the folder.
     pub files: Vec<String>,
-    /// Number of cells that are periodic, chaotic, undecided, failed.
-    pub classes: [usize; 4],
+    /// Number of cells of each class.
+    pub classes: [usize; Class::NAMES.len()],
     /// The object that `map --json` prints, with the number of `shards`.
     pub object: Value,
     /// Damage in record files behind the last record.

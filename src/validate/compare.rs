@@ -272,7 +272,9 @@ impl Bars<'_> {
                     self.compare_cycle(record, answer, f64::from(ours), &mut list);
                 }
             }
-            (Class::Chaotic, Class::Chaotic) | (Class::Undecided, Class::Undecided) => {
+            (Class::Chaotic, Class::Chaotic)
+            | (Class::QuasiPeriodic, Class::QuasiPeriodic)
+            | (Class::Undecided, Class::Undecided) => {
                 self.compare_averages(record, judge, &mut list);
             }
             _ => {}
@@ -288,14 +290,15 @@ impl Bars<'_> {
         Some(compared(Field::Attractor, ours == theirs, || (shown(ours), shown(theirs))))
     }
 
-    /// Whether two statuses of one class agree. Lanes report `slow` at distances above 1e-4 from the cycle, the reference
-    /// above 1e-8, so `ok` and `slow` agree for motion that settles slowly.
+    /// Whether two statuses of one class agree. Lanes in f32 report `slow` at distances above 1e-4 from the cycle, other
+    /// engines above 1e-8, and a multiplier of 1 has a larger error in f32. So `ok`, `slow` and `neutral` agree for motion
+    /// that settles slowly.
     fn is_same_status(&self, class: Class, statuses: [Status; 2], judge: &Record) -> bool {
         match class {
             // For these classes the status adds nothing.
-            Class::Chaotic | Class::Undecided => true,
+            Class::Chaotic | Class::QuasiPeriodic | Class::Undecided => true,
             _ => {
-                let graded = [Status::Ok, Status::Slow];
+                let graded = [Status::Ok, Status::Slow, Status::Neutral];
                 let is_grade = statuses.iter().all(|status| graded.contains(status));
                 statuses[0] == statuses[1] || is_grade && !self.is_decisive(judge)
             }

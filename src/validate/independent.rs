@@ -34,6 +34,10 @@ const RECURS: f64 = 1e-7;
 /// Relative distance below which two strobe states may still converge.
 const NEARLY_RECURS: f64 = 1e-4;
 
+/// Largest distance from phase 0, in turns, of an event that rounding may put before or after the strobe. Then states at
+/// another phase are compared.
+const ON_STROBE: f64 = 1e-7;
+
 /// Relative displacement of a neighbouring motion.
 const DISPLACEMENT: f64 = 1e-7;
 
@@ -45,6 +49,8 @@ const LEAST_MULTIPLIER: f64 = 1e-4;
 struct Strobed<'a> {
     solver: Solver,
     period: f64,
+    /// Time since phase 0 at which states are compared.
+    from: f64,
     flight: Flight,
     /// The last event before the current period.
     before: Option<Ended>,
@@ -61,6 +67,8 @@ struct Tally {
     series: bool,
     meshing_time: f64,
     symbols: Vec<u8>,
+    /// Phases of events, in turns.
+    phases: Vec<f64>,
 }
 
 impl Strobed<'_> {
@@ -68,6 +76,7 @@ impl Strobed<'_> {
         Strobed {
             solver: Solver { omega: oscillator.omega, tolerance: TOLERANCE },
             period: oscillator.period(),
+            from: 0.0,
             flight: Flight::new(oscillator, law, start),
             before: None,
             tally: Tally::default(),
@@ -81,10 +90,12 @@ impl Strobed<'_> {
             return None;
         }
         let meshed = self.flight.meshing().is_some();
-        self.solver.advance(&mut self.flight, 0.0, self.period)?;
-        let mut meshing_since = meshed.then_some(0.0);
+        let until = self.from + self.period;
+        self.solver.advance(&mut self.flight, self.from, until)?;
+        let mut meshing_since = meshed.then_some(self.from);
         for ended in std::mem::take(&mut self.flight.events) {
             self.tally.series |= ended.after_series;
+            self.tally.phases.push((ended.t / self.period).fract());
             match ended.kind {
                 EventKind::Impact => self.tally.impacts += 1,
                 EventKind::MeshStart => meshing_since = Some(ended.t),
@@ -95,8 +106,33 @@ impl Strobed<'_> {
             self.tally.symbols.extend(self.before.map(|before| symbol(before, ended.side)));
             self.before = Some(ended);
         }
-        self.tally.meshing_time += meshing_since.map_or(0.0, |since| self.period - since);
+        self.tally.meshing_time += meshing_since.map_or(0.0, |since| until - since);
         Some(())
+    }
+
+    /// Returns the state at the next phase 0, after an event there.
+    fn strobe(&self) -> Option<State> {
+        let mut flight = self.flight.clone();
+        if self.from > 0.0 {
+            self.solver.advance(&mut flight, self.from, self.period * (1.0 + ON_STROBE))?;
+        }
+        Some(flight.state())
+    }
+
+    /// Compares states in the middle of the longest flight from here on. Returns false if they are compared there already
+    /// or no event lies at phase 0.
+    fn leave_strobe(&mut self) -> Option<bool> {
+        let mut phases = std::mem::take(&mut self.tally.phases);
+        if self.from > 0.0 || !phases.iter().any(|phase| (phase - phase.round()).abs() < ON_STROBE) {
+            return Some(false);
+        }
+        phases.extend([0.0, 1.0]);
+        phases.sort_by(f64::total_cmp);
+        let longest = phases.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
+        let from = 0.5 * (longest[0] + longest[1]) * self.period;
+        self.solver.advance(&mut self.flight, 0.0, from)?;
+        self.from = from;
+        Some(true)
     }
 }
 
@@ -127,9 +163,15 @@ pub(super) fn record_until(plan: &Plan, id: u32, records: &[Record], halt: &Atom
 fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> Option<Record> {
     let stored = 2 * budget.settings.max_period as usize + 1;
     let mut strobes = Vec::new();
-    for _ in 0..budget.periods() {
+    for n in 0..budget.periods() as usize {
+        if n + stored == budget.periods() as usize {
+            motion.tally = Tally::default();
+        }
         motion.advance()?;
         strobes.push(motion.flight.q);
+    }
+    if motion.leave_strobe()? {
+        return follow(motion, oscillator, budget);
     }
     let window = &strobes[strobes.len().saturating_sub(stored)..];
     let largest = |i: usize| window.iter().map(|q| q[i].abs().max(q[i + 2].abs())).fold(0.0, f64::max);
@@ -191,7 +233,7 @@ fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<R
         lyapunov: radius.ln() / span,
         impacts_per_period: tally.impacts as f64 / f64::from(period),
         mesh_fraction: tally.meshing_time / span,
-        strobe: on.flight.state(),
+        strobe: on.strobe()?,
         status: Status::Ok.code(),
         valid: valid::PERIOD | valid::IMPACTS | valid::MESH | valid::STROBE,
         ..Record::default()

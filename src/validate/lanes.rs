@@ -6,7 +6,7 @@ use super::Subject;
 use super::sample::Sample;
 use super::states::HORIZON;
 use crate::gpu::{self, Gpu, GpuError, Lane, LaneSettings};
-use crate::map::engine::{drop_unrequested, lane_settings};
+use crate::map::engine::{compare_at_sections, drop_unrequested, lane_settings};
 use crate::map::plan::Plan;
 use crate::record::Record;
 use rattlemap_dynamics::model::State;
@@ -135,5 +135,12 @@ pub async fn run_lanes(
         .collect();
     let flows: Vec<_> = flows.iter().map(|&flow| plan.oscillator(flow)).collect();
     let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
-    gpu.run(&flows, &laws, &lanes, settings).await
+    let records = gpu.run(&flows, &laws, &lanes, settings).await?;
+    let mut numbered: Vec<_> = (0..).zip(records).collect();
+    let of = |i: u32| {
+        let lane = &lanes[i as usize];
+        (flows[lane.flow as usize], laws[lane.law as usize])
+    };
+    compare_at_sections(gpu, &mut numbered, of, settings).await?;
+    Ok(numbered.into_iter().map(|(_, record)| record).collect())
 }

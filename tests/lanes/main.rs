@@ -13,6 +13,8 @@ mod engines_agree;
 mod independence;
 mod kinds;
 mod measures;
+mod neutral;
+mod resonance;
 mod shaders;
 mod standard_errors;
 mod stored;

@@ -135,7 +135,8 @@ impl Oscillator {
         if phase == 0.0 {
             return *self;
         }
-        let (sin, cos) = phase.sin_cos();
+        // Half a turn changes the sign only: no rounding error adds a sine to the force.
+        let (sin, cos) = if phase == std::f64::consts::PI { (0.0, -1.0) } else { phase.sin_cos() };
         let turned = |i: usize| {
             let (f, g) = (self.force[i], self.force_sin[i]);
             [cos * f + sin * g, cos * g - sin * f]

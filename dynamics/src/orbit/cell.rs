@@ -7,14 +7,15 @@ use std::cell::{Cell, OnceCell};
 use std::sync::atomic::AtomicBool;
 
 use super::CHAOS_ERRORS;
-use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, status_of};
+use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, neutral_growth, status_of};
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::Quantities;
-use super::reading::Reading;
+use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
+use super::regularity::is_regular;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
-use super::{Budget, Orbit, Status};
+use super::{Budget, Orbit, Section, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Allowance, Stop, Trajectory};
@@ -32,9 +33,8 @@ const CHECK_DIVISOR: u32 = 6;
 /// `mesh_speed`: with 2e-3, one cell of 4,000 over restitution and frequency got a period that it then left.
 const EARLY_STOP_DISTANCE: f64 = 5e-4;
 
-/// Growth of tangents that is not chaos, as a power of time. Tangents of neutral motion grow in proportion to time (a
-/// free body, a torus, an undamped oscillation), and at a double root to its square.
-pub const NEUTRAL_ORDER: f64 = 2.0;
+/// Share of a motion, as a divisor, that the test for regularity leaves out because it may be transient.
+const TRANSIENT_SHARE: usize = 4;
 
 /// Least number of cycles of an approach.
 const LEAST_APPROACH_CYCLES: usize = 4;
@@ -47,8 +47,10 @@ const SEARCH_DISTANCE: f64 = 3.0;
 pub struct Measurement {
     /// Confirmed period, in forcing periods.
     pub period: Option<u32>,
+    /// Whether the motion is quasi-periodic.
+    pub is_quasi_periodic: bool,
     /// How the integration ended. `Slow` without a period means that the motion stays near some cycle, or that the
-    /// exponent does not exceed zero by three standard errors: it is undecided.
+    /// exponent does not exceed zero by three standard errors: it is undecided. So it is with `Neutral`.
     pub status: Status,
     /// Largest Lyapunov exponent per unit time, and its standard error, which is zero for a cycle.
     pub lyapunov: Option<[f64; 2]>,
@@ -68,14 +70,15 @@ pub struct Measurement {
     pub strobe: State,
     /// Forcing periods of the motion itself.
     pub periods_run: u32,
-    /// Forcing periods of searches: of Newton's method, with four tangent vectors, and of the readings of cycles.
+    /// Forcing periods of searches: of Newton's method, with four tangent vectors, of the readings of cycles, and of the
+    /// comparison at another phase.
     pub search_periods: u32,
 }
 
 impl Measurement {
-    /// Whether aperiodic motion is certainly chaotic.
+    /// Whether aperiodic motion is certainly chaotic or quasi-periodic.
     fn is_decided(&self) -> bool {
-        self.status != Status::Slow && self.lyapunov.is_some()
+        self.status == Status::Ok && self.lyapunov.is_some()
     }
 }
 
@@ -97,6 +100,8 @@ pub fn measure_until(
     (!allowance.is_halted()).then_some(measured)
 }
 
+/// Integrates one cell. If an event of its cycle lies at phase 0, states are compared at another phase, within a second
+/// budget.
 fn measure_within(
     flow: &Flow,
     law: Law,
@@ -104,6 +109,34 @@ fn measure_within(
     budget: &Budget,
     allowance: Allowance<'_>,
 ) -> Measurement {
+    let (first, is_on_strobe) = measure_by_strobes(flow, law, start, budget, allowance);
+    if !is_on_strobe {
+        return first;
+    }
+    let by_section = || {
+        let section = Section::of(flow, law, first.strobe, first.period.unwrap_or(2), allowance)?;
+        let (second, _) = measure_by_strobes(&section.flow, law, section.start, budget, allowance);
+        second.period?;
+        Some(Measurement {
+            quantities: second.quantities.map(|quantities| section.quantities(quantities)),
+            strobe: section.strobe(law, second.strobe, ON_STROBE_TURNS)?.0,
+            periods_run: first.periods_run,
+            search_periods: first.search_periods + second.periods_run + second.search_periods,
+            ..second
+        })
+    };
+    by_section().unwrap_or(first)
+}
+
+/// Integrates one cell and compares its states at phase 0. Also returns whether an event at phase 0 makes that
+/// comparison uncertain.
+fn measure_by_strobes(
+    flow: &Flow,
+    law: Law,
+    start: State,
+    budget: &Budget,
+    allowance: Allowance<'_>,
+) -> (Measurement, bool) {
     let settings = &budget.settings;
     let analysis = Analysis {
         flow,
@@ -113,6 +146,7 @@ fn measure_within(
         event_periods: 0,
         measures: budget.quantities,
         allowance,
+        report: &|_, _| (),
     };
     let mut run = CellRun {
         analysis: &analysis,
@@ -122,13 +156,21 @@ fn measure_within(
         exponent: Exponent::default(),
         cycle: None,
         approaches: false,
+        is_neutral: false,
         counts: vec![[0.0; 2]],
         itineraries: Vec::new(),
+        near_strobe: 0,
         history: SearchHistory::default(),
         newton: Newton::default(),
         reading_periods: Cell::new(0),
     };
-    run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)))
+    let measured = run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)));
+    let is_on_strobe = match measured.status {
+        Status::StrobeOnEvent => true,
+        Status::Slow => measured.period.is_none() && run.has_events_at_strobes(),
+        _ => false,
+    };
+    (measured, is_on_strobe)
 }
 
 /// Returns modulus and argument of a complex number.
@@ -160,10 +202,14 @@ struct CellRun<'a> {
     cycle: Option<FoundCycle<'a>>,
     /// Whether the last check found `cycle`, or the motion was closer to it than when it was found.
     approaches: bool,
+    /// Whether the last check found a neutral cycle nearby.
+    is_neutral: bool,
     /// Impacts and meshing time up to each strobe.
     counts: Vec<[f64; 2]>,
     /// Itinerary of each period.
     itineraries: Vec<Itinerary>,
+    /// One bit for each of the last periods: whether it has an event near phase 0.
+    near_strobe: u16,
     history: SearchHistory,
     newton: Newton,
     /// Periods of the readings of cycles.
@@ -206,6 +252,7 @@ impl<'a> CellRun<'a> {
         let mut recorder = Recorder::new(self.analysis.flow);
         trajectory.advance_period(&mut recorder)?;
         self.itineraries.push(recorder.itinerary);
+        self.near_strobe = self.near_strobe << 1 | u16::from(recorder.is_near_strobe);
         self.exponent.renormalise(trajectory);
         self.strobes.push(trajectory.state());
         let now = self.strobes.len() as u32 - 1;
@@ -251,6 +298,11 @@ impl<'a> CellRun<'a> {
         }))
     }
 
+    /// Whether an event stays near phase 0: it may lie before and after the strobe in turn, so every second period has none.
+    fn has_events_at_strobes(&self) -> bool {
+        self.near_strobe.count_ones() >= u16::BITS / 2
+    }
+
     /// Whether the motion certainly has no further event.
     fn is_non_impacting<const N: usize>(&self, trajectory: &Trajectory<'a, N>) -> bool {
         let free = self.analysis.flow.non_impacting();
@@ -262,13 +314,15 @@ impl<'a> CellRun<'a> {
         let flow = self.analysis.flow;
         Measurement {
             period: Some(1),
-            status: Status::Ok,
             lyapunov: flow.non_impacting().map(|motion| [motion.exponent(), 0.0]),
             symmetric: flow.mirror_symmetric(&self.analysis.law).then_some(true),
             word: Some(Word::default()),
             multiplier: flow.non_impacting().map(|motion| polar(motion.multiplier(flow.period))),
             quantities: flow.non_impacting().and_then(|motion| self.analysis.steady_quantities(motion)),
-            ..self.without_results(Status::Ok)
+            ..self.without_results(match flow.non_impacting() {
+                Some(motion) if motion.is_neutral() => Status::Neutral,
+                _ => Status::Ok,
+            })
         }
     }
 
@@ -311,6 +365,17 @@ impl<'a> CellRun<'a> {
                     self.history.add_failure(map, state);
                     continue;
                 };
+                if cycle.is_neutral() && metric.distance(&state, &cycle.state) < RECURRENCE_DISTANCE {
+                    // Motion near a neutral cycle neither approaches nor leaves it.
+                    self.is_neutral = is_last;
+                    if metric.distance(&state, &cycle.state) < ON_CYCLE {
+                        let cycle = self.analysis.smallest(newton, seed, cycle, &metric);
+                        let of = |cycle| {
+                            Ok(self.analysis.periodic(&self.analysis.read(seed, &cycle)?, &cycle, 0.0))
+                        };
+                        return cycle.map(of).transpose();
+                    }
+                }
                 // An unstable cycle is unstable at its smallest period, too.
                 if !cycle.is_stable() {
                     self.history.add_unstable(map, &cycle);
@@ -380,7 +445,8 @@ impl<'a> CellRun<'a> {
         if let Some(reading) = found.reading.get() {
             return Ok(reading);
         }
-        self.reading_periods.set(self.reading_periods.get() + found.cycle.period);
+        // Once for the events, once for the growth of rounding errors.
+        self.reading_periods.set(self.reading_periods.get() + 2 * found.cycle.period);
         let reading = self.analysis.read(&found.seed, &found.cycle)?;
         Ok(found.reading.get_or_init(|| reading))
     }
@@ -448,28 +514,34 @@ impl<'a> CellRun<'a> {
         let averaged = &self.strobes[self.budget.exponent_from() as usize..];
         let near_saddle_periods = near_saddle(averaged, &Metric::of(window, self.analysis.flow), max_period);
         let is_escape = |rate: f64| rate * near_saddle_periods as f64 * period < ESCAPE_GROWTH;
+        let periods = averaged.len().saturating_sub(1) as f64;
         let is_neutral =
-            |rate: f64| rate * averaged.len().saturating_sub(1) as f64 * period <= self.neutral_growth();
+            |rate: f64| rate * periods * period <= neutral_growth(self.budget.exponent_from(), periods);
         let slow = least.is_some_and(is_neutral)
             || 2.0 * near_saddle_periods as f64 >= span && least.is_none_or(is_escape);
+        let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
+        let is_quasi_periodic = self.strobes.len() > self.budget.periods() as usize
+            && lyapunov.is_some_and(|(mean, error)| is_neutral(mean.abs() - errors * error))
+            && is_regular(late, &Metric::of(late, self.analysis.flow), max_period);
+        let status = match slow {
+            true if self.is_neutral => Status::Neutral,
+            true => Status::Slow,
+            false => Status::Ok,
+        };
         Measurement {
+            is_quasi_periodic,
             lyapunov: lyapunov.map(|(mean, error)| [mean, error]),
             impacts_per_period: impacts / span,
             mesh_fraction: meshing_time / (span * period),
-            ..self.without_results(if slow { Status::Slow } else { Status::Ok })
+            ..self.without_results(if is_quasi_periodic { Status::Ok } else { status })
         }
-    }
-
-    /// Returns the logarithm of the largest growth of tangents in neutral motion; see [`NEUTRAL_ORDER`].
-    fn neutral_growth(&self) -> f64 {
-        let from = f64::from(self.budget.exponent_from().max(1));
-        NEUTRAL_ORDER * ((self.strobes.len() - 1) as f64 / from).ln()
     }
 
     /// Builds a measurement with the last strobe state and the numbers of periods only.
     fn without_results(&self, status: Status) -> Measurement {
         Measurement {
             period: None,
+            is_quasi_periodic: false,
             status,
             lyapunov: None,
             impacts_per_period: 0.0,

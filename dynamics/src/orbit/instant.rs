@@ -53,8 +53,14 @@ pub fn is_reached(event: f64, time: f64) -> bool {
 /// Returns the state of a trajectory at the present time, and the wall of the contact that lasts. `time` is the time
 /// since its start. If rounding has put an event just behind this time, it is the state after the event.
 pub(super) fn at_present(trajectory: &Trajectory<'_, 0>, time: f64) -> (State, Option<Side>) {
+    after_events(trajectory, EVENT_ROUNDINGS * f64::EPSILON * time)
+}
+
+/// Returns the state of a trajectory at the present time, and the wall of the contact that lasts. If an event follows
+/// within the time `tolerance`, it is the state after the event.
+pub(super) fn after_events(trajectory: &Trajectory<'_, 0>, tolerance: f64) -> (State, Option<Side>) {
     let (flow, mut ahead, mut events) = (trajectory.flow(), trajectory.clone(), Vec::<GapEvent>::new());
-    let until = trajectory.time_in_period() + EVENT_ROUNDINGS * f64::EPSILON * time;
+    let until = trajectory.time_in_period() + tolerance;
     let advanced = if until <= flow.period {
         ahead.advance_to(until, &mut events)
     } else {

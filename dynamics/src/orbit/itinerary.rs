@@ -7,6 +7,9 @@ use crate::flow::Flow;
 use crate::model::Side;
 use crate::reference::{GapEvent, Observer};
 
+/// Largest distance from phase 0, in turns, of an event that a slow approach may still move to the other side.
+pub const NEAR_STROBE_TURNS: f64 = 1e-3;
+
 /// A hash of the events of one forcing period in their order, with their walls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Itinerary(u64);
@@ -15,12 +18,20 @@ pub(super) struct Itinerary(u64);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Recorder {
     walls: [f64; 2],
+    period: f64,
     pub(super) itinerary: Itinerary,
+    /// Whether an event lies near phase 0, so that rounding or a slow approach may move it to the other side.
+    pub(super) is_near_strobe: bool,
 }
 
 impl Recorder {
     pub(super) fn new(flow: &Flow) -> Recorder {
-        Recorder { walls: flow.walls, itinerary: Itinerary::default() }
+        Recorder {
+            walls: flow.walls,
+            period: flow.period,
+            itinerary: Itinerary::default(),
+            is_near_strobe: false,
+        }
     }
 
     /// Returns the itineraries of `periods` consecutive periods, of which `start` is the first.
@@ -41,6 +52,7 @@ impl Observer for Recorder {
             1 + u64::from(event.side == Side::Right) + 2 * u64::from(is_on_wall) + 4 * event.kind as u64;
         let Itinerary(before) = self.itinerary;
         // Multiplication by an odd number and rotation are invertible, and they make the order count.
+        self.is_near_strobe |= event.t.min(self.period - event.t) < NEAR_STROBE_TURNS * self.period;
         self.itinerary = Itinerary((before ^ code).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(23));
     }
 }

@@ -14,6 +14,7 @@ mod orbits;
 mod paper;
 mod properties;
 mod quantities;
+mod resonance;
 mod single_stop;
 mod sticking;
 mod stops;

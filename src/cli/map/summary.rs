@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::cli::say::{path, quoted};
+use crate::cli::say::{classes, path, quoted};
 use crate::map::engine::CardReport;
 use crate::map::plan::count_classes;
 use crate::map::schedule::{Deviation, Errors, Refined};
@@ -70,10 +70,6 @@ pub(super) fn shard(finished: &FinishedShard<'_>, folder: &Path, files: &[String
         files.join(", "),
         shard.count()
     )
-}
-
-fn classes([periodic, chaotic, undecided, failed]: [usize; 4]) -> String {
-    format!("{periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed")
 }
 
 /// One line per card, if there are several.

@@ -7,7 +7,8 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::{Device, EngineError, drop_unrequested};
+use super::section::is_on_strobe;
+use super::{Device, EngineError, compare_at_sections, drop_unrequested};
 use crate::gpu::{
     self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables,
 };
@@ -142,6 +143,16 @@ impl<'p> Gpu<'p> {
             _ => self.run_waiting().await,
         };
         let mut ended = ended.map_err(|error| self.error(error, self.waiting.len()))?;
+        let plan = &*self.plan;
+        let of = |id| {
+            let cell = plan.cell(id);
+            (plan.oscillator(cell.flow), plan.law(cell.law))
+        };
+        match compare_at_sections(&mut self.device, &mut ended, of, &self.settings).await {
+            // These cells have not ended.
+            Err(GpuError::Halted) => ended.retain(|(_, record)| !is_on_strobe(record)),
+            compared => compared.map_err(|error| self.error(error, ended.len()))?,
+        }
         ended.iter_mut().for_each(|(_, record)| drop_unrequested(record, self.plan.needs()));
         Ok(ended)
     }

@@ -9,15 +9,17 @@ use crate::show::cells::Cells;
 use crate::show::color::Color;
 use crate::show::layers::bar::{Bar, count_beyond, round_bound};
 use crate::show::layers::colors::{
-    self, ALWAYS_IN_CONTACT, FAILED, NO_CONTACT, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, UNSYMMETRIC, chaos,
+    self, ALWAYS_IN_CONTACT, FAILED, NO_CONTACT, QUASI_PERIODIC, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED,
+    UNSYMMETRIC, chaos,
 };
 use crate::show::layers::layer::{Layer, NamedColor, legend};
 use rattlemap_dynamics::orbit::Class;
 
-/// Indices into the palette: five kinds of period 1, periods 2 to 64, undecided, failed, then shades of chaos.
+/// Indices into the palette: five kinds of period 1, periods 2 to 64, undecided, failed, quasi-periodic,
+/// then shades of chaos.
 const FIRST_PERIOD: u8 = 5;
 const EXCEPTIONS: u8 = FIRST_PERIOD + 63;
-const FIRST_SHADE: u8 = EXCEPTIONS + 2;
+const FIRST_SHADE: u8 = EXCEPTIONS + 3;
 const SHADES: u8 = 64;
 
 /// Forcing periods T to which the legend refers the rate at which chaos ends.
@@ -39,6 +41,7 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         Class::Periodic { period } => FIRST_PERIOD + (period.min(64) - 2) as u8,
         Class::Undecided => EXCEPTIONS,
         Class::Failed => EXCEPTIONS + 1,
+        Class::QuasiPeriodic => EXCEPTIONS + 2,
         Class::Chaotic if !shows_chaos => FIRST_SHADE + SHADES - 1,
         Class::Chaotic => {
             let share = (record.lyapunov / high).clamp(0.0, 1.0);
@@ -96,12 +99,12 @@ fn first_period(record: &Record, shows_symmetry: bool) -> u8 {
 fn palette() -> Vec<Color> {
     let mut palette = vec![NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN, ALWAYS_IN_CONTACT];
     palette.extend((2..=64).map(colors::period));
-    palette.extend([UNDECIDED, FAILED]);
+    palette.extend([UNDECIDED, FAILED, QUASI_PERIODIC]);
     palette.extend((0..SHADES).map(|shade| chaos(f64::from(shade) / f64::from(SHADES - 1))));
     palette
 }
 
-/// Returns the legend: low periods first, then chaos, undecided and failed.
+/// Returns the legend: low periods first, then chaos, quasi-periodic, undecided and failed.
 fn entries(
     indices: &[u8],
     palette: &[Color],
@@ -140,6 +143,7 @@ fn entries(
     let middle = if shows_chaos { usize::from(FIRST_SHADE + SHADES / 2) } else { palette.len() - 1 };
     let exceptions = usize::from(EXCEPTIONS);
     list.push(NamedColor { color: palette[middle], text: chaos_text, cells: chaos });
+    list.push(entry(exceptions + 2, "quasi-periodic".to_owned()));
     list.push(entry(exceptions, "undecided".to_owned()));
     list.push(entry(exceptions + 1, "failed".to_owned()));
     legend(list)

@@ -1,0 +1,120 @@
+//! Comparison of states at a phase far from events, for a motion with an event at phase 0.
+//!
+//! Rounding puts an event at phase 0 before or after the strobe. An impact changes the velocity there, so that strobe
+//! states alternate between both sides of the jump. States at another phase have no jump nearby, and the class, the
+//! period, the word and the multipliers do not depend on the phase.
+
+use super::Event;
+use super::instant::after_events;
+use super::quantities::Quantities;
+use super::reading::ON_STROBE_TURNS;
+use crate::flow::Flow;
+use crate::model::{Law, Side, State};
+use crate::reference::{Allowance, GapEvent, Trajectory};
+
+/// Least distance of half a turn from events, in turns, at which states are compared there. Half a turn adds no sine to
+/// the force.
+const CLEARANCE: f64 = 1.0 / 16.0;
+
+/// Largest rounding error of a lane's gap, relative to the wall's position or the scale of length.
+const ON_WALL: f64 = 1e-5;
+
+/// Distance from a wall, in the same unit, that is rounding in double precision.
+const IN_FRONT: f64 = 1e-15;
+
+/// A phase far from the events of a motion, and the motion's state there.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// The flow whose phase 0 is this phase.
+    pub flow: Box<Flow>,
+    /// The state of the motion at this phase.
+    pub start: State,
+    /// The phase, in turns.
+    turns: f64,
+}
+
+impl Section {
+    /// Finds the phase from the events of the `periods` forcing periods that follow the state `strobe` at phase 0; none
+    /// if the motion cannot be continued, or if the state at the phase does not determine the kind of contact.
+    pub fn of(
+        flow: &Flow,
+        law: Law,
+        strobe: State,
+        periods: u32,
+        allowance: Allowance<'_>,
+    ) -> Option<Section> {
+        let mut trajectory = Trajectory::<0>::new(flow, law, in_front(flow, strobe)).allowing(allowance);
+        let mut events: Vec<GapEvent> = Vec::new();
+        for _ in 0..periods {
+            trajectory.advance_period(&mut events).ok()?;
+        }
+        let mut phases: Vec<f64> = events.iter().map(|event| event.t / flow.period).collect();
+        phases.extend([0.0, 1.0]);
+        phases.sort_by(f64::total_cmp);
+        let is_half_clear = phases.iter().all(|phase| (phase - 0.5).abs() >= CLEARANCE);
+        let widest = || phases.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
+        let turns = if is_half_clear { 0.5 } else { widest().map(|gap| 0.5 * (gap[0] + gap[1]))? };
+        trajectory.advance_to(turns * flow.period, &mut ()).ok()?;
+        let (section, start) = (Box::new(flow.at_phase(turns)), trajectory.state());
+        let is_determined = Trajectory::<0>::new(&section, law, start).meshing() == trajectory.meshing();
+        is_determined.then_some(Section { flow: section, start, turns })
+    }
+
+    /// Returns the state at the phase 0 that follows `state`, a state at this phase, and the wall of the contact that
+    /// lasts then. It is the state after an event that lies within `tolerance` turns of phase 0.
+    pub fn strobe(&self, law: Law, state: State, tolerance: f64) -> Option<(State, Option<Side>)> {
+        let mut trajectory = Trajectory::<0>::new(&self.flow, law, state);
+        trajectory.advance_to(self.time_to_strobe(), &mut ()).ok()?;
+        Some(after_events(&trajectory, tolerance * self.flow.period))
+    }
+
+    /// Returns the phase of a harmonic, given its phase with the time since this phase of the forcing.
+    pub fn harmonic_phase(&self, phase: f64) -> f64 {
+        let turned = phase - self.turns * std::f64::consts::TAU;
+        turned.sin().atan2(turned.cos())
+    }
+
+    /// Converts quantities whose time begins at this phase.
+    pub(super) fn quantities(&self, mut quantities: Quantities) -> Quantities {
+        for displacement in &mut quantities.displacements {
+            displacement.harmonic[1] = self.harmonic_phase(displacement.harmonic[1]);
+        }
+        quantities
+    }
+
+    /// Converts the events of a cycle of `periods` forcing periods, whose times begin at this phase, to times since the
+    /// next phase 0. An event there ends the cycle, as the strobe is the state after it.
+    pub(super) fn events(&self, events: &[Event], periods: u32) -> Vec<Event> {
+        let period = self.flow.period;
+        let cycle = f64::from(periods) * period;
+        let rounding = ON_STROBE_TURNS * period;
+        let mut list: Vec<Event> = events.to_vec();
+        for event in &mut list {
+            let t = event.t - self.time_to_strobe();
+            let nearest = (t / period).round() * period;
+            let t = if (t - nearest).abs() < rounding { nearest } else { t };
+            event.t = if t <= 0.0 { t + cycle } else { t };
+            event.t_mod_period = if t == nearest { 0.0 } else { event.t % period };
+        }
+        list.sort_by(|a, b| a.t.total_cmp(&b.t));
+        list
+    }
+
+    fn time_to_strobe(&self) -> f64 {
+        (1.0 - self.turns) * self.flow.period
+    }
+}
+
+/// Moves a gap that lies behind a wall by rounding to its front: behind it would be a lasting contact.
+fn in_front(flow: &Flow, y: State) -> State {
+    let mut q = flow.to_gap(y);
+    for side in Side::BOTH {
+        let (wall, sign) = (flow.wall(side), side.sign());
+        let unit = wall.abs().max(flow.length);
+        if (0.0..ON_WALL * unit).contains(&(sign * (q[0] - wall))) {
+            q[0] = wall - sign * IN_FRONT * unit;
+            return flow.to_state(q);
+        }
+    }
+    y
+}
