@@ -90,7 +90,6 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("MIRROR_DISTANCE", MIRROR_DISTANCE),
         ("NOISE", noise),
         ("ON_CYCLE", ON_CYCLE),
-        ("NEAR_STROBE", NEAR_STROBE_TURNS),
     ];
     let reals = [
         ("CHAOS_ERRORS", CHAOS_ERRORS),
@@ -101,6 +100,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("NO_THRESHOLD", NO_THRESHOLD),
         ("LINEAR", LINEAR_TOLERANCE),
         ("ON_STROBE", on_strobe),
+        ("NEAR_STROBE", NEAR_STROBE_TURNS),
     ];
     let count = |(name, value): (&str, u32)| format!("const {name}: u32 = {value}u;\n");
     let number =
