@@ -105,6 +105,15 @@ require_slurm() {
     done
 }
 
+# Compiles the library with each feature alone, and without any. Every other phase has several of them.
+each_feature() {
+    cargo check --quiet -p rattlemap --lib --no-default-features
+    local feature
+    for feature in $(sed -n '/^\[features\]/,/^\[dep/s/^\([a-z]*\) = .*/\1/p' Cargo.toml); do
+        cargo check --quiet -p rattlemap --lib --no-default-features --features "$feature"
+    done
+}
+
 # Runs a command under a title and records its time.
 phases=()
 phase() {
@@ -192,6 +201,7 @@ phase "docs, warnings denied" docs
 phase "dependencies" dependencies
 phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
 phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu,figures --lib
+phase "each feature alone" each_feature
 if $all; then
     phase "the program on Windows" cargo check --target "$windows" -p rattlemap
     phase "the program on macOS" cargo check --target "$macos" -p rattlemap

@@ -20,6 +20,7 @@ fn store_strobe(itinerary: u32) {
     let place = search.strobe_count % TRAIL;
     motions[lane].trail[place] = strobe_state();
     tallies[lane].itineraries[place] = itinerary;
+    add_to_averages();
 }
 
 fn trail(strobe: u32) -> array<Real, 4> {

@@ -15,7 +15,14 @@ fn is_chaos() -> bool {
     if tally.period < search.counting_start + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
-    let errors = select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods);
+    // Chaos that is confirmed later needs no early stop.
+    if settings.longest > settings.decided_by {
+        return false;
+    }
+    return is_chaotic(select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods));
+}
+
+fn is_chaotic(errors: Real) -> bool {
     return grows(errors) && outgrows(errors) && !escapes(errors);
 }
 
@@ -33,12 +40,16 @@ fn grows(errors: Real) -> bool {
 // s; 0 1` by d = ULP, which gives growth of sqrt(s ULP); s of one event is at most 1.
 fn outgrows(errors: Real) -> bool {
     let growth = mean_growth();
+    return exceeds_neutral(growth.x - errors * growth.y);
+}
+
+fn exceeds_neutral(growth: Real) -> bool {
     let periods = search.blocks * settings.exponent_block;
     let began = max(settings.exponent_from, 1u);
     let neutral = NEUTRAL_ORDER * log(f32(began + periods) / f32(began));
     let events_per_period = Real(tally.events) / Real(max(tally.period - search.counting_start, 1u));
     let rounding = sqrt(events_per_period * events_per_period * ULP);
-    return (growth.x - errors * growth.y - rounding) * Real(periods) > Real(neutral);
+    return (growth - rounding) * Real(periods) > Real(neutral);
 }
 
 // Whether the motion stays near a cycle, so that its growth may be that of leaving the cycle.

@@ -39,10 +39,6 @@ fn close_chatter(side: u32, u: Real) {
     if lasts <= 0.0 || lasts >= steps_to_stop_phase(next_stop_phase()) {
         return;
     }
-    if MEASURE {
-        // The series takes the energy with which the gap leaves the wall.
-        add(SUM_LOST, u * u);
-    }
     let across = here.x_row;
     let v_by_x = across[2] + kick * row[2];
     let v_by_v = across[3] + kick * row[3];
@@ -64,12 +60,18 @@ fn close_chatter(side: u32, u: Real) {
         );
         crossing.v_by = array<Real, 3>((across[1] + kick * row[1]) - kick * v_by_v, v_by_x, v_by_v);
     }
-    motion.q = array<Real, 4>(
+    let ends = array<Real, 4>(
         0.0,
         0.0,
         closed[2] + lasts * (rate + lasts * (0.5 * v_rate + lasts * (1.0 / 6.0) * v_jerk)),
         rate + lasts * (v_rate + 0.5 * lasts * v_jerk),
     );
+    if MEASURE {
+        // The series takes the energy with which the gap leaves the wall.
+        add(SUM_LOST, u * u);
+        measure_series(closed, ends, lasts);
+    }
+    motion.q = ends;
     advance_phase(lasts);
     turn_phasor(lasts);
     count_event(side);
@@ -262,7 +264,5 @@ fn carry_over_short(t: Real, end: End, removed: Real) {
         iterations += 1u;
         set_tangent(i, saltate(glide_short(tangent(i), t)));
     }
-    if tally.tangent_count == 1u {
-        rescale_tangent();
-    }
+    check_range();
 }

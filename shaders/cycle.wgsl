@@ -74,20 +74,17 @@ fn spectral_growth() -> Real {
         // Too large, or not a number.
         return 100.0;
     }
-    if KINDS && whole == 0.0 {
+    if tallies[lane].is_superstable == 1u || !(whole > 1e-30) {
         return SUPERSTABLE_GROWTH;
-    }
-    if !(whole > 1e-30) {
-        return -100.0;
     }
     m = nearly_triangular(m, 1.0 / whole);
     var growth = octaves_of(whole);
+    let unresolved = growth + octaves_of(ULP);
     var weight: Real = 1.0;
     for (var n = 0u; n <= SQUARINGS; n++) {
         let size = largest_entry(m);
         if !(size > 1e-30) {
-            // Superstable within rounding.
-            return -100.0;
+            return SUPERSTABLE_GROWTH;
         }
         growth += weight * octaves_of(size);
         weight *= 0.5;
@@ -101,7 +98,18 @@ fn spectral_growth() -> Real {
         }
         m = square;
     }
-    return growth;
+    // A radius below the rounding errors of the matrix may as well be zero.
+    return select(growth - LARGE_OCTAVES * Real(tallies[lane].column_scalings), SUPERSTABLE_GROWTH, growth < unresolved);
+}
+
+// Gives the columns that were kept in range their true size, after `spectral_growth`.
+fn restore_columns() {
+    for (var n = 0u; n < tallies[lane].column_scalings + tallies[lane].is_superstable; n++) {
+        let factor = select(1.0 / LARGE, Real(0.0), tallies[lane].is_superstable == 1u);
+        for (var k = 0u; k < 16u; k++) {
+            motions[lane].tangents[k] *= factor;
+        }
+    }
 }
 
 // Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. If the cycle
@@ -109,7 +117,6 @@ fn spectral_growth() -> Real {
 // left: chaos stays near unstable cycles, and near places where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
-    let is_last = tally.period >= settings.longest;
     if !EXPONENT {
         // The divisor's distance is as small as the cycle's: a multiple of the period has been read.
         if search.divisor > 0u && search.divisor_distance + 8u >= search.return_distance && reads_divisor() {
@@ -118,12 +125,27 @@ fn judge_cycle() {
         search.cycle = tally.candidate;
         return;
     }
-    carry_vector();
     measures.cycle_growth = spectral_growth();
+    measures.cycle_stretch = cycle_stretch();
+    measures.strobe_stretch = motions[lane].stretch[3];
+    restore_columns();
+    carry_vector();
+    confirm_chaos();
+    let is_last = tally.period >= last_period();
     store_branch();
     let to = fixed_point();
     search.linear_distance = octaves(distance_between(strobe_state(), to));
+    search.motion_distance = select(octaves(distance_between(trail(search.strobe_count), to)), search.linear_distance, search.newton_steps == 0u);
+    compare_growth();
     let is_stable = measures.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    search.is_neutral = select(0u, 1u, abs(measures.cycle_growth) <= NEUTRAL * Real(tally.candidate));
+    // Motion on a neutral cycle neither approaches nor leaves it.
+    if search.is_neutral == 1u && search.newton_steps == 0u && search.return_distance >= AT_REST {
+        if search.divisor == 0u || search.divisor_distance < AT_REST || !reads_divisor() {
+            search.cycle = tally.candidate;
+        }
+        return;
+    }
     // Near a graze the strobe map has no derivative that locates the cycle.
     let is_smooth = tally.grazes == 0u || search.newton_steps > 0u;
     // Where rounding is amplified, it moves the lane away from the fixed point: such cycles are only waited for.
@@ -169,9 +191,39 @@ fn judge_cycle() {
     search.checks_divisor = 0u;
 }
 
+// Largest relative error of the exponent of a cycle whose status is ok.
+const EXPONENT_ERROR: f32 = 0.02;
+// Binary logarithm of the smallest multiplier for which that error counts: smaller ones are below the resolution of f32.
+const LEAST_GROWTH: f32 = -7.0;
+
+// Compares the exponent with that of the reading before, at another distance from the cycle. The change per distance
+// gives the error at the present distance.
+fn compare_growth() {
+    let growth = f32(measures.cycle_growth);
+    let now = distance_to_cycle();
+    let change = abs(growth - f32(measures.earlier_growth));
+    let error = change * now / max(f32(measures.earlier_distance) - now, now);
+    let is_known = search.earlier_branch == branch() && growth > LEAST_GROWTH;
+    search.is_uncertain = select(0u, 1u, is_known && error > EXPONENT_ERROR * abs(growth));
+    search.earlier_branch = branch();
+    measures.earlier_growth = measures.cycle_growth;
+    measures.earlier_distance = Real(now);
+}
+
+// Whether the motion has not settled on the cycle by the end of the budget, as far as its multiplier tells, or is too far
+// from the cycle for its exponent.
+fn is_slow() -> bool {
+    if !EXPONENT {
+        return !is_near_cycle();
+    }
+    let left = f32(settings.periods) - f32(search.strobe_count);
+    let at_last = -f32(search.motion_distance) / PARTS_PER_OCTAVE + f32(measures.cycle_growth) * left / f32(search.cycle);
+    return !is_near_cycle() || search.is_uncertain == 1u || at_last > log2(SETTLED_DISTANCE);
+}
+
 // Starts to read the divisor of the period. Returns false if too few periods are left.
 fn reads_divisor() -> bool {
-    if tally.period + search.divisor > settings.longest {
+    if tally.period + search.divisor > last_period() {
         return false;
     }
     tally.candidate = search.divisor;
@@ -199,6 +251,7 @@ fn restart_search() {
         motion.q[1] += Real(PERTURBATION * exp2(-f32(AT_REST) / PARTS_PER_OCTAVE)) * measures.rate_scale;
         motion.bound = 0.0;
         search.strobe_count = 0u;
+        search.average_length = 0u;
         // Growth there was that of the unstable cycle, not of chaos.
         search.blocks = 0u;
         search.block_periods = 0u;
@@ -240,10 +293,18 @@ fn is_rejected() -> bool {
     return search.rejected_divisor == search.divisor && search.divisor_distance < AT_REST && is_separate;
 }
 
-// Whether the cycle closes earlier within the rounding error of a cycle. Its period may then be that divisor, and the
-// longer one an effect of rounding.
+// Rounding errors that the motion between two events adds, as a multiple of ULP; the same in resolution.rs.
+const ROUNDINGS: Real = 8.0;
+
+// Whether rounding decides the period: the cycle closes earlier within rounding, or rounding scatters its strobes by more
+// than the distance between two of them, or its states by the size of the motion. The reference has the same rule
+// (dynamics/src/orbit/resolution.rs).
 fn hides_period() -> bool {
-    return search.divisor > 0u && exp2(-f32(search.divisor_distance) / PARTS_PER_OCTAVE) < max(noise(), NOISE);
+    if search.divisor > 0u && exp2(-f32(search.divisor_distance) / PARTS_PER_OCTAVE) < max(noise(), NOISE) {
+        return true;
+    }
+    let nearest = Real(exp2(-f32(search.nearest) / PARTS_PER_OCTAVE));
+    return EXPONENT && (ROUNDINGS * ULP * measures.strobe_stretch >= nearest || ULP * measures.cycle_stretch >= 1.0);
 }
 
 // Returns the largest change of the state over a cycle by rounding, relative to the motion: every event rounds, and
@@ -295,12 +356,14 @@ fn is_near_cycle() -> bool {
 // distance for the state, and twice the amplified distance for the image.
 fn is_surely_unsymmetric() -> bool {
     let amplified = select(1.0, f32(gain()), EXPONENT);
-    return exp2(-f32(search.mirror) / PARTS_PER_OCTAVE) > 2.0 * (1.0 + amplified) * max(blurred_distance_to_cycle(), ON_CYCLE);
+    return exp2(-f32(search.mirror) / PARTS_PER_OCTAVE) > 2.0 * (1.0 + amplified) * max(blurred_distance_to_cycle(), SYMMETRIC);
 }
 
-// Whether the cycle is nearer to its mirror image than lanes resolve.
+// Whether the cycle is as near to its mirror image as rounding and the lane's distance from the cycle allow.
 fn is_surely_symmetric() -> bool {
-    return is_near_cycle() && exp2(-f32(search.mirror) / PARTS_PER_OCTAVE) + 2.0 * distance_to_cycle() < MIRROR_DISTANCE;
+    let mirror = exp2(-f32(search.mirror) / PARTS_PER_OCTAVE);
+    let is_close = mirror < max(4.0 * distance_to_cycle(), SYMMETRIC);
+    return is_near_cycle() && is_close && mirror + 2.0 * distance_to_cycle() < MIRROR_DISTANCE;
 }
 
 // Whether the lane rests. A slow lane far from the cycle does not count.

@@ -68,6 +68,8 @@ struct FlowShape {
     phasors: u32,
     // Number of displacements. With one, the second rests at 0.
     degrees: u32,
+    // 1 if contact-free motion also requires that x rests at 0.
+    must_rest: u32,
     // CONTACT_* of the right and of the left wall.
     contacts: array<u32, 2>,
 }
@@ -96,8 +98,9 @@ struct Settings {
     // Length of the active list, and the place in it from which lanes have yet to begin.
     active_lanes: u32,
     first_new: u32,
-    // Forcing periods to integrate, and the number that undecided lanes get.
+    // Forcing periods to integrate, the number that undecided lanes get, and the number that chaotic lanes get.
     periods: u32,
+    decided_by: u32,
     longest: u32,
     // First period at which a lane may stop as chaotic.
     chaos_from: u32,
@@ -157,6 +160,10 @@ struct Measures {
     // Growth of the tangent vector over whole blocks: its sum, and the sum of squared deviations from its mean.
     growth_sum: Real,
     growth_squares: Real,
+    // Sum of products of consecutive blocks, both relative to the first block; the first and the last whole block.
+    growth_products: Real,
+    first_block: Real,
+    last_block: Real,
     // Strobe state that later strobes are compared with. While a cycle is read, the cycle's start.
     anchor: array<Real, 4>,
     // Largest position and largest rate at strobes: the units of distances.
@@ -164,6 +171,12 @@ struct Measures {
     rate_scale: Real,
     // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
     cycle_growth: Real,
+    // Largest growth of a perturbation between two instants of that cycle, and from an instant to a strobe.
+    cycle_stretch: Real,
+    strobe_stretch: Real,
+    // Growth and distance from the cycle at the reading before.
+    earlier_growth: Real,
+    earlier_distance: Real,
 }
 
 struct Motion {
@@ -173,8 +186,13 @@ struct Motion {
     tangents: array<Real, 16>,
     // The exponent's tangent vector while the matrix takes its place.
     vector: array<Real, 4>,
+    // Growth of perturbations on the cycle that is read (check_columns in tangent.wgsl): smallest size of the columns so
+    // far, largest ratio of a size to a smaller one before it, largest size, and largest ratio at a strobe.
+    stretch: array<Real, 4>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
+    // Weighted averages of gap, rate, x, its rate and their squares: the first window less the second (regularity.wgsl).
+    averages: array<Real, 5>,
     // The last state of a lane that is being measured.
     ended: MotionNow,
     // What was measured in the present period, and in all (measure.wgsl).
@@ -277,11 +295,25 @@ struct Search {
     rejected_divisor: u32,
     // Distance of the lane from the fixed point of the linearised strobe map, in quarter octaves below 1.
     linear_distance: u32,
+    // Distance of the motion itself from that point, and of the cycle's start from the nearest other strobe of the cycle,
+    // in quarter octaves below 1.
+    motion_distance: u32,
+    nearest: u32,
+    // Hash of the events of the reading before; and 1 if the exponents of the two readings differ by too much.
+    earlier_branch: u32,
+    is_uncertain: u32,
     // Strobes of the motion so far, and its latest cycles that have the same events as the cycle that is read.
     strobe_count: u32,
     matching_cycles: u32,
     // Events of all whole periods.
     all_events: u32,
+    // 1 once only further periods of chaos are left.
+    confirms_chaos: u32,
+    // Strobe after which the windows of the averages begin, and their length; 0 if they have not begun.
+    average_start: u32,
+    average_length: u32,
+    // 1 if the cycle that was read last has a multiplier of modulus 1.
+    is_neutral: u32,
 }
 
 // All counters of a lane.
@@ -293,6 +325,10 @@ struct Tally {
     last_distances: array<u32, 16>,
     // Hashes of the events of the trail's periods.
     itineraries: array<u32, TRAIL>,
+    // The columns of the monodromy matrix: how often they were multiplied by LARGE; and 1 if an event has made them zero,
+    // after which they start again.
+    column_scalings: u32,
+    is_superstable: u32,
     // Symbols of the word, ten to a number.
     word: array<u32, 7>,
     // The pattern: one symbol for every run of equal symbols. Stored and hashed like the word.

@@ -23,13 +23,18 @@ fn begin_period() {
         widen_scales(strobe_state());
         let read = tally.candidate - tally.periods_to_read;
         if EXPONENT {
+            check_columns();
+            motions[lane].stretch[3] = max(motions[lane].stretch[3], size_of_columns() / motions[lane].stretch[0]);
             compare_itineraries(itinerary, read);
         }
         let distance = octaves(distance_between(strobe_state(), measures.anchor));
         if tally.periods_to_read == 0u {
             search.return_distance = distance;
             tally.stage = STAGE_READ;
-        } else if tally.candidate % read == 0u && distance > search.divisor_distance {
+            return;
+        }
+        search.nearest = max(search.nearest, distance);
+        if tally.candidate % read == 0u && distance > search.divisor_distance {
             search.divisor = read;
             search.divisor_distance = distance;
         }
@@ -42,17 +47,34 @@ fn begin_period() {
     let decided = settings.max_period > 0u && recurs();
     // The budget includes the periods in which the cycle is read.
     let read_by = tally.period + tally.candidate;
-    let is_last = read_by == settings.periods || read_by == settings.longest;
+    let is_last = read_by == settings.periods || read_by == last_period();
     // A chance contraction in growing motion has not settled.
     let is_due = is_last && search.streak >= STREAK && (search.is_settled == 1u || !grows(DOUBT));
     let early = settings.early_stop == 1u;
-    if read_by <= settings.longest && (is_due || (decided && early)) {
+    if read_by <= last_period() && (is_due || (decided && (early || search.confirms_chaos == 1u))) {
         begin_reading();
     } else if early && is_non_impacting() {
         end_non_impacting();
-    } else if tally.period >= settings.longest || (early && is_chaos()) {
+    } else if tally.period >= settings.longest || (early && is_chaos()) || (early && tally.period >= settings.periods && is_quasi_periodic()) {
         tally.stage = STAGE_DONE;
+    } else {
+        confirm_chaos();
+        if tally.period >= last_period() {
+            tally.stage = STAGE_DONE;
+        }
     }
+}
+
+// Gives a chaotic lane the periods that confirm chaos.
+fn confirm_chaos() {
+    if settings.longest > settings.decided_by && tally.period >= settings.decided_by && search.confirms_chaos == 0u {
+        search.confirms_chaos = select(0u, 1u, is_chaotic(CHAOS_ERRORS));
+    }
+}
+
+// Returns the period after which the lane ends if it is not decided before.
+fn last_period() -> u32 {
+    return select(settings.decided_by, settings.longest, search.confirms_chaos == 1u);
 }
 
 // Whether the energy of the transient keeps the gap off the walls from now on.
@@ -62,6 +84,9 @@ fn is_non_impacting() -> bool {
     }
     let s = flows[cell.flow_index].steady;
     let q = motion.q;
+    if shapes[cell.flow_index].must_rest == 1u && (q[2] != 0.0 || q[3] != 0.0) {
+        return false;
+    }
     return derivative_bound(q[0] - s[0], q[1] - s[1], q[2] - s[2], q[3] - s[3]) < flows[cell.flow_index].contact_free_size;
 }
 
@@ -106,15 +131,17 @@ fn begin_reading() {
     search.mirror = 0u;
     search.divisor = 0u;
     search.divisor_distance = 0u;
+    search.nearest = 0u;
     search.matching_cycles = TRAIL;
     measures.anchor = strobe_state();
     narrow_scales(measures.anchor);
     if EXPONENT {
         save_vector();
         tally.tangent_count = 4u;
-        // With one displacement, x has no neighbours.
-        let x = select(Real(0.0), Real(1.0), shapes[cell.flow_index].degrees > 1u);
-        motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, x, 0.0, 0.0, 0.0, 0.0, x);
+        begin_columns();
+        motions[lane].stretch = array<Real, 4>(1.0, 1.0, 1.0, 1.0);
+        tallies[lane].column_scalings = 0u;
+        tallies[lane].is_superstable = 0u;
     }
 }
 

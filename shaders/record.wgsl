@@ -43,6 +43,9 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
             let growth = mean_growth();
             reading.growth = growth.x;
             reading.growth_error = growth.y;
+            if is_quasi_periodic() {
+                finding.valid |= VALID_QUASI_PERIODIC;
+            }
         }
     }
     readings[i] = reading;
@@ -53,9 +56,16 @@ fn last_status() -> u32 {
     if tally.status != STATUS_OK || tally.stage != STAGE_DONE {
         return tally.status;
     }
-    if search.has_read == 0u || search.cycle == 0u {
-        let is_open = settings.max_period > 0u && search.cycle == 0u && EXPONENT && search.blocks > 1u;
-        return select(STATUS_OK, STATUS_SLOW, is_open && (escapes(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
+    if search.cycle == 0u {
+        if is_quasi_periodic() {
+            return STATUS_OK;
+        }
+        let is_open = settings.max_period > 0u && EXPONENT && search.blocks > 1u;
+        let open = select(STATUS_SLOW, STATUS_NEUTRAL, search.is_neutral == 1u);
+        return select(STATUS_OK, open, is_open && (escapes(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
+    }
+    if search.has_read == 0u {
+        return select(STATUS_OK, STATUS_NEUTRAL, measures.cycle_growth >= 0.0);
     }
     if tally.grazes > 0u {
         return STATUS_NEAR_GRAZING;
@@ -63,7 +73,10 @@ fn last_status() -> u32 {
     if strobe_distance() < ON_STROBE {
         return STATUS_STROBE_ON_EVENT;
     }
-    if !is_near_cycle() {
+    if search.is_neutral == 1u {
+        return STATUS_NEUTRAL;
+    }
+    if is_slow() {
         return STATUS_SLOW;
     }
     return select(STATUS_OK, STATUS_BELOW_RESOLUTION, hides_period());

@@ -9,8 +9,10 @@ fn refine(to: array<Real, 4>) -> bool {
         search.newton_start_origin = tally.origin;
     }
     let stalls = search.newton_steps > 0u && search.return_distance < search.earlier_return_distance + SHRUNK;
-    let is_over = search.newton_steps >= MOST_NEWTON_STEPS || tally.period + tally.candidate > settings.longest;
-    if stalls || is_over || is_onset() || tally.order > 0u {
+    let is_over = search.newton_steps >= MOST_NEWTON_STEPS || tally.period + tally.candidate > last_period();
+    // In the contact onset the gap is in front of its wall.
+    let leaves_onset = is_onset() && !(beyond(to) > 0.0);
+    if stalls || is_over || leaves_onset || tally.order > 0u {
         return false;
     }
     if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, trail(search.strobe_count)) < Real(LONGEST_NEWTON_STEP)) {

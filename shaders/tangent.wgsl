@@ -102,6 +102,58 @@ fn store_tangent_now() {
     }
 }
 
+// Starts to carry the columns of the monodromy matrix. With one displacement, x has no neighbours.
+fn begin_columns() {
+    let x = select(Real(0.0), Real(1.0), shapes[cell.flow_index].degrees > 1u);
+    motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, x, 0.0, 0.0, 0.0, 0.0, x);
+}
+
+// Keeps the columns of the monodromy matrix in range after an event, and measures how much perturbations grow between
+// two instants of the cycle: rounding at the first one is amplified until the second.
+fn check_columns() {
+    let size = size_of_columns();
+    if size == 0.0 {
+        // All neighbours have become the same motion. New perturbations grow from here on.
+        tallies[lane].is_superstable = 1u;
+        motions[lane].stretch[0] = 1.0;
+        begin_columns();
+        return;
+    }
+    if tallies[lane].is_superstable + tallies[lane].column_scalings == 0u {
+        motions[lane].stretch[2] = max(motions[lane].stretch[2], size);
+    }
+    let smallest = min(motions[lane].stretch[0], size);
+    motions[lane].stretch[0] = smallest;
+    motions[lane].stretch[1] = max(motions[lane].stretch[1], size / smallest);
+    if size * LARGE < 1.0 {
+        iterations += 16u;
+        for (var k = 0u; k < 16u; k++) {
+            motions[lane].tangents[k] *= LARGE;
+        }
+        motions[lane].stretch[0] *= LARGE;
+        tallies[lane].column_scalings += 1u;
+    }
+}
+
+// Returns the largest entry of the columns, with rates divided by the forcing frequency.
+fn size_of_columns() -> Real {
+    let angle = flows[cell.flow_index].domains[0].angle;
+    var sizes: array<Real, 4>;
+    for (var i = 0u; i < 4u; i++) {
+        iterations += 1u;
+        let u = tangent(i);
+        sizes[i] = max(max(abs(u[0]), abs(u[2])), max(abs(u[1]), abs(u[3])) / angle);
+    }
+    return max(max(sizes[0], sizes[2]), max(sizes[1], sizes[3]) * angle);
+}
+
+// Returns the largest growth of a perturbation between two instants of the cycle that was read; the second may be in the
+// next turn.
+fn cycle_stretch() -> Real {
+    let stretch = motions[lane].stretch;
+    return max(stretch[1], size_of_columns() / stretch[0] * stretch[2]);
+}
+
 // Carries the columns of the monodromy matrix over full steps; each vector costs one iteration.
 fn step_columns(count: u32) {
     if tally.tangent_count <= 1u {
@@ -171,8 +223,14 @@ fn carry_tangents(flight_pull: Pull, tau: Real, held: bool) {
         }
         set_tangent(i, u);
     }
+    check_range();
+}
+
+fn check_range() {
     if tally.tangent_count == 1u {
         rescale_tangent();
+    } else if tally.tangent_count > 1u {
+        check_columns();
     }
 }
 
@@ -315,6 +373,13 @@ fn count_growth(growth: Real, periods: u32) {
         let deviation = whole - measures.growth_sum / max(blocks, 1.0);
         measures.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
         measures.growth_sum += whole;
+        if search.blocks == 0u {
+            measures.first_block = whole;
+            measures.growth_products = 0.0;
+        } else {
+            measures.growth_products += (measures.last_block - measures.first_block) * (whole - measures.first_block);
+        }
+        measures.last_block = whole;
         motion.block_growth = 0.0;
         search.block_periods = 0u;
         search.blocks += 1u;
@@ -327,6 +392,22 @@ const LN_2: Real = 0.6931471805599453;
 // of blocks.
 fn mean_growth() -> vec2<Real> {
     let blocks = Real(search.blocks);
-    let variance = measures.growth_squares / (blocks * (blocks - 1.0));
-    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(measures.growth_sum / blocks, sqrt(variance));
+    let mean = measures.growth_sum / blocks;
+    let rho = block_correlation(mean);
+    let variance = measures.growth_squares / (blocks * (blocks - 1.0)) * ((1.0 + rho) / (1.0 - rho));
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(mean, sqrt(variance));
+}
+
+// Returns the correlation of neighbouring blocks. It is above zero where blocks are shorter than the correlation time.
+fn block_correlation(mean: Real) -> Real {
+    if search.blocks < FEWEST_BLOCKS || !(measures.growth_squares > 0.0) {
+        return 0.0;
+    }
+    let blocks = Real(search.blocks);
+    let m = mean - measures.first_block;
+    let last = measures.last_block - measures.first_block;
+    let products = measures.growth_products - m * (2.0 * blocks * m - last) + (blocks - 1.0) * m * m;
+    // Deviations from a common mean bias the correlation downwards.
+    let biased = products / measures.growth_squares;
+    return clamp(biased + (1.0 + 3.0 * biased) / blocks, 0.0, 1.0 - CORRELATION_MARGIN / sqrt(blocks));
 }

@@ -38,6 +38,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![cfg_attr(
+    not(feature = "job"),
+    allow(dead_code, unused_imports, reason = "only layers above use some items")
+)]
 #![warn(clippy::print_stderr, clippy::print_stdout, reason = "output goes where the caller says")]
 
 pub use rattlemap_dynamics as dynamics;

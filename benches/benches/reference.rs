@@ -119,6 +119,7 @@ fn per_period_of_a_map(c: &mut Criterion) {
         settings: Settings::default(),
         early_stop: true,
         undecided_periods: 0,
+        confirm_chaos: 0,
         exponent: true,
         shows_exponent: false,
         quantities: false,

@@ -15,6 +15,8 @@ mod itinerary;
 mod quantities;
 mod reading;
 mod recurrence;
+mod regularity;
+mod resolution;
 mod search_filter;
 mod section;
 #[cfg(test)]
@@ -22,17 +24,18 @@ mod tests;
 mod trace;
 
 pub use analysis::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, analyse, analyse_flow, analyse_until,
-    status_of,
+    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, NEUTRAL_ORDER, analyse, analyse_flow,
+    analyse_until, status_of,
 };
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
-pub use cell::{Measurement, NEUTRAL_ORDER, measure, measure_until};
+pub use cell::{Measurement, measure, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
+pub use regularity::{LARGEST_DIFFERENCE, LEAST_WINDOW};
 pub use section::Section;
 pub use trace::trace;
 
@@ -72,11 +75,13 @@ pub enum Class {
     Undecided,
     /// The integration ended early; the status gives the reason.
     Failed,
+    /// Regular motion on a torus: neither periodic nor chaotic.
+    QuasiPeriodic,
 }
 
 impl Class {
     /// Names of all classes, in the order of their indices.
-    pub const NAMES: [&'static str; 4] = ["periodic", "chaotic", "undecided", "failed"];
+    pub const NAMES: [&'static str; 5] = ["periodic", "chaotic", "undecided", "failed", "quasi-periodic"];
 
     /// Returns the index of the class in [`Class::NAMES`].
     pub fn index(self) -> usize {
@@ -85,6 +90,7 @@ impl Class {
             Class::Chaotic => 1,
             Class::Undecided => 2,
             Class::Failed => 3,
+            Class::QuasiPeriodic => 4,
         }
     }
 
@@ -113,13 +119,15 @@ pub enum Status {
     TooStiff,
     /// The state is not finite.
     NonFinite,
-    /// Points of the cycle lie closer together than the engine resolves: the true period may be a divisor.
+    /// Rounding decides the period: rounding errors grow to the distance between points of the cycle.
     BelowResolution,
+    /// A Floquet multiplier of the cycle has modulus 1 within its error: perturbations neither decay nor grow.
+    Neutral,
 }
 
 impl Status {
     /// Every status, in the order of its code in records and tables.
-    pub const ALL: [Status; 9] = [
+    pub const ALL: [Status; 10] = [
         Status::Ok,
         Status::Slow,
         Status::NearGrazing,
@@ -129,6 +137,7 @@ impl Status {
         Status::TooStiff,
         Status::NonFinite,
         Status::BelowResolution,
+        Status::Neutral,
     ];
 
     /// Returns the name in tables and on the command line.
@@ -143,6 +152,7 @@ impl Status {
             Status::TooStiff => "too_stiff",
             Status::NonFinite => "non_finite",
             Status::BelowResolution => "below_resolution",
+            Status::Neutral => "neutral",
         }
     }
 

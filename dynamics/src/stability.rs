@@ -10,7 +10,7 @@ mod exponent;
 mod newton;
 mod unit_circle;
 
-pub use exponent::{Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
+pub use exponent::{CORRELATION_MARGIN, Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
 pub use newton::refine;
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 
@@ -201,18 +201,9 @@ impl Cycle {
         self.log_radius < -NEUTRAL * f64::from(self.period)
     }
 
-    /// Returns the cycle without the multipliers of the degree of freedom `resting`, which is at rest and does not
-    /// affect the other.
-    pub(crate) fn without_resting(&self, resting: usize) -> Option<Cycle> {
-        let mut monodromy = self.monodromy;
-        for i in [2 * resting, 2 * resting + 1] {
-            monodromy.row_mut(i).fill(0.0);
-            monodromy.column_mut(i).fill(0.0);
-        }
-        let mut multipliers = multipliers(&monodromy)?;
-        multipliers.truncate(2);
-        let log_radius = modulus(multipliers[0]).ln();
-        Some(Cycle { multipliers, log_radius, ..self.clone() })
+    /// Whether the largest multiplier has modulus 1 within its error.
+    pub fn is_neutral(&self) -> bool {
+        self.log_radius.abs() <= NEUTRAL * f64::from(self.period)
     }
 
     /// Returns the largest Lyapunov exponent, `ln |mu1| / (p T)`.

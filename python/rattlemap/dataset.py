@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
 
@@ -215,7 +215,7 @@ _TYPES: dict[str, Any] = {
 _NAMES = frozenset(("class", "class_a", "class_b", "status", "kind", "direction", "domain", "event", "moment"))
 
 
-def text_table(source: Path | StringIO) -> pd.DataFrame:
+def text_table(source: Path | StringIO | BytesIO) -> pd.DataFrame:
     """Read a table of the program with every field as text."""
     return pd.read_csv(source, dtype=str, keep_default_na=False)
 

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from io import StringIO
+from pathlib import Path
 from typing import Any, Literal
 
 import xarray as xr
@@ -54,7 +55,12 @@ def interruptible(folder: str | None, *, resumable: bool = True) -> Iterator[Non
         if not resumable:
             text = "interrupted; nothing is stored, so the same call starts from the beginning"
         elif folder is None:
-            text = "interrupted; nothing is stored; to be able to continue a map, give out=FOLDER, and later resume=True"
+            text = (
+                "interrupted; nothing is stored. With out=FOLDER, finished cells are stored, and the same call with resume=True "
+                "continues"
+            )
+        elif not Path(folder, "records.bin").exists():
+            text = "interrupted before the first cell; the same call starts from the beginning"
         else:
             text = f"interrupted; the finished cells are in {folder}; the same call with resume=True continues"
         raise KeyboardInterrupt(text) from None

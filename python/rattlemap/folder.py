@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
@@ -25,8 +29,9 @@ _ATTRACTORS, _POINTS, _COLUMNS = "attractors.csv", "bifurcation.csv", "bifurcati
 def open(folder: str | os.PathLike[str]) -> xr.Dataset:  # noqa: A001
     """Open the folder of a finished map, basin map, list of cells or bifurcation diagram.
 
-    Only the manifest and the axes are read at first. Numbers are views of the memory-mapped file ``cells.npy``. Codes and
-    words are converted to text on access, for the accessed cells only.
+    Numbers are views of the memory-mapped file ``cells.npy``. Codes and words are converted to text on access, for the accessed
+    cells only. Each file is compared with its size and hash in the manifest when it is first read: ``cells.npy``, which contains
+    the axes, at once, and the table of words on access.
 
     Parameters
     ----------
@@ -51,7 +56,7 @@ def open(folder: str | os.PathLike[str]) -> xr.Dataset:  # noqa: A001
     ------
     FolderError
         If the folder does not exist, is not finished, is a shard's, has another format, has no ``cells.npy``, or is
-        damaged.
+        damaged. Access to words raises it, too, if their table is damaged.
 
     Notes
     -----
@@ -78,97 +83,137 @@ class FolderBackend(BackendEntrypoint):
     ) -> xr.Dataset:
         folder = Path(os.fspath(filename_or_obj))
         manifest = json.loads(_native.manifest(os.fspath(folder)))
-        ds = _diagram(folder, manifest) if manifest["command"] == "bifurcation" else _map(folder, manifest)
+        with _folder_errors(folder):
+            ds = _diagram(folder, manifest) if manifest["command"] == "bifurcation" else _map(folder, manifest)
         ds.encoding["source"] = str(folder)
         left_out = [drop_variables] if isinstance(drop_variables, str) else [*(drop_variables or ())]
         return ds.drop_vars(left_out, errors="ignore")
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
-        if not isinstance(filename_or_obj, (str, os.PathLike)):
+        is_path = isinstance(filename_or_obj, (str, os.PathLike))
+        # Opening a pipe would block.
+        if not is_path or not (Path(os.fspath(filename_or_obj)) / _MANIFEST).is_file():
             return False
         manifest = Path(os.fspath(filename_or_obj)) / _MANIFEST
         try:
             return json.loads(manifest.read_text(encoding="utf-8")).get("command") in ("map", "bifurcation")
-        except (OSError, ValueError, AttributeError):
+        except (OSError, ValueError, AttributeError, RecursionError):
             return False
 
 
-def _require(folder: Path, manifest: dict[str, Any], name: str, kind: str) -> Path:
-    """Return the path of a file in the folder; if it is missing, raise FolderError with the remedy."""
-    path = folder / name
-    if path.is_file():
-        return path
-    command = manifest["command"]
-    if any(entry["name"] == name for entry in manifest["files"]):
-        has_records = (folder / _RECORDS).is_file()
-        again = f"rattlemap check {folder} --repair" if has_records else f"rattlemap {command} SCENE --out {folder} --force"
-        raise FolderError(f"{folder}: {name} is missing; `{again}` recreates it")
-    again = "--resume" if command == "map" else "--force"
-    raise FolderError(
-        f"{folder}: there is no {name}, because outputs.files of the scene lacks {kind!r}; add it and write the files again: "
-        f"`rattlemap {command} SCENE --out {folder} {again}`"
-    )
+@contextmanager
+def _folder_errors(folder: Path) -> Iterator[None]:
+    """Turn every error of malformed files into FolderError."""
+    try:
+        yield
+    except (FolderError, MemoryError):
+        raise
+    except Exception as error:
+        why = f"{type(error).__name__}: {error}"
+        raise FolderError(f"{folder}: the folder is damaged: {why}; `rattlemap check {folder}` lists damaged files") from error
+
+
+class _Files:
+    """The files of a finished folder, each compared with the manifest when it is first read."""
+
+    def __init__(self, folder: Path, manifest: dict[str, Any]) -> None:
+        self.folder, self.command = folder, manifest["command"]
+        self.listed = {entry["name"]: (entry["bytes"], entry["sha256"]) for entry in manifest["files"]}
+
+    def require(self, name: str, kind: str) -> None:
+        """Raise FolderError with the remedy if a file is missing."""
+        folder, command = self.folder, self.command
+        if name in self.listed and not (folder / name).is_file():
+            again = f"check {folder} --repair" if (folder / _RECORDS).is_file() else f"{command} SCENE --out {folder} --force"
+            raise FolderError(f"{folder}: {name} is missing; `rattlemap {again}` recreates it")
+        if name not in self.listed:
+            again = "--resume" if command == "map" else "--force"
+            raise FolderError(
+                f"{folder}: there is no {name} in the list of {_MANIFEST}, because outputs.files of the scene lacks {kind!r}; add "
+                f"it and write the files again: `rattlemap {command} SCENE --out {folder} {again}`"
+            )
+
+    def read(self, name: str, kind: str) -> pd.DataFrame:
+        """Return a table with every field as text."""
+        self.require(name, kind)
+        content = (self.folder / name).read_bytes()
+        self._compare(name, len(content), hashlib.sha256(content))
+        return dataset.text_table(BytesIO(content))
+
+    def check(self, name: str) -> None:
+        """Compare a file that is not read as a whole."""
+        digest, part = hashlib.sha256(), memoryview(bytearray(1 << 20))
+        with (self.folder / name).open("rb", buffering=0) as file:
+            while count := file.readinto(part):
+                digest.update(part[:count])
+            self._compare(name, file.tell(), digest)
+
+    def _compare(self, name: str, size: int, digest: Any) -> None:
+        if (size, digest.hexdigest()) != self.listed[name]:
+            raise self.damage(name, f"its size or hash is not that of {_MANIFEST}")
+
+    def damage(self, name: str, why: str) -> FolderError:
+        folder = self.folder
+        return FolderError(f"{folder}: {name} is damaged: {why}; `rattlemap check {folder} --repair` recreates it")
 
 
 def _map(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
-    path = _require(folder, manifest, _CELLS, "npy")
-    cells = _Cells(path, int(manifest["cells"]))
+    files = _Files(folder.absolute(), manifest)
+    files.require(_CELLS, "npy")
+    cells = _Cells(files, int(manifest["cells"]))
     array = cells.array
     fields = array.dtype.names or ()
     if any(name in fields for name in dataset.TEXT_COLUMNS):
-        _require(folder, manifest, _WORDS, "npy")
+        files.require(_WORDS, "npy")
 
     def read(name: str, shape: tuple[int, ...], table: str | None) -> indexing.LazilyIndexedArray:
         codes = manifest["codes"].get(table)
         return indexing.LazilyIndexedArray(_Column(cells, name, shape, table, codes))
 
     ds = dataset.arrange(fields, manifest, array.__getitem__, read)
-    if "attractor" in fields:
-        # The table is written together with cells.csv.
-        attractors = folder / _ATTRACTORS
-        if attractors.is_file() or any(entry["name"] == _ATTRACTORS for entry in manifest["files"]):
-            ds = dataset.with_attractors(ds, dataset.text_table(_require(folder, manifest, _ATTRACTORS, "csv")))
+    # The table is written together with cells.csv.
+    if "attractor" in fields and ((folder / _ATTRACTORS).is_file() or _ATTRACTORS in files.listed):
+        ds = dataset.with_attractors(ds, files.read(_ATTRACTORS, "csv"))
     return ds
 
 
 def _diagram(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
-    columns, points = (dataset.text_table(_require(folder, manifest, name, "csv")) for name in (_COLUMNS, _POINTS))
+    files = _Files(folder.absolute(), manifest)
+    columns, points = (files.read(name, "csv") for name in (_COLUMNS, _POINTS))
     return dataset.diagram(columns, points, manifest)
 
 
 class _Cells:
     """The memory-mapped ``cells.npy`` and the texts of its words. A copy in another process maps the file again."""
 
-    def __init__(self, path: Path, count: int) -> None:
-        self.path = path.absolute()
-        self.count = count
+    def __init__(self, files: _Files, count: int) -> None:
+        self.files, self.count = files, count
+        self.checked: tuple[int, int] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"path": self.path, "count": self.count}
+        return {"files": self.files, "count": self.count, "checked": self.checked}
 
     @cached_property
     def array(self) -> npt.NDArray[Any]:
-        try:
-            array: npt.NDArray[Any] = np.load(self.path, mmap_mode="r", allow_pickle=False)
-        except (ValueError, OSError, EOFError) as error:
-            raise self._damage_error(self.path.name, str(error)) from error
+        path = self.files.folder / _CELLS
+        with _folder_errors(self.files.folder):
+            status = path.stat()
+            # A copy does not compute the hash of an unchanged file again.
+            if self.checked != (status.st_size, status.st_mtime_ns):
+                self.files.check(_CELLS)
+                self.checked = (status.st_size, status.st_mtime_ns)
+            array: npt.NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
         if array.shape != (self.count,) or array.dtype.names is None:
-            raise self._damage_error(self.path.name, f"it has the shape {array.shape}, not ({self.count},)")
+            raise self.files.damage(_CELLS, f"it has the shape {array.shape}, not ({self.count},)")
         return array
 
     @cached_property
     def texts(self) -> npt.NDArray[Any]:
-        return dataset.text_array(dataset.text_table(self.path.with_name(_WORDS))["text"])
-
-    def _damage_error(self, name: str, why: str) -> FolderError:
-        folder = self.path.parent
-        return FolderError(f"{folder}: {name} is damaged: {why}; `rattlemap check {folder} --repair` recreates it")
+        return dataset.text_array(self.files.read(_WORDS, "npy")["text"])
 
     def convert(self, table: str, codes: dict[str, int] | None, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        try:
+        with _folder_errors(self.files.folder):
             return dataset.look_up(self.texts if codes is None else dataset.code_names(codes), rows)
-        except IndexError as error:
-            raise self._damage_error(_WORDS, str(error)) from error
 
 
 class _Column(BackendArray):
@@ -178,6 +223,8 @@ class _Column(BackendArray):
         self, cells: _Cells, name: str, shape: tuple[int, ...], table: str | None, codes: dict[str, int] | None
     ) -> None:
         self.cells, self.name, self.shape, self.table, self.codes = cells, name, shape, table, codes
+        # Raises for a shape that does not fit, before any value is read.
+        cells.array[name].reshape(shape)
         if table is None:
             self.dtype = cells.array.dtype[name]
         else:

@@ -42,7 +42,7 @@ class Orbit:
 
     @property
     def class_(self) -> str:
-        """Class: ``periodic``, ``chaotic``, ``undecided`` or ``failed``. ``class`` itself is a keyword of Python."""
+        """Class: ``periodic``, ``chaotic``, ``quasi-periodic``, ``undecided`` or ``failed``. ``class`` itself is a keyword of Python."""
         return str(self._facts["class"])
 
     @property
@@ -279,7 +279,8 @@ def orbit(
     start
         The state at phase 0: all components, or some by name (the others are 0); by default rest.
     phase
-        The phase of the force at the start, in radians, 0 by default. It is then phase 0 of the results.
+        Phase of the force at the start, in radians; 0 by default. Results call this phase 0. A parameter of the model with
+        this name is given in ``parameters``.
     **names
         Values of parameters; the others keep the values of the model.
 
@@ -308,6 +309,8 @@ def orbit(
     _check_whole("transient", transient, _TRANSIENT)
     changes = scenes.all_names(names, None, parameters)
     if phase is not None:
+        if "phase" in require_model(model).parameters and "phase" not in changes:
+            raise SceneError('phase: the model has a parameter of this name; give it as parameters={"phase": VALUE}')
         changes["start.phase"] = phase
     model = require_model(model).replace(**changes)
     state = None if start is None else _state(model, start)

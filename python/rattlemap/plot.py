@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
 #: Names of cells without a cycle, in the order of legends.
-_WITHOUT_CYCLE = ("chaotic", "undecided", "failed")
+_WITHOUT_CYCLE = ("chaotic", "quasi-periodic", "undecided", "failed")
 
 #: Units of a width, in inches; smallest and largest width; type size of figures with a width, in points.
 _UNITS = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0, "pt": 1 / 72}
@@ -109,7 +109,7 @@ def plot(
 
 def _inches(width: str) -> float:
     """Return a width in inches."""
-    length = re.fullmatch(r"\s*([0-9.]+)\s*(mm|cm|in|pt)\s*", width)
+    length = re.fullmatch(r"\s*([0-9.]+)\s*(mm|cm|in|pt)\s*", str(width))
     try:
         inches = float(length[1]) * _UNITS[length[2]] if length else 0.0
     except ValueError:

@@ -24,6 +24,7 @@ INTEGRATION = (
     "observed_periods",
     "early_stop",
     "undecided_periods",
+    "confirm_chaos",
     "max_period",
 )
 

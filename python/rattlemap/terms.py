@@ -16,6 +16,8 @@ _VALUES = {
     "at": re.compile(r".+=.+"),
     "set": re.compile(r".+=.+"),
 }
+#: Other arguments of the package's functions.
+_NAMES = frozenset(("out", "samples", "seed", "start", "periods", "transient", "adapters", "memory", "threads"))
 #: Commands that are functions of the package.
 _FUNCTIONS = frozenset(("map", "check", "validate", "compare", "devices"))
 
@@ -50,13 +52,18 @@ def _option(found: re.Match[str]) -> str:
         return f"{name}=True" + ("" if value is None else f" {value}")
     if value is not None and name in _VALUES and _VALUES[name].fullmatch(value):
         return _argument(name, value)
+    if name not in _VALUES and name not in _NAMES:
+        return found[0]
     is_place = found.string[found.end() : found.end() + 1] == ":"
     return name + ("" if is_place else "=") + ("" if value is None else f" {value}")
 
 
 def _call(command: str) -> str:
     """Return a command of the program as a call, if the package has a function for it."""
-    _, name, *words = shlex.split(command)
+    try:
+        _, name, *words = shlex.split(command)
+    except ValueError:
+        return command
     if name not in _FUNCTIONS or "--shard" in words:
         return command
     arguments, sets = [], []

@@ -56,7 +56,12 @@ class Validation:
 
 
 def validate(
-    folder: str | os.PathLike[str], samples: int = 400, seed: int = 1, *, progress: bool | Report = True
+    folder: str | os.PathLike[str],
+    samples: int = 400,
+    seed: int = 1,
+    chaos_periods: int = 6000,
+    *,
+    progress: bool | Report = True,
 ) -> Validation:
     """Compute a sample of a finished map's cells again and compare, like ``rattlemap validate``.
 
@@ -70,6 +75,9 @@ def validate(
         Number of cells in the sample; all cells if the map has fewer.
     seed
         Seed of the sample. The same seed draws the same cells.
+    chaos_periods
+        Further periods for which chaotic cells are followed, one cell per five cells of the sample; 0 follows none. The result is
+        ``data["chaos_ends"]``.
     progress
         True shows a bar of tqdm if it is installed; a function receives (done, total).
 
@@ -80,7 +88,7 @@ def validate(
     Raises
     ------
     SceneError
-        If ``samples`` or ``seed`` is out of range.
+        If ``samples``, ``seed`` or ``chaos_periods`` is out of range.
     FolderError
         If the folder is not that of a finished map, or its records are damaged.
     KeyboardInterrupt
@@ -92,11 +100,15 @@ def validate(
     >>> rm.validate("validated", samples=4).faults
     []
     """
-    for name, value, least, most in (("samples", samples, 1, 2**32), ("seed", seed, 0, 2**64)):
+    for name, value, least, most in (
+        ("samples", samples, 1, 2**32),
+        ("seed", seed, 0, 2**64),
+        ("chaos_periods", chaos_periods, 0, 10**9 + 1),
+    ):
         if not least <= value < most:
             raise SceneError(f"{name} = {value}: it must be a whole number from {least} to {most - 1}")
     with no_display(), reporter(progress, "cells") as report:
-        failure, warnings = _native.validate(os.fspath(folder), samples, seed, report)
+        failure, warnings = _native.validate(os.fspath(folder), samples, seed, chaos_periods, report)
     warn(warnings)
     data = json.loads((Path(folder) / "validation.json").read_text(encoding="utf-8"))
     strata = pd.DataFrame([_stratum(stratum) for stratum in data["strata"]]).set_index("stratum")

@@ -67,23 +67,24 @@ pub(crate) fn compare(py: Python<'_>, a: PathBuf, b: PathBuf) -> PyResult<(Strin
 /// Validates a finished map, and writes `validation.json` and its section of the report. Returns the error that the program would
 /// report, if any, and warnings.
 #[pyfunction]
-#[pyo3(signature = (folder, samples, seed, progress=None))]
+#[pyo3(signature = (folder, samples, seed, chaos_periods, progress=None))]
 pub(crate) fn validate(
     py: Python<'_>,
     folder: PathBuf,
     samples: u32,
     seed: u64,
+    chaos_periods: u32,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Option<String>, Vec<String>)> {
     worker::run(py, progress, move |watch| {
         let clock = Instant::now();
         let observer = Collector::new(watch);
-        let job = ValidateJob::open(&folder, samples as usize, seed, &observer)?;
+        let job = ValidateJob::open(&folder, samples as usize, seed, chaos_periods, &observer)?;
         let lanes = job.run_lanes(watch.halt());
         if watch.is_halted() {
             return Ok(None);
         }
-        let (lanes, count) = (lanes?, job.sample_count());
+        let (lanes, count) = (lanes?, job.sample_count() + job.followed_count());
         let report = |done| observer.progress(done, count);
         let Some(validation) = job.replay(&lanes, &report, watch.halt()) else { return Ok(None) };
         let written = job.write(&job.validated(&lanes, &validation), clock.elapsed())?;

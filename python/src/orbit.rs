@@ -91,7 +91,7 @@ pub(crate) fn orbit(
     let own = Arc::clone(&model);
     let orbit = worker::run(py, None, move |watch| {
         let shown = analysis::EVENT_PERIODS;
-        Ok(analysis::analyse_until(&*own, state, &settings, longest, shown, watch.halt())?)
+        Ok(analysis::analyse_until(&*own, state, &settings, longest, shown, watch.halt(), &|_, _| ())?)
     })?;
     Ok(Orbit { model, orbit: Arc::new(orbit), start: state })
 }

@@ -101,7 +101,7 @@ def test_damaged_files_are_found_and_repaired(pair: tuple[Path, Path], tmp_path:
     assert found == {"cells.csv": True, "words.csv": True, "notes.txt": False}
     assert (folder / "cells.csv").read_bytes() == table and [fault.name for fault in rm.check(folder)] == ["notes.txt"]
     (folder / "records.bin").unlink()
-    with pytest.raises(rm.FolderError, match="records.bin is damaged or missing"):
+    with pytest.raises(rm.FolderError, match="records.bin cannot be recreated"):
         rm.check(folder, repair=True)
 
 

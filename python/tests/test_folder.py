@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 import pickle
+import random
+import re
 import shutil
 import warnings
 from collections.abc import Callable
@@ -17,7 +20,7 @@ import pytest
 import rattlemap as rm
 import xarray as xr
 from conftest import SCENES, Program, set_arguments, small
-from rattlemap import dataset
+from rattlemap import _native, dataset
 from rattlemap.folder import FolderBackend
 
 ABSENT = {"period": 0, "symmetric": -1, "attractor": -1}
@@ -205,9 +208,21 @@ def truncate(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
 
 
+def seal(text: str) -> str:
+    """Renews the hash of a manifest's text, as a program would that forges it."""
+    empty = re.sub('"manifest_sha256": "[0-9a-f]*"', '"manifest_sha256": ""', text)
+    return empty.replace('"manifest_sha256": ""', f'"manifest_sha256": "{hashlib.sha256(empty.encode()).hexdigest()}"')
+
+
 def mark_unlisted(folder: Path) -> None:
-    (folder / "cells.npy").unlink()
-    edit_manifest(folder, files=[])
+    path = folder / "manifest.json"
+    path.write_text(seal(re.sub(r'"files": \[.*?\n  \]', '"files": []', path.read_text(), flags=re.DOTALL)))
+
+
+def flip_bit(path: Path, place: int, bit: int = 0) -> None:
+    content = bytearray(path.read_bytes())
+    content[place] ^= 1 << bit
+    path.write_bytes(content)
 
 
 def keep_manifest_alone(folder: Path) -> None:
@@ -229,6 +244,8 @@ DAMAGES: list[tuple[Callable[[Path], object], str]] = [
     (keep_manifest_alone, "cells.npy is missing; `rm.map(..., out="),
     (lambda folder: (folder / "words.csv").unlink(), "words.csv is missing; `rm.check("),
     (lambda folder: truncate(folder / "cells.npy"), "cells.npy is damaged"),
+    (lambda folder: flip_bit(folder / "cells.npy", -9), "its size or hash is not that of manifest.json"),
+    (lambda folder: edit_manifest(folder, cells=431), "manifest.json is damaged: its contents are not what they were"),
 ]
 
 
@@ -248,3 +265,68 @@ def test_words_that_are_not_in_their_table(map_folder: Path, tmp_path: Path) -> 
     (folder / "words.csv").write_text("row,text\n0,\n")
     with pytest.raises(rm.FolderError, match="words.csv is damaged"):
         rm.open(folder)["word"].values
+
+
+@pytest.fixture(scope="module", params=["map", "basins", "diagram"])
+def example(request: pytest.FixtureRequest, program: Program, map_folder: Path, scratch: Path) -> Path:
+    folder = scratch / f"mutated-{request.param}"
+    if request.param == "map":
+        return map_folder
+    if request.param == "basins":
+        return small(program, SCENES / "basin.toml", folder, (5, 4), "outputs.files=['csv', 'npy']")
+    sets = ("axis.0.count=5", "axis.0.min=0.5", "outputs.files=['csv']", "start.policy=both")
+    program("bifurcation", SCENES / "paper_fig5.toml", "--quiet", "--out", folder, *set_arguments(*sets))
+    return folder
+
+
+def assert_refused_or(folder: Path, expected: xr.Dataset | None) -> bool:
+    """A malformed folder raises FolderError; if it does not, its values are the expected ones, if any. Returns if it does."""
+    try:
+        found = rm.open(folder).load()
+    except rm.FolderError as error:
+        assert str(folder) in str(error)
+        return True
+    assert expected is None or found.identical(expected)
+    return False
+
+
+def test_no_flipped_bit_changes_a_value(example: Path, tmp_path: Path) -> None:
+    draw, expected, refused = random.Random(1), rm.open(example).load(), 0
+    folder = tmp_path / "map"
+    shutil.copytree(example, folder)
+    names = ["manifest.json", "cells.npy", *(["words.csv"] if "word" in expected else []), "attractors.csv"]
+    read = [folder / name for name in (*names, "bifurcation.csv", "bifurcation_columns.csv") if (folder / name).exists()]
+    for path in read:
+        right = path.read_bytes()
+        for _ in range(30):
+            flip_bit(path, draw.randrange(len(right)), draw.randrange(8))
+            refused += assert_refused_or(folder, expected)
+            path.write_bytes(right)
+    # A flipped bit can turn "1e-9" in the manifest into "1E-9".
+    assert refused >= 28 * len(read)
+
+
+def test_forged_folders_raise_no_other_error(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hashes of forged files are right. The manifest is forged behind the check of its own hash."""
+    draw, folder = random.Random(2), tmp_path / "map"
+    shutil.copytree(example, folder)
+    manifest = json.loads((folder / "manifest.json").read_text())
+
+    def open_with(forged: dict[str, Any]) -> None:
+        monkeypatch.setattr(_native, "manifest", lambda _: json.dumps(forged))
+        assert_refused_or(folder, None)
+
+    for key in manifest:
+        for value in (None, [], {}, "x", -1, [[]], {"x": []}):
+            open_with({**manifest, key: value})
+        open_with({name: value for name, value in manifest.items() if name != key})
+    for name in ("cells.npy", "words.csv", "attractors.csv", "bifurcation.csv", "bifurcation_columns.csv"):
+        right = (folder / name).read_bytes() if (folder / name).exists() else b""
+        for _ in range(40 if right else 0):
+            place = draw.randrange(min(len(right), draw.choice([80, 10**9])))
+            forged = right[:place] + draw.choice([b"", b"\n", b",", b'"', b"\xff", b"9"]) + right[place + draw.randrange(3) :]
+            (folder / name).write_bytes(forged)
+            entry = {"name": name, "bytes": len(forged), "sha256": hashlib.sha256(forged).hexdigest()}
+            open_with({**manifest, "files": [entry, *(file for file in manifest["files"] if file["name"] != name)]})
+        if right:
+            (folder / name).write_bytes(right)

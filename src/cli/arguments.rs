@@ -1,6 +1,6 @@
 //! Arguments of all commands, and their help texts.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -8,14 +8,14 @@ use crate::cli::failure::Failure;
 use crate::cli::say;
 use crate::gpu::Precision;
 use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
-use crate::map::scene::{Along, FigureStyle, Format, toml};
+use crate::map::scene::{Along, FigureStyle, Format, MAX_PERIODS, toml};
 use crate::map::shard::Shard;
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
 use crate::store::inventory::figure_formats;
 use crate::store::orbit::{HistoryRequest, TABLED};
 use crate::text::printable::is_printable;
 use crate::text::shell::quoted;
-use crate::validate::DEFAULT_SAMPLES;
+use crate::validate::{CHAOS_PERIODS, DEFAULT_SAMPLES};
 use anyhow::anyhow;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -239,7 +239,7 @@ impl Map {
     /// The folder to write to.
     pub(crate) fn out(&self) -> PathBuf {
         let Some(shard) = self.shard.filter(|_| self.run.out.is_none()) else { return self.run.out() };
-        let mut name = self.run.scene.file_stem().unwrap_or_default().to_owned();
+        let mut name = self.run.stem().to_owned();
         name.push(format!(".shard-{}-of-{}", shard.index(), shard.count()));
         Path::new("out").join(name)
     }
@@ -325,8 +325,13 @@ pub(crate) struct SceneOptions {
 impl SceneOptions {
     /// The folder to write to.
     pub(crate) fn out(&self) -> PathBuf {
-        let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
-        self.out.clone().unwrap_or_else(default)
+        self.out.clone().unwrap_or_else(|| Path::new("out").join(self.stem()))
+    }
+
+    /// The scene's name without its extension. A name that leaves `.` or `..`, which are folders, keeps its extension.
+    fn stem(&self) -> &OsStr {
+        let stem = self.scene.file_stem().filter(|stem| *stem != "." && *stem != "..");
+        stem.or(self.scene.file_name()).unwrap_or_default()
     }
 }
 
@@ -650,7 +655,7 @@ impl Bifurcation {
         };
         let at: String =
             self.at.iter().map(|at| format!(".{}", at.replace(char::is_whitespace, ""))).collect();
-        let mut name = self.run.scene.file_stem().unwrap_or_default().to_owned();
+        let mut name = self.run.stem().to_owned();
         name.push(format!(".{along}{at}"));
         Path::new("out").join(name)
     }
@@ -682,7 +687,8 @@ pub(crate) struct Models {
 /// computes each cell over the whole budget, without early stops. Maps that the reference computed are compared with
 /// lanes in f64, or with the ODE solver DOP853 if no adapter has f64. Each difference is of one of five kinds: another
 /// attractor, a border within rounding, a budget too short, a limit of the engine, or unexplained. Averages over chaotic
-/// motions are compared as distributions. The exit code is 1 if significantly more than one cell in 10,000 is unexplained.
+/// motions are compared as distributions. Chaotic cells, one per five cells of the sample, are followed on the reference for
+/// further periods; the result says in how many of them chaos ends, and where. The exit code is 1 if significantly more than one cell in 10,000 is unexplained.
 /// Writes validation.json and a section of report.html.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, a thousand cells of the main map:\n  \
@@ -700,6 +706,11 @@ pub(crate) struct Validate {
     /// Seed of the sample. The same seed draws the same cells
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(crate) seed: u64,
+
+    /// Further periods for which chaotic cells are followed; 0 follows none
+    #[arg(long, value_name = "N", default_value_t = CHAOS_PERIODS,
+          value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_PERIODS)))]
+    pub(crate) chaos_periods: u32,
 
     /// Print only errors and warnings
     #[arg(long)]

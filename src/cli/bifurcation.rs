@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(options.quiet)?;
     let folder = Folder::open(&out, options.force)?;
-    folder.refuse_links(store::bifurcation::names())?;
+    folder.prepare(store::bifurcation::names())?;
     let cells = scene.line();
     let count = bifurcation::column_count(cells.len(), scene.start());
     let progress = Progress::new(count, 0, "columns", options.quiet);
@@ -62,12 +62,11 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
         &columns,
         elapsed,
     )?;
-    let [periodic, chaotic, undecided, failed] =
-        plan::count_classes(columns.iter().map(|column| column.class));
+    let classes = say::classes(plan::count_classes(columns.iter().map(|column| column.class)));
     let name = &scene.axes()[0].parameter().name;
     let hysteresis = hysteresis::hysteresis(&columns).map(|found| format!("{}\n", described(&found, name)));
     progress.finish(&format!(
-        "{count} columns in {:.3} s: {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
+        "{count} columns in {:.3} s: {classes}\n\
          {}{}: {}",
         elapsed.as_secs_f64(),
         hysteresis.unwrap_or_default(),

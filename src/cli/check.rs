@@ -27,5 +27,5 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     for name in repaired.iter().flatten().filter(|_| !quiet) {
         say::note(format_args!("{}: {name} was recreated", dir.display()));
     }
-    Ok(checked.require_good(repaired.as_deref())?)
+    Ok(checked.require_good(repaired.as_deref().unwrap_or_default(), repaired.is_some())?)
 }

@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let out = arguments.out(job.names());
     job.check_output(&out)?;
     let folder = Folder::open(&out, arguments.force)?;
-    folder.refuse_links(store::compare::names())?;
+    folder.prepare(store::compare::names())?;
     interrupt.wait_for(Some("the maps are read"));
     let result = job.compare(&Console::new(arguments.quiet, "", false), interrupt.raised())?;
     let stopped = || interrupt.failure(format!("interrupted, and nothing was written to {}", out.display()));

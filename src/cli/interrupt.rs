@@ -53,8 +53,8 @@ impl Interrupt {
     #[cfg(unix)]
     fn wait_in_thread(self, quiet: bool) -> std::io::Result<()> {
         let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
-        std::thread::spawn(move || signals.forever().for_each(|signal| self.receive(signal, quiet)));
-        Ok(())
+        let listener = move || signals.forever().for_each(|signal| self.receive(signal, quiet));
+        std::thread::Builder::new().spawn(listener).map(drop)
     }
 
     #[cfg(not(unix))]
@@ -64,13 +64,13 @@ impl Interrupt {
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&self.raised))?;
         }
-        std::thread::spawn(move || {
+        let listener = move || {
             while !self.is_raised() {
                 std::thread::sleep(INTERVAL);
             }
             self.receive(SIGINT, quiet);
-        });
-        Ok(())
+        };
+        std::thread::Builder::new().spawn(listener).map(drop)
     }
 
     fn receive(&self, signal: i32, quiet: bool) {

@@ -123,9 +123,7 @@ fn integrate(run: &mut MapRun<'_>, restart: &Restart<'_>, interrupt: &Interrupt)
             let text = format!("{error}; {restart_text}{}", restart.with_the_cpu());
             Err(JobError::Failed(text).into())
         }
-        Err(error) => {
-            Err(JobError::Failed(format!("{error}; make space on this disk; {restart_text}")).into())
-        }
+        Err(error) => Err(JobError::Failed(format!("{error}; {restart_text}")).into()),
     }
 }
 

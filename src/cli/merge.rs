@@ -11,16 +11,18 @@ use crate::job::size;
 use crate::store;
 use crate::store::folder::Folder;
 use crate::store::merge::{MergeError, Parts, Progress};
+use rattlemap_dynamics::orbit::Class;
 
 /// Gathers the records of all shards, and writes the map.
 pub(crate) fn run(arguments: &Merge) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(arguments.quiet)?;
+    interrupt.ends_at_once(format!("nothing was written to {}", arguments.out.display()), || {});
     let parts = Parts::open(&arguments.parts)?;
     parts.refuse(&arguments.out)?;
     size::check_merge(parts.scene(), Some(&arguments.out))?;
     // A folder without results may be replaced. A run that was killed at its start leaves one.
     let folder = Folder::open(&arguments.out, arguments.force || !Folder::holds_results(&arguments.out))?;
-    folder.refuse_links(store::map::names())?;
+    folder.prepare(store::map::names())?;
     let (shards, out) = (parts.count(), arguments.out.display());
     let runs = parts.scene().run_count().max(1) as usize;
     let progress = progress::Progress::new(runs, 0, "runs", arguments.quiet);
@@ -43,12 +45,12 @@ pub(crate) fn run(arguments: &Merge) -> Result<(), Failure> {
     for warning in &merged.warnings {
         say::note(format_args!("warning: {warning}"));
     }
-    let [periodic, chaotic, undecided, failed] = merged.classes;
     let [reading, writing] = merged.times.map(|time| time.as_secs_f64());
     progress.finish(&format!(
         "{runs} runs of {shards} shards, read in {reading:.3} s; files written in {writing:.3} s\n\
-         {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
+         {}\n\
          {}: {}",
+        say::classes(merged.classes),
         say::path(folder.path()),
         merged.files.join(", ")
     ));
@@ -58,6 +60,7 @@ pub(crate) fn run(arguments: &Merge) -> Result<(), Failure> {
     if arguments.json {
         print_json(&merged.object)?;
     }
-    let all_failed = failed > 0 && periodic + chaotic + undecided == 0;
+    let failed = merged.classes[Class::Failed.index()];
+    let all_failed = failed > 0 && failed == merged.classes.iter().sum::<usize>();
     fail_if(all_failed, "every cell failed; the status column says why")
 }

@@ -19,10 +19,18 @@ pub(crate) mod say;
 mod stdout;
 mod validate;
 
+use std::error::Error as _;
 use std::ffi::OsString;
 use std::process::ExitCode;
+#[cfg(unix)]
+use std::sync::Arc;
+
+#[cfg(unix)]
+use anyhow::Context;
+use anyhow::anyhow;
 
 use arguments::{Bench, Cli, Command, parsed_from};
+use failure::Failure;
 
 pub use arguments::parsed;
 pub use progress::Progress;
@@ -39,7 +47,7 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    let result = match cli.command {
+    let result = prepare(&cli.command).and_then(|()| match cli.command {
         Command::Map(arguments) => map::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
@@ -51,6 +59,26 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Check(arguments) => check::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Bench(Bench::Engines(arguments)) => bench::run(&arguments),
-    };
+    });
     result.map_or_else(|failure| failure.print(), |()| 0)
+}
+
+/// Prepares the process for limits that a shell can set (`ulimit`), so that they lead to error messages.
+fn prepare(command: &Command) -> Result<(), Failure> {
+    // Without a handler, a file that becomes too large ends the process. With one, writing fails.
+    #[cfg(unix)]
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())
+        .context("cannot listen for signals")?;
+    if matches!(command, Command::Models(_) | Command::Devices | Command::Completions(_)) {
+        return Ok(());
+    }
+    // The error has no source if there are threads already: Python may have started them.
+    let started = rayon::ThreadPoolBuilder::new().build_global();
+    match started.err().filter(|error| error.source().is_some()) {
+        None => Ok(()),
+        Some(error) => Err(Failure::Run(anyhow!(
+            "cannot start a thread on each core ({error}); raise the limits of this shell (`ulimit -u` and `ulimit -v`), or \
+             use fewer threads: set RAYON_NUM_THREADS to a small number"
+        ))),
+    }
 }

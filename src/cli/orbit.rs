@@ -1,6 +1,7 @@
 //! `rattlemap orbit`: computes and describes one motion.
 
-use std::time::Instant;
+use std::cell::OnceCell;
+use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
 use rattlemap_dynamics::flow::Flow;
@@ -10,6 +11,7 @@ use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 use super::arguments::{FigureFormat, Orbit};
 use super::failure::{Failure, fail_if};
 use super::interrupt::Interrupt;
+use super::progress::Progress;
 use super::stdout::print;
 use crate::cli::say;
 use crate::job::model_choice;
@@ -20,6 +22,9 @@ use crate::store;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::orbit::OrbitRequest;
+
+/// Time after which an analysis shows its progress.
+const SILENCE: Duration = Duration::from_secs(2);
 
 /// Computes the motion, prints it, and writes its folder if there is one.
 pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
@@ -35,7 +40,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(true)?;
     let folder = arguments.out.as_ref().map(|dir| Folder::open(dir, arguments.force)).transpose()?;
     if let Some(folder) = &folder {
-        folder.refuse_links(store::orbit::names())?;
+        folder.prepare(store::orbit::names())?;
     }
     let clock = Instant::now();
     let (start, settings) = (arguments.start(), arguments.settings());
@@ -61,7 +66,18 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
         return finish(arguments, folder, &style, write);
     }
     let (shown, longest, halt) = (orbit::EVENT_PERIODS, arguments.longest_window(), interrupt.raised());
-    let orbit = orbit::analyse_until(&*model, start, &settings, longest, shown, halt)?.ok_or_else(stopped)?;
+    let progress = OnceCell::new();
+    let report = |done: u64, total: u64| {
+        if clock.elapsed() > SILENCE {
+            let begin = || Progress::of(total as usize, done as usize, "forcing periods", false, true);
+            progress.get_or_init(begin).report(done as usize, total as usize);
+        }
+    };
+    let orbit = orbit::analyse_until(&*model, start, &settings, longest, shown, halt, &report);
+    if let Some(progress) = progress.get() {
+        progress.clear();
+    }
+    let orbit = orbit?.ok_or_else(stopped)?;
     print(&match arguments.json {
         true => store::orbit::json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),

@@ -83,6 +83,13 @@ impl Progress {
         }
     }
 
+    /// Removes the bar.
+    pub(super) fn clear(&self) {
+        if let Progress::Bar(bar, _) = self {
+            bar.finish_and_clear();
+        }
+    }
+
     /// Removes the bar and prints lines, unless quiet.
     pub fn finish(&self, line: &str) {
         match self {

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::store::folder::Folder;
 use crate::text::printable;
+use rattlemap_dynamics::orbit::Class;
 
 /// Prints a line on stderr; line feeds in it are escaped. If stderr is closed or full, the line is dropped and the run
 /// continues.
@@ -43,4 +44,10 @@ pub(crate) fn path(path: &Path) -> String {
 /// Escapes text from outside for a message of several lines.
 pub(crate) fn quoted(text: impl Display) -> String {
     printable::line(&text.to_string()).into_owned()
+}
+
+/// Lists the numbers of cells of each class. Quasi-periodic motion is listed only where it occurs.
+pub(crate) fn classes([periodic, chaotic, undecided, failed, tori]: [usize; Class::NAMES.len()]) -> String {
+    let tori = if tori > 0 { format!("{tori} quasi-periodic, ") } else { String::new() };
+    format!("{periodic} periodic, {chaotic} chaotic, {tori}{undecided} undecided, {failed} failed")
 }

@@ -16,9 +16,9 @@ pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
     let (clock, quiet) = (Instant::now(), arguments.quiet);
     let interrupt = Interrupt::listen(quiet)?;
     let console = Console::new(quiet, "cells replayed", false);
-    let Validate { folder, samples, seed, .. } = arguments;
-    let job = ValidateJob::open(folder, *samples as usize, *seed, &console)?;
-    let (dir, count) = (job.folder().path(), job.sample_count());
+    let Validate { folder, samples, seed, chaos_periods, .. } = arguments;
+    let job = ValidateJob::open(folder, *samples as usize, *seed, *chaos_periods, &console)?;
+    let (dir, count, followed) = (job.folder().path(), job.sample_count(), job.followed_count());
     console.note(&format!(
         "computing {count} different cells of the map again, on a graphics device if there is one"
     ));
@@ -26,8 +26,10 @@ pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
     let nothing = format!("none of {count} cells was replayed, and nothing was written to {path}");
     interrupt.ends_at_once(nothing, job.folder().leaver());
     let stopped = |replayed: usize| {
-        let text =
-            format!("interrupted after {replayed} of {count} cells, and nothing was written to {path}");
+        let text = format!(
+            "interrupted after {replayed} of {} cells, and nothing was written to {path}",
+            count + followed
+        );
         interrupt.failure(text)
     };
     let lanes = job.run_lanes(interrupt.raised());
@@ -36,11 +38,14 @@ pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
     }
     let lanes = lanes?;
     console.note(&format!("replaying {count} cells without early stops: each may take its whole budget"));
-    console.progress(0, count);
+    if followed > 0 {
+        console.note(&format!("then following {followed} chaotic cells for {chaos_periods} further periods"));
+    }
+    console.progress(0, count + followed);
     let replayed = AtomicUsize::new(0);
     let report = |done| {
         replayed.store(done, Ordering::Relaxed);
-        console.progress(done, count);
+        console.progress(done, count + followed);
     };
     let validation = job
         .replay(&lanes, &report, interrupt.raised())

@@ -37,13 +37,13 @@ pub const CONTINUATION: f64 = 0.25;
 pub struct Attractor {
     /// Periodic or chaotic.
     pub class: Class,
-    /// The lexicographically smallest strobe state; none for chaos.
+    /// The lexicographically smallest strobe state; none for aperiodic motion.
     pub strobe: Option<State>,
     /// Word of the cycle, if the reference confirmed it.
     pub word: Option<Word>,
     /// Whether the cycle is in contact at phase 0.
     pub meshes: bool,
-    /// Largest Lyapunov exponent; for chaos the mean over its cells.
+    /// Largest Lyapunov exponent; for aperiodic motion the mean over its cells.
     pub exponent: Option<f64>,
     /// Modulus of the largest Floquet multiplier of the cycle.
     pub multiplier: Option<f64>,
@@ -63,7 +63,8 @@ pub struct Basins {
     list: Vec<Attractor>,
     /// Cycles at each value of the swept parameter; one entry without one.
     groups: Vec<Group>,
-    chaos: Option<u16>,
+    /// Labels of chaos and of quasi-periodic motion.
+    aperiodic: [Option<u16>; 2],
     grouping: Grouping,
 }
 
@@ -133,28 +134,38 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
     // A cycle and its continuations have one number.
     let numbers = follow(groups.iter().map(|(catalogue, _)| catalogue));
     let cycles = numbers.iter().flatten().map(|&n| n + 1).max().unwrap_or(0);
-    let chaos = cycles;
+    // All chaotic motions count as one attractor, all quasi-periodic ones as another.
+    let [chaos, torus] = [cycles, cycles + 1];
     let mut own = vec![None; records.count()];
     for (group, (_, found)) in groups.iter().enumerate() {
         for &(id, found) in found {
             own[id] = match found {
                 Outcome::Cycle(nth) => Some(numbers[group][nth as usize]),
                 Outcome::Chaos => Some(chaos),
+                Outcome::Torus => Some(torus),
                 Outcome::Unresolved(_) | Outcome::Undecided | Outcome::Failed => None,
             };
         }
     }
     let of = |id: usize| filled_from.get(id).map_or(own[id], |&from| own[from as usize]);
     let cells: Vec<Option<usize>> = (0..records.count()).map(of).collect();
-    let mut counts = vec![0usize; cycles + 1];
+    let mut counts = vec![0usize; cycles + 2];
     cells.iter().flatten().for_each(|&n| counts[n] += 1);
     let catalogues: Vec<&Catalogue> = groups.iter().map(|(catalogue, _)| catalogue).collect();
     let sources =
         Sources { plan, records, grouping, flows: &flows, catalogues: &catalogues, numbers: &numbers };
-    let mut list: Vec<(usize, Attractor)> = (0..=cycles)
+    let mut list: Vec<(usize, Attractor)> = (0..counts.len())
         .into_par_iter()
         .filter(|&n| counts[n] > 0)
-        .map(|n| (n, if n == chaos { sources.chaos(&own, n) } else { sources.cycle(&cells, n) }))
+        .map(|n| {
+            let aperiodic = |class| sources.aperiodic(class, &own, n);
+            let attractor = match n.checked_sub(chaos) {
+                None => sources.cycle(&cells, n),
+                Some(0) => aperiodic(Class::Chaotic),
+                Some(_) => aperiodic(Class::QuasiPeriodic),
+            };
+            (n, attractor)
+        })
         .collect();
     list.iter_mut().for_each(|(n, attractor)| attractor.cells = counts[*n]);
     list.sort_by(|(_, a), (_, b)| {
@@ -166,7 +177,7 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
         let by_state = || lexicographic(&state(a), &state(b));
         b.cells.cmp(&a.cells).then(period(a).cmp(&period(b))).then_with(by_state)
     });
-    let mut label_of = vec![NONE; cycles + 1];
+    let mut label_of = vec![NONE; counts.len()];
     for (label, (n, _)) in (0..NONE).zip(&list) {
         label_of[*n] = label;
     }
@@ -179,7 +190,7 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
         labels: cells.iter().map(|n| n.map_or(NONE, |n| label_of[n])).collect(),
         list: list.into_iter().map(|(_, attractor)| attractor).collect(),
         groups: groups.collect(),
-        chaos: Some(label_of[chaos]).filter(|&label| label != NONE),
+        aperiodic: [chaos, torus].map(|n| Some(label_of[n]).filter(|&label| label != NONE)),
         grouping,
     })
 }
@@ -206,7 +217,8 @@ impl Basins {
     pub fn label(&self, id: usize, record: &Record) -> Option<u16> {
         let group = &self.groups[self.grouping.group(id)];
         match classify(record) {
-            Class::Chaotic => self.chaos,
+            Class::Chaotic => self.aperiodic[0],
+            Class::QuasiPeriodic => self.aperiodic[1],
             Class::Periodic { period } => {
                 let nth = group.catalogue.nearest(&record.strobe, period)?;
                 Some(group.labels[nth as usize]).filter(|&label| label != NONE)
@@ -316,11 +328,11 @@ impl<R: Records + ?Sized> Sources<'_, R> {
         }
     }
 
-    fn chaos(&self, own: &[Option<usize>], number: usize) -> Attractor {
+    fn aperiodic(&self, class: Class, own: &[Option<usize>], number: usize) -> Attractor {
         let ids: Vec<usize> = (0..own.len()).filter(|&id| own[id] == Some(number)).collect();
         let sum: f64 = ids.iter().map(|&id| self.records.record(id).lyapunov).sum();
         Attractor {
-            class: Class::Chaotic,
+            class,
             strobe: None,
             word: None,
             meshes: false,

@@ -35,7 +35,8 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     let count = |id: usize| {
         let runs = (id..records.count()).step_by(cells);
         let cell = plan.cell(id as u32);
-        let mut found = CellAttractors { law: plan.law(cell.law), chaos: false, cycles: Vec::new() };
+        let mut found =
+            CellAttractors { law: plan.law(cell.law), chaos: false, torus: false, cycles: Vec::new() };
         flows.with(cell.flow, |flow| runs.for_each(|run| found.take(flow, &records.record(run))));
         found.count()
     };
@@ -46,17 +47,19 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
 struct CellAttractors {
     law: Law,
     chaos: bool,
+    torus: bool,
     cycles: Vec<StrobeCycle>,
 }
 
 impl CellAttractors {
     fn count(&self) -> u8 {
-        (self.cycles.len() + usize::from(self.chaos)) as u8
+        (self.cycles.len() + usize::from(self.chaos) + usize::from(self.torus)) as u8
     }
 
     fn take(&mut self, flow: &Flow, record: &Record) {
         match classify(record) {
             Class::Chaotic => self.chaos = true,
+            Class::QuasiPeriodic => self.torus = true,
             Class::Periodic { period } if record.strobe.iter().all(|x| x.is_finite()) => {
                 if self.cycles.iter().any(|cycle| cycle.passes(flow, &record.strobe, period)) {
                     return;

@@ -5,7 +5,7 @@
 
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
-use crate::record::measures::GROUPS;
+use crate::record::measures::{GROUPS, SMALL};
 use crate::record::{Record, Records, valid};
 
 /// Relative tolerance for rounding errors of engines in single precision.
@@ -60,7 +60,7 @@ fn is_same(a: &Record, b: &Record, tolerance: f64) -> bool {
         && both(valid::LYAPUNOV, near(a.lyapunov, b.lyapunov))
         && both(valid::IMPACTS, near(a.impacts_per_period, b.impacts_per_period))
         && both(valid::MESH, near(a.mesh_fraction, b.mesh_fraction))
-        && GROUPS.iter().all(|group| both(group.bit, group.distance(a, b) <= tolerance))
+        && GROUPS.iter().all(|group| both(group.bit, group.distance(a, b, SMALL) <= tolerance))
         && both(valid::SYMMETRIC, a.symmetric == b.symmetric)
         && both(valid::WORD, a.spelling() == b.spelling())
         && both(valid::PATTERN, a.pattern() == b.pattern())

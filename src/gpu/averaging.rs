@@ -6,8 +6,7 @@ const ALIGNMENT: u32 = 50;
 /// Blocks whose means give the exponent's standard error.
 const EXPONENT_BLOCKS: u32 = 32;
 
-/// Least periods of a block. Neighbouring periods are correlated, so that shorter blocks give too small a standard
-/// error.
+/// Least periods of a block. Lanes measure the correlation of neighbouring blocks; shorter blocks would have more of it.
 const SHORTEST_BLOCK: u32 = 4;
 
 /// Periods that count, and their blocks.

@@ -34,6 +34,8 @@ pub struct Constants {
     pub mirror_symmetric: bool,
     /// Number of displacements.
     pub degrees: u32,
+    /// Whether contact-free motion also requires that the displacement `x` rests at 0.
+    pub(super) must_rest: bool,
     /// Kinds of the right and of the left wall.
     pub contacts: [Contact; 2],
     /// Whether a wall exists and is elastic or rigid.
@@ -71,6 +73,7 @@ impl Constants {
             phasors: phasors(steps),
             mirror_symmetric: oscillator.mirror_symmetric(),
             degrees: oscillator.degrees as u32,
+            must_rest: false,
             contacts: oscillator.contacts,
             has_elastic_or_rigid_wall: has_elastic_or_rigid_wall(oscillator),
             has_sine: has_sine(oscillator),
@@ -92,6 +95,7 @@ impl Constants {
             displacements: coordinates.displacements(),
         };
         if let Some(motion) = non_impacting(oscillator) {
+            constants.must_rest = motion.resting().is_some();
             constants.flow.steady = constants.to_lane(motion.steady());
             // In units of the free domain's energy form.
             constants.flow.contact_free_size = h * (coordinates.compliance() * motion.reach()).sqrt();
@@ -141,12 +145,11 @@ pub fn has_sine(oscillator: &model::Oscillator) -> bool {
     oscillator.force_sin != [0.0; 2]
 }
 
-/// Returns the motion without contacts. With one displacement it may be known only by its rest position.
+/// Returns the motion without contacts. It may require that `x` is at rest, which a lane knows exactly.
 fn non_impacting(oscillator: &model::Oscillator) -> Option<model::NonImpacting> {
-    let beside_rest = || {
-        let is_alone = oscillator.degrees == 1;
-        is_alone.then(|| model::NonImpacting::with_one_at_rest(oscillator)).flatten()
-    };
+    let other = Coordinates::new(oscillator).other;
+    let beside_rest =
+        || model::NonImpacting::with_one_at_rest(oscillator).filter(|motion| motion.resting() == Some(other));
     model::NonImpacting::new(oscillator).or_else(beside_rest)
 }
 

@@ -8,7 +8,7 @@ pub(super) struct Coordinates {
     gap: [f64; 2],
     mass: [[f64; 2]; 2],
     /// Index of the displacement `x`: the one with the smaller factor in the gap.
-    other: usize,
+    pub(super) other: usize,
 }
 
 /// Second-order form of a domain's equations in `(z, x)`: `y'' = -stiffness y - damping y' + cos + sin + load`, where `cos`

@@ -27,7 +27,8 @@ pub(super) fn quantities(constants: &Constants, measured: &Measured) -> Option<Q
         largest: highs[4] / h,
     };
     let rows = [constants.flow.displacements[0], constants.flow.displacements[1], [1.0, 0.0]];
-    let displacement = |i: usize| displacement(rows[i], totals, steps, 0.5 * (highs[i] - lows[i]));
+    let displacement =
+        |i: usize| displacement(rows[i], totals, steps, totals[2 + i], 0.5 * (highs[i] - lows[i]));
     Some(Quantities {
         approaches: [Approaches::default(), Approaches::default(), both],
         impact_energy: lost * energy / (steps * h),
@@ -38,14 +39,13 @@ pub(super) fn quantities(constants: &Constants, measured: &Measured) -> Option<Q
     })
 }
 
-fn displacement([a, b]: Row, totals: &[f64; SUMS], steps: f64, amplitude: f64) -> Displacement {
-    let [z, x, zz, zx, xx, zc, zs, xc, xs, ..] = *totals;
-    let square = a * a * zz + 2.0 * a * b * zx + b * b * xx;
+fn displacement([a, b]: Row, totals: &[f64; SUMS], steps: f64, square: f64, amplitude: f64) -> Displacement {
+    let [z, x, _, _, _, zc, zs, xc, xs, ..] = *totals;
     let [cos, sin] = [a * zc + b * xc, a * zs + b * xs].map(|sum| 2.0 * sum / steps);
     Displacement {
         amplitude,
         mean: (a * z + b * x) / steps,
-        rms: (square / steps).max(0.0).sqrt(),
+        rms: (square / steps).sqrt(),
         harmonic: [cos.hypot(sin), (-sin).atan2(cos)],
     }
 }

@@ -37,6 +37,7 @@ mod unroll;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 pub(crate) use adapter::no_adapter;
 pub use adapter::{
@@ -96,6 +97,8 @@ pub struct LaneSettings {
     pub early_stop: bool,
     /// Further periods for lanes that are undecided after `periods`; only with early stops.
     pub undecided_periods: u32,
+    /// Further periods for lanes that are chaotic after all others; only with exponents.
+    pub confirm_chaos: u32,
     /// Whether records contain exponents.
     pub exponent: bool,
     /// Whether records contain words.
@@ -167,6 +170,7 @@ impl Default for LaneSettings {
             max_period: 64,
             early_stop: true,
             undecided_periods: 0,
+            confirm_chaos: 0,
             exponent: true,
             word: true,
             pattern: true,
@@ -200,6 +204,7 @@ impl LaneSettings {
             max_period: budget.settings.max_period,
             early_stop: budget.early_stop,
             undecided_periods: budget.undecided_periods,
+            confirm_chaos: budget.confirm_chaos,
             exponent: budget.exponent,
             exponent_from: budget.exponent_from(),
             chaos_from: budget.chaos_from(),
@@ -222,10 +227,18 @@ impl LaneSettings {
     }
 }
 
+/// Longest time to wait for the work of a lost device.
+const LONGEST_WAIT: Duration = Duration::from_secs(10);
+
 impl Drop for Gpu {
-    /// Leaves a lost device to the driver: the last owner of a lost device would panic when it is dropped.
+    /// Waits until the driver works no more on a lost device, and leaves the device to the driver. The process may end
+    /// after this, and a driver that still works would use its own destroyed objects. The last owner of a lost device
+    /// would panic when it is dropped.
     fn drop(&mut self) {
         if self.trouble.message().is_some() {
+            let idle = wgpu::PollType::Wait { submission_index: None, timeout: Some(LONGEST_WAIT) };
+            // A driver that reports the loss here has stopped.
+            let _ = catch_panic(|| self.device.poll(idle));
             std::mem::forget((self.device.clone(), (*self.queue).clone()));
         }
     }
@@ -464,8 +477,9 @@ impl Gpu {
         Ok(Pool::new(self, variants, settings))
     }
 
-    /// Returns the largest number of bytes of device memory that so many lanes take.
-    pub(crate) fn bytes_of_lanes(&self, lanes: usize) -> u64 {
-        slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision)
+    /// Returns the largest number of bytes of device memory that so many lanes take; with those of measured quantities if
+    /// `gathers`.
+    pub(crate) fn bytes_of_lanes(&self, lanes: usize, gathers: bool) -> u64 {
+        slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision, gathers)
     }
 }

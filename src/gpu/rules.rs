@@ -2,10 +2,11 @@
 
 use super::precision::Precision;
 use rattlemap_dynamics::orbit::{
-    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR_TOLERANCE, NEAR_STROBE_TURNS, NEUTRAL_ORDER,
-    ON_STROBE_TURNS,
+    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LARGEST_DIFFERENCE, LEAST_WINDOW, LINEAR_TOLERANCE,
+    NEAR_STROBE_TURNS, NEUTRAL_ORDER, ON_STROBE_TURNS,
 };
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
+use rattlemap_dynamics::stability::CORRELATION_MARGIN;
 
 /// Largest meshing speed at which lanes follow chatter by short flights, relative to half the walls' distance times
 /// the rate of free motion. At higher speeds short flights are too few to save time.
@@ -40,6 +41,23 @@ pub(crate) const MIRROR_DISTANCE: f64 = 2.44e-4;
 
 /// Largest distance of a settled lane from its cycle, relative to the motion.
 pub(crate) const ON_CYCLE: f64 = 1e-4;
+
+/// Returns the largest distance from its cycle, relative to the motion, at which a motion counts as settled at the end of
+/// its budget. In f64 it is that of the reference.
+pub(crate) const fn settled_distance(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => ON_CYCLE,
+        Precision::F64 => 1e-8,
+    }
+}
+
+/// Returns the distance of a symmetric cycle from its mirror image, relative to the motion, that rounding explains.
+pub(crate) const fn symmetric(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 3e-5,
+        Precision::F64 => 1e-8,
+    }
+}
 
 /// Returns [`RECURRENCE_LIMIT`] as a distance relative to the motion.
 pub(crate) fn recurrence_distance() -> f64 {
@@ -81,6 +99,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("MOST_FAILED_SEARCHES", MOST_FAILED_SEARCHES),
         ("TRAIL", TRAIL as u32),
         ("REQUIRED_CYCLES", BRANCH_CYCLES as u32),
+        ("LEAST_WINDOW_STROBES", LEAST_WINDOW as u32),
         ("WINDOW_SHARE", WINDOW_SHARE),
     ];
     let singles = [
@@ -90,14 +109,18 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("MIRROR_DISTANCE", MIRROR_DISTANCE),
         ("NOISE", noise),
         ("ON_CYCLE", ON_CYCLE),
+        ("SETTLED_DISTANCE", settled_distance(precision)),
+        ("SYMMETRIC", symmetric(precision)),
     ];
     let reals = [
         ("CHAOS_ERRORS", CHAOS_ERRORS),
+        ("CORRELATION_MARGIN", CORRELATION_MARGIN),
         ("ESCAPE_GROWTH", ESCAPE_GROWTH),
         ("FOLLOWED_MESH_SPEED", FOLLOWED_MESH_SPEED),
         ("GRAZING_SPEED", GRAZING_SPEED),
         ("NO_SPEED", NO_SPEED),
         ("NO_THRESHOLD", NO_THRESHOLD),
+        ("LARGEST_DIFFERENCE", LARGEST_DIFFERENCE),
         ("LINEAR", LINEAR_TOLERANCE),
         ("ON_STROBE", on_strobe),
         ("NEAR_STROBE", NEAR_STROBE_TURNS),

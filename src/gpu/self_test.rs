@@ -35,6 +35,7 @@ pub(super) async fn check(
         transient_periods: 0,
         max_period: 0,
         undecided_periods: 0,
+        confirm_chaos: 0,
         steps_per_period: None,
         multiplier: false,
         measures: None,

@@ -58,6 +58,7 @@ const BODY: &str = concat!(
     include_str!("../../shaders/observe.wgsl"),
     include_str!("../../shaders/recurrence.wgsl"),
     include_str!("../../shaders/chaos.wgsl"),
+    include_str!("../../shaders/regularity.wgsl"),
     include_str!("../../shaders/word.wgsl"),
     include_str!("../../shaders/cycle.wgsl"),
     include_str!("../../shaders/refine.wgsl"),
@@ -134,7 +135,7 @@ impl Variant {
 }
 
 /// The records' validity bits, by their names in the shader.
-const VALID: [(&str, u32); 9] = [
+const VALID: [(&str, u32); 10] = [
     ("PERIOD", valid::PERIOD),
     ("LYAPUNOV", valid::LYAPUNOV),
     ("IMPACTS", valid::IMPACTS),
@@ -143,6 +144,7 @@ const VALID: [(&str, u32); 9] = [
     ("WORD", valid::WORD),
     ("STROBE", valid::STROBE),
     ("PATTERN", valid::PATTERN),
+    ("QUASI_PERIODIC", valid::QUASI_PERIODIC),
     ("NEAR_STROBE", valid::NEAR_STROBE),
 ];
 

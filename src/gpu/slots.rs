@@ -36,9 +36,10 @@ pub(super) struct Slots {
     row: u32,
 }
 
-/// Returns the bytes of device memory that so many slots take.
-pub(super) fn bytes(slots: usize, precision: Precision) -> u64 {
-    let reals = size_of::<Reading>() + size_of::<[f64; 4]>() + size_of::<Motion>();
+/// Returns the bytes of device memory that so many slots take; with those of measured quantities if `gathers`.
+pub(super) fn bytes(slots: usize, precision: Precision, gathers: bool) -> u64 {
+    let measured = if gathers { 2 * size_of::<Measured>() } else { 0 };
+    let reals = size_of::<Reading>() + size_of::<[f64; 4]>() + size_of::<Motion>() + measured;
     let reals = reals / size_of::<f64>() * precision.bytes();
     let counts = size_of::<Finding>() + size_of::<Cell>() + size_of::<Tally>() + 3 * size_of::<u32>();
     (slots * (reals + counts)) as u64
@@ -47,24 +48,19 @@ pub(super) fn bytes(slots: usize, precision: Precision) -> u64 {
 impl Slots {
     pub(super) fn new(gpu: &Gpu, slots: usize, settings: &LaneSettings) -> Slots {
         let workgroup = settings.workgroup;
-        let of_reals = |label, bytes: usize| {
-            buffer(gpu, label, slots * bytes / size_of::<f64>() * gpu.precision.bytes())
-        };
-        let readings = of_reals("readings", size_of::<Reading>());
+        let of_reals =
+            |label, bytes: usize| buffer(gpu, label, bytes / size_of::<f64>() * gpu.precision.bytes());
+        let readings = of_reals("readings", slots * size_of::<Reading>());
         let findings = buffer(gpu, "findings", slots * size_of::<Finding>());
         let places = if settings.gathers() { slots } else { 1 };
-        let measured = buffer(
-            gpu,
-            "measured",
-            places * size_of::<Measured>() / size_of::<f64>() * gpu.precision.bytes(),
-        );
+        let measured = of_reals("measured", places * size_of::<Measured>());
         Slots {
             count: slots,
             workgroup,
             settings: upload(gpu, "settings", bytemuck::bytes_of(&Settings::default())),
             cells: buffer(gpu, "cells", slots * size_of::<Cell>()),
-            starts: of_reals("starts", size_of::<[f64; 4]>()),
-            motions: of_reals("motions", size_of::<Motion>()),
+            starts: of_reals("starts", slots * size_of::<[f64; 4]>()),
+            motions: of_reals("motions", slots * size_of::<Motion>()),
             tallies: buffer(gpu, "tallies", slots * size_of::<Tally>()),
             queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
             blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
@@ -188,6 +184,8 @@ fn uniform(
 ) -> Settings {
     let LaneSettings { periods, early_stop, .. } = *settings;
     let more = if early_stop { settings.undecided_periods } else { 0 };
+    let decided_by = periods.saturating_add(more);
+    let confirm_chaos = if settings.exponent { settings.confirm_chaos } else { 0 };
     // Lanes that stop early may stop before a long transient is over.
     let transient_periods = if early_stop {
         settings.transient_periods.min(settings.exponent_from)
@@ -200,7 +198,8 @@ fn uniform(
         active_lanes: active_lanes as u32,
         first_new: first_new as u32,
         periods,
-        longest: periods.saturating_add(more),
+        decided_by,
+        longest: decided_by.saturating_add(confirm_chaos),
         chaos_from: settings.chaos_from,
         chaos_errors: settings.chaos_errors,
         iterations: settings.iterations,

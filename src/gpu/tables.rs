@@ -70,6 +70,7 @@ impl Tables {
                     shapes.push(FlowShape {
                         steps: constants.steps,
                         phasors: phasors.len() as u32,
+                        must_rest: constants.must_rest.into(),
                         degrees: constants.degrees,
                         contacts: constants.contacts.map(contact_code),
                     });

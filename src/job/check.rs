@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap, damage, repair_command};
 use crate::job::observer::Observer;
+use crate::map::scene::Scene;
 use crate::store::finished_map::{self, FinishedMap, FinishedMapError};
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry, Finding};
@@ -48,20 +49,21 @@ pub fn check(dir: &Path) -> Result<CheckedFolder, JobError> {
     let files: Vec<FileEntry> = serde_json::from_value(manifest["files"].clone()).map_err(|error| {
         JobError::Usage(format!("{} has no list of files: {error}", dir.join(MANIFEST).display()))
     })?;
-    let command = manifest["command"].as_str().unwrap_or_default().to_owned();
-    Ok(CheckedFolder { dir: dir.to_owned(), command, files: files.len(), findings: findings(dir, &files)? })
-}
-
-/// Compares size and hash of the listed files.
-///
-/// # Errors
-/// [`JobError`] if the folder cannot be read.
-pub(crate) fn findings(dir: &Path, listed: &[FileEntry]) -> Result<Vec<Finding>, JobError> {
-    inventory::check(dir, listed)
-        .map_err(|error| JobError::Failed(format!("cannot read {}: {error}", dir.display())))
+    let command = manifest["command"].as_str().unwrap_or_default();
+    CheckedFolder::of(dir, command, &files)
 }
 
 impl CheckedFolder {
+    /// Compares size and hash of the files that the manifest of a command lists.
+    ///
+    /// # Errors
+    /// [`JobError`] if the folder cannot be read.
+    pub(crate) fn of(dir: &Path, command: &str, listed: &[FileEntry]) -> Result<CheckedFolder, JobError> {
+        let findings = inventory::check(dir, listed)
+            .map_err(|error| JobError::Failed(format!("cannot read {}: {error}", dir.display())))?;
+        Ok(CheckedFolder { dir: dir.to_owned(), command: command.to_owned(), files: listed.len(), findings })
+    }
+
     /// Number of files that the manifest lists.
     pub fn files(&self) -> usize {
         self.files
@@ -82,50 +84,15 @@ impl CheckedFolder {
     /// # Errors
     /// [`JobError`] if the folder is not a map's, a damaged file cannot be recreated, or a file cannot be written.
     pub fn repair(&self, folder: &Folder, observer: &dyn Observer) -> Result<Vec<String>, JobError> {
-        let dir = &self.dir;
         let lost: Vec<&str> = self.lost().map(|finding| finding.name.as_str()).collect();
         if lost.is_empty() {
             return Ok(Vec::new());
         }
-        if self.command != MAP {
-            return Err(JobError::Failed(format!(
-                "{}: only the files of a map can be recreated from records; run `{}` again with --force",
-                damage(dir, self.lost()),
-                self.command.escape_debug()
-            )));
-        }
-        folder.refuse_links(map::names())?;
-        let part = FinishedMap::open_part(dir)?;
-        let remake = part.remake_command();
-        if let Some(shard) = part.manifest().shard {
-            return Err(JobError::Failed(format!(
-                "{}: no file of shard {shard} can be recreated from the others; `{remake}` keeps the undamaged records, \
-                 computes the others and writes the files again",
-                damage(dir, self.lost())
-            )));
-        }
-        let map = FinishedMap::open_own(dir)?;
-        let cannot = |name: &str, why: &str| {
-            let dir = dir.display();
-            JobError::Failed(format!("{dir}: {name} is damaged or missing, and {why}"))
-        };
-        if lost.contains(&MANIFEST) {
-            return Err(cannot(MANIFEST, &format!("cannot be trusted; `{remake}` recreates every file")));
-        }
-        if lost.contains(&RECORDS) {
-            let why = format!(
-                "cannot be recreated from other files; `{remake}` keeps its undamaged records, computes the others \
-                 and recreates every file"
-            );
-            return Err(cannot(RECORDS, &why));
-        }
-        if lost.contains(&LIST) {
-            let why = format!(
-                "no other file lists the cells; `{remake}` recreates every file from the scene's own table"
-            );
-            return Err(cannot(LIST, &why));
-        }
-        let scene = finished::scene(&map)?;
+        let (map, scene) = self.repairable().map_err(|error| match error {
+            JobError::Failed(why) => JobError::Failed(format!("{}; {why}", damage(&self.dir, self.lost()))),
+            error => error,
+        })?;
+        folder.prepare(map::names())?;
         let mut loaded = LoadedMap::read(&map, &scene, observer)?;
         let survey = loaded.survey();
         let has_validation =
@@ -139,23 +106,71 @@ impl CheckedFolder {
         )?)
     }
 
-    /// Checks that no file is damaged or missing, except the repaired ones. `repaired` is none if no repair was requested.
+    /// Checks that a map's damaged and missing files can be recreated from its records. Returns the map and its scene.
+    ///
+    /// # Errors
+    /// [`JobError`] with the reason and the remedy.
+    fn repairable(&self) -> Result<(FinishedMap, Scene), JobError> {
+        let failed = |why| Err(JobError::Failed(why));
+        if self.command != MAP {
+            return failed(format!(
+                "only the files of a map can be recreated from records; run `{}` again with --force",
+                self.command.escape_debug()
+            ));
+        }
+        let part = FinishedMap::open_part(&self.dir)?;
+        let remake = part.remake_command();
+        if let Some(shard) = part.manifest().shard {
+            return failed(format!(
+                "no file of shard {shard} can be recreated from the others; `{remake}` keeps the undamaged records, computes \
+                 the others and writes the files again"
+            ));
+        }
+        let map = FinishedMap::open_own(&self.dir)?;
+        for name in self.lost().map(|finding| finding.name.as_str()) {
+            return failed(match name {
+                MANIFEST => format!("{MANIFEST} cannot be trusted; `{remake}` recreates every file"),
+                RECORDS => format!(
+                    "{RECORDS} cannot be recreated from other files; `{remake}` keeps its undamaged records, computes the \
+                     others and recreates every file"
+                ),
+                LIST => format!(
+                    "no other file than {LIST} lists the cells; `{remake}` recreates every file from the scene's own table"
+                ),
+                _ if map::names().any(|known| known == name) => continue,
+                _ => format!("a map has no file {}; `{remake}` recreates every file", name.escape_debug()),
+            });
+        }
+        let scene = finished::scene(&map)?;
+        Ok((map, scene))
+    }
+
+    /// Checks that no file is damaged or missing, except those that were `written` since the check. `is_repaired` says
+    /// whether a repair has been tried.
     ///
     /// # Errors
     /// [`JobError::Failed`] with the files and the remedy.
-    pub fn require_good(&self, repaired: Option<&[String]>) -> Result<(), JobError> {
-        let is_left = |finding: &&Finding| repaired.is_none_or(|names| !names.contains(&finding.name));
+    pub fn require_good(&self, written: &[impl AsRef<str>], is_repaired: bool) -> Result<(), JobError> {
+        let is_left = |finding: &&Finding| !written.iter().any(|name| name.as_ref() == finding.name);
         let left: Vec<&Finding> = self.lost().filter(is_left).collect();
         if left.is_empty() {
             return Ok(());
         }
-        let remedy = if left.iter().any(|finding| finding.name == VALIDATION) {
-            format!("; `rattlemap validate` recreates {VALIDATION} and its section of the report")
-        } else if repaired.is_none() && self.command == MAP {
-            format!("; `{}` recreates tables, figures and report from the records", repair_command(&self.dir))
-        } else {
-            String::new()
-        };
-        Err(JobError::Failed(format!("{}{remedy}", damage(&self.dir, left))))
+        let (validation, others): (Vec<&Finding>, Vec<&Finding>) =
+            left.iter().partition(|finding| finding.name == VALIDATION);
+        let mut text = damage(&self.dir, left);
+        if !others.is_empty() && !is_repaired {
+            text += &match self.repairable() {
+                Ok(_) => format!(
+                    "; `{}` recreates tables, figures and report from the records",
+                    repair_command(&self.dir)
+                ),
+                Err(why) => format!("; {why}"),
+            };
+        }
+        if !validation.is_empty() {
+            text += &format!("; `rattlemap validate` recreates {VALIDATION} and its section of the report");
+        }
+        Err(JobError::Failed(text))
     }
 }

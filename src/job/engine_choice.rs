@@ -235,8 +235,14 @@ fn open_cards(
         })
     };
     let opened: Vec<_> = std::thread::scope(|scope| {
-        let threads: Vec<_> = numbers.iter().map(|&number| scope.spawn(move || open(number))).collect();
-        threads.into_iter().map(|thread| thread.join()).collect()
+        let open = &open;
+        let spawn = |&number: &usize| {
+            let thread = std::thread::Builder::new().spawn_scoped(scope, move || open(number));
+            // If no thread can be started, this one opens the device.
+            thread.map_err(|_| open(number))
+        };
+        let threads: Vec<_> = numbers.iter().map(spawn).collect();
+        threads.into_iter().map(|thread| thread.map_or_else(Ok, |thread| thread.join())).collect()
     });
     let (mut cards, mut warnings, mut first_error) = (Vec::new(), Vec::new(), None);
     for (number, opened) in numbers.iter().zip(opened) {

@@ -133,10 +133,12 @@ fn spread(plan: &Plan, nth: usize) -> Cell {
 fn halted_after(time: Duration) -> Arc<AtomicBool> {
     let halt = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&halt);
-    std::thread::spawn(move || {
+    let wait = move || {
         std::thread::sleep(time);
         raised.store(true, Ordering::Relaxed);
-    });
+    };
+    // Without a thread, nothing could end a sample that takes too long.
+    halt.store(std::thread::Builder::new().spawn(wait).is_err(), Ordering::Relaxed);
     halt
 }
 

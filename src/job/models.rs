@@ -149,7 +149,10 @@ fn meaning(status: Status) -> &'static str {
         Status::TooStiff => "failed: too stiff for the engine",
         Status::NonFinite => "failed: the state became infinite or not a number",
         Status::BelowResolution => {
-            "points of the cycle are closer than the engine resolves: the true period may be a divisor"
+            "rounding decides the period: errors grow to the distance between points of the cycle"
+        }
+        Status::Neutral => {
+            "a multiplier has modulus 1 within its error: perturbations neither decay nor grow"
         }
     }
 }
@@ -157,10 +160,11 @@ fn meaning(status: Status) -> &'static str {
 const CLASSES: &str = "\
 Class
 
-    periodic    a stable cycle; the period is its number of forcing periods
-    chaotic     no cycle, and the Lyapunov exponent exceeds 0 by three standard errors
-    undecided   neither was found within the budget: long transients, bifurcations near by, tori
-    failed      the integration stopped; the status gives the reason";
+    periodic        a stable or neutral cycle; the period is its number of forcing periods
+    chaotic         no cycle, and the Lyapunov exponent exceeds 0 by three standard errors
+    quasi-periodic  no cycle, the Lyapunov exponent is 0 within its error, and the states at phase 0 lie on a torus
+    undecided       none of these was found within the budget: long transients, bifurcations near by
+    failed          the integration stopped; the status gives the reason";
 
 const ERRORS: &str = "\
 Errors

@@ -1,14 +1,19 @@
 //! Loads scenes from files.
 
-use std::fs;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use crate::map::scene::{Along, CompanionFile, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
 use crate::store::finished_map::{MOST_LIST_BYTES, MOST_TABLE_BYTES};
 use crate::store::plain_file::read_text;
+use crate::text::size::bytes;
 
 /// Largest size of a model's file, in bytes.
 const MOST_OF_MODEL: u64 = 1_000_000;
+
+/// Largest size of a scene, in bytes: two axes of a million listed values.
+const MOST_OF_SCENE: u64 = 64_000_000;
 
 /// Begins the `--set` argument that lists the output files.
 pub const FILES: &str = "outputs.files=";
@@ -38,7 +43,7 @@ impl SceneFile<'_> {
     /// [`SceneError`] if the file cannot be read or is wrong.
     pub fn load(&self, sets: &[String]) -> Result<Scene, SceneError> {
         let name = self.path.display().to_string();
-        let text = fs::read_to_string(self.path).map_err(|error| SceneError {
+        let text = read_scene(self.path).map_err(|error| SceneError {
             place: Place::File { file: name.as_str().into() },
             problem: Problem::Unreadable { reason: error.to_string(), example: self.purpose.example() },
         })?;
@@ -83,6 +88,15 @@ impl SceneFile<'_> {
             sets.push(format!("{FILES}[{}]", names.join(",")));
         }
         Ok(sets)
+    }
+}
+
+/// Reads a scene. It may come from a pipe.
+fn read_scene(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    match File::open(path)?.take(MOST_OF_SCENE + 1).read_to_string(&mut text)? as u64 > MOST_OF_SCENE {
+        true => Err(io::Error::other(format!("at most {} are read", bytes(MOST_OF_SCENE)))),
+        false => Ok(text),
     }
 }
 

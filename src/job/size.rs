@@ -1,5 +1,6 @@
 //! Estimates the memory and disk space of a map, and compares them with what the machine has free.
 
+use std::fs;
 use std::path::Path;
 
 use crate::gpu;
@@ -108,10 +109,11 @@ impl Size {
             Free { memory: Some(free), .. } if free < memory => {
                 let is_enough = self.cpu_memory < free;
                 let other = if is_enough { ", or give --engine cpu, which needs less" } else { "" };
-                ("memory", memory, free, other)
+                let limit = if address_space().is_some() { ", or raise the limit (`ulimit -v`)" } else { "" };
+                ("memory", memory, free, format!("{other}{limit}"))
             }
             Free { disk: Some(free), .. } if free < self.disk => {
-                ("disk", self.disk, free, ", or give a folder on another disk with --out")
+                ("disk", self.disk, free, ", or give a folder on another disk with --out".to_owned())
             }
             _ => return Ok(()),
         };
@@ -125,7 +127,7 @@ impl Size {
 /// Free memory and disk space, in bytes. None if the system does not report it; then it counts as enough.
 #[derive(Clone, Copy, Debug)]
 pub struct Free {
-    /// Memory, within the limits of a container.
+    /// Memory, within the limits of a container and of the process (`ulimit -v`).
     pub memory: Option<u64>,
     /// Space on the disk of the output folder, including the files of an earlier map, which are replaced.
     pub disk: Option<u64>,
@@ -138,6 +140,7 @@ impl Free {
         system.refresh_memory();
         let memory = system.available_memory();
         let limited = system.cgroup_limits().map_or(memory, |limits| memory.min(limits.free_memory));
+        let limited = address_space().map_or(limited, |left| limited.min(left.max(1)));
         let disk = out.and_then(|out| {
             let absolute = std::path::absolute(out).ok()?;
             let existing = absolute.ancestors().find(|folder| folder.is_dir())?;
@@ -145,6 +148,16 @@ impl Free {
         });
         Free { memory: (limited > 0).then_some(limited), disk }
     }
+}
+
+/// Address space that the limit of this process (`ulimit -v`) leaves, in bytes. None without a limit; only Linux reports it.
+fn address_space() -> Option<u64> {
+    let number = |file: &str, line: &str| -> Option<u64> {
+        let text = fs::read_to_string(file).ok()?;
+        text.lines().find_map(|found| found.strip_prefix(line))?.split_whitespace().next()?.parse().ok()
+    };
+    let limit = number("/proc/self/limits", "Max address space")?;
+    Some(limit.saturating_sub(1024 * number("/proc/self/status", "VmSize:")?))
 }
 
 /// Size of a folder's files that a new map replaces, in bytes.

@@ -1,14 +1,14 @@
 //! Validates a finished map: computes a sample of its cells again and compares them.
 
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::gpu::{AdapterChoice, Gpu, Precision};
-use crate::job::check;
+use crate::job::check::CheckedFolder;
 use crate::job::error::JobError;
-use crate::job::finished::{self, LoadedMap, damage, repair_command};
+use crate::job::finished::{self, LoadedMap};
 use crate::job::observer::Observer;
 use crate::job::processor;
 use crate::map::plan::Plan;
@@ -17,8 +17,8 @@ use crate::show::cells::Survey;
 use crate::show::validation::Validated;
 use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
-use crate::store::inventory::Finding;
 use crate::store::map::{self, MANIFEST, VALIDATION};
+use crate::store::record_file::Identity;
 use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
 
 /// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
@@ -33,7 +33,9 @@ pub struct ValidateJob {
     survey: Survey,
     precision: Precision,
     sample: Sample,
-    findings: Vec<Finding>,
+    checked: CheckedFolder,
+    /// Chaotic runs to follow, the number of chaotic runs, and the further periods.
+    chaos: (Vec<u32>, usize, u32),
     /// This machine's processor.
     processor: String,
 }
@@ -46,8 +48,8 @@ pub struct SampleLanes {
 }
 
 impl ValidateJob {
-    /// Locks the folder, reads the map, and draws a sample of its cells with a seed. Damaged and unknown files are reported to
-    /// the observer.
+    /// Locks the folder, reads the map, and draws a sample of its cells with a seed, and chaotic cells that are followed for
+    /// `chaos_periods` further periods; none if that is 0. Damaged and unknown files are reported to the observer.
     ///
     /// # Errors
     /// [`JobError`] if the folder is not that of a finished map of this version, or the map cannot be read.
@@ -55,15 +57,16 @@ impl ValidateJob {
         dir: &Path,
         samples: usize,
         seed: u64,
+        chaos_periods: u32,
         observer: &dyn Observer,
     ) -> Result<ValidateJob, JobError> {
         finished::require_folder(dir)?;
         // The lock comes first: another run must not replace the map between reading and writing.
         let folder = Folder::open(dir, true)?;
-        folder.refuse_links(map::names())?;
+        folder.prepare(map::names())?;
         let map = FinishedMap::open_own(dir)?;
-        let findings = check::findings(dir, &map.manifest().files)?;
-        for finding in &findings {
+        let checked = CheckedFolder::of(dir, "map", &map.manifest().files)?;
+        for finding in checked.findings() {
             let text = format!("{}: {finding}", dir.display());
             if finding.is_lost() { observer.warn(&text) } else { observer.note(&text) }
         }
@@ -72,8 +75,11 @@ impl ValidateJob {
         let precision = precision(map.manifest())?;
         let survey = loaded.survey();
         let sample = validate::sample(&loaded.plan, &loaded.stored.records, samples, seed);
+        let followed = if chaos_periods > 0 { samples } else { 0 };
+        let (ids, runs) = validate::draw_chaos(&loaded.stored.records, followed, seed);
+        let chaos = (ids, runs, chaos_periods);
         let processor = processor::described();
-        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, findings, processor })
+        Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, chaos, checked, processor })
     }
 
     /// The locked folder.
@@ -84,6 +90,11 @@ impl ValidateJob {
     /// Number of cells in the sample.
     pub fn sample_count(&self) -> usize {
         self.sample.ids().len()
+    }
+
+    /// Number of chaotic cells that are followed.
+    pub fn followed_count(&self) -> usize {
+        self.chaos.0.len()
     }
 
     fn subject(&self) -> Subject<'_> {
@@ -125,16 +136,30 @@ impl ValidateJob {
         Ok(SampleLanes { lanes, not_own })
     }
 
-    /// Replays the sample without early stops, and compares it with the map. `report` receives the number of replayed cells.
-    /// Returns none if `halt` was raised before the last one.
+    /// Replays the sample without early stops, compares it with the map, and follows chaotic cells. `report` receives the number
+    /// of cells that are done, up to [`ValidateJob::sample_count`] and [`ValidateJob::followed_count`] together. Returns none if `halt` was raised before the last one.
     pub fn replay(
         &self,
         lanes: &SampleLanes,
         report: &(impl Fn(usize) + Sync),
         halt: &AtomicBool,
     ) -> Option<Validation> {
-        let basins = self.survey.basins();
-        validate::replay_until(&self.subject(), basins, &self.sample, &lanes.lanes, report, halt)
+        let (basins, subject) = (self.survey.basins(), self.subject());
+        let StoredManifest { sources, target, .. } = self.map.manifest();
+        let is_exact =
+            !subject.is_lane && sources == Identity::own_sources() && target == Identity::own_target();
+        let validation =
+            validate::replay_until(&subject, basins, is_exact, &self.sample, &lanes.lanes, report, halt)?;
+        let (ids, runs, periods) = &self.chaos;
+        let done = Mutex::new(self.sample_count());
+        let one_more = || {
+            let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+            *done += 1;
+            report(*done);
+        };
+        let follow = || validate::follow_chaos(&subject, (ids, *runs), *periods, &one_more, halt);
+        let chaos_ends = (*periods > 0).then(follow);
+        (!halt.load(Ordering::Relaxed)).then_some(Validation { chaos_ends, ..validation })
     }
 
     /// Returns the validation with the devices that took part.
@@ -164,18 +189,8 @@ impl ValidateJob {
     /// # Errors
     /// [`JobError::Failed`].
     pub fn require_valid(&self, validation: &Validation, written: &[&str]) -> Result<(), JobError> {
-        let dir = self.folder.path();
-        verdict(dir, &self.loaded.plan, validation)?;
-        let is_left = |finding: &&Finding| finding.is_lost() && !written.contains(&finding.name.as_str());
-        let left: Vec<&Finding> = self.findings.iter().filter(is_left).collect();
-        match left.is_empty() {
-            true => Ok(()),
-            false => Err(JobError::Failed(format!(
-                "{}; `{}` recreates tables, figures and report from the records",
-                damage(dir, left),
-                repair_command(dir)
-            ))),
-        }
+        verdict(self.folder.path(), &self.loaded.plan, validation)?;
+        self.checked.require_good(written, false)
     }
 }
 

@@ -188,8 +188,9 @@ impl Run<'_> {
         start: State,
     ) -> Result<Option<(Column, State)>, ModelError> {
         let shown = self.settings.observed_periods;
+        let (longest, report) = (orbit::LONGEST_WINDOW, &|_, _| ());
         let Some(orbit) =
-            orbit::analyse_until(model, start, self.settings, orbit::LONGEST_WINDOW, shown, self.halt)?
+            orbit::analyse_until(model, start, self.settings, longest, shown, self.halt, report)?
         else {
             return Ok(None);
         };

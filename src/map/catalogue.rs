@@ -34,6 +34,7 @@ pub(crate) enum Outcome {
     /// A cycle of this period that Newton's method does not find.
     Unresolved(u32),
     Chaos,
+    Torus,
     Undecided,
     Failed,
 }
@@ -106,6 +107,7 @@ impl Catalogue {
             Class::Failed => Ok(Outcome::Failed),
             Class::Undecided => Ok(Outcome::Undecided),
             Class::Chaotic => Ok(Outcome::Chaos),
+            Class::QuasiPeriodic => Ok(Outcome::Torus),
             Class::Periodic { .. } if !record.strobe.iter().all(|x| x.is_finite()) => Ok(Outcome::Undecided),
             Class::Periodic { period } => {
                 let free = self.free.filter(|_| self.is_contact_free(&record.strobe));

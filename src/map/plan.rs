@@ -164,6 +164,7 @@ impl Plan {
                 settings: scene.orbit_settings(),
                 early_stop: integration.early_stop,
                 undecided_periods: integration.undecided_periods,
+                confirm_chaos: integration.confirm_chaos,
                 exponent: needs.exponent,
                 shows_exponent: needs.lyapunov,
                 quantities: needs.measures_motion(),
@@ -195,7 +196,7 @@ impl Plan {
         settings.transient_periods = settings.transient_periods.min(periods / 2);
         settings.observed_periods = settings.observed_periods.min(periods / 2);
         settings.max_period = settings.max_period.min(settings.observed_periods / 2);
-        plan.budget.undecided_periods = 0;
+        (plan.budget.undecided_periods, plan.budget.confirm_chaos) = (0, 0);
         plan
     }
 
@@ -408,9 +409,9 @@ fn needs(quantities: &[Quantity]) -> Needs {
     }
 }
 
-/// Counts the classes: periodic, chaotic, undecided, failed.
-pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; 4] {
-    let mut counts = [0; 4];
+/// Counts the classes, in the order of [`Class::NAMES`].
+pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; Class::NAMES.len()] {
+    let mut counts = [0; Class::NAMES.len()];
     for class in classes {
         counts[class.index()] += 1;
     }

@@ -30,6 +30,7 @@ pub(crate) use derived::Rule;
 pub use figure::{FigureStyle, MapLine};
 pub use keys::{KEYS, Key, KeyDefault, Takes};
 pub use limits::MAX_COUNT;
+pub(crate) use limits::MAX_PERIODS;
 pub use list::{CompanionFile, FileText, FindFile, List};
 pub(crate) use points::Points;
 pub use settings::{Continuous, DEFAULT_AUDIT, Format, Integration, Outputs, Quantity, Refine, Steps};

@@ -6,12 +6,12 @@
 //! - `periodic` if the engine confirmed a period. Recurrence of strobe states is not enough: the orbit must be
 //!   stable;
 //! - `chaotic` if there is no period, the exponent exceeds zero by [`CHAOS_ERRORS`] standard errors, and the motion
-//!   did not stay near a cycle (status `slow`);
+//!   did not stay near a cycle (status `slow` or `neutral`);
+//! - `quasi-periodic` if the engine found an exponent of zero and a regular section;
 //! - `undecided` otherwise: near bifurcations, in long transients, on cycles longer than `max_period`, if the
-//!   exponent is clearly negative, on tori (quasi-periodic motion), and if a multiplier is 1, as for pairs without
-//!   supports.
+//!   exponent is clearly negative, and near cycles with a multiplier of modulus 1 (status `neutral`).
 //!
-//! Two motions are wrongly called chaotic: transient chaos that outlasts the budget, and motion that grows without
+//! Two motions are wrongly called chaotic: transient chaos that outlasts the budget (`confirm_chaos` extends it), and motion that grows without
 //! bound, as of undamped elastic pairs.
 
 use crate::record::{Record, valid};
@@ -25,7 +25,8 @@ pub fn classify(record: &Record) -> Class {
         _ if record.valid & valid::PERIOD != 0 && record.period > 0 => {
             Class::Periodic { period: record.period }
         }
-        Status::Slow => Class::Undecided,
+        _ if record.valid & valid::QUASI_PERIODIC != 0 => Class::QuasiPeriodic,
+        Status::Slow | Status::Neutral => Class::Undecided,
         _ if grows(record) => Class::Chaotic,
         _ => Class::Undecided,
     }
@@ -52,6 +53,10 @@ mod tests {
 
     #[test]
     fn every_class_has_its_records() {
+        let regular = |status, period| {
+            let valid = valid::PERIOD | valid::QUASI_PERIODIC;
+            Record { valid, ..record(status, period, 0.0, 0.01) }
+        };
         let cases = [
             (record(Status::Ok, 3, -0.1, 0.0), Class::Periodic { period: 3 }),
             (record(Status::Slow, 2, -0.1, 0.0), Class::Periodic { period: 2 }),
@@ -60,6 +65,11 @@ mod tests {
             (record(Status::Ok, 0, 0.2, f64::INFINITY), Class::Undecided),
             (record(Status::Ok, 0, f64::NAN, 0.0), Class::Undecided),
             (record(Status::Slow, 0, 0.2, 0.01), Class::Undecided),
+            (record(Status::Neutral, 0, 0.2, 0.01), Class::Undecided),
+            (record(Status::Neutral, 1, 0.0, 0.0), Class::Periodic { period: 1 }),
+            (regular(Status::Ok, 0), Class::QuasiPeriodic),
+            (regular(Status::Ok, 2), Class::Periodic { period: 2 }),
+            (regular(Status::TooStiff, 0), Class::Failed),
         ];
         for (record, class) in cases {
             assert_eq!(classify(&record), class, "{record:?}");

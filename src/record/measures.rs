@@ -106,6 +106,10 @@ pub(crate) const fn places_before(group: usize) -> usize {
     places
 }
 
+/// Share of the largest number of a quantity below which numbers of a cycle count as small. Rounding errors of lanes are
+/// below 1e-6 of the largest number.
+pub const SMALL: f64 = 0.01;
+
 fn relative(distance: f64, scale: f64) -> f64 {
     if distance == 0.0 { 0.0 } else { distance / scale }
 }
@@ -136,13 +140,14 @@ impl Group {
         GROUPS.iter().find(|group| group.name == name)
     }
 
-    /// Returns the largest distance of the numbers of two records up to mirror image, relative to the largest number of the
-    /// second: a displacement at rest has rounding errors of the others' size. Amplitude and phase are compared as a complex
-    /// number.
-    pub fn distance(&self, a: &Record, b: &Record) -> f64 {
+    /// Returns the largest distance of the numbers of two records up to mirror image, relative to the second one plus
+    /// `share` of its record's largest number. A displacement at rest has rounding errors of the others' size, and the
+    /// average of an aperiodic motion the statistical error of its amplitude. Amplitude and phase are compared as a
+    /// complex number.
+    pub fn distance(&self, a: &Record, b: &Record, share: f64) -> f64 {
         let places: Vec<usize> = self.measures().map(|measure| measure.place).collect();
         let sizes = self.measures().filter(|measure| !measure.is_angle()).map(|m| b.measures[m.place].abs());
-        let scale = sizes.fold(0.0, f64::max);
+        let added = share * sizes.fold(0.0, f64::max);
         let of_displacement = |places: &[usize]| {
             let [a, b] =
                 [a, b].map(|record| places.iter().map(|&place| record.measures[place]).collect::<Vec<_>>());
@@ -152,10 +157,10 @@ impl Group {
                     let part = |of: &[f64]| of[0] * if i == 0 { of[1].cos() } else { of[1].sin() };
                     apart(part(&a), part(&b))
                 });
-                return relative(x.hypot(y), scale);
+                return relative(x.hypot(y), b[0].abs() + added);
             }
             // The mean of the mirror image has the other sign.
-            let distances = a.iter().zip(&b).map(|(a, b)| relative(apart(a.abs(), b.abs()), scale));
+            let distances = a.iter().zip(&b).map(|(a, b)| relative(apart(a.abs(), b.abs()), b.abs() + added));
             distances.fold(0.0, farther)
         };
         places.chunks(self.numbers.len()).map(of_displacement).fold(0.0, farther)
@@ -224,7 +229,7 @@ impl Measure {
         }
     }
 
-    /// Returns the word that distinguishes the number from the first one of its quantity.
+    /// Returns what the number's name adds to that of its quantity, such as `mean` or `argument`.
     pub fn part(&self) -> &'static str {
         self.number.name.strip_prefix(self.group.name).unwrap_or(self.number.name).trim_start_matches('_')
     }
@@ -388,7 +393,7 @@ mod tests {
             let record = Record { measures: [0.5; MEASURES], ..Record::default() };
             let mut other = record;
             change(&mut other, first);
-            group.distance(&other, &record)
+            group.distance(&other, &record, 0.0)
         };
         assert_eq!(distance("amplitude", |record, first| record.measures[first + 1] *= -1.0), 0.0);
         assert!(
@@ -399,6 +404,19 @@ mod tests {
             distance("harmonic", |record, first| record.measures[first + 1] += std::f64::consts::TAU + 1e-3);
         assert!((turned - 1e-3).abs() < 1e-6, "{turned}");
         assert!(distance("rms", |record, first| record.measures[first + 2] = 0.6) > 0.19, "the gap");
+    }
+
+    /// An amplitude that is a thousand times smaller than the mean.
+    #[test]
+    fn a_wrong_small_number_is_seen_beside_a_large_one() {
+        let group = Group::named("amplitude").unwrap();
+        let first = group.measures().next().unwrap().place;
+        let mut right = Record { measures: [1.0; MEASURES], ..Record::default() };
+        right.measures[first] = 1e-3;
+        let mut wrong = right;
+        wrong.measures[first] = 2e-3;
+        assert!(group.distance(&wrong, &right, SMALL) > 0.09);
+        assert!(group.distance(&wrong, &right, 1.0) < 1.1e-3);
     }
 
     #[test]

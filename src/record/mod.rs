@@ -43,8 +43,10 @@ pub mod valid {
     /// `pattern`, `pattern_length` and `pattern_hash`.
     pub const PATTERN: u32 = 1 << 8;
     /// Set by lanes, cleared by engines: an event near phase 0 makes a period above 1, or an undecided lane, uncertain.
-    pub const NEAR_STROBE: u32 = 1 << 31;
+    pub const NEAR_STROBE: u32 = 1 << 30;
     // The bits from 9 on belong to the groups of [`measures`](super::measures::GROUPS).
+    /// Motion without a period is quasi-periodic.
+    pub const QUASI_PERIODIC: u32 = 1 << 31;
 }
 
 /// Results of one cell, in one fixed layout for all engines, precisions and variants.

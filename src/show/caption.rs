@@ -84,11 +84,17 @@ pub(crate) fn integration(scene: &Scene) -> String {
         more if more > 0 && integration.early_stop => format!(", undecided cells up to {more} more"),
         _ => String::new(),
     };
+    let confirmed = match integration.confirm_chaos {
+        0 => String::new(),
+        more => format!(", chaotic cells {more} more"),
+    };
     let filled = match scene.refine() {
         Some(_) => "; refined at borders, the rest filled and audited",
         None => "",
     };
-    format!("every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{filled}")
+    format!(
+        "every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{confirmed}{filled}"
+    )
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use crate::record::classify::{classify, status};
 use crate::record::measures::{self, MEASURES};
 use crate::record::{Record, Records, Spelling, valid};
 use crate::show::numbers::Number;
+use crate::validate::Rate;
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -122,6 +123,24 @@ impl<'a> Cells<'a> {
     /// Returns the result of an adaptive map.
     pub fn refinement(&self) -> Option<&'a Refined> {
         self.survey?.refined.as_ref()
+    }
+
+    /// Returns how often chaos ends, per forcing period, in a map that continues chaotic cells; none if no cell was continued.
+    ///
+    /// This is the maximum-likelihood rate of an exponential law: the number of ends, divided by the periods in which chaos was
+    /// seen after all other periods. Cells that are still chaotic count with their periods.
+    pub(crate) fn chaos_ends(&self) -> Option<Rate> {
+        let from = self.plan.budget().decided_by();
+        let records = (0..self.records.count()).into_par_iter().map(|run| self.records.record(run));
+        // Only chaotic cells get more periods.
+        let continued = records.filter(|record| record.periods_run > from);
+        let (ends, periods) = continued
+            .map(|record| {
+                let has_ended = matches!(classify(&record), Class::Periodic { .. } | Class::Undecided);
+                (usize::from(has_ended), (record.periods_run - from) as usize)
+            })
+            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        (periods > 0).then(|| Rate::new(ends, periods))
     }
 
     /// Returns the numbers of cells along the two axes. A list is one row.

@@ -2,6 +2,17 @@
 
 use std::io;
 
+/// Remedy for an error of the operating system on writing, to be appended to its text; empty if there is no particular one.
+pub fn remedy(kind: io::ErrorKind) -> &'static str {
+    match kind {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "; make space on this disk",
+        io::ErrorKind::FileTooLarge => {
+            "; raise the limit for the size of files (`ulimit -f`), or write to another disk"
+        }
+        _ => "",
+    }
+}
+
 /// Reason why one result could not be written. The caller knows the file, if there is one.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
@@ -28,4 +39,20 @@ pub enum WriteError {
     /// A typeface that could not be embedded in a PDF.
     #[error("the typeface cannot be embedded: {0}")]
     Typeface(#[from] subsetter::Error),
+}
+
+impl WriteError {
+    /// Remedy, to be appended to the text; empty if there is no particular one.
+    pub fn remedy(&self) -> &'static str {
+        let kind = match self {
+            WriteError::Io(error) | WriteError::Png(png::EncodingError::IoError(error)) => Some(error.kind()),
+            WriteError::Table(error) => match error.kind() {
+                csv::ErrorKind::Io(error) => Some(error.kind()),
+                _ => None,
+            },
+            WriteError::Json(error) => error.io_error_kind(),
+            WriteError::Png(_) | WriteError::Size { .. } | WriteError::Typeface(_) => None,
+        };
+        kind.map_or("", remedy)
+    }
 }

@@ -7,7 +7,7 @@ mod attractors;
 mod bar;
 mod basins;
 mod classes;
-mod colors;
+pub(crate) mod colors;
 mod continuous;
 mod layer;
 mod words;
@@ -39,6 +39,7 @@ pub fn shared_colors() -> SharedColors {
         ("chaotic", colors::CHAOTIC),
         ("undecided", colors::UNDECIDED),
         ("failed", colors::FAILED),
+        ("quasi-periodic", colors::QUASI_PERIODIC),
         ("rare", words::RARE),
     ];
     SharedColors { named, in_a_row: (1..64).map(colors::distinct).collect() }

@@ -167,8 +167,9 @@ fn status(status: Status) -> &'static str {
         Status::TooStiff => "too_stiff: too stiff for this engine",
         Status::NonFinite => "non_finite: the state became infinite or undefined",
         Status::BelowResolution => {
-            "below_resolution: points of the cycle are closer together than the numerical resolution"
+            "below_resolution: rounding decides the period; points of the cycle cannot be told apart"
         }
+        Status::Neutral => "neutral: a multiplier has modulus 1; perturbations neither decay nor grow",
     }
 }
 

@@ -1,7 +1,8 @@
 //! What a validation says in sentences. The console, `validation.json` and the report show the same ones.
 
 use crate::show::provenance::Provenance;
-use crate::validate::{HORIZON, HalfMesh, Judge, Kind, StratumResult, Validation};
+use crate::validate::{ChaosEnds, HORIZON, HalfMesh, Judge, Kind, StratumResult, Validation};
+use rattlemap_dynamics::orbit::Class;
 
 /// A validation with the devices that took part.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +48,10 @@ impl Validated<'_> {
         let is_doubtful = random.rate(Kind::Unexplained).count > 0;
         let stands = if is_doubtful { "The map stands with a reservation" } else { "The map stands" };
         let mut sentences = vec![format!("{stands}: {}.", validation.wrong(random))];
-        if is_doubtful {
+        let is_whole = random.sampled >= random.runs;
+        if is_doubtful && is_whole {
+            sentences.push("Its computations are in validation.json.".to_owned());
+        } else if is_doubtful {
             sentences.push(
                 "This sample is too small to tell whether more than one in 10,000 is wrong: validate again with ten times as \
                  many samples."
@@ -102,6 +106,7 @@ impl Validated<'_> {
                 states.rate().text()
             )
         }));
+        remarks.extend(validation.chaos_ends.as_ref().map(|ends| chaos_ends(ends, validation.counted())));
         remarks.extend(validation.half_mesh.as_ref().map(|half| half_mesh(half, validation.counted())));
         if validation.filled > 0 {
             let (filled, runs, counted) = (validation.filled, validation.runs, validation.counted());
@@ -158,6 +163,12 @@ impl Validated<'_> {
     fn again(&self) -> String {
         let [same, count] = self.validation.again;
         let equal = format!("{same} of {count} records are the same to the bit");
+        let may_differ = match (self.is_gpu(), self.validation.is_exact) {
+            (false, false) => {
+                " Another build of the program computed the map, so records may differ by rounding."
+            }
+            _ => "",
+        };
         match (self.is_gpu(), self.again_on(), self.is_same_device()) {
             (true, Some(device), true) => {
                 format!("Lanes ran again on the map's own device, {device}: {equal}.")
@@ -175,13 +186,12 @@ impl Validated<'_> {
             }
             (false, _, true) => {
                 format!(
-                    "The map's engine, the reference, ran again on the same kind of processor, {}: {equal}.",
+                    "The map's engine, the reference, ran again on the same kind of processor, {}: {equal}.{may_differ}",
                     self.processors[1]
                 )
             }
             (false, _, false) => format!(
-                "The map's engine, the reference, ran again on {}; the map was computed on {}: {equal}. Processors may round \
-                 differently.",
+                "The map's engine, the reference, ran again on {}; the map was computed on {}: {equal}.{may_differ}",
                 self.processors[1], self.processors[0]
             ),
         }
@@ -220,6 +230,34 @@ fn rates(stratum: &StratumResult, counted: &str) -> String {
         differing.text(),
         wrong.count,
         wrong.text()
+    )
+}
+
+/// Largest number of cells that a sentence names.
+const NAMED_CELLS: usize = 8;
+
+/// Says in how many cells chaos ends, in which, and how to find all of them.
+fn chaos_ends(ends: &ChaosEnds, counted: &str) -> String {
+    let ChaosEnds { periods, runs, rate, ended } = ends;
+    if rate.among == 0 {
+        return format!("No {counted} are chaotic, so none was followed to see whether chaos ends.");
+    }
+    let followed = format!(
+        "Chaos was followed in {} of {runs} chaotic {counted} for {periods} further periods: it ends in {} ({})",
+        rate.among,
+        rate.count,
+        rate.text()
+    );
+    if ended.is_empty() {
+        return followed + ".";
+    }
+    let periodic = ended.iter().filter(|end| matches!(end.class, Class::Periodic { .. })).count();
+    let named = ended.iter().take(NAMED_CELLS).map(|end| format!("({}, {})", end.indices[0], end.indices[1]));
+    let more = if ended.len() > NAMED_CELLS { ", ..." } else { "" };
+    format!(
+        "{followed}; {periodic} of these become periodic. They are {}{more}. Set integration.confirm_chaos = {periods} to continue all \
+         chaotic {counted} of the map.",
+        named.collect::<Vec<_>>().join(", ")
     )
 }
 
@@ -280,8 +318,10 @@ mod tests {
             ],
             replayed: 397,
             again: [397, 397],
+            is_exact: false,
             agreement: Vec::new(),
             chaos: Vec::new(),
+            chaos_ends: None,
             half_mesh: None,
             states: None,
             mismatches: Vec::new(),

@@ -10,7 +10,7 @@ use rattlemap_dynamics::model::ModelError;
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// A file cannot be written.
-    #[error("cannot write {}: {reason}", .path.display())]
+    #[error("cannot write {}: {reason}{}", .path.display(), .reason.remedy())]
     Write {
         /// The file.
         path: PathBuf,

@@ -1,6 +1,5 @@
 //! Reads the folder of a finished map or of a finished shard: its manifest, its scene and its records.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -14,7 +13,7 @@ use crate::map::shard::Shard;
 use crate::record::Record;
 use crate::show::provenance::Provenance;
 use crate::store::file_names::{LIST, MANIFEST, RECORDS};
-use crate::store::inventory::FileEntry;
+use crate::store::inventory::{self, FileEntry, has_seal};
 use crate::store::manifest::FORMAT;
 use crate::store::plain_file::read_text;
 use crate::store::record_file::{Damage, Extent, Identity, Order, RecordFile, RecordFileError};
@@ -42,6 +41,12 @@ pub enum FinishedMapError {
     /// The manifest cannot be read, or is not one.
     #[error("{}: this is not the manifest of a map: {reason}", .manifest.display())]
     Unreadable { manifest: PathBuf, reason: String },
+    /// The manifest was changed.
+    #[error(
+        "{}: {MANIFEST} is damaged: its contents are not what they were; write the files again with --force",
+        .folder.display()
+    )]
+    Damaged { folder: PathBuf },
     /// Another command made the folder.
     #[error("{}: this is not the manifest of a map, but of `{}`", .manifest.display(), .command.escape_debug())]
     OtherCommand { manifest: PathBuf, command: String },
@@ -118,7 +123,7 @@ pub fn read_manifest(folder: &Path) -> Result<Value, FinishedMapError> {
             None => FinishedMapError::NoManifest { folder: folder.to_owned() },
         });
     }
-    let text = fs::read_to_string(&manifest).map_err(|error| unreadable(folder, error))?;
+    let text = inventory::text(folder).map_err(|error| unreadable(folder, error))?;
     serde_json::from_str(&text).map_err(|error| unreadable(folder, error))
 }
 
@@ -143,11 +148,12 @@ pub fn require_format(folder: &Path, manifest: &Value) -> Result<(), FinishedMap
 /// Reads the manifest of a folder with tables: a whole map's, or a bifurcation diagram's.
 ///
 /// # Errors
-/// [`FinishedMapError`] if the folder is not one of these, not finished, or of another format.
+/// [`FinishedMapError`] if the folder is not one of these, not finished, or of another format, or if the manifest is damaged.
 pub fn read_tables(folder: &Path) -> Result<Value, FinishedMapError> {
     let manifest = manifest_of(folder, &["map", "bifurcation"])?;
     match Option::<Shard>::deserialize(&manifest["shard"]) {
-        Ok(None) => Ok(manifest),
+        Ok(None) if has_seal(&manifest) => Ok(manifest),
+        Ok(None) => Err(FinishedMapError::Damaged { folder: folder.to_owned() }),
         Ok(Some(shard)) => Err(FinishedMapError::IsShard { folder: folder.to_owned(), shard }),
         Err(error) => Err(unreadable(folder, error)),
     }
@@ -306,6 +312,11 @@ impl FinishedMap {
                 let text = self.manifest.model["text"].as_str();
                 let text = text.ok_or("is not in the manifest; make the map again with --force")?;
                 return Ok(FileText { name: format!("{name}, model"), text: text.to_owned() });
+            }
+            if !self.manifest.files.iter().any(|file| file.name == LIST) {
+                return Err(format!(
+                    "is needed, and {MANIFEST} lists no {LIST}; make the map again with --force"
+                ));
             }
             let path = self.folder.join(LIST);
             let text = read_text(&path, MOST_LIST_BYTES, "list fewer cells").map_err(|error| {

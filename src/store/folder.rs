@@ -15,7 +15,7 @@ use thiserror::Error;
 use crate::show::error::WriteError;
 use crate::store::error::OutputError;
 use crate::store::file_names::UNFINISHED;
-use crate::store::plain_file::{PARTIAL, partial, refuse_link};
+use crate::store::plain_file::{partial, refuse_link};
 pub(crate) use lock::LOCK;
 use lock::Lock;
 
@@ -126,7 +126,7 @@ impl Folder {
     /// Checks whether a folder can be opened and the files `names` be written there, without creating or locking anything.
     ///
     /// # Errors
-    /// As [`Folder::open`] and [`Folder::refuse_links`], as far as can be known without writing.
+    /// As [`Folder::open`] and [`Folder::prepare`], as far as can be known without writing.
     pub fn check<'n>(
         path: &Path,
         force: bool,
@@ -142,12 +142,25 @@ impl Folder {
         refuse_links_in(path, names)
     }
 
-    /// Checks that none of the files `names` is a symbolic link.
+    /// Prepares for writing the files `names`: checks that none of them is a symbolic link, and removes the incomplete ones
+    /// of a command that was killed.
     ///
     /// # Errors
-    /// [`FolderError::Link`] for the first one.
-    pub fn refuse_links<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
-        refuse_links_in(&self.path, names)
+    /// [`FolderError::Link`] for the first link, [`FolderError::NotWritable`] if a file cannot be removed.
+    pub fn prepare<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
+        let names: Vec<&str> = names.into_iter().collect();
+        refuse_links_in(&self.path, names.iter().copied())?;
+        // The records of a merge have a temporary name while they are gathered, and another one before.
+        let once = names.iter().map(|name| partial(&self.path.join(name)));
+        for path in once.flat_map(|path| [partial(&path), path]) {
+            match fs::remove_file(path) {
+                Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
+                    return Err(FolderError::NotWritable { path: self.path.clone(), reason });
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Whether a folder contains other files than those of a run that was killed before it wrote any result.
@@ -224,7 +237,7 @@ impl Folder {
             let name = name.as_ref();
             let path = self.path.join(name);
             match fs::remove_file(&path) {
-                Ok(()) if name.starts_with(PARTIAL) || name == UNFINISHED => {}
+                Ok(()) if name == UNFINISHED => {}
                 Ok(()) => {
                     let mut removed = self.removed.lock().unwrap_or_else(PoisonError::into_inner);
                     removed.insert(name.to_owned());
@@ -253,7 +266,8 @@ fn refuse_links_in<'n>(folder: &Path, names: impl IntoIterator<Item = &'n str>) 
 }
 
 /// Files that a run leaves if it is killed before it has written any result.
-const LEFTOVERS: [&str; 3] = [LOCK, "partial-records.bin", "partial-unfinished.json"];
+const LEFTOVERS: [&str; 4] =
+    [LOCK, "partial-records.bin", "partial-partial-records.bin", "partial-unfinished.json"];
 
 /// Whether a folder contains nothing but its lock.
 fn is_empty(path: &Path) -> io::Result<bool> {
@@ -382,7 +396,7 @@ mod tests {
             std::os::unix::fs::symlink(&outside, &link).unwrap();
             let failed = match Folder::open(&inside, true) {
                 Ok(folder) => {
-                    let named = folder.refuse_links(["x.txt"]).unwrap_err().to_string();
+                    let named = folder.prepare(["x.txt"]).unwrap_err().to_string();
                     assert!(named.contains(&format!("{name} is a symbolic link")), "{named}");
                     folder.replace("x.txt", |out| Ok(out.write_all(b"one")?)).unwrap_err().to_string()
                 }
@@ -396,7 +410,7 @@ mod tests {
         let pipe = inside.join("x.txt");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         let folder = Folder::open(&inside, true).unwrap();
-        let named = folder.refuse_links(["x.txt"]).unwrap_err().to_string();
+        let named = folder.prepare(["x.txt"]).unwrap_err().to_string();
         assert!(named.contains("x.txt is no plain file"), "{named}");
         drop(folder);
         fs::remove_file(pipe).unwrap();

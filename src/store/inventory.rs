@@ -1,6 +1,6 @@
 //! The list `files` of a manifest: name, size and hash of each file, and the comparison with the folder.
 
-use std::fs::{self, File};
+use std::fs::{self, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -15,10 +15,13 @@ use crate::show::replay::MODEL;
 use crate::store::error::OutputError;
 use crate::store::file_names::{LIST, MANIFEST};
 use crate::store::folder::{Folder, LOCK};
-use crate::store::plain_file::PARTIAL;
+use crate::store::plain_file;
 
 /// Field of the manifest's own hash.
 const SEAL: &str = "manifest_sha256";
+
+/// Largest size of a manifest, in bytes. Axes of a million listed values take 130 MB.
+pub(crate) const MOST_MANIFEST_BYTES: u64 = 256_000_000;
 
 /// A file in the list of a manifest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,7 +77,7 @@ impl std::fmt::Display for Finding {
 /// # Errors
 /// If it cannot be read.
 pub fn entry(folder: &Path, name: &str) -> io::Result<FileEntry> {
-    let mut file = File::open(folder.join(name))?;
+    let mut file = plain_file::open(&folder.join(name), OpenOptions::new().read(true))?;
     let (mut hasher, mut bytes, mut part) = (Sha256::new(), 0, vec![0; 1 << 16]);
     loop {
         match file.read(&mut part)? {
@@ -105,8 +108,15 @@ pub fn entries<N: AsRef<str> + Sync>(folder: &Folder, names: &[N]) -> Result<Vec
 
 /// Reads the manifest of a folder; null if there is none or it is not JSON.
 pub(crate) fn stored(folder: &Path) -> Value {
-    let text = fs::read_to_string(folder.join(MANIFEST)).unwrap_or_default();
-    serde_json::from_str(&text).unwrap_or_default()
+    serde_json::from_str(&text(folder).unwrap_or_default()).unwrap_or_default()
+}
+
+/// Reads the text of a folder's manifest.
+///
+/// # Errors
+/// If it cannot be read, or is larger than any that a command writes.
+pub(crate) fn text(folder: &Path) -> io::Result<String> {
+    plain_file::read_text(&folder.join(MANIFEST), MOST_MANIFEST_BYTES, "no command writes a larger one")
 }
 
 /// Returns the files that a manifest lists.
@@ -123,7 +133,7 @@ pub fn figure_formats(folder: &Path, command: &str) -> Vec<Format> {
 }
 
 /// Removes the results of an earlier run of any command: the manifest first, the files that it lists, and the files `names`.
-/// Files for which `keeps` holds stay. Incomplete files of `names` are removed, too.
+/// Files for which `keeps` holds stay.
 ///
 /// # Errors
 /// [`OutputError::Replace`] if a file cannot be removed.
@@ -134,11 +144,8 @@ pub(crate) fn clear<'n>(
 ) -> Result<(), OutputError> {
     let is_result = |name: &String| is_in_folder(name) && !folder.path().join(name).is_dir();
     let listed = listed(&stored(folder.path())).into_iter().map(|file| file.name).filter(is_result);
-    let own: Vec<String> = names.into_iter().map(str::to_owned).collect();
-    let partial: Vec<String> = own.iter().map(|name| format!("{PARTIAL}{name}")).collect();
-    let all = [MANIFEST.to_owned()].into_iter().chain(listed).chain(own);
-    folder.remove(&all.filter(|name| !keeps(name)).collect::<Vec<_>>())?;
-    folder.remove(&partial)
+    let all = [MANIFEST.to_owned()].into_iter().chain(listed).chain(names.into_iter().map(str::to_owned));
+    folder.remove(&all.filter(|name| !keeps(name)).collect::<Vec<_>>())
 }
 
 /// Removes the results of an earlier run, like [`clear`], before a command other than `map` writes its own. The list and the
@@ -163,7 +170,7 @@ fn is_in_folder(name: &str) -> bool {
 /// # Errors
 /// If the folder cannot be read.
 pub fn check(folder: &Path, listed: &[FileEntry]) -> io::Result<Vec<Finding>> {
-    let manifest = fs::read_to_string(folder.join(MANIFEST))?;
+    let manifest = text(folder)?;
     let damaged = || Fault::Damaged("its contents are not what they were".to_owned());
     let of_manifest = (!is_sealed(&manifest)).then(|| (MANIFEST.to_owned(), damaged()));
     let faults = listed.par_iter().map(|entry| fault(folder, entry)).collect::<Vec<_>>();
@@ -213,8 +220,8 @@ fn fault(folder: &Path, listed: &FileEntry) -> Option<Fault> {
 /// Updates the entries of these files in the manifest and adds the seconds of a phase to its timings.
 pub(crate) fn update(folder: &Folder, names: &[&str], timing: (&str, f64)) -> Result<(), OutputError> {
     let path = folder.path().join(MANIFEST);
-    let text = fs::read_to_string(&path)
-        .map_err(|reason| OutputError::Write { path, reason: WriteError::Io(reason) })?;
+    let text =
+        text(folder.path()).map_err(|reason| OutputError::Write { path, reason: WriteError::Io(reason) })?;
     let mut manifest: Value = serde_json::from_str(&text)?;
     let mut listed: Vec<FileEntry> = serde_json::from_value(manifest["files"].take())?;
     for entry in entries(folder, names)? {
@@ -257,6 +264,11 @@ pub fn sealed(mut manifest: Value) -> serde_json::Result<String> {
 pub fn is_sealed(text: &str) -> bool {
     let manifest = serde_json::from_str::<Value>(text);
     manifest.is_ok_and(|manifest| manifest.is_object() && sealed(manifest).is_ok_and(|sealed| sealed == text))
+}
+
+/// Whether a manifest that was read has the right seal.
+pub(crate) fn has_seal(manifest: &Value) -> bool {
+    pretty(manifest).is_ok_and(|text| is_sealed(&text))
 }
 
 fn pretty(manifest: &Value) -> serde_json::Result<String> {

@@ -26,6 +26,7 @@ mod error;
 
 pub use error::MergeError;
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -48,12 +49,16 @@ use crate::store::record_file::{Extent, Identity, RECORDS, RecordFile, RecordFil
 use crate::store::run_records::Work;
 use crate::store::{in_memory, map_json, unfinished};
 use crate::text::shell::quoted;
+use rattlemap_dynamics::orbit::Class;
 
 /// Number of records that are written together: the largest batch of a record file.
 const BATCH: usize = 1 << 16;
 
 /// Largest number of batches in memory that wait to be written; each takes 12 MB.
 const MOST_BATCHES: usize = 8;
+
+/// Largest number of missing shards that a message names.
+const NAMED_SHARDS: usize = 10;
 
 /// Progress of a merge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,9 +108,19 @@ impl Parts {
             }
         }
         require_one_run(&parts, &begun)?;
-        let scene = parts.first().map(|part| part.map.scene()).transpose()?;
-        require_all(&parts, &begun, scene.as_ref())?;
-        let (Some(first), Some(scene)) = (parts.first(), scene) else { return Err(MergeError::Nothing) };
+        let Some(first) = parts.first() else {
+            require_all(&parts, &begun, None)?;
+            return Err(MergeError::Nothing);
+        };
+        let scene = first.map.scene()?;
+        let runs = scene.run_count();
+        if u32::try_from(runs).is_err() {
+            return Err(MergeError::TooLarge { runs });
+        }
+        let plan = Plan::new(&scene);
+        let impossible = |reason| MergeError::Impossible { part: first.map.folder().to_owned(), reason };
+        first.shard.check(&plan).map_err(impossible)?;
+        require_all(&parts, &begun, Some(&plan))?;
         let identity = first.identity.clone().of_shard(None);
         if !identity.is_of(&scene) {
             return Err(first.damaged(format!("the scene in its manifest is not that of its {RECORDS}")));
@@ -148,10 +163,6 @@ impl Parts {
         go_on: impl FnMut(Progress) -> bool,
     ) -> Result<MapRecords, MergeError> {
         let clock = Instant::now();
-        let runs = self.scene.run_count();
-        if u32::try_from(runs).is_err() {
-            return Err(MergeError::TooLarge { runs });
-        }
         let plan = Plan::new(&self.scene);
         plan.check()?;
         let path = folder.path().join(RECORDS);
@@ -343,29 +354,32 @@ fn require_one_run(parts: &[Part], begun: &[UnfinishedRun]) -> Result<(), MergeE
 }
 
 /// Refuses to merge if shards are missing or unfinished, with the commands that compute them.
-fn require_all(parts: &[Part], begun: &[UnfinishedRun], scene: Option<&Scene>) -> Result<(), MergeError> {
+fn require_all(parts: &[Part], begun: &[UnfinishedRun], plan: Option<&Plan>) -> Result<(), MergeError> {
     let first = parts.first();
-    let present: Vec<Shard> =
+    let present: HashSet<Shard> =
         parts.iter().map(|part| part.shard).chain(begun.iter().filter_map(UnfinishedRun::shard)).collect();
     let mut incomplete = Vec::new();
     if let Some(first) = first {
         let count = first.shard.count();
-        let missing: Vec<String> = Shard::all(count)
+        // No shard is present twice.
+        let missing = count as usize - present.len();
+        let named: Vec<String> = Shard::all(count)
             .filter(|shard| !present.contains(shard))
+            .take(NAMED_SHARDS)
             .map(|shard| format!("{shard} (`{}`)", first.map.manifest().shard_command(shard, None)))
             .collect();
-        let are = if missing.len() == 1 { "is" } else { "are" };
-        if !missing.is_empty() {
-            let list = missing.join(", ");
-            incomplete.push(format!("{} of {count} shards {are} missing: {list}", missing.len()));
+        let are = if missing == 1 { "is" } else { "are" };
+        if missing > 0 {
+            let others = missing - named.len();
+            let others = if others > 0 { format!(" and {others} more") } else { String::new() };
+            incomplete
+                .push(format!("{missing} of {count} shards {are} missing: {}{others}", named.join(", ")));
         }
     }
-    let countable = scene.filter(|scene| !begun.is_empty() && u32::try_from(scene.run_count()).is_ok());
-    let plan = countable.map(Plan::new);
     let sets = first.map_or(&[][..], |first| &first.map.manifest().set);
     for run in begun {
         let (part, count) = (run.folder.display(), run.count());
-        let of = plan.as_ref().zip(run.shard()).map(|(plan, shard)| shard.run_count(plan));
+        let of = plan.zip(run.shard()).map(|(plan, shard)| shard.run_count(plan));
         let of = of.map_or(String::new(), |of| format!(" of {of}"));
         incomplete.push(match run.shard() {
             Some(shard) => {
@@ -397,8 +411,8 @@ pub struct MapRecords {
 pub struct MergedMap {
     /// Names of the files in the folder.
     pub files: Vec<String>,
-    /// Number of cells that are periodic, chaotic, undecided, failed.
-    pub classes: [usize; 4],
+    /// Number of cells of each class.
+    pub classes: [usize; Class::NAMES.len()],
     /// The object that `map --json` prints, with the number of `shards`.
     pub object: Value,
     /// Damage in record files behind the last record.

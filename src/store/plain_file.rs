@@ -1,14 +1,16 @@
 //! Plain files: temporary names, no writing through links, and bounded reading.
 
 use std::borrow::Cow;
-use std::fs;
-use std::io;
+use std::fs::{self, File, Metadata, OpenOptions};
+use std::io::{self, Read};
+#[cfg(unix)]
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use crate::text::size::bytes;
 
 /// Prefix of the name under which a file is written until it is complete.
-pub(crate) const PARTIAL: &str = "partial-";
+const PARTIAL: &str = "partial-";
 
 /// Returns the name under which a file is written until it is complete.
 pub(crate) fn partial(path: &Path) -> PathBuf {
@@ -34,15 +36,34 @@ pub(crate) fn refuse_link(path: &Path) -> io::Result<()> {
 /// # Errors
 /// If the file is not a regular file, is longer, or cannot be read.
 pub(crate) fn read_text(path: &Path, most: u64, remedy: &str) -> io::Result<String> {
-    let data = fs::metadata(path)?;
-    if !data.is_file() {
-        return Err(io::Error::other("it is no regular file"));
-    }
-    if data.len() > most {
-        let (size, most) = (bytes(data.len()), bytes(most));
+    let file = open(path, OpenOptions::new().read(true))?;
+    let length = file.metadata()?.len();
+    if length > most {
+        let (size, most) = (bytes(length), bytes(most));
         return Err(io::Error::other(format!("it has {size}, and at most {most} are read: {remedy}")));
     }
-    fs::read_to_string(path)
+    let mut text = String::new();
+    file.take(most).read_to_string(&mut text)?;
+    Ok(text)
+}
+
+/// Opens a regular file. A pipe or a device in its place is refused at once, also behind a link.
+///
+/// # Errors
+/// If the file is not a regular file or cannot be opened.
+pub(crate) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    // Opening a device can already act on it.
+    require_regular(&fs::metadata(path)?)?;
+    // Without this flag, opening a pipe waits for its other end. The file may have become one since the line above.
+    #[cfg(unix)]
+    options.custom_flags(libc::O_NONBLOCK);
+    let file = options.open(path)?;
+    require_regular(&file.metadata()?)?;
+    Ok(file)
+}
+
+fn require_regular(data: &Metadata) -> io::Result<()> {
+    if data.is_file() { Ok(()) } else { Err(io::Error::other("it is no regular file")) }
 }
 
 fn name_of(path: &Path) -> Cow<'_, str> {

@@ -33,7 +33,7 @@ pub use identity::Identity;
 pub use reader::{Damage, Extent, Order};
 
 use crate::record::Record;
-use crate::store::plain_file::{partial, refuse_link};
+use crate::store::plain_file::{self, partial, refuse_link};
 use reader::Reader;
 
 const _: () = assert!(cfg!(target_endian = "little"), "records are written as they lie in memory");
@@ -105,7 +105,7 @@ impl RecordFile {
     ) -> Result<RecordFile, RecordFileError> {
         let io = |reason| io_error(path, reason);
         refuse_link(path).map_err(io)?;
-        let file = OpenOptions::new().read(true).write(true).open(path).map_err(io)?;
+        let file = plain_file::open(path, OpenOptions::new().read(true).write(true)).map_err(io)?;
         let Some(reader) = Reader::of(&file, path, identity)? else {
             return RecordFile::create(path, identity);
         };

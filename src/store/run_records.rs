@@ -100,7 +100,7 @@ pub fn open_folder(out: &Path, force: bool, resume: bool) -> Result<Folder, RunR
         require_records(out)?;
     }
     let folder = Folder::open(out, force || resume)?;
-    folder.refuse_links(map::names())?;
+    folder.prepare(map::names())?;
     Ok(folder)
 }
 

@@ -25,8 +25,8 @@ use rattlemap_dynamics::orbit::{Class, Status};
 /// Counts over the records of a shard. As in a map, only the first of several starts of a cell is counted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Number of cells that are periodic, chaotic, undecided, failed.
-    pub classes: [usize; 4],
+    /// Number of cells of each class.
+    pub classes: [usize; Class::NAMES.len()],
     statuses: BTreeMap<u32, usize>,
     /// Number of integrated forcing periods, over all runs.
     pub periods: u64,

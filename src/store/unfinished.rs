@@ -1,6 +1,5 @@
 //! `unfinished.json`: the time spent so far on a map that has no manifest yet.
 
-use std::fs;
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -8,6 +7,8 @@ use serde_json::{Value, json};
 use crate::store::error::OutputError;
 use crate::store::file_names::{MANIFEST, UNFINISHED};
 use crate::store::folder::Folder;
+use crate::store::inventory::MOST_MANIFEST_BYTES;
+use crate::store::plain_file::read_text;
 
 /// Field of the time in seconds, in both files.
 const ELAPSED: &str = "elapsed_seconds";
@@ -15,7 +16,7 @@ const ELAPSED: &str = "elapsed_seconds";
 /// Returns the time that earlier runs in this folder spent integrating; zero if no file says.
 pub fn elapsed(folder: &Folder) -> Duration {
     let read = |name: &str| {
-        let text = fs::read_to_string(folder.path().join(name)).ok()?;
+        let text = read_text(&folder.path().join(name), MOST_MANIFEST_BYTES, "").ok()?;
         let seconds = serde_json::from_str::<Value>(&text).ok()?[ELAPSED].as_f64()?;
         Duration::try_from_secs_f64(seconds).ok()
     };
@@ -41,6 +42,8 @@ pub fn clear(folder: &Folder) -> Result<(), OutputError> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -9,13 +9,15 @@ use crate::show::replay;
 use crate::show::validation::Validated;
 use crate::store::manifest::{Head, joined};
 use crate::validate::{
-    ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult,
+    ChaosEnd, ChaosEnds, ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck,
+    StratumResult,
 };
+use rattlemap_dynamics::orbit::Class;
 
 /// Describes a validation.
 ///
 /// `counted` is the unit of all numbers but `cells`, `integrated` the number of runs from which the sample was drawn, and
-/// `identical` the number of records that the same engine reproduced bit for bit.
+/// `identical` the number of records that the same engine reproduced bit for bit. All must be if `must_be_identical`.
 pub(crate) fn object(cells: &Cells<'_>, validated: &Validated<'_>) -> Value {
     let Validated { validation, made, processors, double_lanes, .. } = *validated;
     let agreement = validation
@@ -54,7 +56,9 @@ pub(crate) fn object(cells: &Cells<'_>, validated: &Validated<'_>) -> Value {
             "agreement": agreement.collect::<BTreeMap<_, _>>(),
             "identical": validation.again[0],
             "computed_again": validation.again[1],
+            "must_be_identical": validation.is_exact,
             "chaos": validation.chaos.iter().map(chaos).collect::<Vec<_>>(),
+            "chaos_ends": validation.chaos_ends.as_ref().map(|ends| chaos_ends(cells, ends)),
             "half_mesh_speed": validation.half_mesh.as_ref().map(half_mesh),
             "states": validation.states.as_ref().map(states),
             "not_finite": validation.not_finite,
@@ -92,6 +96,25 @@ fn chaos(test: &ChaosTest) -> Value {
     })
 }
 
+/// Chaotic cells that were followed, and those whose chaos ended.
+fn chaos_ends(cells: &Cells<'_>, ends: &ChaosEnds) -> Value {
+    let ended = |end: &ChaosEnd| {
+        let period = match end.class {
+            Class::Periodic { period } => Some(period),
+            _ => None,
+        };
+        let own = json!({ "class": end.class.name(), "period": period, "periods_run": end.periods_run });
+        joined([place(cells, end.id), own])
+    };
+    json!({
+        "further_periods": ends.periods,
+        "chaotic": ends.runs,
+        "followed": ends.rate.among,
+        "ended": rate(ends.rate),
+        "cells": ends.ended.iter().map(ended).collect::<Vec<_>>(),
+    })
+}
+
 /// Changes at half the meshing speed. Words and patterns of mirror images count as equal.
 fn half_mesh(half: &HalfMesh) -> Value {
     let changed = |rate: Rate| {
@@ -121,9 +144,6 @@ fn states(states: &StateCheck) -> Value {
 }
 
 fn mismatch(cells: &Cells<'_>, mismatch: &Mismatch) -> Value {
-    let id = mismatch.id as usize;
-    let [i, j] = cells.row(id).indices;
-    let swept = cells.scene().swept().map(|parameter| parameter.name.to_string());
     let differences = mismatch.differences.iter().map(|difference| {
         json!({
             "field": difference.field.name(),
@@ -131,14 +151,20 @@ fn mismatch(cells: &Cells<'_>, mismatch: &Mismatch) -> Value {
             "judge": difference.judge,
         })
     });
+    let own = json!({ "differences": differences.collect::<Vec<_>>(), "kind": mismatch.kind.name() });
+    joined([place(cells, mismatch.id), own])
+}
+
+/// Names a run: its id, indices and swept values, and the command that replays it.
+fn place(cells: &Cells<'_>, id: u32) -> Value {
+    let [i, j] = cells.row(id as usize).indices;
+    let swept = cells.scene().swept().map(|parameter| parameter.name.to_string());
     json!({
-        "id": mismatch.id,
+        "id": id,
         "i": i,
         "j": j,
-        "values": swept.zip(cells.values(id)).collect::<BTreeMap<_, _>>(),
-        "differences": differences.collect::<Vec<_>>(),
-        "kind": mismatch.kind.name(),
-        "replay": replay::command(cells, id),
+        "values": swept.zip(cells.values(id as usize)).collect::<BTreeMap<_, _>>(),
+        "replay": replay::command(cells, id as usize),
     })
 }
 

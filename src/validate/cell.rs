@@ -119,9 +119,16 @@ impl<'a> Cell<'a> {
         measured.map_or(Record::default(), |measured| measured_record(&measured, needs))
     }
 
+    /// Computes the cell with early stops, and chaos for this number of further periods.
+    pub(super) fn followed(&self, periods: u32) -> Record {
+        let confirm_chaos = self.budget.confirm_chaos.saturating_add(periods);
+        let budget = Budget { early_stop: true, confirm_chaos, quantities: false, ..self.budget };
+        answer(&self.flow, self.law, self.start, &budget, self.halt).record
+    }
+
     /// Builds a budget of this number of periods without early stops.
     fn budget_of(&self, periods: u32) -> Budget {
-        let mut budget = Budget { early_stop: false, ..self.budget };
+        let mut budget = Budget { early_stop: false, confirm_chaos: 0, ..self.budget };
         let observed = budget.settings.observed_periods.min(periods / 2);
         budget.settings.observed_periods = observed;
         budget.settings.max_period = budget.settings.max_period.min(observed / 2).max(1);
@@ -143,7 +150,7 @@ impl<'a> Cell<'a> {
                 if classify(&later.record) == classify(&answer.record) { answer } else { later }
             }
             Class::Undecided => {
-                self::answer(flow, law, start, &self.budget_of(self.budget.longest()), self.halt)
+                self::answer(flow, law, start, &self.budget_of(self.budget.decided_by()), self.halt)
             }
             _ => answer,
         }

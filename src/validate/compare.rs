@@ -9,7 +9,7 @@ use crate::findings::attractors::{Basins, NONE};
 use crate::gpu::Precision;
 use crate::record::classify::{classify, status};
 use crate::record::distance::{apart, is_within};
-use crate::record::measures::{GROUPS, Group};
+use crate::record::measures::{GROUPS, Group, SMALL};
 use crate::record::{Record, Spelling, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Budget, Class, Status};
@@ -188,7 +188,7 @@ pub(super) struct Bars<'a> {
     /// Smallest multiplier that the monodromy matrix resolves; smaller ones count as zero.
     no_multiplier: f64,
     mesh: f64,
-    /// Tolerance of measured quantities of a cycle, relative to the quantity.
+    /// Tolerance of measured quantities of a cycle, as [`Group::distance`] has it.
     measured: f64,
     forcing_period: f64,
     budget: Budget,
@@ -272,7 +272,9 @@ impl Bars<'_> {
                     self.compare_cycle(record, answer, f64::from(ours), &mut list);
                 }
             }
-            (Class::Chaotic, Class::Chaotic) | (Class::Undecided, Class::Undecided) => {
+            (Class::Chaotic, Class::Chaotic)
+            | (Class::QuasiPeriodic, Class::QuasiPeriodic)
+            | (Class::Undecided, Class::Undecided) => {
                 self.compare_averages(record, judge, &mut list);
             }
             _ => {}
@@ -288,14 +290,15 @@ impl Bars<'_> {
         Some(compared(Field::Attractor, ours == theirs, || (shown(ours), shown(theirs))))
     }
 
-    /// Whether two statuses of one class agree. Lanes report `slow` at distances above 1e-4 from the cycle, the reference
-    /// above 1e-8, so `ok` and `slow` agree for motion that settles slowly.
+    /// Whether two statuses of one class agree. Lanes in f32 report `slow` at distances above 1e-4 from the cycle, other
+    /// engines above 1e-8, and a multiplier of 1 has a larger error in f32. So `ok`, `slow` and `neutral` agree for motion
+    /// that settles slowly.
     fn is_same_status(&self, class: Class, statuses: [Status; 2], judge: &Record) -> bool {
         match class {
             // For these classes the status adds nothing.
-            Class::Chaotic | Class::Undecided => true,
+            Class::Chaotic | Class::QuasiPeriodic | Class::Undecided => true,
             _ => {
-                let graded = [Status::Ok, Status::Slow];
+                let graded = [Status::Ok, Status::Slow, Status::Neutral];
                 let is_grade = statuses.iter().all(|status| graded.contains(status));
                 statuses[0] == statuses[1] || is_grade && !self.is_decisive(judge)
             }
@@ -346,7 +349,7 @@ impl Bars<'_> {
         self.push_averages(list, record, judge, [IMPACTS_BAR, self.mesh]);
         self.push_measured(list, record, judge, |group| match group.name == MULTIPLIER {
             true => self.is_same_complex(group, record, judge, period),
-            false => is_within(group.distance(record, judge), self.measured),
+            false => is_within(group.distance(record, judge, SMALL), self.measured),
         });
     }
 
@@ -372,7 +375,7 @@ impl Bars<'_> {
         let impacts = CHAOS_BARS[1] * judge.impacts_per_period + 1.0;
         self.push_averages(list, record, judge, [impacts, CHAOS_BARS[2]]);
         self.push_measured(list, record, judge, |group| {
-            group.name == MULTIPLIER || is_within(group.distance(record, judge), CHAOS_BARS[1])
+            group.name == MULTIPLIER || is_within(group.distance(record, judge, 1.0), CHAOS_BARS[1])
         });
     }
 

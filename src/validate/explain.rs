@@ -75,13 +75,16 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
     if is_rounding { Kind::Border } else { Kind::Unexplained }
 }
 
-/// Whether the claim has the status `below_resolution` and the answer's cycle confirms it: it is the same cycle or closes
-/// earlier, within the effect of rounding.
+/// Whether the claim has the status `below_resolution` and the answer confirms it: by the same status, or because its cycle
+/// is the same or closes earlier, within the effect of rounding.
 fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
+    let confirms = |answer: &Answer| {
+        claim.period.is_multiple_of(answer.record.period.max(1))
+            && is_multiple(cell, claim, answer)
+            && cell.closes_earlier(answer.record.strobe, claim.period)
+    };
     status(claim) == Status::BelowResolution
-        && claim.period.is_multiple_of(answer.record.period.max(1))
-        && is_multiple(cell, claim, answer)
-        && cell.closes_earlier(answer.record.strobe, claim.period)
+        && (status(&answer.record) == Status::BelowResolution || confirms(answer))
 }
 
 /// Whether a record agrees once its exponent and status are replaced by those of the cycle itself.
@@ -118,7 +121,11 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
     };
     // An undecided claim contradicts nothing if the motion is too slow to be decided. A slow approach cannot distinguish
     // a cycle from one that has just bifurcated from it.
-    let is_undecided = classify(claim) == Class::Undecided;
+    let is_undecided = match classify(claim) {
+        // The averages of an engine converge later than those of the other.
+        Class::QuasiPeriodic => classify(&truth.record) == Class::Undecided,
+        class => class == Class::Undecided,
+    };
     let cannot_decide = |answer: &Answer| {
         let claims_nothing =
             is_undecided || status(claim) == Status::Slow && is_multiple(cell, claim, answer);

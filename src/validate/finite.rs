@@ -39,6 +39,7 @@ mod tests {
         settings: Settings { transient_periods: 4, observed_periods: 40, max_period: 2 },
         early_stop: false,
         undecided_periods: 0,
+        confirm_chaos: 0,
         exponent: true,
         shows_exponent: true,
         quantities: false,

@@ -12,6 +12,7 @@
 
 mod cell;
 mod chaos;
+mod chaos_ends;
 mod compare;
 mod explain;
 mod finite;
@@ -30,6 +31,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 pub use chaos::ChaosTest;
+pub use chaos_ends::{CHAOS_PERIODS, ChaosEnd, ChaosEnds, draw_chaos, follow_chaos};
 pub use compare::{Difference, Field, Value};
 pub use half_mesh::HalfMesh;
 pub use lanes::{Lanes, run_lanes};
@@ -176,10 +178,14 @@ pub struct Validation {
     pub replayed: usize,
     /// Number of records that their engine reproduced to the bit, and number of cells that it computed again.
     pub again: [usize; 2],
+    /// Whether a right record is always reproduced to the bit.
+    pub is_exact: bool,
     /// Agreement by field.
     pub agreement: Vec<Agreement>,
     /// Comparison of averages of chaotic motion in the uniform stratum.
     pub chaos: Vec<ChaosTest>,
+    /// Further periods of chaotic cells; none if they were not requested.
+    pub chaos_ends: Option<ChaosEnds>,
     /// Dependence on the meshing speed in the uniform stratum; none if no cell meshes.
     pub half_mesh: Option<HalfMesh>,
     /// Comparison of lanes' states; none if no lanes ran.
@@ -218,6 +224,13 @@ impl Validation {
         let mut faults = Vec::new();
         if self.replayed == 0 {
             faults.push(format!("none of {} {} was compared", self.runs, self.counted()));
+        }
+        let [same, count] = self.again;
+        if self.is_exact && same < count {
+            let [other, counted] = [(count - same).to_string(), self.counted().to_owned()];
+            faults.push(format!(
+                "{other} of {count} {counted} differ from what the same program computes again"
+            ));
         }
         if !self.not_finite.is_empty() {
             let (count, runs, counted) = (self.not_finite.len(), self.runs, self.counted());
@@ -260,19 +273,21 @@ pub fn replay(
     lanes: &Lanes,
     report: &(dyn Fn(usize) + Sync),
 ) -> Validation {
-    replay_whole(subject, None, sample, lanes, report, &NEVER)
+    replay_whole(subject, None, false, sample, lanes, report, &NEVER)
 }
 
-/// Like [`replay`], but returns `None` once `halt` is set. In a map of basins the attractors are compared, too.
+/// Like [`replay`], but returns `None` once `halt` is set. In a map of basins the attractors are compared, too. With
+/// `is_exact` the map fails if its engine does not reproduce a record to the bit.
 pub fn replay_until(
     subject: &Subject<'_>,
     basins: Option<&Basins>,
+    is_exact: bool,
     sample: &Sample,
     lanes: &Lanes,
     report: &(dyn Fn(usize) + Sync),
     halt: &AtomicBool,
 ) -> Option<Validation> {
-    let validation = replay_whole(subject, basins, sample, lanes, report, halt);
+    let validation = replay_whole(subject, basins, is_exact, sample, lanes, report, halt);
     (!halt.load(Ordering::Relaxed)).then_some(validation)
 }
 
@@ -283,6 +298,7 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 fn replay_whole(
     subject: &Subject<'_>,
     basins: Option<&Basins>,
+    is_exact: bool,
     sample: &Sample,
     lanes: &Lanes,
     report: &(dyn Fn(usize) + Sync),
@@ -302,7 +318,8 @@ fn replay_whole(
                 return None;
             }
             let cell = Cell::new(subject, id, halt).in_basins(basins, id);
-            let replayed = replay_cell(subject, &cell, id, judge, lanes, uniform.binary_search(&id).is_ok());
+            let is_uniform = uniform.binary_search(&id).is_ok();
+            let replayed = replay_cell(subject, &cell, id, judge, lanes, is_uniform, is_exact);
             (!is_halted()).then(|| {
                 // Reports are made under the lock, so that the number never falls.
                 let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
@@ -312,7 +329,7 @@ fn replay_whole(
             })
         })
         .collect();
-    let again = again(&mut replayed);
+    let again = again(&mut replayed, is_exact);
     let agreement = Field::all().into_iter().map(|field| {
         let of_field = || replayed.iter().flat_map(|cell| &cell.fields).filter(move |(f, _)| *f == field);
         let agreeing = of_field().filter(|(_, differs)| differs.is_none()).count();
@@ -336,8 +353,10 @@ fn replay_whole(
         strata: sample.draws.iter().map(|draw| stratum(draw, &mismatches)).collect(),
         replayed: ids.len(),
         again,
+        is_exact,
         agreement,
         chaos: chaos::tests(&chaos),
+        chaos_ends: None,
         half_mesh: half_mesh::rates(&changes),
         states: has_states.then(|| states::check(subject, lanes.states(), halt)),
         mismatches,
@@ -393,14 +412,21 @@ fn replay_cell(
     judge: Judge,
     lanes: &Lanes,
     is_uniform: bool,
+    is_exact: bool,
 ) -> Replayed {
     let own = (!subject.is_lane).then(|| cell.again(subject.plan.needs()));
     let again = own.as_ref().or(lanes.again(id));
+    let is_same = again.map(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(cell.record));
     let truth = cell.truth();
     let mut fields = cell.bars.compare(cell.record, &truth);
     let differs = |fields: &[Compared]| fields.iter().any(|(_, differs)| differs.is_some());
     let ran = explain::RepeatedLanes { again, whole: lanes.whole(id), double: lanes.double(id) };
-    let mut kind = differs(&fields).then(|| explain::kind(cell, cell.record, &truth, ran));
+    // A record that its engine cannot have returned needs no explanation.
+    let is_forged = is_exact && is_same == Some(false);
+    let mut kind = match is_forged {
+        true => Some(Kind::Unexplained),
+        false => differs(&fields).then(|| explain::kind(cell, cell.record, &truth, ran)),
+    };
     if kind.is_none()
         && let Some(judged) = judged(subject, cell, id, judge, lanes)
     {
@@ -414,7 +440,7 @@ fn replay_cell(
     }
     Replayed {
         id,
-        again: again.map(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(cell.record)),
+        again: is_same,
         fields,
         kind,
         chaos: is_uniform.then(|| chaos::differences(cell)).flatten(),
@@ -422,12 +448,12 @@ fn replay_cell(
     }
 }
 
-/// Marks records that their engine does not reproduce to the bit as unexplained, if it reproduces most of them. Returns
-/// the number of reproduced records and of repeated cells.
-fn again(replayed: &mut [Replayed]) -> [usize; 2] {
+/// Marks records that their engine does not reproduce to the bit as unexplained, if it must reproduce all of them or
+/// reproduces most of them. Returns the number of reproduced records and of repeated cells.
+fn again(replayed: &mut [Replayed], is_exact: bool) -> [usize; 2] {
     let count = |same| replayed.iter().filter(|cell| cell.again == Some(same)).count();
     let [same, other] = [count(true), count(false)];
-    if same > other {
+    if is_exact || same > other {
         for cell in replayed {
             let Some(is_same) = cell.again else { continue };
             let values = || (Value::Text("another record".into()), Value::Text("the engine's".into()));
@@ -479,11 +505,14 @@ mod tests {
     #[test]
     fn a_record_that_its_engine_does_not_reproduce_is_unexplained_if_most_are_reproduced() {
         let mut one = replayed(&[true, true, false]);
-        assert_eq!(again(&mut one), [2, 3]);
+        assert_eq!(again(&mut one, false), [2, 3]);
         assert_eq!(one[2].kind, Some(Kind::Unexplained));
         assert!(one[..2].iter().all(|cell| cell.kind.is_none()));
         let mut most = replayed(&[true, false, false]);
-        assert_eq!(again(&mut most), [1, 3]);
+        assert_eq!(again(&mut most, false), [1, 3]);
         assert!(most.iter().all(|cell| cell.kind.is_none() && cell.fields.is_empty()));
+        // The same program on the same processor does not.
+        assert_eq!(again(&mut most, true), [1, 3]);
+        assert!(most[1..].iter().all(|cell| cell.kind == Some(Kind::Unexplained)));
     }
 }

@@ -35,12 +35,19 @@ impl Rate {
 
     /// Formats the rate as a percentage with its interval: `0.5 %, 0.06 to 1.8`, or `below 0.75 %` if `count` is 0.
     pub fn text(&self) -> String {
-        let [low, high] = self.interval.map(|end| percent(100.0 * end));
+        self.text_within(1)
+    }
+
+    /// Formats the probability that an event of this rate happens within a number of trials.
+    pub fn text_within(&self, trials: u32) -> String {
+        let within = |rate: f64| match trials {
+            1 => percent(100.0 * rate),
+            trials => percent(-100.0 * (f64::from(trials) * (-rate).ln_1p()).exp_m1()),
+        };
+        let [low, high] = self.interval.map(within);
         match self.count {
             0 => format!("below {high} %"),
-            count => {
-                format!("{} %, {low} to {high}", percent(100.0 * count as f64 / self.among.max(1) as f64))
-            }
+            count => format!("{} %, {low} to {high}", within(count as f64 / self.among.max(1) as f64)),
         }
     }
 
@@ -60,6 +67,9 @@ fn percent(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
+/// Logarithm of a number that is zero in double precision.
+const SMALLEST_LN: f64 = -746.0;
+
 /// Returns the binomial probability of at least `count` successes in `among` trials of probability `p`.
 fn at_least(count: usize, among: usize, p: f64) -> f64 {
     // Logarithms of the binomial terms, each computed from the one before.
@@ -77,6 +87,10 @@ fn at_least(count: usize, among: usize, p: f64) -> f64 {
     let mut above = 0.0;
     for k in count..=among {
         above += term.exp();
+        // Later terms are smaller still. The trials may be as many as a map has forcing periods.
+        if term < SMALLEST_LN {
+            break;
+        }
         if k < among {
             term += ((among - k) as f64 / (k + 1) as f64).ln() + success - failure;
         }
@@ -117,6 +131,11 @@ mod tests {
         assert_eq!(Rate::new(2, 400).text(), "0.5 %, 0.061 to 1.8");
         assert_eq!(Rate::new(0, 400).text(), "below 0.75 %");
         assert_eq!(Rate::new(0, 0).interval, [0.0, 1.0]);
+        // A map has millions of trials. 260 events in 4 10^6: the interval of Poisson (exact tables: 229.4 and 293.6).
+        let rate = Rate::new(260, 4_000_000);
+        assert!((4e6 * rate.interval[0] - 229.4).abs() < 0.1 && (4e6 * rate.interval[1] - 293.6).abs() < 0.1);
+        assert_eq!(rate.text_within(1000), "6.3 %, 5.6 to 7.1");
+        assert_eq!(Rate::new(0, 4_000_000).text_within(1000), "below 0.075 %");
     }
 
     #[test]

@@ -94,11 +94,16 @@ impl Bench {
 
     /// Runs the program with the layer, which makes a call fail if there is a fault.
     fn run(&self, arguments: &[&str], fault: Option<Fault<'_>>) -> Output {
+        self.run_with(&[], arguments, fault)
+    }
+
+    /// Like [`Bench::run`], with more environment variables.
+    fn run_with(&self, more: &[(&str, &str)], arguments: &[&str], fault: Option<Fault<'_>>) -> Output {
         let path = self.folder.path();
         let mut command = Command::cargo_bin("rattlemap").unwrap();
         command.current_dir(path).args(arguments).timeout(LONGEST);
         command.env("VK_LAYER_PATH", path).env("VK_INSTANCE_LAYERS", "VK_LAYER_RATTLEMAP_faults");
-        command.env("RATTLEMAP_CALLS", path.join("calls"));
+        command.env("RATTLEMAP_CALLS", path.join("calls")).envs(more.iter().copied());
         if let Some((call, from, result)) = fault {
             command.env("RATTLEMAP_FAULT", format!("{call}:{from}:{result}"));
         }
@@ -228,4 +233,17 @@ fn every_command_survives_a_lost_device() {
     let measured = bench.run(&["bench", "engines", "--quick"], Some(fault));
     let text = said(&measured, fault);
     assert!(measured.status.success() && text.contains("is left out: ") && text.contains("lost"), "{text}");
+}
+
+/// Without its cache the driver compiles shaders in a thread of its own while the next submit fails.
+#[test]
+fn the_process_ends_after_the_work_of_a_device_whose_submit_fails() {
+    let Some(bench) = Bench::new() else { return };
+    let slow = [("MESA_SHADER_CACHE_DISABLE", "true"), ("RATTLEMAP_LINGER", "1")];
+    for submit in [2, 3] {
+        let fault = ("vkQueueSubmit", submit, NO_MEMORY);
+        let failed = bench.run_with(&slow, &RUN, Some(fault));
+        let text = said(&failed, fault);
+        assert!(failed.status.code() == Some(1) && text.contains("was lost"), "{:?}: {text}", failed.status);
+    }
 }

@@ -13,7 +13,7 @@ mod faults;
 mod from_start;
 #[cfg(unix)]
 mod interrupts;
-mod known_faults;
+mod labels;
 mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;

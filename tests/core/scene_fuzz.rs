@@ -28,7 +28,7 @@ const VALUES: [&str; 36] = [
 /// Known names, and some unknown ones.
 fn names() -> Vec<&'static str> {
     let fields = "title model parameters axis integration start refine outputs parameter min max count \
-                  steps_per_period transient_periods observed_periods early_stop undecided_periods max_period policy \
+                  steps_per_period transient_periods observed_periods early_stop undecided_periods confirm_chaos max_period policy \
                   state scale values derived cells file derived.k2 derived.e axis.0.values axis.1.scale cells.file \
                   minimum_grid rounds max_error audit word continuous quantities files axis.0.min axis.1.count \
                   axis.9.min integration.max_period K Omega eps \u{3c9} a.b.c";

@@ -5,6 +5,7 @@ mod common;
 
 mod chatter;
 mod classes;
+mod confirm_chaos;
 mod counters;
 mod counting;
 mod early_stops;
@@ -12,7 +13,9 @@ mod engines_agree;
 mod independence;
 mod kinds;
 mod measures;
+mod neutral;
 mod resonance;
 mod shaders;
+mod standard_errors;
 mod stored;
 mod work;

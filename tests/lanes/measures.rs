@@ -59,9 +59,9 @@ fn cases() -> Vec<Case> {
             REST,
         ),
         (
-            with_wall(table.oscillator(), Side::Right, 0.0, Contact::Rigid, [0.0; 2]),
+            with_wall(table.oscillator(), Side::Right, 0.3, Contact::Rigid, [0.0; 2]),
             Law::both(0.4, 0.0),
-            [-0.3, 0.0, 0.0, 0.0],
+            REST,
         ),
     ]
 }
@@ -102,7 +102,12 @@ fn lanes_measure_what_the_reference_measures() {
             let case = format!("{precision:?} {oscillator:?} {law:?}:\n{of:?}\n{:?}", expected.quantities);
             assert_eq!(expected.period.unwrap_or(0), period, "{case}");
             let (of, reference) = (of.expect("measured"), expected.quantities.expect("measured"));
-            if period > 0 {
+            if period == 0 {
+                let size = reference.displacements[2].rms;
+                assert!(near(of.displacements[2].rms, size, 0.2 * size), "{case}");
+                let energy = reference.impact_energy;
+                assert!(near(of.impact_energy, energy, 0.3 * energy), "{case}");
+            } else {
                 assert!(agree(&of, &reference, oscillator.omega, within), "{case}");
                 let [modulus, argument] = multiplier.expect("a cycle");
                 let [expected_modulus, expected_argument] = expected.multiplier.expect("a cycle");

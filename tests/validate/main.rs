@@ -5,6 +5,7 @@ mod common;
 mod fixtures;
 mod short_cells;
 
+mod chaos_ends;
 mod classes_agree;
 mod half_mesh;
 mod independent;

@@ -551,6 +551,56 @@ fn planted_records_fail_the_validation_by_name() {
     rattlemap(folder.path(), &arguments).success();
 }
 
+/// The folder of a basin map whose records are changed as if its engine had returned them.
+#[test]
+fn the_same_program_must_reproduce_records_of_the_reference_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("o");
+    let text =
+        ["x1", "v1"].map(|name| format!("[[axis]]\nstart = '{name}'\nmin = -0.4\nmax = 0.4\ncount = 3\n"));
+    let text = format!("{}[parameters]\ne = 0.6\nomega = 5.6\n", text.concat());
+    fs::write(folder.path().join("s.toml"), &text).unwrap();
+    rattlemap(folder.path(), &["map", "s.toml", "--engine", "cpu", "--out", "o", "--quiet"]).success();
+    let identity = cpu_identity(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap());
+    let right = read_records(&out.join(RECORDS), &identity);
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let forge = |change: fn(usize, &mut Record), sources: &str| {
+        let mut records = right.clone();
+        records.iter_mut().enumerate().for_each(|(nth, (_, record))| change(nth, record));
+        let identity = identity.clone().built_from(sources, Identity::own_target());
+        RecordFile::create(&out.join(RECORDS), &identity).unwrap().append(&records).unwrap();
+        let text = manifest.replace(Identity::own_sources(), sources);
+        let mut forged: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let files = forged["files"].as_array_mut().unwrap();
+        files.retain(|file| file["name"] == "cells.csv");
+        files.push(serde_json::to_value(inventory::entry(&out, RECORDS).unwrap()).unwrap());
+        fs::write(out.join("manifest.json"), inventory::sealed(forged).unwrap()).unwrap();
+        rattlemap(folder.path(), &["validate", "o"])
+    };
+    let one_bit = |nth: usize, record: &mut Record| {
+        if nth == 7 {
+            record.strobe[0] = f64::from_bits(record.strobe[0].to_bits() ^ 1);
+        }
+    };
+    let statuses = |_: usize, record: &mut Record| record.status = Status::Slow.code();
+    for (change, count) in [(one_bit as fn(usize, &mut Record), 1), (statuses, 9)] {
+        let text = said(&forge(change, Identity::own_sources()).code(1));
+        let fault = format!(
+            "do not trust this map: {count} of 9 cells differ from what the same program computes again"
+        );
+        assert!(text.contains(&fault), "{text}");
+    }
+    // Another build may round differently in every cell.
+    let every_bit = |_: usize, record: &mut Record| {
+        record.strobe[0] = f64::from_bits(record.strobe[0].to_bits() ^ 1);
+    };
+    let text = said(&forge(every_bit, "other sources").success());
+    assert!(
+        text.contains(": 0 of 9 records are the same to the bit. Another build of the program"),
+        "{text}"
+    );
+}
+
 /// All cells of an adaptive map may be filled. Then there is no cell to recompute.
 #[test]
 fn a_validation_without_a_recomputed_cell_fails() {

@@ -144,6 +144,7 @@ pub(super) fn budget() -> Budget {
         settings: SETTINGS,
         early_stop: true,
         undecided_periods: 0,
+        confirm_chaos: 0,
         exponent: true,
         shows_exponent: true,
         quantities: false,

@@ -78,6 +78,7 @@ fn time(seed: u64, n: u64) -> (Status, f64) {
         settings: Settings::default(),
         early_stop: n.is_multiple_of(2),
         undecided_periods: 0,
+        confirm_chaos: 0,
         exponent: true,
         shows_exponent: true,
         quantities: false,

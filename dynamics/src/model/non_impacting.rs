@@ -67,7 +67,7 @@ impl NonImpacting {
     }
 
     /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
-    /// the walls, stays at rest. The one at rest may be undamped.
+    /// the walls, stays at rest. The one at rest may be undamped; then the motion is neutral.
     pub fn with_one_at_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
             let Oscillator { gap, force, force_sin, free, mass, .. } = *oscillator;
@@ -80,7 +80,12 @@ impl NonImpacting {
                 return None;
             }
             let motion = NonImpacting::of_two_degrees(&with_copy(oscillator, resting))?;
-            Some(NonImpacting { resting: Some(resting), ..motion })
+            let [m, c, k] = [mass, free.damping, free.stiffness].map(|matrix| matrix[resting][resting]);
+            let root = Complex::from(c * c - 4.0 * m * k).sqrt();
+            let own = (root - c) / (2.0 * m);
+            let slowest = if own.re > motion.slowest.re { own } else { motion.slowest };
+            // Rest that any perturbation leaves is not stable.
+            (slowest.re <= 0.0).then_some(NonImpacting { resting: Some(resting), slowest, ..motion })
         })
     }
 
@@ -100,6 +105,11 @@ impl NonImpacting {
         let kinetic = m1 * q[1] * q[1] + m2 * q[3] * q[3] + 2.0 * m * q[1] * q[3];
         let twice_energy = kinetic + x.dot(&(self.stiffness * x));
         twice_energy < self.reach * self.reach
+    }
+
+    /// Whether perturbations of the degree of freedom at rest neither decay nor grow.
+    pub fn is_neutral(&self) -> bool {
+        self.slowest.re == 0.0
     }
 
     /// Returns the steady state at phase 0.
@@ -193,7 +203,7 @@ mod tests {
             let motion = NonImpacting::with_one_at_rest(&oscillator).unwrap();
             let off = std::array::from_fn::<_, 4, _>(|i| (motion.steady()[i] - whole.steady()[i]).abs());
             assert!(motion.resting() == Some(1) && off.iter().all(|&x| x < 1e-15), "{off:?}");
-            assert!((motion.exponent() + 0.15).abs() < 1e-12);
+            assert!(motion.is_neutral() && motion.exponent() == 0.0, "{}", motion.exponent());
             assert!(motion.is_certain(motion.steady()));
             let [x1, v1, ..] = motion.steady();
             assert!(!motion.is_certain([x1, v1, 1e-12, 0.0]) && !motion.is_certain([x1, v1, 0.0, 1e-12]));

@@ -6,7 +6,9 @@ use super::approach::{BRANCH_CYCLES, HULL_CYCLES, LINEAR_TOLERANCE, stays};
 use super::itinerary::Recorder;
 use super::quantities::{Meter, Quantities};
 use super::reading::{ON_STROBE_TURNS, Reading};
-use super::recurrence::{Candidate, Metric, candidates};
+use super::recurrence::{Candidate, Metric, RECURRENCE_DISTANCE, candidates};
+use super::regularity::is_regular;
+use super::resolution::is_below_resolution;
 use super::{Class, Orbit, Section, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, Model, ModelError, NonImpacting, State};
@@ -46,6 +48,9 @@ const APPROACH_CHECKS: u32 = 4;
 pub(super) const ALLOWANCE: Allowance<'static> =
     Allowance { steps: 1_000_000_000, events: 200_000_000, ..Allowance::UNLIMITED };
 
+/// Forcing periods between two reports of progress.
+const REPORT_INTERVAL: u64 = 64;
+
 /// Number of steps after which the window of an undecided motion is not extended.
 const EXTENSION_STEPS: u64 = 100_000_000;
 
@@ -56,8 +61,8 @@ const APPROACH_CYCLE_CAP: f64 = 4000.0;
 ///
 /// The motion is `periodic` if a stable cycle of at most `max_period` forcing periods is confirmed. It is `chaotic`
 /// if the exponent exceeds zero by three standard errors and nearby motions have separated by a factor of `e^40` or
-/// more. If neither holds after the observed periods, windows of twice the length follow, up to 32,768 periods; after
-/// that it is undecided.
+/// more. It is `quasi-periodic` if the exponent is zero within its error and the section is regular. If none of these
+/// holds after the observed periods, windows of twice the length follow, up to 32,768 periods; after that it is undecided.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -66,7 +71,8 @@ pub fn analyse(model: &dyn Model, start: State, settings: &Settings) -> Result<O
 }
 
 /// Classifies a motion like [`analyse`], with windows of at most `longest_window` forcing periods after the first one, and
-/// lists the events of the last `event_periods` of aperiodic motion. Returns none if `halt` was raised.
+/// lists the events of the last `event_periods` of aperiodic motion. Calls `report` with the forcing periods so far and a
+/// lower bound of their total, which grows with each window. Returns none if `halt` was raised.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -77,6 +83,7 @@ pub fn analyse_until(
     longest_window: u32,
     event_periods: u32,
     halt: &AtomicBool,
+    report: &dyn Fn(u64, u64),
 ) -> Result<Option<Orbit>, ModelError> {
     let (flow, allowance) = (Flow::of(model)?, ALLOWANCE.until(halt));
     let analysis = Analysis {
@@ -87,6 +94,7 @@ pub fn analyse_until(
         event_periods,
         measures: true,
         allowance,
+        report,
     };
     let orbit = analysis.orbit(start);
     Ok((!allowance.is_halted()).then_some(orbit))
@@ -96,7 +104,18 @@ pub fn analyse_until(
 /// `event_periods` of aperiodic motion.
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, event_periods: u32) -> Orbit {
     let (longest_window, allowance) = (LONGEST_WINDOW, ALLOWANCE);
-    Analysis { flow, law, settings, longest_window, event_periods, measures: true, allowance }.orbit(start)
+    let report = &|_, _| ();
+    Analysis { flow, law, settings, longest_window, event_periods, measures: true, allowance, report }
+        .orbit(start)
+}
+
+/// Growth of tangents that is not chaos, as a power of time. Tangents of neutral motion grow in proportion to time (a
+/// free body, a torus, an undamped oscillation), and at a double root to its square.
+pub const NEUTRAL_ORDER: f64 = 2.0;
+
+/// Returns the logarithm of the largest growth of tangents in neutral motion over `periods` after the first `from`.
+pub(super) fn neutral_growth(from: u32, periods: f64) -> f64 {
+    NEUTRAL_ORDER * ((f64::from(from) + periods) / f64::from(from.max(1))).ln()
 }
 
 /// Returns the status of a motion that a stop has ended.
@@ -150,6 +169,8 @@ pub(super) struct Analysis<'a> {
     pub(super) measures: bool,
     /// Work that the motion may take.
     pub(super) allowance: Allowance<'a>,
+    /// Receives the forcing periods so far, and a lower bound of their total.
+    pub(super) report: &'a dyn Fn(u64, u64),
 }
 
 impl Analysis<'_> {
@@ -186,12 +207,21 @@ impl Analysis<'_> {
         Orbit { periods_run, ..orbit }
     }
 
+    /// Counts a forcing period and reports progress.
+    fn count(&self, periods_run: &mut u64, total: u64) {
+        *periods_run += 1;
+        if periods_run.is_multiple_of(REPORT_INTERVAL) {
+            (self.report)(*periods_run, total);
+        }
+    }
+
     /// Classifies the motion and counts its forcing periods in `periods_run`.
     fn run(&self, start: State, periods_run: &mut u64) -> Result<Orbit, Stop> {
         let mut trajectory = Trajectory::new(self.flow, self.law, start).allowing(self.allowance);
-        for _ in 0..self.settings.transient_periods {
+        let transient = self.settings.transient_periods;
+        for _ in 0..transient {
             trajectory.advance_period(&mut ())?;
-            *periods_run += 1;
+            self.count(periods_run, u64::from(transient) + u64::from(self.settings.observed_periods));
         }
         if let Some(orbit) = self.non_impacting(&trajectory)? {
             return Ok(orbit);
@@ -209,8 +239,12 @@ impl Analysis<'_> {
             if self.is_chaotic(&window) {
                 return self.aperiodic(trajectory, &window, Class::Chaotic, Status::Ok);
             }
+            if self.is_quasi_periodic(&window) {
+                return self.aperiodic(trajectory, &window, Class::QuasiPeriodic, Status::Ok);
+            }
             if length >= last || trajectory.work().steps > EXTENSION_STEPS {
-                return self.aperiodic(trajectory, &window, Class::Undecided, Status::Slow);
+                let status = self.undecided_status(&trajectory, &window.metric, &found);
+                return self.aperiodic(trajectory, &window, Class::Undecided, status);
             }
             length = length.saturating_mul(2).min(last);
         }
@@ -224,14 +258,33 @@ impl Analysis<'_> {
         let steady = Trajectory::new(self.flow, self.law, motion.steady());
         let newton = &mut Newton::default();
         let cycle = self.maps(1).into_iter().find_map(|map| newton.refine(&steady, map));
-        let of = |cycle: Cycle| {
-            let cycle = match motion.resting() {
-                Some(resting) => cycle.without_resting(resting).unwrap_or(cycle),
-                None => cycle,
-            };
-            Ok(self.periodic(&self.read(&steady, &cycle)?, &cycle, 0.0))
-        };
-        cycle.map(of).transpose()
+        cycle.map(|cycle| Ok(self.periodic(&self.read(&steady, &cycle)?, &cycle, 0.0))).transpose()
+    }
+
+    /// Whether the motion is quasi-periodic: the largest exponent is zero within its error, like the one of the phase, and
+    /// the section is regular.
+    fn is_quasi_periodic(&self, window: &Window) -> bool {
+        let (count, error) = (window.strobes.len() as f64, CHAOS_ERRORS * window.lyapunov_error);
+        let neutral = neutral_growth(TANGENT_PERIODS, count) / (count * self.flow.period);
+        window.lyapunov.abs() - error <= neutral
+            && is_regular(&window.strobes, &window.metric, self.settings.max_period)
+    }
+
+    /// Returns the status of undecided motion: neutral if Newton's method finds a neutral cycle nearby.
+    fn undecided_status(
+        &self,
+        trajectory: &Trajectory<'_, 0>,
+        metric: &Metric,
+        found: &[Candidate],
+    ) -> Status {
+        let mut maps = found.iter().flat_map(|candidate| self.maps(candidate.period));
+        let is_neutral = maps.any(|map| {
+            let cycle = Newton::default().refine(trajectory, map);
+            cycle.is_some_and(|cycle| {
+                cycle.is_neutral() && metric.distance(&trajectory.state(), &cycle.state) < RECURRENCE_DISTANCE
+            })
+        });
+        if is_neutral { Status::Neutral } else { Status::Slow }
     }
 
     /// Whether nearby motions separate by more than in an escape from an unstable cycle, and by far more than in
@@ -250,9 +303,11 @@ impl Analysis<'_> {
     ) -> Result<Window, Stop> {
         let mut carrier = trajectory.carrying([FRESH_TANGENT]);
         let mut exponent = Exponent::default();
-        for _ in 0..TANGENT_PERIODS.min(length) {
+        let turning = TANGENT_PERIODS.min(length);
+        let total = *periods_run + u64::from(turning) + u64::from(length);
+        for _ in 0..turning {
             carrier.advance_period(&mut ())?;
-            *periods_run += 1;
+            self.count(periods_run, total);
             exponent.renormalise(&mut carrier);
         }
         exponent.reset();
@@ -260,7 +315,7 @@ impl Analysis<'_> {
         let mut strobes = vec![carrier.state()];
         for _ in 0..length {
             carrier.advance_period(&mut ())?;
-            *periods_run += 1;
+            self.count(periods_run, total);
             exponent.renormalise(&mut carrier);
             strobes.push(carrier.state());
         }
@@ -288,9 +343,13 @@ impl Analysis<'_> {
             let newton = &mut Newton::default();
             let Some(cycle) = newton.refine(trajectory, map) else { continue };
             let Some(cycle) = self.smallest(newton, trajectory, cycle, &window.metric) else { continue };
-            if cycle.is_stable()
-                && let Some(distance) = self.approach(trajectory, &cycle, &window.metric)?
-            {
+            let now = window.metric.distance(&trajectory.state(), &cycle.state);
+            let distance = match cycle.is_stable() {
+                true => self.approach(trajectory, &cycle, &window.metric)?,
+                // Motion near a neutral cycle neither approaches nor leaves it.
+                false => Some(now).filter(|&now| cycle.is_neutral() && now < ON_CYCLE),
+            };
+            if let Some(distance) = distance {
                 let reading = self.read(trajectory, &cycle)?;
                 return Ok(Some(self.periodic(&reading, &cycle, distance)));
             }
@@ -418,7 +477,8 @@ impl Analysis<'_> {
         if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         }
-        Ok(Reading { closes, ..reading })
+        let below_resolution = is_below_resolution(seed, cycle, &reading.events)?;
+        Ok(Reading { closes, below_resolution, ..reading })
     }
 
     /// Builds the orbit of a cycle; `distance` is that of the motion from the cycle.
@@ -427,8 +487,12 @@ impl Analysis<'_> {
             Status::NearGrazing
         } else if reading.on_strobe {
             Status::StrobeOnEvent
+        } else if cycle.is_neutral() {
+            Status::Neutral
         } else if distance > ON_CYCLE {
             Status::Slow
+        } else if reading.below_resolution {
+            Status::BelowResolution
         } else {
             Status::Ok
         };

@@ -46,6 +46,8 @@ pub struct Budget {
     pub early_stop: bool,
     /// Additional periods for cells that are still undecided; used only with early stops.
     pub undecided_periods: u32,
+    /// Further periods for cells that are chaotic after all others. A cell whose chaos ends in them gets a new class.
+    pub confirm_chaos: u32,
     /// Whether aperiodic motion gets an exponent, which costs a tangent vector.
     pub exponent: bool,
     /// Whether the exponent is reported. Otherwise it only distinguishes chaos, and may be less accurate.
@@ -60,10 +62,16 @@ impl Budget {
         self.settings.transient_periods.saturating_add(self.settings.observed_periods)
     }
 
-    /// Returns the largest number of forcing periods, including those for undecided cells.
-    pub fn longest(&self) -> u32 {
+    /// Returns the forcing periods after which every cell ends that is not chaotic.
+    pub fn decided_by(&self) -> u32 {
         let more = if self.early_stop { self.undecided_periods } else { 0 };
         self.periods().saturating_add(more)
+    }
+
+    /// Returns the largest number of forcing periods, including those that confirm chaos.
+    pub fn longest(&self) -> u32 {
+        let more = if self.exponent { self.confirm_chaos } else { 0 };
+        self.decided_by().saturating_add(more)
     }
 
     /// Returns the work that one cell may take, including searches for cycles.

@@ -7,12 +7,13 @@ use std::cell::{Cell, OnceCell};
 use std::sync::atomic::AtomicBool;
 
 use super::CHAOS_ERRORS;
-use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, status_of};
+use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, neutral_growth, status_of};
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::Quantities;
 use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
+use super::regularity::is_regular;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
 use super::{Budget, Orbit, Section, Status};
 use crate::flow::Flow;
@@ -32,9 +33,8 @@ const CHECK_DIVISOR: u32 = 6;
 /// `mesh_speed`: with 2e-3, one cell of 4,000 over restitution and frequency got a period that it then left.
 const EARLY_STOP_DISTANCE: f64 = 5e-4;
 
-/// Growth of tangents that is not chaos, as a power of time. Tangents of neutral motion grow in proportion to time (a
-/// free body, a torus, an undamped oscillation), and at a double root to its square.
-pub const NEUTRAL_ORDER: f64 = 2.0;
+/// Share of a motion, as a divisor, that the test for regularity leaves out because it may be transient.
+const TRANSIENT_SHARE: usize = 4;
 
 /// Least number of cycles of an approach.
 const LEAST_APPROACH_CYCLES: usize = 4;
@@ -47,8 +47,10 @@ const SEARCH_DISTANCE: f64 = 3.0;
 pub struct Measurement {
     /// Confirmed period, in forcing periods.
     pub period: Option<u32>,
+    /// Whether the motion is quasi-periodic.
+    pub is_quasi_periodic: bool,
     /// How the integration ended. `Slow` without a period means that the motion stays near some cycle, or that the
-    /// exponent does not exceed zero by three standard errors: it is undecided.
+    /// exponent does not exceed zero by three standard errors: it is undecided. So it is with `Neutral`.
     pub status: Status,
     /// Largest Lyapunov exponent per unit time, and its standard error, which is zero for a cycle.
     pub lyapunov: Option<[f64; 2]>,
@@ -74,9 +76,9 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Whether aperiodic motion is certainly chaotic.
+    /// Whether aperiodic motion is certainly chaotic or quasi-periodic.
     fn is_decided(&self) -> bool {
-        self.status != Status::Slow && self.lyapunov.is_some()
+        self.status == Status::Ok && self.lyapunov.is_some()
     }
 }
 
@@ -144,6 +146,7 @@ fn measure_by_strobes(
         event_periods: 0,
         measures: budget.quantities,
         allowance,
+        report: &|_, _| (),
     };
     let mut run = CellRun {
         analysis: &analysis,
@@ -153,6 +156,7 @@ fn measure_by_strobes(
         exponent: Exponent::default(),
         cycle: None,
         approaches: false,
+        is_neutral: false,
         counts: vec![[0.0; 2]],
         itineraries: Vec::new(),
         near_strobe: 0,
@@ -198,6 +202,8 @@ struct CellRun<'a> {
     cycle: Option<FoundCycle<'a>>,
     /// Whether the last check found `cycle`, or the motion was closer to it than when it was found.
     approaches: bool,
+    /// Whether the last check found a neutral cycle nearby.
+    is_neutral: bool,
     /// Impacts and meshing time up to each strobe.
     counts: Vec<[f64; 2]>,
     /// Itinerary of each period.
@@ -216,7 +222,8 @@ impl<'a> CellRun<'a> {
         let last = self.budget.longest();
         let exponent_from = self.budget.exponent_from();
         let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
-        let mut next_check = if self.budget.early_stop { FIRST_CHECK.min(budget) } else { last };
+        let decided_by = self.budget.decided_by();
+        let mut next_check = if self.budget.early_stop { FIRST_CHECK.min(budget) } else { decided_by };
         let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start).allowing(self.allowance);
         while bare.period() < u64::from(turning_from) {
             if let Some(measured) = self.period(&mut bare, &mut next_check, last)? {
@@ -257,10 +264,12 @@ impl<'a> CellRun<'a> {
             return Ok(None);
         }
         let (budget, chaos_from) = (self.budget.periods(), self.budget.chaos_from());
+        let decided_by = self.budget.decided_by();
         let next = now + now.div_ceil(CHECK_DIVISOR);
-        let stages = [chaos_from, budget, last].into_iter().filter(|&stage| now < stage && stage <= last);
+        let stages = [chaos_from, budget, decided_by, last];
+        let stages = stages.into_iter().filter(|&stage| now < stage && stage <= last);
         *next_check = next.min(stages.min().unwrap_or(last));
-        let is_last = now == budget || now == last;
+        let is_last = [budget, decided_by, last].contains(&now);
         if let Some(orbit) = self.confirmed_orbit(&trajectory.carrying([]), is_last)? {
             let strobe = if is_last { trajectory.state() } else { orbit.strobe };
             return Ok(Some(self.periodic(orbit, strobe)));
@@ -270,8 +279,11 @@ impl<'a> CellRun<'a> {
         self.allowance.covers(work)?;
         Ok(match now {
             // Newton's method does not find this cycle if the degree of freedom at rest is undamped.
-            _ if now == last && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
+            _ if now >= decided_by && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
+            // Only chaos continues until the last period.
+            _ if now == decided_by => Some(self.aperiodic(CHAOS_ERRORS)).filter(|cell| !cell.is_decided()),
+            _ if decided_by < last => None,
             _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measurement::is_decided),
             _ if now >= chaos_from && !self.approaches => {
                 Some(self.aperiodic(self.budget.chaos_errors())).filter(Measurement::is_decided)
@@ -302,13 +314,15 @@ impl<'a> CellRun<'a> {
         let flow = self.analysis.flow;
         Measurement {
             period: Some(1),
-            status: Status::Ok,
             lyapunov: flow.non_impacting().map(|motion| [motion.exponent(), 0.0]),
             symmetric: flow.mirror_symmetric(&self.analysis.law).then_some(true),
             word: Some(Word::default()),
             multiplier: flow.non_impacting().map(|motion| polar(motion.multiplier(flow.period))),
             quantities: flow.non_impacting().and_then(|motion| self.analysis.steady_quantities(motion)),
-            ..self.without_results(Status::Ok)
+            ..self.without_results(match flow.non_impacting() {
+                Some(motion) if motion.is_neutral() => Status::Neutral,
+                _ => Status::Ok,
+            })
         }
     }
 
@@ -351,6 +365,17 @@ impl<'a> CellRun<'a> {
                     self.history.add_failure(map, state);
                     continue;
                 };
+                if cycle.is_neutral() && metric.distance(&state, &cycle.state) < RECURRENCE_DISTANCE {
+                    // Motion near a neutral cycle neither approaches nor leaves it.
+                    self.is_neutral = is_last;
+                    if metric.distance(&state, &cycle.state) < ON_CYCLE {
+                        let cycle = self.analysis.smallest(newton, seed, cycle, &metric);
+                        let of = |cycle| {
+                            Ok(self.analysis.periodic(&self.analysis.read(seed, &cycle)?, &cycle, 0.0))
+                        };
+                        return cycle.map(of).transpose();
+                    }
+                }
                 // An unstable cycle is unstable at its smallest period, too.
                 if !cycle.is_stable() {
                     self.history.add_unstable(map, &cycle);
@@ -386,7 +411,9 @@ impl<'a> CellRun<'a> {
         let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_strobe_of(found));
         let distance = |back: usize| metric.distance(&self.strobes[now - back * period], &cycle.state);
         let present = distance(0);
-        let left = f64::from(self.budget.periods()) - (self.strobes.len() - 1) as f64;
+        let is_confirming = self.strobes.len() as u32 - 1 > self.budget.decided_by();
+        let end = if is_confirming { self.budget.longest() } else { self.budget.periods() };
+        let left = f64::from(end) - (self.strobes.len() - 1) as f64;
         // The predicted distance at the end of the budget gives the same status with and without early stops.
         let radius = cycle.spectral_radius();
         let at_last = present * radius.powf(left / f64::from(cycle.period));
@@ -418,7 +445,8 @@ impl<'a> CellRun<'a> {
         if let Some(reading) = found.reading.get() {
             return Ok(reading);
         }
-        self.reading_periods.set(self.reading_periods.get() + found.cycle.period);
+        // Once for the events, once for the growth of rounding errors.
+        self.reading_periods.set(self.reading_periods.get() + 2 * found.cycle.period);
         let reading = self.analysis.read(&found.seed, &found.cycle)?;
         Ok(found.reading.get_or_init(|| reading))
     }
@@ -486,28 +514,34 @@ impl<'a> CellRun<'a> {
         let averaged = &self.strobes[self.budget.exponent_from() as usize..];
         let near_saddle_periods = near_saddle(averaged, &Metric::of(window, self.analysis.flow), max_period);
         let is_escape = |rate: f64| rate * near_saddle_periods as f64 * period < ESCAPE_GROWTH;
+        let periods = averaged.len().saturating_sub(1) as f64;
         let is_neutral =
-            |rate: f64| rate * averaged.len().saturating_sub(1) as f64 * period <= self.neutral_growth();
+            |rate: f64| rate * periods * period <= neutral_growth(self.budget.exponent_from(), periods);
         let slow = least.is_some_and(is_neutral)
             || 2.0 * near_saddle_periods as f64 >= span && least.is_none_or(is_escape);
+        let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
+        let is_quasi_periodic = self.strobes.len() > self.budget.periods() as usize
+            && lyapunov.is_some_and(|(mean, error)| is_neutral(mean.abs() - errors * error))
+            && is_regular(late, &Metric::of(late, self.analysis.flow), max_period);
+        let status = match slow {
+            true if self.is_neutral => Status::Neutral,
+            true => Status::Slow,
+            false => Status::Ok,
+        };
         Measurement {
+            is_quasi_periodic,
             lyapunov: lyapunov.map(|(mean, error)| [mean, error]),
             impacts_per_period: impacts / span,
             mesh_fraction: meshing_time / (span * period),
-            ..self.without_results(if slow { Status::Slow } else { Status::Ok })
+            ..self.without_results(if is_quasi_periodic { Status::Ok } else { status })
         }
-    }
-
-    /// Returns the logarithm of the largest growth of tangents in neutral motion; see [`NEUTRAL_ORDER`].
-    fn neutral_growth(&self) -> f64 {
-        let from = f64::from(self.budget.exponent_from().max(1));
-        NEUTRAL_ORDER * ((self.strobes.len() - 1) as f64 / from).ln()
     }
 
     /// Builds a measurement with the last strobe state and the numbers of periods only.
     fn without_results(&self, status: Status) -> Measurement {
         Measurement {
             period: None,
+            is_quasi_periodic: false,
             status,
             lyapunov: None,
             impacts_per_period: 0.0,

@@ -28,6 +28,8 @@ pub(super) struct Reading {
     pub(super) closes: bool,
     pub(super) near_grazing: bool,
     pub(super) on_strobe: bool,
+    /// Whether rounding decides the period of the cycle that was read.
+    pub(super) below_resolution: bool,
 }
 
 impl Reading {
@@ -67,6 +69,7 @@ impl Reading {
             itineraries: Recorder::list(flow, &events, start, periods),
             closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),
+            below_resolution: false,
             on_strobe: events.iter().any(|event| {
                 let turns = event.t / flow.period;
                 turns < ON_STROBE_TURNS || 1.0 - turns < ON_STROBE_TURNS

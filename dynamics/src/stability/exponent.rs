@@ -6,6 +6,10 @@ use crate::reference::Trajectory;
 /// Number of blocks whose means give the standard error.
 const BLOCKS: usize = 16;
 
+/// Least distance from 1 of the correlation of `n` neighbouring blocks, times the square root of `n`: 1.2 times the
+/// scatter of a measured correlation.
+pub const CORRELATION_MARGIN: f64 = 1.2;
+
 /// Least number of periods for a finite standard error.
 pub const LEAST_FOR_ERROR: u32 = BLOCKS as u32;
 
@@ -60,6 +64,9 @@ impl Exponent {
 
 /// Returns the standard error of the mean of consecutive values, from the means of 16 blocks of equal length. The
 /// first values are ignored if their number is not a multiple of 16. The error is infinite for fewer than 16 values.
+///
+/// Blocks that are shorter than the correlation time are correlated. Their correlation is measured between neighbours
+/// and taken to fall by a constant ratio from block to block (an AR(1) process).
 pub fn standard_error(values: &[f64]) -> f64 {
     let block = values.len() / BLOCKS;
     if block == 0 {
@@ -69,7 +76,44 @@ pub fn standard_error(values: &[f64]) -> f64 {
         .chunks(block)
         .map(|chunk| chunk.iter().sum::<f64>() / block as f64)
         .collect();
-    let centre = means.iter().sum::<f64>() / BLOCKS as f64;
-    let variance = means.iter().map(|m| (m - centre).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
-    (variance / BLOCKS as f64).sqrt()
+    let count = BLOCKS as f64;
+    let centre = means.iter().sum::<f64>() / count;
+    let squares = means.iter().map(|m| (m - centre).powi(2)).sum::<f64>();
+    let products = means.windows(2).map(|pair| (pair[0] - centre) * (pair[1] - centre)).sum::<f64>();
+    let biased = if squares > 0.0 { products / squares } else { 0.0 };
+    // The deviations from a common mean bias the correlation downwards (Marriott and Pope 1954).
+    let correlation = biased + (1.0 + 3.0 * biased) / count;
+    let correlation = correlation.clamp(0.0, 1.0 - CORRELATION_MARGIN / count.sqrt());
+    (squares / (count * (count - 1.0)) * (1.0 + correlation) / (1.0 - correlation)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Means of an AR(1) process whose correlation time is several blocks.
+    #[test]
+    fn the_standard_error_is_right_for_correlated_and_for_independent_values() {
+        let mut seed = 1_u64;
+        let mut noise = move || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        for (memory, least, most) in [(0.0, 0.8, 1.0), (0.97, 0.85, 1.15)] {
+            let mut value = 0.0;
+            let mut estimate = |_| {
+                let values: Vec<f64> = (0..320)
+                    .map(|_| {
+                        value = memory * value + noise();
+                        value
+                    })
+                    .collect();
+                [values.iter().sum::<f64>() / 320.0, standard_error(&values)]
+            };
+            let found: Vec<[f64; 2]> = (0..2000).map(&mut estimate).collect();
+            let [scatter, stated] = [0, 1].map(|i| found.iter().map(|pair| pair[i].powi(2)).sum::<f64>());
+            let ratio = (scatter / stated).sqrt();
+            assert!((least..most).contains(&ratio), "{memory}: {ratio}");
+        }
+    }
 }

@@ -211,16 +211,19 @@ fn balanced_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<V
 
 fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> Option<Cycle> {
     let (scaled, log_scale) = map.monodromy(image);
-    let mut scaled_multipliers = multipliers(&balanced(&scaled, image.rate))?;
+    let matrix = balanced(&scaled, image.rate);
+    let mut scaled_multipliers = multipliers(&matrix)?;
     scaled_multipliers.truncate(2 * seed.flow().degrees);
     let [re, im] = scaled_multipliers[0];
-    let scale = log_scale.exp();
+    let (radius, scale) = (re.hypot(im), log_scale.exp());
+    // A radius below the rounding errors of the matrix may as well be zero.
+    let is_resolved = radius > f64::EPSILON * matrix.amax();
     Some(Cycle {
         state,
         period: map.cycle_periods(),
         symmetric: matches!(map, StrobeMap::MirroredHalves(_)),
         multipliers: scaled_multipliers.iter().map(|m| m.map(|x| x * scale)).collect(),
-        log_radius: re.hypot(im).ln() + log_scale,
+        log_radius: if is_resolved { radius.ln() + log_scale } else { f64::NEG_INFINITY },
         monodromy: scaled * scale,
         near_grazing: image.near_grazing,
     })

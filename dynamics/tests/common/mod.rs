@@ -17,6 +17,7 @@ pub(crate) const BUDGET: Budget = Budget {
     settings: Settings { transient_periods: 400, observed_periods: 128, max_period: 64 },
     early_stop: true,
     undecided_periods: 1584,
+    confirm_chaos: 0,
     exponent: true,
     shows_exponent: true,
     quantities: false,

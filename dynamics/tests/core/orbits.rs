@@ -1,8 +1,10 @@
 //! Classification of motions that are difficult to classify.
 
 use crate::common::{BUDGET, REST, flow_of, paper as cell};
-use rattlemap_dynamics::model::{GearPair, State};
-use rattlemap_dynamics::orbit::{Class, Orbit, Settings, Status, analyse, measure};
+use rattlemap_dynamics::model::{GearPair, Model, State, Stops};
+use rattlemap_dynamics::orbit::{
+    Class, EVENT_PERIODS, LONGEST_WINDOW, Orbit, Settings, Status, analyse, analyse_until, measure,
+};
 use rattlemap_dynamics::reference::Trajectory;
 
 fn orbit(pair: &GearPair) -> Orbit {
@@ -111,11 +113,77 @@ fn an_escape_from_an_unstable_cycle_is_not_chaos() {
     assert_eq!(orbit.symmetric, Some(false));
 }
 
+/// The oscillator `x'' + x = 0.1 cos(omega t)`, which does not reach its walls.
+fn undamped(omega: f64) -> Stops {
+    Stops { k: 1.0, force: 0.1, omega, ..Stops::with_restitution(0.5) }
+}
+
 #[test]
-fn undamped_motion_is_undecided() {
+fn undamped_motion_is_quasi_periodic() {
     let pair = GearPair { r1: 0.0, r2: 0.0, force: 1e-3, ..cell(0.5, 11.0) };
-    let orbit = analyse(&pair, REST, &Settings { transient_periods: 10, ..Settings::default() }).unwrap();
-    assert_eq!((orbit.class, orbit.status), (Class::Undecided, Status::Slow));
+    let settings = Settings { transient_periods: 10, ..Settings::default() };
+    for model in [&pair as &dyn Model, &undamped(7f64.sqrt())] {
+        let orbit = analyse(model, REST, &settings).unwrap();
+        assert_eq!((orbit.class, orbit.status), (Class::QuasiPeriodic, Status::Ok));
+        assert!(orbit.periods_run < 3000, "{} periods", orbit.periods_run);
+    }
+}
+
+/// The multipliers are `exp(+-2 pi i / omega)`, and after 5 periods of 3/5 the free frequency every motion repeats.
+#[test]
+fn the_steady_motion_of_an_undamped_oscillator_is_neutral() {
+    let omega = 7f64.sqrt();
+    let steady = [0.1 / (1.0 - omega * omega), 0.0, 0.0, 0.0];
+    let orbit = analyse(&undamped(omega), steady, &Settings::default()).unwrap();
+    assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Neutral));
+    let (sin, cos) = (std::f64::consts::TAU / omega).sin_cos();
+    let multipliers = orbit.floquet.unwrap();
+    assert_eq!(multipliers.len(), 2);
+    for ([re, im], exact) in multipliers.into_iter().zip([sin.abs(), -sin.abs()]) {
+        assert!((re - cos).abs() < 1e-13 && (im - exact).abs() < 1e-13, "{re} {im}");
+    }
+    assert!(orbit.lyapunov.abs() < 1e-13, "{}", orbit.lyapunov);
+    let repeating = analyse(&undamped(5.0 / 3.0), REST, &Settings::default()).unwrap();
+    assert_eq!((repeating.class, repeating.status), (Class::Periodic { period: 5 }, Status::Neutral));
+    // A motion nearby stays nearby.
+    let nearby = analyse(&undamped(omega), [1.01 * steady[0], 0.0, 0.0, 0.0], &Settings::default()).unwrap();
+    assert!(nearby.class == Class::QuasiPeriodic || nearby.status == Status::Neutral, "{nearby:?}");
+}
+
+/// Gear 2 has no support, so its multipliers are 1 and 1 while it stays at rest. Those of gear 1 are
+/// `exp((-0.15 +- i sqrt(15 - 0.15^2)) T)`.
+#[test]
+fn a_free_body_at_rest_is_neutral_and_has_all_multipliers() {
+    let pair = GearPair { r2: 0.0, k2: 0.0, ..cell(0.8, 11.0) };
+    let orbit = orbit(&pair);
+    assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Neutral));
+    let period = std::f64::consts::TAU / 11.0;
+    let (radius, angle) = ((-0.15 * period).exp(), (15.0f64 - 0.15 * 0.15).sqrt() * period);
+    let [re, im] = [radius * angle.cos(), radius * angle.sin()];
+    let exact = [[1.0, 0.0], [1.0, 0.0], [re, im], [re, -im]];
+    for (ours, exact) in orbit.floquet.unwrap().into_iter().zip(exact) {
+        assert!((0..2).all(|i| (ours[i] - exact[i]).abs() < 1e-13), "{ours:?}, not {exact:?}");
+    }
+    let measured = measure(&flow_of(&pair), pair.law(), REST, &BUDGET);
+    assert_eq!((measured.period, measured.status), (Some(1), Status::Neutral));
+    assert_eq!((measured.lyapunov, measured.multiplier), (Some([0.0, 0.0]), Some([1.0, 0.0])));
+    // With damping but no support, one of its multipliers is 1.
+    let damped = measure(&flow_of(&GearPair { k2: 0.0, ..pair }), pair.law(), REST, &BUDGET);
+    assert_eq!((damped.status, damped.lyapunov), (Status::Neutral, Some([0.0, 0.0])));
+}
+
+#[test]
+fn progress_reports_grow_and_end_with_the_analysis() {
+    let reports = std::cell::RefCell::new(Vec::new());
+    let (pair, halt) = (cell(0.7222, 2.8172), false.into());
+    let report = |done, total| reports.borrow_mut().push((done, total));
+    let settings = Settings::default();
+    let orbit = analyse_until(&pair, REST, &settings, LONGEST_WINDOW, EVENT_PERIODS, &halt, &report);
+    let periods = orbit.unwrap().unwrap().periods_run;
+    let reports = reports.into_inner();
+    assert!(reports.len() as u64 == periods / 64 && periods > 500, "{} of {periods}", reports.len());
+    assert!(reports.windows(2).all(|two| two[0].0 < two[1].0 && two[0].1 <= two[1].1), "{reports:?}");
+    assert!(reports.iter().all(|(done, total)| done <= total), "{reports:?}");
 }
 
 #[test]

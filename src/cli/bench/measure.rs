@@ -103,7 +103,7 @@ impl Point {
     }
 
     /// Counts cells by class.
-    pub(super) fn counts(&self) -> [usize; 4] {
+    pub(super) fn counts(&self) -> [usize; Class::NAMES.len()] {
         count_classes(self.classes.iter().copied())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::cli::say::{path, quoted};
+use crate::cli::say::{classes, path, quoted};
 use crate::map::engine::CardReport;
 use crate::map::plan::count_classes;
 use crate::map::schedule::{Deviation, Errors, Refined};
@@ -10,6 +10,7 @@ use crate::record::measures;
 use crate::show::cells::Cells;
 use crate::store::map::{Provenance, Run};
 use crate::store::shard::FinishedShard;
+use crate::validate::Rate;
 
 /// Counts, speed and classes of a map. `finishing` is the time from the last cell to the last file, in seconds.
 pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, finishing: f64) -> String {
@@ -26,7 +27,16 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
         "{integrated} {unit}{speed}; files written in {finishing:.3} s\n{}{}{}",
         cards(&run.cards, unit),
         cells.refinement().map_or(String::new(), |refined| refinement(refined, count, cells)),
-        classes(count_classes(cells.classes())),
+        classes(count_classes(cells.classes())) + &cells.chaos_ends().map_or(String::new(), chaos_ends),
+    )
+}
+
+/// Says at which rate chaos ends.
+fn chaos_ends(rate: Rate) -> String {
+    let Rate { count, among, .. } = rate;
+    format!(
+        "\nchaos: {count} ends in {among} periods of chaotic cells, which is {} of these cells in 1000 periods",
+        rate.text_within(1000)
     )
 }
 
@@ -60,10 +70,6 @@ pub(super) fn shard(finished: &FinishedShard<'_>, folder: &Path, files: &[String
         files.join(", "),
         shard.count()
     )
-}
-
-fn classes([periodic, chaotic, undecided, failed]: [usize; 4]) -> String {
-    format!("{periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed")
 }
 
 /// One line per card, if there are several.

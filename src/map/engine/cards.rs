@@ -128,10 +128,13 @@ impl Cards {
         let bytes = engines.iter().map(|(_, engine)| engine.device_bytes());
         let device_bytes = bytes.reduce(|a, b| Some(a?.saturating_add(b?))).flatten();
         let spawn = |(nth, (_, engine)): (usize, (AdapterId, Engine<'static>))| {
-            let shared = Arc::clone(&shared);
-            thread::spawn(move || work(nth, engine, &shared))
+            let device = engine.device();
+            let own = Arc::clone(&shared);
+            let thread = thread::Builder::new().spawn(move || work(nth, engine, &own));
+            let reason = |error| format!("cannot start a thread: {error}");
+            thread.map_err(|error| shared.lose(nth, EngineError::Lost { device, reason: reason(error) })).ok()
         };
-        let threads = engines.into_iter().enumerate().map(spawn).collect();
+        let threads = engines.into_iter().enumerate().filter_map(spawn).collect();
         let (halt, listener) = (Arc::default(), None);
         Cards { shared, threads, halt, listener, name, precision, device, device_bytes, steps_per_period }
     }

@@ -17,6 +17,9 @@ pub fn measured_record(measured: &Measurement, needs: &Needs) -> Record {
         return record;
     }
     record.valid |= valid::PERIOD | valid::IMPACTS | valid::MESH;
+    if measured.is_quasi_periodic {
+        record.valid |= valid::QUASI_PERIODIC;
+    }
     record.period = measured.period.unwrap_or(0);
     record.impacts_per_period = measured.impacts_per_period;
     record.mesh_fraction = measured.mesh_fraction;

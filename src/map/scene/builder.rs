@@ -105,6 +105,7 @@ impl SceneBuilder {
         self.set("integration", "observed_periods", integration.observed_periods);
         self.set("integration", "early_stop", integration.early_stop);
         self.set("integration", "undecided_periods", integration.undecided_periods);
+        self.set("integration", "confirm_chaos", integration.confirm_chaos);
         self.with("integration", "max_period", integration.max_period)
     }
 

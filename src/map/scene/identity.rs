@@ -60,6 +60,7 @@ impl Scene {
         add("integration.observed_periods".into(), integration.observed_periods.to_string());
         add("integration.early_stop".into(), integration.early_stop.to_string());
         add("integration.undecided_periods".into(), integration.undecided_periods.to_string());
+        add("integration.confirm_chaos".into(), integration.confirm_chaos.to_string());
         add("integration.max_period".into(), integration.max_period.to_string());
         let start = match self.start() {
             Start::State(state) => format!("state {state:?}"),

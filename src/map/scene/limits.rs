@@ -4,7 +4,7 @@
 pub const MAX_COUNT: u32 = 1_000_000;
 
 /// Largest number of forcing periods in one field.
-pub(super) const MAX_PERIODS: u32 = 1_000_000_000;
+pub(crate) const MAX_PERIODS: u32 = 1_000_000_000;
 
 /// Largest number of starts per cell: the number of attractors of a cell is stored in one byte.
 pub(super) const MAX_STARTS: u32 = 255;

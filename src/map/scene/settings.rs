@@ -32,6 +32,8 @@ pub struct Integration {
     pub early_stop: bool,
     /// Number of further periods for undecided cells. It needs `early_stop`.
     pub undecided_periods: u32,
+    /// Number of further periods for chaotic cells, after all others.
+    pub confirm_chaos: u32,
     /// Longest cycle that is searched for; at most half of the observed periods.
     pub max_period: u32,
 }
@@ -45,6 +47,7 @@ impl Default for Integration {
             observed_periods,
             early_stop: true,
             undecided_periods: 0,
+            confirm_chaos: 0,
             max_period,
         }
     }
@@ -274,12 +277,12 @@ pub(super) fn read_title(field: &Field<'_>) -> Result<String, SceneError> {
 
 pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneError> {
     let section = root.section("integration", &keys::names("integration"))?;
-    let periods = |name, default| match section.get(name) {
-        Some(field) => field.whole(1..=MAX_PERIODS),
+    let periods = |name, least, default| match section.get(name) {
+        Some(field) => field.whole(least..=MAX_PERIODS),
         None => Ok(default),
     };
     let default = Integration::default();
-    let transient_periods = periods("transient_periods", default.transient_periods)?;
+    let transient_periods = periods("transient_periods", 1, default.transient_periods)?;
     let observed_periods = match section.get("observed_periods") {
         // A cycle is recognized only after it has repeated once.
         Some(field) => field.whole(2..=MAX_PERIODS)?,
@@ -290,9 +293,8 @@ pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneE
         transient_periods,
         observed_periods,
         early_stop: section.get("early_stop").map_or(Ok(default.early_stop), |field| field.flag())?,
-        undecided_periods: section
-            .get("undecided_periods")
-            .map_or(Ok(default.undecided_periods), |field| field.whole(0..=MAX_PERIODS))?,
+        undecided_periods: periods("undecided_periods", 0, default.undecided_periods)?,
+        confirm_chaos: periods("confirm_chaos", 0, default.confirm_chaos)?,
         max_period: read_max_period(&section, observed_periods)?,
     })
 }

@@ -162,7 +162,8 @@ fn the_identity_differs_for_scenes_with_other_records() {
     };
     let original = scene(&[]);
     assert_eq!(original, scene(&["title=Other", "outputs.files=[\"png\"]", "F=50"]));
-    for set in ["F=51", "axis.1.count=4", "axis.0.max=0.9", "integration.early_stop=true"] {
+    let confirm = "integration.confirm_chaos=9";
+    for set in ["F=51", "axis.1.count=4", "axis.0.max=0.9", "integration.early_stop=true", confirm] {
         let other = scene(&[set]);
         let differing: Vec<_> = original.iter().zip(&other).filter(|(a, b)| a != b).collect();
         assert_eq!(differing.len(), 1, "{set}: {differing:?}");

@@ -55,6 +55,7 @@ fn label(found: Outcome) -> Label {
         Outcome::Failed => 1,
         Outcome::Undecided => 2,
         Outcome::Chaos => 3,
+        Outcome::Torus => 4,
         Outcome::Cycle(nth) => FIRST_CYCLE + nth,
         Outcome::Unresolved(period) => FIRST_UNRESOLVED + period,
     })

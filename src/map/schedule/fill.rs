@@ -8,6 +8,11 @@ use crate::record::measures::{self, GROUPS, MEASURES};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::Class;
 
+/// Returns the bit by which a record is quasi-periodic. Like the class of other motion, it is that of the nearest corner.
+fn torus(record: &Record) -> u32 {
+    record.valid & valid::QUASI_PERIODIC
+}
+
 /// Computes the filled records of one block. Values that do not depend on the cell are computed once.
 pub(super) struct Filling<'r> {
     block: Block,
@@ -22,7 +27,7 @@ impl<'r> Filling<'r> {
     /// Prepares the filling of a block from the records of its corners, in the order of [`Block::corners`].
     pub(super) fn new(block: &Block, corners: [&'r Record; 4]) -> Filling<'r> {
         let common = corners.iter().fold(u32::MAX, |bits, corner| bits & corner.valid);
-        let mut valid = common & !valid::STROBE | valid::FILLED;
+        let mut valid = common & !valid::STROBE & !valid::QUASI_PERIODIC | valid::FILLED;
         let agree = |of: fn(&Record) -> u64| corners[1..].iter().all(|corner| of(corner) == of(corners[0]));
         if !agree(word_of) {
             valid &= !valid::WORD;
@@ -31,9 +36,9 @@ impl<'r> Filling<'r> {
             valid &= !valid::PATTERN;
         }
         let averages = corners.map(|nearest| {
-            let class = classify(&Record { valid, ..*nearest });
+            let class = classify(&Record { valid: valid | torus(nearest), ..*nearest });
             // An average exponent could turn undecided cells into decided ones.
-            let decided = matches!(class, Class::Periodic { .. } | Class::Chaotic);
+            let decided = !matches!(class, Class::Undecided | Class::Failed);
             decided && corners.iter().all(|corner| classify(corner) == class)
         });
         Filling { block: *block, corners, valid, averages }
@@ -53,6 +58,7 @@ impl<'r> Filling<'r> {
         };
         let mut filled =
             Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..*self.corners[nearest] };
+        filled.valid |= torus(self.corners[nearest]);
         filled.clear_measures(|group| self.valid & group.bit == 0);
         if !self.averages[nearest] {
             return filled;

@@ -21,7 +21,8 @@ impl Label {
             Class::Failed => 1,
             Class::Undecided => 2,
             Class::Chaotic => 3,
-            Class::Periodic { period } => 3 + period,
+            Class::QuasiPeriodic => 4,
+            Class::Periodic { period } => 4 + period,
         };
         let contact = match (record.is_contact_free(), record.is_always_in_contact()) {
             (true, _) => 1,

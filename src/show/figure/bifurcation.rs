@@ -128,6 +128,8 @@ fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry>
     let has = |index: usize| columns.iter().any(|column| column.class.index() == index);
     let is_periodic = has(Class::Periodic { period: 1 }.index());
     let is_chaotic = has(Class::Chaotic.index());
+    let has_tori = has(Class::QuasiPeriodic.index());
+    let torus = class_color(Class::QuasiPeriodic);
     let periodic = class_color(Class::Periodic { period: 1 });
     let chaotic = class_color(Class::Chaotic);
     let mut entries = Vec::new();
@@ -138,6 +140,7 @@ fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry>
             entries.extend(panels.has_strobes().then(|| dot(STROBE, "phase 0 of each period")));
             entries.extend(is_periodic.then(|| dot(periodic, "\u{3bb}: periodic")));
             entries.extend(is_chaotic.then(|| dot(chaotic, "\u{3bb}: chaotic")));
+            entries.extend(has_tori.then(|| dot(torus, "\u{3bb}: quasi-periodic")));
         }
         Coloring::Directions => {
             entries.push(dot(direction_color(Direction::Up), "followed upwards"));
@@ -145,6 +148,7 @@ fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry>
             entries.push(dot(both_directions(), "both"));
             entries.extend(is_periodic.then(|| patch(periodic, 1.0, "periodic")));
             entries.extend(is_chaotic.then(|| patch(chaotic, 1.0, "chaotic")));
+            entries.extend(has_tori.then(|| patch(torus, 1.0, "quasi-periodic")));
         }
     }
     if columns.iter().any(|column| column.lyapunov_error.is_some()) {

@@ -9,6 +9,7 @@ use crate::show::color::Color;
 use crate::show::drawing::{Canvas, write_figure};
 use crate::show::error::WriteError;
 use crate::show::figure::map_layout::{MapFigure, Row, RowKey};
+use crate::show::layers::colors::QUASI_PERIODIC;
 use crate::show::map_pair::{MapPair, MapSide, SceneDifference};
 use crate::show::symbols::symbol;
 use rattlemap_dynamics::orbit::Class;
@@ -31,7 +32,7 @@ const fn entry(color: Color, text: &'static str, kind: Option<Kind>) -> CellColo
 }
 
 /// All colours. Those of differences are from Okabe and Ito's colour-blind safe set.
-const COLORS: [CellColor; 8] = [
+const COLORS: [CellColor; 10] = [
     entry([0xdc, 0xe9, 0xf4], "both periodic", None),
     entry([0xf6, 0xd9, 0x8b], "both periodic, other pattern", None),
     entry([0xbc, 0xbc, 0xbc], "both chaotic", None),
@@ -40,6 +41,8 @@ const COLORS: [CellColor; 8] = [
     entry([0x00, 0x72, 0xb2], "A chaotic, B periodic", Some(Kind::Class)),
     entry([0xcc, 0x79, 0xa7], "undecided or failed in one", Some(Kind::Class)),
     entry([0x00, 0x9e, 0x73], "both periodic", Some(Kind::Period)),
+    entry([0xeb, 0xf5, 0xdc], "both quasi-periodic", None),
+    entry(QUASI_PERIODIC, "quasi-periodic in one", Some(Kind::Class)),
 ];
 
 /// Index of the colour of cells of equal period whose patterns differ, or whose words differ where there are no patterns.
@@ -47,11 +50,13 @@ const OTHER_PATTERN: usize = 1;
 
 /// Returns the index of the colour of a cell with the given classes in A and B.
 fn color_index(classes: [Class; 2]) -> usize {
-    use Class::{Chaotic, Periodic};
+    use Class::{Chaotic, Periodic, QuasiPeriodic};
     match classes {
         [Periodic { .. }, Periodic { .. }] if classes[0] != classes[1] => 7,
         [Periodic { .. }, Periodic { .. }] => 0,
         [Chaotic, Chaotic] => 2,
+        [QuasiPeriodic, QuasiPeriodic] => 8,
+        [QuasiPeriodic, _] | [_, QuasiPeriodic] => 9,
         [a, b] if a == b => 3,
         [Periodic { .. }, Chaotic] => 4,
         [Chaotic, Periodic { .. }] => 5,

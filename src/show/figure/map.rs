@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use crate::map::scene::{Format, Target};
+use crate::map::scene::{Axis, Format, Target};
 use crate::show::caption;
 use crate::show::cells::Cells;
 use crate::show::drawing::frame::Frame;
@@ -67,10 +67,7 @@ pub(super) fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
                     color(nth),
                 );
             }
-            let inside = attractors.iter().filter(|(x, y)| {
-                (frame.x.low..=frame.x.high).contains(x) && (frame.y.low..=frame.y.high).contains(y)
-            });
-            inside.for_each(|(x, y)| canvas.marker(frame.at(*x, *y), ATTRACTOR));
+            attractors.iter().for_each(|(x, y)| canvas.marker(frame.at(*x, *y), ATTRACTOR));
         },
     )
 }
@@ -84,7 +81,7 @@ fn draw_line(canvas: &Canvas, frame: &Frame, parts: &[Vec<Point>], color: Color)
     }
 }
 
-/// Returns the strobe states of all attractors that lie in the plane of a map whose axes are both components of the start.
+/// Returns the strobe states of all attractors that lie on a map whose axes are both components of the start.
 pub(super) fn attractors(cells: &Cells<'_>) -> Vec<Point> {
     let targets: Vec<Target> = cells.scene().axes().iter().map(|axis| axis.target()).collect();
     let (Some(basins), &[Target::Start(x), Target::Start(y)]) = (cells.basins(), &targets[..]) else {
@@ -96,7 +93,15 @@ pub(super) fn attractors(cells: &Cells<'_>) -> Vec<Point> {
         let is_near = |i: usize| (state[i] - plane[i]).abs() <= IN_PLANE * size;
         (0..state.len()).filter(|i| ![x, y].contains(i)).all(is_near)
     };
-    basins.strobes().filter(lies_in_plane).map(|state| (state[x], state[y])).collect()
+    let is_on_axis =
+        |axis: &Axis, value: f64| (axis.value(0)..=axis.value(axis.values().len() - 1)).contains(&value);
+    let [horizontal, vertical] = [0, 1].map(|i| &cells.scene().axes()[i]);
+    basins
+        .strobes()
+        .filter(lies_in_plane)
+        .map(|state| (state[x], state[y]))
+        .filter(|&(x, y)| is_on_axis(horizontal, x) && is_on_axis(vertical, y))
+        .collect()
 }
 
 #[cfg(test)]

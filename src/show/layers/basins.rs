@@ -2,7 +2,7 @@
 
 use crate::findings::attractors::{Attractor, Basins, NONE};
 use crate::show::color::Color;
-use crate::show::layers::colors::{self, CHAOTIC, NO_VALUE, SYMMETRIC, UNDECIDED};
+use crate::show::layers::colors::{self, CHAOTIC, NO_VALUE, QUASI_PERIODIC, SYMMETRIC, UNDECIDED};
 use crate::show::layers::layer::{Layer, NamedColor, legend};
 use crate::show::table::attractors_csv::attractor_name;
 use rattlemap_dynamics::orbit::Class;
@@ -15,12 +15,14 @@ const LISTED_ATTRACTORS: usize = 20;
 const OTHER_INDEX: u8 = COLORED_ATTRACTORS as u8;
 const CHAOS_INDEX: u8 = OTHER_INDEX + 1;
 const UNKNOWN_INDEX: u8 = CHAOS_INDEX + 1;
+const TORUS_INDEX: u8 = UNKNOWN_INDEX + 1;
 
 /// Returns the layer.
 pub(crate) fn layer(basins: &Basins) -> Layer {
     let list = basins.attractors();
     let index = |label: usize| match list[label].class {
         Class::Chaotic => CHAOS_INDEX,
+        Class::QuasiPeriodic => TORUS_INDEX,
         _ => label.min(COLORED_ATTRACTORS) as u8,
     };
     let labels = basins.labels();
@@ -28,7 +30,7 @@ pub(crate) fn layer(basins: &Basins) -> Layer {
     // The largest basin has a pale colour.
     let palette: Vec<Color> = std::iter::once(SYMMETRIC)
         .chain((1..COLORED_ATTRACTORS).map(colors::distinct))
-        .chain([NO_VALUE, CHAOTIC, UNDECIDED])
+        .chain([NO_VALUE, CHAOTIC, UNDECIDED, QUASI_PERIODIC])
         .collect();
     let color = |label: usize| palette[usize::from(index(label))];
     let entry = |(label, attractor): (usize, &_)| NamedColor {
@@ -37,7 +39,7 @@ pub(crate) fn layer(basins: &Basins) -> Layer {
         cells: attractor.cells,
     };
     let is_listed = |(label, attractor): &(usize, &Attractor)| {
-        *label < LISTED_ATTRACTORS || attractor.class == Class::Chaotic
+        *label < LISTED_ATTRACTORS || matches!(attractor.class, Class::Chaotic | Class::QuasiPeriodic)
     };
     let mut entries: Vec<NamedColor> = list.iter().enumerate().filter(is_listed).map(entry).collect();
     let is_colored = |label: usize| label < COLORED_ATTRACTORS;

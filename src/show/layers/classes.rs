@@ -9,16 +9,21 @@ use crate::show::cells::Cells;
 use crate::show::color::Color;
 use crate::show::layers::bar::{Bar, count_beyond, round_bound};
 use crate::show::layers::colors::{
-    self, ALWAYS_IN_CONTACT, FAILED, NO_CONTACT, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, UNSYMMETRIC, chaos,
+    self, ALWAYS_IN_CONTACT, FAILED, NO_CONTACT, QUASI_PERIODIC, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED,
+    UNSYMMETRIC, chaos,
 };
 use crate::show::layers::layer::{Layer, NamedColor, legend};
 use rattlemap_dynamics::orbit::Class;
 
-/// Indices into the palette: five kinds of period 1, periods 2 to 64, undecided, failed, then shades of chaos.
+/// Indices into the palette: five kinds of period 1, periods 2 to 64, undecided, failed, quasi-periodic,
+/// then shades of chaos.
 const FIRST_PERIOD: u8 = 5;
 const EXCEPTIONS: u8 = FIRST_PERIOD + 63;
-const FIRST_SHADE: u8 = EXCEPTIONS + 2;
+const FIRST_SHADE: u8 = EXCEPTIONS + 3;
 const SHADES: u8 = 64;
+
+/// Forcing periods T to which the legend refers the rate at which chaos ends.
+const PERIODS: u32 = 1000;
 
 /// Number of periods in the legend before the others are combined in one entry.
 const LISTED_PERIODS: usize = 17;
@@ -36,6 +41,7 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         Class::Periodic { period } => FIRST_PERIOD + (period.min(64) - 2) as u8,
         Class::Undecided => EXCEPTIONS,
         Class::Failed => EXCEPTIONS + 1,
+        Class::QuasiPeriodic => EXCEPTIONS + 2,
         Class::Chaotic if !shows_chaos => FIRST_SHADE + SHADES - 1,
         Class::Chaotic => {
             let share = (record.lyapunov / high).clamp(0.0, 1.0);
@@ -51,7 +57,16 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         high,
         beyond: count_beyond(exponents(), 0.0, high),
     };
-    let entries = entries(&indices, &palette, shows_chaos, cells.has(Quantity::Symmetric));
+    let chaos = match cells.chaos_ends() {
+        // The legend has no room for the interval, which `map` prints.
+        Some(rate) => {
+            let text = rate.text_within(PERIODS).replace("below", "<");
+            let share = text.split(',').next().unwrap_or_default();
+            format!("chaos, {share} end in {PERIODS} T")
+        }
+        None => "chaos".to_owned(),
+    };
+    let entries = entries(&indices, &palette, chaos, shows_chaos, cells.has(Quantity::Symmetric));
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);
     Layer {
         name: "map".into(),
@@ -84,13 +99,19 @@ fn first_period(record: &Record, shows_symmetry: bool) -> u8 {
 fn palette() -> Vec<Color> {
     let mut palette = vec![NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN, ALWAYS_IN_CONTACT];
     palette.extend((2..=64).map(colors::period));
-    palette.extend([UNDECIDED, FAILED]);
+    palette.extend([UNDECIDED, FAILED, QUASI_PERIODIC]);
     palette.extend((0..SHADES).map(|shade| chaos(f64::from(shade) / f64::from(SHADES - 1))));
     palette
 }
 
-/// Returns the legend: low periods first, then chaos, undecided and failed.
-fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool, shows_symmetry: bool) -> Vec<NamedColor> {
+/// Returns the legend: low periods first, then chaos, quasi-periodic, undecided and failed.
+fn entries(
+    indices: &[u8],
+    palette: &[Color],
+    chaos_text: String,
+    shows_chaos: bool,
+    shows_symmetry: bool,
+) -> Vec<NamedColor> {
     let mut counts = [0usize; 256];
     indices.iter().for_each(|&index| counts[usize::from(index)] += 1);
     let entry = |index: usize, text: String| NamedColor { color: palette[index], text, cells: counts[index] };
@@ -121,7 +142,8 @@ fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool, shows_symmetry:
     let chaos = counts[FIRST_SHADE.into()..].iter().sum();
     let middle = if shows_chaos { usize::from(FIRST_SHADE + SHADES / 2) } else { palette.len() - 1 };
     let exceptions = usize::from(EXCEPTIONS);
-    list.push(NamedColor { color: palette[middle], text: "chaos".to_owned(), cells: chaos });
+    list.push(NamedColor { color: palette[middle], text: chaos_text, cells: chaos });
+    list.push(entry(exceptions + 2, "quasi-periodic".to_owned()));
     list.push(entry(exceptions, "undecided".to_owned()));
     list.push(entry(exceptions + 1, "failed".to_owned()));
     legend(list)

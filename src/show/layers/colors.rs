@@ -36,6 +36,7 @@ pub(crate) const CHAOTIC: Color = hex(0x2a2a2a);
 const CHAOS_RAMP: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
 /// Exceptions have conspicuous colours.
 pub(crate) const UNDECIDED: Color = hex(0xce44fa);
+pub(crate) const QUASI_PERIODIC: Color = hex(0x0000fa);
 pub(crate) const FAILED: Color = hex(0x8d130f);
 /// Cells without a value of a continuous layer.
 pub(crate) const NO_VALUE: Color = hex(0x8f8f8f);
@@ -136,6 +137,7 @@ mod tests {
             SYMMETRY_UNKNOWN,
             UNDECIDED,
             FAILED,
+            QUASI_PERIODIC,
         ]);
         let count = colors.len();
         colors.sort_unstable();
@@ -163,7 +165,9 @@ mod tests {
         };
         least(all(&near));
         let greys = (0..=20).map(|step| chaos(f64::from(step) / 20.0));
-        least(legend.iter().copied().chain(greys).chain([FAILED]).map(|color| (color, UNDECIDED)).collect());
+        let others: Vec<Color> = legend.iter().copied().chain(greys).chain([FAILED]).collect();
+        least(others.iter().map(|color| (*color, UNDECIDED)).collect());
+        least(others.iter().chain(&[UNDECIDED]).map(|color| (*color, QUASI_PERIODIC)).collect());
         let exceptions =
             legend[..usual].iter().copied().chain((0..=20).map(|step| chaos(f64::from(step) / 20.0)));
         least(exceptions.map(|color| (color, FAILED)).collect());

@@ -57,22 +57,33 @@ const FIELDS = { word: "word, up to mirror image", pattern: "pattern, up to mirr
   finite: "numbers are finite", again: "record computed again" };
 const fieldName = (name) => FIELDS[name] ?? spaced(name);
 
+// Returns the first columns of a cell: a button that shows it on the map, and the values of its parameters.
+function place({ i, j, values }) {
+  const go = element("button", `${i}, ${j}`);
+  go.type = "button";
+  go.title = "show this cell on the map";
+  go.addEventListener("click", () => {
+    choose({ i, j });
+    follow({ i, j });
+    scrollTo({ top: 0, behavior: "smooth" });
+  });
+  return [go, ...map.axes.map(({ parameter }) => short(values[parameter]))];
+}
+
+// Returns the table of the chaotic cells whose chaos ends.
+function ended({ cells, further_periods: periods, followed, ended: { count: ends, text } }) {
+  const line = ({ class: name, period, periods_run: after, replay, ...cell }) =>
+    ({ cells: [...place(cell), period ? `period ${period}` : name, after, element("code", replay)] });
+  return table(`Chaos that ends within ${periods} further periods: ${ends} of ${followed} cells (${text})`,
+    ["cell", ...map.axes.map((axis) => axis.parameter), "becomes", "after periods", "replay"], cells.map(line));
+}
+
 // Returns the table of the cells that differ, grouped by kind. Cells without an explanation come first.
 function differing({ kinds, mismatches }) {
   const difference = ({ field, map, judge }) => `${fieldName(field)}: ${short(map)}, judge ${short(judge)}`;
   const parameters = map.axes.map((axis) => axis.parameter);
-  const line = ({ i, j, values, differences, kind, replay }) => {
-    const go = element("button", `${i}, ${j}`);
-    go.type = "button";
-    go.title = "show this cell on the map";
-    go.addEventListener("click", () => {
-      choose({ i, j });
-      follow({ i, j });
-      scrollTo({ top: 0, behavior: "smooth" });
-    });
-    return { bad: kind === "unexplained",
-      cells: [go, ...parameters.map((name) => short(values[name])), differences.map(difference).join("; "), element("code", replay)] };
-  };
+  const line = ({ differences, kind, replay, ...cell }) => ({ bad: kind === "unexplained",
+    cells: [...place(cell), differences.map(difference).join("; "), element("code", replay)] });
   const order = Object.keys(kinds).sort((a, b) => (b === "unexplained") - (a === "unexplained"));
   const groups = order.map((kind) => [kind, mismatches.filter((mismatch) => mismatch.kind === kind)]);
   const box = element("div");
@@ -110,6 +121,7 @@ function showValidation(found) {
       + "One is that of the map, the other that of a second computation; chance exceeds the limit once in 10,000 tests.", "note"));
     tables.append(chaos);
   }
+  if (found.chaos_ends?.cells.length) tables.append(ended(found.chaos_ends));
   section.append(
     element("h2", "Validation"),
     element("p", found.verdict, found.faults.length ? "verdict bad" : "verdict"),

@@ -18,6 +18,7 @@ pub(super) const FIELDS_AFTER: [&str; 2] = ["cells", "share"];
 pub(crate) fn attractor_name(label: usize, attractor: &Attractor) -> String {
     let kind = match attractor.class {
         Class::Periodic { period } => format!("period {period}"),
+        Class::QuasiPeriodic => "quasi-periodic".to_owned(),
         _ => "chaos".to_owned(),
     };
     let word = match &attractor.word {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use fs4::fs_std::FileExt;
 use same_file::Handle;
 
-use crate::store::plain_file::refuse_link;
+use crate::store::plain_file::{self, refuse_link};
 
 /// Name of the file. After a kill it exists, but is not locked.
 pub(crate) const LOCK: &str = ".rattlemap.lock";
@@ -47,7 +47,7 @@ impl Lock {
 impl Lock {
     /// Whether another process has the lock of a folder; creates no file.
     pub(crate) fn is_held(folder: &Path) -> bool {
-        let file = OpenOptions::new().write(true).open(folder.join(LOCK));
+        let file = plain_file::open(&folder.join(LOCK), OpenOptions::new().write(true));
         file.is_ok_and(|file| matches!(FileExt::try_lock_exclusive(&file), Ok(false)))
     }
 

@@ -191,6 +191,7 @@ pub(crate) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> Value {
         "observed_periods": settings.observed_periods,
         "early_stop": settings.early_stop,
         "undecided_periods": settings.undecided_periods,
+        "confirm_chaos": settings.confirm_chaos,
         "max_period": settings.max_period,
     })
 }

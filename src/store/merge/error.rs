@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::map::plan::NoMotion;
-use crate::map::shard::Shard;
+use crate::map::shard::{Shard, ShardError};
 use crate::store::error::OutputError;
 use crate::store::finished_map::FinishedMapError;
 use crate::store::record_file::RecordFileError;
@@ -39,6 +39,9 @@ pub enum MergeError {
     /// Two parts are the same shard.
     #[error("{} and {} are both shard {shard}; name one of them", .first.display(), .part.display())]
     Twice { shard: Shard, first: PathBuf, part: PathBuf },
+    /// The map cannot be divided into so many shards.
+    #[error("{}: {reason}", .part.display())]
+    Impossible { part: PathBuf, reason: ShardError },
     /// Shards are missing or unfinished.
     #[error("{0}")]
     Incomplete(String),

@@ -10,6 +10,9 @@ pub(crate) const HEAD: usize = 32;
 /// Largest number of cells in a batch. It bounds the loss by one damaged byte and the memory of a reader.
 pub(crate) const MOST_CELLS: usize = 1 << 16;
 
+/// Largest number of bytes of a batch's columns. Where compression fails, it adds less than a thousandth.
+const MOST_BYTES: usize = (columns::ROW + 1) * MOST_CELLS;
+
 /// Head of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BatchHead {
@@ -50,7 +53,8 @@ impl BatchHead {
         let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
         let head =
             BatchHead { number: word(8), cells: word(12), columns: word(16), bytes: word(20), sum: word(24) };
-        (head.bytes() == *bytes && head.cells as usize <= MOST_CELLS).then_some(head)
+        let is_possible = head.cells as usize <= MOST_CELLS && head.bytes as usize <= MOST_BYTES;
+        (head.bytes() == *bytes && is_possible).then_some(head)
     }
 
     /// Returns the records that these bytes encode, or none if they are damaged.

@@ -14,7 +14,7 @@ use crate::record::Record;
 use crate::record::measures::{GROUPS, places_before};
 
 /// Number of bytes of an id and its record.
-const ROW: usize = ID + size_of::<Record>();
+pub(crate) const ROW: usize = ID + size_of::<Record>();
 const ID: usize = size_of::<u32>();
 
 /// Number of columns without measured quantities, and of all columns.

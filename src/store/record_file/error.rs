@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::show::error::remedy;
 use crate::store::file_names::RECORDS;
 
 /// Why a record file cannot be used.
@@ -45,7 +46,7 @@ pub enum RecordFileError {
         path: PathBuf,
     },
     /// The operating system reports an error.
-    #[error("{}: {reason}", .path.display())]
+    #[error("{}: {reason}{}", .path.display(), remedy(.reason.kind()))]
     Io {
         /// The file.
         path: PathBuf,

@@ -1,19 +1,20 @@
 //! Reads `records.bin` and skips damaged batches.
 
 use std::fmt;
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
 
 use crate::record::{Record, valid};
+use crate::store::plain_file;
 use crate::store::record_file::batch::{self, BatchHead, HEAD};
 use crate::store::record_file::error::RecordFileError;
 use crate::store::record_file::header::{self, Found};
 use crate::store::record_file::identity::Identity;
 
-/// Number of bytes that are searched at a time for the next batch behind damage.
-const WINDOW: usize = 1 << 16;
+/// Numbers of bytes that are searched at a time for the next batch behind damage: at first, and at most.
+const WINDOW: Range<usize> = 1 << 10..1 << 16;
 
 /// Whether records that follow a damaged batch can be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,6 +76,13 @@ impl Extent {
     }
 }
 
+/// Damage of a batch.
+struct Bad {
+    what: &'static str,
+    /// Number of bytes that were read behind its head.
+    body: u64,
+}
+
 impl Identity {
     /// Reads the identity of the run from a record file; none if the run ended before it wrote anything.
     ///
@@ -88,7 +96,8 @@ impl Identity {
 
 /// Opens a file for reading.
 pub(crate) fn open(path: &Path) -> Result<File, RecordFileError> {
-    File::open(path).map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })
+    plain_file::open(path, OpenOptions::new().read(true))
+        .map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })
 }
 
 /// A record file whose header has been read.
@@ -141,11 +150,14 @@ impl<'a> Reader<'a> {
         let io = |reason| RecordFileError::Io { path: self.path.to_owned(), reason };
         let damaged = |at, what| RecordFileError::Damaged { path: self.path.to_owned(), at, what };
         let mut extent = Extent::default();
-        let mut at = self.begin;
+        let (mut at, mut wasted) = (self.begin, 0);
         while at < self.length {
             match self.batch_at(at, extent.next_number).map_err(io)? {
-                Err(what) => {
+                Err(Bad { what, body }) => {
+                    wasted += body;
                     let next = match order {
+                        // Heads inside the body of a damaged batch would let the reader read the same bytes again and again.
+                        Order::Any if wasted > self.length => self.next_after(at + body).map_err(io)?,
                         Order::Any => self.next_after(at).map_err(io)?,
                         Order::Sequential => self.length,
                     };
@@ -175,38 +187,35 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the batch at an offset; its number must be at least `least`. The inner error describes the damage.
-    #[expect(clippy::type_complexity, reason = "used once")]
-    fn batch_at(
-        &self,
-        at: u64,
-        least: u32,
-    ) -> io::Result<Result<(BatchHead, Vec<(u32, Record)>), &'static str>> {
+    fn batch_at(&self, at: u64, least: u32) -> io::Result<Result<(BatchHead, Vec<(u32, Record)>), Bad>> {
+        let bad = |what| Ok(Err(Bad { what, body: 0 }));
         const CUT: &str = "a batch is cut short";
         let mut head = [0; HEAD];
         let left = self.length - at;
         if left < HEAD as u64 {
-            return Ok(Err(CUT));
+            return bad(CUT);
         }
         let mut input = read_at(self.file, at)?;
         input.read_exact(&mut head)?;
-        let Some(head) = BatchHead::read(&head) else { return Ok(Err("the head of a batch is damaged")) };
+        let Some(head) = BatchHead::read(&head) else { return bad("the head of a batch is damaged") };
         if left - (HEAD as u64) < u64::from(head.bytes) {
-            return Ok(Err(CUT));
+            return bad(CUT);
+        }
+        if head.number < least {
+            return bad("a batch is out of place");
         }
         let mut body = vec![0; head.bytes as usize];
         input.read_exact(&mut body)?;
-        if head.number < least {
-            return Ok(Err("a batch is out of place"));
-        }
-        Ok(head.decode(&body).map(|batch| (head, batch)).ok_or("a batch does not match its checksum"))
+        let batch = head.decode(&body).map(|batch| (head, batch));
+        Ok(batch.ok_or(Bad { what: "a batch does not match its checksum", body: body.len() as u64 }))
     }
 
     /// Returns the offset of the next undamaged head of a batch behind `at`, or the length of the file.
     fn next_after(&self, at: u64) -> io::Result<u64> {
         let mut from = at + 1;
-        let mut window = vec![0; WINDOW + HEAD];
+        let mut window = vec![0; WINDOW.start];
         while from + (HEAD as u64) <= self.length {
-            let here = window.len().min((self.length - from) as usize);
+            let here = (window.len() as u64).min(self.length - from) as usize;
             read_at(self.file, from)?.read_exact(&mut window[..here])?;
             let mut searched = 0;
             while let Some(place) = batch::find(&window[searched..here]) {
@@ -219,6 +228,7 @@ impl<'a> Reader<'a> {
             }
             // The windows overlap, so that a head across their border is found.
             from += (here - (HEAD - 1)) as u64;
+            window.resize(WINDOW.end.min(2 * window.len()), 0);
         }
         Ok(self.length)
     }

@@ -4,9 +4,11 @@
  *     RATTLEMAP_FAULT=CALL:N:RESULT[:DEVICE]   from its Nth call, CALL returns RESULT (a negative VkResult). With DEVICE, only
  *                                              calls on the DEVICE-th device that was created count and fail
  *     RATTLEMAP_CALLS=FILE                     at the end the layer writes lines "CALL COUNT" to FILE
+ *     RATTLEMAP_LINGER=SECONDS                 the process lasts so long after its libraries have destroyed their objects. A driver
+ *                                              that still works then fails for certain, not by chance
  *
  * After the first result -4 the device stays lost: every call that can report a lost device does so. Without DEVICE this holds
- * for all devices. The few types that a layer needs are declared here, so no headers have to be installed. Calls are forwarded
+ * for all devices. A call on a device that does not exist (any more) ends the process with a message. The few types that a layer needs are declared here, so no headers have to be installed. Calls are forwarded
  * with six words, because 64-bit calling conventions pass integers and pointers in equal ways.
  */
 #include <pthread.h>
@@ -14,6 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 typedef uint64_t word;
 typedef void (*function)(void);
@@ -45,21 +48,18 @@ struct interface {
     get_function instance, device, physical_device;
 };
 
-/* Functions of the next layer for the latest instance and device. All of one driver share their functions. */
-static get_function next_instance, next_device;
-static void *latest_instance, *latest_device;
+/* Functions of the next layer for the latest instance. */
+static get_function next_instance;
+static void *latest_instance;
 
-/* Devices in the order of creation; NULL for destroyed ones. Objects of a device begin with the device's pointer to its table
- * of functions. */
+/* Devices in the order of creation. Objects of a device begin with the device's pointer to its table of functions. `handle` is NULL
+ * for a destroyed device. */
 enum { MOST_DEVICES = 64 };
-static void *devices[MOST_DEVICES];
+static struct device {
+    void *handle;
+    get_function next;
+} devices[MOST_DEVICES];
 static int device_count;
-
-static void *device_of(void *handle) {
-    for (int n = 0; n < device_count && n < MOST_DEVICES; n++)
-        if (devices[n] && *(void **)devices[n] == *(void **)handle) return devices[n];
-    return latest_device;
-}
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 
@@ -86,19 +86,23 @@ static const struct {
     CALLS(ROW){"vkCreateDevice", 0},
 };
 
+/* Returns the device of an object. Call it under the lock. */
+static struct device *device_of(void *object, const char *name) {
+    for (int n = device_count - 1; n >= 0; n--)
+        if (devices[n].handle && *(void **)devices[n].handle == *(void **)object) return &devices[n];
+    fprintf(stderr, "layer of faults: %s on a device that does not exist\n", name);
+    abort();
+}
+
 static int counts[CALL_COUNT], counts_on_one[CALL_COUNT];
 static int is_lost;
 
-/* Returns the result of a failing call; 0 if the call may proceed. */
-static int32_t fault(int which, void *handle) {
-    pthread_mutex_lock(&lock);
+/* Returns the result of a failing call; 0 if the call may proceed. Call it under the lock. */
+static int32_t fault(int which, const struct device *device) {
     int count = ++counts[which], one = 0;
     const char *request = getenv("RATTLEMAP_FAULT"), *colon = request ? strchr(request, ':') : NULL;
     if (colon && sscanf(colon, ":%*d:%*d:%d", &one) == 1 && which != CreateDevice) {
-        if (one < 1 || one > device_count || devices[one - 1] != device_of(handle)) {
-            pthread_mutex_unlock(&lock);
-            return 0;
-        }
+        if (one < 1 || one > device_count || &devices[one - 1] != device) return 0;
         count = ++counts_on_one[which];
     }
     int32_t result = is_lost && calls[which].reports_loss ? DEVICE_LOST : 0;
@@ -109,23 +113,22 @@ static int32_t fault(int which, void *handle) {
         result = code;
         is_lost |= code == DEVICE_LOST;
     }
-    pthread_mutex_unlock(&lock);
     return result;
 }
 
-/* Waits until the device is idle. The driver does not know that it is lost, and objects in use must not be destroyed. */
-static void wait_idle(void *handle) {
-    pthread_mutex_lock(&lock);
-    void *device = device_of(handle);
-    pthread_mutex_unlock(&lock);
-    if (device) ((call)next_device(device, "vkDeviceWaitIdle"))(device, 0, 0, 0, 0, 0);
+static call driver(const struct device *device, const char *name) {
+    return (call)device->next(device->handle, name);
 }
 
+/* A driver does not know that its device is lost. What it uses must not be destroyed, so the layer waits until it is idle. */
 #define WRAPPER(name, reports_loss) \
     static int32_t wrapped_##name(void *handle, word a, word b, word c, word d, word e) { \
-        int32_t result = fault(name, handle); \
-        if (result == DEVICE_LOST) wait_idle(handle); \
-        return result ? result : ((call)next_device(latest_device, "vk" #name))(handle, a, b, c, d, e); \
+        pthread_mutex_lock(&lock); \
+        const struct device *found = device_of(handle, "vk" #name), device = *found; \
+        int32_t result = fault(name, found); \
+        pthread_mutex_unlock(&lock); \
+        if (result == DEVICE_LOST) driver(&device, "vkDeviceWaitIdle")(device.handle, 0, 0, 0, 0, 0); \
+        return result ? result : driver(&device, "vk" #name)(handle, a, b, c, d, e); \
     }
 CALLS(WRAPPER)
 
@@ -149,7 +152,9 @@ static int32_t create_instance(const struct info *create, const void *allocator,
 static int32_t create_device(void *physical, const struct info *create, const void *allocator, void **device) {
     struct info *link = (struct info *)link_of(create, DEVICE_LINK);
     if (!link) return INITIALIZATION_FAILED;
-    int32_t result = fault(CreateDevice, NULL);
+    pthread_mutex_lock(&lock);
+    int32_t result = device_count < MOST_DEVICES ? fault(CreateDevice, NULL) : INITIALIZATION_FAILED;
+    pthread_mutex_unlock(&lock);
     if (result) return result;
     get_function instance = link->link->instance, next = link->link->other;
     link->link = link->link->next;
@@ -157,19 +162,19 @@ static int32_t create_device(void *physical, const struct info *create, const vo
     result = create_next(physical, create, allocator, device);
     if (result) return result;
     pthread_mutex_lock(&lock);
-    next_device = next, latest_device = *device;
-    if (device_count < MOST_DEVICES) devices[device_count++] = *device;
+    devices[device_count++] = (struct device){*device, next};
     pthread_mutex_unlock(&lock);
     return 0;
 }
 
-static int32_t destroy_device(void *device, word allocator, word a, word b, word c, word d) {
+static int32_t destroy_device(void *handle, word allocator, word a, word b, word c, word d) {
+    if (!handle) return 0;
     pthread_mutex_lock(&lock);
-    for (int n = 0; n < device_count; n++)
-        if (devices[n] == device) devices[n] = NULL;
+    struct device *found = device_of(handle, "vkDestroyDevice");
+    call next = driver(found, "vkDestroyDevice");
+    found->handle = NULL;
     pthread_mutex_unlock(&lock);
-    call next = device ? (call)next_device(device, "vkDestroyDevice") : NULL;
-    return next ? next(device, allocator, a, b, c, d) : 0;
+    return next(handle, allocator, a, b, c, d);
 }
 
 static function device_function(void *device, const char *name);
@@ -188,9 +193,12 @@ static function own(const char *name) {
 }
 
 /* The layer has no function that the driver does not have. */
-static function device_function(void *device, const char *name) {
-    function next = next_device(device, name), mine = own(name);
-    return next && mine ? mine : next;
+static function device_function(void *handle, const char *name) {
+    pthread_mutex_lock(&lock);
+    get_function next = device_of(handle, name)->next;
+    pthread_mutex_unlock(&lock);
+    function theirs = next(handle, name), mine = own(name);
+    return theirs && mine ? mine : theirs;
 }
 
 static function instance_function(void *instance, const char *name) {
@@ -208,9 +216,9 @@ __attribute__((visibility("default"))) int32_t vkNegotiateLoaderLayerInterfaceVe
 }
 
 __attribute__((destructor)) static void write_calls(void) {
-    const char *path = getenv("RATTLEMAP_CALLS");
+    const char *path = getenv("RATTLEMAP_CALLS"), *linger = getenv("RATTLEMAP_LINGER");
     FILE *file = path ? fopen(path, "w") : NULL;
-    if (!file) return;
-    for (int n = 0; n < CALL_COUNT; n++) fprintf(file, "%s %d\n", calls[n].name, counts[n]);
-    fclose(file);
+    for (int n = 0; file && n < CALL_COUNT; n++) fprintf(file, "%s %d\n", calls[n].name, counts[n]);
+    if (file) fclose(file);
+    if (linger) sleep(atoi(linger));
 }

@@ -8,6 +8,8 @@ mod dry_run;
 mod engines;
 mod figures;
 mod folders;
+#[cfg(unix)]
+mod hostile;
 mod interrupts;
 mod json;
 mod quantities;

@@ -102,3 +102,32 @@ fn an_adaptive_map_fills_and_audits_measured_quantities() {
     assert_eq!(manifest["measured"]["mean_gap"]["long_name"], "mean of gap");
     succeeds(&folder, "validate out/s --quiet --samples 20");
 }
+
+/// The impact oscillator has chaos that ends.
+#[test]
+fn chaos_that_ends_is_counted_by_maps_and_by_validations() {
+    let folder = with(include_str!("../../../scenes/gallery/impact_oscillator.toml"));
+    let few = "--set axis.0.count=16 --set axis.1.count=16 --engine cpu";
+    let run = map(&folder, &format!("{few} --set integration.confirm_chaos=2000")).success();
+    run.stderr(says(&["chaos: ", " of these cells in 1000 periods"]));
+    let out = folder.path().join("out/s");
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains(" % end in 1000 T\""), "the legend states the rate");
+    assert_eq!(json(&out.join("manifest.json"))["integration"]["confirm_chaos"], 2000);
+    fails(&folder, &format!("map s.toml {few} --resume"), 2, &["integration.confirm_chaos"]);
+    // A map whose chaotic cells do not continue states no rate.
+    let run = map(&folder, &format!("{few} --force")).success();
+    let said = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+    assert!(!said.contains("chaos: "), "{said}");
+    assert!(!fs::read_to_string(out.join("report.html")).unwrap().contains("end in 1000"));
+    let run = succeeds(&folder, "validate out/s --samples 100 --chaos-periods 1500");
+    run.stderr(says(&["Chaos was followed in 20 of ", " for 1500 further periods: it ends in "]));
+    let ends = json(&out.join("validation.json"))["chaos_ends"].clone();
+    assert_eq!((&ends["further_periods"], &ends["followed"]), (&1500.into(), &20.into()));
+    let cells = ends["cells"].as_array().unwrap();
+    assert_eq!(ends["ended"]["count"], cells.len());
+    assert!(cells.iter().all(|cell| cell["replay"].is_string() && cell["values"]["omega"].is_number()));
+    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("\"further_periods\":1500"));
+    succeeds(&folder, "validate out/s --samples 5 --chaos-periods 0 --quiet");
+    assert!(json(&out.join("validation.json"))["chaos_ends"].is_null());
+}

@@ -181,6 +181,7 @@ fn records_agree_with_the_reference() {
         settings: Settings::default(),
         early_stop: true,
         undecided_periods: 0,
+        confirm_chaos: 0,
         exponent: true,
         shows_exponent: true,
         quantities: false,

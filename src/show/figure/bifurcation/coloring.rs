@@ -4,6 +4,7 @@ use crate::map::bifurcation::{Column, Direction};
 use crate::show::color::Color;
 use crate::show::drawing::{DARK, FAINT, GEAR_2, MESHING, wall_color};
 use crate::show::figure::bifurcation::panels::{Panel, States};
+use crate::show::layers::colors::QUASI_PERIODIC;
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::Class;
 
@@ -83,6 +84,7 @@ pub(crate) fn class_color(class: Class) -> Color {
     match class {
         Class::Periodic { .. } => MESHING,
         Class::Chaotic => DARK,
+        Class::QuasiPeriodic => QUASI_PERIODIC,
         Class::Undecided | Class::Failed => FAINT,
     }
 }
@@ -94,9 +96,10 @@ mod tests {
 
     #[test]
     fn classes_differ_also_for_colour_blind_people() {
-        let [periodic, chaotic, undecided] =
-            [Class::Periodic { period: 1 }, Class::Chaotic, Class::Undecided].map(class_color);
-        for (a, b) in [(periodic, chaotic), (chaotic, undecided), (periodic, undecided)] {
+        let classes = [Class::Periodic { period: 1 }, Class::Chaotic, Class::Undecided, Class::QuasiPeriodic];
+        let colors = classes.map(class_color);
+        for (i, j) in (0..colors.len()).flat_map(|j| (0..j).map(move |i| (i, j))) {
+            let [a, b] = [colors[i], colors[j]];
             assert!(least_difference(a, b) >= 10.0, "{a:?} {b:?}: {}", least_difference(a, b));
         }
     }

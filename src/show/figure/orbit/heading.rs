@@ -23,6 +23,7 @@ pub(crate) fn character(model: &dyn Model, orbit: &Orbit) -> String {
         (Class::Chaotic, _) => "chaotic".to_owned(),
         (Class::Undecided, _) => "undecided".to_owned(),
         (Class::Failed, _) => "failed".to_owned(),
+        (Class::QuasiPeriodic, _) => "quasi-periodic".to_owned(),
     };
     let mut parts = vec![class, flights(orbit)];
     if orbit.lyapunov.is_finite() {

@@ -1,0 +1,63 @@
+//! Whether rounding decides the period of a cycle.
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::Event;
+use super::recurrence::Metric;
+use crate::reference::{Stop, Trajectory};
+use crate::stability::{Cycle, UNIT};
+
+/// Rounding error of the motion between two events, relative to the size of the motion.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Whether rounding scatters the strobes of a cycle by more than the distance between two of them, or its states by the
+/// size of the motion. The period is then a result of rounding. `events` are those of the cycle.
+///
+/// Each part of the cycle, from between two events to between the next two, adds a rounding error in every direction, and
+/// the derivative of the motion carries the sum of all earlier errors on. So an error counts with its largest growth up
+/// to any later instant, even if it has decayed at the end of the cycle.
+///
+/// # Errors
+/// A [`Stop`] if the cycle cannot be integrated.
+pub(super) fn is_below_resolution(
+    seed: &Trajectory<'_>,
+    cycle: &Cycle,
+    events: &[Event],
+) -> Result<bool, Stop> {
+    let flow = seed.flow();
+    let mut trajectory = seed.at(cycle.state, UNIT);
+    let (mut strobes, mut parts) = (vec![cycle.state], Vec::new());
+    let mut part = |trajectory: &mut Trajectory<'_, 4>, is_strobe: bool| {
+        let columns = trajectory.tangents().map(Vector4::from);
+        parts.push((Matrix4::from_columns(&columns) * trajectory.log_scale().exp(), is_strobe));
+        trajectory.set_tangents(UNIT);
+    };
+    let mut times = events.windows(2).map(|pair| 0.5 * (pair[0].t + pair[1].t)).peekable();
+    for n in 0..cycle.period {
+        let start = f64::from(n) * flow.period;
+        while let Some(time) = times.next_if(|time| *time < start + flow.period) {
+            trajectory.advance_to(time - start, &mut ())?;
+            part(&mut trajectory, false);
+        }
+        trajectory.advance_period(&mut ())?;
+        part(&mut trajectory, true);
+        strobes.push(trajectory.state());
+    }
+    strobes.pop();
+    let metric = Metric::of(&strobes, flow);
+    let units = metric.scaled(&Vector4::repeat(1.0));
+    let (to, from) = (Matrix4::from_diagonal(&units), Matrix4::from_diagonal(&units.map(f64::recip)));
+    // Covariance of the errors. The second turn includes growth across the end of the cycle.
+    let (mut errors, mut largest, mut at_strobes) = (Matrix4::zeros(), 0.0f64, 0.0f64);
+    for (part, is_strobe) in parts.iter().chain(&parts) {
+        let part = to * part * from;
+        errors = part * errors * part.transpose() + Matrix4::identity() * ROUNDING.powi(2);
+        largest = largest.max(errors.diagonal().max());
+        if *is_strobe {
+            at_strobes = at_strobes.max(errors.diagonal().max());
+        }
+    }
+    let pairs = strobes.iter().enumerate().flat_map(|(i, a)| strobes[..i].iter().map(move |b| (a, b)));
+    let nearest = pairs.map(|(a, b)| metric.distance(a, b)).fold(f64::INFINITY, f64::min);
+    Ok(at_strobes.sqrt() >= nearest || largest >= 1.0)
+}

@@ -1,0 +1,60 @@
+// Whether motion without a period is quasi-periodic, by the rule of the reference (dynamics/src/orbit/regularity.rs):
+// weighted averages of the strobes over two successive windows agree.
+
+// Adds the strobe that was stored last to the averages. The first windows end before the budget does, the next ones
+// before that of undecided lanes. Newton's method may use up the periods that are left over.
+fn add_to_averages() {
+    let length = search.average_length;
+    if length == 0u || (has_averages() && tally.period > settings.periods) {
+        let budget = select(settings.longest, settings.periods, tally.period < settings.periods);
+        if 4u * tally.period >= settings.periods && budget >= tally.period + 4u * LEAST_WINDOW_STROBES {
+            search.average_length = (budget - tally.period) / 16u * 7u;
+            search.average_start = search.strobe_count;
+            motions[lane].averages = array<Real, 5>();
+        }
+        return;
+    }
+    let n = search.strobe_count - search.average_start - 1u;
+    if n >= 2u * length {
+        return;
+    }
+    let t = (Real(n % length) + 0.5) / Real(length);
+    let square = (t * (1.0 - t)) * (t * (1.0 - t));
+    // The integral of the window from 0 to 1 is 1/630. The second window counts as negative.
+    let weight = select(Real(-630.0), Real(630.0), n < length) / Real(length) * square * square;
+    let q = strobe_state();
+    let rate = 1.0 / flows[cell.flow_index].domains[0].angle;
+    let w = rate * q[1];
+    let v = rate * q[3];
+    let squares = (q[0] * q[0] + q[2] * q[2]) + (w * w + v * v);
+    var values = array<Real, 5>(q[0], w, q[2], v, squares);
+    for (var k = 0u; k < 5u; k++) {
+        motions[lane].averages[k] += weight * values[k];
+    }
+}
+
+// Whether both windows are complete.
+fn has_averages() -> bool {
+    return search.average_length > 0u && search.strobe_count >= search.average_start + 2u * search.average_length;
+}
+
+// Whether the exponent is zero within its error and the section is regular.
+fn is_quasi_periodic() -> bool {
+    if !EXPONENT || search.blocks < 2u || !has_averages() || search.known_lags == 0u
+        || 2u * search.known_lags < settings.max_period {
+        return false;
+    }
+    var nearest = 0u;
+    for (var lag = 1u; lag <= search.known_lags; lag++) {
+        iterations += 1u;
+        nearest = max(nearest, last_distance_at(lag));
+    }
+    let d = motions[lane].averages;
+    let unit = 1.0 / max(measures.position_scale, Real(1e-30));
+    let rate = flows[cell.flow_index].domains[0].angle / unit_of_rates();
+    let displacements = max(abs(d[0]), abs(d[2])) * unit;
+    let difference = max(max(displacements, abs(d[4]) * unit * unit), max(abs(d[1]), abs(d[3])) * rate);
+    let growth = mean_growth();
+    return difference < LARGEST_DIFFERENCE * Real(exp2(-f32(nearest) / PARTS_PER_OCTAVE))
+        && !exceeds_neutral(abs(growth.x) - CHAOS_ERRORS * growth.y);
+}
