@@ -139,8 +139,9 @@ fn judge_cycle() {
     compare_growth();
     let is_stable = measures.cycle_growth < -NEUTRAL * Real(tally.candidate);
     search.is_neutral = select(0u, 1u, abs(measures.cycle_growth) <= NEUTRAL * Real(tally.candidate));
-    // Motion on a neutral cycle neither approaches nor leaves it.
-    if search.is_neutral == 1u && search.newton_steps == 0u && search.return_distance >= AT_REST {
+    // Motion on a neutral cycle neither approaches nor leaves it, so it must return within rounding.
+    let returns = exp2(-f32(search.return_distance) / PARTS_PER_OCTAVE) < max(noise(), NOISE) && tally.grazes == 0u;
+    if search.is_neutral == 1u && search.newton_steps == 0u && returns {
         if search.divisor == 0u || search.divisor_distance < AT_REST || !reads_divisor() {
             search.cycle = tally.candidate;
         }

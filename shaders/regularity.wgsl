@@ -38,7 +38,7 @@ fn has_averages() -> bool {
     return search.average_length > 0u && search.strobe_count >= search.average_start + 2u * search.average_length;
 }
 
-// Whether the exponent is zero within its error and the section is regular.
+// Whether the exponent is that of neutral motion and the section is regular.
 fn is_quasi_periodic() -> bool {
     if !EXPONENT || search.blocks < 2u || !has_averages() || search.known_lags == 0u
         || 2u * search.known_lags < settings.max_period {
@@ -56,5 +56,5 @@ fn is_quasi_periodic() -> bool {
     let difference = max(max(displacements, abs(d[4]) * unit * unit), max(abs(d[1]), abs(d[3])) * rate);
     let growth = mean_growth();
     return difference < LARGEST_DIFFERENCE * Real(exp2(-f32(nearest) / PARTS_PER_OCTAVE))
-        && !exceeds_neutral(abs(growth.x) - CHAOS_ERRORS * growth.y);
+        && growth.x >= -CHAOS_ERRORS * growth.y && !exceeds_neutral(abs(growth.x));
 }

@@ -261,12 +261,12 @@ impl Analysis<'_> {
         cycle.map(|cycle| Ok(self.periodic(&self.read(&steady, &cycle)?, &cycle, 0.0))).transpose()
     }
 
-    /// Whether the motion is quasi-periodic: the largest exponent is zero within its error, like the one of the phase, and
-    /// the section is regular.
+    /// Whether the motion is quasi-periodic: the largest exponent is zero, like the one of the phase, and the section is
+    /// regular. Tangents on a torus may grow like those of neutral motion, but no more, and they do not shrink.
     fn is_quasi_periodic(&self, window: &Window) -> bool {
-        let (count, error) = (window.strobes.len() as f64, CHAOS_ERRORS * window.lyapunov_error);
-        let neutral = neutral_growth(TANGENT_PERIODS, count) / (count * self.flow.period);
-        window.lyapunov.abs() - error <= neutral
+        let count = window.strobes.len() as f64;
+        window.lyapunov >= -CHAOS_ERRORS * window.lyapunov_error
+            && window.lyapunov.abs() * count * self.flow.period <= neutral_growth(TANGENT_PERIODS, count)
             && is_regular(&window.strobes, &window.metric, self.settings.max_period)
     }
 

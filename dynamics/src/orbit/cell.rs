@@ -527,7 +527,7 @@ impl<'a> CellRun<'a> {
             || 2.0 * near_saddle_periods as f64 >= span && least.is_none_or(is_escape);
         let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
         let is_quasi_periodic = self.strobes.len() > self.budget.periods() as usize
-            && lyapunov.is_some_and(|(mean, error)| is_neutral(mean.abs() - errors * error))
+            && lyapunov.is_some_and(|(mean, error)| mean >= -errors * error && is_neutral(mean.abs()))
             && is_regular(late, &Metric::of(late, self.analysis.flow), max_period);
         let status = match slow {
             true if self.is_neutral => Status::Neutral,
