@@ -127,7 +127,6 @@ fn judge_cycle() {
     }
     measures.cycle_growth = spectral_growth();
     measures.cycle_stretch = cycle_stretch();
-    measures.strobe_stretch = motions[lane].stretch[3];
     restore_columns();
     carry_vector();
     confirm_chaos();
@@ -297,15 +296,17 @@ fn is_rejected() -> bool {
 // Rounding errors that the motion between two events adds, as a multiple of ULP; the same in resolution.rs.
 const ROUNDINGS: Real = 8.0;
 
-// Whether rounding decides the period: the cycle closes earlier within rounding, or rounding scatters its strobes by more
-// than the distance between two of them, or its states by the size of the motion. The reference has the same rule
-// (dynamics/src/orbit/resolution.rs).
+// Whether rounding decides the period: the cycle closes earlier within rounding, or rounding scatters its states by more
+// than the distance between two strobes. If there is only one strobe, a single rounding error must grow to the size of the
+// motion; with eight, f32 would doubt cells of the main map whose words and exponents are right. The reference has the
+// same rule (dynamics/src/orbit/resolution.rs).
 fn hides_period() -> bool {
     if search.divisor > 0u && exp2(-f32(search.divisor_distance) / PARTS_PER_OCTAVE) < max(noise(), NOISE) {
         return true;
     }
     let nearest = Real(exp2(-f32(search.nearest) / PARTS_PER_OCTAVE));
-    return EXPONENT && (ROUNDINGS * ULP * measures.strobe_stretch >= nearest || ULP * measures.cycle_stretch >= 1.0);
+    let roundings = select(Real(1.0), ROUNDINGS, search.cycle > 1u);
+    return EXPONENT && roundings * ULP * measures.cycle_stretch >= nearest;
 }
 
 // Returns the largest change of the state over a cycle by rounding, relative to the motion: every event rounds, and

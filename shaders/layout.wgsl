@@ -171,9 +171,8 @@ struct Measures {
     rate_scale: Real,
     // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
     cycle_growth: Real,
-    // Largest growth of a perturbation between two instants of that cycle, and from an instant to a strobe.
+    // Largest growth of a perturbation between two instants of that cycle.
     cycle_stretch: Real,
-    strobe_stretch: Real,
     // Growth and distance from the cycle at the reading before.
     earlier_growth: Real,
     earlier_distance: Real,
@@ -187,8 +186,8 @@ struct Motion {
     // The exponent's tangent vector while the matrix takes its place.
     vector: array<Real, 4>,
     // Growth of perturbations on the cycle that is read (check_columns in tangent.wgsl): smallest size of the columns so
-    // far, largest ratio of a size to a smaller one before it, largest size, and largest ratio at a strobe.
-    stretch: array<Real, 4>,
+    // far, largest ratio of a size to a smaller one before it, and largest size.
+    stretch: array<Real, 3>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
     // Weighted averages of gap, x and their squares: the first window less the second (regularity.wgsl).

@@ -24,7 +24,6 @@ fn begin_period() {
         let read = tally.candidate - tally.periods_to_read;
         if EXPONENT {
             check_columns();
-            motions[lane].stretch[3] = max(motions[lane].stretch[3], size_of_columns() / motions[lane].stretch[0]);
             compare_itineraries(itinerary, read);
         }
         let distance = octaves(distance_between(strobe_state(), measures.anchor));
@@ -139,7 +138,7 @@ fn begin_reading() {
         save_vector();
         tally.tangent_count = 4u;
         begin_columns();
-        motions[lane].stretch = array<Real, 4>(1.0, 1.0, 1.0, 1.0);
+        motions[lane].stretch = array<Real, 3>(1.0, 1.0, 1.0);
         tallies[lane].column_scalings = 0u;
         tallies[lane].is_superstable = 0u;
     }

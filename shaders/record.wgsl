@@ -70,7 +70,7 @@ fn last_status() -> u32 {
     if tally.grazes > 0u {
         return STATUS_NEAR_GRAZING;
     }
-    if strobe_distance() < f32(ON_STROBE) {
+    if strobe_distance() < ON_STROBE {
         return STATUS_STROBE_ON_EVENT;
     }
     if search.is_neutral == 1u {
@@ -82,8 +82,8 @@ fn last_status() -> u32 {
     return select(STATUS_OK, STATUS_BELOW_RESOLUTION, hides_period());
 }
 
-fn strobe_distance() -> f32 {
-    return bitcast<f32>(tally.strobe_distance);
+fn strobe_distance() -> Real {
+    return Real(bitcast<f32>(tally.strobe_distance));
 }
 
 // Whether an event near phase 0 makes the comparison of strobe states uncertain although the status does not say so: it
@@ -92,7 +92,7 @@ fn is_near_strobe() -> bool {
     if search.cycle > 1u {
         return strobe_distance() < NEAR_STROBE;
     }
-    return search.cycle == 0u && last_status() == STATUS_SLOW && strobe_distance() < f32(ON_STROBE);
+    return search.cycle == 0u && last_status() == STATUS_SLOW && strobe_distance() < ON_STROBE;
 }
 
 fn mesh_fraction(periods: u32) -> Real {

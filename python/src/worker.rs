@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use rattlemap::job::observer::Observer;
+use rattlemap::job::processor;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::problem::Problem;
@@ -119,7 +120,7 @@ fn own_threads() -> Result<Option<&'static ThreadPool>, Problem> {
     static OWN: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
     let this = process::id();
     if FIRST_PROCESS.get() == Some(&this) {
-        return Ok(None);
+        return processor::start_threads().map(|()| None).map_err(Problem::engine);
     }
     let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, pool)) = own.filter(|(process, _)| *process == this) {

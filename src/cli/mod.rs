@@ -19,7 +19,6 @@ pub(crate) mod say;
 mod stdout;
 mod validate;
 
-use std::error::Error as _;
 use std::ffi::OsString;
 use std::process::ExitCode;
 #[cfg(unix)]
@@ -31,6 +30,8 @@ use anyhow::anyhow;
 
 use arguments::{Bench, Cli, Command, parsed_from};
 use failure::Failure;
+
+use crate::job::processor;
 
 pub use arguments::parsed;
 pub use progress::Progress;
@@ -72,13 +73,5 @@ fn prepare(command: &Command) -> Result<(), Failure> {
     if matches!(command, Command::Models(_) | Command::Devices | Command::Completions(_)) {
         return Ok(());
     }
-    // The error has no source if there are threads already: Python may have started them.
-    let started = rayon::ThreadPoolBuilder::new().build_global();
-    match started.err().filter(|error| error.source().is_some()) {
-        None => Ok(()),
-        Some(error) => Err(Failure::Run(anyhow!(
-            "cannot start a thread on each core ({error}); raise the limits of this shell (`ulimit -u` and `ulimit -v`), or \
-             use fewer threads: set RAYON_NUM_THREADS to a small number"
-        ))),
-    }
+    processor::start_threads().map_err(|error| Failure::Run(anyhow!(error)))
 }

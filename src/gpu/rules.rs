@@ -111,7 +111,6 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("ON_CYCLE", ON_CYCLE),
         ("SETTLED_DISTANCE", settled_distance(precision)),
         ("SYMMETRIC", symmetric(precision)),
-        ("NEAR_STROBE", NEAR_STROBE_TURNS),
     ];
     let reals = [
         ("CHAOS_ERRORS", CHAOS_ERRORS),
@@ -124,6 +123,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("LARGEST_DIFFERENCE", LARGEST_DIFFERENCE),
         ("LINEAR", LINEAR_TOLERANCE),
         ("ON_STROBE", on_strobe),
+        ("NEAR_STROBE", NEAR_STROBE_TURNS),
     ];
     let count = |(name, value): (&str, u32)| format!("const {name}: u32 = {value}u;\n");
     let number =

@@ -1,5 +1,8 @@
 //! The host's processor: its name, its cores, and whether it can run the program.
 
+use std::error::Error;
+use std::sync::OnceLock;
+
 #[cfg(target_arch = "x86_64")]
 use raw_cpuid::native_cpuid::cpuid_count;
 
@@ -30,6 +33,24 @@ pub fn is_fit() -> bool {
 /// Number of threads that can run at a time.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Starts the threads that all computations share, unless they have been started.
+///
+/// # Errors
+/// The message, if the system refuses.
+pub fn start_threads() -> Result<(), String> {
+    // Threads that could not be started cannot be started later.
+    static STARTED: OnceLock<Result<(), String>> = OnceLock::new();
+    let start = || match rayon::ThreadPoolBuilder::new().build_global() {
+        Err(error) if error.source().is_some() => Err(format!(
+            "cannot start a thread on each core ({error}); raise the limits of this shell (`ulimit -u` and `ulimit -v`), or \
+             use fewer threads: set RAYON_NUM_THREADS to a small number"
+        )),
+        // An error without a source says that there are threads already.
+        _ => Ok(()),
+    };
+    STARTED.get_or_init(start).clone()
 }
 
 /// Name that the processor reports, which may be empty. None if it cannot be found.

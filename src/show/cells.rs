@@ -136,7 +136,7 @@ impl<'a> Cells<'a> {
         let continued = records.filter(|record| record.periods_run > from);
         let (ends, periods) = continued
             .map(|record| {
-                let has_ended = matches!(classify(&record), Class::Periodic { .. } | Class::Undecided);
+                let has_ended = !matches!(classify(&record), Class::Chaotic | Class::Failed);
                 (usize::from(has_ended), (record.periods_run - from) as usize)
             })
             .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));

@@ -194,7 +194,7 @@ pub fn check(folder: &Path, listed: &[FileEntry]) -> io::Result<Vec<Finding>> {
 }
 
 /// Compares a file with its entry.
-fn fault(folder: &Path, listed: &FileEntry) -> Option<Fault> {
+pub(crate) fn fault(folder: &Path, listed: &FileEntry) -> Option<Fault> {
     if !is_in_folder(&listed.name) {
         return Some(Fault::Damaged("this is no name of a file in the folder".to_owned()));
     }

@@ -1,7 +1,7 @@
 //! The folder of a map: tables, figures, report and manifest.
 
-use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
@@ -24,6 +24,7 @@ use crate::store::error::OutputError;
 use crate::store::file_names::{RECORDS, UNFINISHED};
 use crate::store::folder::Folder;
 use crate::store::inventory::FileEntry;
+use crate::store::plain_file::read_text;
 use crate::store::{inventory, manifest, unfinished, validation_json};
 
 pub use crate::show::provenance::Provenance;
@@ -43,6 +44,9 @@ const LAYERS: [&str; 8] =
 
 /// Largest number of cells of a map whose figures are drawn in parallel: each figure holds its pixels twice.
 const SIDE_BY_SIDE: usize = 1 << 22;
+
+/// Largest size of a validation that is read, in bytes.
+const MOST_VALIDATION_BYTES: u64 = 1_000_000_000;
 
 /// Names of all files that are made from a map's records.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
@@ -116,10 +120,15 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<St
 
 /// Returns the validation in a folder, if it is undamaged and the records are those that were validated.
 fn validation_of(folder: &Folder, earlier: &[FileEntry], records: &[FileEntry]) -> Option<Value> {
-    let entry = inventory::entry(folder.path(), VALIDATION).ok()?;
-    let is_same = records.iter().chain([&entry]).all(|entry| earlier.contains(entry));
-    let text = fs::read_to_string(folder.path().join(VALIDATION)).ok().filter(|_| is_same)?;
+    let listed = earlier.iter().find(|entry| entry.name == VALIDATION)?;
+    let is_same = records.iter().all(|entry| earlier.contains(entry))
+        && inventory::fault(folder.path(), listed).is_none();
+    let text = read_validation(&folder.path().join(VALIDATION)).ok().filter(|_| is_same)?;
     serde_json::from_str(&text).ok()
+}
+
+fn read_validation(path: &Path) -> io::Result<String> {
+    read_text(path, MOST_VALIDATION_BYTES, "validate the map again")
 }
 
 /// Writes `validation.json`, the report with a section on the validation if the map has one, and the manifest. `elapsed` is
@@ -159,7 +168,7 @@ pub fn repair(
     let clock = Instant::now();
     let path = folder.path().join(VALIDATION);
     let read = || {
-        let text = fs::read_to_string(&path);
+        let text = read_validation(&path);
         text.map_err(|reason| OutputError::Write { path: path.clone(), reason: reason.into() })
     };
     let validation: Option<Value> = if has_validation { Some(serde_json::from_str(&read()?)?) } else { None };

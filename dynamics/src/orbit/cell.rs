@@ -80,6 +80,11 @@ impl Measurement {
     fn is_decided(&self) -> bool {
         self.status == Status::Ok && self.lyapunov.is_some()
     }
+
+    /// Whether aperiodic motion is certainly chaotic.
+    fn is_chaotic(&self) -> bool {
+        self.is_decided() && !self.is_quasi_periodic
+    }
 }
 
 /// Integrates one cell from `start` at phase 0 within its budget.
@@ -282,9 +287,10 @@ impl<'a> CellRun<'a> {
             _ if now >= decided_by && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
             // Only chaos continues until the last period.
-            _ if now == decided_by => Some(self.aperiodic(CHAOS_ERRORS)).filter(|cell| !cell.is_decided()),
+            _ if now == decided_by => Some(self.aperiodic(CHAOS_ERRORS)).filter(|cell| !cell.is_chaotic()),
+            _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS))
+                .filter(|cell| cell.is_quasi_periodic || decided_by == last && cell.is_chaotic()),
             _ if decided_by < last => None,
-            _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measurement::is_decided),
             _ if now >= chaos_from && !self.approaches => {
                 Some(self.aperiodic(self.budget.chaos_errors())).filter(Measurement::is_decided)
             }

@@ -10,8 +10,8 @@ use crate::stability::{Cycle, UNIT};
 /// Rounding error of the motion between two events, relative to the size of the motion.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Whether rounding scatters the strobes of a cycle by more than the distance between two of them, or its states by the
-/// size of the motion. The period is then a result of rounding. `events` are those of the cycle.
+/// Whether rounding scatters the states of a cycle by more than the distance between two strobes, or by the size of the
+/// motion. The period is then a result of rounding. `events` are those of the cycle.
 ///
 /// Each part of the cycle, from between two events to between the next two, adds a rounding error in every direction, and
 /// the derivative of the motion carries the sum of all earlier errors on. So an error counts with its largest growth up
@@ -27,9 +27,9 @@ pub(super) fn is_below_resolution(
     let flow = seed.flow();
     let mut trajectory = seed.at(cycle.state, UNIT);
     let (mut strobes, mut parts) = (vec![cycle.state], Vec::new());
-    let mut part = |trajectory: &mut Trajectory<'_, 4>, is_strobe: bool| {
+    let mut part = |trajectory: &mut Trajectory<'_, 4>| {
         let columns = trajectory.tangents().map(Vector4::from);
-        parts.push((Matrix4::from_columns(&columns) * trajectory.log_scale().exp(), is_strobe));
+        parts.push(Matrix4::from_columns(&columns) * trajectory.log_scale().exp());
         trajectory.set_tangents(UNIT);
     };
     let mut times = events.windows(2).map(|pair| 0.5 * (pair[0].t + pair[1].t)).peekable();
@@ -37,10 +37,10 @@ pub(super) fn is_below_resolution(
         let start = f64::from(n) * flow.period;
         while let Some(time) = times.next_if(|time| *time < start + flow.period) {
             trajectory.advance_to(time - start, &mut ())?;
-            part(&mut trajectory, false);
+            part(&mut trajectory);
         }
         trajectory.advance_period(&mut ())?;
-        part(&mut trajectory, true);
+        part(&mut trajectory);
         strobes.push(trajectory.state());
     }
     strobes.pop();
@@ -48,16 +48,13 @@ pub(super) fn is_below_resolution(
     let units = metric.scaled(&Vector4::repeat(1.0));
     let (to, from) = (Matrix4::from_diagonal(&units), Matrix4::from_diagonal(&units.map(f64::recip)));
     // Covariance of the errors. The second turn includes growth across the end of the cycle.
-    let (mut errors, mut largest, mut at_strobes) = (Matrix4::zeros(), 0.0f64, 0.0f64);
-    for (part, is_strobe) in parts.iter().chain(&parts) {
+    let (mut errors, mut largest) = (Matrix4::zeros(), 0.0f64);
+    for part in parts.iter().chain(&parts) {
         let part = to * part * from;
         errors = part * errors * part.transpose() + Matrix4::identity() * ROUNDING.powi(2);
         largest = largest.max(errors.diagonal().max());
-        if *is_strobe {
-            at_strobes = at_strobes.max(errors.diagonal().max());
-        }
     }
     let pairs = strobes.iter().enumerate().flat_map(|(i, a)| strobes[..i].iter().map(move |b| (a, b)));
-    let nearest = pairs.map(|(a, b)| metric.distance(a, b)).fold(f64::INFINITY, f64::min);
-    Ok(at_strobes.sqrt() >= nearest || largest >= 1.0)
+    let nearest = pairs.map(|(a, b)| metric.distance(a, b)).fold(1.0, f64::min);
+    Ok(largest.sqrt() >= nearest)
 }

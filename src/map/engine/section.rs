@@ -18,6 +18,16 @@ const BATCH: usize = 4096;
 /// at every step.
 const STROBE_TOLERANCES: f64 = 16.0;
 
+/// The second run of a lane.
+struct SecondRun {
+    /// Place of its record.
+    place: usize,
+    section: Section,
+    law: Law,
+    /// Whether its shader adds a sine to the force.
+    sine: bool,
+}
+
 /// Runs the lanes of these records a second time if an event lies at phase 0, and replaces the records whose period the
 /// second run confirms. `of` returns oscillator and law of a record's number.
 ///
@@ -34,42 +44,36 @@ pub(crate) async fn compare_at_sections(
         let period = if record.period > 0 { record.period } else { 2 };
         let flow = Flow::new(&oscillator);
         let section = Section::of(&flow, law, record.strobe, period, Allowance::UNLIMITED)?;
-        Some((place, section, law))
+        let sine = settings.sine || has_sine(&section.flow.oscillator);
+        Some(SecondRun { place, section, law, sine })
     };
-    let sections: Vec<_> = records.par_iter().enumerate().filter_map(section).collect();
+    let mut runs: Vec<_> = records.par_iter().enumerate().filter_map(section).collect();
     // A shader that adds a sine to the force may round differently, so these lanes run apart from the others.
-    let (with_sine, others): (Vec<_>, Vec<_>) =
-        sections.into_iter().partition(|(_, section, _)| has_sine(&section.flow.oscillator));
+    runs.sort_by_key(|run| run.sine);
     let tolerance = STROBE_TOLERANCES * rules::on_strobe(gpu.precision());
-    for batch in others.chunks(BATCH).chain(with_sine.chunks(BATCH)) {
-        let flows: Vec<_> = batch.iter().map(|(_, section, _)| section.flow.oscillator).collect();
-        let laws: Vec<_> = batch.iter().map(|(_, _, law)| *law).collect();
-        let lane = |(i, (_, section, _)): (usize, &(usize, Section, Law))| Lane {
-            flow: i as u32,
-            law: i as u32,
-            start: section.start,
-        };
-        let lanes: Vec<_> = batch.iter().enumerate().map(lane).collect();
-        let settings = LaneSettings { sine: settings.sine || flows.iter().any(has_sine), ..*settings };
-        let again = gpu.run(&flows, &laws, &lanes, &settings).await?;
-        for ((place, section, law), mut second) in batch.iter().zip(again) {
-            if std::env::var("DBG").is_ok() {
-                eprintln!(
-                    "{:?} start {:?} second {:?} {:?} {} {:?}",
-                    records[*place].1.strobe,
-                    section.start,
-                    second.period,
-                    status(&second),
-                    second.periods_run,
-                    second.strobe
-                );
+    // A lane that begins at rest on its cycle may find no recurrence that contracts: then the whole budget decides.
+    for early_stop in [settings.early_stop, false] {
+        let mut open = Vec::new();
+        for batch in runs.chunk_by(|a, b| a.sine == b.sine).flat_map(|alike| alike.chunks(BATCH)) {
+            let flows: Vec<_> = batch.iter().map(|run| run.section.flow.oscillator).collect();
+            let laws: Vec<_> = batch.iter().map(|run| run.law).collect();
+            let lanes = (0..).zip(batch).map(|(i, run)| Lane { flow: i, law: i, start: run.section.start });
+            let settings = LaneSettings { sine: batch[0].sine, early_stop, ..*settings };
+            let seconds = gpu.run(&flows, &laws, &lanes.collect::<Vec<_>>(), &settings).await?;
+            for (run, mut second) in batch.iter().zip(seconds) {
+                let first = &mut records[run.place].1;
+                let strobe = run.section.strobe(run.law, second.strobe, tolerance);
+                let (Class::Periodic { .. }, Some((strobe, _))) = (classify(&second), strobe) else {
+                    open.push(run.place);
+                    continue;
+                };
+                if replaces(&second, first) {
+                    second.turn_harmonics(|phase| run.section.harmonic_phase(phase));
+                    *first = Record { strobe, periods_run: first.periods_run, ..second };
+                }
             }
-            let first = &mut records[*place].1;
-            let strobe = section.strobe(*law, second.strobe, tolerance);
-            let Some((strobe, _)) = strobe.filter(|_| replaces(&second, first)) else { continue };
-            second.turn_harmonics(|phase| section.harmonic_phase(phase));
-            *first = Record { strobe, periods_run: first.periods_run, ..second };
         }
+        runs.retain(|run| settings.early_stop && open.contains(&run.place));
     }
     records.iter_mut().for_each(|(_, record)| record.valid &= !valid::NEAR_STROBE);
     Ok(())
@@ -80,11 +84,8 @@ pub(crate) fn is_on_strobe(record: &Record) -> bool {
     status(record) == Status::StrobeOnEvent && record.period > 0 || record.valid & valid::NEAR_STROBE != 0
 }
 
-/// Whether a second run replaces a record. The period of a record with the flag may be right.
+/// Whether a second run that found a cycle replaces a record. If only its flag is set, its period may be right.
 fn replaces(second: &Record, first: &Record) -> bool {
-    let is_flagged = first.valid & valid::NEAR_STROBE != 0;
-    let is_shorter =
-        first.period == 0 || first.period > second.period && first.period.is_multiple_of(second.period);
-    matches!(classify(second), Class::Periodic { .. })
-        && (is_shorter || !is_flagged || status(first) == Status::StrobeOnEvent)
+    let is_shorter = first.period > second.period && first.period.is_multiple_of(second.period);
+    first.period == 0 || is_shorter || status(first) == Status::StrobeOnEvent
 }

@@ -105,8 +105,8 @@ fn a_manifest_larger_than_any_is_refused_unread() {
         .unwrap()
         .set_len(1 << 40)
         .unwrap();
-    fails(&folder, "check out/s", 1, &["manifest.json is damaged (it has 1", "at most 256 MB are read"]);
-    fails(&folder, "validate out/s", 2, &["at most 256 MB are read"]);
+    fails(&folder, "check out/s", 1, &["manifest.json is damaged (it has 1", "at most 256.0 MB are read"]);
+    fails(&folder, "validate out/s", 2, &["at most 256.0 MB are read"]);
 }
 
 #[test]
