@@ -6,7 +6,7 @@
 //! Physica D 411 (2020) 132569): of each displacement, and of the sum of their squares, which shows whether a spiral
 //! shrinks. Velocities jump where an impact passes phase 0, and their averages converge slowly.
 
-use super::recurrence::{Metric, near_saddle};
+use super::recurrence::Metric;
 use crate::model::State;
 
 /// Least number of strobe states in a window.
@@ -16,6 +16,9 @@ pub const LEAST_WINDOW: usize = 64;
 /// sequences of the logistic map, with windows of 64 to 200 strobes, none was below 0.0024 and half exceeded 0.06.
 pub const LARGEST_DIFFERENCE: f64 = 1.0 / 1024.0;
 
+/// Least distance within which the motion recurs, relative to its displacements: that of a torus with a tenth of their size.
+const LEAST_RECURRENCE: f64 = 5e-3;
+
 /// Power of `t (1 - t)` in the window, with `t` from 0 to 1. WGSL has no exponential function of f64, so the window is a
 /// polynomial; for windows of up to 500 strobes its side lobes are lower than those of the exponential window.
 const POWER: i32 = 4;
@@ -23,8 +26,7 @@ const POWER: i32 = 4;
 /// Whether averages over both halves of a sequence of strobe states agree, and the states do not stay near a cycle.
 pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) -> bool {
     let length = strobes.len() / 2;
-    // Near a cycle the section is too small to show whether it shrinks.
-    if length < LEAST_WINDOW || near_saddle(strobes, metric, max_period) >= length {
+    if length < LEAST_WINDOW {
         return false;
     }
     let [first, second] = [0, length].map(|from| averages(&strobes[from..][..length], metric));
@@ -34,7 +36,9 @@ pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) ->
         (squares.sum::<f64>() / (strobes.len() - lag) as f64).sqrt()
     };
     let nearest = (1..=length.min(max_period as usize)).map(distance).fold(f64::INFINITY, f64::min);
-    difference < LARGEST_DIFFERENCE * nearest
+    let size = strobes.iter().map(|y| metric.scaled(&(*y).into())).map(|y| y[0].abs().max(y[2].abs()));
+    // Near a cycle the section is too small to show whether it shrinks.
+    difference < LARGEST_DIFFERENCE * nearest && nearest > LEAST_RECURRENCE * size.fold(0.0, f64::max)
 }
 
 /// Returns the weighted averages of both displacements, in units of the metric, and of the sum of their squares.
