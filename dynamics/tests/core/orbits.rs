@@ -129,6 +129,15 @@ fn undamped_motion_is_quasi_periodic() {
     }
 }
 
+/// The exponent is -0.0009, and after 48 periods the motion is within 2e-4: the averages of its long cycle are regular.
+#[test]
+fn the_end_of_a_period_doubling_cascade_is_not_quasi_periodic() {
+    let pair = cell(0.9789473684210527, 5.747368421052632);
+    let measured = measure(&flow_of(&pair), pair.law(), REST, &BUDGET);
+    assert!(!measured.is_quasi_periodic, "{measured:?}");
+    assert_ne!(orbit(&pair).class, Class::QuasiPeriodic);
+}
+
 /// The multipliers are `exp(+-2 pi i / omega)`, and after 5 periods of 3/5 the free frequency every motion repeats.
 #[test]
 fn the_steady_motion_of_an_undamped_oscillator_is_neutral() {
