@@ -92,7 +92,9 @@ fn is_near_strobe() -> bool {
     if search.cycle > 1u {
         return strobe_distance() < NEAR_STROBE;
     }
-    return search.cycle == 0u && last_status() == STATUS_SLOW && strobe_distance() < ON_STROBE;
+    let status = last_status();
+    let is_undecided = search.cycle == 0u && (status == STATUS_SLOW || status == STATUS_NEUTRAL);
+    return is_undecided && strobe_distance() < ON_STROBE;
 }
 
 fn mesh_fraction(periods: u32) -> Real {

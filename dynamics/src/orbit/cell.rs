@@ -172,7 +172,7 @@ fn measure_by_strobes(
     let measured = run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)));
     let is_on_strobe = match measured.status {
         Status::StrobeOnEvent => true,
-        Status::Slow => measured.period.is_none() && run.has_events_at_strobes(),
+        Status::Slow | Status::Neutral => measured.period.is_none() && run.has_events_at_strobes(),
         _ => false,
     };
     (measured, is_on_strobe)
