@@ -112,6 +112,9 @@ fn restore_columns() {
     }
 }
 
+// Distance of 0.01, in quarter octaves below 1.
+const NEAR_RETURN: u32 = 26u;
+
 // Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. If the cycle
 // is unstable, or if its multiplier shows that the lane is still too far from it, the lane goes on while it has periods
 // left: chaos stays near unstable cycles, and near places where a pair of cycles has just vanished.
@@ -141,10 +144,15 @@ fn judge_cycle() {
     // Motion on a neutral cycle neither approaches nor leaves it, so it must return within rounding.
     let returns = exp2(-f32(search.return_distance) / PARTS_PER_OCTAVE) < max(noise(), NOISE) && tally.grazes == 0u;
     if search.is_neutral == 1u && search.newton_steps == 0u && returns {
-        if search.divisor == 0u || search.divisor_distance < AT_REST || !reads_divisor() {
-            search.cycle = tally.candidate;
+        let is_at_divisor = search.divisor > 0u && search.divisor_distance >= AT_REST;
+        if is_at_divisor && reads_divisor() {
+            return;
         }
-        return;
+        // Motion that slowly approaches a cycle from both sides in turn nearly returns after half of the period that it seems to have.
+        if is_at_divisor || search.divisor == 0u || search.divisor_distance < NEAR_RETURN {
+            search.cycle = tally.candidate;
+            return;
+        }
     }
     // Near a graze the strobe map has no derivative that locates the cycle.
     let is_smooth = tally.grazes == 0u || search.newton_steps > 0u;
