@@ -54,5 +54,5 @@ fn is_quasi_periodic() -> bool {
     let allowed = LARGEST_DIFFERENCE * Real(exp2(-f32(nearest) / PARTS_PER_OCTAVE)) + ROUNDING_OF_AVERAGES * ULP;
     let growth = mean_growth();
     return difference < allowed && !escapes(CHAOS_ERRORS)
-        && growth.x >= -CHAOS_ERRORS * growth.y && !exceeds_neutral(abs(growth.x));
+        && growth.x >= -CHAOS_ERRORS * growth.y - 64.0 * ULP && !exceeds_neutral(abs(growth.x));
 }

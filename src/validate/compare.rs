@@ -300,7 +300,12 @@ impl Bars<'_> {
             _ => {
                 let graded = [Status::Ok, Status::Slow, Status::Neutral];
                 let is_grade = statuses.iter().all(|status| graded.contains(status));
-                statuses[0] == statuses[1] || is_grade && !self.is_decisive(judge)
+                // The limit of contact-free motion is known, so an early stop need not wait until it is reached.
+                let counted = valid::IMPACTS | valid::MESH;
+                let is_free = judge.valid & counted == counted
+                    && judge.impacts_per_period == 0.0
+                    && judge.mesh_fraction == 0.0;
+                statuses[0] == statuses[1] || is_grade && (is_free || !self.is_decisive(judge))
             }
         }
     }

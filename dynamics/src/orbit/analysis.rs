@@ -19,6 +19,9 @@ use crate::word::Word;
 /// Default number of last periods whose events are listed for aperiodic motion.
 pub const EVENT_PERIODS: u32 = 8;
 
+/// Rounding error of the logarithm of a tangent vector's growth over a forcing period.
+pub(super) const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
 /// Standard errors by which an exponent must exceed zero for chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
 
@@ -93,6 +96,7 @@ pub fn analyse_until(
         longest_window,
         event_periods,
         measures: true,
+        resolves: true,
         allowance,
         report,
     };
@@ -105,8 +109,18 @@ pub fn analyse_until(
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, event_periods: u32) -> Orbit {
     let (longest_window, allowance) = (LONGEST_WINDOW, ALLOWANCE);
     let report = &|_, _| ();
-    Analysis { flow, law, settings, longest_window, event_periods, measures: true, allowance, report }
-        .orbit(start)
+    Analysis {
+        flow,
+        law,
+        settings,
+        longest_window,
+        event_periods,
+        measures: true,
+        resolves: true,
+        allowance,
+        report,
+    }
+    .orbit(start)
 }
 
 /// Growth of tangents that is not chaos, as a power of time. Tangents of neutral motion grow in proportion to time (a
@@ -167,6 +181,8 @@ pub(super) struct Analysis<'a> {
     pub(super) event_periods: u32,
     /// Whether quantities are measured.
     pub(super) measures: bool,
+    /// Whether the growth of rounding errors on cycles is computed.
+    pub(super) resolves: bool,
     /// Work that the motion may take.
     pub(super) allowance: Allowance<'a>,
     /// Receives the forcing periods so far, and a lower bound of their total.
@@ -265,7 +281,7 @@ impl Analysis<'_> {
     /// regular. Tangents on a torus may grow like those of neutral motion, but no more, and they do not shrink.
     fn is_quasi_periodic(&self, window: &Window) -> bool {
         let count = window.strobes.len() as f64;
-        window.lyapunov >= -CHAOS_ERRORS * window.lyapunov_error
+        window.lyapunov >= -CHAOS_ERRORS * window.lyapunov_error - ROUNDING / self.flow.period
             && window.lyapunov.abs() * count * self.flow.period <= neutral_growth(TANGENT_PERIODS, count)
             && is_regular(&window.strobes, &window.metric, self.settings.max_period)
     }
@@ -477,7 +493,7 @@ impl Analysis<'_> {
         if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         }
-        let below_resolution = is_below_resolution(seed, cycle, &reading.events)?;
+        let below_resolution = self.resolves && is_below_resolution(seed, cycle, &reading.events)?;
         Ok(Reading { closes, below_resolution, ..reading })
     }
 

@@ -7,7 +7,9 @@ use std::cell::{Cell, OnceCell};
 use std::sync::atomic::AtomicBool;
 
 use super::CHAOS_ERRORS;
-use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, neutral_growth, status_of};
+use super::analysis::{
+    APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, ROUNDING, neutral_growth, status_of,
+};
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::Quantities;
@@ -150,6 +152,8 @@ fn measure_by_strobes(
         longest_window: 0,
         event_periods: 0,
         measures: budget.quantities,
+        // Without exponents, recurrence alone decides, as in lanes.
+        resolves: budget.exponent,
         allowance,
         report: &|_, _| (),
     };
@@ -451,9 +455,10 @@ impl<'a> CellRun<'a> {
         if let Some(reading) = found.reading.get() {
             return Ok(reading);
         }
-        // Once for the events, once for the growth of rounding errors.
-        self.reading_periods.set(self.reading_periods.get() + 2 * found.cycle.period);
         let reading = self.analysis.read(&found.seed, &found.cycle)?;
+        // Once for the events, and once for the growth of rounding errors if it is computed.
+        let turns = if self.analysis.resolves && reading.events.len() > 1 { 2 } else { 1 };
+        self.reading_periods.set(self.reading_periods.get() + turns * found.cycle.period);
         Ok(found.reading.get_or_init(|| reading))
     }
 
@@ -527,7 +532,9 @@ impl<'a> CellRun<'a> {
             || 2.0 * near_saddle_periods as f64 >= span && least.is_none_or(is_escape);
         let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
         let is_quasi_periodic = self.strobes.len() > self.budget.periods() as usize
-            && lyapunov.is_some_and(|(mean, error)| mean >= -errors * error && is_neutral(mean.abs()))
+            && lyapunov.is_some_and(|(mean, error)| {
+                mean >= -errors * error - ROUNDING / period && is_neutral(mean.abs())
+            })
             && is_regular(late, &Metric::of(late, self.analysis.flow), max_period);
         let status = match slow {
             true if self.is_neutral => Status::Neutral,
