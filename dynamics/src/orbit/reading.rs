@@ -70,13 +70,23 @@ impl Reading {
             closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),
             below_resolution: false,
-            on_strobe: events.iter().any(|event| {
-                let turns = event.t / flow.period;
-                turns < ON_STROBE_TURNS || 1.0 - turns < ON_STROBE_TURNS
-            }),
+            // Rounding may put an event at phase 0 outside the cycle.
+            on_strobe: [&first, &*trajectory].into_iter().any(|end| passes_wall(flow, end))
+                || events.iter().any(|event| {
+                    let turns = event.t / flow.period;
+                    turns < ON_STROBE_TURNS || 1.0 - turns < ON_STROBE_TURNS
+                }),
             events: events.iter().map(|event| in_states(flow, event, start)).collect(),
         })
     }
+}
+
+/// Whether free motion is at a wall within `ON_STROBE_TURNS` of the present time.
+fn passes_wall(flow: &Flow, trajectory: &Trajectory<'_, 0>) -> bool {
+    let q = flow.to_gap(trajectory.state());
+    let reach = ON_STROBE_TURNS * flow.period * q[1].abs();
+    let is_near = |side| (q[0] - flow.wall(side)).abs() < reach;
+    trajectory.meshing().is_none() && Side::BOTH.into_iter().any(is_near)
 }
 
 /// Converts an event to states; `start` is the first period.
