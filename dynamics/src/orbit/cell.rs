@@ -16,6 +16,7 @@ use super::quantities::Quantities;
 use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
 use super::regularity::is_regular;
+use super::resolution::can_be_below;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
 use super::{Budget, Orbit, Section, Status};
 use crate::flow::Flow;
@@ -457,7 +458,8 @@ impl<'a> CellRun<'a> {
         }
         let reading = self.analysis.read(&found.seed, &found.cycle)?;
         // Once for the events, and once for the growth of rounding errors if it is computed.
-        let turns = if self.analysis.resolves && reading.events.len() > 1 { 2 } else { 1 };
+        let again = self.analysis.resolves && can_be_below(found.cycle.period, reading.events.len());
+        let turns = if again { 2 } else { 1 };
         self.reading_periods.set(self.reading_periods.get() + turns * found.cycle.period);
         Ok(found.reading.get_or_init(|| reading))
     }

@@ -10,6 +10,12 @@ use crate::stability::{Cycle, UNIT};
 /// Rounding error of the motion between two events, relative to the size of the motion.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
+/// Whether so many events can amplify rounding errors enough. Away from grazing, which has a status of its own, an event
+/// amplifies them by less than 1000; with a single strobe, they must grow to the size of the motion.
+pub(super) fn can_be_below(period: u32, events: usize) -> bool {
+    events >= if period == 1 { 5 } else { 2 }
+}
+
 /// Whether rounding scatters the states of a cycle by more than the distance between two strobes, or by the size of the
 /// motion. The period is then a result of rounding. `events` are those of the cycle.
 ///
@@ -24,8 +30,7 @@ pub(super) fn is_below_resolution(
     cycle: &Cycle,
     events: &[Event],
 ) -> Result<bool, Stop> {
-    // One event amplifies errors that much only near grazing, which has a status of its own.
-    if events.len() < 2 {
+    if !can_be_below(cycle.period, events.len()) {
         return Ok(false);
     }
     let flow = seed.flow();
