@@ -233,7 +233,7 @@ fn all_cards_are_measured_against_one() {
     let mut run = Process::new(script);
     run.arg(assert_cmd::cargo::cargo_bin("rattlemap")).arg(machine.folder.path().join("measured"));
     run.args(["8", "cards"]).envs(machine.environment());
-    run.env("WGPU_ADAPTER_NAME", "llvmpipe").env("PRECISIONS", "f32").env("MEASURE_SECONDS", "400");
+    run.env("WGPU_ADAPTER_NAME", "llvmpipe").env("PRECISIONS", "f32").env("MEASURE_SECONDS", "800");
     let output = run.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let table = fs::read_to_string(machine.file("measured", "speed.csv")).unwrap();

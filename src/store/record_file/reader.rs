@@ -76,6 +76,9 @@ impl Extent {
     }
 }
 
+/// A batch with its head: numbers of runs and their records.
+type Batch = (BatchHead, Vec<(u32, Record)>);
+
 /// Damage of a batch.
 struct Bad {
     what: &'static str,
@@ -187,7 +190,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the batch at an offset; its number must be at least `least`. The inner error describes the damage.
-    fn batch_at(&self, at: u64, least: u32) -> io::Result<Result<(BatchHead, Vec<(u32, Record)>), Bad>> {
+    fn batch_at(&self, at: u64, least: u32) -> io::Result<Result<Batch, Bad>> {
         let bad = |what| Ok(Err(Bad { what, body: 0 }));
         const CUT: &str = "a batch is cut short";
         let mut head = [0; HEAD];
