@@ -274,7 +274,7 @@ impl Analysis<'_> {
         let steady = Trajectory::new(self.flow, self.law, motion.steady());
         let newton = &mut Newton::default();
         let cycle = self.maps(1).into_iter().find_map(|map| newton.refine(&steady, map));
-        cycle.map(|cycle| Ok(self.periodic(&self.read(&steady, &cycle)?, &cycle, 0.0))).transpose()
+        cycle.map(|cycle| self.periodic(&steady, &self.read(&steady, &cycle)?, &cycle, 0.0)).transpose()
     }
 
     /// Whether the motion is quasi-periodic: the largest exponent is zero, like the one of the phase, and the section is
@@ -367,7 +367,7 @@ impl Analysis<'_> {
             };
             if let Some(distance) = distance {
                 let reading = self.read(trajectory, &cycle)?;
-                return Ok(Some(self.periodic(&reading, &cycle, distance)));
+                return Ok(Some(self.periodic(trajectory, &reading, &cycle, distance)?));
             }
         }
         Ok(None)
@@ -493,12 +493,21 @@ impl Analysis<'_> {
         if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period, self.measures)?;
         }
-        let below_resolution = self.resolves && is_below_resolution(seed, cycle, &reading.events)?;
-        Ok(Reading { closes, below_resolution, ..reading })
+        Ok(Reading { closes, ..reading })
     }
 
-    /// Builds the orbit of a cycle; `distance` is that of the motion from the cycle.
-    pub(super) fn periodic(&self, reading: &Reading, cycle: &Cycle, distance: f64) -> Orbit {
+    /// Builds the orbit of a cycle; `distance` is that of the motion from the cycle. The growth of rounding errors is
+    /// computed only if no other status comes first.
+    ///
+    /// # Errors
+    /// A [`Stop`] if the cycle cannot be integrated.
+    pub(super) fn periodic(
+        &self,
+        seed: &Trajectory<'_>,
+        reading: &Reading,
+        cycle: &Cycle,
+        distance: f64,
+    ) -> Result<Orbit, Stop> {
         let status = if reading.near_grazing || cycle.near_grazing {
             Status::NearGrazing
         } else if reading.on_strobe {
@@ -507,12 +516,12 @@ impl Analysis<'_> {
             Status::Neutral
         } else if distance > ON_CYCLE {
             Status::Slow
-        } else if reading.below_resolution {
+        } else if self.resolves && is_below_resolution(seed, cycle, &reading.events)? {
             Status::BelowResolution
         } else {
             Status::Ok
         };
-        Orbit {
+        Ok(Orbit {
             class: Class::Periodic { period: cycle.period },
             status,
             lyapunov: cycle.exponent(self.flow.period),
@@ -529,7 +538,7 @@ impl Analysis<'_> {
             cycle_periods: cycle.period,
             forcing_period: self.flow.period,
             periods_run: 0,
-        }
+        })
     }
 
     /// Measures the observed periods that follow a trajectory; none if they are not requested or it cannot be

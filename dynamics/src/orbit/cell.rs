@@ -16,7 +16,7 @@ use super::quantities::Quantities;
 use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
 use super::regularity::is_regular;
-use super::resolution::can_be_below;
+use super::resolution::too_few_events;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
 use super::{Budget, Orbit, Section, Status};
 use crate::flow::Flow;
@@ -382,7 +382,7 @@ impl<'a> CellRun<'a> {
                     if metric.distance(&state, &cycle.state) < ON_CYCLE {
                         let cycle = self.analysis.smallest(newton, seed, cycle, &metric);
                         let of = |cycle| {
-                            Ok(self.analysis.periodic(&self.analysis.read(seed, &cycle)?, &cycle, 0.0))
+                            self.analysis.periodic(seed, &self.analysis.read(seed, &cycle)?, &cycle, 0.0)
                         };
                         return cycle.map(of).transpose();
                     }
@@ -429,7 +429,7 @@ impl<'a> CellRun<'a> {
         let radius = cycle.spectral_radius();
         let at_last = present * radius.powf(left / f64::from(cycle.period));
         if present < ON_CYCLE {
-            return Ok(Some(self.analysis.periodic(self.reading(found)?, cycle, at_last)));
+            return Ok(Some(self.accepted(found, at_last)?));
         }
         let halving = (0.5f64.ln() / radius.max(0.1).ln()).ceil();
         let back = (halving.min(1e6) as usize).max(LEAST_APPROACH_CYCLES).min(now / 2 / period);
@@ -448,7 +448,18 @@ impl<'a> CellRun<'a> {
         let stays = |tolerance| reading.closes && self.stays(found, &reading.itineraries, metric, tolerance);
         let stays = stays(LINEAR_TOLERANCE)
             || present < near && stays(CLOSE_TOLERANCE) && !self.tangent_grows_near(found, metric);
-        Ok(stays.then(|| self.analysis.periodic(reading, cycle, at_last)))
+        stays.then(|| self.accepted(found, at_last)).transpose()
+    }
+
+    /// Builds the orbit of a cycle that the motion approaches; `at_last` is its distance at the end of the budget.
+    fn accepted(&self, found: &FoundCycle, at_last: f64) -> Result<Orbit, Stop> {
+        let orbit = self.analysis.periodic(&found.seed, self.reading(found)?, &found.cycle, at_last)?;
+        let is_resolved = matches!(orbit.status, Status::Ok | Status::BelowResolution);
+        if is_resolved && self.analysis.resolves && !too_few_events(found.cycle.period, &orbit.events) {
+            // The cycle was integrated once more for the growth of rounding errors.
+            self.reading_periods.set(self.reading_periods.get() + found.cycle.period);
+        }
+        Ok(orbit)
     }
 
     /// Returns the reading of a cycle, which is integrated on the first call.
@@ -457,10 +468,7 @@ impl<'a> CellRun<'a> {
             return Ok(reading);
         }
         let reading = self.analysis.read(&found.seed, &found.cycle)?;
-        // Once for the events, and once for the growth of rounding errors if it is computed.
-        let again = self.analysis.resolves && can_be_below(found.cycle.period, reading.events.len());
-        let turns = if again { 2 } else { 1 };
-        self.reading_periods.set(self.reading_periods.get() + turns * found.cycle.period);
+        self.reading_periods.set(self.reading_periods.get() + found.cycle.period);
         Ok(found.reading.get_or_init(|| reading))
     }
 

@@ -28,8 +28,6 @@ pub(super) struct Reading {
     pub(super) closes: bool,
     pub(super) near_grazing: bool,
     pub(super) on_strobe: bool,
-    /// Whether rounding decides the period of the cycle that was read.
-    pub(super) below_resolution: bool,
 }
 
 impl Reading {
@@ -69,7 +67,6 @@ impl Reading {
             itineraries: Recorder::list(flow, &events, start, periods),
             closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),
-            below_resolution: false,
             // Rounding may put an event at phase 0 outside the cycle.
             on_strobe: [&first, &*trajectory].into_iter().any(|end| passes_wall(flow, end))
                 || events.iter().any(|event| {

@@ -10,10 +10,11 @@ use crate::stability::{Cycle, UNIT};
 /// Rounding error of the motion between two events, relative to the size of the motion.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Whether so many events can amplify rounding errors enough. Away from grazing, which has a status of its own, an event
-/// amplifies them by less than 1000; with a single strobe, they must grow to the size of the motion.
-pub(super) fn can_be_below(period: u32, events: usize) -> bool {
-    events >= if period == 1 { 5 } else { 2 }
+/// Whether so few events cannot amplify rounding errors enough. On a stable cycle of period 1, errors must grow to the size of
+/// the motion, by 1e15, within about one turn. Grazing has a status of its own, and an event that is not near grazing amplifies
+/// by at most `1 / GRAZING_SPEED`, 2.5e4. So more than three events are needed.
+pub(super) fn too_few_events(period: u32, events: &[Event]) -> bool {
+    period == 1 && events.len() <= 3
 }
 
 /// Whether rounding scatters the states of a cycle by more than the distance between two strobes, or by the size of the
@@ -30,7 +31,7 @@ pub(super) fn is_below_resolution(
     cycle: &Cycle,
     events: &[Event],
 ) -> Result<bool, Stop> {
-    if !can_be_below(cycle.period, events.len()) {
+    if too_few_events(cycle.period, events) {
         return Ok(false);
     }
     let flow = seed.flow();
