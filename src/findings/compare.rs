@@ -172,9 +172,13 @@ impl Comparison {
     /// Compares the exponents of two cycles of one period.
     fn take_exponents(&mut self, id: usize, a: &Record, b: &Record) {
         if a.valid & b.valid & valid::LYAPUNOV != 0 && (a.valid | b.valid) & valid::FILLED == 0 {
-            self.exponents += 1;
-            // Both exponents are minus infinity if a multiplier is zero.
+            // Both exponents are minus infinity if a multiplier is zero. If one map has a zero and the other a tiny multiplier,
+            // the difference of the exponents means nothing.
             let difference = if a.lyapunov == b.lyapunov { 0.0 } else { apart(a.lyapunov, b.lyapunov) };
+            if difference.is_infinite() {
+                return;
+            }
+            self.exponents += 1;
             if self.exponent.is_none_or(|largest| difference > largest.difference) {
                 self.exponent = Some(Largest { difference, id });
             }

@@ -89,17 +89,8 @@ pub fn analyse_until(
     report: &dyn Fn(u64, u64),
 ) -> Result<Option<Orbit>, ModelError> {
     let (flow, allowance) = (Flow::of(model)?, ALLOWANCE.until(halt));
-    let analysis = Analysis {
-        flow: &flow,
-        law: model.law(),
-        settings,
-        longest_window,
-        event_periods,
-        measures: true,
-        resolves: true,
-        allowance,
-        report,
-    };
+    let new = Analysis::new(&flow, model.law(), settings);
+    let analysis = Analysis { longest_window, event_periods, allowance, report, ..new };
     let orbit = analysis.orbit(start);
     Ok((!allowance.is_halted()).then_some(orbit))
 }
@@ -107,20 +98,7 @@ pub fn analyse_until(
 /// Classifies a motion like [`analyse`], with a flow that the caller has computed, and lists the events of the last
 /// `event_periods` of aperiodic motion.
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, event_periods: u32) -> Orbit {
-    let (longest_window, allowance) = (LONGEST_WINDOW, ALLOWANCE);
-    let report = &|_, _| ();
-    Analysis {
-        flow,
-        law,
-        settings,
-        longest_window,
-        event_periods,
-        measures: true,
-        resolves: true,
-        allowance,
-        report,
-    }
-    .orbit(start)
+    Analysis { event_periods, ..Analysis::new(flow, law, settings) }.orbit(start)
 }
 
 /// Growth of tangents that is not chaos, as a power of time. Tangents of neutral motion grow in proportion to time (a
@@ -187,6 +165,23 @@ pub(super) struct Analysis<'a> {
     pub(super) allowance: Allowance<'a>,
     /// Receives the forcing periods so far, and a lower bound of their total.
     pub(super) report: &'a dyn Fn(u64, u64),
+}
+
+impl<'a> Analysis<'a> {
+    /// Measures and resolves, with the default work and windows; lists no events of aperiodic motion.
+    pub(super) fn new(flow: &'a Flow, law: Law, settings: &'a Settings) -> Analysis<'a> {
+        Analysis {
+            flow,
+            law,
+            settings,
+            longest_window: LONGEST_WINDOW,
+            event_periods: 0,
+            measures: true,
+            resolves: true,
+            allowance: ALLOWANCE,
+            report: &|_, _| (),
+        }
+    }
 }
 
 impl Analysis<'_> {

@@ -145,18 +145,12 @@ fn measure_by_strobes(
     budget: &Budget,
     allowance: Allowance<'_>,
 ) -> (Measurement, bool) {
-    let settings = &budget.settings;
     let analysis = Analysis {
-        flow,
-        law,
-        settings,
-        longest_window: 0,
-        event_periods: 0,
         measures: budget.quantities,
         // Without exponents, recurrence alone decides, as in lanes.
         resolves: budget.exponent,
         allowance,
-        report: &|_, _| (),
+        ..Analysis::new(flow, law, &budget.settings)
     };
     let mut run = CellRun {
         analysis: &analysis,

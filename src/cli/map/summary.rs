@@ -35,7 +35,7 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
 fn chaos_ends(rate: Rate) -> String {
     let Rate { count, among, .. } = rate;
     format!(
-        "\nchaos: {count} ends in {among} periods of chaotic cells, which is {} of these cells in 1000 periods",
+        "\nchaos ended {count} times in {among} forcing periods of chaotic cells: {} of these cells end in 1000 periods",
         rate.text_within(1000)
     )
 }

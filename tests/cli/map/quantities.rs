@@ -109,7 +109,7 @@ fn chaos_that_ends_is_counted_by_maps_and_by_validations() {
     let folder = with(include_str!("../../../scenes/gallery/impact_oscillator.toml"));
     let few = "--set axis.0.count=16 --set axis.1.count=16 --engine cpu";
     let run = map(&folder, &format!("{few} --set integration.confirm_chaos=2000")).success();
-    run.stderr(says(&["chaos: ", " of these cells in 1000 periods"]));
+    run.stderr(says(&["chaos ended ", " of these cells end in 1000 periods"]));
     let out = folder.path().join("out/s");
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains(" % end in 1000 T\""), "the legend states the rate");
