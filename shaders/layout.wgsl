@@ -180,7 +180,7 @@ struct Measures {
 
 struct Motion {
     now: MotionNow,
-        measures: Measures,
+    measures: Measures,
     // Tangent vectors in lane units: one for the exponent, or the four columns of the monodromy matrix.
     tangents: array<Real, 16>,
     // The exponent's tangent vector while the matrix takes its place.
