@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import _thread
 import pickle
-import threading
 from pathlib import Path
 
 import pytest
@@ -54,8 +53,12 @@ def test_errors_name_arguments(tmp_path: Path) -> None:
 @pytest.mark.parametrize("has_folder", [False, True])
 def test_ctrl_c_says_how_to_continue(tmp_path: Path, has_folder: bool) -> None:
     out = tmp_path / "out" if has_folder else None
-    settings = {"early_stop": False, "transient_periods": 20_000, "engine": "cpu", "progress": False, "out": out}
-    threading.Timer(0.5, _thread.interrupt_main).start()
+
+    def interrupt(done: int, total: int) -> None:
+        if done > 0:
+            _thread.interrupt_main()
+
+    settings = {"early_stop": False, "transient_periods": 20_000, "engine": "cpu", "progress": interrupt, "out": out}
     with pytest.raises(KeyboardInterrupt) as raised:
         rm.map(rm.gear_pair(), e=(0, 1, 200), omega=(1, 12, 200), **settings)
     remedy = "resume=True" if has_folder else "give out=FOLDER"
