@@ -190,8 +190,9 @@ struct Motion {
     stretch: array<Real, 3>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
-    // Weighted averages of gap, x and their squares: the first window less the second (regularity.wgsl).
+    // Weighted averages of gap, x and their squares from a centre: the first window less the second (regularity.wgsl).
     averages: array<Real, 3>,
+    average_centre: array<Real, 4>,
     // The last state of a lane that is being measured.
     ended: MotionNow,
     // What was measured in the present period, and in all (measure.wgsl).
@@ -311,6 +312,8 @@ struct Search {
     // Strobe after which the windows of the averages begin, and their length; 0 if they have not begun.
     average_start: u32,
     average_length: u32,
+    // Distance within which the motion recurs, in quarter octaves below 1.
+    recurrence: u32,
     // 1 if the cycle that was read last has a multiplier of modulus 1.
     is_neutral: u32,
 }

@@ -38,6 +38,7 @@ fn recurs() -> bool {
     let settled = judge_lag(found);
     search.known_lags = search.window;
     tallies[lane].last_distances = tallies[lane].distances;
+    keep_recurrence();
     // The next anchor lies at the same point of the cycle, because distances compare only there. The points of a
     // cycle may be so close together that a shorter lag seems to recur.
     let cycle = max(closest_lag(), 1u);

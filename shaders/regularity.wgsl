@@ -10,7 +10,9 @@ fn add_to_averages() {
         if 4u * tally.period >= settings.periods && budget >= tally.period + 4u * LEAST_WINDOW_STROBES {
             search.average_length = (budget - tally.period) / 16u * 7u;
             search.average_start = search.strobe_count;
+            search.recurrence = 255u;
             motions[lane].averages = array<Real, 3>();
+            motions[lane].average_centre = strobe_state();
         }
         return;
     }
@@ -23,36 +25,53 @@ fn add_to_averages() {
     // The integral of the window from 0 to 1 is 1/630. The second window counts as negative.
     let weight = select(Real(-630.0), Real(630.0), n < length) / Real(length) * square * square;
     let q = strobe_state();
-    motions[lane].averages[0] += weight * q[0];
-    motions[lane].averages[1] += weight * q[2];
-    motions[lane].averages[2] += weight * (q[0] * q[0] + q[2] * q[2]);
+    let x = q[0] - motions[lane].average_centre[0];
+    let y = q[2] - motions[lane].average_centre[2];
+    motions[lane].averages[0] += weight * x;
+    motions[lane].averages[1] += weight * y;
+    motions[lane].averages[2] += weight * (x * x + y * y);
 }
-
-// Largest rounding error of an average, in units of ULP times the motion.
-const ROUNDING_OF_AVERAGES: Real = 16.0;
 
 // Whether both windows are complete.
 fn has_averages() -> bool {
     return search.average_length > 0u && search.strobe_count >= search.average_start + 2u * search.average_length;
 }
 
-// Whether the exponent is that of neutral motion and the section is regular. Near a cycle the section is too small to show
-// whether it shrinks.
-fn is_quasi_periodic() -> bool {
-    if !EXPONENT || search.blocks < 2u || !has_averages() || search.known_lags == 0u
-        || 2u * search.known_lags < settings.max_period {
-        return false;
+// Keeps the distance within which the motion recurs: the largest, over the windows, of the distance to the anchor's
+// nearest strobe.
+fn keep_recurrence() {
+    if 2u * search.known_lags < settings.max_period {
+        return;
     }
     var nearest = 0u;
     for (var lag = 1u; lag <= search.known_lags; lag++) {
         iterations += 1u;
         nearest = max(nearest, last_distance_at(lag));
     }
+    search.recurrence = min(search.recurrence, nearest);
+}
+
+// Whether the exponent is that of neutral motion and the section is regular.
+fn is_quasi_periodic() -> bool {
+    if !EXPONENT || search.blocks < 2u || !has_averages() {
+        return false;
+    }
+    var farthest = 255u;
+    for (var lag = 1u; lag <= search.known_lags; lag++) {
+        iterations += 1u;
+        farthest = min(farthest, last_distance_at(lag));
+    }
     let d = motions[lane].averages;
     let unit = 1.0 / max(measures.position_scale, Real(1e-30));
-    let difference = max(max(abs(d[0]), abs(d[1])) * unit, abs(d[2]) * unit * unit);
-    let allowed = LARGEST_DIFFERENCE * Real(exp2(-f32(nearest) / PARTS_PER_OCTAVE)) + ROUNDING_OF_AVERAGES * ULP;
+    let size = distance_of(farthest);
+    let difference = max(max(abs(d[0]), abs(d[1])) * unit, abs(d[2]) * unit * unit / size);
+    let allowed = LARGEST_DIFFERENCE * distance_of(search.recurrence);
+    let rounding = ROUNDING_OF_AVERAGES * ULP;
     let growth = mean_growth();
-    return difference < allowed && !escapes(CHAOS_ERRORS)
+    return allowed > rounding && difference < allowed + rounding
         && growth.x >= -CHAOS_ERRORS * growth.y - 64.0 * ULP && !exceeds_neutral(abs(growth.x));
+}
+
+fn distance_of(octaves: u32) -> Real {
+    return Real(exp2(-f32(octaves) / PARTS_PER_OCTAVE));
 }

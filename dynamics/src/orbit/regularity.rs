@@ -3,8 +3,10 @@
 //! On a torus, averages with a smooth window converge faster than any power of the number of strobes; in chaos the error
 //! shrinks as its square root (S. Das, Y. Saiki, E. Sander, J. A. Yorke, "Quantitative quasiperiodicity", Nonlinearity 30
 //! (2017) 4111, arXiv 1601.06051 of 2016). So averages over two successive windows are compared (E. Sander, J. D. Meiss,
-//! Physica D 411 (2020) 132569): of each displacement, and of the sum of their squares, which shows whether a spiral
-//! shrinks. Velocities jump where an impact passes phase 0, and their averages converge slowly.
+//! Physica D 411 (2020) 132569): of each displacement from the first strobe, and of the sum of their squares, which shows
+//! whether a spiral shrinks. Velocities jump where an impact passes phase 0, and their averages converge slowly.
+
+use nalgebra::Vector4;
 
 use super::recurrence::Metric;
 use crate::model::State;
@@ -16,38 +18,40 @@ pub const LEAST_WINDOW: usize = 64;
 /// sequences of the logistic map, with windows of 64 to 200 strobes, none was below 0.0024 and half exceeded 0.06.
 pub const LARGEST_DIFFERENCE: f64 = 1.0 / 1024.0;
 
-/// Least distance within which the motion recurs, relative to its displacements: that of a torus with a tenth of their size.
-const LEAST_RECURRENCE: f64 = 5e-3;
+/// Largest rounding error of an average, in units of the machine epsilon times the displacements.
+pub const ROUNDING_OF_AVERAGES: f64 = 16.0;
 
 /// Power of `t (1 - t)` in the window, with `t` from 0 to 1. WGSL has no exponential function of f64, so the window is a
 /// polynomial; for windows of up to 500 strobes its side lobes are lower than those of the exponential window.
 const POWER: i32 = 4;
 
-/// Whether averages over both halves of a sequence of strobe states agree, and the states do not stay near a cycle.
+/// Whether averages over both halves of a sequence of strobe states agree.
 pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) -> bool {
     let length = strobes.len() / 2;
     if length < LEAST_WINDOW {
         return false;
     }
-    let [first, second] = [0, length].map(|from| averages(&strobes[from..][..length], metric));
-    let difference = first.iter().zip(second).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let centre = strobes[0];
+    let [first, second] = [0, length].map(|from| averages(&strobes[from..][..length], &centre, metric));
+    let [x, y, squares] = [0, 1, 2].map(|i: usize| (first[i] - second[i]).abs());
     let distance = |lag: usize| {
         let squares = strobes.iter().zip(&strobes[lag..]).map(|(a, b)| metric.distance(a, b).powi(2));
         (squares.sum::<f64>() / (strobes.len() - lag) as f64).sqrt()
     };
     let nearest = (1..=length.min(max_period as usize)).map(distance).fold(f64::INFINITY, f64::min);
-    let size = strobes.iter().map(|y| metric.scaled(&(*y).into())).map(|y| y[0].abs().max(y[2].abs()));
-    // Near a cycle the section is too small to show whether it shrinks.
-    difference < LARGEST_DIFFERENCE * nearest && nearest > LEAST_RECURRENCE * size.fold(0.0, f64::max)
+    let size = strobes.iter().map(|y| metric.distance(y, &centre)).fold(0.0, f64::max);
+    let allowed = LARGEST_DIFFERENCE * nearest;
+    x.max(y) < allowed && squares < allowed * size && allowed > ROUNDING_OF_AVERAGES * f64::EPSILON
 }
 
-/// Returns the weighted averages of both displacements, in units of the metric, and of the sum of their squares.
-fn averages(strobes: &[State], metric: &Metric) -> [f64; 3] {
+/// Returns the weighted averages of both displacements from `centre`, in units of the metric, and of the sum of their
+/// squares.
+fn averages(strobes: &[State], centre: &State, metric: &Metric) -> [f64; 3] {
     let (mut sums, mut total) = ([0.0; 3], 0.0);
     for (n, y) in strobes.iter().enumerate() {
         let t = (n as f64 + 0.5) / strobes.len() as f64;
         let weight = (t * (1.0 - t)).powi(POWER);
-        let y = metric.scaled(&(*y).into());
+        let y = metric.scaled(&(Vector4::from(*y) - Vector4::from(*centre)));
         let values = [y[0], y[2], y[0] * y[0] + y[2] * y[2]];
         sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
         total += weight;
@@ -70,16 +74,19 @@ mod tests {
     #[test]
     fn a_rotation_is_regular_and_a_decaying_one_is_not() {
         let golden = std::f64::consts::TAU * 0.618_033_988_75;
-        let turning = |decay: f64| {
-            move |n: usize| {
-                let (sin, cos) = (golden * n as f64).sin_cos();
-                [0.2 + cos * decay.powi(n as i32), 5.6 * sin * decay.powi(n as i32), 0.1 * sin * cos, 0.0]
-            }
-        };
-        assert!(regular(turning(1.0), 400));
-        assert!(!regular(turning(1.0), 100), "too short");
-        assert!(!regular(turning(1.0 - 1e-4), 400));
-        assert!(!regular(turning(1.0 + 1e-4), 400));
+        for size in [1.0, 1e-6] {
+            let turning = |decay: f64| {
+                move |n: usize| {
+                    let (sin, cos) = (golden * n as f64).sin_cos();
+                    let r = size * decay.powi(n as i32);
+                    [0.2 + cos * r, 5.6 * sin * r, 0.1 * sin * cos * r, 0.0]
+                }
+            };
+            assert!(regular(turning(1.0), 400), "size {size}");
+            assert!(!regular(turning(1.0), 100), "too short");
+            assert!(!regular(turning(1.0 - 1e-4), 400), "size {size}");
+            assert!(!regular(turning(1.0 + 1e-4), 400), "size {size}");
+        }
     }
 
     #[test]
