@@ -65,10 +65,11 @@ fn is_quasi_periodic() -> bool {
     let unit = 1.0 / max(measures.position_scale, Real(1e-30));
     let size = distance_of(farthest);
     let difference = max(max(abs(d[0]), abs(d[1])) * unit, abs(d[2]) * unit * unit / size);
-    let allowed = LARGEST_DIFFERENCE * distance_of(search.recurrence);
+    let nearest = distance_of(search.recurrence);
+    let allowed = LARGEST_DIFFERENCE * nearest;
     let rounding = ROUNDING_OF_AVERAGES * ULP;
     let growth = mean_growth();
-    return allowed > rounding && difference < allowed + rounding
+    return nearest > LEAST_RECURRENCE * size && allowed > rounding && difference < allowed + rounding
         && growth.x >= -CHAOS_ERRORS * growth.y - 64.0 * ULP && !exceeds_neutral(abs(growth.x));
 }
 

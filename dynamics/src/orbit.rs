@@ -35,7 +35,7 @@ pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
-pub use regularity::{LARGEST_DIFFERENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};
+pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};
 pub use section::Section;
 pub use trace::trace;
 

@@ -18,6 +18,10 @@ pub const LEAST_WINDOW: usize = 64;
 /// sequences of the logistic map, with windows of 64 to 200 strobes, none was below 0.0024 and half exceeded 0.06.
 pub const LARGEST_DIFFERENCE: f64 = 1.0 / 1024.0;
 
+/// Least distance within which the motion recurs, relative to the size of its section: nearer motion may approach a long
+/// cycle.
+pub const LEAST_RECURRENCE: f64 = 5e-3;
+
 /// Largest rounding error of an average, in units of the machine epsilon times the displacements.
 pub const ROUNDING_OF_AVERAGES: f64 = 16.0;
 
@@ -41,7 +45,8 @@ pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) ->
     let nearest = (1..=length.min(max_period as usize)).map(distance).fold(f64::INFINITY, f64::min);
     let size = strobes.iter().map(|y| metric.distance(y, &centre)).fold(0.0, f64::max);
     let allowed = LARGEST_DIFFERENCE * nearest;
-    x.max(y) < allowed && squares < allowed * size && allowed > ROUNDING_OF_AVERAGES * f64::EPSILON
+    let is_wide = nearest > LEAST_RECURRENCE * size && allowed > ROUNDING_OF_AVERAGES * f64::EPSILON;
+    is_wide && x.max(y) < allowed && squares < allowed * size
 }
 
 /// Returns the weighted averages of both displacements from `centre`, in units of the metric, and of the sum of their

@@ -194,7 +194,8 @@ fn records_agree_with_the_reference() {
     for (precision, exponent_bar, contact_bar) in
         [(Precision::F64, 1e-10, 1e-10), (Precision::F32, 5e-5, 1e-6)]
     {
-        let settings = LaneSettings { undecided_periods: budget.undecided_periods, ..LaneSettings::default() };
+        let settings =
+            LaneSettings { undecided_periods: budget.undecided_periods, ..LaneSettings::default() };
         let records = run(precision, &cells, &settings).unwrap();
         let (mut cycles, mut superstable, mut symbols) = (0, 0, 0);
         for (seed, (record, expected)) in records.iter().zip(&expected).enumerate() {
