@@ -51,7 +51,7 @@ fn recurs() -> bool {
 
 // Raises the units of distances to the largest strobe.
 fn widen_scales(q: array<Real, 4>) {
-    measures.position_scale = max(measures.position_scale, max(abs(q[0]), abs(q[2])));
+    measures.position_scale = max(measures.position_scale, largest_position(q));
     measures.rate_scale = max(measures.rate_scale, max(abs(q[1]), abs(q[3])));
 }
 
@@ -59,10 +59,20 @@ fn widen_scales(q: array<Real, 4>) {
 // at a turning point or midway between two.
 fn narrow_scales(q: array<Real, 4>) {
     let angle = flows[cell.flow_index].domains[0].angle;
-    let position = max(abs(q[0]), abs(q[2]));
+    let position = largest_position(q);
     let rate = max(abs(q[1]), abs(q[3]));
     measures.position_scale = min(measures.position_scale, max(position, rate / angle));
     measures.rate_scale = min(measures.rate_scale, max(rate, angle * position));
+}
+
+// Returns the largest displacement of a strobe, whose rounding error limits distances. In contact, the gap is the sum of
+// the wall's position and the penetration, which may have opposite signs.
+fn largest_position(q: array<Real, 4>) -> Real {
+    let position = max(abs(q[0]), abs(q[2]));
+    if tally.mode == MODE_FREE {
+        return position;
+    }
+    return max(position, abs(flows[cell.flow_index].walls[side_of(tally.mode)]));
 }
 
 fn widest() -> u32 {

@@ -36,6 +36,7 @@ pub use itinerary::NEAR_STROBE_TURNS;
 pub use quantities::{Approaches, Displacement, Quantities};
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};
+pub use resolution::rounding_decides;
 pub use section::Section;
 pub use trace::trace;
 

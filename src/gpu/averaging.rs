@@ -7,7 +7,7 @@ const ALIGNMENT: u32 = 50;
 const EXPONENT_BLOCKS: u32 = 32;
 
 /// Least periods of a block. Lanes measure the correlation of neighbouring blocks; shorter blocks would have more of it.
-const SHORTEST_BLOCK: u32 = 4;
+const SHORTEST_BLOCK: u32 = 2;
 
 /// Periods that count, and their blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +40,6 @@ mod tests {
         let of_map = Averaging::new(528, 100);
         assert_eq!(of_map, Averaging { growth_from: 50, exponent_from: 100, block: 13 });
         let of_few = Averaging::new(64, 32);
-        assert_eq!(of_few, Averaging { growth_from: 16, exponent_from: 32, block: 4 });
+        assert_eq!(of_few, Averaging { growth_from: 16, exponent_from: 32, block: 2 });
     }
 }

@@ -17,7 +17,7 @@ use crate::record::classify::{classify, status};
 use crate::record::distance::{self, farther};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, State};
-use rattlemap_dynamics::orbit::{Budget, Class, Status, measure_until};
+use rattlemap_dynamics::orbit::{self, Budget, Class, Status, measure_until};
 use rattlemap_dynamics::reference::{Allowance, Trajectory};
 use rattlemap_dynamics::stability::{UNIT, multipliers};
 
@@ -204,6 +204,18 @@ impl<'a> Cell<'a> {
         (0..periods).try_for_each(|_| trajectory.advance_period(&mut ())).ok()?;
         let moved = (0..count).filter_map(|k| self.perturbed(k)?.state_after(periods));
         Some((trajectory.state(), moved.collect()))
+    }
+
+    /// Whether rounding in the engine's precision decides the period of a record's cycle.
+    pub(super) fn rounding_decides(&self, record: &Record) -> bool {
+        let Class::Periodic { period } = classify(record) else { return false };
+        let epsilon = match self.precision {
+            Precision::F32 => f64::from(f32::EPSILON),
+            Precision::F64 => f64::EPSILON,
+        };
+        let allowance = Allowance::UNLIMITED.until(self.halt);
+        let epsilon = ROUNDING_FACTOR * epsilon;
+        orbit::rounding_decides(&self.flow, self.law, record.strobe, period, epsilon, allowance)
     }
 
     /// Whether a cycle of `period` periods closes after fewer periods, within the effect of rounding.

@@ -75,16 +75,19 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
     if is_rounding { Kind::Border } else { Kind::Unexplained }
 }
 
-/// Whether the claim has the status `below_resolution` and the answer confirms it: by the same status, or because its cycle
-/// is the same or closes earlier, within the effect of rounding.
+/// Whether the claim has the status `below_resolution` and the answer confirms it: by the same status, or because rounding in
+/// the claim's precision decides the period of the answer's cycle, or because that cycle closes earlier, within the effect of
+/// rounding.
 fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
-    let confirms = |answer: &Answer| {
+    let closes = |answer: &Answer| {
         claim.period.is_multiple_of(answer.record.period.max(1))
             && is_multiple(cell, claim, answer)
             && cell.closes_earlier(answer.record.strobe, claim.period)
     };
     status(claim) == Status::BelowResolution
-        && (status(&answer.record) == Status::BelowResolution || confirms(answer))
+        && (status(&answer.record) == Status::BelowResolution
+            || cell.rounding_decides(&answer.record)
+            || closes(answer))
 }
 
 /// Whether a record agrees once its exponent and status are replaced by those of the cycle itself.

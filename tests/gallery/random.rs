@@ -271,6 +271,7 @@ fn validate(
         Quantity::Mesh,
         Quantity::Symmetric,
         Quantity::Word,
+        Quantity::Pattern,
     ];
     let scene = Scene::builder(cell.model.clone())
         .cells(["omega"], &[[cell.oscillator.omega]])

@@ -8,7 +8,7 @@ use super::quantities::{Meter, Quantities};
 use super::reading::{ON_STROBE_TURNS, Reading};
 use super::recurrence::{Candidate, Metric, RECURRENCE_DISTANCE, candidates};
 use super::regularity::is_regular;
-use super::resolution::is_below_resolution;
+use super::resolution::{is_below_resolution, too_few_events};
 use super::{Class, Orbit, Section, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, Model, ModelError, NonImpacting, State};
@@ -511,7 +511,10 @@ impl Analysis<'_> {
             Status::Neutral
         } else if distance > ON_CYCLE {
             Status::Slow
-        } else if self.resolves && is_below_resolution(seed, cycle, &reading.events)? {
+        } else if self.resolves
+            && !too_few_events(cycle.period, &reading.events)
+            && is_below_resolution(seed, cycle, &reading.events, f64::EPSILON)?
+        {
             Status::BelowResolution
         } else {
             Status::Ok

@@ -2,15 +2,38 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::Event;
 use super::recurrence::Metric;
-use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, UNIT};
+use super::analysis::Analysis;
+use super::{Event, Settings};
+use crate::flow::Flow;
+use crate::model::{Law, State};
+use crate::reference::{Allowance, Stop, Trajectory};
+use crate::stability::{Cycle, StrobeMap, UNIT, refine};
 
-/// Rounding error of the motion between two events, relative to the size of the motion.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Rounding error of the motion between two events, in units of the machine epsilon times the size of the motion.
+const ROUNDING: f64 = 4.0;
 
-/// Whether so few events cannot amplify rounding errors enough. On a stable cycle of period 1, errors must grow to the size of
+/// Whether arithmetic with this machine epsilon cannot determine the period of the cycle of `period` forcing periods
+/// through `state`. False if Newton's method finds no such cycle.
+pub fn rounding_decides(
+    flow: &Flow,
+    law: Law,
+    state: State,
+    period: u32,
+    epsilon: f64,
+    allowance: Allowance<'_>,
+) -> bool {
+    let settings = Settings::default();
+    let analysis = Analysis { allowance, ..Analysis::new(flow, law, &settings) };
+    let seed = Trajectory::new(flow, law, state).allowing(allowance);
+    let is_decided = refine(&seed, StrobeMap::Periods(period)).map(|cycle| {
+        let events = analysis.read(&seed, &cycle)?.events;
+        is_below_resolution(&seed, &cycle, &events, epsilon)
+    });
+    is_decided.is_some_and(|decided| decided.unwrap_or(false))
+}
+
+/// Whether so few events cannot amplify rounding errors of f64 enough. On a stable cycle of period 1, errors must grow to the size of
 /// the motion, by 1e15, within about one turn. Grazing has a status of its own, and an event that is not near grazing amplifies
 /// by at most `1 / GRAZING_SPEED`, 2.5e4. So more than three events are needed.
 pub(super) fn too_few_events(period: u32, events: &[Event]) -> bool {
@@ -30,10 +53,8 @@ pub(super) fn is_below_resolution(
     seed: &Trajectory<'_>,
     cycle: &Cycle,
     events: &[Event],
+    epsilon: f64,
 ) -> Result<bool, Stop> {
-    if too_few_events(cycle.period, events) {
-        return Ok(false);
-    }
     let flow = seed.flow();
     let mut trajectory = seed.at(cycle.state, UNIT);
     let (mut strobes, mut parts) = (vec![cycle.state], Vec::new());
@@ -61,7 +82,7 @@ pub(super) fn is_below_resolution(
     let (mut errors, mut largest) = (Matrix4::zeros(), 0.0f64);
     for part in parts.iter().chain(&parts) {
         let part = to * part * from;
-        errors = part * errors * part.transpose() + Matrix4::identity() * ROUNDING.powi(2);
+        errors = part * errors * part.transpose() + Matrix4::identity() * (ROUNDING * epsilon).powi(2);
         largest = largest.max(errors.diagonal().max());
     }
     let pairs = strobes.iter().enumerate().flat_map(|(i, a)| strobes[..i].iter().map(move |b| (a, b)));
