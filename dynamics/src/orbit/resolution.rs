@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::recurrence::Metric;
 use super::analysis::Analysis;
+use super::recurrence::Metric;
 use super::{Event, Settings};
 use crate::flow::Flow;
 use crate::model::{Law, State};
