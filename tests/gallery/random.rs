@@ -338,7 +338,8 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
         kinds.len()
     );
     for kind in Kind::ALL {
-        println!("{}: {}", kind.name(), kinds.iter().filter(|(_, found)| *found == Some(kind)).count());
+        let count = kinds.iter().filter(|(_, found)| *found == Some(kind)).count();
+        println!("{}: {count} ({})", kind.name(), Rate::new(count, cells.len()).text());
     }
     let unexplained: Vec<_> = kinds.iter().filter(|(_, kind)| *kind == Some(Kind::Unexplained)).collect();
     for (i, _) in &unexplained {
@@ -351,7 +352,6 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
         println!("{:?}\n{:?}", records[*i], reference);
     }
     let rate = Rate::new(unexplained.len(), cells.len());
-    println!("unexplained: {}", rate.text());
     assert!(rate.interval[0] <= most, "unexplained: {unexplained:?}");
 }
 
