@@ -130,8 +130,10 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
         class => class == Class::Undecided,
     };
     let cannot_decide = |answer: &Answer| {
+        // Nor has it reached the exponent.
+        let open = Record { valid: claim.valid & !valid::LYAPUNOV, ..*claim };
         let claims_nothing =
-            is_undecided || status(claim) == Status::Slow && is_multiple(cell, claim, answer);
+            is_undecided || status(claim) == Status::Slow && is_multiple(cell, &open, answer);
         claims_nothing && !cell.bars.is_decisive(&answer.record)
     };
     let stopped = || (0..MANY_PERTURBED).filter_map(|k| cell.perturbed_after(k, claim.periods_run));
