@@ -108,7 +108,7 @@ def _require_same_run(parts: list[Path]) -> None:
 
 
 def _identity(part: Path) -> list[Any]:
-    manifest = json.loads(_native.manifest(str(part)))
+    manifest = json.loads((part / "manifest.json").read_text(encoding="utf-8"))
     return [manifest.get(name) for name in _IDENTITY]
 
 

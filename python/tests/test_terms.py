@@ -61,5 +61,5 @@ def test_ctrl_c_says_how_to_continue(tmp_path: Path, has_folder: bool) -> None:
     settings = {"early_stop": False, "transient_periods": 20_000, "engine": "cpu", "progress": interrupt, "out": out}
     with pytest.raises(KeyboardInterrupt) as raised:
         rm.map(rm.gear_pair(), e=(0, 1, 200), omega=(1, 12, 200), **settings)
-    remedy = "resume=True" if has_folder else "give out=FOLDER"
+    remedy = "resume=True" if has_folder else "With out=FOLDER"
     assert remedy in str(raised.value), raised.value

@@ -7,14 +7,15 @@ use std::path::{Path, PathBuf};
 
 use crate::common::gpu::{map, open};
 use crate::fixtures::{
-    cpu_identity, cpu_records, kind, kinds, read_records, sample_of, unexplained, validate_all,
+    EVERYTHING, cpu_identity, cpu_records, kind, kinds, read_records, sample_of, unexplained, validate_all,
     validate_first,
 };
 use assert_cmd::Command;
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
-use rattlemap::record::classify::classify;
+use rattlemap::model_file::FileModel;
+use rattlemap::record::classify::{classify, status};
 use rattlemap::record::{Record, valid};
 use rattlemap::store::inventory;
 use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
@@ -391,6 +392,21 @@ fn a_threshold_that_is_off_by_a_hundredth_is_found_in_f64_and_on_the_reference()
     let other = cpu_records(&plane_of_chatter(&["mesh_speed=0.0101"]));
     let found = validate_all(&plane_of_chatter(&[]), &other, Precision::F64, false);
     assert!(!found.faults().is_empty(), "{:?}", found.mismatches);
+}
+
+/// The multiplier is -0.9972. A lane is still far from the cycle when it has read twice its period and an exponent of that place.
+#[test]
+fn a_slow_lane_may_have_twice_the_period_and_another_exponent() {
+    let model = FileModel::parse(include_str!("data/loose_gear.toml"), "loose_gear.toml").unwrap();
+    let scene = Scene::builder(model)
+        .cells(["rpm", "a"], &[[2138.4615384615386, 55.53846153846154]])
+        .quantities(&EVERYTHING)
+        .build();
+    let plan = Plan::new(&scene.unwrap());
+    assert_eq!(cpu_records(&plan)[0].period, 24);
+    let lane = map(&plan, &mut open(Precision::F64))[0];
+    assert_eq!((lane.period, status(&lane)), (48, Status::Slow), "{lane:?}");
+    assert_eq!(kind(&plan, lane, Precision::F64), Some(Kind::Budget));
 }
 
 /// An ODE library that shares no code with the reference judges a map of the reference.
