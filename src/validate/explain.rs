@@ -130,8 +130,11 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
         class => class == Class::Undecided,
     };
     let cannot_decide = |answer: &Answer| {
-        // Nor has it reached the exponent.
-        let open = Record { valid: claim.valid & !valid::LYAPUNOV, ..*claim };
+        // Far from the cycle, the exponent of several turns says little.
+        let open = match claim.period == answer.record.period {
+            true => *claim,
+            false => Record { valid: claim.valid & !valid::LYAPUNOV, ..*claim },
+        };
         let claims_nothing =
             is_undecided || status(claim) == Status::Slow && is_multiple(cell, &open, answer);
         claims_nothing && !cell.bars.is_decisive(&answer.record)
