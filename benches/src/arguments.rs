@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use rattlemap_bench::stress::Part;
 use rattlemap_bench::work_precision::measure::Method;
 
-/// Instruments of rattlemap: numerical stress, run time against error, scale.
+/// Instruments of rattlemap: numerical stress, run time against error, scale, cost of the host.
 ///
 /// Each writes tables (CSV), figures (PNG) and manifest.json to a folder of its own.
 #[derive(Debug, Parser)]
@@ -21,6 +21,7 @@ pub(crate) enum Instrument {
     WorkPrecision(WorkPrecision),
     Stress(Stress),
     Scale(Scale),
+    HostCost(HostCost),
 }
 
 /// Error of strobe states and event times against run time per period, for every method
@@ -97,6 +98,33 @@ pub(crate) struct Scale {
     /// Request every quantity instead of class and exponent
     #[arg(long)]
     pub(crate) all: bool,
+}
+
+/// Time that a map costs the host, by phase, and the work that a device receives
+///
+/// All motions of the map end after one forcing period, so that lanes cost next to nothing. Prints wall time, processor time of
+/// all threads and that of the main thread for each phase, per million cells, and the device's dispatches, submissions and
+/// read-backs. Writes host_cost.csv, and the map into a folder of its own. manifest.json there has the time of each file.
+#[derive(Debug, Args)]
+pub(crate) struct HostCost {
+    #[command(flatten)]
+    pub(crate) run: Options,
+
+    /// Number of cells along the first axis
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub(crate) columns: u32,
+
+    /// Number of cells along the second axis
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub(crate) rows: u32,
+
+    /// Request every quantity instead of class and exponent
+    #[arg(long)]
+    pub(crate) all: bool,
+
+    /// Compute lanes on the best graphics device, in f32, instead of the reference on the processor
+    #[arg(long)]
+    pub(crate) gpu: bool,
 }
 
 /// Options of all instruments.

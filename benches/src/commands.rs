@@ -1,5 +1,6 @@
 //! The instruments' commands.
 
+pub(crate) mod host_cost;
 pub(crate) mod scale;
 pub(crate) mod stress;
 pub(crate) mod work_precision;

@@ -1,5 +1,7 @@
 //! Instruments: measurements of speed, accuracy and scale that everyone can repeat.
 
+pub mod host_cost;
+pub mod phase;
 pub mod scale;
 pub mod stress;
 pub mod work_precision;

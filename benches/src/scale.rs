@@ -4,7 +4,6 @@
 //! from cell to cell, so that they compress no better than those of lanes. They are written as shards, into folders like
 //! those of `map --shard`, and merged as by `merge`.
 
-mod phase;
 mod stretched;
 
 use std::path::{Path, PathBuf};
@@ -28,7 +27,8 @@ use rattlemap_dynamics::flow::Flow;
 use rayon::prelude::*;
 use serde::Serialize;
 
-pub use phase::Cost;
+use crate::phase::{self, Cost};
+
 pub use stretched::Stretched;
 
 /// Number of records that are written together: about as many as a fast card computes in a second.

@@ -146,7 +146,8 @@ fn finish_map(
         .collect();
     console.finish(&format!(
         "{}{without_effect}\n{}: {}",
-        summary::map(&cells, &run, map.lane_steps(), finishing.as_secs_f64()),
+        summary::map(&cells, &run, map.lane_steps(), finishing.as_secs_f64())
+            + &summary::times(&run, finishing, map.writing_times()),
         say::path(folder),
         files.join(", ")
     ));

@@ -117,6 +117,7 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         trouble,
         rewrite: None,
         policy,
+        traffic: Default::default(),
         watcher: None,
         halt: Arc::default(),
     })

@@ -53,6 +53,7 @@ use shader::WORKGROUP;
 pub use stage::{DeviceTimes, Stage};
 pub use tables::Tables;
 pub(crate) use tables::{MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
+pub use transfer::Traffic;
 
 use panics::{PanicFree, catch_panic};
 
@@ -256,6 +257,7 @@ pub struct Gpu {
     trouble: device::Trouble,
     rewrite: Option<fn(String) -> String>,
     policy: DispatchPolicy,
+    traffic: transfer::TrafficCounter,
     watcher: Option<stage::Watcher>,
     halt: Arc<AtomicBool>,
 }

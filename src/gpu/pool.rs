@@ -118,19 +118,15 @@ impl Pool {
             for at in stretches(slots.iter().rev().map(|&slot| slot as usize)) {
                 let (of_cells, of_starts) = (at.start * size_of::<Cell>(), at.start * 4 * real);
                 let starts = reals(&self.starts[at.clone()], gpu.precision);
-                gpu.queue.write_buffer(
-                    &buffers.cells,
-                    of_cells as u64,
-                    bytemuck::cast_slice(&self.cells[at]),
-                );
-                gpu.queue.write_buffer(&buffers.starts, of_starts as u64, &starts);
+                gpu.write(&buffers.cells, of_cells as u64, bytemuck::cast_slice(&self.cells[at]));
+                gpu.write(&buffers.starts, of_starts as u64, &starts);
             }
             buffers.call(gpu, &self.active_list, self.active_list.len() - lanes.len(), &self.settings);
             let first = &gpu.pipelines[&self.variants[0]];
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let bindings = bind(gpu, &first.begin, BEGIN, &buffers.bindings(tables));
-            dispatch(&mut encoder, &first.begin, &bindings, buffers.grid(lanes.len() as u32), None);
-            gpu.queue.submit([encoder.finish()]);
+            dispatch(gpu, &mut encoder, &first.begin, &bindings, buffers.grid(lanes.len() as u32), None);
+            gpu.submit(encoder);
         })?;
         gpu.report(Stage::Uploaded);
         Ok(())
@@ -209,8 +205,8 @@ impl Pool {
                 for (from, to) in [(&old.motions, &buffers.motions), (&old.tallies, &buffers.tallies)] {
                     encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
                 }
-                gpu.queue.submit([encoder.finish()]);
-                gpu.queue.write_buffer(&buffers.cells, 0, bytemuck::cast_slice(&self.cells));
+                gpu.submit(encoder);
+                gpu.write(&buffers.cells, 0, bytemuck::cast_slice(&self.cells));
             })?;
         }
         self.buffers = Some(buffers);

@@ -152,7 +152,7 @@ impl Rounds<'_> {
         clock: Option<&Clock>,
     ) -> Round<'a> {
         let gpu = self.gpu;
-        gpu.queue.write_buffer(self.settings, ITERATIONS, bytemuck::bytes_of(&iterations));
+        gpu.write(self.settings, ITERATIONS, bytemuck::bytes_of(&iterations));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         // A variant has work if one of the variants before it has: their lanes may reach it.
         let first = left.iter().position(|&left| left > 0).unwrap_or(0);
@@ -161,12 +161,12 @@ impl Rounds<'_> {
             lanes += left[n];
             for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate() {
                 let writes = clock.and_then(|clock| clock.writes(slot, n == first && nth == 0, false));
-                dispatch(&mut encoder, pipeline, bindings, compacting(nth, self.active_lanes), writes);
+                dispatch(gpu, &mut encoder, pipeline, bindings, compacting(nth, self.active_lanes), writes);
             }
             let (pipeline, bindings) = &variant.sweep;
             for _ in 0..gpu.policy.dispatches {
                 let writes = clock.map(|clock| clock.dispatch_writes(slot, dispatches));
-                dispatch(&mut encoder, pipeline, bindings, (self.grid)(lanes), writes);
+                dispatch(gpu, &mut encoder, pipeline, bindings, (self.grid)(lanes), writes);
                 dispatches += 1;
             }
         }
@@ -174,7 +174,7 @@ impl Rounds<'_> {
             for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate().take(COUNTED) {
                 let is_last = n + 1 == variants.len() && nth + 1 == COUNTED;
                 let writes = clock.and_then(|clock| clock.writes(slot, false, is_last));
-                dispatch(&mut encoder, pipeline, bindings, compacting(nth, self.active_lanes), writes);
+                dispatch(gpu, &mut encoder, pipeline, bindings, compacting(nth, self.active_lanes), writes);
             }
             encoder.copy_buffer_to_buffer(self.queue, COUNT_AT, check, 4 * n as u64, 4);
         }
@@ -184,7 +184,7 @@ impl Rounds<'_> {
             clock.copy(&mut encoder, (slot, dispatches), check, TIMES);
             bytes += Clock::bytes(dispatches);
         }
-        let submission = gpu.queue.submit([encoder.finish()]);
+        let submission = gpu.submit(encoder);
         let ran = (0..variants.len()).map(|n| n >= first).collect();
         Round { check, submission, ran, iterations, bytes }
     }
@@ -234,6 +234,7 @@ pub(super) fn bind(
 }
 
 pub(super) fn dispatch(
+    gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     pipeline: &wgpu::ComputePipeline,
     bindings: &wgpu::BindGroup,
@@ -244,6 +245,7 @@ pub(super) fn dispatch(
     pass.set_pipeline(pipeline);
     pass.set_bind_group(0, bindings, &[]);
     pass.dispatch_workgroups(groups[0], groups[1], 1);
+    gpu.traffic.add_dispatch();
 }
 
 #[cfg(test)]

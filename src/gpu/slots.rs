@@ -103,9 +103,9 @@ impl Slots {
     /// on have yet to begin.
     pub(super) fn call(&self, gpu: &Gpu, active_list: &[u32], first_new: usize, settings: &LaneSettings) {
         let called = uniform(self, active_list.len(), first_new, settings, gpu.policy.late_tangent);
-        gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&called));
+        gpu.write(&self.settings, 0, bytemuck::bytes_of(&called));
         let head = (QUEUE_HEAD * size_of::<u32>()) as u64;
-        gpu.queue.write_buffer(&self.queue, head, bytemuck::cast_slice(active_list));
+        gpu.write(&self.queue, head, bytemuck::cast_slice(active_list));
     }
 
     /// Reads the results of the lanes that have ended, in the order of the active list.
@@ -118,20 +118,34 @@ impl Slots {
         gathers: bool,
     ) -> Result<Vec<(Reading, Finding, Option<Measured>)>, GpuError> {
         let submission = gpu.call(|| {
-            gpu.queue.write_buffer(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
+            gpu.write(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             for (pass, (entry_point, pipeline)) in COMPACT.into_iter().zip(&pipelines.compact).enumerate() {
                 let compact = bind(gpu, pipeline, entry_point, bindings);
-                dispatch(&mut encoder, pipeline, &compact, compacting(pass, active_lanes as u32), None);
+                dispatch(gpu, &mut encoder, pipeline, &compact, compacting(pass, active_lanes as u32), None);
             }
             let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
-            dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(active_lanes as u32), None);
+            dispatch(
+                gpu,
+                &mut encoder,
+                &pipelines.conclude,
+                &concluding,
+                self.grid(active_lanes as u32),
+                None,
+            );
             if gathers {
                 let gathering = bind(gpu, &pipelines.gather, GATHER, bindings);
-                dispatch(&mut encoder, &pipelines.gather, &gathering, self.grid(active_lanes as u32), None);
+                dispatch(
+                    gpu,
+                    &mut encoder,
+                    &pipelines.gather,
+                    &gathering,
+                    self.grid(active_lanes as u32),
+                    None,
+                );
             }
             encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_readback, 0, COUNT_BYTES);
-            gpu.queue.submit([encoder.finish()])
+            gpu.submit(encoder)
         })?;
         let count = read(gpu, &self.count_readback, COUNT_BYTES, submission, |bytes| {
             bytemuck::pod_read_unaligned::<u32>(bytes) as usize
@@ -157,7 +171,7 @@ impl Slots {
             }
             encoder.copy_buffer_to_buffer(&self.readings, 0, readings, 0, numbers);
             encoder.copy_buffer_to_buffer(&self.findings, 0, findings, 0, counts);
-            gpu.queue.submit([encoder.finish()])
+            gpu.submit(encoder)
         })?;
         let to_readings = |bytes: &[u8]| from_reals::<Reading>(bytes, gpu.precision);
         let readings = read(gpu, readings, numbers, submission.clone(), to_readings).await?;

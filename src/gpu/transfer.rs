@@ -1,5 +1,7 @@
 //! Transfers of bytes to and from the device.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use super::precision::Precision;
 use super::signal::Signal;
 use super::{Gpu, GpuError};
@@ -43,7 +45,7 @@ pub(super) fn buffer(gpu: &Gpu, label: &'static str, size: usize) -> wgpu::Buffe
 /// Creates a storage buffer that holds `bytes`.
 pub(super) fn upload(gpu: &Gpu, label: &'static str, bytes: &[u8]) -> wgpu::Buffer {
     let buffer = buffer(gpu, label, bytes.len());
-    gpu.queue.write_buffer(&buffer, 0, bytes);
+    gpu.write(&buffer, 0, bytes);
     buffer
 }
 
@@ -69,8 +71,68 @@ pub(super) async fn read<T>(
     let (mapped, send) = Signal::new();
     buffer.map_async(wgpu::MapMode::Read, ..size, send);
     gpu.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })?;
+    gpu.traffic.add_read_back(size);
     mapped.await.map_err(|error| lost(error.to_string()))?;
     let value = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);
     buffer.unmap();
     Ok(value)
+}
+
+/// Work that a host has given to a device since it was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Dispatches of shaders.
+    pub dispatches: u64,
+    /// Submissions of commands.
+    pub submissions: u64,
+    /// Submissions whose results the host has waited for.
+    pub read_backs: u64,
+    /// Bytes written to buffers of the device.
+    pub written_bytes: u64,
+    /// Bytes read from buffers of the device.
+    pub read_bytes: u64,
+}
+
+/// Counts the [`Traffic`] of a device.
+#[derive(Debug, Default)]
+pub(super) struct TrafficCounter([AtomicU64; 5]);
+
+impl TrafficCounter {
+    fn add(&self, place: usize, count: u64) {
+        self.0[place].fetch_add(count, Ordering::Relaxed);
+    }
+
+    pub(super) fn add_dispatch(&self) {
+        self.add(0, 1);
+    }
+
+    fn add_read_back(&self, bytes: u64) {
+        self.add(2, 1);
+        self.add(4, bytes);
+    }
+
+    fn sum(&self) -> Traffic {
+        let [dispatches, submissions, read_backs, written_bytes, read_bytes] =
+            self.0.each_ref().map(|count| count.load(Ordering::Relaxed));
+        Traffic { dispatches, submissions, read_backs, written_bytes, read_bytes }
+    }
+}
+
+impl Gpu {
+    /// Returns the work that the device has received since it was opened.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic.sum()
+    }
+
+    /// Submits the commands of an encoder.
+    pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
+        self.traffic.add(1, 1);
+        self.queue.submit([encoder.finish()])
+    }
+
+    /// Writes bytes to a buffer before the next submission.
+    pub(super) fn write(&self, buffer: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
+        self.traffic.add(3, bytes.len() as u64);
+        self.queue.write_buffer(buffer, offset, bytes);
+    }
 }

@@ -1,5 +1,6 @@
 //! Computes a map or a shard of one: opens the engine, creates or resumes the record file, integrates, finishes.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -79,11 +80,13 @@ impl<'a> MapJob<'a> {
     /// # Errors
     /// [`JobError`] if a cell has no motion, or the map cannot be divided into this number of shards.
     pub fn plan(&self) -> Result<Plan, JobError> {
-        let plan = Plan::new(self.scene);
+        let clock = Instant::now();
+        let mut plan = Plan::new(self.scene);
         if let Some(shard) = self.shard {
             shard.check(&plan).map_err(|error| JobError::Usage(format!("--shard {error}")))?;
         }
         plan.check()?;
+        plan.planning = clock.elapsed();
         Ok(plan)
     }
 
@@ -229,6 +232,11 @@ impl<'p> MapRun<'p> {
         &self.open.reason
     }
 
+    /// The engine.
+    pub fn engine(&self) -> &Engine<'p> {
+        &self.open.engine
+    }
+
     /// Number of runs that are done.
     pub fn done(&self) -> usize {
         self.done
@@ -305,8 +313,10 @@ impl<'p> MapRun<'p> {
             commit: OWN_COMMIT,
         };
         Run {
+            planning: self.open.plan.planning,
             opening: *opening,
             elapsed: self.elapsed,
+            storing: self.records.as_ref().map_or(Duration::ZERO, RunRecords::storing),
             elapsed_before: self.records.as_ref().map_or(Duration::ZERO, RunRecords::elapsed_before),
             resumed_cells: self.resumed(),
             ..Run::new(provenance, job.sets, &self.processor).on(engine)
@@ -367,6 +377,11 @@ impl ComputedMap<'_> {
     pub fn write(&self) -> Result<Vec<String>, OutputError> {
         let Some(folder) = self.run.open.folder else { return Ok(Vec::new()) };
         store::map::write(folder, &self.cells(), &self.description())
+    }
+
+    /// Time that it took to write each file; they are written side by side.
+    pub fn writing_times(&self) -> BTreeMap<String, Duration> {
+        self.run.open.folder.map_or_else(BTreeMap::new, Folder::writing_times)
     }
 
     /// Returns the manifest and the columns of the map.

@@ -17,6 +17,7 @@ mod section;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use thiserror::Error;
 
@@ -77,6 +78,15 @@ impl EngineError {
             EngineError::Refused { reason, .. } | EngineError::Lost { reason, .. } => reason.clone(),
         }
     }
+}
+
+/// Time that it took to prepare an engine on its open device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Preparation {
+    /// Time for the constants of all flows.
+    pub flows: Duration,
+    /// Time in which the driver compiled the shaders.
+    pub compile: Duration,
 }
 
 /// The work of one of several cards.
@@ -143,6 +153,10 @@ trait Device {
 
     fn room(&self) -> usize {
         usize::MAX
+    }
+
+    fn preparation(&self) -> Preparation {
+        Preparation::default()
     }
 
     fn stop_on(&mut self, halt: &Arc<AtomicBool>);
@@ -238,6 +252,11 @@ impl Engine<'_> {
     /// Returns the number of cells for which the engine has memory now.
     pub fn room(&self) -> usize {
         self.properties().room()
+    }
+
+    /// Returns the time that it took to prepare the engine; zero without lanes, and on several cards.
+    pub fn preparation(&self) -> Preparation {
+        self.properties().preparation()
     }
 
     /// Sets the flag that stops the engine: while it is raised, [`Engine::advance`] soon returns the cells that have

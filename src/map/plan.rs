@@ -16,6 +16,7 @@ pub(crate) use morton::key as morton_key;
 pub(crate) use parts::Parts;
 
 use std::ops::Range;
+use std::time::Duration;
 
 use rayon::prelude::*;
 use thiserror::Error;
@@ -136,6 +137,8 @@ pub struct Plan {
     steps: Steps,
     refine: Option<Refine>,
     needs: Needs,
+    /// Time that numbering and checking the cells took; zero if it was not measured.
+    pub planning: Duration,
 }
 
 impl Plan {
@@ -172,6 +175,7 @@ impl Plan {
             steps: integration.steps_per_period,
             refine: scene.refine(),
             needs,
+            planning: Duration::ZERO,
         }
     }
 

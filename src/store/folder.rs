@@ -3,11 +3,12 @@
 
 mod lock;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use thiserror::Error;
@@ -50,6 +51,8 @@ pub struct Folder {
     path: PathBuf,
     /// Names of the results that were removed.
     removed: Mutex<BTreeSet<String>>,
+    /// Time that it took to write each file.
+    written: Mutex<BTreeMap<String, Duration>>,
     lock: Lock,
     // Dropped after the lock, whose file is in the folder.
     created: NewFolders,
@@ -97,7 +100,9 @@ impl Folder {
             Ok((Some(lock), created)) => match is_empty(&path) {
                 Err(reason) => Err(FolderError::NotWritable { path, reason }),
                 Ok(false) if !force => Err(FolderError::NotEmpty { path }),
-                Ok(_) => Ok(Folder { path, removed: Mutex::default(), lock, created }),
+                Ok(_) => {
+                    Ok(Folder { path, removed: Mutex::default(), written: Mutex::default(), lock, created })
+                }
             },
         }
     }
@@ -194,6 +199,7 @@ impl Folder {
         name: &str,
         write: impl FnOnce(&mut BufWriter<File>) -> Result<(), WriteError>,
     ) -> Result<(), OutputError> {
+        let clock = Instant::now();
         let target = self.path.join(name);
         let partial = partial(&target);
         let links = refuse_link(&target).and_then(|()| refuse_link(&partial));
@@ -214,6 +220,8 @@ impl Folder {
             // Best effort: the error that matters is the one already at hand.
             let _ = fs::remove_file(&partial);
         }
+        let mut times = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        times.insert(name.to_owned(), clock.elapsed());
         written.map_err(|reason| OutputError::Write { path: target, reason })
     }
 
@@ -247,6 +255,11 @@ impl Folder {
             }
         }
         Ok(())
+    }
+
+    /// Time that it took to write each file since the folder was opened. Files are written side by side.
+    pub fn writing_times(&self) -> BTreeMap<String, Duration> {
+        self.written.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Names of the results that were removed since the folder was opened, and not written again.

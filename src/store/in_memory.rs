@@ -1,5 +1,6 @@
 //! Builds the manifest and the tables of a map, diagram or comparison in memory, for callers that write no folder (Python).
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::map::bifurcation::Column;
@@ -44,7 +45,7 @@ pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
     let attractors =
         cells.basins().map(|basins| text(|to| attractors_csv::write(to, cells, basins))).transpose()?;
     Ok(Map {
-        manifest: map::map(cells, run, Duration::ZERO, &[]).to_string(),
+        manifest: map::map(cells, run, map::timings(run, Duration::ZERO, BTreeMap::new()), &[]).to_string(),
         columns: cell_columns::read(cells, &rows),
         texts: rows.texts(),
         attractors,

@@ -108,7 +108,8 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<St
     let keeps = |name: &str| [MANIFEST, RECORDS].contains(&name) || files.iter().any(|file| file == name);
     inventory::clear(folder, ALL.iter().map(String::as_str), keeps)?;
     let listed = [inventory::entries(folder, &files)?, records].concat();
-    let mut manifest = manifest::map::map(cells, run, clock.elapsed(), &listed);
+    let timings = manifest::map::timings(run, clock.elapsed(), folder.writing_times());
+    let mut manifest = manifest::map::map(cells, run, timings, &listed);
     if validation.is_some() {
         manifest["timings"]["validate"] = earlier["timings"]["validate"].clone();
     }

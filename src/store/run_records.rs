@@ -113,6 +113,7 @@ pub struct RunRecords<'f> {
     unit: &'static str,
     elapsed_before: Duration,
     clock: Instant,
+    storing: Duration,
 }
 
 impl<'f> RunRecords<'f> {
@@ -153,7 +154,15 @@ impl<'f> RunRecords<'f> {
         }
         let resumed = file.count();
         let unit = work.plan.unit();
-        Ok(RunRecords { file, folder, resumed, unit, elapsed_before, clock: Instant::now() })
+        Ok(RunRecords {
+            file,
+            folder,
+            resumed,
+            unit,
+            elapsed_before,
+            clock: Instant::now(),
+            storing: Duration::ZERO,
+        })
     }
 
     /// Stores a batch and waits until it is on the disk.
@@ -161,8 +170,11 @@ impl<'f> RunRecords<'f> {
     /// # Errors
     /// [`RunRecordsError`], for instance if the disk is full.
     pub fn store(&mut self, batch: &[(u32, Record)]) -> Result<(), RunRecordsError> {
+        let clock = Instant::now();
         self.file.append(batch)?;
-        Ok(unfinished::store_elapsed(self.folder, self.elapsed_before + self.elapsed())?)
+        unfinished::store_elapsed(self.folder, self.elapsed_before + self.elapsed())?;
+        self.storing += clock.elapsed();
+        Ok(())
     }
 
     /// Number of records in the file.
@@ -190,6 +202,11 @@ impl<'f> RunRecords<'f> {
     /// Time that earlier runs spent.
     pub fn elapsed_before(&self) -> Duration {
         self.elapsed_before
+    }
+
+    /// Time in which this run stored records.
+    pub fn storing(&self) -> Duration {
+        self.storing
     }
 
     /// Time since this run began.

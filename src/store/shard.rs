@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde_json::{Value, json};
 
@@ -85,14 +85,15 @@ pub fn write(folder: &Folder, finished: &FinishedShard<'_>) -> Result<Vec<String
     let mut files = map::write_copies(folder, scene, &|_| true)?;
     let listed: Vec<&str> = files.iter().map(String::as_str).chain([RECORDS]).collect();
     let listed = inventory::entries(folder, &listed)?;
-    inventory::write_manifest(folder, &manifest(finished, clock.elapsed(), &listed))?;
+    let timings = timings(finished.run, clock.elapsed(), folder.writing_times());
+    inventory::write_manifest(folder, &manifest(finished, timings, &listed))?;
     files.extend([RECORDS, MANIFEST].map(str::to_owned));
     unfinished::clear(folder)?;
     Ok(files)
 }
 
 /// Returns the manifest of a shard: the fields of a map's manifest that do not need the records of other shards.
-fn manifest(finished: &FinishedShard<'_>, writing: Duration, files: &[FileEntry]) -> Value {
+fn manifest(finished: &FinishedShard<'_>, timings: Value, files: &[FileEntry]) -> Value {
     let FinishedShard { shard, scene, run, .. } = *finished;
     joined([
         run_and_scene("map", Some(shard), run, scene),
@@ -101,7 +102,7 @@ fn manifest(finished: &FinishedShard<'_>, writing: Duration, files: &[FileEntry]
         json!({
             "elapsed_seconds": (run.elapsed_before + run.elapsed).as_secs_f64(),
             "resumed_cells": run.resumed_cells,
-            "timings": timings(run, writing),
+            "timings": timings,
             "files": files,
         }),
     ])

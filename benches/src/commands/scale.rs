@@ -6,7 +6,8 @@ use anyhow::Context;
 use rattlemap::cli::failure::Failure;
 use rattlemap::cli::note;
 use rattlemap::store::record_file::RECORDS;
-use rattlemap_bench::scale::{self, Cost, FileSize, Sizes};
+use rattlemap_bench::phase::Cost;
+use rattlemap_bench::scale::{self, FileSize, Sizes};
 use rattlemap_bench::write_rows;
 
 use crate::arguments::Scale;
@@ -43,7 +44,7 @@ pub(crate) fn run(arguments: &Scale) -> Result<(), Failure> {
     outer.replace("scale.csv", |out| write_rows(out, &costs))?;
     outer.replace("files.csv", |out| write_rows(out, &files))?;
     if !arguments.run.quiet {
-        for Cost { phase, seconds, processor_seconds, peak_bytes } in &costs {
+        for Cost { phase, seconds, processor_seconds, peak_bytes, .. } in &costs {
             let peak = peak_bytes.map_or(String::new(), |bytes| format!("{:>9.1} MB", bytes as f64 / 1e6));
             note(format_args!(
                 "{phase:<24} {seconds:>8.2} s, processor time {processor_seconds:>8.2} s {peak}"

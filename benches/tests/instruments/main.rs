@@ -3,6 +3,7 @@
 //! The lanes need an adapter; the tests fail without one: see `scripts/test.sh`.
 
 mod cli;
+mod host_cost;
 mod order;
 mod scale;
 mod stress;

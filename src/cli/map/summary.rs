@@ -1,9 +1,11 @@
 //! Lines that are printed when a map or a shard is done.
 
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Duration;
 
 use crate::cli::say::{classes, path, quoted};
-use crate::map::engine::CardReport;
+use crate::map::engine::{CardReport, Preparation};
 use crate::map::plan::count_classes;
 use crate::map::schedule::{Deviation, Errors, Refined};
 use crate::record::measures;
@@ -29,6 +31,23 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
         cells.refinement().map_or(String::new(), |refined| refinement(refined, count, cells)),
         classes(count_classes(cells.classes())) + &cells.chaos_ends().map_or(String::new(), chaos_ends),
     )
+}
+
+/// Says where the time of a run went, in seconds. `finishing` is the time from the last cell to the last file.
+pub(super) fn times(run: &Run<'_>, finishing: Duration, files: BTreeMap<String, Duration>) -> String {
+    let phase = |name: &str, time: Duration| format!("{name} {:.3}", time.as_secs_f64());
+    let Preparation { flows, compile } = run.preparation;
+    let slowest = files.into_iter().max_by_key(|(_, time)| *time);
+    let slowest = slowest.map_or(String::new(), |(name, time)| format!(" ({})", phase(&name, time)));
+    let phases = [
+        phase("plan", run.planning),
+        phase("device", run.device()),
+        phase("flows", flows),
+        phase("compile", compile),
+        format!("{} ({})", phase("integrate", run.elapsed), phase("records", run.storing)),
+        phase("files", finishing) + &slowest,
+    ];
+    format!("\ntime in seconds: {}", phases.join(", "))
 }
 
 /// Says at which rate chaos ends.

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
+use web_time::Instant;
 
 use super::section::is_on_strobe;
-use super::{Device, EngineError, compare_at_sections, drop_unrequested};
+use super::{Device, EngineError, Preparation, compare_at_sections, drop_unrequested};
 use crate::gpu::{
-    self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables,
+    self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables, Traffic,
 };
 use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};
@@ -42,6 +43,7 @@ pub struct Gpu<'p> {
     waiting: Vec<Cell>,
     /// Largest number of cells of such a batch.
     most_waiting: usize,
+    preparation: Preparation,
 }
 
 impl Gpu<'static> {
@@ -64,6 +66,7 @@ impl<'p> Gpu<'p> {
     }
 
     async fn open(plan: Cow<'p, Plan>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+        let mut clock = Instant::now();
         // Each oscillator is derived once: if the flows are stored, together with its constants.
         let (constants, survey) = if plan.stores_flows() {
             let derived = survey_flows(&plan, Constants::new);
@@ -83,6 +86,7 @@ impl<'p> Gpu<'p> {
             pool: None,
             waiting: Vec::new(),
             most_waiting: gpu::MOST_FLOWS,
+            preparation: Preparation::default(),
         };
         if !engine.is_hardware() {
             engine.most_waiting = FLOWS_IN_SOFTWARE;
@@ -95,10 +99,18 @@ impl<'p> Gpu<'p> {
                 other => Some(other.map_err(|error| engine.error(error, engine.plan.cell_count()))?),
             };
         }
+        engine.preparation.flows = clock.elapsed();
+        clock = Instant::now();
         // The shader is compiled now, so that the first batch does not wait for it.
         let pool = engine.device.pool(&settings).await.map_err(|error| engine.error(error, 0))?;
         engine.pool = engine.plan.stores_flows().then_some(pool);
+        engine.preparation.compile = clock.elapsed();
         Ok(engine)
+    }
+
+    /// Returns the work that the device has received since it was opened.
+    pub fn traffic(&self) -> Traffic {
+        self.device.traffic()
     }
 
     /// Returns the device for another plan.
@@ -248,6 +260,10 @@ impl Device for Gpu<'_> {
 
     fn steps_per_period(&self) -> Option<[u32; 2]> {
         self.steps_per_period
+    }
+
+    fn preparation(&self) -> Preparation {
+        self.preparation
     }
 
     fn room(&self) -> usize {

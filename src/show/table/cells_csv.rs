@@ -3,16 +3,10 @@
 use std::io::Write;
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::show::cells::Cells;
 use crate::show::error::WriteError;
 use crate::show::table::cell_columns::{CellColumn, CellRow, location_names, of_csv};
-
-/// Number of rows formatted at a time by all cores together.
-const BLOCK: usize = 1 << 16;
-/// Number of rows per task.
-const PART: usize = 1 << 12;
+use crate::show::table::write_rows;
 
 /// Writes the table.
 pub fn write(mut out: impl Write, cells: &Cells<'_>) -> Result<(), WriteError> {
@@ -21,16 +15,7 @@ pub fn write(mut out: impl Write, cells: &Cells<'_>) -> Result<(), WriteError> {
     header.write_record(location_names(cells).chain(columns.iter().map(|column| &*column.name)))?;
     header.flush()?;
     drop(header);
-    let count = cells.count();
-    for block in (0..count).step_by(BLOCK) {
-        let end = count.min(block + BLOCK);
-        let starts: Vec<usize> = (block..end).step_by(PART).collect();
-        let parts = starts.par_iter().map(|&start| part(cells, &columns, start..end.min(start + PART)));
-        for part in parts.collect::<Result<Vec<_>, WriteError>>()? {
-            out.write_all(&part)?;
-        }
-    }
-    Ok(out.flush()?)
+    write_rows(&mut out, cells.count(), |ids| part(cells, &columns, ids))
 }
 
 fn part(cells: &Cells<'_>, columns: &[CellColumn], ids: Range<usize>) -> Result<Vec<u8>, WriteError> {

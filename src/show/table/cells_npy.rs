@@ -6,6 +6,7 @@ use crate::show::cells::Cells;
 use crate::show::error::WriteError;
 use crate::show::table::cell_columns::{CellRow, numpy_types, requested};
 use crate::show::table::words_csv::WordRows;
+use crate::show::table::write_rows;
 
 /// The header ends at a multiple of this many bytes.
 const ALIGNMENT: usize = 64;
@@ -27,14 +28,14 @@ pub fn write(mut out: impl Write, cells: &Cells<'_>, rows: &WordRows<'_>) -> Res
     out.write_all(magic)?;
     out.write_all(&(length as u16).to_le_bytes())?;
     out.write_all(header.as_bytes())?;
-    let mut bytes = Vec::new();
-    for id in 0..count {
-        let cell = CellRow::new(cells, id);
-        bytes.clear();
-        cell.indices().iter().for_each(|&index| bytes.extend((index as u32).to_le_bytes()));
-        cells.values(id).iter().for_each(|value| bytes.extend(value.to_le_bytes()));
-        columns.iter().for_each(|column| column.value.put(&cell, rows, &mut bytes));
-        out.write_all(&bytes)?;
-    }
-    Ok(out.flush()?)
+    write_rows(&mut out, count, |ids| {
+        let mut bytes = Vec::new();
+        for id in ids {
+            let cell = CellRow::new(cells, id);
+            cell.indices().iter().for_each(|&index| bytes.extend((index as u32).to_le_bytes()));
+            cells.values(id).iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+            columns.iter().for_each(|column| column.value.put(&cell, rows, &mut bytes));
+        }
+        Ok(bytes)
+    })
 }

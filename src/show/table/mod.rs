@@ -9,6 +9,35 @@ pub mod compare_csv;
 pub mod orbit_tables;
 pub mod words_csv;
 
+use std::io::Write;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::show::error::WriteError;
+
+/// Number of rows that all cores together format at a time.
+const BLOCK: usize = 1 << 16;
+/// Number of rows per task.
+const PART: usize = 1 << 12;
+
+/// Writes `count` rows in order. `part` returns the bytes of a range of rows and is called in parallel.
+fn write_rows(
+    out: &mut impl Write,
+    count: usize,
+    part: impl Fn(Range<usize>) -> Result<Vec<u8>, WriteError> + Sync,
+) -> Result<(), WriteError> {
+    for block in (0..count).step_by(BLOCK) {
+        let end = count.min(block + BLOCK);
+        let starts: Vec<usize> = (block..end).step_by(PART).collect();
+        let parts = starts.par_iter().map(|&start| part(start..end.min(start + PART)));
+        for part in parts.collect::<Result<Vec<_>, WriteError>>()? {
+            out.write_all(&part)?;
+        }
+    }
+    Ok(out.flush()?)
+}
+
 #[cfg(test)]
 mod tests {
     use crate::model_file::FileModel;

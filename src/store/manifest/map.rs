@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::findings::attractors::Attractor;
 use crate::gpu::AdapterId;
-use crate::map::engine::{CardReport, Engine};
+use crate::map::engine::{CardReport, Engine, Preparation};
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
 use crate::map::shard::Shard;
@@ -36,10 +36,16 @@ pub struct Run<'a> {
     pub cards: Vec<CardReport>,
     /// Description of the host's processor.
     pub processor: &'a str,
+    /// Time that numbering and checking the cells took.
+    pub planning: Duration,
     /// Time until the engine was ready.
     pub opening: Duration,
+    /// The part of that time after the device was open.
+    pub preparation: Preparation,
     /// Time spent integrating in this run.
     pub elapsed: Duration,
+    /// The part of that time in which records were stored.
+    pub storing: Duration,
     /// Time spent integrating in earlier runs that this one resumed.
     pub elapsed_before: Duration,
     /// Number of records of earlier runs.
@@ -61,8 +67,11 @@ impl<'a> Run<'a> {
             adapter: None,
             cards: Vec::new(),
             processor,
+            planning: Duration::ZERO,
             opening: Duration::ZERO,
+            preparation: Preparation::default(),
             elapsed: Duration::ZERO,
+            storing: Duration::ZERO,
             elapsed_before: Duration::ZERO,
             resumed_cells: 0,
             lane_grid: None,
@@ -75,7 +84,12 @@ impl<'a> Run<'a> {
     #[must_use]
     pub fn on(self, engine: &Engine<'_>) -> Run<'a> {
         let (adapter, cards, lane_grid) = (engine.adapter(), engine.cards(), engine.steps_per_period());
-        Run { adapter, cards, lane_grid, ..self }
+        Run { adapter, cards, lane_grid, preparation: engine.preparation(), ..self }
+    }
+
+    /// Time in which the device was opened.
+    pub fn device(&self) -> Duration {
+        self.opening.saturating_sub(self.preparation.flows + self.preparation.compile)
     }
 }
 
@@ -91,7 +105,7 @@ pub struct ShardOrigin<'a> {
 }
 
 /// Returns the manifest of a map. It contains neither paths nor user names.
-pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, writing: Duration, files: &[FileEntry]) -> Value {
+pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, timings: Value, files: &[FileEntry]) -> Value {
     let scene = cells.scene();
     let quantities: Vec<&str> = scene.outputs().quantities.iter().map(|quantity| quantity.name()).collect();
     joined([
@@ -113,7 +127,7 @@ pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, writing: Duration, files: &[
             "elapsed_seconds": (run.elapsed_before + run.elapsed).as_secs_f64(),
             "resumed_cells": run.resumed_cells,
             "refinement": refinement::object(cells),
-            "timings": timings(run, writing),
+            "timings": timings,
             "files": files,
         }),
     ])
@@ -196,12 +210,21 @@ pub(crate) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> Value {
     })
 }
 
-/// Seconds that each phase took. `integrate` is the sum over all resumed runs; the others are those of the last run.
-pub(crate) fn timings(run: &Run<'_>, writing: Duration) -> Value {
+/// Seconds that each phase took. `integrate` is the sum over all resumed runs and includes `records`, the time in which they
+/// were stored; the others are those of the last run. `open` is the sum of `device`, `flows` and `compile`. The `files` are
+/// written side by side, within `write`.
+pub(crate) fn timings(run: &Run<'_>, writing: Duration, files: BTreeMap<String, Duration>) -> Value {
+    let files = files.into_iter().map(|(name, time)| (name, time.as_secs_f64()));
     json!({
+        "plan": run.planning.as_secs_f64(),
         "open": run.opening.as_secs_f64(),
+        "device": run.device().as_secs_f64(),
+        "flows": run.preparation.flows.as_secs_f64(),
+        "compile": run.preparation.compile.as_secs_f64(),
         "integrate": (run.elapsed_before + run.elapsed).as_secs_f64(),
+        "records": run.storing.as_secs_f64(),
         "write": writing.as_secs_f64(),
+        "files": files.collect::<BTreeMap<_, _>>(),
     })
 }
 

@@ -283,7 +283,7 @@ fn check_manifest(out: &Path, rows: &[Vec<String>]) {
         assert_eq!(manifest["classes"][class], count);
     }
     assert_eq!(manifest["format"], 2);
-    for phase in ["open", "integrate", "write"] {
+    for phase in words("plan open device flows compile integrate records write") {
         assert!(manifest["timings"][phase].as_f64().unwrap() >= 0.0, "{phase}");
     }
     let files = manifest["files"].as_array().unwrap();

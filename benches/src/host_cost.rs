@@ -1,0 +1,62 @@
+//! What a map costs the host: time by phase, and the work that a device receives.
+//!
+//! Every motion of the map is contact-free and ends after one forcing period, so that lanes cost next to nothing and the host's
+//! work remains.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use rattlemap::gpu::Traffic;
+use rattlemap::job::engine_choice::EngineRequest;
+use rattlemap::job::map::MapJob;
+use rattlemap::map::engine::Engine;
+use rattlemap::map::scene::{Quantity, Scene};
+use rattlemap::model::GearPair;
+use rattlemap::store::folder::Folder;
+
+use crate::phase::{self, Cost};
+
+/// Amplitude of the force. The teeth move by a small part of the backlash.
+const FORCE: f64 = 1e-3;
+
+/// Costs of a map.
+#[derive(Clone, Debug)]
+pub struct HostCost {
+    /// Number of cells.
+    pub cells: usize,
+    /// Cost of each phase, in order.
+    pub phases: Vec<Cost>,
+    /// Work that the device has received. None for maps of the processor.
+    pub traffic: Option<Traffic>,
+}
+
+/// Computes and writes a map of `counts` cells, of class and exponent or of `all` quantities.
+///
+/// # Errors
+/// If the engine cannot be opened or fails, a file cannot be written, or a motion does not end after one period.
+pub fn run(counts: [u32; 2], all: bool, engine: EngineRequest, out: &Path) -> Result<HostCost> {
+    use Quantity::{Class, Impacts, Lyapunov, Mesh, Pattern, Symmetric, Word};
+    let model = GearPair { force: FORCE, ..GearPair::paper(0.5) };
+    let builder = Scene::builder(model).axis("e", 0.0..=1.0, counts[0]).axis("omega", 1.0..=12.0, counts[1]);
+    let everything = [Class, Lyapunov, Impacts, Mesh, Symmetric, Word, Pattern];
+    let scene = if all { builder.quantities(&everything) } else { builder }.build()?;
+    let job = MapJob::new(&scene, engine);
+    let folder = Folder::open(out, true)?;
+    let mut phases = Vec::new();
+    let plan = phase::run("plan", &mut phases, || job.plan())?;
+    let opened = phase::run("open", &mut phases, || job.open(&plan, Some(&folder), Arc::new(())))?;
+    let mut run = phase::run("begin", &mut phases, || opened.begin())?;
+    phase::run("integrate", &mut phases, || run.integrate(&Arc::default()))?;
+    let traffic = match run.engine() {
+        Engine::Gpu(gpu) => Some(gpu.traffic()),
+        _ => None,
+    };
+    let map = phase::run("survey", &mut phases, || run.finish());
+    phase::run("write", &mut phases, || map.write())?;
+    let (cells, periods) = (map.cells().count(), map.cells().periods());
+    if periods > 2 * cells as u64 {
+        bail!("{cells} cells took {periods} forcing periods; each must end after the first or second");
+    }
+    Ok(HostCost { cells, phases, traffic })
+}
