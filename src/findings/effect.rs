@@ -3,6 +3,10 @@
 //! All quantities of tables are compared, as far as they were computed: class, period, exponent, impacts, meshing,
 //! symmetry, word and pattern.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
 use crate::record::measures::{GROUPS, SMALL};
@@ -13,6 +17,9 @@ const SINGLE_TOLERANCE: f64 = 1e-3;
 
 /// Relative tolerance for rounding errors of engines in double precision.
 const DOUBLE_TOLERANCE: f64 = 1e-6;
+
+/// Number of neighbouring lines that are compared together. Their records are neighbours in memory, too.
+const LINES: usize = 64;
 
 /// Returns the names of the swept parameters along whose axis all integrated cells are equal within rounding errors.
 /// The tolerance depends on `precision`: `f64`, else single.
@@ -29,23 +36,32 @@ pub fn names(plan: &Plan, records: &(impl Records + ?Sized), precision: &str) ->
     }
     let tolerance = if precision == "f64" { DOUBLE_TOLERANCE } else { SINGLE_TOLERANCE };
     let counts = plan.counts();
-    let changes_nothing = |axis: usize| {
-        let mut compared = 0;
+    // Number of comparisons along some neighbouring lines of a map; none if cells of a line differ.
+    let compare = |axis: usize, map: usize, lines: Range<usize>| {
         let [step, other_step] = if axis == 0 { [1, counts[0]] } else { [counts[0], 1] };
-        for map in (0..records.count()).step_by(plan.cell_count()) {
-            for line in 0..counts[1 - axis] {
-                let cells = (0..counts[axis]).map(|n| records.record(map + line * other_step + n * step));
-                let mut integrated = cells.filter(|record| record.valid & valid::FILLED == 0);
-                let Some(first) = integrated.next() else { continue };
-                for record in integrated {
-                    if !is_same(&first, &record, tolerance) {
-                        return false;
-                    }
-                    compared += 1;
+        let (mut firsts, mut compared) = (vec![None; lines.len()], 0);
+        for n in 0..counts[axis] {
+            for (line, first) in lines.clone().zip(&mut firsts) {
+                let record = records.record(map + line * other_step + n * step);
+                if record.valid & valid::FILLED != 0 {
+                    continue;
+                }
+                match first {
+                    None => *first = Some(record),
+                    Some(first) if is_same(first, &record, tolerance) => compared += 1,
+                    Some(_) => return None,
                 }
             }
         }
-        compared > 0
+        Some(compared)
+    };
+    let changes_nothing = |axis: usize| {
+        let lines = counts[1 - axis];
+        let maps = (0..records.count()).step_by(plan.cell_count());
+        let parts: Vec<(usize, usize)> =
+            maps.flat_map(|map| (0..lines).step_by(LINES).map(move |line| (map, line))).collect();
+        let part = |&(map, line): &(usize, usize)| compare(axis, map, line..lines.min(line + LINES));
+        parts.par_iter().map(part).try_reduce(|| 0, |a, b| Some(a + b)).is_some_and(|compared| compared > 0)
     };
     // Components of the start are not parameters.
     let axes = plan.axes().iter().enumerate().filter(|(_, axis)| !axis.target().is_start());
@@ -60,7 +76,9 @@ fn is_same(a: &Record, b: &Record, tolerance: f64) -> bool {
         && both(valid::LYAPUNOV, near(a.lyapunov, b.lyapunov))
         && both(valid::IMPACTS, near(a.impacts_per_period, b.impacts_per_period))
         && both(valid::MESH, near(a.mesh_fraction, b.mesh_fraction))
-        && GROUPS.iter().all(|group| both(group.bit, group.distance(a, b, SMALL) <= tolerance))
+        && GROUPS.iter().all(|group| {
+            (a.valid | b.valid) & group.bit == 0 || both(group.bit, group.distance(a, b, SMALL) <= tolerance)
+        })
         && both(valid::SYMMETRIC, a.symmetric == b.symmetric)
         && both(valid::WORD, a.spelling() == b.spelling())
         && both(valid::PATTERN, a.pattern() == b.pattern())

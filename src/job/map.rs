@@ -1,9 +1,11 @@
 //! Computes a map or a shard of one: opens the engine, creates or resumes the record file, integrates, finishes.
 
 use std::collections::BTreeMap;
+use std::panic;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, mpsc};
+use std::thread::{self, ScopedJoinHandle};
 use std::time::{Duration, Instant};
 
 use crate::findings::effect;
@@ -34,6 +36,9 @@ use crate::store::record_file::{Identity, RECORDS};
 use crate::store::run_records::{RunRecords, Work};
 use crate::store::shard::{self, FinishedShard};
 use rattlemap_dynamics::orbit::Status;
+
+/// Most batches of records that wait for the thread that stores them.
+const BATCHES_WAITING: usize = 1;
 
 /// A map, or a shard of one, to be computed.
 #[derive(Clone, Debug)]
@@ -257,8 +262,8 @@ impl<'p> MapRun<'p> {
         self.records.as_ref().map_or(0, RunRecords::resumed)
     }
 
-    /// Computes the remaining runs, and stores their records twice a second. Returns false if `halt` was raised
-    /// before the last one ended.
+    /// Computes the remaining runs. A thread of its own stores their records. Returns false if `halt` was raised before the
+    /// last one ended.
     ///
     /// # Errors
     /// [`SweepError`] if the engine fails or a record cannot be stored. Stored records can be resumed.
@@ -268,20 +273,29 @@ impl<'p> MapRun<'p> {
         let Work { plan, schedule, records, tally, .. } = work;
         let mut is_first = *done == 0;
         observer.progress(*done, schedule.expected());
-        let store = |batch: &[(u32, Record)], expected| {
-            if let Some(stored) = stored {
-                stored.store(batch)?;
+        let is_finished = thread::scope(|scope| {
+            let (sender, batches) = mpsc::sync_channel(BATCHES_WAITING);
+            let writer = stored.as_mut().map(|stored| scope.spawn(move || stored.store(&batches)));
+            let is_stored = writer.is_some();
+            let store = |batch: Vec<(u32, Record)>, expected| {
+                tally.take(plan, &batch);
+                *done += batch.len();
+                if let Some(failed) = all_failed(&batch, plan.unit()).filter(|_| is_first) {
+                    observer.warn(&failed);
+                }
+                is_first = false;
+                observer.progress(*done, expected);
+                // Sending fails if the writer has ended with an error, which is returned below.
+                if is_stored { Ok(sender.send(batch)?) } else { Ok(()) }
+            };
+            let swept = pollster::block_on(sweep::run(plan, schedule, engine, records, halt, store));
+            drop(sender);
+            match writer.map(ScopedJoinHandle::join) {
+                Some(Ok(Err(error))) => Err(SweepError::Store(error.into())),
+                Some(Err(panic)) => panic::resume_unwind(panic),
+                _ => swept,
             }
-            tally.take(plan, batch);
-            *done += batch.len();
-            if let Some(failed) = all_failed(batch, plan.unit()).filter(|_| is_first) {
-                observer.warn(&failed);
-            }
-            is_first = false;
-            observer.progress(*done, expected);
-            Ok(())
-        };
-        let is_finished = pollster::block_on(sweep::run(plan, schedule, engine, records, halt, store))?;
+        })?;
         self.elapsed = clock.elapsed();
         Ok(is_finished)
     }

@@ -48,7 +48,7 @@ pub async fn run(
     engine: &mut Engine<'_>,
     records: &mut [Record],
     halt: &Arc<AtomicBool>,
-    mut store: impl FnMut(&[(u32, Record)], usize) -> Result<(), Box<dyn Error + Send + Sync>>,
+    mut store: impl FnMut(Vec<(u32, Record)>, usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
     engine.stop_on(halt);
     let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH * engine.card_count() };
@@ -72,26 +72,30 @@ pub async fn run(
         };
         last_ended = Instant::now();
         let is_halted = halt.load(Ordering::Relaxed);
-        let is_over = match &ended {
-            Err(_) => true,
+        let (is_over, failure) = match ended {
+            Err(error) => (true, Some(error)),
             Ok(ended) => {
                 pace.adapt(under_way, ended.len(), last_ended - clock);
                 under_way -= ended.len();
-                schedule.prepare(ended);
-                for &(id, record) in ended {
+                schedule.prepare(&ended);
+                for &(id, record) in &ended {
                     put(records, id, record);
                     schedule.take(id, records);
                 }
-                unstored.extend_from_slice(ended);
-                schedule.is_finished() || is_halted
+                // A large batch is stored alone and need not be copied.
+                if unstored.is_empty() {
+                    unstored = ended;
+                } else {
+                    unstored.extend(ended);
+                }
+                (schedule.is_finished() || is_halted, None)
             }
         };
         if !unstored.is_empty() && (is_over || last_stored.elapsed() >= STORE_INTERVAL) {
-            store(&unstored, schedule.expected()).map_err(SweepError::Store)?;
-            unstored.clear();
+            store(std::mem::take(&mut unstored), schedule.expected()).map_err(SweepError::Store)?;
             last_stored = Instant::now();
         }
-        ended?;
+        failure.map_or(Ok(()), Err)?;
         if is_halted && !schedule.is_finished() {
             return Ok(false);
         }

@@ -220,8 +220,10 @@ impl Folder {
             // Best effort: the error that matters is the one already at hand.
             let _ = fs::remove_file(&partial);
         }
-        let mut times = self.written.lock().unwrap_or_else(PoisonError::into_inner);
-        times.insert(name.to_owned(), clock.elapsed());
+        if name != UNFINISHED {
+            let mut times = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+            times.insert(name.to_owned(), clock.elapsed());
+        }
         written.map_err(|reason| OutputError::Write { path: target, reason })
     }
 

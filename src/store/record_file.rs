@@ -144,7 +144,7 @@ impl RecordFile {
         self.damage.as_ref()
     }
 
-    /// Appends records with their ids and waits until they are on the disk.
+    /// Appends records with their ids. [`RecordFile::sync`] waits until they are on the disk.
     ///
     /// # Errors
     /// [`RecordFileError::Io`], for instance if the disk is full.
@@ -155,11 +155,18 @@ impl RecordFile {
             numbered.map(|(number, cells)| batch::encode(number, cells)).collect();
         encoded
             .and_then(|encoded| encoded.iter().try_for_each(|batch| self.file.write_all(batch)))
-            .and_then(|()| self.file.sync_data())
             .map_err(|reason| io_error(&self.path, reason))?;
         self.next_number += batches.len() as u32;
         self.count += records.len();
         Ok(())
+    }
+
+    /// Waits until all records are on the disk.
+    ///
+    /// # Errors
+    /// [`RecordFileError::Io`], for instance if the disk is full.
+    pub fn sync(&self) -> Result<(), RecordFileError> {
+        self.file.sync_data().map_err(|reason| io_error(&self.path, reason))
     }
 }
 

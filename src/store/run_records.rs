@@ -1,6 +1,7 @@
 //! Records of a run that may be interrupted: stored as cells end, and taken up again when the run resumes.
 
 use std::path::Path;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use thiserror::Error;
@@ -17,6 +18,9 @@ use crate::store::folder::{Folder, FolderError};
 use crate::store::record_file::{Extent, Identity, Order, RECORDS, RecordFile, RecordFileError};
 use crate::store::shard::Tally;
 use crate::store::{map, unfinished};
+
+/// Longest time between two waits for the disk while records are stored.
+const SYNC_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Why records cannot be stored in a folder.
 #[derive(Debug, Error)]
@@ -165,16 +169,32 @@ impl<'f> RunRecords<'f> {
         })
     }
 
-    /// Stores a batch and waits until it is on the disk.
+    /// Stores batches of records until their sender is dropped. They are on the disk a second after they were sent, if the
+    /// disk is fast enough, and all of them in the end.
     ///
     /// # Errors
     /// [`RunRecordsError`], for instance if the disk is full.
-    pub fn store(&mut self, batch: &[(u32, Record)]) -> Result<(), RunRecordsError> {
-        let clock = Instant::now();
-        self.file.append(batch)?;
-        unfinished::store_elapsed(self.folder, self.elapsed_before + self.elapsed())?;
-        self.storing += clock.elapsed();
-        Ok(())
+    pub fn store(&mut self, batches: &Receiver<Vec<(u32, Record)>>) -> Result<(), RunRecordsError> {
+        let (mut synced, mut is_synced) = (Instant::now(), true);
+        loop {
+            let left = if is_synced { SYNC_INTERVAL } else { SYNC_INTERVAL.saturating_sub(synced.elapsed()) };
+            let received = batches.recv_timeout(left);
+            let clock = Instant::now();
+            if let Ok(batch) = &received {
+                self.file.append(batch)?;
+                is_synced = false;
+            }
+            let is_over = received == Err(RecvTimeoutError::Disconnected);
+            if !is_synced && (is_over || synced.elapsed() >= SYNC_INTERVAL) {
+                self.file.sync()?;
+                unfinished::store_elapsed(self.folder, self.elapsed_before + self.elapsed())?;
+                (synced, is_synced) = (Instant::now(), true);
+            }
+            self.storing += clock.elapsed();
+            if is_over {
+                return Ok(());
+            }
+        }
     }
 
     /// Number of records in the file.

@@ -33,7 +33,7 @@ fn swept(plan: &Plan, engine: &mut Engine<'_>, before: &[(u32, Record)]) -> Swep
     let (mut schedule, mut stored) = (Schedule::new(plan), Vec::new());
     let mut records = vec![Record::default(); plan.run_count()];
     assert!(sweep::replay(&mut schedule, &mut records, before));
-    let store = |batch: &[(u32, Record)], expected: usize| {
+    let store = |batch: Vec<(u32, Record)>, expected: usize| {
         assert!(expected <= plan.run_count());
         stored.extend(batch.iter().map(|(id, _)| *id));
         Ok(())

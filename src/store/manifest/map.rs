@@ -44,7 +44,7 @@ pub struct Run<'a> {
     pub preparation: Preparation,
     /// Time spent integrating in this run.
     pub elapsed: Duration,
-    /// The part of that time in which records were stored.
+    /// Time in which a thread of its own stored records.
     pub storing: Duration,
     /// Time spent integrating in earlier runs that this one resumed.
     pub elapsed_before: Duration,
@@ -210,8 +210,8 @@ pub(crate) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> Value {
     })
 }
 
-/// Seconds that each phase took. `integrate` is the sum over all resumed runs and includes `records`, the time in which they
-/// were stored; the others are those of the last run. `open` is the sum of `device`, `flows` and `compile`. The `files` are
+/// Seconds that each phase took. `integrate` is the sum over all resumed runs; the others are those of the last run. `records`
+/// is the time of the thread that stores records meanwhile. `open` is the sum of `device`, `flows` and `compile`. The `files` are
 /// written side by side, within `write`.
 pub(crate) fn timings(run: &Run<'_>, writing: Duration, files: BTreeMap<String, Duration>) -> Value {
     let files = files.into_iter().map(|(name, time)| (name, time.as_secs_f64()));
