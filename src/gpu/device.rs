@@ -106,7 +106,7 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
     let (device, queue) = requested.await.map_err(|error| no_device(error.to_string()))?;
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();
-    let (queue, policy) = (PanicFree::new(queue), DispatchPolicy::of(info.device_type));
+    let (queue, policy) = (PanicFree::new(queue), DispatchPolicy::of(&info));
     Ok(Gpu {
         device,
         queue,

@@ -3,7 +3,7 @@
 use web_time::Duration;
 
 /// How lanes are driven. Records depend on `late_tangent` and `keep` alone, by rounding.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DispatchPolicy {
     /// Dispatches of a round, between two checks. A lane that has read a cycle continues in the next dispatch.
     pub(super) dispatches: u32,
@@ -16,7 +16,12 @@ pub(super) struct DispatchPolicy {
     pub(super) late_tangent: bool,
     /// Whether lanes keep copies of all their constants.
     pub(super) keep: bool,
+    /// Longest time to wait for a submission. A device that takes longer counts as lost.
+    pub(super) longest_wait: Duration,
 }
+
+/// A round takes some milliseconds, and seconds on a busy processor.
+const LONGEST_WAIT: Duration = Duration::from_secs(300);
 
 /// Software: the duration of a round grows with the number of lanes, and only the amount of work matters.
 const SOFTWARE: DispatchPolicy = DispatchPolicy {
@@ -25,6 +30,7 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
     patience: 8,
     late_tangent: true,
     keep: true,
+    longest_wait: LONGEST_WAIT,
 };
 
 /// Hardware that shares the processor's memory and draws the screen: the amount of work matters there, too.
@@ -34,25 +40,46 @@ const INTEGRATED: DispatchPolicy = DispatchPolicy {
     patience: 4,
     late_tangent: true,
     keep: false,
+    longest_wait: LONGEST_WAIT,
 };
 
 /// Hardware with room for more lanes than a map has: the wait for cells that others depend on matters. Checks follow
 /// each other after about 64 periods of a lane, and all lanes run side by side.
-const DEDICATED: DispatchPolicy = DispatchPolicy {
+pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
     dispatches: 8,
     round: Duration::from_millis(2),
     patience: 4,
     late_tangent: false,
     keep: false,
+    longest_wait: LONGEST_WAIT,
 };
 
 impl DispatchPolicy {
-    /// Returns the policy for a kind of adapter.
-    pub(super) fn of(kind: wgpu::DeviceType) -> DispatchPolicy {
-        match kind {
+    /// Returns the policy for an adapter. A browser does not say of which kind its hardware is.
+    pub(super) fn of(info: &wgpu::AdapterInfo) -> DispatchPolicy {
+        match info.device_type {
             wgpu::DeviceType::Cpu => SOFTWARE,
+            wgpu::DeviceType::Other if info.backend == wgpu::Backend::BrowserWebGpu => DEDICATED,
             wgpu::DeviceType::IntegratedGpu | wgpu::DeviceType::Other => INTEGRATED,
             wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::VirtualGpu => DEDICATED,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hardware_of_a_browser_is_driven_like_a_card() {
+        let info = |kind, backend| wgpu::AdapterInfo::new(kind, backend);
+        for (kind, backend, expected) in [
+            (wgpu::DeviceType::Other, wgpu::Backend::BrowserWebGpu, DEDICATED),
+            (wgpu::DeviceType::Cpu, wgpu::Backend::BrowserWebGpu, SOFTWARE),
+            (wgpu::DeviceType::Other, wgpu::Backend::Vulkan, INTEGRATED),
+            (wgpu::DeviceType::DiscreteGpu, wgpu::Backend::Vulkan, DEDICATED),
+        ] {
+            assert_eq!(DispatchPolicy::of(&info(kind, backend)), expected, "{kind:?} {backend:?}");
         }
     }
 }

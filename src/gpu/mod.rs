@@ -297,7 +297,7 @@ impl Gpu {
     /// Uses the dispatch policy of dedicated hardware after this call, for tests on software drivers.
     #[doc(hidden)]
     pub fn drive_as_dedicated(&mut self) {
-        self.policy = DispatchPolicy::of(wgpu::DeviceType::DiscreteGpu);
+        self.policy = dispatch_policy::DEDICATED;
     }
 
     /// Calls `watcher` after this call when lanes reach a stage, for measurements.
@@ -325,7 +325,17 @@ impl Gpu {
 
     /// Polls the device. Callbacks of native drivers run only here.
     fn poll(&self, poll: wgpu::PollType) -> Result<(), GpuError> {
-        let lost = |error: wgpu::PollError| self.failure(GpuError::Lost { message: error.to_string() });
+        let lost = |error: wgpu::PollError| {
+            let message = match error {
+                wgpu::PollError::Timeout => {
+                    let message = format!("it is not ready after {} s", self.policy.longest_wait.as_secs());
+                    self.trouble.note(message.clone());
+                    message
+                }
+                error => error.to_string(),
+            };
+            self.failure(GpuError::Lost { message })
+        };
         self.call(|| self.device.poll(poll))?.map_err(lost)?;
         self.trouble.check()
     }

@@ -261,16 +261,28 @@ mod tests {
         assert!(stretches(std::iter::empty()).is_empty());
     }
 
-    #[test]
-    fn a_lost_device_is_an_error() {
+    /// Runs a lane on a device that was changed before, and returns the error.
+    fn error_after(change: impl FnOnce(&mut Gpu)) -> String {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
-        gpu.device.destroy();
+        change(&mut gpu);
         let pair = GearPair::paper(0.5);
         let lanes = [Lane { flow: 0, law: 0, start: [0.0; 4] }];
         let flows = [pair.oscillator().unwrap()];
         let settings = LaneSettings::default();
         let error = pollster::block_on(gpu.run(&flows, &[pair.law()], &lanes, &settings)).unwrap_err();
         assert!(matches!(error, GpuError::Lost { .. }), "{error}");
-        assert!(error.to_string().contains("lost"), "{error}");
+        error.to_string()
+    }
+
+    #[test]
+    fn a_lost_device_is_an_error() {
+        let error = error_after(|gpu| gpu.device.destroy());
+        assert!(error.contains("lost"), "{error}");
+    }
+
+    #[test]
+    fn a_device_that_never_ends_is_lost() {
+        let error = error_after(|gpu| gpu.policy.longest_wait = std::time::Duration::ZERO);
+        assert!(error.contains("it is not ready after 0 s"), "{error}");
     }
 }

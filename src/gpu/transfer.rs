@@ -70,7 +70,8 @@ pub(super) async fn read<T>(
     let lost = |message: String| gpu.failure(GpuError::Lost { message });
     let (mapped, send) = Signal::new();
     buffer.map_async(wgpu::MapMode::Read, ..size, send);
-    gpu.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })?;
+    let timeout = Some(gpu.policy.longest_wait);
+    gpu.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout })?;
     gpu.traffic.add_read_back(size);
     mapped.await.map_err(|error| lost(error.to_string()))?;
     let value = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);

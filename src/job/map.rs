@@ -37,9 +37,6 @@ use crate::store::run_records::{RunRecords, Work};
 use crate::store::shard::{self, FinishedShard};
 use rattlemap_dynamics::orbit::Status;
 
-/// Most batches of records that wait for the thread that stores them.
-const BATCHES_WAITING: usize = 1;
-
 /// A map, or a shard of one, to be computed.
 #[derive(Clone, Debug)]
 pub struct MapJob<'a> {
@@ -205,7 +202,11 @@ impl<'p> OpenMap<'p> {
         if let Some(raised) = raised_steps(scene, &self.engine) {
             self.observer.note(&raised);
         }
-        let mut work = Work::new(self.plan, shard);
+        // The caller of a map in memory may read everything.
+        let mut work = match self.folder {
+            Some(_) => Work::compact(self.plan, shard),
+            None => Work::new(self.plan, shard),
+        };
         let records = match self.folder {
             Some(folder) => Some(RunRecords::open(folder, scene, &self.engine, resume, &mut work)?),
             None => None,
@@ -270,15 +271,19 @@ impl<'p> MapRun<'p> {
     pub fn integrate(&mut self, halt: &Arc<AtomicBool>) -> Result<bool, SweepError> {
         let clock = Instant::now();
         let MapRun { open: OpenMap { engine, observer, .. }, records: stored, work, done, .. } = self;
-        let Work { plan, schedule, records, tally, .. } = work;
+        let Work { plan, schedule, records, store: kept, tally, .. } = work;
         let mut is_first = *done == 0;
         observer.progress(*done, schedule.expected());
         let is_finished = thread::scope(|scope| {
-            let (sender, batches) = mpsc::sync_channel(BATCHES_WAITING);
+            // A batch is large, so none waits beside the one that is being stored.
+            let (sender, batches) = mpsc::sync_channel(0);
             let writer = stored.as_mut().map(|stored| scope.spawn(move || stored.store(&batches)));
             let is_stored = writer.is_some();
             let store = |batch: Vec<(u32, Record)>, expected| {
                 tally.take(plan, &batch);
+                if let Some(kept) = kept {
+                    kept.put_all(&batch);
+                }
                 *done += batch.len();
                 if let Some(failed) = all_failed(&batch, plan.unit()).filter(|_| is_first) {
                     observer.warn(&failed);
@@ -305,8 +310,8 @@ impl<'p> MapRun<'p> {
         let mut run = self;
         let plan = run.work.plan;
         let refined = run.work.schedule.finish(&mut run.work.records);
-        let survey = Survey::of(plan, &run.work.records, refined);
-        let without_effect = effect::names(plan, &run.work.records, run.open.engine.precision());
+        let survey = Survey::of(plan, run.work.kept(), refined);
+        let without_effect = effect::names(plan, run.work.kept(), run.open.engine.precision());
         ComputedMap { run, survey, without_effect }
     }
 
@@ -366,7 +371,7 @@ pub struct ComputedMap<'p> {
 impl ComputedMap<'_> {
     /// The cells, for tables and figures.
     pub fn cells(&self) -> Cells<'_> {
-        Cells::new(self.run.open.job.scene, self.run.work.plan, &self.run.work.records).surveyed(&self.survey)
+        Cells::new(self.run.open.job.scene, self.run.work.plan, self.run.work.kept()).surveyed(&self.survey)
     }
 
     /// Describes the run for the manifest.

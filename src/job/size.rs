@@ -10,6 +10,7 @@ use crate::job::processor;
 use crate::map::plan::{Parts, stores_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
+use crate::map::sweep::LARGEST_BATCH;
 use crate::record::Record;
 use crate::store::folder::Folder;
 use crate::store::map;
@@ -49,7 +50,14 @@ impl Size {
         let record = size_of::<Record>() as u64;
         let [record_on_disk, files] = disk(scene);
         let (memory, disk) = match shard {
-            None => (runs.saturating_mul(record + RUN), runs.saturating_mul(record_on_disk) + cells * files),
+            None => {
+                let is_whole = scene.refine().is_none() && !scene.start().follows();
+                // Two batches are under way, one of them on its way to the disk.
+                let batches = 2 * runs.min(LARGEST_BATCH as u64) * record;
+                let kept = if is_whole { stored_run(scene) } else { record };
+                let memory = runs.saturating_mul(kept + RUN) + batches;
+                (memory, runs.saturating_mul(record_on_disk) + cells * files)
+            }
             Some(shard) => {
                 let own = runs.div_ceil(u64::from(shard.count()));
                 let kept = if scene.start().follows() { 1 + record } else { 1 };
@@ -194,7 +202,9 @@ pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
 /// # Errors
 /// [`JobError::TooLarge`] with the needed and the free amount.
 pub fn check_finished(scene: &Scene) -> Result<(), JobError> {
-    Size::of(scene, None).check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
+    let whole = Size::of(scene, None);
+    let cpu_memory = whole.cpu_memory + whole.runs.saturating_mul(size_of::<Record>() as u64);
+    Size { cpu_memory, ..whole }.check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
 }
 
 /// Bytes on disk: per run for its record, and per cell for all other files. The constants are the largest of measured maps.

@@ -20,7 +20,7 @@ const BATCH_SECONDS: f64 = 1.0;
 const STORE_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Largest number of cells under way per card. It bounds the memory that a fast engine uses.
-const LARGEST_BATCH: usize = 1 << 20;
+pub(crate) const LARGEST_BATCH: usize = 1 << 20;
 
 /// Why a sweep ended early.
 #[derive(Debug, thiserror::Error)]

@@ -90,6 +90,14 @@ impl RecordStore {
         self.pattern.put(count, id, (record.pattern, record.pattern_hash, record.pattern_length));
     }
 
+    /// Replaces the records with these numbers.
+    ///
+    /// # Panics
+    /// If there is no such record.
+    pub fn put_all(&mut self, batch: &[(u32, Record)]) {
+        batch.iter().for_each(|(id, record)| self.put(*id as usize, record));
+    }
+
     /// Returns the bytes of memory of the columns, without the lists of words.
     pub fn bytes(&self) -> usize {
         let small = [&self.periods_run, &self.flags.places, &self.word.places, &self.pattern.places];

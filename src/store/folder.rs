@@ -360,7 +360,7 @@ mod tests {
         assert!(matches!(Folder::open(root.path(), true), Err(FolderError::InUse { .. })));
         drop(folder);
         let inside = std::sync::atomic::AtomicUsize::new(0);
-        let opened: usize = std::thread::scope(|scope| {
+        std::thread::scope(|scope| {
             let work = || {
                 let held = || {
                     Folder::open(root.path(), true).ok().map(|_held| {
@@ -370,12 +370,11 @@ mod tests {
                         assert_eq!(others, 0, "two writers");
                     })
                 };
-                (0..500).filter_map(|_| held()).count()
+                // Each thread has its turn 30 times; most attempts in between find another writer.
+                std::iter::repeat_with(held).flatten().take(30).for_each(drop);
             };
-            let threads: Vec<_> = (0..4).map(|_| scope.spawn(work)).collect();
-            threads.into_iter().map(|thread| thread.join().unwrap()).sum()
+            (0..4).for_each(|_| drop(scope.spawn(work)));
         });
-        assert!(opened > 100, "{opened} of 2000");
         // The file that a killed process leaves is not locked.
         fs::write(root.path().join(LOCK), "").unwrap();
         Folder::open(root.path(), false).unwrap();

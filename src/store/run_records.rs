@@ -12,7 +12,7 @@ use crate::map::scene::Scene;
 use crate::map::schedule::Schedule;
 use crate::map::shard::Shard;
 use crate::map::sweep;
-use crate::record::Record;
+use crate::record::{Record, RecordStore, Records};
 use crate::store::error::OutputError;
 use crate::store::folder::{Folder, FolderError};
 use crate::store::record_file::{Extent, Identity, Order, RECORDS, RecordFile, RecordFileError};
@@ -42,8 +42,10 @@ pub struct Work<'p> {
     pub plan: &'p Plan,
     /// The cells to integrate, and their order.
     pub schedule: Schedule,
-    /// Records by run. Empty for a shard whose cells do not depend on each other.
+    /// Records by run. Empty for a shard whose cells do not depend on each other, and if `store` has them.
     pub records: Vec<Record>,
+    /// Records by run in little memory, for [`Work::compact`].
+    pub store: Option<RecordStore>,
     /// Counts over the records so far.
     pub tally: Tally,
     shard: Option<Shard>,
@@ -59,10 +61,27 @@ impl<'p> Work<'p> {
         work
     }
 
+    /// Returns the work on a map, or on a shard of it, that keeps records in little memory unless cells depend on each other.
+    /// Strobe states are kept if the map's files need them.
+    pub fn compact(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
+        let mut work = Work::without_records(plan, shard);
+        if work.schedule.reads_records() {
+            work.records = vec![Record::default(); plan.run_count()];
+        } else if shard.is_none() {
+            work.store = Some(RecordStore::new(plan.run_count(), plan.reads_strobes()));
+        }
+        work
+    }
+
+    /// The records of all runs.
+    pub fn kept(&self) -> &dyn Records {
+        self.store.as_ref().map_or(&self.records, |store| store)
+    }
+
     /// Returns work that keeps no records, for checking those of a shard.
     pub(crate) fn without_records(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
         let (schedule, tally) = (Schedule::of(plan, shard), Tally::default());
-        Work { plan, schedule, records: Vec::new(), tally, shard }
+        Work { plan, schedule, records: Vec::new(), store: None, tally, shard }
     }
 
     /// Whether records behind damage can be taken up.
@@ -72,7 +91,12 @@ impl<'p> Work<'p> {
 
     /// Takes up a stored batch. Returns false if the plan has no such records or the schedule does not wait for them.
     pub(crate) fn replay(&mut self, batch: &[(u32, Record)]) -> bool {
-        self.plan.admits(batch) && sweep::replay(&mut self.schedule, &mut self.records, batch)
+        let is_admitted =
+            self.plan.admits(batch) && sweep::replay(&mut self.schedule, &mut self.records, batch);
+        if let Some(store) = self.store.as_mut().filter(|_| is_admitted) {
+            store.put_all(batch);
+        }
+        is_admitted
     }
 
     /// Takes up all records of a file.
