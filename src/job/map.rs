@@ -277,21 +277,29 @@ impl<'p> MapRun<'p> {
         let is_finished = thread::scope(|scope| {
             // A batch is large, so none waits beside the one that is being stored.
             let (sender, batches) = mpsc::sync_channel(0);
-            let writer = stored.as_mut().map(|stored| scope.spawn(move || stored.store(&batches)));
-            let is_stored = writer.is_some();
-            let store = |batch: Vec<(u32, Record)>, expected| {
-                tally.take(plan, &batch);
-                if let Some(kept) = kept {
-                    kept.put_all(&batch);
+            let take = |batch: &[(u32, Record)]| {
+                tally.take(plan, batch);
+                if let Some(kept) = &mut *kept {
+                    kept.put_all(batch);
                 }
+            };
+            let (writer, mut take) = match stored {
+                Some(stored) => (Some(scope.spawn(move || stored.store(&batches, take))), None),
+                None => (None, Some(take)),
+            };
+            let store = |batch: Vec<(u32, Record)>, expected| {
                 *done += batch.len();
                 if let Some(failed) = all_failed(&batch, plan.unit()).filter(|_| is_first) {
                     observer.warn(&failed);
                 }
                 is_first = false;
                 observer.progress(*done, expected);
-                // Sending fails if the writer has ended with an error, which is returned below.
-                if is_stored { Ok(sender.send(batch)?) } else { Ok(()) }
+                match &mut take {
+                    Some(take) => take(&batch),
+                    // Sending fails if the writer has ended with an error, which is returned below.
+                    None => sender.send(batch)?,
+                }
+                Ok(())
             };
             let swept = pollster::block_on(sweep::run(plan, schedule, engine, records, halt, store));
             drop(sender);

@@ -193,18 +193,23 @@ impl<'f> RunRecords<'f> {
         })
     }
 
-    /// Stores batches of records until their sender is dropped. They are on the disk a second after they were sent, if the
-    /// disk is fast enough, and all of them in the end.
+    /// Stores batches of records until their sender is dropped, and calls `take` with each. They are on the disk a second
+    /// after they were sent, if the disk is fast enough, and all of them in the end.
     ///
     /// # Errors
     /// [`RunRecordsError`], for instance if the disk is full.
-    pub fn store(&mut self, batches: &Receiver<Vec<(u32, Record)>>) -> Result<(), RunRecordsError> {
+    pub fn store(
+        &mut self,
+        batches: &Receiver<Vec<(u32, Record)>>,
+        mut take: impl FnMut(&[(u32, Record)]),
+    ) -> Result<(), RunRecordsError> {
         let (mut synced, mut is_synced) = (Instant::now(), true);
         loop {
             let left = if is_synced { SYNC_INTERVAL } else { SYNC_INTERVAL.saturating_sub(synced.elapsed()) };
             let received = batches.recv_timeout(left);
             let clock = Instant::now();
             if let Ok(batch) = &received {
+                take(batch);
                 self.file.append(batch)?;
                 is_synced = false;
             }
