@@ -89,6 +89,14 @@ impl Size {
         Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
+    /// Estimates the size of a finished map in memory, with whole records.
+    fn finished(scene: &Scene) -> Size {
+        let whole = Size::of(scene, None);
+        let flows = kept_flows(&Parts::flows(scene.points()), whole.runs);
+        let memory = whole.runs.saturating_mul(size_of::<Record>() as u64 + RUN) + list_rows(scene) + flows;
+        Size { cpu_memory: memory, gpu_memory: memory, ..whole }
+    }
+
     /// Memory of the host that a kind of engine needs, in bytes; for `auto` the larger one.
     pub fn memory(&self, kind: EngineKind) -> u64 {
         match kind {
@@ -202,9 +210,7 @@ pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
 /// # Errors
 /// [`JobError::TooLarge`] with the needed and the free amount.
 pub fn check_finished(scene: &Scene) -> Result<(), JobError> {
-    let whole = Size::of(scene, None);
-    let cpu_memory = whole.cpu_memory + whole.runs.saturating_mul(size_of::<Record>() as u64);
-    Size { cpu_memory, ..whole }.check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
+    Size::finished(scene).check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
 }
 
 /// Bytes on disk: per run for its record, and per cell for all other files. The constants are the largest of measured maps.

@@ -66,10 +66,9 @@ impl<'p> Work<'p> {
     pub fn compact(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
         let mut work = Work::without_records(plan, shard);
         if work.schedule.reads_records() {
-            work.records = vec![Record::default(); plan.run_count()];
-        } else if shard.is_none() {
-            work.store = Some(RecordStore::new(plan.run_count(), plan.reads_strobes()));
+            return Work::new(plan, shard);
         }
+        work.store = shard.is_none().then(|| RecordStore::new(plan.run_count(), plan.reads_strobes()));
         work
     }
 
