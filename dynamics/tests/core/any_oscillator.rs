@@ -26,6 +26,9 @@ struct Case {
 /// Largest growth of tangents for which two computations of one motion are compared.
 const GROWTH: f64 = 1e4;
 
+/// Part of a period after phase 0, where a motion that began at another phase ends.
+const BEYOND: f64 = 0.03;
+
 fn or_none(values: impl Strategy<Value = f64> + 'static) -> impl Strategy<Value = f64> {
     or_zero(3, values)
 }
@@ -338,12 +341,14 @@ proptest! {
         prop_assume!(whole.meshing().is_none_or(|side| case.oscillator.contacts[side.index()] != Contact::Impact));
         let (then, meshing) = (whole.state(), whole.meshing());
         prop_assume!(whole.advance_period(&mut events) != Err(Stop::CapEvents));
+        // Under a pure sine force, contacts can end exactly at phase 0. Both motions must be past such an event.
+        prop_assume!(whole.advance_to(BEYOND * flow.period, &mut events) != Err(Stop::CapEvents));
         prop_assume!(!whole.near_grazing() && growth(&whole) < GROWTH && !is_narrow(&case, &events));
         prop_assume!(events.len() <= COMPARABLE_EVENTS);
         let later = Flow::new(&case.oscillator.at_phase(turn * std::f64::consts::TAU));
         let mut rest = Trajectory::meshing_from(&later, case.law, then, meshing);
         let mut others: Vec<GapEvent> = Vec::new();
-        prop_assert_eq!(rest.advance_to((1.0 - turn) * flow.period, &mut others), Ok(()));
+        prop_assert_eq!(rest.advance_to((1.0 + BEYOND - turn) * flow.period, &mut others), Ok(()));
         prop_assert_eq!(kinds(&events), kinds(&others));
         let off = departure(whole.state(), rest.state());
         prop_assert!(off < 1e-12 * growth(&whole) * size(whole.state()), "off by {off:e}");
