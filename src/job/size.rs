@@ -24,6 +24,8 @@ const LIST_ROW: u64 = 200;
 const PERIOD: u64 = 40;
 /// Memory per flow that the CPU engine keeps, in bytes: an upper bound for built-in models.
 const FLOW: u64 = 100_000;
+/// Address space that a graphics driver needs, in bytes: the software driver's, which fails without a message if it has less.
+const DRIVER: u64 = 2_000_000_000;
 /// Number of flows from which the size of all lane tables is estimated.
 const SAMPLED_FLOWS: u64 = 256;
 
@@ -186,6 +188,14 @@ fn replaced(out: &Path) -> u64 {
 /// # Errors
 /// [`JobError::TooLarge`] with the needed and the free amount.
 pub fn check_map(scene: &Scene, shard: Option<Shard>, kind: EngineKind, free: &Free) -> Result<(), JobError> {
+    if let (EngineKind::Gpu, Some(left @ ..DRIVER)) = (kind, address_space()) {
+        return Err(JobError::TooLarge(format!(
+            "graphics drivers need about {} of address space, and {} are left; raise the limit (`ulimit -v`), or give \
+             --engine cpu",
+            bytes(DRIVER),
+            bytes(left)
+        )));
+    }
     let remedy = match scene.list() {
         Some(_) => "shorten the list of cells",
         None => "lower axis.0.count or axis.1.count",

@@ -255,6 +255,8 @@ fn a_limit_for_memory_causes_a_message() {
         code == 2 && text.contains("of memory, and") && text.contains("raise the limit (`ulimit -v`)"),
         "{text}"
     );
+    let (code, text) = limited(&folder, "ulimit -v 1000000", "map s.toml --engine gpu");
+    assert!(code == 2 && text.contains("graphics drivers need about 2.0 GB of address space"), "{text}");
     // Memory that no estimate contains: the text of a scene.
     fs::File::create(path(&folder, "s.toml")).unwrap().set_len(60_000_000).unwrap();
     let (code, text) =
