@@ -56,7 +56,7 @@ fn count_selected(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     }
 }
 
-// One workgroup computes the place of each block's lanes, and the total.
+// One workgroup computes the place of each block's lanes, the total, and the workgroups of a dispatch over these lanes.
 @compute @workgroup_size(BLOCK)
 fn sum_selected(@builtin(local_invocation_index) k: u32) {
     let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;
@@ -77,6 +77,9 @@ fn sum_selected(@builtin(local_invocation_index) k: u32) {
     if k == BLOCK - 1u {
         queue.count = block_counts[k];
         queue.beat += 1u;
+        let groups = (queue.count + WORKGROUP - 1u) / WORKGROUP;
+        let in_row = settings.row / WORKGROUP;
+        workgroups = array<u32, 3>(min(groups, in_row), (groups + in_row - 1u) / in_row, 1u);
     }
 }
 

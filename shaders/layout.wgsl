@@ -108,6 +108,8 @@ struct Settings {
     chaos_errors: f32,
     // Loop iterations that one dispatch may spend on a lane.
     iterations: u32,
+    // 1: compaction selects the lanes that have ended. 0: it selects those that this variant has work for.
+    ended: u32,
     // Passes (scan steps and careful steps) allowed in one period.
     passes_per_period: u32,
     // Events allowed in one period, and in all periods together.
@@ -128,8 +130,6 @@ struct Settings {
     early_stop: u32,
     // Periods over which aperiodic motion is measured; 0 measures nothing.
     measured_periods: u32,
-    // 1: compaction selects the lanes that have ended. 0: it selects those that this variant has work for.
-    ended: u32,
 }
 
 // State that a lane carries between dispatches. `MotionNow` and `TallyNow` are used by every step and event; a lane
@@ -421,6 +421,7 @@ const STAGE_MEASURING: u32 = 4u; // the lane is decided, and its motion is measu
 @group(0) @binding(11) var<storage, read_write> findings: array<Finding>;
 @group(0) @binding(12) var<storage, read_write> block_starts: array<u32>;
 @group(0) @binding(13) var<storage, read_write> measured: array<Measured>;
+@group(0) @binding(14) var<storage, read_write> workgroups: array<u32, 3>;
 
 // What governs the motion. All modes but the first are followed by the side: mode + SIDE_*.
 const MODE_FREE: u32 = 0u;

@@ -46,7 +46,10 @@ impl AdapterChoice {
 }
 
 fn instance() -> wgpu::Instance {
-    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    // It would add a dispatch to each dispatch whose size the lanes' shader computes.
+    descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
+    wgpu::Instance::new(descriptor)
 }
 
 /// Properties of an adapter.
@@ -136,8 +139,13 @@ pub fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
     info.device_type != wgpu::DeviceType::Cpu
 }
 
-/// Most slots of a pool: less than 1 GB on the device.
-const MOST_SLOTS: usize = 1 << 19;
+/// Whether an adapter is a card with memory of its own.
+pub fn is_card(info: &wgpu::AdapterInfo) -> bool {
+    matches!(info.device_type, wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::VirtualGpu)
+}
+
+/// Most slots of a pool: less than 2 GB on the device.
+const MOST_SLOTS: usize = 1 << 20;
 
 /// Returns the most slots that an adapter's limits allow.
 pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {

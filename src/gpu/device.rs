@@ -9,9 +9,9 @@ use super::panics::{PanicFree, catch_panic};
 use super::{Gpu, GpuError, Precision};
 
 /// Whether the shader writes to each storage binding, from 1 on: flows, shapes, phasors, laws, cells, motions,
-/// tallies, queue, starts, readings, findings, blocks, measured.
-const WRITES: [bool; 13] =
-    [false, false, false, false, false, true, true, true, false, true, true, true, true];
+/// tallies, queue, starts, readings, findings, blocks, measured, workgroups.
+const WRITES: [bool; 14] =
+    [false, false, false, false, false, true, true, true, false, true, true, true, true, true];
 
 /// An entry point of the shader and its storage bindings: at most eight, which every adapter supports.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2
 /// Lists the lanes that a variant has work for, in three passes.
 pub(super) const COMPACT: [EntryPoint; 3] = [
     EntryPoint { name: "count_selected", storage: &[7, 8, 12] },
-    EntryPoint { name: "sum_selected", storage: &[8, 12] },
+    EntryPoint { name: "sum_selected", storage: &[8, 12, 14] },
     EntryPoint { name: "move_selected", storage: &[7, 8, 12] },
 ];
 /// Writes the results of lanes.

@@ -5,11 +5,16 @@ use web_time::Duration;
 /// How lanes are driven. Records depend on `late_tangent` and `keep` alone, by rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DispatchPolicy {
-    /// Dispatches of a round, between two checks. A lane that has read a cycle continues in the next dispatch.
+    /// Parts of a round, each of which begins with a list of the lanes that have work.
+    pub(super) parts: u32,
+    /// Dispatches of a part. A lane that has read a cycle continues in the next dispatch.
     pub(super) dispatches: u32,
-    /// Desired duration of a round.
+    /// Desired duration of a round, from one check to the next.
     pub(super) round: Duration,
-    /// Rounds after which lanes that have ended no longer wait for others.
+    /// Number of lanes that the device certainly integrates for [`FEWEST_ITERATIONS`](super::rounds::FEWEST_ITERATIONS) within a
+    /// second.
+    pub(super) at_once: u32,
+    /// Rounds after which lanes that have ended no longer wait for others, if further lanes can begin.
     pub(super) patience: u32,
     /// Whether lanes begin in a variant without the tangent vector and change to the other variant when they need it.
     /// That is less work, but the variants run one after the other.
@@ -25,8 +30,10 @@ const LONGEST_WAIT: Duration = Duration::from_secs(300);
 
 /// Software: the duration of a round grows with the number of lanes, and only the amount of work matters.
 const SOFTWARE: DispatchPolicy = DispatchPolicy {
+    parts: 1,
     dispatches: 4,
     round: Duration::from_millis(100),
+    at_once: 1 << 14,
     patience: 8,
     late_tangent: true,
     keep: true,
@@ -35,19 +42,23 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
 
 /// Hardware that shares the processor's memory and draws the screen: the amount of work matters there, too.
 const INTEGRATED: DispatchPolicy = DispatchPolicy {
+    parts: 1,
     dispatches: 4,
     round: Duration::from_millis(10),
+    at_once: 1 << 14,
     patience: 4,
     late_tangent: true,
     keep: false,
     longest_wait: LONGEST_WAIT,
 };
 
-/// Hardware with room for more lanes than a map has: the wait for cells that others depend on matters. Checks follow
-/// each other after about 64 periods of a lane, and all lanes run side by side.
+/// Hardware with room for more lanes than a map has. A round costs the host more than the first lanes of a map cost the
+/// device, so that rounds are few and long. A part is about 64 periods of a lane, and all lanes run side by side.
 pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
-    dispatches: 8,
-    round: Duration::from_millis(2),
+    parts: 4,
+    dispatches: 4,
+    round: Duration::from_millis(16),
+    at_once: 1 << 18,
     patience: 4,
     late_tangent: false,
     keep: false,

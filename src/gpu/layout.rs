@@ -114,6 +114,7 @@ structs! {
         chaos_from: u32,
         chaos_errors: f32,
         iterations: u32,
+        ended: u32,
         passes_per_period: u32,
         events_per_period: u32,
         most_events: u32,
@@ -125,7 +126,6 @@ structs! {
         max_period: u32,
         early_stop: u32,
         measured_periods: u32,
-        ended: u32,
     }
 
     /// Real numbers that a lane carries between dispatches.

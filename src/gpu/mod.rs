@@ -41,7 +41,8 @@ use std::time::Duration;
 
 pub(crate) use adapter::no_adapter;
 pub use adapter::{
-    AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
+    AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_card, is_hardware,
+    narrowed_by,
 };
 pub use constants::{Constants, has_elastic_or_rigid_wall, has_sine};
 pub use error::GpuError;

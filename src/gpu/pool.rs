@@ -132,8 +132,8 @@ impl Pool {
         Ok(())
     }
 
-    /// Integrates until at most `until` lanes are under way, and returns those that have ended. The result is empty
-    /// only if a flag has stopped the device.
+    /// Integrates until at most `until` lanes are under way, or until some have ended and have waited for others, and returns
+    /// those that have ended. The result is empty only if a flag has stopped the device.
     ///
     /// # Errors
     /// Errors of the device. The pool cannot be used afterwards.
@@ -153,17 +153,19 @@ impl Pool {
             queue: &buffers.queue,
             buffers: &bindings,
             active_lanes: self.active_list.len() as u32,
-            grid: &|lanes| buffers.grid(lanes),
+            workgroups: &buffers.workgroups,
             most_iterations: self.settings.iterations,
         };
         let variants: Vec<&Pipelines> = self.variants.iter().map(|variant| &gpu.pipelines[variant]).collect();
         gpu.call(|| buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings))?;
-        let device = rounds.run(&variants, until as u32, &mut self.iterations).await?;
-        gpu.report(Stage::Integrated { device });
         // The last variant that decides classes.
         let decided = self.variants.iter().rposition(|variant| variant.measures.is_none()).unwrap_or(0);
         let (active_lanes, gathers) = (self.active_list.len(), self.settings.gathers());
-        let results = buffers.conclude(gpu, variants[decided], &bindings, active_lanes, gathers).await?;
+        let conclude = || buffers.conclude(gpu, variants[decided], &bindings, active_lanes, gathers);
+        let (concluding, device) =
+            rounds.run(&variants, until as u32, &mut self.iterations, conclude).await?;
+        gpu.report(Stage::Integrated { device });
+        let results = concluding.read(gpu).await?;
         if results.is_empty() && !gpu.is_halted() {
             let message = "it returned no results of the lanes that have ended".into();
             return Err(gpu.failure(GpuError::Lost { message }));

@@ -1,23 +1,30 @@
 //! Rounds of dispatches over the lanes under way, until few enough are left.
 //!
-//! Each round lists the lanes that a variant has work for, in the order of the active list, dispatches them a few
-//! times, and counts the lanes that are left. The next round runs while the host checks the last one. Rounds are
-//! short, because some drivers reset a device whose work takes seconds, and long enough that their overhead is small.
+//! Each part of a round lists the lanes that a variant has work for, in the order of the active list, and dispatches them
+//! a few times; the device decides how many workgroups they need. At its end the round counts the lanes that are left.
+//! The next round runs while the host checks the last one, and while it reads results. Rounds are short, because some
+//! drivers reset a device whose work takes seconds, and long enough that their overhead is small.
 
 use web_time::{Duration, Instant};
 
 use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP};
 use super::layout::{BEAT_AT, BLOCK, COUNT_AT, Settings};
 use super::stage::{Clock, DeviceTimes};
-use super::transfer::{read, readback};
-use super::{Gpu, GpuError};
+use super::transfer::{Download, readback};
+use super::{Gpu, GpuError, Precision};
 
 /// Least iterations of a dispatch, and those of the first round: shorter dispatches cost more than they do.
-const FEWEST_ITERATIONS: u32 = 250;
+pub(super) const FEWEST_ITERATIONS: u32 = 250;
 
-/// Number of lanes above which this minimum is lowered in proportion, so that the first round, whose duration is
-/// unknown, is no longer.
-const FEWEST_ITERATIONS_FOR: u32 = 1 << 14;
+/// Number of lanes that every device can integrate at once for so long. With many more lanes the minimum is lowered, so
+/// that the first round, whose duration is unknown, is no longer.
+const FEWEST_AT_ONCE: u32 = 1 << 14;
+
+/// Ratio by which hardware may be slower in f64 than in f32.
+const SLOWER_IN_F64: u32 = 16;
+
+/// Longest time that lanes that have ended wait for the last ones.
+const LONGEST_HOLD: Duration = Duration::from_millis(500);
 
 /// Most variants of a pool.
 const VARIANTS: usize = 3;
@@ -27,7 +34,7 @@ const VARIANTS: usize = 3;
 const BEAT: u64 = 4 * VARIANTS as u64;
 const TIMES: u64 = 16;
 
-/// Byte offset of the iterations in the shader's settings.
+/// Byte offset of the iterations in the shader's settings; `ended` follows.
 const ITERATIONS: u64 = std::mem::offset_of!(Settings, iterations) as u64;
 
 /// Parts of a pool that its rounds use.
@@ -39,8 +46,8 @@ pub(super) struct Rounds<'a> {
     pub(super) buffers: &'a [&'a wgpu::Buffer],
     /// Length of the active list.
     pub(super) active_lanes: u32,
-    /// Returns the workgroups for a number of lanes.
-    pub(super) grid: &'a dyn Fn(u32) -> [u32; 2],
+    /// Workgroups of a dispatch over the selected lanes, which the device has computed.
+    pub(super) workgroups: &'a wgpu::Buffer,
     /// Most iterations that one dispatch may spend on a lane.
     pub(super) most_iterations: u32,
 }
@@ -63,18 +70,20 @@ struct Round<'a> {
 }
 
 impl Rounds<'_> {
-    /// Runs lanes until at most `until` are left. If `until` is above zero, it also stops when some lanes have ended
-    /// and have waited for a number of rounds. `iterations` are those of the first dispatch, and of the last on
-    /// return. Each variant continues lanes where the one before it stops. Returns the device's times if a watcher
-    /// measures.
-    pub(super) async fn run(
+    /// Runs lanes until at most `until` are left. Also stops when some lanes have ended and have waited long enough: for a
+    /// number of rounds, or for [`LONGEST_HOLD`] if `until` is zero. Then calls `conclude`, which submits the copies of
+    /// results, and submits a further round for the time in which the host reads them. `iterations` are those of the first
+    /// dispatch, and of the last on return. Each variant continues lanes where the one before it stops. Returns the result
+    /// of `conclude`, and the device's times if a watcher measures.
+    pub(super) async fn run<C>(
         &self,
         variants: &[&Pipelines],
         until: u32,
         iterations: &mut u32,
-    ) -> Result<Option<DeviceTimes>, GpuError> {
+        conclude: impl FnOnce() -> Result<C, GpuError>,
+    ) -> Result<(C, Option<DeviceTimes>), GpuError> {
         let gpu = self.gpu;
-        let dispatches = gpu.policy.dispatches * variants.len() as u32;
+        let dispatches = gpu.policy.parts * gpu.policy.dispatches * variants.len() as u32;
         let (clock, bound, checks) = gpu.call(|| {
             let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue, dispatches));
             let bound: Vec<BoundVariant<'_>> =
@@ -86,23 +95,25 @@ impl Rounds<'_> {
         let mut left = vec![0; variants.len()];
         left[0] = self.active_lanes;
         let most = self.most_iterations.max(1);
-        let fewest = fewest_iterations(self.active_lanes).min(most);
+        let fewest = fewest_iterations(self.active_lanes, at_once(gpu)).min(most);
         *iterations = (*iterations).clamp(fewest, most);
         let (mut device, mut device_end) = (DeviceTimes::default(), None);
         let mut last_beat = 0;
         let mut before: Option<Round<'_>> = None;
-        let mut last_end = Instant::now();
+        let began = Instant::now();
+        let mut last_end = began;
         let mut checked = 0;
         for (slot, check) in (0..2).zip(&checks).cycle() {
-            let sent = gpu.call(|| self.send(&bound, &left, *iterations, (slot, check), clock.as_ref()))?;
-            let Some(sent) = before.replace(sent) else { continue };
+            let sent =
+                gpu.call(|| self.send(&bound, &left, *iterations, Some((slot, check)), clock.as_ref()))?;
+            let Some(sent) = sent.and_then(|sent| before.replace(sent)) else { continue };
             let take = |bytes: &[u8]| {
                 if let Some(clock) = &clock {
                     device = device.and(clock.times(&bytes[TIMES as usize..], &mut device_end));
                 }
                 bytemuck::pod_read_unaligned::<[u32; VARIANTS + 1]>(&bytes[..TIMES as usize])
             };
-            let [counts @ .., beat] = read(gpu, sent.check, sent.bytes, sent.submission, take).await?;
+            let [counts @ .., beat] = sent.check(gpu, take).await?;
             if beat <= last_beat {
                 return Err(gpu.failure(GpuError::Lost { message: "it executes no commands".into() }));
             }
@@ -112,10 +123,11 @@ impl Rounds<'_> {
             }
             let all_left = left.iter().sum::<u32>();
             checked += 1;
-            if all_left <= until
-                || gpu.is_halted()
-                || (until > 0 && checked >= gpu.policy.patience && all_left < self.active_lanes)
-            {
+            let has_waited = match until {
+                0 => began.elapsed() >= LONGEST_HOLD,
+                _ => checked >= gpu.policy.patience,
+            };
+            if all_left <= until || gpu.is_halted() || has_waited && all_left < self.active_lanes {
                 break;
             }
             *iterations =
@@ -125,9 +137,14 @@ impl Rounds<'_> {
         // The last round belongs to the measured time, too; what follows waits for it anyway.
         if let (Some(clock), Some(sent)) = (&clock, before) {
             let take = |bytes: &[u8]| clock.times(&bytes[TIMES as usize..], &mut device_end);
-            device = device.and(read(gpu, sent.check, sent.bytes, sent.submission, take).await?);
+            device = device.and(sent.check(gpu, take).await?);
         }
-        Ok(clock.map(|_| device))
+        let concluding = conclude()?;
+        // A measured time has an end.
+        if clock.is_none() && !gpu.is_halted() && left.iter().any(|&left| left > 0) {
+            gpu.call(|| self.send(&bound, &left, *iterations, None, None))?;
+        }
+        Ok((concluding, clock.map(|_| device)))
     }
 
     fn bound<'a>(&self, pipelines: &'a Pipelines) -> BoundVariant<'a> {
@@ -141,35 +158,43 @@ impl Rounds<'_> {
         }
     }
 
-    /// Submits a round: each variant's list of lanes and its dispatches, then a count of the lanes that each has
-    /// left.
+    /// Submits a round: for each variant its list of lanes and its dispatches, and then, if there is a check, a count of the
+    /// lanes that each has left.
     fn send<'a>(
         &self,
         variants: &[BoundVariant<'_>],
         left: &[u32],
         iterations: u32,
-        (slot, check): (u32, &'a wgpu::Buffer),
+        check: Option<(u32, &'a wgpu::Buffer)>,
         clock: Option<&Clock>,
-    ) -> Round<'a> {
+    ) -> Option<Round<'a>> {
         let gpu = self.gpu;
-        gpu.write(self.settings, ITERATIONS, bytemuck::bytes_of(&iterations));
+        gpu.write(self.settings, ITERATIONS, bytemuck::cast_slice(&[iterations, 0]));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         // A variant has work if one of the variants before it has: their lanes may reach it.
         let first = left.iter().position(|&left| left > 0).unwrap_or(0);
-        let (mut lanes, mut dispatches) = (0, 0);
-        for (n, variant) in variants.iter().enumerate().skip(first) {
-            lanes += left[n];
-            for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate() {
-                let writes = clock.and_then(|clock| clock.writes(slot, n == first && nth == 0, false));
-                dispatch(gpu, &mut encoder, pipeline, bindings, compacting(nth, self.active_lanes), writes);
-            }
-            let (pipeline, bindings) = &variant.sweep;
-            for _ in 0..gpu.policy.dispatches {
-                let writes = clock.map(|clock| clock.dispatch_writes(slot, dispatches));
-                dispatch(gpu, &mut encoder, pipeline, bindings, (self.grid)(lanes), writes);
-                dispatches += 1;
+        let slot = check.map_or(0, |(slot, _)| slot);
+        let mut dispatches = 0;
+        for part in 0..gpu.policy.parts {
+            for (n, variant) in variants.iter().enumerate().skip(first) {
+                for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate() {
+                    let is_first = part == 0 && n == first && nth == 0;
+                    let writes = clock.and_then(|clock| clock.writes(slot, is_first, false));
+                    let groups = compacting(nth, self.active_lanes);
+                    dispatch(gpu, &mut encoder, pipeline, bindings, groups, writes);
+                }
+                let (pipeline, bindings) = &variant.sweep;
+                for _ in 0..gpu.policy.dispatches {
+                    let writes = clock.map(|clock| clock.dispatch_writes(slot, dispatches));
+                    dispatch(gpu, &mut encoder, pipeline, bindings, Selected(self.workgroups), writes);
+                    dispatches += 1;
+                }
             }
         }
+        let Some((_, check)) = check else {
+            gpu.submit(encoder);
+            return None;
+        };
         for (n, variant) in variants.iter().enumerate().skip(first) {
             for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate().take(COUNTED) {
                 let is_last = n + 1 == variants.len() && nth + 1 == COUNTED;
@@ -186,7 +211,16 @@ impl Rounds<'_> {
         }
         let submission = gpu.submit(encoder);
         let ran = (0..variants.len()).map(|n| n >= first).collect();
-        Round { check, submission, ran, iterations, bytes }
+        Some(Round { check, submission, ran, iterations, bytes })
+    }
+}
+
+impl Round<'_> {
+    /// Waits for the round and passes its check to `take`.
+    async fn check<T>(&self, gpu: &Gpu, take: impl FnOnce(&[u8]) -> T) -> Result<T, GpuError> {
+        let check = Download::new(gpu, self.check, self.bytes);
+        gpu.wait(self.submission.clone())?;
+        check.take(gpu, take).await
     }
 }
 
@@ -194,20 +228,28 @@ impl Rounds<'_> {
 const COUNTED: usize = 2;
 
 /// Returns the workgroups of a pass of the compaction.
-pub(super) fn compacting(pass: usize, active_lanes: u32) -> [u32; 2] {
-    [if pass == 1 { 1 } else { active_lanes.div_ceil(BLOCK).min(65_535) }, 1]
+pub(super) fn compacting(pass: usize, active_lanes: u32) -> Workgroups<'static> {
+    Counted([if pass == 1 { 1 } else { active_lanes.div_ceil(BLOCK).min(65_535) }, 1])
+}
+
+/// Returns the number of lanes that a device integrates at once for [`FEWEST_ITERATIONS`].
+fn at_once(gpu: &Gpu) -> u32 {
+    match gpu.precision {
+        Precision::F32 => gpu.policy.at_once,
+        Precision::F64 => (gpu.policy.at_once / SLOWER_IN_F64).max(FEWEST_AT_ONCE),
+    }
 }
 
 /// Returns the least iterations of a round with so many lanes.
-fn fewest_iterations(lanes: u32) -> u32 {
-    (FEWEST_ITERATIONS * FEWEST_ITERATIONS_FOR / lanes.max(1)).clamp(1, FEWEST_ITERATIONS)
+fn fewest_iterations(lanes: u32, at_once: u32) -> u32 {
+    (FEWEST_ITERATIONS * at_once / lanes.max(1)).clamp(1, FEWEST_ITERATIONS)
 }
 
 /// Returns the iterations of a round that should take `round`, from those of an earlier round and its duration.
 /// Results do not depend on them.
 fn next_iterations(iterations: u32, took: Duration, round: Duration) -> u32 {
     let factor = round.as_secs_f64() / took.as_secs_f64().max(1e-6);
-    (f64::from(iterations) * factor.clamp(0.25, 2.0)) as u32
+    (f64::from(iterations) * factor.clamp(0.25, 4.0)) as u32
 }
 
 /// Returns the workgroups in a row of the grid for so many lanes.
@@ -233,18 +275,31 @@ pub(super) fn bind(
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }
 
+/// Size of a dispatch.
+pub(super) enum Workgroups<'a> {
+    /// Columns and rows of workgroups.
+    Counted([u32; 2]),
+    /// As many as the selected lanes need, as the device has computed.
+    Selected(&'a wgpu::Buffer),
+}
+
+pub(super) use Workgroups::{Counted, Selected};
+
 pub(super) fn dispatch(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     pipeline: &wgpu::ComputePipeline,
     bindings: &wgpu::BindGroup,
-    groups: [u32; 2],
+    workgroups: Workgroups<'_>,
     timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
 ) {
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
     pass.set_pipeline(pipeline);
     pass.set_bind_group(0, bindings, &[]);
-    pass.dispatch_workgroups(groups[0], groups[1], 1);
+    match workgroups {
+        Counted([columns, rows]) => pass.dispatch_workgroups(columns, rows, 1),
+        Selected(count) => pass.dispatch_workgroups_indirect(count, 0),
+    }
     gpu.traffic.add_dispatch();
 }
 
@@ -264,8 +319,9 @@ mod tests {
         }
         assert!((300..=340).contains(&iterations), "{iterations}");
         assert!((300..=340).contains(&under_way), "{under_way}");
-        assert_eq!(next_iterations(1000, Duration::ZERO, ROUND), 2000);
+        assert_eq!(next_iterations(1000, Duration::ZERO, ROUND), 4000);
         assert_eq!(next_iterations(1000, Duration::from_secs(100), ROUND), 250);
-        assert_eq!([1, 1 << 14, 1 << 15, 1 << 20].map(fewest_iterations), [250, 250, 125, 3]);
+        let fewest = |lanes| fewest_iterations(lanes, 1 << 14);
+        assert_eq!([1, 1 << 14, 1 << 15, 1 << 20].map(fewest), [250, 250, 125, 3]);
     }
 }

@@ -49,9 +49,12 @@ pub(super) async fn check(
         Precision::F32 => 1e-3,
         Precision::F64 => 1e-9,
     };
-    let ended = pool.advance(gpu, &tables, 0).await?;
-    if ended.len() < ANSWERS.len() {
-        return Err(GpuError::Halted);
+    let mut ended = Vec::new();
+    while pool.under_way() > 0 {
+        if gpu.is_halted() {
+            return Err(GpuError::Halted);
+        }
+        ended.extend(pool.advance(gpu, &tables, 0).await?);
     }
     for ended in ended {
         let (e, omega, answer) = ANSWERS[ended.number() as usize];

@@ -3,11 +3,14 @@
 use super::averaging::Averaging;
 use super::device::{COMPACT, CONCLUDE, GATHER, Pipelines};
 use super::layout::{COUNT_AT, Cell, Finding, Measured, Motion, QUEUE_HEAD, Reading, Settings, Tally};
-use super::rounds::{bind, compacting, dispatch, row};
+use super::rounds::{Counted, Selected, Workgroups, bind, compacting, dispatch, row};
 use super::tables::Tables;
-use super::transfer::{buffer, from_reals, read, readback, upload};
+use super::transfer::{Download, buffer, from_reals, indirect, readback, upload};
 use super::{Gpu, GpuError, LaneSettings, Precision};
 use crate::record::limits::LONGEST_CYCLE;
+
+/// What a lane has returned: its averages, what was found out about it, and what was measured on it.
+pub(super) type Returned = (Reading, Finding, Option<Measured>);
 
 /// Byte offset, in the shader's settings, of the flag that selects lanes for compaction.
 const ENDED: u64 = std::mem::offset_of!(Settings, ended) as u64;
@@ -29,6 +32,8 @@ pub(super) struct Slots {
     findings: wgpu::Buffer,
     /// What was measured on lanes, and the buffer in which the host reads it; of one lane if nothing is measured.
     measured: [wgpu::Buffer; 2],
+    /// Workgroups of a dispatch over the lanes that a compaction has selected.
+    pub(super) workgroups: wgpu::Buffer,
     /// Buffers in which the host reads `readings` and `findings`; and the number of results.
     readbacks: [wgpu::Buffer; 2],
     count_readback: wgpu::Buffer,
@@ -65,6 +70,7 @@ impl Slots {
             queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
             blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
             readbacks: [&readings, &findings].map(|buffer| readback(gpu, "results", buffer.size())),
+            workgroups: indirect(gpu),
             count_readback: readback(gpu, "count", COUNT_BYTES),
             measured: [measured.clone(), readback(gpu, "results", measured.size())],
             readings,
@@ -74,7 +80,7 @@ impl Slots {
     }
 
     /// Returns all buffers, by binding.
-    pub(super) fn bindings<'a>(&'a self, tables: &'a Tables) -> [&'a wgpu::Buffer; 14] {
+    pub(super) fn bindings<'a>(&'a self, tables: &'a Tables) -> [&'a wgpu::Buffer; 15] {
         [
             &self.settings,
             &tables.flows,
@@ -90,13 +96,14 @@ impl Slots {
             &self.findings,
             &self.blocks,
             &self.measured[0],
+            &self.workgroups,
         ]
     }
 
     /// Returns the workgroups for so many lanes.
-    pub(super) fn grid(&self, lanes: u32) -> [u32; 2] {
+    pub(super) fn grid(&self, lanes: u32) -> Workgroups<'static> {
         let groups = lanes.div_ceil(self.workgroup).max(1);
-        [groups.min(self.row), groups.div_ceil(self.row)]
+        Counted([groups.min(self.row), groups.div_ceil(self.row)])
     }
 
     /// Uploads the active list, in the order in which its lanes began, and the settings. Lanes from place `first_new`
@@ -108,15 +115,19 @@ impl Slots {
         gpu.write(&self.queue, head, bytemuck::cast_slice(active_list));
     }
 
-    /// Reads the results of the lanes that have ended, in the order of the active list.
-    pub(super) async fn conclude(
+    /// Submits the copies of the results of all lanes that have ended, for the host to read.
+    pub(super) fn conclude(
         &self,
         gpu: &Gpu,
         pipelines: &Pipelines,
         bindings: &[&wgpu::Buffer],
         active_lanes: usize,
         gathers: bool,
-    ) -> Result<Vec<(Reading, Finding, Option<Measured>)>, GpuError> {
+    ) -> Result<Conclusion<'_>, GpuError> {
+        let reals = |size: usize| (active_lanes * size / size_of::<f64>() * gpu.precision.bytes()) as u64;
+        let sizes = [reals(size_of::<Reading>()), (active_lanes * size_of::<Finding>()) as u64];
+        let [on_device, measured] = &self.measured;
+        let size_of_measured = if gathers { reals(size_of::<Measured>()) } else { 0 };
         let submission = gpu.call(|| {
             gpu.write(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -124,64 +135,64 @@ impl Slots {
                 let compact = bind(gpu, pipeline, entry_point, bindings);
                 dispatch(gpu, &mut encoder, pipeline, &compact, compacting(pass, active_lanes as u32), None);
             }
-            let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
-            dispatch(
-                gpu,
-                &mut encoder,
-                &pipelines.conclude,
-                &concluding,
-                self.grid(active_lanes as u32),
-                None,
-            );
-            if gathers {
-                let gathering = bind(gpu, &pipelines.gather, GATHER, bindings);
-                dispatch(
-                    gpu,
-                    &mut encoder,
-                    &pipelines.gather,
-                    &gathering,
-                    self.grid(active_lanes as u32),
-                    None,
-                );
+            let ends = [(&pipelines.conclude, CONCLUDE), (&pipelines.gather, GATHER)];
+            for (pipeline, entry_point) in ends.into_iter().take(1 + usize::from(gathers)) {
+                let concluding = bind(gpu, pipeline, entry_point, bindings);
+                dispatch(gpu, &mut encoder, pipeline, &concluding, Selected(&self.workgroups), None);
             }
             encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_readback, 0, COUNT_BYTES);
-            gpu.submit(encoder)
-        })?;
-        let count = read(gpu, &self.count_readback, COUNT_BYTES, submission, |bytes| {
-            bytemuck::pod_read_unaligned::<u32>(bytes) as usize
-        })
-        .await?
-        .min(active_lanes);
-        if count == 0 {
-            return Ok(Vec::new());
-        }
-        let [readings, findings] = &self.readbacks;
-        let numbers = (count * size_of::<Reading>() / size_of::<f64>() * gpu.precision.bytes()) as u64;
-        let counts = (count * size_of::<Finding>()) as u64;
-        let all_measured = if gathers {
-            (count * size_of::<Measured>() / size_of::<f64>() * gpu.precision.bytes()) as u64
-        } else {
-            0
-        };
-        let [on_device, measured] = &self.measured;
-        let submission = gpu.call(|| {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            if gathers {
-                encoder.copy_buffer_to_buffer(on_device, 0, measured, 0, all_measured);
+            // The host does not know yet how many results there are.
+            let results = [&self.readings, &self.findings].into_iter().zip(&self.readbacks).zip(sizes);
+            for ((from, to), size) in
+                results.chain(gathers.then_some(((on_device, measured), size_of_measured)))
+            {
+                encoder.copy_buffer_to_buffer(from, 0, to, 0, size);
             }
-            encoder.copy_buffer_to_buffer(&self.readings, 0, readings, 0, numbers);
-            encoder.copy_buffer_to_buffer(&self.findings, 0, findings, 0, counts);
             gpu.submit(encoder)
         })?;
-        let to_readings = |bytes: &[u8]| from_reals::<Reading>(bytes, gpu.precision);
-        let readings = read(gpu, readings, numbers, submission.clone(), to_readings).await?;
-        let to_findings = bytemuck::pod_collect_to_vec::<u8, Finding>;
-        let findings = read(gpu, findings, counts, submission.clone(), to_findings).await?;
-        let measured = if gathers {
-            let to_measured = |bytes: &[u8]| from_reals::<Measured>(bytes, gpu.precision);
-            read(gpu, measured, all_measured, submission, to_measured).await?
-        } else {
-            Vec::new()
+        let [readings, findings] = &self.readbacks;
+        Ok(Conclusion {
+            submission,
+            active_lanes,
+            count: Download::new(gpu, &self.count_readback, COUNT_BYTES),
+            readings: Download::new(gpu, readings, sizes[0]),
+            findings: Download::new(gpu, findings, sizes[1]),
+            measured: gathers.then(|| Download::new(gpu, measured, size_of_measured)),
+        })
+    }
+}
+
+/// Results of lanes on their way to the host.
+pub(super) struct Conclusion<'s> {
+    submission: wgpu::SubmissionIndex,
+    active_lanes: usize,
+    count: Download<'s>,
+    readings: Download<'s>,
+    findings: Download<'s>,
+    measured: Option<Download<'s>>,
+}
+
+impl Conclusion<'_> {
+    /// Waits for the results, in the order of the active list.
+    pub(super) async fn read(self, gpu: &Gpu) -> Result<Vec<Returned>, GpuError> {
+        gpu.wait(self.submission)?;
+        let count = self.count.take(gpu, |bytes| bytemuck::pod_read_unaligned::<u32>(bytes) as usize).await?;
+        let first = |bytes: usize| bytes / self.active_lanes * count.min(self.active_lanes);
+        let readings = self
+            .readings
+            .take(gpu, |all| from_reals::<Reading>(&all[..first(all.len())], gpu.precision))
+            .await?;
+        let findings = self
+            .findings
+            .take(gpu, |all| bytemuck::pod_collect_to_vec::<u8, Finding>(&all[..first(all.len())]))
+            .await?;
+        let measured = match self.measured {
+            Some(measured) => {
+                measured
+                    .take(gpu, |all| from_reals::<Measured>(&all[..first(all.len())], gpu.precision))
+                    .await?
+            }
+            None => Vec::new(),
         };
         let measured = measured.into_iter().map(Some).chain(std::iter::repeat(None));
         let results = readings.into_iter().zip(findings).zip(measured);

@@ -42,6 +42,16 @@ pub(super) fn buffer(gpu: &Gpu, label: &'static str, size: usize) -> wgpu::Buffe
     })
 }
 
+/// Creates a buffer for the size of a dispatch, which the device computes.
+pub(super) fn indirect(gpu: &Gpu) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("workgroups"),
+        size: 16,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
+        mapped_at_creation: false,
+    })
+}
+
 /// Creates a storage buffer that holds `bytes`.
 pub(super) fn upload(gpu: &Gpu, label: &'static str, bytes: &[u8]) -> wgpu::Buffer {
     let buffer = buffer(gpu, label, bytes.len());
@@ -59,24 +69,32 @@ pub(super) fn readback(gpu: &Gpu, label: &'static str, size: u64) -> wgpu::Buffe
     })
 }
 
-/// Passes the first `size` bytes of a [`readback`] buffer to `take`, after the work up to `submission`.
-pub(super) async fn read<T>(
-    gpu: &Gpu,
-    buffer: &wgpu::Buffer,
+/// The first bytes of a [`readback`] buffer, on their way to the host.
+pub(super) struct Download<'b> {
+    buffer: &'b wgpu::Buffer,
     size: u64,
-    submission: wgpu::SubmissionIndex,
-    take: impl FnOnce(&[u8]) -> T,
-) -> Result<T, GpuError> {
-    let lost = |message: String| gpu.failure(GpuError::Lost { message });
-    let (mapped, send) = Signal::new();
-    buffer.map_async(wgpu::MapMode::Read, ..size, send);
-    let timeout = Some(gpu.policy.longest_wait);
-    gpu.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout })?;
-    gpu.traffic.add_read_back(size);
-    mapped.await.map_err(|error| lost(error.to_string()))?;
-    let value = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);
-    buffer.unmap();
-    Ok(value)
+    mapped: Signal<Result<(), wgpu::BufferAsyncError>>,
+}
+
+impl<'b> Download<'b> {
+    /// Requests the first `size` bytes, after all work that has been submitted.
+    pub(super) fn new(gpu: &Gpu, buffer: &'b wgpu::Buffer, size: u64) -> Download<'b> {
+        let (mapped, send) = Signal::new();
+        buffer.map_async(wgpu::MapMode::Read, ..size, send);
+        gpu.traffic.add(4, size);
+        Download { buffer, size, mapped }
+    }
+
+    /// Passes the bytes to `take`. Native drivers deliver them in [`Gpu::wait`].
+    pub(super) async fn take<T>(self, gpu: &Gpu, take: impl FnOnce(&[u8]) -> T) -> Result<T, GpuError> {
+        let lost = |message: String| gpu.failure(GpuError::Lost { message });
+        self.mapped.await.map_err(|error| lost(error.to_string()))?;
+        let mapped = self.buffer.get_mapped_range(..self.size).map_err(|error| lost(error.to_string()))?;
+        let value = take(&mapped);
+        drop(mapped);
+        self.buffer.unmap();
+        Ok(value)
+    }
 }
 
 /// Work that a host has given to a device since it was opened.
@@ -107,11 +125,6 @@ impl TrafficCounter {
         self.add(0, 1);
     }
 
-    fn add_read_back(&self, bytes: u64) {
-        self.add(2, 1);
-        self.add(4, bytes);
-    }
-
     fn sum(&self) -> Traffic {
         let [dispatches, submissions, read_backs, written_bytes, read_bytes] =
             self.0.each_ref().map(|count| count.load(Ordering::Relaxed));
@@ -129,6 +142,13 @@ impl Gpu {
     pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
         self.traffic.add(1, 1);
         self.queue.submit([encoder.finish()])
+    }
+
+    /// Waits until the work up to a submission is done.
+    pub(super) fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
+        self.traffic.add(2, 1);
+        let timeout = Some(self.policy.longest_wait);
+        self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout })
     }
 
     /// Writes bytes to a buffer before the next submission.

@@ -143,6 +143,10 @@ trait Device {
 
     fn least_batch(&self) -> usize;
 
+    fn first_batch(&self) -> usize {
+        self.least_batch()
+    }
+
     fn lane_steps(&self) -> Option<u64> {
         None
     }
@@ -233,9 +237,14 @@ impl Engine<'_> {
         self.properties().device_bytes()
     }
 
-    /// Returns the smallest number of cells that keeps the engine busy: the size of the first batch.
+    /// Returns the smallest number of cells that keeps the engine busy.
     pub fn least_batch(&self) -> usize {
         self.properties().least_batch()
+    }
+
+    /// Returns the number of cells to begin first.
+    pub fn first_batch(&self) -> usize {
+        self.properties().first_batch()
     }
 
     /// Returns the number of free steps that lanes have taken so far; none without a time grid.

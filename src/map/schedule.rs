@@ -141,6 +141,11 @@ impl Schedule {
         cells
     }
 
+    /// Whether no further cell will be requested, and all have begun.
+    pub fn has_begun_all(&self) -> bool {
+        matches!(self.strategy, Strategy::Whole) && self.begun == self.sequence.len()
+    }
+
     /// Takes back the cells that [`Schedule::next`] returned last, because they could not be begun.
     pub fn return_last(&mut self) {
         self.begun = self.begun_before;

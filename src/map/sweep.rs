@@ -51,7 +51,7 @@ pub async fn run(
     mut store: impl FnMut(Vec<(u32, Record)>, usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
     engine.stop_on(halt);
-    let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH * engine.card_count() };
+    let mut pace = Pace { cells: engine.first_batch(), most: LARGEST_BATCH * engine.card_count() };
     let mut under_way = 0;
     let (mut unstored, mut last_stored, mut last_ended) = (Vec::new(), Instant::now(), Instant::now());
     while !schedule.is_finished() {
@@ -67,7 +67,8 @@ pub async fn run(
             Ok(()) => {
                 under_way += next.len();
                 assert!(under_way > 0, "a schedule that is not finished has cells to begin");
-                engine.advance(under_way / 2).await
+                let until = if schedule.has_begun_all() { 0 } else { under_way / 2 };
+                engine.advance(until).await
             }
         };
         last_ended = Instant::now();

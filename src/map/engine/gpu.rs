@@ -20,6 +20,8 @@ use rattlemap_dynamics::model::{Contact, Oscillator};
 
 /// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
+/// First batch on a card: less than a second of work, unless motions are expensive.
+const FIRST_ON_A_CARD: usize = 1 << 20;
 /// Smallest batch on a software device: about a second of work.
 const LEAST_IN_SOFTWARE: usize = 256;
 
@@ -247,6 +249,10 @@ impl Device for Gpu<'_> {
 
     fn least_batch(&self) -> usize {
         if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
+    }
+
+    fn first_batch(&self) -> usize {
+        if gpu::is_card(self.device.adapter()) { FIRST_ON_A_CARD } else { self.least_batch() }
     }
 
     fn device_bytes(&self) -> Option<u64> {
