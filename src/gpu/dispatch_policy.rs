@@ -57,7 +57,7 @@ const INTEGRATED: DispatchPolicy = DispatchPolicy {
 pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
     parts: 4,
     dispatches: 4,
-    round: Duration::from_millis(16),
+    round: Duration::from_millis(32),
     at_once: 1 << 18,
     patience: 4,
     late_tangent: false,

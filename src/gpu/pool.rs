@@ -249,6 +249,7 @@ fn start(tables: &Tables, lane: &Lane) -> (Cell, [f64; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::dispatch_policy::{DEDICATED, DispatchPolicy};
     use crate::gpu::{AdapterChoice, Precision};
     use rattlemap_dynamics::model::GearPair;
 
@@ -261,6 +262,34 @@ mod tests {
             [0..1, far..2 * far - 8, 5 * far..5 * far + 1]
         );
         assert!(stretches(std::iter::empty()).is_empty());
+    }
+
+    /// Few rounds, although the slowest lanes take ten times as long as most: software takes a second for what a card does
+    /// in a round.
+    #[test]
+    fn a_map_on_a_card_is_waited_for_a_few_times() {
+        let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
+        gpu.policy = DispatchPolicy { round: std::time::Duration::from_secs(1), ..DEDICATED };
+        let at = |i: u32, count: u32| f64::from(i) / f64::from(count);
+        let pairs = (0..32).flat_map(|i| (0..32).map(move |j| (at(i, 32), 1.0 + 11.0 * at(j, 32))));
+        let pairs: Vec<_> = pairs.map(|(e, omega)| GearPair { omega, ..GearPair::paper(e) }).collect();
+        let flows: Vec<_> = pairs.iter().map(|pair| pair.oscillator().unwrap()).collect();
+        let laws: Vec<_> = pairs.iter().map(GearPair::law).collect();
+        let lane = |i| (i, Lane { flow: i, law: i, start: [0.0; 4] });
+        let lanes: Vec<_> = (0..flows.len() as u32).map(lane).collect();
+        let settings = LaneSettings::default();
+        let tables = pollster::block_on(gpu.load(&flows, &laws, None)).unwrap();
+        // Half of the lanes are a first picture.
+        for (until, most) in [(lanes.len() / 2, 2), (0, 12)] {
+            let mut pool = pollster::block_on(gpu.pool(&settings)).unwrap();
+            let before = gpu.traffic().waits;
+            pollster::block_on(pool.begin(&gpu, &tables, &lanes)).unwrap();
+            while pool.under_way() > until {
+                pollster::block_on(pool.advance(&gpu, &tables, until)).unwrap();
+            }
+            let waits = gpu.traffic().waits - before;
+            assert!(waits <= most, "{waits} waits until {until} lanes are left");
+        }
     }
 
     /// Runs a lane on a device that was changed before, and returns the error.

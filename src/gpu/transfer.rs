@@ -105,7 +105,7 @@ pub struct Traffic {
     /// Submissions of commands.
     pub submissions: u64,
     /// Submissions whose results the host has waited for.
-    pub read_backs: u64,
+    pub waits: u64,
     /// Bytes written to buffers of the device.
     pub written_bytes: u64,
     /// Bytes read from buffers of the device.
@@ -126,9 +126,9 @@ impl TrafficCounter {
     }
 
     fn sum(&self) -> Traffic {
-        let [dispatches, submissions, read_backs, written_bytes, read_bytes] =
+        let [dispatches, submissions, waits, written_bytes, read_bytes] =
             self.0.each_ref().map(|count| count.load(Ordering::Relaxed));
-        Traffic { dispatches, submissions, read_backs, written_bytes, read_bytes }
+        Traffic { dispatches, submissions, waits, written_bytes, read_bytes }
     }
 }
 

@@ -32,9 +32,9 @@ pub(crate) fn run(arguments: &arguments::HostCost) -> Result<(), Failure> {
     for Cost { phase, seconds, processor_seconds, thread_seconds, .. } in &phases {
         note(format_args!("{phase:<12} {seconds:>8.3} {processor_seconds:>10.3} {thread_seconds:>12.3}"));
     }
-    if let Some(Traffic { dispatches, submissions, read_backs, written_bytes, read_bytes }) = traffic {
+    if let Some(Traffic { dispatches, submissions, waits, written_bytes, read_bytes }) = traffic {
         note(format_args!(
-            "device: {dispatches} dispatches in {submissions} submissions, {read_backs} read-backs; {:.1} MB written, {:.1} MB read",
+            "device: {dispatches} dispatches in {submissions} submissions, {waits} waits; {:.1} MB written, {:.1} MB read",
             written_bytes as f64 / 1e6,
             read_bytes as f64 / 1e6
         ));
