@@ -1,12 +1,13 @@
 //! Opens adapters and compiles shaders.
 
 use std::collections::HashMap;
+use std::future::Future;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::adapter::{AdapterChoice, AdapterReport, features, listed, no_adapter};
 use super::dispatch_policy::DispatchPolicy;
 use super::panics::{PanicFree, catch_panic};
-use super::{Gpu, GpuError, Precision};
+use super::{Gpu, GpuError, Precision, Variant};
 
 /// Whether the shader writes to each storage binding, from 1 on: flows, shapes, phasors, laws, cells, motions,
 /// tallies, queue, starts, readings, findings, blocks, measured, workgroups.
@@ -140,32 +141,74 @@ fn bind_group_layout(device: &wgpu::Device, entry_point: EntryPoint) -> wgpu::Bi
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries })
 }
 
-/// Compiles a variant.
-pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipelines, GpuError> {
+/// Compiles variants.
+///
+/// # Errors
+/// [`GpuError::Refused`] if the driver does not compile one of them.
+pub(super) async fn pipelines(gpu: &Gpu, variants: &[Variant]) -> Result<Vec<Pipelines>, GpuError> {
+    let mut modules = Vec::with_capacity(variants.len());
+    for variant in variants {
+        let source = gpu.rewrite.map_or_else(|| variant.source(), |rewrite| rewrite(variant.source()));
+        let descriptor = || wgpu::ShaderModuleDescriptor {
+            label: Some("lane"),
+            source: wgpu::ShaderSource::Wgsl(source.as_str().into()),
+        };
+        modules.push(compiling(gpu, &|| gpu.device.create_shader_module(descriptor())).await?);
+    }
+    // The largest ones come first.
+    let entry_points = [SWEEP, CONCLUDE, BEGIN, GATHER].into_iter().chain(COMPACT);
+    let jobs: Vec<_> =
+        entry_points.flat_map(|entry| modules.iter().map(move |module| (module, entry))).collect();
+    let compiled =
+        side_by_side(&jobs, |&(module, entry_point)| compiling(gpu, &|| pipeline(gpu, module, entry_point)));
+    let mut made = Vec::with_capacity(jobs.len());
+    for pipeline in compiled {
+        made.push(pipeline.await?);
+    }
+    let of = |nth: usize| {
+        let get = |entry: usize| made[entry * variants.len() + nth].clone();
+        let [sweep, conclude, begin, gather] = [0, 1, 2, 3].map(get);
+        Pipelines { begin, sweep, compact: [4, 5, 6].map(get), conclude, gather }
+    };
+    Ok((0..variants.len()).map(of).collect())
+}
+
+/// Makes a part of a shader's program now. The future returns it, or the driver's error.
+fn compiling<'g, T>(
+    gpu: &'g Gpu,
+    make: &dyn Fn() -> T,
+) -> impl Future<Output = Result<T, GpuError>> + use<'g, T> {
     // wgpu reports errors of a driver's own compiler as internal errors or as lack of memory.
     let filters =
         [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation];
     let scopes = filters.map(|filter| gpu.device.push_error_scope(filter));
-    let source = gpu.rewrite.map_or_else(|| variant.source(), |rewrite| rewrite(variant.source()));
-    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("lane"),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    });
-    let pipelines = gpu.call(|| Pipelines {
-        begin: pipeline(gpu, &module, BEGIN),
-        sweep: pipeline(gpu, &module, SWEEP),
-        compact: COMPACT.map(|entry_point| pipeline(gpu, &module, entry_point)),
-        conclude: pipeline(gpu, &module, CONCLUDE),
-        gather: pipeline(gpu, &module, GATHER),
-    });
-    let mut refused = None;
-    for scope in scopes.into_iter().rev() {
-        refused = refused.or(scope.pop().await);
+    let made = gpu.call(make);
+    let errors: Vec<_> = scopes.into_iter().rev().map(wgpu::ErrorScopeGuard::pop).collect();
+    async move {
+        let mut refused = None;
+        for error in errors {
+            refused = refused.or(error.await);
+        }
+        match refused {
+            None => made,
+            Some(error) => {
+                Err(gpu.failure(GpuError::Refused { what: "a shader", message: error.to_string() }))
+            }
+        }
     }
-    match refused {
-        None => pipelines,
-        Some(error) => Err(gpu.failure(GpuError::Refused { what: "a shader", message: error.to_string() })),
-    }
+}
+
+/// Applies `function` to all items, on all cores.
+#[cfg(not(target_arch = "wasm32"))]
+fn side_by_side<T: Sync, R: Send>(items: &[T], function: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+    use rayon::prelude::*;
+    items.par_iter().with_max_len(1).map(function).collect()
+}
+
+/// Applies `function` to all items. A browser's device belongs to one thread.
+#[cfg(target_arch = "wasm32")]
+fn side_by_side<T, R>(items: &[T], function: impl Fn(&T) -> R) -> Vec<R> {
+    items.iter().map(function).collect()
 }
 
 fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry_point: EntryPoint) -> wgpu::ComputePipeline {

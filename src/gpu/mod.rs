@@ -2,8 +2,8 @@
 //!
 //! [`Gpu::open`] opens an adapter for one precision. [`Gpu::run`] integrates lanes and returns one [`Record`] per
 //! lane. It runs as many lanes at a time as the adapter's limits allow, by short dispatches over state that stays on
-//! the device. In a [`Pool`], lanes can begin and end at any time. The engine uses no files and no
-//! threads of its own.
+//! the device. In a [`Pool`], lanes can begin and end at any time. The engine uses no files, and several threads only to
+//! compile shaders.
 //!
 //! Lanes are independent of [`rattlemap_dynamics::reference`]: they read the description of the model
 //! ([`rattlemap_dynamics::model`]) and nothing else. A lane moves from event to event on a fixed grid of steps with
@@ -53,7 +53,7 @@ pub use shader::Variant;
 use shader::WORKGROUP;
 pub use stage::{DeviceTimes, Stage};
 pub use tables::Tables;
-pub(crate) use tables::{MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
+pub(crate) use tables::{COPIES, MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
 pub use transfer::Traffic;
 
 use panics::{PanicFree, catch_panic};
@@ -476,10 +476,8 @@ impl Gpu {
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).chain(measuring).collect();
         let missing: Vec<Variant> =
             variants.iter().copied().filter(|variant| !self.pipelines.contains_key(variant)).collect();
-        for &variant in &missing {
-            let pipelines = device::pipelines(self, variant).await?;
-            self.pipelines.insert(variant, pipelines);
-        }
+        let compiled = device::pipelines(self, &missing).await?;
+        self.pipelines.extend(missing.iter().copied().zip(compiled));
         if !missing.is_empty() && self.rewrite.is_none() {
             let watcher = self.watcher.take();
             let checked = self_test::check(self, variants.clone(), settings).await;

@@ -25,7 +25,7 @@ pub struct Tables {
 
 /// Copies of all constants during an upload: the lanes' constants, the lists of flows and phasors, these lists in the
 /// lanes' precision, the driver's copy, and the device's copy if it shares the host's memory.
-const COPIES: u64 = 5;
+pub(crate) const COPIES: u64 = 5;
 
 /// Most flows that are uploaded at a time if there are too many for one upload, and most bytes that their constants
 /// then take. So many lanes keep hardware busy.

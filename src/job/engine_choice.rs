@@ -3,15 +3,13 @@
 mod adapters;
 
 use std::str::FromStr;
-#[cfg(not(target_arch = "wasm32"))]
-use std::sync::Arc;
 
 use thiserror::Error;
 
 use crate::gpu::{self, AdapterChoice, AdapterReport, GpuError, Precision};
 #[cfg(not(target_arch = "wasm32"))]
 use crate::map::engine::Cards;
-use crate::map::engine::{Cpu, Engine, EngineError, Gpu};
+use crate::map::engine::{Cpu, Engine, EngineError, Gpu, Prepared};
 use crate::map::plan::Plan;
 
 use adapters::Selection;
@@ -210,8 +208,15 @@ async fn open_gpu<'p>(
         let (engine, warnings) = open_cards(plan, precision, &numbers)?;
         return Ok(ChosenEngine { engine, reason: reason.to_owned(), notes, warnings });
     }
-    let device = open_device(precision, numbers[0]).await?;
-    let engine = Engine::Gpu(Box::new(Gpu::new(plan, device).await?));
+    #[cfg(not(target_arch = "wasm32"))]
+    let (prepared, device) = {
+        let open = || pollster::block_on(open_device(precision, numbers[0]));
+        let (prepared, device) = rayon::join(|| Prepared::new(plan), open);
+        (prepared, device?)
+    };
+    #[cfg(target_arch = "wasm32")]
+    let (prepared, device) = (Prepared::new(plan), open_device(precision, numbers[0]).await?);
+    let engine = Engine::Gpu(Box::new(Gpu::prepared(prepared, device).await?));
     Ok(ChosenEngine { notes, ..ChosenEngine::new(engine, reason.to_owned()) })
 }
 
@@ -225,13 +230,13 @@ fn open_cards(
     precision: Precision,
     numbers: &[usize],
 ) -> Result<(Engine<'static>, Vec<String>), ChoiceError> {
-    let plan = Arc::new(plan.clone());
+    let prepared = Prepared::new(plan).into_owned();
     let open = |number: usize| {
-        let plan = Arc::clone(&plan);
+        let prepared = prepared.clone();
         pollster::block_on(async {
             let device = open_device(precision, number).await?;
             let id = device.id();
-            Ok::<_, ChoiceError>((id, Box::new(Gpu::shared(plan, device).await?)))
+            Ok::<_, ChoiceError>((id, Box::new(Gpu::prepared(prepared, device).await?)))
         })
     };
     let opened: Vec<_> = std::thread::scope(|scope| {

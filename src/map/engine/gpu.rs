@@ -2,8 +2,11 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::panic;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use rayon::prelude::*;
 use web_time::Instant;
@@ -43,18 +46,42 @@ pub struct Gpu<'p> {
     pool: Option<Pool>,
     /// Cells under way, if tables are loaded for each batch.
     waiting: Vec<Cell>,
+    /// The next such batch, while its constants are derived.
+    next: Option<Chunk>,
     /// Largest number of cells of such a batch.
     most_waiting: usize,
     preparation: Preparation,
 }
 
-impl Gpu<'static> {
-    /// Builds an engine that can move to another thread.
-    ///
-    /// # Errors
-    /// As for [`Gpu::new`].
-    pub async fn shared(plan: Arc<Plan>, device: gpu::Gpu) -> Result<Gpu<'static>, EngineError> {
-        Gpu::open(Cow::Owned(Arc::unwrap_or_clone(plan)), device).await
+/// What lanes need to know of a plan. It can be derived while a device opens, and serves several devices.
+#[derive(Clone)]
+pub struct Prepared<'p> {
+    plan: Cow<'p, Plan>,
+    /// Constants by flow. None if the flows are too many to be stored.
+    constants: Option<Vec<Option<Constants>>>,
+    survey: Survey,
+    /// Time that it took.
+    took: Duration,
+}
+
+impl<'p> Prepared<'p> {
+    /// Derives the constants of a plan.
+    pub fn new(plan: &'p Plan) -> Prepared<'p> {
+        let clock = Instant::now();
+        // Each oscillator is derived once: if the flows are stored, together with its constants.
+        let (constants, survey) = if plan.stores_flows() {
+            let derived = survey_flows(plan, Constants::new);
+            let (constants, surveys): (Vec<_>, Vec<_>) = derived.unzip();
+            (Some(constants), surveys.into_iter().fold(Survey::default(), Survey::and))
+        } else {
+            (None, survey(plan))
+        };
+        Prepared { plan: Cow::Borrowed(plan), constants, survey, took: clock.elapsed() }
+    }
+
+    /// Copies the plan, for a device that moves to another thread.
+    pub fn into_owned(self) -> Prepared<'static> {
+        Prepared { plan: Cow::Owned(self.plan.into_owned()), ..self }
     }
 }
 
@@ -64,19 +91,16 @@ impl<'p> Gpu<'p> {
     /// # Errors
     /// [`EngineError`] if the device cannot store the constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        Gpu::open(Cow::Borrowed(plan), device).await
+        Gpu::prepared(Prepared::new(plan), device).await
     }
 
-    async fn open(plan: Cow<'p, Plan>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+    /// Builds an engine from what has been derived of a plan.
+    ///
+    /// # Errors
+    /// As for [`Gpu::new`].
+    pub async fn prepared(prepared: Prepared<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let mut clock = Instant::now();
-        // Each oscillator is derived once: if the flows are stored, together with its constants.
-        let (constants, survey) = if plan.stores_flows() {
-            let derived = survey_flows(&plan, Constants::new);
-            let (constants, surveys): (Vec<_>, Vec<_>) = derived.unzip();
-            (Some(constants), surveys.into_iter().fold(Survey::default(), Survey::and))
-        } else {
-            (None, survey(&plan))
-        };
+        let Prepared { plan, constants, survey, took } = prepared;
         let settings = settings_after(&plan, &survey);
         let mut engine = Gpu {
             plan,
@@ -87,6 +111,7 @@ impl<'p> Gpu<'p> {
             steps_per_period: survey.steps,
             pool: None,
             waiting: Vec::new(),
+            next: None,
             most_waiting: gpu::MOST_FLOWS,
             preparation: Preparation::default(),
         };
@@ -101,7 +126,7 @@ impl<'p> Gpu<'p> {
                 other => Some(other.map_err(|error| engine.error(error, engine.plan.cell_count()))?),
             };
         }
-        engine.preparation.flows = clock.elapsed();
+        engine.preparation.flows = took + clock.elapsed();
         clock = Instant::now();
         // The shader is compiled now, so that the first batch does not wait for it.
         let pool = engine.device.pool(&settings).await.map_err(|error| engine.error(error, 0))?;
@@ -171,41 +196,52 @@ impl<'p> Gpu<'p> {
         Ok(ended)
     }
 
-    /// Computes some of the waiting cells with tables of their own; fewer if they do not fit into the memory.
+    /// Computes some of the waiting cells with tables of their own; fewer if they do not fit into the memory. Meanwhile
+    /// the processor derives the constants of the next ones.
     async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
-        while !self.waiting.is_empty() {
-            let steps = self.settings.steps_per_period;
-            let candidates = &self.waiting[self.waiting.len().saturating_sub(self.most_waiting)..];
-            let (flows, laws, lanes) = renumbered(candidates);
-            let plan: &Plan = &self.plan;
-            let oscillators: Vec<_> = flows.into_par_iter().map(|flow| plan.oscillator(flow)).collect();
-            let bytes = |lane: &Lane| gpu::table_bytes(&oscillators[lane.flow as usize], steps);
-            let count = fitting(lanes.iter().map(bytes), self.most_waiting);
-            match self.run_cells(&oscillators, &laws, &lanes[..count]).await {
-                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if count > 1 => {
-                    self.most_waiting = count / 2;
+        while let Some(chunk) = self.next.take().or_else(|| self.chunk()) {
+            let Chunk { cells, laws, lanes, constants } = chunk;
+            let constants = constants.take();
+            self.next = self.chunk();
+            let error = match self.run_lanes(constants, &laws, &lanes).await {
+                Ok(records) => return Ok(cells.iter().rev().map(|cell| cell.id).zip(records).collect()),
+                Err(error) => error,
+            };
+            self.waiting.extend(self.next.take().into_iter().flat_map(|chunk| chunk.cells));
+            self.waiting.extend(&cells);
+            match error {
+                GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. } if cells.len() > 1 => {
+                    self.most_waiting = cells.len() / 2;
                 }
-                Err(GpuError::Halted) => return Ok(Vec::new()),
-                Err(error) => return Err(error),
-                Ok(records) => {
-                    let cells = self.waiting.split_off(self.waiting.len() - count);
-                    return Ok(cells.iter().map(|cell| cell.id).zip(records.into_iter().rev()).collect());
-                }
+                GpuError::Halted => return Ok(Vec::new()),
+                error => return Err(error),
             }
         }
         Ok(Vec::new())
     }
 
-    /// Runs lanes on the flows that they use: the first of `oscillators`.
-    async fn run_cells(
+    /// Takes the last cells from those that wait, as many as have tables that fit into the memory.
+    fn chunk(&mut self) -> Option<Chunk> {
+        let steps = self.settings.steps_per_period;
+        let candidates = &self.waiting[self.waiting.len().saturating_sub(self.most_waiting)..];
+        let (flows, laws, mut lanes) = renumbered(candidates);
+        let plan: &Plan = &self.plan;
+        let mut oscillators: Vec<_> = flows.into_par_iter().map(|flow| plan.oscillator(flow)).collect();
+        let bytes = |lane: &Lane| gpu::table_bytes(&oscillators[lane.flow as usize], steps);
+        lanes.truncate(fitting(lanes.iter().map(bytes), self.most_waiting));
+        oscillators.truncate(lanes.iter().map(|lane| lane.flow as usize + 1).max()?);
+        let cells = self.waiting.split_off(self.waiting.len() - lanes.len());
+        let constants = Deriving::new(oscillators, steps);
+        Some(Chunk { cells, laws, lanes, constants })
+    }
+
+    /// Runs lanes with tables of their own.
+    async fn run_lanes(
         &mut self,
-        oscillators: &[Oscillator],
+        constants: Vec<Option<Constants>>,
         laws: &[u32],
         lanes: &[Lane],
     ) -> Result<Vec<Record>, GpuError> {
-        let steps = self.settings.steps_per_period;
-        let flows = lanes.iter().map(|lane| lane.flow as usize + 1).max().unwrap_or(0);
-        let constants = oscillators[..flows].par_iter().map(|flow| Constants::new(flow, steps)).collect();
         let tables = self.load(constants, laws).await?;
         let records = self.device.run_on(&tables, lanes, &self.settings).await?;
         let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
@@ -274,6 +310,44 @@ impl Device for Gpu<'_> {
 
     fn room(&self) -> usize {
         self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
+    }
+}
+
+/// Cells with tables of their own.
+struct Chunk {
+    cells: Vec<Cell>,
+    laws: Vec<u32>,
+    /// Lanes of the cells, the last one first.
+    lanes: Vec<Lane>,
+    constants: Deriving,
+}
+
+/// Constants of flows, which other threads derive.
+enum Deriving {
+    Thread(JoinHandle<Vec<Option<Constants>>>),
+    Done(Vec<Option<Constants>>),
+}
+
+impl Deriving {
+    fn new(oscillators: Vec<Oscillator>, steps: Option<u32>) -> Deriving {
+        let flows = Arc::new(oscillators);
+        let derive = move |flows: Arc<Vec<Oscillator>>| {
+            flows.par_iter().map(|flow| Constants::new(flow, steps)).collect::<Vec<_>>()
+        };
+        let own = Arc::clone(&flows);
+        // In a browser, a thread cannot be started like this.
+        match thread::Builder::new().spawn(move || derive(own)) {
+            Ok(thread) => Deriving::Thread(thread),
+            Err(_) => Deriving::Done(derive(flows)),
+        }
+    }
+
+    /// Waits for the constants.
+    fn take(self) -> Vec<Option<Constants>> {
+        match self {
+            Deriving::Thread(thread) => thread.join().unwrap_or_else(|panic| panic::resume_unwind(panic)),
+            Deriving::Done(constants) => constants,
+        }
     }
 }
 
