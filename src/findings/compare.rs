@@ -6,7 +6,7 @@
 
 use crate::record::classify::classify;
 use crate::record::distance::apart;
-use crate::record::{Record, Spelling, valid};
+use crate::record::{Record, Records, Spelling, valid};
 use rattlemap_dynamics::orbit::Class;
 use rattlemap_dynamics::word::Word;
 
@@ -112,22 +112,21 @@ impl Comparison {
 /// One of two maps.
 #[derive(Clone, Copy, Debug)]
 pub struct Side<'a> {
-    /// Record of the first run of each cell, by id.
-    pub records: &'a [Record],
+    /// Records by run; the first runs of all cells come first.
+    pub records: &'a dyn Records,
     /// Number of attractors of each cell, if counted.
     pub attractors: Option<&'a [u8]>,
     /// Whether the scene requests exponents.
     pub has_exponents: bool,
 }
 
-/// Compares two maps cell by cell. Filled cells are compared, too, except for their exponents, which are interpolated.
+/// Compares two maps of so many cells. Filled cells are compared, too, except for their exponents, which are interpolated.
 ///
 /// # Panics
-/// If the maps have different numbers of cells.
-pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
-    assert_eq!(a.records.len(), b.records.len(), "maps of one grid");
+/// If a map has fewer cells.
+pub fn compare(cells: usize, a: Side<'_>, b: Side<'_>) -> Comparison {
     let mut found = Comparison {
-        kinds: Vec::with_capacity(a.records.len()),
+        kinds: Vec::with_capacity(cells),
         symmetric: Tally::default(),
         words: Tally::default(),
         patterns: Tally::default(),
@@ -136,13 +135,14 @@ pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
         attractors: Tally::default(),
     };
     let has_exponents = a.has_exponents && b.has_exponents;
-    for (id, (a, b)) in a.records.iter().zip(b.records).enumerate() {
-        let classes = [classify(a), classify(b)];
+    for id in 0..cells {
+        let [a, b] = [a, b].map(|side| side.records.record(id));
+        let classes = [classify(&a), classify(&b)];
         let mut kind = Kind::of(classes[0], classes[1]);
         if classes[0] == classes[1] && matches!(classes[0], Class::Periodic { .. }) {
-            kind = found.take_cycles(a, b);
+            kind = found.take_cycles(&a, &b);
             if has_exponents {
-                found.take_exponents(id, a, b);
+                found.take_exponents(id, &a, &b);
             }
         }
         found.kinds.push(kind);
@@ -221,9 +221,10 @@ mod tests {
         }
     }
 
-    fn of(a: &[Record], b: &[Record]) -> Comparison {
+    fn of(a: &dyn Records, b: &dyn Records) -> Comparison {
+        let cells = a.count();
         let [a, b] = [a, b].map(|records| Side { records, attractors: None, has_exponents: true });
-        compare(a, b)
+        compare(cells, a, b)
     }
 
     #[test]
@@ -261,7 +262,7 @@ mod tests {
             attractors: None,
             has_exponents,
         });
-        let unrequested = compare(a, b);
+        let unrequested = compare(4, a, b);
         assert_eq!((unrequested.exponents, unrequested.exponent), (0, None));
     }
 
@@ -297,7 +298,7 @@ mod tests {
         let records = [chaos(); 3];
         let [a, b] = [&[1u8, 2, 3], &[1u8, 1, 3]];
         let side = |attractors| Side { records: &records, attractors, has_exponents: true };
-        assert_eq!(compare(side(Some(a)), side(Some(b))).attractors, Tally { compared: 3, differing: 1 });
-        assert_eq!(compare(side(Some(a)), side(None)).attractors, Tally::default());
+        assert_eq!(compare(3, side(Some(a)), side(Some(b))).attractors, Tally { compared: 3, differing: 1 });
+        assert_eq!(compare(3, side(Some(a)), side(None)).attractors, Tally::default());
     }
 }

@@ -10,7 +10,7 @@ use crate::job::finished::{self, LoadedMap};
 use crate::job::observer::Observer;
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
-use crate::record::Record;
+use crate::record::Records;
 use crate::show::cells::{Cells, Survey};
 use crate::show::map_pair::{MapPair, MapSide};
 use crate::store::finished_map::FinishedMap;
@@ -79,19 +79,19 @@ impl<'a> CompareJob<'a> {
             return Ok(None);
         }
         let has_starts = loaded.iter().all(|map| map.plan.start_count() > 1);
-        let attractors = |plan: &Plan, records: &[Record]| {
+        let attractors = |plan: &Plan, records: &dyn Records| {
             if has_starts && !is_halted() { coexistence::attractors(plan, records) } else { None }
         };
-        let counts = loaded.each_ref().map(|map| attractors(&map.plan, &map.stored.records));
+        let counts = loaded.each_ref().map(|map| attractors(&map.plan, &*map.stored.records));
         if is_halted() {
             return Ok(None);
         }
         let [a, b] = [0, 1].map(|i| Side {
-            records: &loaded[i].stored.records[..loaded[i].plan.cell_count()],
+            records: &*loaded[i].stored.records,
             attractors: counts[i].as_deref(),
             has_exponents: self.scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
         });
-        let comparison = compare::compare(a, b);
+        let comparison = compare::compare(loaded[0].plan.cell_count(), a, b);
         let surveys = loaded.each_mut().map(|map| Survey::of_refinement(map.stored.refined.take()));
         Ok(Some(MapComparison { job: self, loaded, surveys, comparison }))
     }

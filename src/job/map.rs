@@ -21,8 +21,8 @@ use crate::map::scene::{Scene, Steps};
 use crate::map::schedule::Refined;
 use crate::map::shard::Shard;
 use crate::map::sweep::{self, SweepError};
-use crate::record::Record;
 use crate::record::classify::status;
+use crate::record::{Record, Records};
 use crate::show::cells::{Cells, Survey};
 use crate::store;
 use crate::store::error::OutputError;
@@ -203,10 +203,7 @@ impl<'p> OpenMap<'p> {
             self.observer.note(&raised);
         }
         // The caller of a map in memory may read everything.
-        let mut work = match self.folder {
-            Some(_) => Work::compact(self.plan, shard),
-            None => Work::new(self.plan, shard),
-        };
+        let mut work = Work::compact(self.plan, shard, self.folder.is_none());
         let records = match self.folder {
             Some(folder) => Some(RunRecords::open(folder, scene, &self.engine, resume, &mut work)?),
             None => None,
@@ -325,9 +322,9 @@ impl<'p> MapRun<'p> {
 
     /// Finishes a whole map without analysing it: returns its records and the refinement of an adaptive one.
     pub(crate) fn into_records(self) -> (Vec<Record>, Option<Refined>) {
-        let Work { schedule, mut records, .. } = self.work;
+        let Work { schedule, mut records, store, .. } = self.work;
         let refined = schedule.finish(&mut records);
-        (records, refined)
+        (store.map_or(records, |store| (&store as &dyn Records).iter().collect()), refined)
     }
 
     /// Describes the run for manifests.

@@ -16,8 +16,8 @@ use crate::store::folder::Folder;
 use crate::store::map;
 use crate::text::size::bytes;
 
-/// Memory per run without its record, in bytes: its place in the order, and the rows of tables and figures.
-const RUN: u64 = 64;
+/// Memory per run without its record, in bytes: its place in the order, its state, and its part of tables and figures.
+const RUN: u64 = 8;
 /// Memory per cell of a list, in bytes: values, their text, flow and law.
 const LIST_ROW: u64 = 200;
 /// Memory per forcing period of a cell that is being computed, in bytes: strobe state, growth of a tangent vector.
@@ -49,14 +49,13 @@ impl Size {
     /// the map, and all records if cells follow their neighbours.
     pub fn of(scene: &Scene, shard: Option<Shard>) -> Size {
         let (cells, runs) = (scene.cell_count(), scene.run_count());
-        let record = size_of::<Record>() as u64;
+        let record = size_of::<(u32, Record)>() as u64;
         let [record_on_disk, files] = disk(scene);
         let (memory, disk) = match shard {
             None => {
-                let is_whole = scene.refine().is_none() && !scene.start().follows();
                 // Two batches are under way, one of them on its way to the disk.
                 let batches = 2 * runs.min(LARGEST_BATCH as u64) * record;
-                let kept = if is_whole { stored_run(scene) } else { record };
+                let kept = if depends_on_others(scene) { record } else { stored_run(scene, false) };
                 let memory = runs.saturating_mul(kept + RUN) + batches;
                 (memory, runs.saturating_mul(record_on_disk) + cells * files)
             }
@@ -87,15 +86,17 @@ impl Size {
             true => kept_flows(&Parts::flows(scene.points()), whole.runs),
             false => 0,
         };
-        let memory = whole.runs.saturating_mul(stored_run(scene) + RUN) + list_rows(scene) + flows;
+        let memory = whole.runs.saturating_mul(stored_run(scene, false) + RUN) + list_rows(scene) + flows;
         Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
-    /// Estimates the size of a finished map in memory, with whole records.
+    /// Estimates the size of a finished map in memory, with its strobe states.
     fn finished(scene: &Scene) -> Size {
         let whole = Size::of(scene, None);
         let flows = kept_flows(&Parts::flows(scene.points()), whole.runs);
-        let memory = whole.runs.saturating_mul(size_of::<Record>() as u64 + RUN) + list_rows(scene) + flows;
+        let kept =
+            if depends_on_others(scene) { size_of::<Record>() as u64 } else { stored_run(scene, true) };
+        let memory = whole.runs.saturating_mul(kept + RUN) + list_rows(scene) + flows;
         Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
@@ -257,8 +258,14 @@ fn disk(scene: &Scene) -> [u64; 2] {
     [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
 }
 
-/// Bytes per run in a [`RecordStore`](crate::record::RecordStore), which has only the requested columns.
-fn stored_run(scene: &Scene) -> u64 {
+/// Whether cells are requested by the records of other cells. All records are then in memory as they are.
+fn depends_on_others(scene: &Scene) -> bool {
+    scene.refine().is_some() || scene.start().follows()
+}
+
+/// Bytes per run in a [`RecordStore`](crate::record::RecordStore), which has only the requested columns, and strobe states
+/// on request.
+fn stored_run(scene: &Scene, with_strobes: bool) -> u64 {
     let quantities = &scene.outputs().quantities;
     let column = |quantity: &Quantity| match quantity {
         // The rate is computed from the impacts per period.
@@ -272,7 +279,7 @@ fn stored_run(scene: &Scene) -> u64 {
     let exponent = if quantities.iter().any(is_exponent) || scene.is_basin() { 16 } else { 0 };
     let has_starts = scene.run_count() > scene.cell_count();
     let needs_state = quantities.contains(&Quantity::State) || scene.is_basin() || scene.start().follows();
-    let state = if has_starts || needs_state { 32 } else { 0 };
+    let state = if with_strobes || has_starts || needs_state { 32 } else { 0 };
     8 + exponent + state + quantities.iter().map(column).sum::<u64>()
 }
 
@@ -420,7 +427,11 @@ mod tests {
             }
             let mut store = RecordStore::new(runs, plan.reads_strobes());
             (0..runs).for_each(|id| store.put(id, &record));
-            assert_eq!((store.bytes(), stored_run(&scene)), (per_run * runs, per_run as u64), "{more:?}");
+            assert_eq!(
+                (store.bytes(), stored_run(&scene, false)),
+                (per_run * runs, per_run as u64),
+                "{more:?}"
+            );
         }
     }
 

@@ -21,6 +21,13 @@ pub trait Records: Debug + Sync {
     fn record(&self, id: usize) -> Record;
 }
 
+impl dyn Records + '_ {
+    /// Returns all records by number.
+    pub fn iter(&self) -> impl Iterator<Item = Record> + '_ {
+        (0..self.count()).map(|id| self.record(id))
+    }
+}
+
 impl<R: AsRef<[Record]> + Debug + Sync + ?Sized> Records for R {
     fn count(&self) -> usize {
         self.as_ref().len()

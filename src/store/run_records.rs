@@ -62,13 +62,14 @@ impl<'p> Work<'p> {
     }
 
     /// Returns the work on a map, or on a shard of it, that keeps records in little memory unless cells depend on each other.
-    /// Strobe states are kept if the map's files need them.
-    pub fn compact(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
+    /// Strobe states are kept on request, and if the map's files need them.
+    pub fn compact(plan: &'p Plan, shard: Option<Shard>, with_strobes: bool) -> Work<'p> {
         let mut work = Work::without_records(plan, shard);
         if work.schedule.reads_records() {
             return Work::new(plan, shard);
         }
-        work.store = shard.is_none().then(|| RecordStore::new(plan.run_count(), plan.reads_strobes()));
+        let with_strobes = with_strobes || plan.reads_strobes();
+        work.store = shard.is_none().then(|| RecordStore::new(plan.run_count(), with_strobes));
         work
     }
 

@@ -43,7 +43,7 @@ const FOLLOWED: u32 = 8;
 
 /// A cell of a finished map.
 pub(super) struct Cell<'a> {
-    pub(super) record: &'a Record,
+    pub(super) record: Record,
     model: Box<dyn Model>,
     pub(super) flow: Box<Flow>,
     pub(super) law: Law,
@@ -74,7 +74,7 @@ impl<'a> Cell<'a> {
         let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
         let budget = *plan.budget();
         Cell {
-            record: &subject.records[id as usize],
+            record: subject.records.record(id as usize),
             model: plan.model(id),
             law: plan.law(cell.law),
             start: plan.start(id, subject.records),

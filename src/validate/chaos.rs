@@ -49,7 +49,7 @@ pub(super) type Differences = [Option<[f64; 2]>; COUNT];
 
 /// Computes the differences of one cell; none unless all three results are chaotic.
 pub(super) fn differences(cell: &Cell<'_>) -> Option<Differences> {
-    let record = cell.record;
+    let record = &cell.record;
     // Large indices, because `explain` uses those from zero.
     let [first, second] = [1 << 16, 1 << 17].map(|k| cell.averages(k, record.periods_run));
     let (first, second) = (first?, second?);

@@ -12,7 +12,7 @@ use super::cell::Cell;
 use super::rate::Rate;
 use crate::map::random::Random;
 use crate::record::classify::classify;
-use crate::record::{Record, valid};
+use crate::record::{Record, Records, valid};
 use rattlemap_dynamics::orbit::Class;
 
 /// Default number of further periods.
@@ -48,10 +48,10 @@ pub struct ChaosEnd {
 }
 
 /// Draws chaotic runs to follow for a validation with `samples` cells. Returns them, and the number of integrated chaotic runs.
-pub fn draw_chaos(records: &[Record], samples: usize, seed: u64) -> (Vec<u32>, usize) {
+pub fn draw_chaos(records: &dyn Records, samples: usize, seed: u64) -> (Vec<u32>, usize) {
     let is_chaotic =
         |record: &Record| record.valid & valid::FILLED == 0 && classify(record) == Class::Chaotic;
-    let chaotic = (0..).zip(records).filter(|(_, record)| is_chaotic(record));
+    let chaotic = (0..).zip(records.iter()).filter(|(_, record)| is_chaotic(record));
     let mut ids: Vec<u32> = chaotic.map(|(id, _)| id).collect();
     let (runs, count) = (ids.len(), ids.len().min(samples.div_ceil(SAMPLES_PER_CELL)));
     Random::new(seed).draw(&mut ids, count);

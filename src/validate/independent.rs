@@ -16,7 +16,7 @@ use nalgebra::Matrix4;
 use crate::map::plan::Plan;
 use crate::record::classify::CHAOS_ERRORS;
 use crate::record::distance::{self, farther};
-use crate::record::{Record, valid};
+use crate::record::{Record, Records, valid};
 use dop853::Solver;
 use flight::{Ended, Flight};
 use rattlemap_dynamics::model::{Law, Oscillator, Side, State};
@@ -149,12 +149,12 @@ fn symbol(before: Ended, side: Side) -> u8 {
 }
 
 /// Computes the record of a run; none if the judge gives no answer.
-pub fn record(plan: &Plan, id: u32, records: &[Record]) -> Option<Record> {
+pub fn record(plan: &Plan, id: u32, records: &dyn Records) -> Option<Record> {
     record_until(plan, id, records, &super::NEVER)
 }
 
 /// Like [`record`], but returns `None` once `halt` is set.
-pub(super) fn record_until(plan: &Plan, id: u32, records: &[Record], halt: &AtomicBool) -> Option<Record> {
+pub(super) fn record_until(plan: &Plan, id: u32, records: &dyn Records, halt: &AtomicBool) -> Option<Record> {
     let cell = plan.cell(id);
     let (oscillator, start) = (plan.oscillator(cell.flow), plan.start(id, records));
     follow(Strobed::new(&oscillator, plan.law(cell.law), start, halt), &oscillator, plan.budget())

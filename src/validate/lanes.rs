@@ -8,7 +8,7 @@ use super::states::HORIZON;
 use crate::gpu::{self, Gpu, GpuError, Lane, LaneSettings};
 use crate::map::engine::{compare_at_sections, drop_unrequested, lane_settings};
 use crate::map::plan::Plan;
-use crate::record::Record;
+use crate::record::{Record, Records};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::Status;
 
@@ -109,7 +109,7 @@ async fn states(
 pub async fn run_lanes(
     gpu: &mut Gpu,
     plan: &Plan,
-    records: &[Record],
+    records: &dyn Records,
     ids: &[u32],
     settings: &LaneSettings,
 ) -> Result<Vec<Record>, GpuError> {

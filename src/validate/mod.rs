@@ -43,7 +43,7 @@ use crate::findings::attractors::Basins;
 use crate::gpu::Precision;
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
-use crate::record::{Record, valid};
+use crate::record::{Record, Records, valid};
 use cell::Cell;
 use compare::{Answer, Bars, Compared};
 use rattlemap_dynamics::orbit::{Budget, Class};
@@ -57,7 +57,7 @@ pub struct Subject<'a> {
     /// Its cells and their starts.
     pub plan: &'a Plan,
     /// Records, one per run.
-    pub records: &'a [Record],
+    pub records: &'a dyn Records,
     /// Precision in which the records were computed.
     pub precision: Precision,
     /// Whether lanes on a graphics device computed the records; otherwise the reference did.
@@ -346,7 +346,7 @@ fn replay_whole(
     Validation {
         seed: sample.seed,
         requested: sample.requested,
-        runs: subject.records.len(),
+        runs: subject.records.count(),
         filled: subject.records.iter().filter(|record| record.valid & valid::FILLED != 0).count(),
         has_starts: subject.plan.start_count() > 1,
         judge,
@@ -368,7 +368,7 @@ fn replay_whole(
 fn not_finite(subject: &Subject<'_>) -> Vec<u32> {
     let budget = subject.plan.budget();
     let is_wrong = |record: &Record| finite::not_finite(record, budget).is_some();
-    (0..).zip(subject.records).filter(|(_, record)| is_wrong(record)).map(|(id, _)| id).collect()
+    (0..).zip(subject.records.iter()).filter(|(_, record)| is_wrong(record)).map(|(id, _)| id).collect()
 }
 
 /// Compares two records of the same cell and lists the fields that differ.
@@ -416,22 +416,22 @@ fn replay_cell(
 ) -> Replayed {
     let own = (!subject.is_lane).then(|| cell.again(subject.plan.needs()));
     let again = own.as_ref().or(lanes.again(id));
-    let is_same = again.map(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(cell.record));
+    let is_same = again.map(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(&cell.record));
     let truth = cell.truth();
-    let mut fields = cell.bars.compare(cell.record, &truth);
+    let mut fields = cell.bars.compare(&cell.record, &truth);
     let differs = |fields: &[Compared]| fields.iter().any(|(_, differs)| differs.is_some());
     let ran = explain::RepeatedLanes { again, whole: lanes.whole(id), double: lanes.double(id) };
     // A record that its engine cannot have returned needs no explanation.
     let is_forged = is_exact && is_same == Some(false);
     let mut kind = match is_forged {
         true => Some(Kind::Unexplained),
-        false => differs(&fields).then(|| explain::kind(cell, cell.record, &truth, ran)),
+        false => differs(&fields).then(|| explain::kind(cell, &cell.record, &truth, ran)),
     };
     if kind.is_none()
         && let Some(judged) = judged(subject, cell, id, judge, lanes)
     {
         // The second judge is compared with the reference as a lane would be.
-        fields = cell.bars.compare(cell.record, &Answer::new(judged, None));
+        fields = cell.bars.compare(&cell.record, &Answer::new(judged, None));
         kind = differs(&fields).then(|| match classify(&judged) {
             // An undecided answer contradicts nothing.
             Class::Undecided => Kind::Budget,

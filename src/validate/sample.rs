@@ -3,7 +3,7 @@
 use crate::map::plan::Plan;
 use crate::map::random::Random;
 use crate::record::classify::{classify, status};
-use crate::record::{Record, valid};
+use crate::record::{Records, valid};
 use rattlemap_dynamics::orbit::{Class, Status};
 
 /// Number of lanes whose states are compared, per cell of the sample. Each takes a few periods only.
@@ -80,14 +80,14 @@ impl Sample {
 /// Draws `size` runs: half from all integrated runs, a quarter at borders of classes, and a quarter with a status other
 /// than `ok`. If a stratum has too few runs, the rest is drawn from all. A map with no more than `size` runs is validated
 /// completely. Equal maps, sizes and seeds give equal samples.
-pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample {
+pub fn sample(plan: &Plan, records: &dyn Records, size: usize, seed: u64) -> Sample {
     // The audit of an adaptive map checks filled cells.
-    let is_own = |id: &u32| records[*id as usize].valid & valid::FILLED == 0;
-    let all: Vec<u32> = (0..records.len() as u32).filter(is_own).collect();
+    let is_own = |id: &u32| records.record(*id as usize).valid & valid::FILLED == 0;
+    let all: Vec<u32> = (0..records.count() as u32).filter(is_own).collect();
     let rare: [Vec<u32>; 2] = if size >= all.len() {
         [Vec::new(), Vec::new()]
     } else {
-        let remarked = |id: &u32| status(&records[*id as usize]) != Status::Ok;
+        let remarked = |id: &u32| status(&records.record(*id as usize)) != Status::Ok;
         [
             border(plan, records).into_iter().filter(is_own).collect(),
             all.iter().copied().filter(remarked).collect(),
@@ -112,11 +112,11 @@ pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample
 }
 
 /// Lists runs with a neighbour of another class or period, left, right, above or below. A list of cells has no neighbours.
-fn border(plan: &Plan, records: &[Record]) -> Vec<u32> {
+fn border(plan: &Plan, records: &dyn Records) -> Vec<u32> {
     if plan.is_list() {
         return Vec::new();
     }
-    let classes: Vec<Class> = records.iter().map(classify).collect();
+    let classes: Vec<Class> = records.iter().map(|record| classify(&record)).collect();
     let [columns, rows] = plan.counts();
     let differs = |id: usize| {
         let [i, j] = plan.indices(id as u32);
@@ -128,5 +128,5 @@ fn border(plan: &Plan, records: &[Record]) -> Vec<u32> {
         ];
         neighbours.into_iter().flatten().any(|other| classes[other] != classes[id])
     };
-    (0..records.len()).filter(|&id| differs(id)).map(|id| id as u32).collect()
+    (0..records.count()).filter(|&id| differs(id)).map(|id| id as u32).collect()
 }

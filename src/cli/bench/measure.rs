@@ -230,8 +230,8 @@ impl OpenEngine {
         let plan = Plan::new(scene);
         let device = self.device.as_deref_mut();
         let precision = device.as_ref().map_or(Precision::F64, |device| device.precision());
-        let subject = Subject { plan: &plan, records, precision, is_lane: device.is_some() };
-        let sample = validate::sample(&plan, records, samples, SEED);
+        let subject = Subject { plan: &plan, records: &records, precision, is_lane: device.is_some() };
+        let sample = validate::sample(&plan, &records, samples, SEED);
         let lanes = match device {
             Some(device) => pollster::block_on(Lanes::run(&subject, &sample, Some(device), None))
                 .map_err(|error| anyhow!("cannot compute the sample's lanes again: {error}"))?,

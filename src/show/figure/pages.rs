@@ -214,6 +214,7 @@ fn comparisons_fit_a_page() {
         let first = records(&plans[0]);
         let second: Vec<Record> = first.iter().cycle().skip(3).take(first.len()).cloned().collect();
         let comparison: Comparison = compared(
+            first.len(),
             MapRecords { records: &first, attractors: None, has_exponents: true },
             MapRecords { records: &second, attractors: None, has_exponents: true },
         );
