@@ -123,8 +123,15 @@ pub(crate) struct HostCost {
     pub(crate) all: bool,
 
     /// Compute lanes on the best graphics device, in f32, instead of the reference on the processor
-    #[arg(long)]
+    #[arg(long, conflicts_with = "scaling")]
     pub(crate) gpu: bool,
+
+    /// Measure how maps of cheap and of expensive cells scale with the number of threads instead
+    ///
+    /// Computes both with one thread and with all, and the serial part by Amdahl's law. Simulates 64 cores with the measured
+    /// costs. Writes scaling.csv. The map of expensive cells is the main map with an eighth of the columns and rows.
+    #[arg(long)]
+    pub(crate) scaling: bool,
 }
 
 /// Options of all instruments.

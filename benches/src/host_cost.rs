@@ -1,7 +1,7 @@
 //! What a map costs the host: time by phase, and the work that a device receives.
 //!
-//! Every motion of the map is contact-free and ends after one forcing period, so that lanes cost next to nothing and the host's
-//! work remains.
+//! If every motion of the map is contact-free, it ends after one forcing period, so that lanes cost next to nothing and the
+//! host's work remains.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,8 +17,10 @@ use rattlemap::store::folder::Folder;
 
 use crate::phase::{self, Cost};
 
-/// Amplitude of the force. The teeth move by a small part of the backlash.
-const FORCE: f64 = 1e-3;
+/// Amplitude of the force for which the teeth move by a small part of the backlash.
+pub const CONTACT_FREE: f64 = 1e-3;
+/// Amplitude of the force of the main map.
+pub const RATTLING: f64 = 50.0;
 
 /// Costs of a map.
 #[derive(Clone, Debug)]
@@ -29,15 +31,18 @@ pub struct HostCost {
     pub phases: Vec<Cost>,
     /// Work that the device has received. None for maps of the processor.
     pub traffic: Option<Traffic>,
+    /// Forcing periods of each cell, in the order in which cells are computed.
+    pub periods: Vec<u32>,
 }
 
-/// Computes and writes a map of `counts` cells, of class and exponent or of `all` quantities.
+/// Computes and writes a map of `counts` cells under a force of this amplitude, of class and exponent or of `all` quantities.
 ///
 /// # Errors
-/// If the engine cannot be opened or fails, a file cannot be written, or a motion does not end after one period.
-pub fn run(counts: [u32; 2], all: bool, engine: EngineRequest, out: &Path) -> Result<HostCost> {
+/// If the engine cannot be opened or fails, a file cannot be written, or a contact-free motion does not end after one
+/// period.
+pub fn run(counts: [u32; 2], force: f64, all: bool, engine: EngineRequest, out: &Path) -> Result<HostCost> {
     use Quantity::{Class, Impacts, Lyapunov, Mesh, Pattern, Symmetric, Word};
-    let model = GearPair { force: FORCE, ..GearPair::paper(0.5) };
+    let model = GearPair { force, ..GearPair::paper(0.5) };
     let builder = Scene::builder(model).axis("e", 0.0..=1.0, counts[0]).axis("omega", 1.0..=12.0, counts[1]);
     let everything = [Class, Lyapunov, Impacts, Mesh, Symmetric, Word, Pattern];
     let scene = if all { builder.quantities(&everything) } else { builder }.build()?;
@@ -54,9 +59,11 @@ pub fn run(counts: [u32; 2], all: bool, engine: EngineRequest, out: &Path) -> Re
     };
     let map = phase::run("survey", &mut phases, || run.finish());
     phase::run("write", &mut phases, || map.write())?;
-    let (cells, periods) = (map.cells().count(), map.cells().periods());
-    if periods > 2 * cells as u64 {
-        bail!("{cells} cells took {periods} forcing periods; each must end after the first or second");
+    let cells = map.cells().count();
+    let of = |place| map.cells().record(plan.run_at(place) as usize).periods_run;
+    let periods: Vec<u32> = (0..cells).map(of).collect();
+    if force <= CONTACT_FREE && periods.iter().any(|&periods| periods > 2) {
+        bail!("a contact-free cell took more than two forcing periods");
     }
-    Ok(HostCost { cells, phases, traffic })
+    Ok(HostCost { cells, phases, traffic, periods })
 }

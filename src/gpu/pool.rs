@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use bytemuck::Zeroable;
+use rayon::prelude::*;
 
 use super::adapter::most_slots;
 use super::device::{BEGIN, Pipelines};
@@ -11,7 +12,7 @@ use super::layout::Cell;
 use super::reading::LaneResult;
 use super::rounds::{Rounds, bind, dispatch};
 use super::shader::Variant;
-use super::slots::Slots;
+use super::slots::{Returned, Slots};
 use super::stage::Stage;
 use super::tables::Tables;
 use super::transfer::reals;
@@ -106,10 +107,11 @@ impl Pool {
         // Takes the lowest slots, so that lanes that begin together are adjacent.
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.free.split_off(self.free.len() - lanes.len());
-        for (&slot, &(number, lane)) in slots.iter().rev().zip(lanes) {
+        let started: Vec<_> = lanes.par_iter().map(|(_, lane)| start(tables, lane)).collect();
+        for ((&slot, &lane), started) in slots.iter().rev().zip(lanes).zip(started) {
             let at = slot as usize;
-            self.lanes[at] = (number, lane);
-            (self.cells[at], self.starts[at]) = start(tables, &lane);
+            self.lanes[at] = lane;
+            (self.cells[at], self.starts[at]) = started;
             self.active_list.push(slot);
         }
         let Some(buffers) = &self.buffers else { return Ok(()) };
@@ -170,12 +172,12 @@ impl Pool {
             let message = "it returned no results of the lanes that have ended".into();
             return Err(gpu.failure(GpuError::Lost { message }));
         }
-        let mut ended = Vec::with_capacity(results.len());
-        for &(reading, finding, measured) in &results {
+        let of = |&(reading, finding, measured): &Returned| {
             let (number, Lane { flow, .. }) = self.lanes[finding.slot as usize];
-            ended.push(LaneResult { number, flow, reading, finding, measured });
-            self.free.push(finding.slot);
-        }
+            LaneResult { number, flow, reading, finding, measured }
+        };
+        let ended = results.par_iter().map(of).collect();
+        self.free.extend(results.iter().map(|(_, finding, _)| finding.slot));
         // Results and active list have the same order.
         let mut slots = results.iter().map(|(_, finding, _)| finding.slot).peekable();
         self.active_list.retain(|&slot| slots.next_if_eq(&slot).is_none());

@@ -1,5 +1,7 @@
 //! The buffers of a pool: the state of each slot on the device, and the transfers to and from the host.
 
+use rayon::prelude::*;
+
 use super::averaging::Averaging;
 use super::device::{COMPACT, CONCLUDE, GATHER, Pipelines};
 use super::layout::{COUNT_AT, Cell, Finding, Measured, Motion, QUEUE_HEAD, Reading, Settings, Tally};
@@ -194,9 +196,8 @@ impl Conclusion<'_> {
             }
             None => Vec::new(),
         };
-        let measured = measured.into_iter().map(Some).chain(std::iter::repeat(None));
-        let results = readings.into_iter().zip(findings).zip(measured);
-        Ok(results.map(|((reading, finding), measured)| (reading, finding, measured)).collect())
+        let of = |i: usize| (readings[i], findings[i], measured.get(i).copied());
+        Ok((0..readings.len()).into_par_iter().map(of).collect())
     }
 }
 

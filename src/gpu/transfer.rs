@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use rayon::prelude::*;
+
 use super::precision::Precision;
 use super::signal::Signal;
 use super::{Gpu, GpuError};
@@ -19,14 +21,20 @@ pub(super) fn reals<T: bytemuck::Pod>(items: &[T], precision: Precision) -> Vec<
 }
 
 /// Converts bytes in a precision to structs of real numbers.
-pub(super) fn from_reals<T: bytemuck::Pod>(bytes: &[u8], precision: Precision) -> Vec<T> {
-    let numbers: Vec<f64> = match precision {
-        Precision::F64 => return bytemuck::pod_collect_to_vec(bytes),
-        Precision::F32 => {
-            bytemuck::pod_collect_to_vec::<u8, f32>(bytes).iter().map(|&x| f64::from(x)).collect()
+pub(super) fn from_reals<T: bytemuck::Pod + Send>(bytes: &[u8], precision: Precision) -> Vec<T> {
+    let size = size_of::<T>() / size_of::<f64>() * precision.bytes();
+    let widened = |bytes: &[u8]| {
+        let mut item = T::zeroed();
+        let numbers: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut item));
+        for (number, bytes) in numbers.iter_mut().zip(bytes.chunks_exact(size_of::<f32>())) {
+            *number = f64::from(bytemuck::pod_read_unaligned::<f32>(bytes));
         }
+        item
     };
-    bytemuck::pod_collect_to_vec(&numbers)
+    match precision {
+        Precision::F64 => bytemuck::pod_collect_to_vec(bytes),
+        Precision::F32 => bytes.par_chunks_exact(size).map(widened).collect(),
+    }
 }
 
 /// Creates a storage buffer of `size` bytes.

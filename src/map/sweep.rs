@@ -79,9 +79,9 @@ pub async fn run(
                 pace.adapt(under_way, ended.len(), last_ended - clock);
                 under_way -= ended.len();
                 schedule.prepare(&ended);
-                for &(id, record) in &ended {
-                    put(records, id, record);
-                    schedule.take(id, records);
+                for (id, record) in &ended {
+                    put(records, *id, record);
+                    schedule.take(*id, records);
                 }
                 // A large batch is stored alone and need not be copied.
                 if unstored.is_empty() {
@@ -108,7 +108,8 @@ pub async fn run(
 /// of them.
 pub fn replay(schedule: &mut Schedule, records: &mut [Record], stored: &[(u32, Record)]) -> bool {
     schedule.prepare(stored);
-    stored.iter().all(|&(id, record)| {
+    stored.iter().all(|(id, record)| {
+        let id = *id;
         let is_expected = schedule.is_waiting_for(id);
         if is_expected {
             put(records, id, record);
@@ -118,9 +119,9 @@ pub fn replay(schedule: &mut Schedule, records: &mut [Record], stored: &[(u32, R
     })
 }
 
-fn put(records: &mut [Record], id: u32, record: Record) {
+fn put(records: &mut [Record], id: u32, record: &Record) {
     if let Some(place) = records.get_mut(id as usize) {
-        *place = record;
+        *place = *record;
     }
 }
 

@@ -62,7 +62,10 @@ pub(crate) fn validate_all(
     precision: Precision,
     is_lane: bool,
 ) -> Validation {
-    validate_runs(&Subject { plan, records: &records, precision, is_lane }, (0..records.len() as u32).collect())
+    validate_runs(
+        &Subject { plan, records: &records, precision, is_lane },
+        (0..records.len() as u32).collect(),
+    )
 }
 
 /// Validates a lane's record of a plan's first run.

@@ -17,6 +17,9 @@ use rattlemap_dynamics::orbit::measure_until;
 /// Time after which a batch begins no more cells and returns those that have ended.
 const BATCH_TIME: Duration = Duration::from_secs(2);
 
+/// Number in place of that of a cell that waits for the next batch. A map has fewer runs.
+const LEFT: u32 = u32::MAX;
+
 /// The event-driven reference.
 pub struct Cpu<'p> {
     plan: &'p Plan,
@@ -41,18 +44,23 @@ impl<'p> Cpu<'p> {
         let clock = Instant::now();
         // Costs of cells differ by a factor of 1000, so each task has one cell. If many are slow, some wait for the
         // next call.
-        let ended: Vec<Option<(u32, Record)>> = cells
+        let mut ended: Vec<(u32, Record)> = cells
             .par_iter()
             .with_max_len(1)
             .enumerate()
             .map(|(i, cell)| {
-                let record = (i == 0 || clock.elapsed() < BATCH_TIME).then(|| self.cell(cell))??;
-                Some((cell.id, record))
+                let has_time = i == 0 || clock.elapsed() < BATCH_TIME;
+                let record = has_time.then(|| self.cell(cell)).flatten();
+                record.map_or((LEFT, Record::default()), |record| (cell.id, record))
             })
             .collect();
-        let left = cells.iter().zip(&ended).filter(|(_, ended)| ended.is_none());
+        let left = cells.iter().zip(&ended).filter(|(_, (id, _))| *id == LEFT);
         self.under_way.extend(left.map(|(cell, _)| *cell));
-        ended.into_iter().flatten().collect()
+        // Records are large: if all cells have ended, none moves.
+        if !self.under_way.is_empty() {
+            ended.retain(|(id, _)| *id != LEFT);
+        }
+        ended
     }
 
     /// Computes a cell; none if the flag is raised.

@@ -192,7 +192,7 @@ impl<'p> Gpu<'p> {
             Err(GpuError::Halted) => ended.retain(|(_, record)| !is_on_strobe(record)),
             compared => compared.map_err(|error| self.error(error, ended.len()))?,
         }
-        ended.iter_mut().for_each(|(_, record)| drop_unrequested(record, self.plan.needs()));
+        ended.par_iter_mut().for_each(|(_, record)| drop_unrequested(record, self.plan.needs()));
         Ok(ended)
     }
 
