@@ -1,7 +1,7 @@
 //! Lanes on a graphics device, as an engine.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -45,6 +45,8 @@ pub struct Gpu<'p> {
     waiting: Vec<Cell>,
     /// Largest number of cells of such a batch.
     most_waiting: usize,
+    /// Memory for the constants of such a batch, used again: fresh memory takes more than half as long as to derive them.
+    constants: Vec<Option<Constants>>,
     preparation: Preparation,
 }
 
@@ -88,6 +90,7 @@ impl<'p> Gpu<'p> {
             pool: None,
             waiting: Vec::new(),
             most_waiting: gpu::MOST_FLOWS,
+            constants: Vec::new(),
             preparation: Preparation::default(),
         };
         if !engine.is_hardware() {
@@ -179,7 +182,12 @@ impl<'p> Gpu<'p> {
             let (flows, laws, lanes) = renumbered(candidates);
             let plan: &Plan = &self.plan;
             let oscillators: Vec<_> = flows.into_par_iter().map(|flow| plan.oscillator(flow)).collect();
-            let bytes = |lane: &Lane| gpu::table_bytes(&oscillators[lane.flow as usize], steps);
+            let mut known = HashSet::new();
+            let bytes = |lane: &Lane| {
+                let steps = Constants::steps(&oscillators[lane.flow as usize], steps);
+                let [flow, phasors] = gpu::table_bytes(steps);
+                if known.insert(steps) { flow + phasors } else { flow }
+            };
             let count = fitting(lanes.iter().map(bytes), self.most_waiting);
             match self.run_cells(&oscillators, &laws, &lanes[..count]).await {
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if count > 1 => {
@@ -205,11 +213,14 @@ impl<'p> Gpu<'p> {
     ) -> Result<Vec<Record>, GpuError> {
         let steps = self.settings.steps_per_period;
         let flows = lanes.iter().map(|lane| lane.flow as usize + 1).max().unwrap_or(0);
-        let constants = oscillators[..flows].par_iter().map(|flow| Constants::new(flow, steps)).collect();
+        let mut constants = std::mem::take(&mut self.constants);
+        let derived = oscillators[..flows].par_iter().map(|flow| Constants::new(flow, steps));
+        derived.collect_into_vec(&mut constants);
         let tables = self.load(constants, laws).await?;
         let records = self.device.run_on(&tables, lanes, &self.settings).await?;
         let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
         self.steps += steps_of(records.iter().zip(steps));
+        self.constants = tables.into_constants();
         Ok(records)
     }
 
