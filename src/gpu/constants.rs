@@ -1,7 +1,7 @@
 //! Constants of a lane, derived in f64 from the description of the model.
 
 use bytemuck::Zeroable;
-use nalgebra::SMatrix;
+use wide::f64x4;
 
 use super::coordinates::Coordinates;
 use super::layout::{Domain, Flow};
@@ -19,17 +19,13 @@ const NOWHERE: f64 = 1e12;
 /// Terms of the matrix exponential over one step, in which the fastest mode turns by at most a radian.
 const EXPONENTIAL_TERMS: u32 = 30;
 
-type Generator = SMatrix<f64, 7, 7>;
-
-/// Constants of one oscillator, and the phasors of its steps.
+/// Constants of one oscillator.
 #[derive(Clone, Debug)]
 pub struct Constants {
     /// Constants that the shader reads.
     pub flow: Flow,
     /// Free steps per forcing period.
     pub steps: u32,
-    /// `(cos, sin)` of the phase at every step, the end included.
-    pub phasors: Vec<[f64; 2]>,
     /// Whether the mirror image of a motion is a motion.
     pub mirror_symmetric: bool,
     /// Number of displacements.
@@ -63,14 +59,17 @@ impl Constants {
         let h = period / f64::from(steps);
         let walls = walls(oscillator);
         let coordinates = Coordinates::new(oscillator);
-        let [right, left] = [0, 1].map(|side| behind_wall(oscillator, side, walls[side], h));
+        let right = behind_wall(oscillator, 0, walls[0], h);
+        let left = match oscillator.mirror_symmetric() {
+            true => mirrored(right),
+            false => behind_wall(oscillator, 1, walls[1], h),
+        };
         let held = |wall: f64| rows(oscillator, &oscillator.free, wall, h)[0];
         let damper =
             |behind: &model::Domain| coordinates.damper(&oscillator.free, behind).map(|rate| -h * rate);
         let mut constants = Constants {
             flow: Zeroable::zeroed(),
             steps,
-            phasors: phasors(steps),
             mirror_symmetric: oscillator.mirror_symmetric(),
             degrees: oscillator.degrees as u32,
             must_rest: false,
@@ -153,13 +152,12 @@ fn non_impacting(oscillator: &model::Oscillator) -> Option<model::NonImpacting> 
     model::NonImpacting::new(oscillator).or_else(beside_rest)
 }
 
-fn phasors(steps: u32) -> Vec<[f64; 2]> {
-    (0..=steps)
-        .map(|n| {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(n % steps) / f64::from(steps)).sin_cos();
-            [cos, sin]
-        })
-        .collect()
+/// Returns `(cos, sin)` of the phase at every step of a period, the end included.
+pub(super) fn phasors(steps: u32) -> impl Iterator<Item = [f64; 2]> {
+    (0..=steps).map(move |n| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(n % steps) / f64::from(steps)).sin_cos();
+        [cos, sin]
+    })
 }
 
 /// Returns a bound on all rates of a domain: the forcing, and the spectral norms of the mass-scaled system. An
@@ -284,32 +282,41 @@ fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
     }
 }
 
-/// Returns the first four rows of `exp(G) - 1` for the generator G on `(z, z', x, x', cos, sin, 1)`.
-pub(crate) fn step(gap_row: &[f64; 7], x_row: &[f64; 7], angle: f64) -> [f64; 28] {
-    let propagator = propagator(gap_row, x_row, angle);
-    std::array::from_fn(|i| propagator[(i / 7, i % 7)])
+/// Returns the domain behind the other wall of a symmetric oscillator: there the load has the opposite sign.
+fn mirrored(mut domain: Domain) -> Domain {
+    let rows = [&mut domain.gap_row[5], &mut domain.x_row[5]];
+    let column = domain.step.iter_mut().skip(6).step_by(7);
+    // A zero stays +0.
+    rows.into_iter().chain(column).for_each(|entry| *entry = 0.0 - *entry);
+    domain
 }
 
-fn propagator(gap_row: &[f64; 7], x_row: &[f64; 7], angle: f64) -> Generator {
-    let mut g = Generator::zeros();
-    g[(0, 1)] = 1.0;
-    g[(2, 3)] = 1.0;
-    for (i, row) in [(1, gap_row), (3, x_row)] {
-        for j in 0..5 {
-            g[(i, j)] = row[j];
-        }
-        // A missing sine is +0, whatever the signs of the factors.
-        g[(i, 5)] = row[6] + 0.0;
-        g[(i, 6)] = row[5];
-    }
-    g[(4, 5)] = -angle;
-    g[(5, 4)] = angle;
+/// Returns the first four rows of `exp(G) - 1` for the generator G on `(z, z', x, x', cos, sin, 1)`.
+fn step(gap_row: &[f64; 7], x_row: &[f64; 7], angle: f64) -> [f64; 28] {
+    let unit = |j: usize| f64x4::from(std::array::from_fn(|i| f64::from(u8::from(i == j))));
+    // Each row in two halves: the motion's columns, and those of (cos, sin, 1).
+    let (zero, mut sum, mut turn) = (f64x4::ZERO, [[f64x4::ZERO; 2]; 4], [f64x4::ZERO; 2]);
     // Horner's scheme adds small terms first.
-    let mut sum = Generator::zeros();
     for n in (1..=EXPONENTIAL_TERMS).rev() {
-        sum = g * (Generator::identity() + sum) / f64::from(n);
+        let n = f64x4::splat(f64::from(n));
+        (0..4).for_each(|i| sum[i][0] += unit(i));
+        (0..2).for_each(|i| turn[i] += unit(i));
+        let accelerated = |row: &[f64; 7]| {
+            let motion = |half: usize| (0..4).fold(zero, |total, i| total + sum[i][half] * row[i]);
+            // A missing sine is +0, whatever the signs of the factors.
+            let forced = motion(1) + turn[0] * row[4] + turn[1] * (row[6] + 0.0) + unit(2) * row[5];
+            [motion(0) / n, forced / n]
+        };
+        sum = [
+            sum[1].map(|half| half / n),
+            accelerated(gap_row),
+            sum[3].map(|half| half / n),
+            accelerated(x_row),
+        ];
+        turn = [turn[1] * -angle / n, turn[0] * angle / n];
     }
-    sum
+    let rows = sum.map(|halves| halves.map(f64x4::to_array));
+    std::array::from_fn(|i| rows[i / 7][i % 7 / 4][i % 7 % 4])
 }
 
 /// Returns the energy bound on derivatives of the gap, in units of the step.
@@ -335,10 +342,10 @@ fn gap_bound(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> 
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Matrix4;
+    use nalgebra::{Matrix4, SMatrix};
 
     use super::*;
-    use rattlemap_dynamics::model::GearPair;
+    use rattlemap_dynamics::model::{GearPair, Oscillator};
 
     /// Underdamped, overdamped by the teeth, and overdamped by a support.
     #[test]
@@ -354,6 +361,59 @@ mod tests {
                 let fastest =
                     generator.complex_eigenvalues().iter().fold(0.0f64, |size, l| size.max(l.norm()));
                 assert!(fastest <= STEP_ANGLE * (1.0 + 1e-9), "{fastest} {pair:?}");
+            }
+        }
+    }
+
+    /// Oscillators with and without a sine, coupled by the masses, with stiff and with heavy parts.
+    fn oscillators() -> Vec<Oscillator> {
+        let paper = GearPair::paper(0.5);
+        let pairs = [
+            paper,
+            GearPair { m1: 1e3, k: 1e6, ..paper },
+            GearPair { r: 450.0, k1: 0.0, ..paper },
+            GearPair { omega: 0.01, b: 1e-3, ..paper },
+        ];
+        let turned = |pair: GearPair| pair.oscillator().unwrap().at_phase(0.3);
+        let coupled =
+            |of: Oscillator| Oscillator { mass: [[of.mass[0][0], 0.4], [0.4, of.mass[1][1]]], ..of };
+        pairs.into_iter().map(turned).flat_map(|of| [of, coupled(of)]).collect()
+    }
+
+    /// By Padé approximants of the whole matrix.
+    #[test]
+    fn steps_are_matrix_exponentials() {
+        for oscillator in oscillators() {
+            for Domain { step, gap_row, x_row, angle, .. } in
+                Constants::new(&oscillator, None).unwrap().flow.domains
+            {
+                let mut generator = SMatrix::<f64, 7, 7>::zeros();
+                for (i, row) in [(1, gap_row), (3, x_row)] {
+                    generator[(i - 1, i)] = 1.0;
+                    let [z, dz, x, dx, cos, load, sin] = row;
+                    generator.row_mut(i).copy_from_slice(&[z, dz, x, dx, cos, sin, load]);
+                }
+                (generator[(4, 5)], generator[(5, 4)]) = (-angle, angle);
+                let change = generator.exp() - SMatrix::identity();
+                for (n, entry) in step.into_iter().enumerate() {
+                    let (i, j) = (n / 7, n % 7);
+                    let error = (entry - change[(i, j)]).abs();
+                    let scale = change.row(i).amax().max(1.0);
+                    assert!(error < 4.0 * f64::EPSILON * scale, "{i}, {j}: {entry}, {error} {oscillator:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_symmetric_oscillator_has_mirrored_domains_to_the_bit() {
+        for oscillator in oscillators() {
+            for contact in [Contact::Impact, Contact::Rigid, Contact::Elastic] {
+                let oscillator = Oscillator { contacts: [contact; 2], ..oscillator };
+                assert!(oscillator.mirror_symmetric());
+                let Flow { domains: [_, _, left], walls, h, .. } =
+                    Constants::new(&oscillator, None).unwrap().flow;
+                assert_eq!(left, behind_wall(&oscillator, 1, walls[1], h));
             }
         }
     }

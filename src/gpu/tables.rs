@@ -1,11 +1,15 @@
 //! Tables on the device that lanes share: flows and contact laws.
 
-use super::constants::Constants;
+use std::collections::HashMap;
+
+use bytemuck::Zeroable;
+
+use super::constants::{Constants, phasors as phasors_of};
 use super::guard::with_error_scopes;
 use super::layout::{self, Flow, FlowShape, contact_code};
-use super::transfer::{reals, upload};
+use super::transfer::{buffer, reals, upload};
 use super::{Gpu, GpuError};
-use rattlemap_dynamics::model::{Law, Oscillator};
+use rattlemap_dynamics::model::Law;
 
 /// Flows and laws, uploaded once for any number of runs.
 pub struct Tables {
@@ -23,20 +27,24 @@ pub struct Tables {
     pub(super) laws: wgpu::Buffer,
 }
 
-/// Copies of all constants during an upload: the lanes' constants, the lists of flows and phasors, these lists in the
-/// lanes' precision, the driver's copy, and the device's copy if it shares the host's memory.
-pub(crate) const COPIES: u64 = 5;
+/// Most copies of all constants during an upload: in f64, in the lanes' precision, the driver's copy, and the device's
+/// copy if it shares the host's memory.
+pub(crate) const COPIES: u64 = 4;
+
+/// Flows whose constants are rounded and given to the driver at a time, so that this memory is used again.
+const FLOWS_AT_A_TIME: usize = 1024;
 
 /// Most flows that are uploaded at a time if there are too many for one upload, and most bytes that their constants
 /// then take. So many lanes keep hardware busy.
 pub(crate) const MOST_FLOWS: usize = 1 << 16;
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
-/// Returns the most bytes of memory that the constants of one flow take.
-pub(crate) fn bytes(oscillator: &Oscillator, steps_per_period: Option<u32>) -> u64 {
-    let steps = Constants::steps(oscillator, steps_per_period);
-    let phasors = steps.map_or(0, |steps| (u64::from(steps) + 1) * size_of::<[f64; 2]>() as u64);
-    COPIES * (size_of::<Constants>() as u64 + size_of::<FlowShape>() as u64 + phasors)
+/// Returns the most bytes of memory that the constants of one flow take, and those of all phasors for its steps, which
+/// flows with equal steps share.
+pub(crate) fn bytes(steps: Option<u32>) -> [u64; 2] {
+    let phasors = steps.map_or(0, |steps| u64::from(steps) + 1);
+    let flow = size_of::<Constants>() + size_of::<FlowShape>();
+    [flow as u64, phasors * size_of::<[f64; 2]>() as u64].map(|bytes| COPIES * bytes)
 }
 
 impl Tables {
@@ -50,6 +58,11 @@ impl Tables {
         [&self.flows, &self.shapes, &self.phasors, &self.laws].map(wgpu::Buffer::size).iter().sum()
     }
 
+    /// Returns the constants, for the next tables to overwrite.
+    pub(crate) fn into_constants(self) -> Vec<Option<Constants>> {
+        self.constants
+    }
+
     /// Returns the constants of each flow; `None` for a flow that lanes cannot carry.
     pub fn constants(&self) -> &[Option<Constants>] {
         &self.constants
@@ -61,44 +74,44 @@ impl Tables {
         laws: &[Law],
     ) -> Result<Tables, GpuError> {
         let flows = constants.len();
-        let mut tables: Vec<Flow> = Vec::with_capacity(flows);
         let mut shapes = Vec::with_capacity(flows);
         let mut phasors = Vec::new();
-        for constants in &constants {
-            match constants {
-                Some(constants) => {
-                    shapes.push(FlowShape {
-                        steps: constants.steps,
-                        phasors: phasors.len() as u32,
-                        must_rest: constants.must_rest.into(),
-                        degrees: constants.degrees,
-                        contacts: constants.contacts.map(contact_code),
-                    });
-                    tables.push(constants.flow);
-                    phasors.extend_from_slice(&constants.phasors);
-                }
-                // Lanes of this flow are refused before they start.
-                None => {
-                    shapes.push(FlowShape { steps: 1, ..bytemuck::Zeroable::zeroed() });
-                    tables.push(bytemuck::Zeroable::zeroed());
-                }
-            }
+        // Flows with equal steps share their phasors.
+        let mut places = HashMap::new();
+        let (mut flow_of_another_kind, mut flow_with_sine) = (None, None);
+        for (i, constants) in constants.iter().enumerate() {
+            // Lanes of a missing flow are refused before they start.
+            let Some(constants) = constants else {
+                shapes.push(FlowShape { steps: 1, ..FlowShape::zeroed() });
+                continue;
+            };
+            let place = *places.entry(constants.steps).or_insert_with_key(|&steps| {
+                let place = phasors.len() as u32;
+                phasors.extend(phasors_of(steps));
+                place
+            });
+            shapes.push(FlowShape {
+                steps: constants.steps,
+                phasors: place,
+                must_rest: constants.must_rest.into(),
+                degrees: constants.degrees,
+                contacts: constants.contacts.map(contact_code),
+            });
+            flow_of_another_kind = flow_of_another_kind.or(constants.has_elastic_or_rigid_wall.then_some(i));
+            flow_with_sine = flow_with_sine.or(constants.has_sine.then_some(i));
         }
         phasors.push([1.0, 0.0]);
         let law = |law: &Law| layout::Law { restitution: law.restitution, mesh_speed: law.mesh_speed };
         let rows: Vec<layout::Law> = laws.iter().map(law).collect();
-        let tables = reals(&tables, gpu.precision);
         let phasors = reals(&phasors, gpu.precision);
+        let flow_size = size_of::<Flow>() / size_of::<f64>() * gpu.precision.bytes();
         let allowed = gpu.device.limits().max_storage_buffer_binding_size;
-        let needed = tables.len().max(phasors.len()) as u64;
+        let needed = (flows * flow_size).max(phasors.len()) as u64;
         if needed > allowed {
             return Err(GpuError::TooManyFlows { flows, needed, allowed });
         }
-        let first = |has: fn(&Constants) -> bool| constants.iter().position(|c| c.as_ref().is_some_and(has));
-        let flow_of_another_kind = first(|c| c.has_elastic_or_rigid_wall);
-        let flow_with_sine = first(|c| c.has_sine);
         let make = || Tables {
-            flows: upload(gpu, "flows", &tables),
+            flows: upload_flows(gpu, &constants, flow_size),
             shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
             phasors: upload(gpu, "phasors", &phasors),
             laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
@@ -109,4 +122,14 @@ impl Tables {
         };
         with_error_scopes(gpu, "flows", flows, make).await
     }
+}
+
+/// Rounds the constants of flows and uploads them; `size` is that of a flow in the lanes' precision.
+fn upload_flows(gpu: &Gpu, constants: &[Option<Constants>], size: usize) -> wgpu::Buffer {
+    let (buffer, none) = (buffer(gpu, "flows", constants.len() * size), Flow::zeroed());
+    for (n, part) in constants.chunks(FLOWS_AT_A_TIME).enumerate() {
+        let flows = part.iter().map(|constants| constants.as_ref().map_or(&none, |c| &c.flow));
+        gpu.write(&buffer, (n * FLOWS_AT_A_TIME * size) as u64, &reals(flows, gpu.precision));
+    }
+    buffer
 }

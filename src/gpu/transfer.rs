@@ -9,15 +9,27 @@ use super::signal::Signal;
 use super::{Gpu, GpuError};
 
 /// Converts structs of real numbers to bytes in a precision.
-pub(super) fn reals<T: bytemuck::Pod>(items: &[T], precision: Precision) -> Vec<u8> {
-    match precision {
-        Precision::F64 => bytemuck::cast_slice(items).to_vec(),
-        Precision::F32 => {
-            let numbers: &[f64] = bytemuck::cast_slice(items);
-            let rounded: Vec<f32> = numbers.iter().map(|&x| x as f32).collect();
-            bytemuck::cast_slice(&rounded).to_vec()
+pub(super) fn reals<'a, T: bytemuck::Pod>(
+    items: impl IntoIterator<Item = &'a T>,
+    precision: Precision,
+) -> Vec<u8> {
+    let items = items.into_iter();
+    let size = size_of::<T>() / size_of::<f64>() * precision.bytes();
+    let mut bytes = Vec::with_capacity(items.size_hint().0 * size);
+    for item in items {
+        let from = bytes.len();
+        bytes.resize(from + size, 0);
+        match precision {
+            Precision::F64 => bytes[from..].copy_from_slice(bytemuck::bytes_of(item)),
+            Precision::F32 => {
+                let numbers = bytemuck::cast_slice::<T, f64>(std::slice::from_ref(item));
+                for (place, &x) in bytes[from..].chunks_exact_mut(size_of::<f32>()).zip(numbers) {
+                    place.copy_from_slice(&(x as f32).to_ne_bytes());
+                }
+            }
         }
     }
+    bytes
 }
 
 /// Converts bytes in a precision to structs of real numbers.

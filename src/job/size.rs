@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::gpu;
+use crate::gpu::{self, Constants};
 use crate::job::engine_choice::EngineKind;
 use crate::job::error::JobError;
 use crate::job::processor;
@@ -307,17 +307,24 @@ fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
         Steps::PerPeriod(steps) => Some(steps),
     };
     let sampled = flows.min(SAMPLED_FLOWS);
-    let sizes = (0..sampled).map(|nth| {
+    let steps_of = |nth| {
         // From the first flow to the last.
         let flow = (flows - 1) * nth / (sampled - 1).max(1);
         let model = scene.points().model(parts.cell(flow as u32));
-        model.oscillator().map_or(0, |oscillator| gpu::table_bytes(&oscillator, steps))
-    });
+        Constants::steps(&model.oscillator().ok()?, steps)
+    };
+    let steps: Vec<u32> = (0..sampled).filter_map(steps_of).collect();
+    let (most, least) = (steps.iter().copied().max(), steps.iter().copied().min());
+    // Flows with equal steps, which are even, share their phasors.
+    let distinct = most.zip(least).map_or(0, |(most, least)| u64::from((most - least) / 2 + 1));
+    let [flow, largest] = gpu::table_bytes(most);
     if stores_flows(flows, runs) {
-        (sizes.sum::<u64>() as f64 / sampled as f64 * flows as f64) as u64
+        let mean = steps.iter().map(|&steps| gpu::table_bytes(Some(steps))[1]).sum::<u64>() / sampled;
+        flows * flow + flows.min(distinct) * mean
     } else {
-        let largest = sizes.max().unwrap_or(0);
-        let uploaded = (flows.min(gpu::MOST_FLOWS as u64) * largest).min(gpu::MOST_BYTES.max(largest));
+        let together = flows.min(gpu::MOST_FLOWS as u64);
+        let uploaded =
+            (together * flow + together.min(distinct) * largest).min(gpu::MOST_BYTES.max(flow + largest));
         // Meanwhile the constants of the next upload are derived.
         uploaded + uploaded / gpu::COPIES
     }
@@ -325,8 +332,9 @@ fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
-    use crate::gpu::Constants;
     use crate::map::plan::Plan;
     use crate::map::scene::{FileText, Purpose};
     use crate::record::RecordStore;
@@ -356,13 +364,12 @@ mod tests {
             let flows: usize = oscillators.iter().map(|oscillator| Flow::new(oscillator).bytes()).sum();
             let ratio = kept_flows(&parts, scene.run_count()) as f64 / flows as f64;
             assert!((1.0..2.0).contains(&ratio), "{second}: {ratio}");
-            let of = |constants: Constants| {
-                size_of::<Constants>() + size_of::<[f64; 2]>() * constants.phasors.capacity()
-            };
-            let one_copy: usize =
-                oscillators.iter().filter_map(|oscillator| Constants::new(oscillator, None)).map(of).sum();
+            let steps: Vec<u32> = oscillators.iter().filter_map(|of| Constants::steps(of, None)).collect();
+            let distinct: BTreeSet<u32> = steps.iter().copied().collect();
+            let phasors: u32 = distinct.iter().map(|steps| steps + 1).sum();
+            let one_copy = steps.len() * size_of::<Constants>() + phasors as usize * size_of::<[f64; 2]>();
             let copies = lane_tables(&scene, &parts, scene.run_count()) as f64 / one_copy as f64;
-            assert!((4.5..5.5).contains(&copies), "{second}: {copies} copies");
+            assert!((3.6..4.4).contains(&copies), "{second}: {copies} copies");
         }
     }
 
@@ -372,13 +379,15 @@ mod tests {
             let (parts, runs) = (Parts::flows(scene.points()), scene.run_count());
             (lane_tables(scene, &parts, runs), kept_flows(&parts, runs))
         };
-        let one = |scene: &Scene| gpu::table_bytes(&scene.base().oscillator().unwrap(), None);
+        let one =
+            |scene: &Scene| gpu::table_bytes(Constants::steps(&scene.base().oscillator().unwrap(), None));
         // One flow: e and mesh_speed belong to the contact law.
         let single = scene("mesh_speed", 0.001, 0.01, [300, 300], &[]);
-        assert_eq!(sizes(&single), (one(&single), FLOW));
+        assert_eq!(sizes(&single), (one(&single).iter().sum(), FLOW));
         let too_many = scene("k", 1e3, 1e4, [2, 100_000], &[]);
         let with_next = |bytes: u64| bytes + bytes / gpu::COPIES;
-        assert_eq!(sizes(&too_many), (with_next(gpu::MOST_FLOWS as u64 * one(&too_many)), 0));
+        let [flow, phasors] = one(&too_many);
+        assert_eq!(sizes(&too_many), (with_next(gpu::MOST_FLOWS as u64 * flow + phasors), 0));
         assert_eq!(sizes(&scene("omega", 0.002, 0.003, [2, 10_000], &[])).0, with_next(gpu::MOST_BYTES));
     }
 

@@ -46,8 +46,6 @@ impl NonImpacting {
         let (stiffness, damping) = (matrix(oscillator.free.stiffness), matrix(oscillator.free.damping));
         let gap = Vector2::from(oscillator.gap);
         let compliance = stiffness.cholesky()?.inverse();
-        let inverse_mass = matrix(oscillator.inverse_mass());
-        let slowest = slowest(&(inverse_mass * stiffness), &(inverse_mass * damping));
         let inertia = matrix(mass) * (omega * omega);
         let dynamic =
             (stiffness - inertia).map(Complex::from) + damping.map(|c| Complex::new(0.0, omega * c));
@@ -58,9 +56,10 @@ impl NonImpacting {
         let swing = gap.map(Complex::from).dot(&amplitude).norm();
         let room = (walls[0] - gap.dot(&middle)).min(gap.dot(&middle) - walls[1]) - swing;
         let reach = (room - MARGIN * 2.0 * oscillator.length_scale()) / gap.dot(&(compliance * gap)).sqrt();
-        if !(reach > 0.0 && slowest.re < -MARGIN * omega) {
-            return None;
-        }
+        let inverse_mass = matrix(oscillator.inverse_mass());
+        let slowest = || slowest(&(inverse_mass * stiffness), &(inverse_mass * damping));
+        // Eigenvalues take longest: they come last.
+        let slowest = (reach > 0.0).then(slowest).filter(|slowest| slowest.re < -MARGIN * omega)?;
         let steady = [0, 1].map(|i| [amplitude[i].re + middle[i], -omega * amplitude[i].im]);
         let steady = [steady[0][0], steady[0][1], steady[1][0], steady[1][1]];
         Some(NonImpacting { steady, mass, stiffness, reach, slowest, resting: None })

@@ -1,7 +1,7 @@
 //! Lanes on a graphics device, as an engine.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::panic;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -50,6 +50,8 @@ pub struct Gpu<'p> {
     next: Option<Chunk>,
     /// Largest number of cells of such a batch.
     most_waiting: usize,
+    /// Memory for the constants of such a batch, used again: fresh memory takes more than half as long as to derive them.
+    constants: Vec<Option<Constants>>,
     preparation: Preparation,
 }
 
@@ -113,6 +115,7 @@ impl<'p> Gpu<'p> {
             waiting: Vec::new(),
             next: None,
             most_waiting: gpu::MOST_FLOWS,
+            constants: Vec::new(),
             preparation: Preparation::default(),
         };
         if !engine.is_hardware() {
@@ -227,11 +230,16 @@ impl<'p> Gpu<'p> {
         let (flows, laws, mut lanes) = renumbered(candidates);
         let plan: &Plan = &self.plan;
         let mut oscillators: Vec<_> = flows.into_par_iter().map(|flow| plan.oscillator(flow)).collect();
-        let bytes = |lane: &Lane| gpu::table_bytes(&oscillators[lane.flow as usize], steps);
+        let mut known = HashSet::new();
+        let bytes = |lane: &Lane| {
+            let steps = Constants::steps(&oscillators[lane.flow as usize], steps);
+            let [flow, phasors] = gpu::table_bytes(steps);
+            if known.insert(steps) { flow + phasors } else { flow }
+        };
         lanes.truncate(fitting(lanes.iter().map(bytes), self.most_waiting));
         oscillators.truncate(lanes.iter().map(|lane| lane.flow as usize + 1).max()?);
         let cells = self.waiting.split_off(self.waiting.len() - lanes.len());
-        let constants = Deriving::new(oscillators, steps);
+        let constants = Deriving::new(oscillators, steps, std::mem::take(&mut self.constants));
         Some(Chunk { cells, laws, lanes, constants })
     }
 
@@ -246,6 +254,7 @@ impl<'p> Gpu<'p> {
         let records = self.device.run_on(&tables, lanes, &self.settings).await?;
         let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
         self.steps += steps_of(records.iter().zip(steps));
+        self.constants = tables.into_constants();
         Ok(records)
     }
 
@@ -329,16 +338,25 @@ enum Deriving {
 }
 
 impl Deriving {
-    fn new(oscillators: Vec<Oscillator>, steps: Option<u32>) -> Deriving {
+    /// Derives the constants of oscillators into `memory`.
+    fn new(oscillators: Vec<Oscillator>, steps: Option<u32>, mut memory: Vec<Option<Constants>>) -> Deriving {
         let flows = Arc::new(oscillators);
-        let derive = move |flows: Arc<Vec<Oscillator>>| {
-            flows.par_iter().map(|flow| Constants::new(flow, steps)).collect::<Vec<_>>()
+        let derive = move |flows: &[Oscillator], memory: &mut Vec<Option<Constants>>| {
+            flows.par_iter().map(|flow| Constants::new(flow, steps)).collect_into_vec(memory);
         };
         let own = Arc::clone(&flows);
         // In a browser, a thread cannot be started like this.
-        match thread::Builder::new().spawn(move || derive(own)) {
+        let thread = thread::Builder::new().spawn(move || {
+            derive(&own, &mut memory);
+            memory
+        });
+        match thread {
             Ok(thread) => Deriving::Thread(thread),
-            Err(_) => Deriving::Done(derive(flows)),
+            Err(_) => {
+                let mut memory = Vec::new();
+                derive(&flows, &mut memory);
+                Deriving::Done(memory)
+            }
         }
     }
 
