@@ -6,6 +6,7 @@ use bytemuck::Zeroable;
 use rayon::prelude::*;
 
 use super::adapter::most_slots;
+use super::constants::Constants;
 use super::device::{BEGIN, Pipelines};
 use super::guard::with_error_scopes;
 use super::layout::Cell;
@@ -107,7 +108,9 @@ impl Pool {
         // Takes the lowest slots, so that lanes that begin together are adjacent.
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.free.split_off(self.free.len() - lanes.len());
-        let started: Vec<_> = lanes.par_iter().map(|(_, lane)| start(tables, lane)).collect();
+        // In a browser, buffers belong to one thread.
+        let Tables { constants, is_even, .. } = tables;
+        let started: Vec<_> = lanes.par_iter().map(|(_, lane)| start(constants, is_even, lane)).collect();
         for ((&slot, &lane), started) in slots.iter().rev().zip(lanes).zip(started) {
             let at = slot as usize;
             self.lanes[at] = lane;
@@ -235,14 +238,14 @@ fn stretches(slots: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
 }
 
 /// Returns a lane's entry in the table of cells, and its start in lane units.
-fn start(tables: &Tables, lane: &Lane) -> (Cell, [f64; 4]) {
+fn start(constants: &[Option<Constants>], is_even: &[bool], lane: &Lane) -> (Cell, [f64; 4]) {
     let cell = Cell { flow_index: lane.flow, law_index: lane.law, refused: Status::Ok.code(), mirror: 0 };
     let refuse = |status: Status| (Cell { refused: status.code(), ..cell }, [0.0; 4]);
-    match &tables.constants[lane.flow as usize] {
+    match &constants[lane.flow as usize] {
         None => refuse(Status::TooStiff),
         Some(_) if !lane.start.iter().all(|x| x.is_finite()) => refuse(Status::NonFinite),
         Some(constants) => {
-            let mirror = constants.mirror_symmetric && tables.is_even[lane.law as usize];
+            let mirror = constants.mirror_symmetric && is_even[lane.law as usize];
             (Cell { mirror: u32::from(mirror), ..cell }, constants.start(lane.start))
         }
     }
