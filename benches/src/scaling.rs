@@ -94,7 +94,8 @@ fn makespan(costs: &[f64], cores: usize) -> f64 {
         begun += count;
         let took = last as f64 * 1e-9;
         time += took;
-        size = (count as f64 * (TARGET / took.max(1e-3)).clamp(0.25, 4.0)) as usize;
+        let paced = count as f64 * (TARGET / took.max(1e-3)).clamp(0.25, 4.0);
+        size = cores.max(paced as usize);
     }
     time
 }
@@ -108,6 +109,7 @@ mod tests {
         let equal = vec![1e-3; 64_000];
         assert!((makespan(&equal, 64) - 1.0).abs() < 1e-2);
         assert!((makespan(&[&equal[..], &[5.0]].concat(), 64) - 6.0).abs() < 0.5, "the last cell is alone");
+        assert!((makespan(&[5.0; 200], 64) - 20.0).abs() < 1e-6, "no cell begins after two seconds");
         assert!((makespan(&equal[..640], 1) - 0.64).abs() < 1e-6);
     }
 }

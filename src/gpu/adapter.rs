@@ -47,7 +47,7 @@ impl AdapterChoice {
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-    // It would add a dispatch to each dispatch whose size the lanes' shader computes.
+    // This validation would precede each indirect dispatch by a dispatch of its own.
     descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     wgpu::Instance::new(descriptor)
 }
@@ -144,7 +144,7 @@ pub fn is_card(info: &wgpu::AdapterInfo) -> bool {
     matches!(info.device_type, wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::VirtualGpu)
 }
 
-/// Most slots of a pool: less than 2 GB on the device.
+/// Most slots of a pool: about 2 GB on the device in f32, 3 GB in f64.
 const MOST_SLOTS: usize = 1 << 20;
 
 /// Returns the most slots that an adapter's limits allow.

@@ -11,8 +11,8 @@ pub(super) struct DispatchPolicy {
     pub(super) dispatches: u32,
     /// Desired duration of a round, from one check to the next.
     pub(super) round: Duration,
-    /// Number of lanes that the device certainly integrates for [`FEWEST_ITERATIONS`](super::rounds::FEWEST_ITERATIONS) within a
-    /// second.
+    /// With at most so many lanes, all dispatches of a round with
+    /// [`FEWEST_ITERATIONS`](super::rounds::FEWEST_ITERATIONS) surely take less than a second together.
     pub(super) at_once: u32,
     /// Rounds after which lanes that have ended no longer wait for others, if further lanes can begin.
     pub(super) patience: u32,
@@ -58,19 +58,22 @@ pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
     parts: 4,
     dispatches: 4,
     round: Duration::from_millis(32),
-    at_once: 1 << 18,
+    at_once: 1 << 17,
     patience: 4,
     late_tangent: false,
     keep: false,
     longest_wait: LONGEST_WAIT,
 };
 
+/// Hardware of a browser, which may be a card or draw the screen of a laptop.
+const BROWSER: DispatchPolicy = DispatchPolicy { at_once: 1 << 14, ..DEDICATED };
+
 impl DispatchPolicy {
     /// Returns the policy for an adapter. A browser does not say of which kind its hardware is.
     pub(super) fn of(info: &wgpu::AdapterInfo) -> DispatchPolicy {
         match info.device_type {
             wgpu::DeviceType::Cpu => SOFTWARE,
-            wgpu::DeviceType::Other if info.backend == wgpu::Backend::BrowserWebGpu => DEDICATED,
+            wgpu::DeviceType::Other if info.backend == wgpu::Backend::BrowserWebGpu => BROWSER,
             wgpu::DeviceType::IntegratedGpu | wgpu::DeviceType::Other => INTEGRATED,
             wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::VirtualGpu => DEDICATED,
         }
@@ -85,7 +88,7 @@ mod tests {
     fn hardware_of_a_browser_is_driven_like_a_card() {
         let info = |kind, backend| wgpu::AdapterInfo::new(kind, backend);
         for (kind, backend, expected) in [
-            (wgpu::DeviceType::Other, wgpu::Backend::BrowserWebGpu, DEDICATED),
+            (wgpu::DeviceType::Other, wgpu::Backend::BrowserWebGpu, BROWSER),
             (wgpu::DeviceType::Cpu, wgpu::Backend::BrowserWebGpu, SOFTWARE),
             (wgpu::DeviceType::Other, wgpu::Backend::Vulkan, INTEGRATED),
             (wgpu::DeviceType::DiscreteGpu, wgpu::Backend::Vulkan, DEDICATED),

@@ -11,13 +11,13 @@ use rattlemap_dynamics::word::Word;
 const SUPERSTABLE_BELOW: f64 = -1e6;
 
 /// Results of a lane that has ended.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct LaneResult {
     pub(super) number: u32,
     pub(super) flow: u32,
     pub(super) reading: Reading,
     pub(super) finding: Finding,
-    pub(super) measured: Option<Measured>,
+    pub(super) measured: Option<Box<Measured>>,
 }
 
 impl LaneResult {
@@ -33,14 +33,14 @@ impl LaneResult {
 
     /// Returns what was measured along the motion.
     pub fn quantities(&self, constants: &[Option<Constants>]) -> Option<Quantities> {
-        measured::quantities(constants[self.flow as usize].as_ref()?, &self.measured?)
+        measured::quantities(constants[self.flow as usize].as_ref()?, self.measured.as_deref()?)
     }
 
     /// Returns modulus and argument of the largest multiplier of a cycle.
     pub fn multiplier(&self, constants: &[Option<Constants>]) -> Option<[f64; 2]> {
-        let (constants, measured) = (constants[self.flow as usize].as_ref()?, self.measured?);
+        let (constants, measured) = (constants[self.flow as usize].as_ref()?, self.measured.as_deref()?);
         let is_cycle = self.finding.valid & valid::LYAPUNOV != 0 && self.finding.period > 0;
-        is_cycle.then(|| measured::multiplier(constants, &measured))
+        is_cycle.then(|| measured::multiplier(constants, measured))
     }
 
     /// Returns its record. `constants` are those of the tables on which it ran. A million records take most of a

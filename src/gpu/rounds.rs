@@ -13,17 +13,17 @@ use super::stage::{Clock, DeviceTimes};
 use super::transfer::{Download, readback};
 use super::{Gpu, GpuError, Precision};
 
-/// Least iterations of a dispatch, and those of the first round: shorter dispatches cost more than they do.
+/// Least iterations of a dispatch, and those of the first round: the overhead of a shorter dispatch exceeds its work.
 pub(super) const FEWEST_ITERATIONS: u32 = 250;
 
-/// Number of lanes that every device can integrate at once for so long. With many more lanes the minimum is lowered, so
-/// that the first round, whose duration is unknown, is no longer.
+/// Number of lanes for which a round of so many iterations is short on every device. With many more lanes the minimum is
+/// lowered, so that the first round, whose duration is unknown, is no longer.
 const FEWEST_AT_ONCE: u32 = 1 << 14;
 
 /// Ratio by which hardware may be slower in f64 than in f32.
 const SLOWER_IN_F64: u32 = 16;
 
-/// Longest time that lanes that have ended wait for the last ones.
+/// Longest time for which results are held back until the last lanes end.
 const LONGEST_HOLD: Duration = Duration::from_millis(500);
 
 /// Most variants of a pool.
@@ -70,16 +70,17 @@ struct Round<'a> {
 }
 
 impl Rounds<'_> {
-    /// Runs lanes until at most `until` are left. Also stops when some lanes have ended and have waited long enough: for a
-    /// number of rounds, or for [`LONGEST_HOLD`] if `until` is zero. Then calls `conclude`, which submits the copies of
+    /// Runs lanes until at most `until` are left. Also stops once some lanes have ended and a number of rounds, or
+    /// [`LONGEST_HOLD`] if `until` is zero, have passed since the call. Then calls `conclude`, which submits the copies of
     /// results, and submits a further round for the time in which the host reads them. `iterations` are those of the first
-    /// dispatch, and of the last on return. Each variant continues lanes where the one before it stops. Returns the result
+    /// dispatch, and of the last on return. `is_ahead` says whether such a further round was sent by the last call. Each variant continues lanes where the one before it stops. Returns the result
     /// of `conclude`, and the device's times if a watcher measures.
     pub(super) async fn run<C>(
         &self,
         variants: &[&Pipelines],
         until: u32,
         iterations: &mut u32,
+        is_ahead: &mut bool,
         conclude: impl FnOnce() -> Result<C, GpuError>,
     ) -> Result<(C, Option<DeviceTimes>), GpuError> {
         let gpu = self.gpu;
@@ -130,8 +131,11 @@ impl Rounds<'_> {
             if all_left <= until || gpu.is_halted() || has_waited && all_left < self.active_lanes {
                 break;
             }
-            *iterations =
-                next_iterations(sent.iterations, last_end.elapsed(), gpu.policy.round).clamp(fewest, most);
+            // The first measured time includes the round that was sent ahead.
+            if checked > 1 || !*is_ahead {
+                *iterations = next_iterations(sent.iterations, last_end.elapsed(), gpu.policy.round)
+                    .clamp(fewest, most);
+            }
             last_end = Instant::now();
         }
         // The last round belongs to the measured time, too; what follows waits for it anyway.
@@ -140,8 +144,9 @@ impl Rounds<'_> {
             device = device.and(sent.check(gpu, take).await?);
         }
         let concluding = conclude()?;
-        // A measured time has an end.
-        if clock.is_none() && !gpu.is_halted() && left.iter().any(|&left| left > 0) {
+        // While times are measured, no work may follow the last measured round.
+        *is_ahead = gpu.watcher.is_none() && !gpu.is_halted() && left.iter().any(|&left| left > 0);
+        if *is_ahead {
             gpu.call(|| self.send(&bound, &left, *iterations, None, None))?;
         }
         Ok((concluding, clock.map(|_| device)))
@@ -249,7 +254,7 @@ fn fewest_iterations(lanes: u32, at_once: u32) -> u32 {
 /// Results do not depend on them.
 fn next_iterations(iterations: u32, took: Duration, round: Duration) -> u32 {
     let factor = round.as_secs_f64() / took.as_secs_f64().max(1e-6);
-    (f64::from(iterations) * factor.clamp(0.25, 4.0)) as u32
+    (f64::from(iterations) * factor.clamp(0.25, 8.0)) as u32
 }
 
 /// Returns the workgroups in a row of the grid for so many lanes.
@@ -319,7 +324,7 @@ mod tests {
         }
         assert!((300..=340).contains(&iterations), "{iterations}");
         assert!((300..=340).contains(&under_way), "{under_way}");
-        assert_eq!(next_iterations(1000, Duration::ZERO, ROUND), 4000);
+        assert_eq!(next_iterations(1000, Duration::ZERO, ROUND), 8000);
         assert_eq!(next_iterations(1000, Duration::from_secs(100), ROUND), 250);
         let fewest = |lanes| fewest_iterations(lanes, 1 << 14);
         assert_eq!([1, 1 << 14, 1 << 15, 1 << 20].map(fewest), [250, 250, 125, 3]);

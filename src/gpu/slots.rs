@@ -1,7 +1,5 @@
 //! The buffers of a pool: the state of each slot on the device, and the transfers to and from the host.
 
-use rayon::prelude::*;
-
 use super::averaging::Averaging;
 use super::device::{COMPACT, CONCLUDE, GATHER, Pipelines};
 use super::layout::{COUNT_AT, Cell, Finding, Measured, Motion, QUEUE_HEAD, Reading, Settings, Tally};
@@ -11,8 +9,8 @@ use super::transfer::{Download, buffer, from_reals, indirect, readback, upload};
 use super::{Gpu, GpuError, LaneSettings, Precision};
 use crate::record::limits::LONGEST_CYCLE;
 
-/// What a lane has returned: its averages, what was found out about it, and what was measured on it.
-pub(super) type Returned = (Reading, Finding, Option<Measured>);
+/// What lanes have returned: their averages, what was found out about them, and what was measured on them, if anything was.
+pub(super) type Returned = (Vec<Reading>, Vec<Finding>, Vec<Measured>);
 
 /// Byte offset, in the shader's settings, of the flag that selects lanes for compaction.
 const ENDED: u64 = std::mem::offset_of!(Settings, ended) as u64;
@@ -46,9 +44,9 @@ pub(super) struct Slots {
 /// Returns the bytes of device memory that so many slots take; with those of measured quantities if `gathers`.
 pub(super) fn bytes(slots: usize, precision: Precision, gathers: bool) -> u64 {
     let measured = if gathers { 2 * size_of::<Measured>() } else { 0 };
-    let reals = size_of::<Reading>() + size_of::<[f64; 4]>() + size_of::<Motion>() + measured;
+    let reals = 2 * size_of::<Reading>() + size_of::<[f64; 4]>() + size_of::<Motion>() + measured;
     let reals = reals / size_of::<f64>() * precision.bytes();
-    let counts = size_of::<Finding>() + size_of::<Cell>() + size_of::<Tally>() + 3 * size_of::<u32>();
+    let counts = 2 * size_of::<Finding>() + size_of::<Cell>() + size_of::<Tally>() + 3 * size_of::<u32>();
     (slots * (reals + counts)) as u64
 }
 
@@ -176,7 +174,7 @@ pub(super) struct Conclusion<'s> {
 
 impl Conclusion<'_> {
     /// Waits for the results, in the order of the active list.
-    pub(super) async fn read(self, gpu: &Gpu) -> Result<Vec<Returned>, GpuError> {
+    pub(super) async fn read(self, gpu: &Gpu) -> Result<Returned, GpuError> {
         gpu.wait(self.submission)?;
         let count = self.count.take(gpu, |bytes| bytemuck::pod_read_unaligned::<u32>(bytes) as usize).await?;
         let first = |bytes: usize| bytes / self.active_lanes * count.min(self.active_lanes);
@@ -196,8 +194,7 @@ impl Conclusion<'_> {
             }
             None => Vec::new(),
         };
-        let of = |i: usize| (readings[i], findings[i], measured.get(i).copied());
-        Ok((0..readings.len()).into_par_iter().map(of).collect())
+        Ok((readings, findings, measured))
     }
 }
 

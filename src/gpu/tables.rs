@@ -27,8 +27,8 @@ pub struct Tables {
     pub(super) laws: wgpu::Buffer,
 }
 
-/// Most copies of all constants during an upload: in f64, in the lanes' precision, the driver's copy, and the device's
-/// copy if it shares the host's memory.
+/// Number of copies of all constants during an upload, at most: the host's in f64, that in the lanes' precision, the
+/// driver's, and the device's if it shares the host's memory.
 pub(crate) const COPIES: u64 = 4;
 
 /// Flows whose constants are rounded and given to the driver at a time, so that this memory is used again.

@@ -107,7 +107,11 @@ impl<'b> Download<'b> {
 
     /// Passes the bytes to `take`. Native drivers deliver them in [`Gpu::wait`].
     pub(super) async fn take<T>(self, gpu: &Gpu, take: impl FnOnce(&[u8]) -> T) -> Result<T, GpuError> {
-        let lost = |message: String| gpu.failure(GpuError::Lost { message });
+        // The buffer stays mapped, so that nothing can be copied into it any more.
+        let lost = |message: String| {
+            gpu.trouble.note(message.clone());
+            gpu.failure(GpuError::Lost { message })
+        };
         self.mapped.await.map_err(|error| lost(error.to_string()))?;
         let mapped = self.buffer.get_mapped_range(..self.size).map_err(|error| lost(error.to_string()))?;
         let value = take(&mapped);

@@ -61,19 +61,22 @@ impl Size {
             }
             Some(shard) => {
                 let own = runs.div_ceil(u64::from(shard.count()));
+                let batches = 2 * own.min(LARGEST_BATCH as u64) * record;
                 let kept = if scene.start().follows() { 1 + record } else { 1 };
-                (runs.saturating_mul(kept) + own * RUN, own * record_on_disk)
+                (runs.saturating_mul(kept) + own * RUN + batches, own * record_on_disk)
             }
         };
         let settings = scene.orbit_settings();
         let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
         let flows = Parts::flows(scene.points());
         let memory = memory + list_rows(scene);
+        // Results of lanes on their way to records.
+        let results = 2 * runs.min(LARGEST_BATCH as u64) * size_of::<gpu::LaneResult>() as u64;
         Size {
             cells,
             runs,
             cpu_memory: memory + kept_flows(&flows, runs) + periods * PERIOD * processor::cores() as u64,
-            gpu_memory: memory + lane_tables(scene, &flows, runs),
+            gpu_memory: memory + lane_tables(scene, &flows, runs) + results,
             disk,
         }
     }

@@ -19,6 +19,9 @@ const BATCH_SECONDS: f64 = 1.0;
 /// Longest time that records wait until they are stored.
 const STORE_INTERVAL: Duration = Duration::from_millis(500);
 
+/// Cells per core in an engine's smallest batch.
+const ROUNDS_OF_CORES: usize = 64;
+
 /// Largest number of cells under way per card. It bounds the memory that a fast engine uses.
 pub(crate) const LARGEST_BATCH: usize = 1 << 20;
 
@@ -51,7 +54,11 @@ pub async fn run(
     mut store: impl FnMut(Vec<(u32, Record)>, usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
     engine.stop_on(halt);
-    let mut pace = Pace { cells: engine.first_batch(), most: LARGEST_BATCH * engine.card_count() };
+    let mut pace = Pace {
+        cells: engine.first_batch(),
+        least: (engine.least_batch() / ROUNDS_OF_CORES).max(1),
+        most: LARGEST_BATCH * engine.card_count(),
+    };
     let mut under_way = 0;
     let (mut unstored, mut last_stored, mut last_ended) = (Vec::new(), Instant::now(), Instant::now());
     while !schedule.is_finished() {
@@ -128,6 +135,8 @@ fn put(records: &mut [Record], id: u32, record: &Record) {
 /// Controls the number of cells under way.
 struct Pace {
     cells: usize,
+    /// Number that keeps every core busy with one cell, however slow it is.
+    least: usize,
     most: usize,
 }
 
@@ -147,7 +156,7 @@ impl Pace {
             return;
         }
         let factor = (BATCH_SECONDS / elapsed.as_secs_f64().max(1e-3)).clamp(0.25, 4.0);
-        self.cells = ((under_way as f64 * factor) as usize).clamp(1, self.most);
+        self.cells = ((under_way as f64 * factor) as usize).clamp(self.least.min(self.most), self.most);
     }
 }
 
@@ -157,7 +166,7 @@ mod tests {
 
     #[test]
     fn the_number_of_cells_under_way_aims_at_one_second() {
-        let mut pace = Pace { cells: 100, most: 1000 };
+        let mut pace = Pace { cells: 100, least: 8, most: 1000 };
         pace.adapt(100, 60, Duration::from_millis(500));
         assert_eq!(pace.cells, 200);
         pace.adapt(200, 200, Duration::from_nanos(1));
@@ -168,6 +177,11 @@ mod tests {
         assert_eq!(pace.cells, 800);
         pace.adapt(800, 400, Duration::from_secs(100));
         assert_eq!(pace.cells, 200);
+        // Every core has a cell, even if each takes minutes.
+        for _ in 0..4 {
+            pace.adapt(pace.cells, pace.cells, Duration::from_secs(100));
+        }
+        assert_eq!(pace.cells, 8);
         assert!(pace.halve(200));
         pace.adapt(100, 100, Duration::from_nanos(1));
         assert_eq!(pace.cells, 100);

@@ -30,7 +30,10 @@ fn lanes(
             |(i, case): (usize, &Case)| (i as u32, Lane { flow: i as u32, law: i as u32, start: case.2 });
         let all: Vec<_> = cases.iter().enumerate().map(lane).collect();
         pool.begin(&gpu, &tables, &all).await.unwrap();
-        let mut ended: Vec<LaneResult> = pool.advance(&gpu, &tables, 0).await.unwrap();
+        let mut ended: Vec<LaneResult> = Vec::new();
+        while pool.under_way() > 0 {
+            ended.extend(pool.advance(&gpu, &tables, 0).await.unwrap());
+        }
         ended.sort_by_key(LaneResult::number);
         let constants = tables.constants();
         let result = |lane: &LaneResult| {

@@ -1,7 +1,7 @@
 //! The event-driven reference as an engine: one cell per task on all processor cores.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use rayon::prelude::*;
@@ -44,6 +44,7 @@ impl<'p> Cpu<'p> {
         let clock = Instant::now();
         // Costs of cells differ by a factor of 1000, so each task has one cell. If many are slow, some wait for the
         // next call.
+        let are_left = AtomicBool::new(false);
         let mut ended: Vec<(u32, Record)> = cells
             .par_iter()
             .with_max_len(1)
@@ -51,13 +52,19 @@ impl<'p> Cpu<'p> {
             .map(|(i, cell)| {
                 let has_time = i == 0 || clock.elapsed() < BATCH_TIME;
                 let record = has_time.then(|| self.cell(cell)).flatten();
-                record.map_or((LEFT, Record::default()), |record| (cell.id, record))
+                record.map_or_else(
+                    || {
+                        are_left.store(true, Ordering::Relaxed);
+                        (LEFT, Record::default())
+                    },
+                    |record| (cell.id, record),
+                )
             })
             .collect();
-        let left = cells.iter().zip(&ended).filter(|(_, (id, _))| *id == LEFT);
-        self.under_way.extend(left.map(|(cell, _)| *cell));
-        // Records are large: if all cells have ended, none moves.
-        if !self.under_way.is_empty() {
+        // Records are large: none is read or moved if all cells have ended.
+        if are_left.into_inner() {
+            let left = cells.iter().zip(&ended).filter(|(_, (id, _))| *id == LEFT);
+            self.under_way.extend(left.map(|(cell, _)| *cell));
             ended.retain(|(id, _)| *id != LEFT);
         }
         ended

@@ -50,7 +50,8 @@ pub struct Gpu<'p> {
     next: Option<Chunk>,
     /// Largest number of cells of such a batch.
     most_waiting: usize,
-    /// Memory for the constants of such a batch, used again: fresh memory takes more than half as long as to derive them.
+    /// Memory for the constants of such a batch, used again: touching fresh memory takes more than half of the time of
+    /// deriving them.
     constants: Vec<Option<Constants>>,
     preparation: Preparation,
 }
@@ -344,20 +345,25 @@ impl Deriving {
         let derive = move |flows: &[Oscillator], memory: &mut Vec<Option<Constants>>| {
             flows.par_iter().map(|flow| Constants::new(flow, steps)).collect_into_vec(memory);
         };
+        // A worker of the pool that waited for the thread might be the one that the thread waits for.
+        if rayon::current_thread_index().is_some() {
+            derive(&flows, &mut memory);
+            return Deriving::Done(memory);
+        }
         let own = Arc::clone(&flows);
         // In a browser, a thread cannot be started like this.
         let thread = thread::Builder::new().spawn(move || {
             derive(&own, &mut memory);
             memory
         });
-        match thread {
-            Ok(thread) => Deriving::Thread(thread),
-            Err(_) => {
+        thread.map_or_else(
+            |_| {
                 let mut memory = Vec::new();
                 derive(&flows, &mut memory);
                 Deriving::Done(memory)
-            }
-        }
+            },
+            Deriving::Thread,
+        )
     }
 
     /// Waits for the constants.
