@@ -86,7 +86,7 @@ fn makespan(costs: &[f64], cores: usize) -> f64 {
             if count > 0 && at as f64 >= LIMIT * 1e9 {
                 break;
             }
-            let end = at + (cost * 1e9) as u64;
+            let end = at + (cost * 1e9).ceil() as u64;
             last = last.max(end);
             free.push(Reverse(end));
             count += 1;

@@ -7,7 +7,7 @@ use crate::gpu::{self, Constants};
 use crate::job::engine_choice::EngineKind;
 use crate::job::error::JobError;
 use crate::job::processor;
-use crate::map::plan::{Parts, stores_flows};
+use crate::map::plan::{Cell, Parts, stores_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
 use crate::map::sweep::LARGEST_BATCH;
@@ -16,8 +16,8 @@ use crate::store::folder::Folder;
 use crate::store::map;
 use crate::text::size::bytes;
 
-/// Memory per run without its record, in bytes: its place in the order, its state, and its part of tables and figures.
-const RUN: u64 = 8;
+/// Memory per run without its record, in bytes: its place in the order, and its state.
+const RUN: u64 = 5;
 /// Memory per cell of a list, in bytes: values, their text, flow and law.
 const LIST_ROW: u64 = 200;
 /// Memory per forcing period of a cell that is being computed, in bytes: strobe state, growth of a tangent vector.
@@ -50,20 +50,23 @@ impl Size {
     pub fn of(scene: &Scene, shard: Option<Shard>) -> Size {
         let (cells, runs) = (scene.cell_count(), scene.run_count());
         let record = size_of::<(u32, Record)>() as u64;
+        // Cells that wait for an engine and those that it has, and their records. A batch of records is on the disk before half
+        // of the next one is computed.
+        let under_way = |runs: u64| {
+            let most = LARGEST_BATCH as u64;
+            runs.min(most) * 2 * size_of::<Cell>() as u64 + runs.min(most + most / 2) * record
+        };
         let [record_on_disk, files] = disk(scene);
         let (memory, disk) = match shard {
             None => {
-                // Two batches are under way, one of them on its way to the disk.
-                let batches = 2 * runs.min(LARGEST_BATCH as u64) * record;
                 let kept = if depends_on_others(scene) { record } else { stored_run(scene, false) };
-                let memory = runs.saturating_mul(kept + RUN) + batches;
+                let memory = runs.saturating_mul(kept + RUN) + under_way(runs);
                 (memory, runs.saturating_mul(record_on_disk) + cells * files)
             }
             Some(shard) => {
                 let own = runs.div_ceil(u64::from(shard.count()));
-                let batches = 2 * own.min(LARGEST_BATCH as u64) * record;
                 let kept = if scene.start().follows() { 1 + record } else { 1 };
-                (runs.saturating_mul(kept) + own * RUN + batches, own * record_on_disk)
+                (runs.saturating_mul(kept) + own * RUN + under_way(own), own * record_on_disk)
             }
         };
         let settings = scene.orbit_settings();

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use crate::common::gpu;
 use crate::{Swept, computed, swept};
+use rattlemap::gpu::Precision;
 use rattlemap::map::engine::{Cpu, Engine, EngineError, Fake};
 use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{Purpose, Scene};
@@ -27,6 +29,29 @@ fn scene(count: usize, sets: &[&str]) -> Scene {
     let text = axis("e", 0.0, 1.0) + &axis("omega", 1.0, 12.0);
     let sets: Vec<String> = [QUANTITIES].iter().chain(sets).map(ToString::to_string).collect();
     Scene::parse(&text, "test", &sets, Purpose::Map).unwrap()
+}
+
+/// Every cell has its own flow, and there are more of them than a software device gets at a time (8,192).
+#[test]
+fn flows_of_later_uploads_belong_to_their_cells() {
+    let axis =
+        |name, min, max| format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = 96\n");
+    // Without contact a cell takes one or two periods.
+    let text = axis("k", 500.0, 1500.0) + &axis("omega", 1.0, 12.0) + "[parameters]\ne = 0.5\nF = 0.001\n";
+    let scene = Scene::parse(&text, "test", &[], Purpose::Map).unwrap();
+    let plan = Plan::new(&scene);
+    assert_eq!(plan.flow_count(), 9_216);
+    let mut engine = gpu::engine(&plan, Precision::F32);
+    let records = gpu::all_records(&plan, &mut engine);
+    let cells = plan.cells(0..plan.cell_count());
+    for some in cells.chunks(16).step_by(115) {
+        let alone = pollster::block_on(engine.run(some)).unwrap();
+        for (cell, alone) in some.iter().zip(alone) {
+            assert_eq!(records[cell.id as usize], alone, "cell {}", cell.id);
+        }
+    }
+    let strobes: BTreeSet<_> = records.iter().map(|record| record.strobe.map(f64::to_bits)).collect();
+    assert!(strobes.len() > records.len() * 9 / 10, "cells have states of their own");
 }
 
 fn on_cpu(scene: &Scene) -> Vec<Record> {
