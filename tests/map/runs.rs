@@ -37,8 +37,9 @@ fn flows_of_later_uploads_belong_to_their_cells() {
     let axis =
         |name, min, max| format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = 96\n");
     // Without contact a cell takes one or two periods.
-    let text = axis("k", 500.0, 1500.0) + &axis("omega", 1.0, 12.0) + "[parameters]\ne = 0.5\nF = 0.001\n";
-    let scene = Scene::parse(&text, "test", &[], Purpose::Map).unwrap();
+    let text = axis("k1", 500.0, 1500.0) + &axis("omega", 1.0, 12.0) + "[parameters]\ne = 0.5\nF = 0.001\n";
+    let sets = ["outputs.quantities=['class','state']".to_owned()];
+    let scene = Scene::parse(&text, "test", &sets, Purpose::Map).unwrap();
     let plan = Plan::new(&scene);
     assert_eq!(plan.flow_count(), 9_216);
     let mut engine = gpu::engine(&plan, Precision::F32);
