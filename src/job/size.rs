@@ -16,6 +16,8 @@ use crate::store::folder::Folder;
 use crate::store::map;
 use crate::text::size::bytes;
 
+/// Memory of the program itself, in bytes.
+const PROGRAM: u64 = 30_000_000;
 /// Memory per run without its record, in bytes: its place in the order, and its state.
 const RUN: u64 = 5;
 /// Memory per cell of a list, in bytes: values, their text, flow and law.
@@ -50,11 +52,11 @@ impl Size {
     pub fn of(scene: &Scene, shard: Option<Shard>) -> Size {
         let (cells, runs) = (scene.cell_count(), scene.run_count());
         let record = size_of::<(u32, Record)>() as u64;
-        // Cells that wait for an engine and those that it has, and their records. A batch of records is on the disk before half
-        // of the next one is computed.
+        // Cells that wait for an engine and those that it has, the records of one batch that is computed, and of one on its way
+        // to the disk.
         let under_way = |runs: u64| {
             let most = LARGEST_BATCH as u64;
-            runs.min(most) * 2 * size_of::<Cell>() as u64 + runs.min(most + most / 2) * record
+            PROGRAM + runs.min(most) * 2 * size_of::<Cell>() as u64 + runs.min(2 * most) * record
         };
         let [record_on_disk, files] = disk(scene);
         let (memory, disk) = match shard {
