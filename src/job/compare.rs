@@ -82,12 +82,12 @@ impl<'a> CompareJob<'a> {
         let attractors = |plan: &Plan, records: &dyn Records| {
             if has_starts && !is_halted() { coexistence::attractors(plan, records) } else { None }
         };
-        let counts = loaded.each_ref().map(|map| attractors(&map.plan, &*map.stored.records));
+        let counts = loaded.each_ref().map(|map| attractors(&map.plan, &map.stored.records));
         if is_halted() {
             return Ok(None);
         }
         let [a, b] = [0, 1].map(|i| Side {
-            records: &*loaded[i].stored.records,
+            records: &loaded[i].stored.records,
             attractors: counts[i].as_deref(),
             has_exponents: self.scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
         });

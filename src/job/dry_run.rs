@@ -77,7 +77,7 @@ impl DryRun {
                 Identity::new(engine.name(), engine.precision(), &engine.device(), job.scene.identity())
                     .of_shard(job.shard);
             let path = out.join(RECORDS);
-            if path.is_file() { Work::new(plan, job.shard).read(&path, &identity)?.count } else { 0 }
+            if path.is_file() { Work::new(plan, job.shard, false).read(&path, &identity)?.count } else { 0 }
         } else {
             0
         };

@@ -49,12 +49,12 @@ impl LoadedMap {
 
     /// Analyses all records together.
     pub(crate) fn survey(&mut self) -> Survey {
-        Survey::of(&self.plan, &*self.stored.records, self.stored.refined.take())
+        Survey::of(&self.plan, &self.stored.records, self.stored.refined.take())
     }
 
     /// The cells, for tables and figures.
     pub(crate) fn cells<'a>(&'a self, scene: &'a Scene, survey: &'a Survey) -> Cells<'a> {
-        Cells::new(scene, &self.plan, &*self.stored.records).surveyed(survey)
+        Cells::new(scene, &self.plan, &self.stored.records).surveyed(survey)
     }
 }
 

@@ -22,7 +22,7 @@ use crate::map::schedule::Refined;
 use crate::map::shard::Shard;
 use crate::map::sweep::{self, SweepError};
 use crate::record::classify::status;
-use crate::record::{Record, Records};
+use crate::record::{Record, RecordStore, Records};
 use crate::show::cells::{Cells, Survey};
 use crate::store;
 use crate::store::error::OutputError;
@@ -116,7 +116,8 @@ impl<'a> MapJob<'a> {
         let is_good = findings.is_ok_and(|list| !list.iter().any(Finding::is_lost));
         // Matching hashes are not enough: on a network disk without locks a second run may have spoilt the records before
         // the first one computed their hash.
-        let count = || Work::new(plan, Some(shard)).read(&path, &identity).map_or(0, |extent| extent.count);
+        let count =
+            || Work::new(plan, Some(shard), false).read(&path, &identity).map_or(0, |extent| extent.count);
         is_good && part.is_of(self.scene, self.sets) && count() == shard.run_count(plan)
     }
 
@@ -203,7 +204,7 @@ impl<'p> OpenMap<'p> {
             self.observer.note(&raised);
         }
         // The caller of a map in memory may read everything.
-        let mut work = Work::compact(self.plan, shard, self.folder.is_none());
+        let mut work = Work::new(self.plan, shard, self.folder.is_none());
         let records = match self.folder {
             Some(folder) => Some(RunRecords::open(folder, scene, &self.engine, resume, &mut work)?),
             None => None,
@@ -268,7 +269,13 @@ impl<'p> MapRun<'p> {
     pub fn integrate(&mut self, halt: &Arc<AtomicBool>) -> Result<bool, SweepError> {
         let clock = Instant::now();
         let MapRun { open: OpenMap { engine, observer, .. }, records: stored, work, done, .. } = self;
-        let Work { plan, schedule, records, store: kept, tally, .. } = work;
+        let Work { plan, schedule, records, tally, .. } = work;
+        // The schedule takes the records that it reads at once; the thread that stores all records takes the others.
+        let mut unread = RecordStore::default();
+        let (read, mut kept) = match schedule.reads_records() {
+            true => (records, None),
+            false => (&mut unread, Some(records).filter(|records| records.count() > 0)),
+        };
         let mut is_first = *done == 0;
         observer.progress(*done, schedule.expected());
         let is_finished = thread::scope(|scope| {
@@ -276,7 +283,7 @@ impl<'p> MapRun<'p> {
             let (sender, batches) = mpsc::sync_channel(0);
             let take = |batch: &[(u32, Record)]| {
                 tally.take(plan, batch);
-                if let Some(kept) = &mut *kept {
+                if let Some(kept) = &mut kept {
                     kept.put_all(batch);
                 }
             };
@@ -298,7 +305,7 @@ impl<'p> MapRun<'p> {
                 }
                 Ok(())
             };
-            let swept = pollster::block_on(sweep::run(plan, schedule, engine, records, halt, store));
+            let swept = pollster::block_on(sweep::run(plan, schedule, engine, read, halt, store));
             drop(sender);
             match writer.map(ScopedJoinHandle::join) {
                 Some(Ok(Err(error))) => Err(SweepError::Store(error.into())),
@@ -315,16 +322,16 @@ impl<'p> MapRun<'p> {
         let mut run = self;
         let plan = run.work.plan;
         let refined = run.work.schedule.finish(&mut run.work.records);
-        let survey = Survey::of(plan, run.work.kept(), refined);
-        let without_effect = effect::names(plan, run.work.kept(), run.open.engine.precision());
+        let survey = Survey::of(plan, &run.work.records, refined);
+        let without_effect = effect::names(plan, &run.work.records, run.open.engine.precision());
         ComputedMap { run, survey, without_effect }
     }
 
     /// Finishes a whole map without analysing it: returns its records and the refinement of an adaptive one.
-    pub(crate) fn into_records(self) -> (Vec<Record>, Option<Refined>) {
-        let Work { schedule, mut records, store, .. } = self.work;
+    pub(crate) fn into_records(self) -> (RecordStore, Option<Refined>) {
+        let Work { schedule, mut records, .. } = self.work;
         let refined = schedule.finish(&mut records);
-        (store.map_or(records, |store| (&store as &dyn Records).iter().collect()), refined)
+        (records, refined)
     }
 
     /// Describes the run for manifests.
@@ -376,7 +383,7 @@ pub struct ComputedMap<'p> {
 impl ComputedMap<'_> {
     /// The cells, for tables and figures.
     pub fn cells(&self) -> Cells<'_> {
-        Cells::new(self.run.open.job.scene, self.run.work.plan, self.run.work.kept()).surveyed(&self.survey)
+        Cells::new(self.run.open.job.scene, self.run.work.plan, &self.run.work.records).surveyed(&self.survey)
     }
 
     /// Describes the run for the manifest.

@@ -11,8 +11,8 @@ use crate::job::map::MapJob;
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::map::schedule::Refined;
-use crate::record::Record;
 use crate::record::classify::classify;
+use crate::record::{Record, RecordStore, Records};
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::Class;
 
@@ -74,19 +74,19 @@ pub fn run(scene: &Scene, processor: Processor) -> Result<Map, JobError> {
 #[derive(Clone, Debug)]
 pub struct Map {
     plan: Plan,
-    records: Vec<Record>,
+    records: RecordStore,
     refined: Option<Refined>,
 }
 
 /// A cell of a computed map.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MapCell<'m> {
+pub struct MapCell {
     /// Indices along the two axes; in a list the row and 0.
     pub indices: [usize; 2],
     /// Values of the swept parameters: the axes, or the columns of a list.
     pub values: Vec<f64>,
     /// The measured quantities. The bits of its field `valid` tell which of them are present.
-    pub record: &'m Record,
+    pub record: Record,
     /// Class of the motion.
     pub class: Class,
 }
@@ -99,7 +99,7 @@ impl Map {
 
     /// Iterates over all cells; the index along the first axis changes fastest. A cell of several starts has the record of
     /// its first start.
-    pub fn cells(&self) -> impl ExactSizeIterator<Item = MapCell<'_>> {
+    pub fn cells(&self) -> impl ExactSizeIterator<Item = MapCell> {
         (0..self.plan.cell_count() as u32).map(|id| self.cell_of(id))
     }
 
@@ -107,21 +107,21 @@ impl Map {
     ///
     /// # Panics
     /// If an index is out of range.
-    pub fn cell(&self, indices: [usize; 2]) -> MapCell<'_> {
+    pub fn cell(&self, indices: [usize; 2]) -> MapCell {
         let [columns, rows] = self.counts();
         assert!(indices[0] < columns && indices[1] < rows, "a map of {columns} by {rows} cells");
         self.cell_of((indices[1] * columns + indices[0]) as u32)
     }
 
-    fn cell_of(&self, id: u32) -> MapCell<'_> {
+    fn cell_of(&self, id: u32) -> MapCell {
         let indices = self.plan.indices(id);
-        let record = &self.records[id as usize];
+        let record = self.records.record(id as usize);
         let values = self.plan.points().values(id as usize);
-        MapCell { indices, values, record, class: classify(record) }
+        MapCell { indices, values, record, class: classify(&record) }
     }
 
     /// The model with the parameters of a cell.
-    pub fn model(&self, cell: &MapCell<'_>) -> Box<dyn Model> {
+    pub fn model(&self, cell: &MapCell) -> Box<dyn Model> {
         self.plan.model((cell.indices[1] * self.counts()[0] + cell.indices[0]) as u32)
     }
 
@@ -131,7 +131,7 @@ impl Map {
     }
 
     /// Records by run number.
-    pub fn records(&self) -> &[Record] {
+    pub fn records(&self) -> &dyn Records {
         &self.records
     }
 

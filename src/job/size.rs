@@ -61,13 +61,12 @@ impl Size {
         let [record_on_disk, files] = disk(scene);
         let (memory, disk) = match shard {
             None => {
-                let kept = if depends_on_others(scene) { record } else { stored_run(scene, false) };
-                let memory = runs.saturating_mul(kept + RUN) + under_way(runs);
+                let memory = runs.saturating_mul(stored_run(scene, false) + RUN) + under_way(runs);
                 (memory, runs.saturating_mul(record_on_disk) + cells * files)
             }
             Some(shard) => {
                 let own = runs.div_ceil(u64::from(shard.count()));
-                let kept = if scene.start().follows() { 1 + record } else { 1 };
+                let kept = if scene.start().follows() { 1 + stored_run(scene, false) } else { 1 };
                 (runs.saturating_mul(kept) + own * RUN + under_way(own), own * record_on_disk)
             }
         };
@@ -102,9 +101,7 @@ impl Size {
     fn finished(scene: &Scene) -> Size {
         let whole = Size::of(scene, None);
         let flows = kept_flows(&Parts::flows(scene.points()), whole.runs);
-        let kept =
-            if depends_on_others(scene) { size_of::<Record>() as u64 } else { stored_run(scene, true) };
-        let memory = whole.runs.saturating_mul(kept + RUN) + list_rows(scene) + flows;
+        let memory = whole.runs.saturating_mul(stored_run(scene, true) + RUN) + list_rows(scene) + flows;
         Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
@@ -266,11 +263,6 @@ fn disk(scene: &Scene) -> [u64; 2] {
     [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
 }
 
-/// Whether cells are requested by the records of other cells. All records are then in memory as they are.
-fn depends_on_others(scene: &Scene) -> bool {
-    scene.refine().is_some() || scene.start().follows()
-}
-
 /// Bytes per run in a [`RecordStore`](crate::record::RecordStore), which has only the requested columns, and strobe states
 /// on request.
 fn stored_run(scene: &Scene, with_strobes: bool) -> u64 {
@@ -345,8 +337,8 @@ mod tests {
     use super::*;
     use crate::map::plan::Plan;
     use crate::map::scene::{FileText, Purpose};
-    use crate::record::RecordStore;
     use crate::record::measures::MEASURES;
+    use crate::record::{RecordStore, Records};
     use rattlemap_dynamics::flow::Flow;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2], sets: &[&str]) -> Scene {

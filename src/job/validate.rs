@@ -74,9 +74,9 @@ impl ValidateJob {
         let mut loaded = LoadedMap::read(&map, &scene, observer)?;
         let precision = precision(map.manifest())?;
         let survey = loaded.survey();
-        let sample = validate::sample(&loaded.plan, &*loaded.stored.records, samples, seed);
+        let sample = validate::sample(&loaded.plan, &loaded.stored.records, samples, seed);
         let followed = if chaos_periods > 0 { samples } else { 0 };
-        let (ids, runs) = validate::draw_chaos(&*loaded.stored.records, followed, seed);
+        let (ids, runs) = validate::draw_chaos(&loaded.stored.records, followed, seed);
         let chaos = (ids, runs, chaos_periods);
         let processor = processor::described();
         Ok(ValidateJob { folder, map, scene, loaded, survey, precision, sample, chaos, checked, processor })
@@ -100,7 +100,7 @@ impl ValidateJob {
     fn subject(&self) -> Subject<'_> {
         Subject {
             plan: &self.loaded.plan,
-            records: &*self.loaded.stored.records,
+            records: &self.loaded.stored.records,
             precision: self.precision,
             is_lane: self.map.manifest().engine == "gpu",
         }

@@ -286,12 +286,8 @@ impl Plan {
     /// Returns the state of the run `id` at phase 0. If cells follow their neighbours, it is the neighbour's last
     /// strobe state from `records`, or rest if the neighbour failed or has no record yet.
     pub fn start(&self, id: u32, records: &(impl Records + ?Sized)) -> State {
-        let of = |before: u32| {
-            let before = before as usize;
-            (before < records.count()).then(|| records.record(before))
-        };
         match self.before(id) {
-            Some(before) => followed(of(before).as_ref()),
+            Some(before) => followed(records.get(before as usize).as_ref()),
             None => self.own_start(id),
         }
     }

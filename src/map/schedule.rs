@@ -35,7 +35,7 @@ use follow::Follow;
 
 use crate::map::plan::{Cell, Plan};
 use crate::map::shard::Shard;
-use crate::record::Record;
+use crate::record::{Record, Records};
 
 /// The order of work on a map: the requested cells, and which of them have their records.
 pub struct Schedule {
@@ -168,20 +168,19 @@ impl Schedule {
         }
     }
 
-    /// Whether the schedule reads records of other cells. Otherwise the slice of records may be empty in
-    /// [`Schedule::take`].
+    /// Whether the schedule reads records of other cells. Otherwise `records` may be empty in [`Schedule::take`].
     pub fn reads_records(&self) -> bool {
         !matches!(self.strategy, Strategy::Whole)
     }
 
     /// Accepts the record of a requested cell. `records` are those of all runs, including this one, if the schedule
     /// reads them.
-    pub fn take(&mut self, id: u32, records: &[Record]) {
+    pub fn take(&mut self, id: u32, records: &(impl Records + ?Sized)) {
         self.states[id as usize] = RunState::Done;
         self.done += 1;
         let end = self.sequence.len();
         if let Strategy::Adaptive(adaptive) = &mut self.strategy {
-            adaptive.take(id, &records[id as usize], &mut self.sequence);
+            adaptive.take(id, &records.record(id as usize), &mut self.sequence);
         }
         if self.done == self.sequence.len() {
             match &mut self.strategy {
@@ -224,7 +223,7 @@ impl Schedule {
     }
 
     /// Fills the cells that were not integrated and returns the result; none unless the map is adaptive.
-    pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
+    pub fn finish(&self, records: &mut (impl Records + ?Sized)) -> Option<Refined> {
         let Strategy::Adaptive(adaptive) = &self.strategy else { return None };
         let (filled, filled_from) = adaptive.fill(records);
         Some(Refined {

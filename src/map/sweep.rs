@@ -10,7 +10,7 @@ use web_time::Instant;
 use crate::map::engine::{Engine, EngineError};
 use crate::map::plan::Plan;
 use crate::map::schedule::Schedule;
-use crate::record::Record;
+use crate::record::{Record, Records};
 
 /// Target time in seconds until some of the cells under way have ended: little work is lost on an interruption, and the
 /// overhead per batch stays small.
@@ -36,8 +36,8 @@ pub enum SweepError {
     Store(Box<dyn Error + Send + Sync>),
 }
 
-/// Runs the cells that a schedule requests. Puts their records into `records`, by run; it may be empty if neither the
-/// schedule nor the caller reads them. Calls `store` about twice a second with new records and the number of runs that
+/// Runs the cells that a schedule requests. Puts their records into `records`, by run, if the schedule reads them; otherwise
+/// `records` may be empty. Calls `store` about twice a second with new records and the number of runs that
 /// are expected so far. Stops soon after `halt` is raised. Returns whether the map is finished.
 ///
 /// The number of cells under way is adapted so that some end within about a second; records do not depend on it. It is
@@ -49,7 +49,7 @@ pub async fn run(
     plan: &Plan,
     schedule: &mut Schedule,
     engine: &mut Engine<'_>,
-    records: &mut [Record],
+    records: &mut (impl Records + ?Sized),
     halt: &Arc<AtomicBool>,
     mut store: impl FnMut(Vec<(u32, Record)>, usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
@@ -86,10 +86,7 @@ pub async fn run(
                 pace.adapt(under_way, ended.len(), last_ended - clock);
                 under_way -= ended.len();
                 schedule.prepare(&ended);
-                for (id, record) in &ended {
-                    put(records, *id, record);
-                    schedule.take(*id, records);
-                }
+                ended.iter().for_each(|(id, record)| take(schedule, records, *id, record));
                 // A large batch is stored alone and need not be copied.
                 if unstored.is_empty() {
                     unstored = ended;
@@ -113,23 +110,26 @@ pub async fn run(
 
 /// Repeats the stored records of an interrupted run in their order. Returns false if the schedule does not wait for one
 /// of them.
-pub fn replay(schedule: &mut Schedule, records: &mut [Record], stored: &[(u32, Record)]) -> bool {
+pub fn replay(
+    schedule: &mut Schedule,
+    records: &mut (impl Records + ?Sized),
+    stored: &[(u32, Record)],
+) -> bool {
     schedule.prepare(stored);
     stored.iter().all(|(id, record)| {
-        let id = *id;
-        let is_expected = schedule.is_waiting_for(id);
+        let is_expected = schedule.is_waiting_for(*id);
         if is_expected {
-            put(records, id, record);
-            schedule.take(id, records);
+            take(schedule, records, *id, record);
         }
         is_expected
     })
 }
 
-fn put(records: &mut [Record], id: u32, record: &Record) {
-    if let Some(place) = records.get_mut(id as usize) {
-        *place = *record;
+fn take(schedule: &mut Schedule, records: &mut (impl Records + ?Sized), id: u32, record: &Record) {
+    if (id as usize) < records.count() {
+        records.put(id as usize, record);
     }
+    schedule.take(id, records);
 }
 
 /// Controls the number of cells under way.

@@ -19,6 +19,17 @@ pub trait Records: Debug + Sync {
     /// # Panics
     /// If there is no such record.
     fn record(&self, id: usize) -> Record;
+
+    /// Replaces the record with a number below [`Records::count`].
+    ///
+    /// # Panics
+    /// If there is no such record.
+    fn put(&mut self, id: usize, record: &Record);
+
+    /// Returns the record with this number, if there is one.
+    fn get(&self, id: usize) -> Option<Record> {
+        (id < self.count()).then(|| self.record(id))
+    }
 }
 
 impl dyn Records + '_ {
@@ -28,13 +39,17 @@ impl dyn Records + '_ {
     }
 }
 
-impl<R: AsRef<[Record]> + Debug + Sync + ?Sized> Records for R {
+impl<R: AsRef<[Record]> + AsMut<[Record]> + Debug + Sync + ?Sized> Records for R {
     fn count(&self) -> usize {
         self.as_ref().len()
     }
 
     fn record(&self, id: usize) -> Record {
         self.as_ref()[id]
+    }
+
+    fn put(&mut self, id: usize, record: &Record) {
+        self.as_mut()[id] = *record;
     }
 }
 
@@ -43,7 +58,7 @@ impl<R: AsRef<[Record]> + Debug + Sync + ?Sized> Records for R {
 /// A column that is zero in all records takes no memory, and equal words are stored once. A map of classes and
 /// exponents takes 24 bytes per run; a [`Record`] takes 360. Records come back to the bit, but for strobe states,
 /// which are stored on request only.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct RecordStore {
     count: usize,
     with_strobes: bool,
@@ -71,30 +86,6 @@ impl RecordStore {
             word: Distinct::default(),
             pattern: Distinct::default(),
         }
-    }
-
-    /// Replaces the record with this number.
-    ///
-    /// # Panics
-    /// If there is no such record.
-    pub fn put(&mut self, id: usize, record: &Record) {
-        let count = self.count;
-        assert!(id < count, "record {id} of {count}");
-        let &Record { lyapunov, lyapunov_error, impacts_per_period, mesh_fraction, .. } = record;
-        let numbers = [lyapunov, lyapunov_error, impacts_per_period, mesh_fraction];
-        self.numbers.iter_mut().zip(numbers).for_each(|(column, number)| column.put(count, id, number));
-        self.measures
-            .iter_mut()
-            .zip(record.measures)
-            .for_each(|(column, number)| column.put(count, id, number));
-        if self.with_strobes {
-            self.strobe.put(count, id, record.strobe);
-        }
-        self.periods_run.put(count, id, record.periods_run);
-        let &Record { period, status, symmetric, valid, reserved, .. } = record;
-        self.flags.put(count, id, [period, status, symmetric, valid, reserved]);
-        self.word.put(count, id, (record.word, record.word_hash, record.word_length));
-        self.pattern.put(count, id, (record.pattern, record.pattern_hash, record.pattern_length));
     }
 
     /// Replaces the records with these numbers.
@@ -146,6 +137,26 @@ impl Records for RecordStore {
             reserved,
             measures: self.measures.each_ref().map(|column| column.get(id)),
         }
+    }
+
+    fn put(&mut self, id: usize, record: &Record) {
+        let count = self.count;
+        assert!(id < count, "record {id} of {count}");
+        let &Record { lyapunov, lyapunov_error, impacts_per_period, mesh_fraction, .. } = record;
+        let numbers = [lyapunov, lyapunov_error, impacts_per_period, mesh_fraction];
+        self.numbers.iter_mut().zip(numbers).for_each(|(column, number)| column.put(count, id, number));
+        self.measures
+            .iter_mut()
+            .zip(record.measures)
+            .for_each(|(column, number)| column.put(count, id, number));
+        if self.with_strobes {
+            self.strobe.put(count, id, record.strobe);
+        }
+        self.periods_run.put(count, id, record.periods_run);
+        let &Record { period, status, symmetric, valid, reserved, .. } = record;
+        self.flags.put(count, id, [period, status, symmetric, valid, reserved]);
+        self.word.put(count, id, (record.word, record.word_hash, record.word_length));
+        self.pattern.put(count, id, (record.pattern, record.pattern_hash, record.pattern_length));
     }
 }
 

@@ -10,7 +10,7 @@ use crate::map::plan::Plan;
 use crate::map::scene::{CompanionFile, FileText, Purpose, Scene, SceneError};
 use crate::map::schedule::Refined;
 use crate::map::shard::Shard;
-use crate::record::Records;
+use crate::record::RecordStore;
 use crate::show::provenance::Provenance;
 use crate::store::file_names::{LIST, MANIFEST, RECORDS};
 use crate::store::inventory::{self, FileEntry, has_seal};
@@ -243,7 +243,7 @@ pub struct FinishedMap {
 #[derive(Debug)]
 pub struct StoredRecords {
     /// Records by run.
-    pub records: Box<dyn Records>,
+    pub records: RecordStore,
     /// Refinement of an adaptive map.
     pub refined: Option<Refined>,
     /// Damage behind the last record, to be reported.
@@ -348,7 +348,7 @@ impl FinishedMap {
         }
         let StoredManifest { engine, precision, device, sources, target, .. } = &self.manifest;
         let identity = Identity::new(engine, precision, device, scene.identity()).built_from(sources, target);
-        let mut work = Work::compact(plan, None, true);
+        let mut work = Work::new(plan, None, true);
         let Extent { count, damage, .. } = work.read(&path, &identity).map_err(|error| match error {
             RecordFileError::OtherRun { path, differences } => {
                 let StoredManifest { set, .. } = &self.manifest;
@@ -357,7 +357,7 @@ impl FinishedMap {
             }
             error => error.into(),
         })?;
-        let Work { schedule, mut records, store, .. } = work;
+        let Work { schedule, mut records, .. } = work;
         let unit = plan.unit();
         if !schedule.is_finished() {
             let (expected, command) = (schedule.expected(), self.remake_command());
@@ -366,10 +366,6 @@ impl FinishedMap {
         let warning =
             damage.map(|damage| format!("{}: {damage}; all {count} {unit} are there", path.display()));
         let refined = schedule.finish(&mut records);
-        let records: Box<dyn Records> = match store {
-            Some(store) => Box::new(store),
-            None => Box::new(records),
-        };
         Ok(StoredRecords { records, refined, warning })
     }
 

@@ -12,7 +12,7 @@ use crate::map::scene::Scene;
 use crate::map::schedule::Schedule;
 use crate::map::shard::Shard;
 use crate::map::sweep;
-use crate::record::{Record, RecordStore, Records};
+use crate::record::{Record, RecordStore};
 use crate::store::error::OutputError;
 use crate::store::folder::{Folder, FolderError};
 use crate::store::record_file::{Extent, Identity, Order, RECORDS, RecordFile, RecordFileError};
@@ -42,46 +42,28 @@ pub struct Work<'p> {
     pub plan: &'p Plan,
     /// The cells to integrate, and their order.
     pub schedule: Schedule,
-    /// Records by run. Empty for a shard whose cells do not depend on each other, and if `store` has them.
-    pub records: Vec<Record>,
-    /// Records by run in little memory, for [`Work::compact`].
-    pub store: Option<RecordStore>,
+    /// Records by run. Empty for a shard whose cells do not depend on each other.
+    pub records: RecordStore,
     /// Counts over the records so far.
     pub tally: Tally,
     shard: Option<Shard>,
 }
 
 impl<'p> Work<'p> {
-    /// Returns the work on a map, or on a shard of it, before its first cell.
-    pub fn new(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
+    /// Returns the work on a map, or on a shard of it, before its first cell. Strobe states are kept on request, and if the
+    /// map's files need them.
+    pub fn new(plan: &'p Plan, shard: Option<Shard>, with_strobes: bool) -> Work<'p> {
         let mut work = Work::without_records(plan, shard);
         if shard.is_none() || work.schedule.reads_records() {
-            work.records = vec![Record::default(); plan.run_count()];
+            work.records = RecordStore::new(plan.run_count(), with_strobes || plan.reads_strobes());
         }
         work
-    }
-
-    /// Returns the work on a map, or on a shard of it, that keeps records in little memory unless cells depend on each other.
-    /// Strobe states are kept on request, and if the map's files need them.
-    pub fn compact(plan: &'p Plan, shard: Option<Shard>, with_strobes: bool) -> Work<'p> {
-        let mut work = Work::without_records(plan, shard);
-        if work.schedule.reads_records() {
-            return Work::new(plan, shard);
-        }
-        let with_strobes = with_strobes || plan.reads_strobes();
-        work.store = shard.is_none().then(|| RecordStore::new(plan.run_count(), with_strobes));
-        work
-    }
-
-    /// The records of all runs.
-    pub fn kept(&self) -> &dyn Records {
-        self.store.as_ref().map_or(&self.records, |store| store)
     }
 
     /// Returns work that keeps no records, for checking those of a shard.
     pub(crate) fn without_records(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
         let (schedule, tally) = (Schedule::of(plan, shard), Tally::default());
-        Work { plan, schedule, records: Vec::new(), store: None, tally, shard }
+        Work { plan, schedule, records: RecordStore::default(), tally, shard }
     }
 
     /// Whether records behind damage can be taken up.
@@ -91,12 +73,7 @@ impl<'p> Work<'p> {
 
     /// Takes up a stored batch. Returns false if the plan has no such records or the schedule does not wait for them.
     pub(crate) fn replay(&mut self, batch: &[(u32, Record)]) -> bool {
-        let is_admitted =
-            self.plan.admits(batch) && sweep::replay(&mut self.schedule, &mut self.records, batch);
-        if let Some(store) = self.store.as_mut().filter(|_| is_admitted) {
-            store.put_all(batch);
-        }
-        is_admitted
+        self.plan.admits(batch) && sweep::replay(&mut self.schedule, &mut self.records, batch)
     }
 
     /// Takes up all records of a file.

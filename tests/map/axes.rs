@@ -80,7 +80,9 @@ fn cells_of_a_list_equal_those_of_the_grid_bit_by_bit() {
         .unwrap();
     let list = job::run(&scene, Processor::Cpu).unwrap();
     assert_eq!(list.counts(), [31, 1]);
-    assert!(order.iter().enumerate().all(|(row, &id)| list.records()[row] == grid.records()[id]));
+    assert!(
+        order.iter().enumerate().all(|(row, &id)| list.records().record(row) == grid.records().record(id))
+    );
     assert!(list.cells().zip(&values).all(|(cell, values)| cell.values == values));
     // F and k1 are parameters of the oscillator, not of the law.
     assert_eq!((list.plan().flow_count(), list.plan().law_count()), (30, 1));

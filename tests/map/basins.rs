@@ -170,7 +170,7 @@ fn refined_scene() -> Scene {
 /// Records of that map with every cell integrated.
 static WHOLE: LazyLock<Vec<Record>> = LazyLock::new(|| {
     let scene = gears(coexisting(), SIDE).build().unwrap();
-    job::run(&scene, Processor::Cpu).unwrap().records().to_vec()
+    job::run(&scene, Processor::Cpu).unwrap().records().iter().collect()
 });
 
 /// Computes the adaptive map. `next` removes the cell whose record arrives next from those under way.

@@ -154,7 +154,7 @@ fn engines_agree_on_a_sine_and_on_a_start_phase() {
     let turned = plane(cosine, SIDE).start_phase(phase).build().unwrap();
     let plans = [Plan::new(&sine), Plan::new(&turned)];
     let cpu = |scene: &Scene| -> Vec<Record> {
-        job::run(scene, Processor::Cpu).unwrap().cells().map(|cell| *cell.record).collect()
+        job::run(scene, Processor::Cpu).unwrap().cells().map(|cell| cell.record).collect()
     };
     let reference = cpu(&sine);
     // Long transients part by rounding, as above: in single precision 11 % of them.

@@ -35,7 +35,7 @@ impl<'m> Stretched<'m> {
             let place = (at[axis] * small[axis]) as f64 / self.counts[axis] as f64 + away;
             (place.max(0.0) as usize).min(small[axis] - 1)
         });
-        let mut record = self.small.records()[j * small[0] + i];
+        let mut record = self.small.records().record(j * small[0] + i);
         let mut changed = |value: f64| value * (1.0 + CHANGE * (unit(&mut random) - 0.5));
         record.lyapunov = changed(record.lyapunov);
         record.lyapunov_error = changed(record.lyapunov_error);

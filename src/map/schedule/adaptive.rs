@@ -8,13 +8,12 @@ mod auditing;
 
 use super::audit::Audit;
 use super::basins::BasinLabels;
-use super::fill::Filling;
 use super::label::Label;
 use super::tiling::{Tile, Tiling};
 use crate::map::plan::{Needs, Plan};
 use crate::map::random::Random;
 use crate::map::scene::Refine;
-use crate::record::Record;
+use crate::record::{Record, Records};
 
 /// Smallest width of a block that is halved because it touches a block with a border. In narrower blocks, the cells on
 /// the common edge show whether the border continues. With classes alone, 0.24 % of the filled cells of the main map
@@ -159,7 +158,7 @@ impl Adaptive {
 
     /// Continues after all requested cells have their records: begins an audit, or evaluates it. Adds the next cells to
     /// `requests`; none if the map is finished.
-    pub(super) fn settle(&mut self, records: &[Record], requests: &mut Vec<u32>) {
+    pub(super) fn settle(&mut self, records: &(impl Records + ?Sized), requests: &mut Vec<u32>) {
         let before = requests.len();
         while requests.len() == before && self.stage != Stage::Done {
             match self.stage {
@@ -306,18 +305,17 @@ impl Adaptive {
 
     /// Fills all cells that were not integrated. Returns their number and, for a map of basins, the cell from which
     /// each cell was filled.
-    pub(super) fn fill(&self, records: &mut [Record]) -> (usize, Vec<u32>) {
+    pub(super) fn fill(&self, records: &mut (impl Records + ?Sized)) -> (usize, Vec<u32>) {
         let mut count = 0;
-        let cells = if self.basins.is_some() { records.len() } else { 0 };
+        let cells = if self.basins.is_some() { records.count() } else { 0 };
         let mut from: Vec<u32> = (0..cells as u32).collect();
         for tile in self.tiling.tiles().filter(|&tile| self.tiling.is_leaf(tile)) {
             let block = self.tiling.block(tile);
-            let corners = block.corners().map(|at| records[self.id(at)]);
-            let filling = Filling::new(&block, corners.each_ref());
+            let filling = self.filling(tile, records);
             for at in block.cells().filter(|&at| self.tiling.owner(at) == tile) {
                 let id = self.id(at);
                 if !self.is_requested[id] {
-                    records[id] = filling.record(at);
+                    records.put(id, &filling.record(at));
                     if let Some(from) = from.get_mut(id) {
                         *from = self.id(block.corners()[block.nearest(at)]) as u32;
                     }

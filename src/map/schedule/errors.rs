@@ -45,7 +45,7 @@ pub struct Deviation {
 
 impl Errors {
     /// Compares pairs of filled and integrated records.
-    pub(super) fn new(pairs: &[(Record, &Record)], needs: &Needs) -> Errors {
+    pub(super) fn new(pairs: &[(Record, Record)], needs: &Needs) -> Errors {
         let deviation = |bit, field: fn(&Record) -> f64| {
             let value = |record: &Record| {
                 // The exponent of a superstable cycle is minus infinity, which cannot be compared.

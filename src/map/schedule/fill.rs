@@ -14,28 +14,28 @@ fn torus(record: &Record) -> u32 {
 }
 
 /// Computes the filled records of one block. Values that do not depend on the cell are computed once.
-pub(super) struct Filling<'r> {
+pub(super) struct Filling {
     block: Block,
-    corners: [&'r Record; 4],
+    corners: [Record; 4],
     /// Quantities that all corners have, as bits of [`valid`].
     valid: u32,
     /// For each corner, whether the cells nearest to it get averages.
     averages: [bool; 4],
 }
 
-impl<'r> Filling<'r> {
+impl Filling {
     /// Prepares the filling of a block from the records of its corners, in the order of [`Block::corners`].
-    pub(super) fn new(block: &Block, corners: [&'r Record; 4]) -> Filling<'r> {
+    pub(super) fn new(block: &Block, corners: [Record; 4]) -> Filling {
         let common = corners.iter().fold(u32::MAX, |bits, corner| bits & corner.valid);
         let mut valid = common & !valid::STROBE & !valid::QUASI_PERIODIC | valid::FILLED;
-        let agree = |of: fn(&Record) -> u64| corners[1..].iter().all(|corner| of(corner) == of(corners[0]));
+        let agree = |of: fn(&Record) -> u64| corners.iter().all(|corner| of(corner) == of(&corners[0]));
         if !agree(word_of) {
             valid &= !valid::WORD;
         }
         if !agree(pattern_of) {
             valid &= !valid::PATTERN;
         }
-        let averages = corners.map(|nearest| {
+        let averages = corners.each_ref().map(|nearest| {
             let class = classify(&Record { valid: valid | torus(nearest), ..*nearest });
             // An average exponent could turn undecided cells into decided ones.
             let decided = !matches!(class, Class::Undecided | Class::Failed);
@@ -57,8 +57,8 @@ impl<'r> Filling<'r> {
             weighted.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
         };
         let mut filled =
-            Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..*self.corners[nearest] };
-        filled.valid |= torus(self.corners[nearest]);
+            Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..self.corners[nearest] };
+        filled.valid |= torus(&self.corners[nearest]);
         filled.clear_measures(|group| self.valid & group.bit == 0);
         if !self.averages[nearest] {
             return filled;
@@ -84,13 +84,13 @@ impl<'r> Filling<'r> {
     }
 }
 
-impl Filling<'_> {
+impl Filling {
     /// Returns the averages of the measured quantities that all corners have.
     fn measures(&self, weights: [f64; 4]) -> [f64; MEASURES] {
         let mut averages = [0.0; MEASURES];
         if GROUPS.iter().any(|group| self.valid & group.bit != 0) {
             for measure in measures::all().filter(|measure| self.valid & measure.group.bit != 0) {
-                let values = self.corners.map(|corner| corner.measures[measure.place]);
+                let values = self.corners.each_ref().map(|corner| corner.measures[measure.place]);
                 let weighted: Vec<(f64, f64)> = values.into_iter().zip(weights).collect();
                 averages[measure.place] = measure.average(&weighted);
             }
@@ -114,7 +114,7 @@ mod tests {
         let block = Block { i: [0, 4], j: [0, 2] };
         let corners = [0.0, 4.0, 2.0, 6.0].map(corner);
         for [i, j] in block.cells() {
-            let record = Filling::new(&block, corners.each_ref()).record([i, j]);
+            let record = Filling::new(&block, corners).record([i, j]);
             assert!((record.lyapunov - (i + j) as f64).abs() < 1e-12);
             assert_eq!((record.period, record.periods_run), (2, 0));
             assert_eq!(record.valid, valid::PERIOD | valid::LYAPUNOV | valid::FILLED);
@@ -133,7 +133,7 @@ mod tests {
             record.measures[phase.place] = if value > 2.5 { -value } else { value + 1.0 };
             record
         });
-        let filled = |corners: &[Record; 4]| Filling::new(&block, corners.each_ref()).record([2, 1]);
+        let filled = |corners: &[Record; 4]| Filling::new(&block, *corners).record([2, 1]);
         let record = filled(&corners);
         assert_eq!(
             (speed.of(&record), record.measures[phase.place].abs()),
@@ -149,7 +149,7 @@ mod tests {
     fn a_superstable_corner_contributes_only_with_weight() {
         let block = Block { i: [0, 2], j: [0, 2] };
         let corners = [-1.0, f64::NEG_INFINITY, -3.0, -4.0].map(corner);
-        let exponent = |at| Filling::new(&block, corners.each_ref()).record(at).lyapunov;
+        let exponent = |at| Filling::new(&block, corners).record(at).lyapunov;
         assert_eq!([exponent([0, 0]), exponent([0, 1]), exponent([1, 2])], [-1.0, -2.0, -3.5]);
         assert_eq!([exponent([1, 0]), exponent([1, 1])], [f64::NEG_INFINITY; 2]);
     }
@@ -159,7 +159,7 @@ mod tests {
         let block = Block { i: [0, 2], j: [0, 2] };
         let mut corners = [0.0; 4].map(corner);
         corners[3].valid &= !valid::LYAPUNOV;
-        assert_eq!(Filling::new(&block, corners.each_ref()).record([0, 0]).valid & valid::LYAPUNOV, 0);
+        assert_eq!(Filling::new(&block, corners).record([0, 0]).valid & valid::LYAPUNOV, 0);
     }
 
     /// On an edge only the corners of that edge count.
@@ -174,7 +174,7 @@ mod tests {
             ..Record::default()
         };
         let impacts = |corners: &[Record; 4], at| {
-            let record = Filling::new(&block, corners.each_ref()).record(at);
+            let record = Filling::new(&block, *corners).record(at);
             (record.valid & valid::IMPACTS != 0).then_some(record.impacts_per_period)
         };
         let mut corners = [impacting(7.0, valid::PERIOD); 4];
@@ -182,7 +182,7 @@ mod tests {
         corners[3] = impacting(8.0, valid::PERIOD);
         assert_eq!(impacts(&corners, [1, 1]), None);
         assert_eq!(impacts(&corners, [1, 0]), Some(7.0 / 3.0));
-        let record = Filling::new(&block, corners.each_ref()).record([1, 1]);
+        let record = Filling::new(&block, corners).record([1, 1]);
         assert_eq!((record.mesh_fraction, record.impacts_per_period), (29.0 / 64.0, 0.0));
         // Impacts of chaos are means, not counts, and are averaged.
         let chaos = |count| Record { period: 0, lyapunov: 1.0, ..impacting(count, valid::LYAPUNOV) };
@@ -202,7 +202,7 @@ mod tests {
             record
         };
         let filled = |corners: &[Record; 4]| {
-            let record = Filling::new(&block, corners.each_ref()).record([1, 1]);
+            let record = Filling::new(&block, *corners).record([1, 1]);
             (record.spelling(), record.pattern())
         };
         let mut corners = [spelled(b"25"); 4];

@@ -3,7 +3,7 @@
 use crate::map::plan::{Plan, followed};
 use crate::map::scene::Start;
 use crate::map::shard::Shard;
-use crate::record::Record;
+use crate::record::Records;
 use rattlemap_dynamics::model::{REST, State};
 
 /// State of a map whose cells follow their neighbours.
@@ -43,11 +43,11 @@ impl Follow {
     }
 
     /// Returns the next row after the current one has its records; empty after the last row.
-    pub(super) fn next(&mut self, records: &[Record]) -> Vec<u32> {
+    pub(super) fn next(&mut self, records: &(impl Records + ?Sized)) -> Vec<u32> {
         if self.done + 1 == self.rows {
             return Vec::new();
         }
-        self.starts = self.row().into_iter().map(|id| followed(records.get(id as usize))).collect();
+        self.starts = self.row().into_iter().map(|id| followed(records.get(id as usize).as_ref())).collect();
         self.done += 1;
         self.row()
     }

@@ -9,7 +9,7 @@ use super::super::label::{Label, pattern_of, word_of};
 use super::super::tiling::Tile;
 use super::{Adaptive, Stage};
 use crate::map::scene::Continuous;
-use crate::record::{Record, valid};
+use crate::record::{Records, valid};
 
 /// Result of an audit.
 struct Verdict {
@@ -47,7 +47,7 @@ impl Adaptive {
     /// kinds that are wrong most often, usually chaos with its windows; blocks of other kinds stay. If the number of
     /// wrong cells may be due to chance, more cells are audited first. Blocks that may not be halved further remain as
     /// they are.
-    pub(super) fn judge_audit(&mut self, records: &[Record], requests: &mut Vec<u32>) {
+    pub(super) fn judge_audit(&mut self, records: &(impl Records + ?Sized), requests: &mut Vec<u32>) {
         let Verdict { wrong, bad } = self.count_wrong(records);
         let audit = *self.audits.last().unwrap_or(&Audit::default());
         let is_over = audit.rate() > self.refine.max_error;
@@ -75,7 +75,7 @@ impl Adaptive {
     }
 
     /// Compares the filled values of the audited cells with their records.
-    fn count_wrong(&mut self, records: &[Record]) -> Verdict {
+    fn count_wrong(&mut self, records: &(impl Records + ?Sized)) -> Verdict {
         let mut wrong = Vec::new();
         let filled = self.audits.pop().map_or(0, |audit| audit.filled);
         let mut audit = Audit { filled, sampled: self.audited.len(), ..Audit::default() };
@@ -83,7 +83,7 @@ impl Adaptive {
         // Numbers of attractors depend on the order of the records, but their order in the sample does not.
         let mut sampled_kinds: Vec<u32> = Vec::new();
         let mut pairs = Vec::with_capacity(self.audited.len());
-        let mut fillings: HashMap<Tile, Filling<'_>> = HashMap::new();
+        let mut fillings: HashMap<Tile, Filling> = HashMap::new();
         for &id in &self.audited {
             let at = self.at(id);
             let tile = self.tiling.owner(at);
@@ -92,7 +92,7 @@ impl Adaptive {
                 Some(_) => self.label(self.corner(tile, at)),
                 None => Label::of(&fill, &self.needs),
             };
-            let is_wrong = label != self.labels[id as usize];
+            let (own, is_wrong) = (records.record(id as usize), label != self.labels[id as usize]);
             if is_wrong {
                 wrong.push(id);
             }
@@ -109,13 +109,13 @@ impl Adaptive {
             *wrong += usize::from(is_wrong && self.may_halve(tile));
             if fill.valid & valid::WORD != 0 {
                 audit.words += 1;
-                audit.wrong_words += usize::from(word_of(&fill) != word_of(&records[id as usize]));
+                audit.wrong_words += usize::from(word_of(&fill) != word_of(&own));
             }
             if fill.valid & valid::PATTERN != 0 {
                 audit.patterns += 1;
-                audit.wrong_patterns += usize::from(pattern_of(&fill) != pattern_of(&records[id as usize]));
+                audit.wrong_patterns += usize::from(pattern_of(&fill) != pattern_of(&own));
             }
-            pairs.push((fill, &records[id as usize]));
+            pairs.push((fill, own));
         }
         audit.wrong = wrong.len();
         if self.refine.continuous == Continuous::Interpolated {
@@ -131,9 +131,9 @@ impl Adaptive {
         block.corners()[block.nearest(at)]
     }
 
-    fn filling<'r>(&self, tile: Tile, records: &'r [Record]) -> Filling<'r> {
+    pub(super) fn filling(&self, tile: Tile, records: &(impl Records + ?Sized)) -> Filling {
         let block = self.tiling.block(tile);
-        Filling::new(&block, block.corners().map(|at| &records[self.id(at)]))
+        Filling::new(&block, block.corners().map(|at| records.record(self.id(at))))
     }
 }
 
