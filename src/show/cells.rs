@@ -11,7 +11,7 @@ use crate::map::scene::{Continuous, Quantity, Scene};
 use crate::map::schedule::Refined;
 use crate::record::classify::{classify, status};
 use crate::record::measures::{self, MEASURES};
-use crate::record::{Record, Records, Spelling, valid};
+use crate::record::{Record, Records, valid};
 use crate::show::numbers::Number;
 use crate::validate::Rate;
 use rattlemap_dynamics::model::State;
@@ -230,16 +230,6 @@ impl<'a> Cells<'a> {
     /// Returns the record of the run `id`.
     pub fn record(&self, id: usize) -> Record {
         self.records.record(id)
-    }
-
-    /// Returns the word of the cell `id`, if the scene requests words.
-    pub(crate) fn word(&self, id: usize) -> Option<Spelling> {
-        if self.has(Quantity::Word) { self.record(id).spelling() } else { None }
-    }
-
-    /// Returns the pattern of the cell `id`, if the scene requests patterns.
-    pub(crate) fn pattern(&self, id: usize) -> Option<Spelling> {
-        if self.has(Quantity::Pattern) { self.record(id).pattern() } else { None }
     }
 
     /// Returns the numbers that the scene requests besides exponent, impacts and meshing.

@@ -47,7 +47,7 @@ pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
     Ok(Map {
         manifest: map::map(cells, run, map::timings(run, Duration::ZERO, BTreeMap::new()), &[]).to_string(),
         columns: cell_columns::read(cells, &rows),
-        texts: rows.texts(),
+        texts: rows.texts().to_vec(),
         attractors,
     })
 }

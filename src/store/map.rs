@@ -245,7 +245,7 @@ fn write_tables(
     let rows = WordRows::new(words);
     let has_words = words.words.is_some() || words.patterns.is_some();
     let (csv, npy) = rayon::join(
-        || write_if(asks(Format::Csv), CSV, &|out| cells_csv::write(out, cells)),
+        || write_if(asks(Format::Csv), CSV, &|out| cells_csv::write(out, cells, &rows)),
         || write_if(asks(Format::Npy), NPY, &|out| cells_npy::write(out, cells, &rows)),
     );
     let words = write_if(asks(Format::Npy) && has_words, WORDS, &|out| rows.write(out));

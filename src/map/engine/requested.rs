@@ -35,7 +35,9 @@ pub fn measured_record(measured: &Measurement, needs: &Needs) -> Record {
         record.set_word(word);
         record.set_pattern(&word.pattern());
     }
-    record.set_measures(&measured.into());
+    if needs.measures != 0 {
+        record.set_measures(&measured.into());
+    }
     drop_unrequested(&mut record, needs);
     record
 }

@@ -1,11 +1,10 @@
 //! Columns of a map's rows: texts for `cells.csv`, typed values for `cells.npy` and Python.
 
 use std::borrow::Cow;
+use std::fmt::{self, Display, Write};
 
 use crate::map::scene::Quantity;
-use crate::record::Spelling;
 use crate::show::cells::{Cells, Row, Source};
-use crate::show::names::{float, optional};
 use crate::show::table::words_csv::WordRows;
 use rattlemap_dynamics::orbit::Class;
 
@@ -29,10 +28,25 @@ impl<'a> CellRow<'a> {
         &self.row.indices[..index_names(self.cells).len()]
     }
 
-    /// Returns indices and swept values as texts.
-    pub(crate) fn location(&self) -> impl Iterator<Item = String> {
-        let values = self.cells.values(self.id).into_iter().map(|value| format!("{value:?}"));
-        self.indices().iter().map(ToString::to_string).chain(values)
+    /// Returns indices and swept values, for tables of texts.
+    pub(crate) fn location(&self) -> impl Iterator<Item = Place> {
+        let values = self.cells.values(self.id).into_iter().map(Place::Value);
+        self.indices().iter().map(|&index| Place::Index(index)).chain(values)
+    }
+}
+
+/// An index on an axis, or the value of a swept parameter.
+pub(crate) enum Place {
+    Index(usize),
+    Value(f64),
+}
+
+impl Display for Place {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Index(index) => write!(to, "{index}"),
+            Place::Value(value) => write!(to, "{value:?}"),
+        }
     }
 }
 
@@ -56,9 +70,12 @@ pub(crate) struct CellColumn {
     pub(crate) name: Cow<'static, str>,
     /// Quantity that the scene must request.
     quantity: Option<Quantity>,
-    pub(crate) text: Box<dyn Fn(&CellRow<'_>) -> String + Send + Sync>,
+    pub(crate) text: WriteText,
     pub(crate) value: TypedValue,
 }
+
+/// A function that writes the text of a value; nothing if the value is absent.
+type WriteText = Box<dyn Fn(&CellRow<'_>, &WordRows<'_>, &mut String) -> fmt::Result + Send + Sync>;
 
 /// A function that reads a value of a column.
 type Read<T> = Box<dyn Fn(&CellRow<'_>, &WordRows<'_>) -> T + Send + Sync>;
@@ -123,13 +140,31 @@ types! {
     F64, f64, "<f8";
 }
 
-fn column(
+/// Returns a column whose texts are those of `shown`.
+fn column<T: Display>(
     name: &'static str,
     quantity: Option<Quantity>,
-    text: impl Fn(&CellRow<'_>) -> String + Send + Sync + 'static,
+    shown: impl Fn(&CellRow<'_>) -> Option<T> + Send + Sync + 'static,
     value: TypedValue,
 ) -> CellColumn {
-    CellColumn { name: name.into(), quantity, text: Box::new(text), value }
+    let text = Box::new(move |c: &CellRow<'_>, _: &WordRows<'_>, to: &mut String| {
+        shown(c).map_or(Ok(()), |value| write!(to, "{value}"))
+    });
+    CellColumn { name: name.into(), quantity, text, value }
+}
+
+/// Returns a column of words or of patterns. `row` returns the row of a cell's word.
+fn words(
+    name: &'static str,
+    quantity: Quantity,
+    row: impl Fn(&WordRows<'_>, usize) -> u32 + Copy + Send + Sync + 'static,
+) -> CellColumn {
+    CellColumn {
+        name: name.into(),
+        quantity: Some(quantity),
+        text: Box::new(move |c, rows, to| to.write_str(&rows.texts()[row(rows, c.id) as usize])),
+        value: TypedValue::U32(Box::new(move |c, rows| row(rows, c.id))),
+    }
 }
 
 /// Returns a column of numbers.
@@ -142,7 +177,10 @@ fn number(
     CellColumn {
         name: name.into(),
         quantity: Some(quantity),
-        text: Box::new(move |c| float(text(c))),
+        text: Box::new(move |c, _, to| {
+            // The shortest decimal that reads back as the same number.
+            text(c).filter(|x| x.is_finite()).map_or(Ok(()), |x| write!(to, "{x:?}"))
+        }),
         value: TypedValue::F64(Box::new(move |c, _| value(c).unwrap_or(f64::NAN))),
     }
 }
@@ -151,37 +189,35 @@ fn number(
 #[rustfmt::skip]
 fn all(cells: &Cells<'_>) -> Vec<CellColumn> {
     let mut columns = vec![
-        column("class", Some(Quantity::Class), |c| optional(c.row.class.map(Class::name)),
+        column("class", Some(Quantity::Class), |c| c.row.class.map(Class::name),
             TypedValue::I8(Box::new(|c, _| c.row.class.map_or(ABSENT, |class| class.index() as i8)))),
-        column("period", Some(Quantity::Class), |c| optional(c.row.period),
+        column("period", Some(Quantity::Class), |c| c.row.period,
             TypedValue::U16(Box::new(|c, _| c.row.period.unwrap_or(0) as u16))),
         number("lyapunov", Quantity::Lyapunov, |c| c.row.lyapunov),
         number("lyapunov_error", Quantity::Lyapunov, |c| c.row.lyapunov_error),
         number("impacts_per_period", Quantity::Impacts, |c| c.row.impacts_per_period),
         number("mesh_fraction", Quantity::Mesh, |c| c.row.mesh_fraction),
-        column("symmetric", Some(Quantity::Symmetric), |c| optional(c.row.symmetric),
+        column("symmetric", Some(Quantity::Symmetric), |c| c.row.symmetric,
             TypedValue::I8(Box::new(|c, _| c.row.symmetric.map_or(ABSENT, i8::from)))),
-        column("word", Some(Quantity::Word), |c| spelling(c.cells.word(c.id)),
-            TypedValue::U32(Box::new(|c, rows| rows.word(c.id)))),
-        column("pattern", Some(Quantity::Pattern), |c| spelling(c.cells.pattern(c.id)),
-            TypedValue::U32(Box::new(|c, rows| rows.pattern(c.id)))),
+        words("word", Quantity::Word, |rows, id| rows.word(id)),
+        words("pattern", Quantity::Pattern, |rows, id| rows.pattern(id)),
     ];
     columns.extend(cells.numbers().into_iter().map(|measured| {
         number(measured.name.clone(), measured.quantity, move |c| measured.of_cell(c.cells, c.id, &c.row))
     }));
     columns.extend([
-        column("status", None, |c| c.row.status.name().to_owned(),
+        column("status", None, |c| Some(c.row.status.name()),
             TypedValue::I8(Box::new(|c, _| c.row.status.code() as i8))),
-        column("periods_run", None, |c| c.row.periods_run.to_string(),
+        column("periods_run", None, |c| Some(c.row.periods_run),
             TypedValue::U32(Box::new(|c, _| c.row.periods_run))),
-        column("source", None, |c| c.row.source.name().to_owned(),
+        column("source", None, |c| Some(c.row.source.name()),
             TypedValue::I8(Box::new(|c, _| c.row.source as i8))),
     ]);
     // The number of attractors, in maps whose cells have several starts.
-    columns.extend(cells.attractors().map(|_| column("attractors", None, |c| optional(c.row.attractors),
+    columns.extend(cells.attractors().map(|_| column("attractors", None, |c| c.row.attractors,
         TypedValue::U8(Box::new(|c, _| c.row.attractors.unwrap_or(0))))));
     // The label of the attractor that the start leads to, in maps of basins.
-    columns.extend(cells.basins().map(|_| column("attractor", None, |c| optional(c.row.attractor),
+    columns.extend(cells.basins().map(|_| column("attractor", None, |c| c.row.attractor,
         TypedValue::I32(Box::new(|c, _| c.row.attractor.map_or(i32::from(ABSENT), i32::from))))));
     columns
 }
@@ -207,10 +243,6 @@ pub(super) fn all_names() -> Vec<String> {
 
 // `Source::ALL` gives the codes.
 const _: () = assert!(Source::Integrated as i8 == 0 && Source::Filled as i8 == 1);
-
-fn spelling(word: Option<Spelling>) -> String {
-    word.map_or(String::new(), |word| word.in_table())
-}
 
 /// Returns the columns of `cells.csv`. The first quantities have a column even where the scene does not request them.
 pub(crate) fn of_csv(cells: &Cells<'_>) -> Vec<CellColumn> {

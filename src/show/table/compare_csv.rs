@@ -20,7 +20,7 @@ pub fn write(out: impl Write, pair: &MapPair<'_>) -> Result<(), WriteError> {
     let differing = pair.comparison.kinds.iter().enumerate();
     for (id, kind) in differing.filter_map(|(id, kind)| Some((id, (*kind)?))) {
         let [a, b] = cells.map(|cells| cells.row(id));
-        table.write_record(CellRow::new(cells[0], id).location().chain([
+        table.write_record(CellRow::new(cells[0], id).location().map(|place| place.to_string()).chain([
             optional(a.class.map(Class::name)),
             optional(a.period),
             optional(b.class.map(Class::name)),

@@ -10,8 +10,8 @@ use crate::show::words::{MapWords, WordIndex};
 /// Rows of the table, and the rows of each cell's word and pattern. Row 0 is for cells without one.
 #[derive(Clone, Debug)]
 pub struct WordRows<'s> {
-    /// Rows from 1 on: words, then patterns that are not also words, the most frequent first.
-    list: Vec<&'s Spelling>,
+    /// Texts by row: none, words, then patterns that are not also words, the most frequent first.
+    texts: Vec<String>,
     word: Option<IndexRows<'s>>,
     pattern: Option<IndexRows<'s>>,
 }
@@ -26,19 +26,19 @@ struct IndexRows<'s> {
 impl<'s> WordRows<'s> {
     /// Assigns rows to the words and patterns of a map.
     pub fn new(words: &'s MapWords) -> WordRows<'s> {
-        let (mut list, mut known) = (Vec::new(), HashMap::new());
+        let (mut texts, mut known) = (vec![String::new()], HashMap::new());
         let mut rows = |index: &'s WordIndex| {
             let row = |(spelling, _): &'s (Spelling, usize)| {
                 *known.entry(spelling).or_insert_with(|| {
-                    list.push(spelling);
-                    list.len() as u32
+                    texts.push(spelling.in_table());
+                    texts.len() as u32 - 1
                 })
             };
             IndexRows { index, rows: index.list.iter().map(row).collect() }
         };
         let word = words.words.as_ref().map(&mut rows);
         let pattern = words.patterns.as_ref().map(&mut rows);
-        WordRows { list, word, pattern }
+        WordRows { texts, word, pattern }
     }
 
     /// Returns the row of the word of the cell `id`.
@@ -52,17 +52,16 @@ impl<'s> WordRows<'s> {
     }
 
     /// Returns the texts by row.
-    pub fn texts(&self) -> Vec<String> {
-        let texts = self.list.iter().map(|spelling| spelling.in_table());
-        std::iter::once(String::new()).chain(texts).collect()
+    pub fn texts(&self) -> &[String] {
+        &self.texts
     }
 
     /// Writes the table.
     pub fn write(&self, out: impl Write) -> Result<(), WriteError> {
         let mut table = csv::Writer::from_writer(out);
         table.write_record(["row", "text"])?;
-        for (row, text) in self.texts().into_iter().enumerate() {
-            table.write_record([row.to_string(), text])?;
+        for (row, text) in self.texts.iter().enumerate() {
+            table.write_record([&row.to_string(), text])?;
         }
         Ok(table.flush()?)
     }
