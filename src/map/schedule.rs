@@ -35,7 +35,7 @@ use follow::Follow;
 
 use crate::map::plan::{Cell, Plan};
 use crate::map::shard::Shard;
-use crate::record::{Record, Records};
+use crate::record::{Record, Records, RecordsMut};
 
 /// The order of work on a map: the requested cells, and which of them have their records.
 pub struct Schedule {
@@ -223,7 +223,7 @@ impl Schedule {
     }
 
     /// Fills the cells that were not integrated and returns the result; none unless the map is adaptive.
-    pub fn finish(&self, records: &mut (impl Records + ?Sized)) -> Option<Refined> {
+    pub fn finish(&self, records: &mut (impl RecordsMut + ?Sized)) -> Option<Refined> {
         let Strategy::Adaptive(adaptive) = &self.strategy else { return None };
         let (filled, filled_from) = adaptive.fill(records);
         Some(Refined {

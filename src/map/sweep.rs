@@ -10,7 +10,7 @@ use web_time::Instant;
 use crate::map::engine::{Engine, EngineError};
 use crate::map::plan::Plan;
 use crate::map::schedule::Schedule;
-use crate::record::{Record, Records};
+use crate::record::{Record, RecordsMut};
 
 /// Target time in seconds until some of the cells under way have ended: little work is lost on an interruption, and the
 /// overhead per batch stays small.
@@ -18,6 +18,9 @@ const BATCH_SECONDS: f64 = 1.0;
 
 /// Longest time that records wait until they are stored.
 const STORE_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Number of records from which a batch is stored alone: it is not copied into another, and fills a batch of the file.
+const LARGE: usize = 1 << 16;
 
 /// Cells per core in an engine's smallest batch.
 const ROUNDS_OF_CORES: usize = 64;
@@ -37,8 +40,8 @@ pub enum SweepError {
 }
 
 /// Runs the cells that a schedule requests. Puts their records into `records`, by run, if the schedule reads them; otherwise
-/// `records` may be empty. Calls `store` about twice a second with new records and the number of runs that
-/// are expected so far. Stops soon after `halt` is raised. Returns whether the map is finished.
+/// `records` may be empty. Calls `store` with new records and the number of runs that are expected so far: for each
+/// large batch, and about twice a second. Stops soon after `halt` is raised. Returns whether the map is finished.
 ///
 /// The number of cells under way is adapted so that some end within about a second; records do not depend on it. It is
 /// halved if the cells do not fit into the engine's memory.
@@ -49,7 +52,7 @@ pub async fn run(
     plan: &Plan,
     schedule: &mut Schedule,
     engine: &mut Engine<'_>,
-    records: &mut (impl Records + ?Sized),
+    records: &mut (impl RecordsMut + ?Sized),
     halt: &Arc<AtomicBool>,
     mut store: impl FnMut(Vec<(u32, Record)>, usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
@@ -60,7 +63,8 @@ pub async fn run(
         most: LARGEST_BATCH * engine.card_count(),
     };
     let mut under_way = 0;
-    let (mut unstored, mut last_stored, mut last_ended) = (Vec::new(), Instant::now(), Instant::now());
+    let mut unstored = Vec::new();
+    let (mut last_stored, mut last_ended) = (Instant::now(), Instant::now());
     while !schedule.is_finished() {
         let next = schedule.next(plan, pace.cells.saturating_sub(under_way).min(engine.room()));
         // Several cards compute between two calls of `advance`, one engine does not.
@@ -80,6 +84,7 @@ pub async fn run(
         };
         last_ended = Instant::now();
         let is_halted = halt.load(Ordering::Relaxed);
+        let mut stored = Vec::new();
         let (is_over, failure) = match ended {
             Err(error) => (true, Some(error)),
             Ok(ended) => {
@@ -87,17 +92,18 @@ pub async fn run(
                 under_way -= ended.len();
                 schedule.prepare(&ended);
                 ended.iter().for_each(|(id, record)| take(schedule, records, *id, record));
-                // A large batch is stored alone and need not be copied.
-                if unstored.is_empty() {
-                    unstored = ended;
-                } else {
+                if ended.len().max(unstored.len()) < LARGE {
                     unstored.extend(ended);
+                } else if !ended.is_empty() {
+                    stored = std::mem::replace(&mut unstored, ended);
                 }
                 (schedule.is_finished() || is_halted, None)
             }
         };
-        if !unstored.is_empty() && (is_over || last_stored.elapsed() >= STORE_INTERVAL) {
-            store(std::mem::take(&mut unstored), schedule.expected()).map_err(SweepError::Store)?;
+        let is_time = is_over || last_stored.elapsed() >= STORE_INTERVAL;
+        let due = if is_time { std::mem::take(&mut unstored) } else { Vec::new() };
+        for batch in [stored, due].into_iter().filter(|batch| !batch.is_empty()) {
+            store(batch, schedule.expected()).map_err(SweepError::Store)?;
             last_stored = Instant::now();
         }
         failure.map_or(Ok(()), Err)?;
@@ -112,7 +118,7 @@ pub async fn run(
 /// of them.
 pub fn replay(
     schedule: &mut Schedule,
-    records: &mut (impl Records + ?Sized),
+    records: &mut (impl RecordsMut + ?Sized),
     stored: &[(u32, Record)],
 ) -> bool {
     schedule.prepare(stored);
@@ -125,7 +131,7 @@ pub fn replay(
     })
 }
 
-fn take(schedule: &mut Schedule, records: &mut (impl Records + ?Sized), id: u32, record: &Record) {
+fn take(schedule: &mut Schedule, records: &mut (impl RecordsMut + ?Sized), id: u32, record: &Record) {
     if (id as usize) < records.count() {
         records.put(id as usize, record);
     }

@@ -10,7 +10,7 @@ mod store;
 #[cfg(feature = "gpu")]
 pub(crate) use spelling::joined;
 pub use spelling::{Spelling, word_hash};
-pub use store::{RecordStore, Records};
+pub use store::{RecordStore, Records, RecordsMut};
 
 use bytemuck::{Pod, Zeroable};
 

@@ -20,16 +20,19 @@ pub trait Records: Debug + Sync {
     /// If there is no such record.
     fn record(&self, id: usize) -> Record;
 
+    /// Returns the record with this number, if there is one.
+    fn get(&self, id: usize) -> Option<Record> {
+        (id < self.count()).then(|| self.record(id))
+    }
+}
+
+/// Records by number that can be replaced.
+pub trait RecordsMut: Records {
     /// Replaces the record with a number below [`Records::count`].
     ///
     /// # Panics
     /// If there is no such record.
     fn put(&mut self, id: usize, record: &Record);
-
-    /// Returns the record with this number, if there is one.
-    fn get(&self, id: usize) -> Option<Record> {
-        (id < self.count()).then(|| self.record(id))
-    }
 }
 
 impl dyn Records + '_ {
@@ -39,7 +42,7 @@ impl dyn Records + '_ {
     }
 }
 
-impl<R: AsRef<[Record]> + AsMut<[Record]> + Debug + Sync + ?Sized> Records for R {
+impl<R: AsRef<[Record]> + Debug + Sync + ?Sized> Records for R {
     fn count(&self) -> usize {
         self.as_ref().len()
     }
@@ -47,7 +50,9 @@ impl<R: AsRef<[Record]> + AsMut<[Record]> + Debug + Sync + ?Sized> Records for R
     fn record(&self, id: usize) -> Record {
         self.as_ref()[id]
     }
+}
 
+impl<R: AsRef<[Record]> + AsMut<[Record]> + Debug + Sync + ?Sized> RecordsMut for R {
     fn put(&mut self, id: usize, record: &Record) {
         self.as_mut()[id] = *record;
     }
@@ -138,7 +143,10 @@ impl Records for RecordStore {
             measures: self.measures.each_ref().map(|column| column.get(id)),
         }
     }
+}
 
+impl RecordsMut for RecordStore {
+    // A store without strobe states drops them.
     fn put(&mut self, id: usize, record: &Record) {
         let count = self.count;
         assert!(id < count, "record {id} of {count}");

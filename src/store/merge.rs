@@ -54,7 +54,7 @@ use rattlemap_dynamics::orbit::Class;
 /// Number of records that are written together: the largest batch of a record file.
 const BATCH: usize = 1 << 16;
 
-/// Largest number of batches in memory that wait to be written; each takes 12 MB.
+/// Largest number of batches in memory that wait to be written; each takes 25 MB.
 const MOST_BATCHES: usize = 8;
 
 /// Largest number of missing shards that a message names.
@@ -203,7 +203,7 @@ impl Parts {
                 if !work.replay(batch) {
                     return false;
                 }
-                batch.iter().for_each(|(id, record)| records.put(*id as usize, record));
+                records.put_all(batch);
                 done += batch.len();
                 if !follows {
                     waiting.extend_from_slice(batch);

@@ -1,6 +1,7 @@
 //! Maps computed through the library: comparison with single orbits, independence of batches and threads, failures.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::common::gpu;
 use crate::{Swept, computed, swept};
@@ -11,7 +12,7 @@ use rattlemap::map::scene::{Purpose, Scene};
 use rattlemap::map::schedule::Schedule;
 use rattlemap::map::sweep::{self, SweepError};
 use rattlemap::record::classify::classify;
-use rattlemap::record::{Record, valid};
+use rattlemap::record::{Record, RecordStore, Records, valid};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse};
@@ -207,6 +208,28 @@ fn records_without_a_request_are_refused() {
     assert!(replay(&[0, 8, 16]));
     for wrong in [&[0, 8, 8][..], &[1], &[41 * 41], &[u32::MAX]] {
         assert!(!replay(wrong), "{wrong:?}");
+    }
+}
+
+/// The second sweep continues after half of the records of the first one.
+#[test]
+fn a_compact_store_holds_the_records_that_a_schedule_reads() {
+    let adaptive = ["refine.minimum_grid=8", "refine.max_error=0.02"];
+    for sets in [&adaptive[..], &["start.policy=up"]] {
+        let scene = scene(33, sets);
+        let plan = Plan::new(&scene);
+        let mut engine = Engine::Cpu(Cpu::new(&plan));
+        let Swept { schedule, mut records, stored, .. } = swept(&plan, &mut engine, &[]);
+        let half: Vec<(u32, Record)> =
+            stored[..stored.len() / 2].iter().map(|&id| (id, records[id as usize])).collect();
+        let (mut again, mut store) = (Schedule::new(&plan), RecordStore::new(plan.run_count(), true));
+        assert!(sweep::replay(&mut again, &mut store, &half));
+        let ignore = |_: Vec<(u32, Record)>, _: usize| Ok(());
+        let halt = Arc::default();
+        let run = sweep::run(&plan, &mut again, &mut engine, &mut store, &halt, ignore);
+        assert!(pollster::block_on(run).unwrap());
+        assert_eq!(schedule.finish(&mut records), again.finish(&mut store));
+        assert!(records.iter().enumerate().all(|(id, record)| store.record(id) == *record));
     }
 }
 

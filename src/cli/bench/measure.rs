@@ -10,8 +10,8 @@ use crate::gpu::{self, AdapterChoice, AdapterReport, DeviceTimes, Precision, Sta
 use crate::map::engine::{Cpu, Engine, Gpu};
 use crate::map::plan::{Plan, count_classes};
 use crate::map::scene::{Purpose, Scene};
+use crate::record::Record;
 use crate::record::classify::classify;
-use crate::record::{Record, Records};
 use crate::validate::{self, Kind, Lanes, Subject, Validation};
 use rattlemap_dynamics::orbit::Class;
 
@@ -226,17 +226,12 @@ impl OpenEngine {
     ///
     /// # Errors
     /// If the device fails while it computes the sample's lanes again.
-    pub(super) fn check(
-        &mut self,
-        scene: &Scene,
-        records: &dyn Records,
-        samples: usize,
-    ) -> Result<SampleCheck> {
+    pub(super) fn check(&mut self, scene: &Scene, records: &[Record], samples: usize) -> Result<SampleCheck> {
         let plan = Plan::new(scene);
         let device = self.device.as_deref_mut();
         let precision = device.as_ref().map_or(Precision::F64, |device| device.precision());
-        let subject = Subject { plan: &plan, records, precision, is_lane: device.is_some() };
-        let sample = validate::sample(&plan, records, samples, SEED);
+        let subject = Subject { plan: &plan, records: &records, precision, is_lane: device.is_some() };
+        let sample = validate::sample(&plan, &records, samples, SEED);
         let lanes = match device {
             Some(device) => pollster::block_on(Lanes::run(&subject, &sample, Some(device), None))
                 .map_err(|error| anyhow!("cannot compute the sample's lanes again: {error}"))?,

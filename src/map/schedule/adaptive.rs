@@ -13,7 +13,7 @@ use super::tiling::{Tile, Tiling};
 use crate::map::plan::{Needs, Plan};
 use crate::map::random::Random;
 use crate::map::scene::Refine;
-use crate::record::{Record, Records};
+use crate::record::{Record, Records, RecordsMut};
 
 /// Smallest width of a block that is halved because it touches a block with a border. In narrower blocks, the cells on
 /// the common edge show whether the border continues. With classes alone, 0.24 % of the filled cells of the main map
@@ -305,7 +305,7 @@ impl Adaptive {
 
     /// Fills all cells that were not integrated. Returns their number and, for a map of basins, the cell from which
     /// each cell was filled.
-    pub(super) fn fill(&self, records: &mut (impl Records + ?Sized)) -> (usize, Vec<u32>) {
+    pub(super) fn fill(&self, records: &mut (impl RecordsMut + ?Sized)) -> (usize, Vec<u32>) {
         let mut count = 0;
         let cells = if self.basins.is_some() { records.count() } else { 0 };
         let mut from: Vec<u32> = (0..cells as u32).collect();
