@@ -381,11 +381,11 @@ struct Finding {
     // Halves of the hash of a word that is too long to be stored.
     hash_low: u32,
     hash_high: u32,
-    word: array<u32, 7>,
-    // Length, hash and symbols of the pattern.
+    // Length and hash of the pattern.
     pattern_length: u32,
     pattern_hash: array<u32, 2>,
-    pattern: array<u32, 7>,
+    // Symbols of the word, then those of the pattern; one unused number if neither is requested.
+    symbols: array<u32, SYMBOLS>,
 }
 
 // Lists of slots. The first `slots` entries are the active list: lanes under way, in the order in which they began.

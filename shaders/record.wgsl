@@ -128,7 +128,9 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     }
     (*finding).valid |= VALID_WORD;
     (*finding).word_length = tally.word_length;
-    (*finding).word = tallies[lane].word;
+    for (var n = 0u; n < 7u; n++) {
+        (*finding).symbols[n] = tallies[lane].word[n];
+    }
     if tally.word_length > WORD_SYMBOLS {
         close_hash();
         (*finding).hash_low = tally.hash_low;
@@ -151,7 +153,9 @@ fn read_pattern(finding: ptr<function, Finding>) {
     }
     (*finding).valid |= VALID_PATTERN;
     (*finding).pattern_length = length;
-    (*finding).pattern = tallies[lane].pattern;
+    for (var n = 0u; n < 7u; n++) {
+        (*finding).symbols[7u + n] = tallies[lane].pattern[n];
+    }
     if length > WORD_SYMBOLS {
         for (var n = 0u; n < 7u; n++) {
             recent = append_symbol(recent, (first >> (3u * n)) & 7u);

@@ -271,16 +271,25 @@ structs! {
         word_length: u32,
         hash_low: u32,
         hash_high: u32,
-        word: [u32; 7],
         pattern_length: u32,
         pattern_hash: [u32; 2],
-        pattern: [u32; 7],
+        symbols: [u32; SYMBOLS],
     }
 }
 
 /// Sums and extremes that a lane measures; `shaders/measure.wgsl` has their places.
 pub(super) const SUMS: usize = 16;
 pub(super) const EXTREMES: usize = 5;
+
+/// Numbers that hold the symbols of a word and of a pattern in a [`Finding`].
+pub(super) const SYMBOLS: usize = 14;
+
+impl Finding {
+    /// Returns the size on the device, in numbers: with or without the symbols of words and patterns.
+    pub const fn length(is_spelled: bool) -> usize {
+        size_of::<Finding>() / size_of::<u32>() - if is_spelled { 0 } else { SYMBOLS - 1 }
+    }
+}
 
 /// Lanes of a workgroup that compacts.
 pub(super) const BLOCK: u32 = 256;

@@ -488,9 +488,8 @@ impl Gpu {
         Ok(Pool::new(self, variants, settings))
     }
 
-    /// Returns the largest number of bytes of device memory that so many lanes take; with those of measured quantities if
-    /// `gathers`.
-    pub(crate) fn bytes_of_lanes(&self, lanes: usize, gathers: bool) -> u64 {
-        slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision, gathers)
+    /// Returns the largest number of bytes of device memory that so many lanes take.
+    pub(crate) fn bytes_of_lanes(&self, lanes: usize, settings: &LaneSettings) -> u64 {
+        slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision, settings)
     }
 }

@@ -168,8 +168,8 @@ impl Pool {
         gpu.call(|| buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings))?;
         // The last variant that decides classes.
         let decided = self.variants.iter().rposition(|variant| variant.measures.is_none()).unwrap_or(0);
-        let (active_lanes, gathers) = (self.active_list.len(), self.settings.gathers());
-        let conclude = || buffers.conclude(gpu, variants[decided], &bindings, active_lanes, gathers);
+        let (active_lanes, settings) = (self.active_list.len(), &self.settings);
+        let conclude = || buffers.conclude(gpu, variants[decided], &bindings, active_lanes, settings);
         let (concluding, device) =
             rounds.run(&variants, until as u32, &mut self.iterations, &mut self.is_ahead, conclude).await?;
         gpu.report(Stage::Integrated { device });

@@ -1,7 +1,7 @@
 //! Conversion of a lane's results to a record.
 
 use super::constants::Constants;
-use super::layout::{Finding, Measured, Reading, SYMBOLS_PER_NUMBER};
+use super::layout::{Finding, Measured, Reading, SYMBOLS, SYMBOLS_PER_NUMBER};
 use super::measured;
 use crate::record::{Record, WORD_SYMBOLS, joined, measures, valid};
 use rattlemap_dynamics::orbit::Quantities;
@@ -83,7 +83,7 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
         }
     }
     if is_valid(valid::WORD) {
-        match spelled(finding.word, finding.word_length) {
+        match spelled(&finding.symbols[..SYMBOLS / 2], finding.word_length) {
             Some(word) => record.set_word(&word),
             None => {
                 record.word_length = finding.word_length;
@@ -92,7 +92,7 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
         }
     }
     if is_valid(valid::PATTERN) {
-        match spelled(finding.pattern, finding.pattern_length) {
+        match spelled(&finding.symbols[SYMBOLS / 2..], finding.pattern_length) {
             Some(pattern) => record.set_pattern(&pattern),
             None => {
                 record.pattern_length = finding.pattern_length;
@@ -104,7 +104,7 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
 }
 
 /// Returns the word with these symbols, or `None` if it is too long to be stored.
-fn spelled(symbols: [u32; 7], length: u32) -> Option<Word> {
+fn spelled(symbols: &[u32], length: u32) -> Option<Word> {
     let symbol =
         |i: usize| b'0' + ((symbols[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8;
     let length = Some(length as usize).filter(|&length| length <= WORD_SYMBOLS)?;

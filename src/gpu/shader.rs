@@ -1,7 +1,7 @@
 //! Shader variants: one source, composed of small files.
 
 use super::Measures;
-use super::layout::{BLOCK, CONTACTS, EXTREMES, SUMS, SYMBOLS_PER_NUMBER};
+use super::layout::{BLOCK, CONTACTS, EXTREMES, SUMS, SYMBOLS, SYMBOLS_PER_NUMBER};
 use super::precision::Precision;
 use super::rules;
 use super::unroll::unroll;
@@ -105,6 +105,7 @@ impl Variant {
             ("WORKGROUP", self.workgroup),
             ("BLOCK", BLOCK),
             ("SUMS", SUMS as u32),
+            ("SYMBOLS", if self.word || self.pattern { SYMBOLS as u32 } else { 1 }),
             ("EXTREMES", EXTREMES as u32),
             ("WORD_SYMBOLS", WORD_SYMBOLS as u32),
             ("SYMBOLS_PER_NUMBER", SYMBOLS_PER_NUMBER as u32),

@@ -1,5 +1,7 @@
 //! The buffers of a pool: the state of each slot on the device, and the transfers to and from the host.
 
+use rayon::prelude::*;
+
 use super::averaging::Averaging;
 use super::device::{COMPACT, CONCLUDE, GATHER, Pipelines};
 use super::layout::{COUNT_AT, Cell, Finding, Measured, Motion, QUEUE_HEAD, Reading, Settings, Tally};
@@ -41,12 +43,27 @@ pub(super) struct Slots {
     row: u32,
 }
 
-/// Returns the bytes of device memory that so many slots take; with those of measured quantities if `gathers`.
-pub(super) fn bytes(slots: usize, precision: Precision, gathers: bool) -> u64 {
-    let measured = if gathers { 2 * size_of::<Measured>() } else { 0 };
+/// Returns the size of a lane's findings on the device.
+fn finding_bytes(settings: &LaneSettings) -> usize {
+    Finding::length(settings.word || settings.pattern) * size_of::<u32>()
+}
+
+/// Reads findings of `size` bytes each, with symbols of zero if they have none.
+fn findings(bytes: &[u8], size: usize) -> Vec<Finding> {
+    let widened = |bytes: &[u8]| {
+        let mut finding = Finding::default();
+        bytemuck::bytes_of_mut(&mut finding)[..size].copy_from_slice(bytes);
+        finding
+    };
+    bytes.par_chunks_exact(size).map(widened).collect()
+}
+
+/// Returns the bytes of device memory that so many slots take.
+pub(super) fn bytes(slots: usize, precision: Precision, settings: &LaneSettings) -> u64 {
+    let measured = if settings.gathers() { 2 * size_of::<Measured>() } else { 0 };
     let reals = 2 * size_of::<Reading>() + size_of::<[f64; 4]>() + size_of::<Motion>() + measured;
     let reals = reals / size_of::<f64>() * precision.bytes();
-    let counts = 2 * size_of::<Finding>() + size_of::<Cell>() + size_of::<Tally>() + 3 * size_of::<u32>();
+    let counts = 2 * finding_bytes(settings) + size_of::<Cell>() + size_of::<Tally>() + 3 * size_of::<u32>();
     (slots * (reals + counts)) as u64
 }
 
@@ -56,7 +73,7 @@ impl Slots {
         let of_reals =
             |label, bytes: usize| buffer(gpu, label, bytes / size_of::<f64>() * gpu.precision.bytes());
         let readings = of_reals("readings", slots * size_of::<Reading>());
-        let findings = buffer(gpu, "findings", slots * size_of::<Finding>());
+        let findings = buffer(gpu, "findings", slots * finding_bytes(settings));
         let places = if settings.gathers() { slots } else { 1 };
         let measured = of_reals("measured", places * size_of::<Measured>());
         Slots {
@@ -122,10 +139,11 @@ impl Slots {
         pipelines: &Pipelines,
         bindings: &[&wgpu::Buffer],
         active_lanes: usize,
-        gathers: bool,
+        settings: &LaneSettings,
     ) -> Result<Conclusion<'_>, GpuError> {
+        let gathers = settings.gathers();
         let reals = |size: usize| (active_lanes * size / size_of::<f64>() * gpu.precision.bytes()) as u64;
-        let sizes = [reals(size_of::<Reading>()), (active_lanes * size_of::<Finding>()) as u64];
+        let sizes = [reals(size_of::<Reading>()), (active_lanes * finding_bytes(settings)) as u64];
         let [on_device, measured] = &self.measured;
         let size_of_measured = if gathers { reals(size_of::<Measured>()) } else { 0 };
         let submission = gpu.call(|| {
@@ -184,7 +202,7 @@ impl Conclusion<'_> {
             .await?;
         let findings = self
             .findings
-            .take(gpu, |all| bytemuck::pod_collect_to_vec::<u8, Finding>(&all[..first(all.len())]))
+            .take(gpu, |all| findings(&all[..first(all.len())], all.len() / self.active_lanes))
             .await?;
         let measured = match self.measured {
             Some(measured) => {

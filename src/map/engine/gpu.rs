@@ -303,7 +303,7 @@ impl Device for Gpu<'_> {
 
     fn device_bytes(&self) -> Option<u64> {
         let constants = self.tables.as_ref().map_or(gpu::MOST_BYTES, Tables::bytes);
-        Some(self.device.bytes_of_lanes(self.plan.run_count(), self.plan.needs().measures != 0) + constants)
+        Some(self.device.bytes_of_lanes(self.plan.run_count(), &self.settings) + constants)
     }
 
     fn lane_steps(&self) -> Option<u64> {
