@@ -177,7 +177,8 @@ fn meaning(kind: Kind) -> &'static str {
         }
         Kind::Border => {
             "a border within rounding: the reference gives the map's answer when parameters and start move within the \
-             engine's resolution, or lanes in double precision give the reference's"
+             engine's resolution, lanes in double precision give the reference's, or a status says that rounding \
+             decides the period"
         }
         Kind::Budget => {
             "a budget too short: one side gives the other's answer with fewer or with more periods, or the motion \

@@ -187,6 +187,11 @@ impl<'a> Cell<'a> {
         Some(answer(&moved.flow, moved.law, moved.start, &self.whole_budget(FOLLOWED), self.halt))
     }
 
+    /// Computes the cell over a multiple of the plan's budget.
+    pub(super) fn followed_for_long(&self) -> Answer {
+        answer(&self.flow, self.law, self.start, &self.whole_budget(FOLLOWED), self.halt)
+    }
+
     /// Computes averages of the `k`th perturbed cell over the periods that a chaotic record averages.
     pub(super) fn averages(&self, k: u64, periods: u32) -> Option<Record> {
         let moved = self.perturbed(k)?;

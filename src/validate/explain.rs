@@ -1,10 +1,11 @@
 //! Explanations of mismatches.
 
 use super::Kind;
-use super::cell::Cell;
+use super::cell::{Cell, ROUNDING_FACTOR};
 use super::compare::Answer;
 use super::near_cycle::{meets_strobe, on_its_cycle};
 use crate::record::classify::{classify, status};
+use crate::record::distance::apart;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -17,6 +18,9 @@ const PERTURBED_IN_BASINS: u64 = 512;
 
 /// Number of perturbed cells if the transient must be as long as the record's.
 const MANY_PERTURBED: u64 = 48;
+
+/// Largest error of the fraction of meshing that the distance from a cycle explains.
+const MESH_NEAR_CYCLE: f64 = 1e-4;
 
 /// Records of lanes that computed the cell again.
 #[derive(Clone, Copy, Debug, Default)]
@@ -90,7 +94,18 @@ fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
             || closes(answer))
 }
 
-/// Whether a record agrees once its exponent and status are replaced by those of the cycle itself.
+/// Whether the status of the second judge's claim, or of the reference's answer, says that rounding decides the period. Then
+/// neither side contradicts the other, unless one is chaotic.
+pub(super) fn is_unresolved(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
+    let sides = [claim, &truth.record];
+    let is_open = |record: &Record| matches!(classify(record), Class::Periodic { .. } | Class::Undecided);
+    sides.iter().any(|record| status(record) == Status::BelowResolution)
+        && sides.iter().all(|record| is_open(record) && cell.is_finite(record))
+        && claim.periods_run <= cell.longest()
+}
+
+/// Whether a record agrees once its exponent and status are replaced by those of the cycle itself. Its fraction of meshing
+/// may be wrong in proportion to the distance from the cycle.
 fn agrees_on_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     let cycle = &truth.record;
     let is_on_strobe =
@@ -98,7 +113,13 @@ fn agrees_on_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     let status = if is_on_strobe { cycle.status } else { claim.status };
     let claim = Record { status, ..*claim };
     let agrees = |claim: &Record| cell.bars.agree(claim, truth);
-    agrees(&claim) || on_its_cycle(cell, &claim).is_some_and(|claim| agrees(&claim))
+    agrees(&claim)
+        || on_its_cycle(cell, &claim).is_some_and(|(claim, distance)| {
+            let reach = (ROUNDING_FACTOR * distance).min(MESH_NEAR_CYCLE);
+            let is_near = apart(claim.mesh_fraction, cycle.mesh_fraction) <= reach;
+            let mesh_fraction = if is_near { cycle.mesh_fraction } else { claim.mesh_fraction };
+            agrees(&Record { mesh_fraction, ..claim })
+        })
 }
 
 /// Whether two cycles agree except for their status, and except that one may repeat the other several times.
@@ -141,7 +162,14 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
     };
     let stopped = || (0..MANY_PERTURBED).filter_map(|k| cell.perturbed_after(k, claim.periods_run));
     let later = || (0..PERTURBED).filter_map(|k| cell.perturbed_for_long(k));
+    // A search may find a cycle long before the motion is on it.
+    let arrives = || {
+        let answer = cell.followed_for_long();
+        let arrived = Record { status: answer.record.status, ..*claim };
+        matches!(classify(&answer.record), Class::Periodic { .. }) && cell.bars.agree(&arrived, &answer)
+    };
+    let approaches = matches!(classify(claim), Class::Periodic { .. }) && status(claim) == Status::Slow;
     cannot_decide(truth)
         || is_open(claim) && stopped().any(|answer| agrees(&answer) || cannot_decide(&answer))
-        || is_open(&truth.record) && later().any(|answer| agrees(&answer))
+        || is_open(&truth.record) && (approaches && arrives() || later().any(|answer| agrees(&answer)))
 }

@@ -2,7 +2,7 @@
 //!
 //! The reference computes each sampled cell over the plan's whole budget, without early stops. A record that differs is
 //! a mismatch of one of five kinds ([`Kind`]). Every kind except the last rests on a computation that explains the
-//! difference. Averages of chaotic motion are compared as distributions over the class ([`ChaosTest`]). States of many
+//! difference, or on a status by which an answer leaves it open. Averages of chaotic motion are compared as distributions over the class ([`ChaosTest`]). States of many
 //! lanes are compared a few periods after their start ([`StateCheck`]). Meshing cells are also computed with half the
 //! meshing speed ([`HalfMesh`]). The main result is a rate per kind with its 95 % interval ([`Rate`]), from cells drawn
 //! uniformly.
@@ -435,7 +435,10 @@ fn replay_cell(
         kind = differs(&fields).then(|| match classify(&judged) {
             // An undecided answer contradicts nothing.
             Class::Undecided => Kind::Budget,
-            _ => explain::kind(cell, &judged, &truth, explain::RepeatedLanes::default()),
+            _ => match explain::kind(cell, &judged, &truth, explain::RepeatedLanes::default()) {
+                Kind::Unexplained if explain::is_unresolved(cell, &judged, &truth) => Kind::Border,
+                kind => kind,
+            },
         });
     }
     Replayed {

@@ -15,8 +15,8 @@ use rattlemap_dynamics::reference::{Allowance, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 /// Returns the record with the exponent of the cycle itself, if the reference confirms the record's exponent at the
-/// record's state; none otherwise.
-pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
+/// record's state, and the distance from the cycle; none otherwise.
+pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<(Record, f64)> {
     let Class::Periodic { period } = classify(record) else { return None };
     let needed = valid::STROBE | valid::LYAPUNOV;
     if record.valid & needed != needed || !record.strobe.iter().all(|x| x.is_finite()) {
@@ -27,18 +27,17 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
     let cycle = refine(&seed, StrobeMap::Periods(period))?;
     let is_slow = status(record) == Status::Slow;
     let reach = if is_slow { rules::recurrence_distance() } else { rules::ON_CYCLE };
-    let is_there = cell.apart(&record.strobe, &cycle.state) <= ROUNDING_FACTOR * reach;
+    let distance = cell.apart(&record.strobe, &cycle.state);
+    let is_there = distance <= ROUNDING_FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };
     // The lane's window ends at the strobe state. With a negative multiplier it began on the other side of the cycle.
     let turns = cycle.multipliers.first().is_some_and(|[re, _]| *re < 0.0);
     let before = |i: usize| if turns { 2.0 * cycle.state[i] - record.strobe[i] } else { record.strobe[i] };
     let began = std::array::from_fn(before);
-    (is_there && is_within_scatter(cell, began, record.lyapunov * time, period)).then(|| Record {
-        lyapunov: cycle.exponent(cell.flow.period),
-        status,
-        ..*record
-    })
+    let settled = Record { lyapunov: cycle.exponent(cell.flow.period), status, ..*record };
+    (is_there && is_within_scatter(cell, began, record.lyapunov * time, period))
+        .then_some((settled, distance))
 }
 
 /// Whether rounding explains a multiplier: the logarithm `log_multiplier` lies in the range that the reference computes

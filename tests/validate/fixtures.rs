@@ -63,7 +63,7 @@ pub(crate) fn validate_all(
     is_lane: bool,
 ) -> Validation {
     validate_runs(
-        &Subject { plan, records: &records.to_vec(), precision, is_lane },
+        &Subject { plan, records: &records, precision, is_lane },
         (0..records.len() as u32).collect(),
     )
 }

@@ -89,8 +89,7 @@ fn a_number_that_is_not_finite_is_found_outside_the_sample() {
     let plan = Plan::new(&scene());
     let mut records = cpu_records(&plan);
     let faults = |records: &[Record]| {
-        let subject =
-            Subject { plan: &plan, records: &records.to_vec(), precision: Precision::F64, is_lane: true };
+        let subject = Subject { plan: &plan, records: &records, precision: Precision::F64, is_lane: true };
         validate_runs(&subject, vec![0, 1]).faults()
     };
     assert_eq!(faults(&records), Vec::<String>::new());

@@ -138,6 +138,24 @@ fn wrong_records_are_found_whatever_the_engine() {
     }
 }
 
+/// Newton's method finds these cycles after 101 periods. The motion itself is still on its way after 528 periods.
+#[test]
+fn a_cycle_that_a_search_finds_early_is_reached_later() {
+    let text = "model = 'two-masses'\n[[axis]]\nparameter = 'omega'\nvalues = [1.9247058823529413, 1.9686274509803923]\n\
+                [[axis]]\nparameter = 'e'\nvalues = [0.5909803921568627, 0.6513725490196078]\n\
+                [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n";
+    let plan = Plan::new(&Scene::parse(text, "test", &[], Purpose::Map).unwrap());
+    let mut records = cpu_records(&plan);
+    let is_slow = |record: &Record| record.period == 1 && status(record) == Status::Slow;
+    assert!(records.iter().all(|record| is_slow(record) && record.periods_run < 200));
+    let found = kinds(&validate_all(&plan, &records, Precision::F64, false));
+    assert!(found.len() > 1 && found.iter().all(|kind| *kind == Kind::Budget), "{found:?}");
+    records[0].impacts_per_period += 1.0;
+    records[1].lyapunov *= 1.5;
+    records[2].mesh_fraction += 2e-4;
+    assert_eq!(unexplained(&validate_all(&plan, &records, Precision::F64, true)), [0, 1, 2]);
+}
+
 /// Exchanges records of cells, and computes a map from another start.
 #[test]
 fn records_of_other_cells_and_of_another_start_are_found() {
