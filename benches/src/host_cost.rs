@@ -10,7 +10,8 @@ use anyhow::{Result, bail};
 use rattlemap::gpu::Traffic;
 use rattlemap::job::engine_choice::EngineRequest;
 use rattlemap::job::map::MapJob;
-use rattlemap::map::engine::Engine;
+use rattlemap::map::engine::{Cpu, Engine, EngineError};
+use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Quantity, Scene};
 use rattlemap::model::GearPair;
 use rattlemap::store::folder::Folder;
@@ -21,6 +22,9 @@ use crate::phase::{self, Cost};
 pub const CONTACT_FREE: f64 = 1e-3;
 /// Amplitude of the force of the main map.
 pub const RATTLING: f64 = 50.0;
+
+/// Cells that the engine alone computes at once.
+const BATCH: usize = 1 << 16;
 
 /// Costs of a map.
 #[derive(Clone, Debug)]
@@ -41,11 +45,7 @@ pub struct HostCost {
 /// If the engine cannot be opened or fails, a file cannot be written, or a contact-free motion does not end after one
 /// period.
 pub fn run(counts: [u32; 2], force: f64, all: bool, engine: EngineRequest, out: &Path) -> Result<HostCost> {
-    use Quantity::{Class, Impacts, Lyapunov, Mesh, Pattern, Symmetric, Word};
-    let model = GearPair { force, ..GearPair::paper(0.5) };
-    let builder = Scene::builder(model).axis("e", 0.0..=1.0, counts[0]).axis("omega", 1.0..=12.0, counts[1]);
-    let everything = [Class, Lyapunov, Impacts, Mesh, Symmetric, Word, Pattern];
-    let scene = if all { builder.quantities(&everything) } else { builder }.build()?;
+    let scene = scene(counts, force, all)?;
     let job = MapJob::new(&scene, engine);
     let folder = Folder::open(out, true)?;
     let mut phases = Vec::new();
@@ -66,4 +66,36 @@ pub fn run(counts: [u32; 2], force: f64, all: bool, engine: EngineRequest, out: 
         bail!("a contact-free cell took more than two forcing periods");
     }
     Ok(HostCost { cells, phases, traffic, periods })
+}
+
+/// Computes all cells of the same map with the processor's engine alone, and drops their records.
+///
+/// # Errors
+/// If the engine fails.
+pub fn alone(counts: [u32; 2], force: f64, all: bool) -> Result<Cost> {
+    let scene = scene(counts, force, all)?;
+    let plan = Plan::new(&scene);
+    let (mut engine, cells) = (Engine::Cpu(Cpu::new(&plan)), plan.cells(0..plan.run_count()));
+    let mut compute = || {
+        for batch in cells.chunks(BATCH) {
+            pollster::block_on(engine.begin(batch))?;
+            let mut left = batch.len();
+            while left > 0 {
+                left -= pollster::block_on(engine.advance(0))?.len();
+            }
+        }
+        Ok(())
+    };
+    let mut costs = Vec::new();
+    phase::run("lanes", &mut costs, &mut compute).map_err(|error: EngineError| error)?;
+    Ok(costs.remove(0))
+}
+
+/// Builds the scene of a map under a force of this amplitude, of class and exponent or of `all` quantities.
+fn scene(counts: [u32; 2], force: f64, all: bool) -> Result<Scene> {
+    use Quantity::{Class, Impacts, Lyapunov, Mesh, Pattern, Symmetric, Word};
+    let model = GearPair { force, ..GearPair::paper(0.5) };
+    let builder = Scene::builder(model).axis("e", 0.0..=1.0, counts[0]).axis("omega", 1.0..=12.0, counts[1]);
+    let everything = [Class, Lyapunov, Impacts, Mesh, Symmetric, Word, Pattern];
+    Ok(if all { builder.quantities(&everything) } else { builder }.build()?)
 }

@@ -24,6 +24,17 @@ pub(crate) fn run(arguments: &arguments::HostCost) -> Result<(), Failure> {
     let cost =
         host_cost::run(counts, CONTACT_FREE, arguments.all, engine, &dir.join("map")).context("the map")?;
     let HostCost { cells, mut phases, traffic, .. } = cost;
+    if kind == EngineKind::Cpu {
+        let lanes = host_cost::alone(counts, CONTACT_FREE, arguments.all).context("the engine alone")?;
+        let left = |of: fn(&Cost) -> f64| phases.iter().map(of).sum::<f64>() - of(&lanes);
+        let [seconds, processor_seconds, thread_seconds] = [
+            left(|cost| cost.seconds),
+            left(|cost| cost.processor_seconds),
+            left(|cost| cost.thread_seconds),
+        ];
+        let host = Cost { phase: "host", seconds, processor_seconds, thread_seconds, peak_bytes: None };
+        phases.extend([lanes, host]);
+    }
     let per_million = 1e6 / cells as f64;
     for Cost { seconds, processor_seconds, thread_seconds, .. } in &mut phases {
         [seconds, processor_seconds, thread_seconds].into_iter().for_each(|time| *time *= per_million);
