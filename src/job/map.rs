@@ -279,7 +279,7 @@ impl<'p> MapRun<'p> {
         let mut is_first = *done == 0;
         observer.progress(*done, schedule.expected());
         let is_finished = thread::scope(|scope| {
-            // A batch is large, so none waits beside the one that is being stored.
+            // A batch may be large, so none waits in the channel.
             let (sender, batches) = mpsc::sync_channel(0);
             let take = |batch: &[(u32, Record)]| {
                 tally.take(plan, batch);

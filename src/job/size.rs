@@ -20,6 +20,8 @@ use crate::text::size::bytes;
 const PROGRAM: u64 = 30_000_000;
 /// Memory per run without its record, in bytes: its place in the order, and its state.
 const RUN: u64 = 5;
+/// Memory per cell of an adaptive map, in bytes: label, request, blocks.
+const REFINED: u64 = 40;
 /// Memory per cell of a list, in bytes: values, their text, flow and law.
 const LIST_ROW: u64 = 200;
 /// Memory per forcing period of a cell that is being computed, in bytes: strobe state, growth of a tangent vector.
@@ -28,6 +30,8 @@ const PERIOD: u64 = 40;
 const FLOW: u64 = 100_000;
 /// Address space that a graphics driver needs, in bytes: the software driver's, which fails without a message if it has less.
 const DRIVER: u64 = 2_000_000_000;
+/// Pixels of the largest figure, twice, in bytes.
+const FIGURE: u64 = 2 * 2048 * 2048 * 4;
 /// Number of flows from which the size of all lane tables is estimated.
 const SAMPLED_FLOWS: u64 = 256;
 
@@ -56,12 +60,13 @@ impl Size {
         // to the disk.
         let under_way = |runs: u64| {
             let most = LARGEST_BATCH as u64;
-            PROGRAM + runs.min(most) * 2 * size_of::<Cell>() as u64 + runs.min(2 * most) * record
+            runs.min(most) * 2 * size_of::<Cell>() as u64 + runs.min(2 * most) * record
         };
         let [record_on_disk, files] = disk(scene);
         let (memory, disk) = match shard {
             None => {
-                let memory = runs.saturating_mul(stored_run(scene, false) + RUN) + under_way(runs);
+                // Files are written when no cell is under way.
+                let memory = runs.saturating_mul(held_run(scene, false)) + under_way(runs).max(drawn(scene));
                 (memory, runs.saturating_mul(record_on_disk) + cells * files)
             }
             Some(shard) => {
@@ -73,7 +78,7 @@ impl Size {
         let settings = scene.orbit_settings();
         let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
         let flows = Parts::flows(scene.points());
-        let memory = memory + list_rows(scene);
+        let memory = PROGRAM + memory + list_rows(scene);
         // Results of lanes on their way to records.
         let results = 2 * runs.min(LARGEST_BATCH as u64) * size_of::<gpu::LaneResult>() as u64;
         Size {
@@ -93,7 +98,11 @@ impl Size {
             true => kept_flows(&Parts::flows(scene.points()), whole.runs),
             false => 0,
         };
-        let memory = whole.runs.saturating_mul(stored_run(scene, false) + RUN) + list_rows(scene) + flows;
+        let memory = PROGRAM
+            + whole.runs.saturating_mul(held_run(scene, false))
+            + list_rows(scene)
+            + flows
+            + drawn(scene);
         Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
@@ -101,7 +110,11 @@ impl Size {
     fn finished(scene: &Scene) -> Size {
         let whole = Size::of(scene, None);
         let flows = kept_flows(&Parts::flows(scene.points()), whole.runs);
-        let memory = whole.runs.saturating_mul(stored_run(scene, true) + RUN) + list_rows(scene) + flows;
+        let memory = PROGRAM
+            + whole.runs.saturating_mul(held_run(scene, true))
+            + list_rows(scene)
+            + flows
+            + drawn(scene);
         Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
@@ -263,6 +276,28 @@ fn disk(scene: &Scene) -> [u64; 2] {
     [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
 }
 
+/// Bytes while the files of a map are written: numbers of words, layers, and the pixels of a figure.
+fn drawn(scene: &Scene) -> u64 {
+    let outputs = scene.outputs();
+    let is_drawn = |format: &Format| *format == Format::Html || Format::FIGURES.contains(format);
+    let draws = u64::from(outputs.files.iter().any(is_drawn));
+    let layer = |quantity: &Quantity| match quantity {
+        Quantity::Word | Quantity::Pattern => 4 + draws,
+        Quantity::Lyapunov | Quantity::Impacts | Quantity::Mesh | Quantity::ImpactRate => 5 * draws,
+        Quantity::Class | Quantity::Symmetric | Quantity::State => 0,
+        measured => 5 * draws * numbers(*measured) / 8,
+    };
+    // Two layers of classes, and the numbers of the layer that is being made.
+    let layers = outputs.quantities.iter().map(layer).sum::<u64>() + 10 * draws;
+    scene.cell_count() * layers + draws * FIGURE
+}
+
+/// Bytes per run of a whole map: its record, its state in the schedule, and its part of the blocks of an adaptive map.
+fn held_run(scene: &Scene, with_strobes: bool) -> u64 {
+    let refined = if scene.refine().is_some() { REFINED } else { 0 };
+    stored_run(scene, with_strobes) + RUN + refined
+}
+
 /// Bytes per run in a [`RecordStore`](crate::record::RecordStore), which has only the requested columns, and strobe states
 /// on request.
 fn stored_run(scene: &Scene, with_strobes: bool) -> u64 {
@@ -338,7 +373,7 @@ mod tests {
     use crate::map::plan::Plan;
     use crate::map::scene::{FileText, Purpose};
     use crate::record::measures::MEASURES;
-    use crate::record::{RecordStore, Records};
+    use crate::record::{RecordStore, RecordsMut};
     use rattlemap_dynamics::flow::Flow;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2], sets: &[&str]) -> Scene {

@@ -353,7 +353,7 @@ fn maps_that_do_not_fit_are_refused_with_figures() {
         fails(&folder, &map, 2, parts);
     };
     refused("1000000", &["1000000 x 1000000 = 1000000000000 cells is too large"]);
-    refused("65000", &["4225000000 cells needs about 224.8 GB of memory, and", "are free"]);
+    refused("65000", &["4225000000 cells needs about 371.9 GB of memory, and", "are free"]);
     assert!(!folder.path().join("out").exists(), "an output folder was made");
 }
 
