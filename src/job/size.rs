@@ -30,6 +30,8 @@ const PERIOD: u64 = 40;
 const FLOW: u64 = 100_000;
 /// Address space that a graphics driver needs, in bytes: the software driver's, which fails without a message if it has less.
 const DRIVER: u64 = 2_000_000_000;
+/// Size of a report without cells, in bytes.
+const PAGE: u64 = 950_000;
 /// Pixels of the largest figure, twice, in bytes.
 const FIGURE: u64 = 2 * 2048 * 2048 * 4;
 /// Number of flows from which the size of all lane tables is estimated.
@@ -67,7 +69,7 @@ impl Size {
             None => {
                 // Files are written when no cell is under way.
                 let memory = runs.saturating_mul(held_run(scene, false)) + under_way(runs).max(drawn(scene));
-                (memory, runs.saturating_mul(record_on_disk) + cells * files)
+                (memory, runs.saturating_mul(record_on_disk) + cells * files + page(scene))
             }
             Some(shard) => {
                 let own = runs.div_ceil(u64::from(shard.count()));
@@ -274,6 +276,11 @@ fn disk(scene: &Scene) -> [u64; 2] {
     };
     // Every record has an exponent with its error: the class needs them.
     [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
+}
+
+/// Bytes of the report without its cells: the engine that computes orbits.
+fn page(scene: &Scene) -> u64 {
+    if scene.outputs().files.contains(&Format::Html) { PAGE } else { 0 }
 }
 
 /// Bytes while the files of a map are written: numbers of words, layers, and the pixels of a figure.

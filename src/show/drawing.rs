@@ -28,6 +28,14 @@ pub use style::{DARK, FAINT, GEAR_1, GEAR_2, GRID, LARGE, MEDIUM, MESHING, SMALL
 use crate::map::scene::Format;
 use crate::show::error::WriteError;
 
+/// Returns a picture as SVG.
+pub(crate) fn svg(canvas: &Canvas) -> String {
+    let mut image = Vec::new();
+    // Writing to memory cannot fail.
+    let _ = svg::write(&mut image, canvas);
+    String::from_utf8_lossy(&image).into_owned()
+}
+
 /// Writes a picture as SVG, PDF or, for all other formats, PNG.
 ///
 /// # Errors

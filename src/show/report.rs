@@ -3,7 +3,9 @@
 //! The page's own code is in `report/`. Its data are JSON. Arrays over the cells are little endian numbers, compressed with
 //! gzip and encoded in base64.
 //!
-//! The page's security policy allows only its own script and style. Texts from a scene or a manifest are never executed.
+//! A click on a cell computes its motion: the page contains `web/` as WebAssembly.
+//!
+//! The page's security policy allows only its own script, style and engine. Texts from a scene or a manifest are never executed.
 
 use std::io::{self, Write};
 
@@ -17,6 +19,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::map::scene::{Axis, Quantity, Rule, Scale, Scene, Target};
+use crate::model_file::FileModel;
 use crate::show::cells::{Cells, Row, Source};
 use crate::show::color::hex;
 use crate::show::error::WriteError;
@@ -36,9 +39,22 @@ const SCRIPT: &str = concat!(
     include_str!("report/colors.js"),
     include_str!("report/panel.js"),
     include_str!("report/input.js"),
+    include_str!("report/orbit.js"),
     include_str!("report/checks.js"),
     include_str!("report/start.js"),
 );
+
+/// The engine that computes orbits in the page, compressed WebAssembly, and the script of its worker. `scripts/wasm.sh` makes
+/// both from `web/`.
+#[cfg(not(target_arch = "wasm32"))]
+const ENGINE: &[u8] = include_bytes!("report/engine.wasm.gz");
+#[cfg(not(target_arch = "wasm32"))]
+const WORKER: &str = concat!(include_str!("report/engine.js"), include_str!("report/worker.js"));
+// The engine does not contain itself.
+#[cfg(target_arch = "wasm32")]
+const ENGINE: &[u8] = &[];
+#[cfg(target_arch = "wasm32")]
+const WORKER: &str = "";
 
 /// Writes the page, with a section on the validation if there was one.
 pub fn write(
@@ -73,6 +89,8 @@ pub fn write(
         "derived": derived(scene),
         // Arguments of the replay command that are the same for all cells.
         "replay": replay::arguments(scene),
+        // Text of the map's own model file; empty for a built-in model, absent for a model that is not a file.
+        "model_file": scene.base().downcast_ref::<FileModel>().map(own_text),
         "components": components,
         // Start state of the first cell, if axes sweep components of it.
         "start": scene.sweeps_start().then(|| cells.start(0)[..components].to_vec()),
@@ -93,6 +111,7 @@ pub fn write(
         data["starts"] = packed("f64", &starts);
     }
     let [style, script] = [STYLE, SCRIPT].map(inline);
+    let (engine, worker) = (STANDARD.encode(ENGINE), inline(WORKER));
     let policy = policy(&style, &script);
     let title = scene.title().replace('&', "&amp;").replace('<', "&lt;");
     // The data are long, so they are neither searched for marks nor copied.
@@ -101,6 +120,8 @@ pub fn write(
         ("@POLICY@", Some(policy.as_str())),
         ("@TITLE@", Some(&title)),
         ("@STYLE@", Some(&style)),
+        ("@ENGINE@", Some(&engine)),
+        ("@WORKER@", Some(&worker)),
         ("@DATA@", None),
         ("@SCRIPT@", Some(&script)),
     ] {
@@ -140,11 +161,20 @@ fn inline(source: &str) -> String {
     format!("\n{}\n", source.replace("\r\n", "\n").trim_end())
 }
 
-/// Returns the security policy: a browser may run the page's script and style, identified by their hashes, and nothing else.
+/// Returns the text of a model's file; none for a built-in model.
+fn own_text(model: &FileModel) -> &str {
+    if model.is_built_in() { "" } else { &model.definition().text }
+}
+
+/// Returns the security policy: a browser may run the page's script and style, identified by their hashes, and a worker that
+/// the script makes; it may show images that the script makes.
 fn policy(style: &str, script: &str) -> String {
     let [style, script] =
         [style, script].map(|part| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(part))));
-    format!("default-src 'none'; script-src {script}; style-src {style}; base-uri 'none'; form-action 'none'")
+    format!(
+        "default-src 'none'; script-src {script} 'wasm-unsafe-eval'; worker-src blob:; img-src blob:; style-src {style}; \
+         base-uri 'none'; form-action 'none'"
+    )
 }
 
 /// Returns the derived parameters in the order of the scene. Values are stored along the axes that they depend on.

@@ -69,6 +69,19 @@ function visit() {
   point("pointerdown", x, y);
   point("pointerup", x, y);
   said.command = text("command");
+  settled(() => browse(x, y));
+}
+// Continues when the motion of the selected cell is there. The browser's virtual time does not wait for workers, so each
+// step takes some real time.
+function settled(next) {
+  for (let n = 0, sum = 0; n < 5e6; n++) sum += Math.sqrt(n);
+  if (text("computing").includes("computing")) return setTimeout(() => settled(next), 20);
+  said.motion = text("computing");
+  said.summary = text("summary");
+  said.figures = ["gap", "phase_plane", "time_history"].map((id) => document.getElementById(id).naturalWidth > 100);
+  next();
+}
+function browse(x, y) {
   canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -600, clientX: canvas.getBoundingClientRect().left + x,
     clientY: canvas.getBoundingClientRect().top + y, cancelable: true }));
   said.zoomed = view.width < 12 && view.left > 0;
@@ -152,6 +165,13 @@ impl Report {
         program.current_dir(self.folder.path()).args(arguments).assert().success();
     }
 
+    /// Runs a command and returns what it prints.
+    fn printed(&self, command: &str) -> String {
+        let arguments = command.split(' ').skip(1);
+        let output = Cargo::cargo_bin("rattlemap").unwrap().args(arguments).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    }
+
     fn file(&self, name: &str) -> PathBuf {
         self.folder.path().join("o").join(name)
     }
@@ -229,15 +249,19 @@ fn the_policy_allows_only_the_script_and_style_of_the_page() {
     let style = hashed(between(&page, "<style>", "</style>"));
     let script = hashed(between(&page, "<script>", "</script>"));
     let expected = format!(
-        "default-src 'none'; script-src {script}; style-src {style}; base-uri 'none'; form-action 'none'"
+        "default-src 'none'; script-src {script} 'wasm-unsafe-eval'; worker-src blob:; img-src blob:; style-src {style}; \
+         base-uri 'none'; form-action 'none'"
     );
     assert_eq!(policy, expected);
     let at = |part: &str| page.find(part).unwrap();
     assert!(at("Content-Security-Policy") < at("<title>") && at("<title>") < at("<style>"), "too late");
-    assert_eq!((page.matches("<script").count(), page.matches("<style").count()), (2, 1));
+    assert_eq!((page.matches("<script").count(), page.matches("<style").count()), (4, 1));
     let data = between(&page, "<script id=\"map\" type=\"application/json\">", "</script>");
     let script = between(&page, "<script>", "</script>");
-    let markup = page.replace(data, "").replace(script, "");
+    let [engine, worker] = ["engine", "worker"]
+        .map(|id| between(&page, &format!("<script id=\"{id}\" type=\"text/plain\">"), "</script>"));
+    let markup =
+        [data, script, engine, worker].iter().fold(page.clone(), |page, part| page.replace(part, ""));
     let handles = |tag: &&str| {
         let name = |attribute: &str| attribute.split('=').next().unwrap().to_ascii_lowercase();
         tag.split_whitespace().skip(1).map(name).any(|name| name == "style" || name.starts_with("on"))
@@ -330,7 +354,7 @@ fn the_report_is_one_page_with_all_cells() {
     let report = Report::new();
     let page = report.page();
     assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("src="));
-    assert_eq!(page.matches("</script>").count(), 2, "the title ended a script");
+    assert_eq!(page.matches("</script>").count(), 4, "the title ended a script");
     let (data, table) = (report.data(), report.table());
     assert_eq!(data["title"], "Evil </script><b>title</b> & more");
     assert_eq!((table.len(), &data["validation"]), (COLUMNS * ROWS, &Value::Null));
@@ -384,7 +408,7 @@ fn the_command_of_a_cell_gives_its_class_period_word_and_pattern() {
 #[test]
 fn a_validated_report_contains_the_validation_and_works_in_a_browser() {
     let report = Report::validated();
-    assert_eq!(report.page().matches("</script>").count(), 2, "the validation ended its script");
+    assert_eq!(report.page().matches("</script>").count(), 4, "the validation ended its script");
     let found = &report.data()["validation"];
     let uniform = &found["strata"][0];
     let numbers = [&found["seed"], &found["cells"], &uniform["kinds"]["unexplained"]["count"]];
@@ -404,6 +428,14 @@ fn a_validated_report_contains_the_validation_and_works_in_a_browser() {
     let (rounded, exact): (f64, f64) = (readout[4].parse().unwrap(), row[6].parse().unwrap());
     assert!((rounded - exact).abs() < 1e-4 * exact.abs(), "{rounded} {exact}");
     assert_eq!(said["command"], command(&row));
+    // The page computes the motion by the same code as the program, which uses FMA where the processor has it.
+    let motion = said["motion"].as_str().unwrap();
+    assert!(motion.starts_with("computed in this page in "), "{motion}");
+    assert_eq!(said["figures"], json!([true, true, true]));
+    let printed = report.printed(&command(&row));
+    for (ours, theirs) in said["summary"].as_str().unwrap().lines().zip(printed.lines()).take(7) {
+        assert_eq!(ours, theirs);
+    }
     for fact in ["zoomed", "panned", "all"] {
         assert_eq!(said[fact], true, "{fact}: {said}");
     }
@@ -578,4 +610,41 @@ fn the_scene_of_a_whole_map_gives_equal_records() {
     let before = report.table();
     report.run(&["map", "s.toml", "--quiet", "--out", "o", "--force"]);
     assert_eq!(report.table(), before);
+}
+
+/// The engine in the page is built by hand, because a fresh machine needs Rust alone.
+#[test]
+fn the_engine_is_built_from_todays_sources() {
+    let script = include_str!("../../scripts/wasm.sh");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut folders, mut files) = (Vec::new(), Vec::new());
+    for word in between(script, "sources=(", ")").split_whitespace() {
+        match word.split_once(['{', '}']) {
+            None => folders.push(PathBuf::from(word)),
+            Some((folder, names)) => {
+                let names = names.trim_end_matches("}.rs").split(',');
+                files.extend(names.map(|name| format!("{folder}{name}.rs")));
+            }
+        }
+    }
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(root.join(&folder)).unwrap() {
+            let path = folder.join(entry.unwrap().file_name());
+            if root.join(&path).is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                files.push(path.to_str().unwrap().replace('\\', "/"));
+            }
+        }
+    }
+    files.sort_unstable();
+    let hex =
+        |bytes: &[u8]| Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let lines = files.iter().map(|file| format!("{}  {file}\n", hex(&fs::read(root.join(file)).unwrap())));
+    let built = include_str!("../../src/show/report/engine.sources").trim();
+    assert_eq!(
+        hex(lines.collect::<String>().as_bytes()),
+        built,
+        "run scripts/wasm.sh and commit what it makes"
+    );
 }

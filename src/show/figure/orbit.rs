@@ -12,7 +12,7 @@ mod time_history;
 use std::io::Write;
 
 use crate::map::scene::{FigureStyle, Format};
-use crate::show::drawing::{Canvas, write_figure};
+use crate::show::drawing::{Canvas, svg, write_figure};
 use crate::show::error::WriteError;
 use plot::ORBIT_WIDTH;
 pub use plot::OrbitPlot;
@@ -69,6 +69,12 @@ impl OrbitFigure {
         plot: &OrbitPlot<'_>,
     ) -> Result<(), WriteError> {
         write_figure(out, format, &self.draw(style, plot))
+    }
+
+    /// Draws the figure of an orbit and returns it as SVG. A page calls this, because [`OrbitFigure::write`] links the
+    /// writers of all formats.
+    pub fn svg(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> String {
+        svg(&self.draw(style, plot))
     }
 
     pub(super) fn draw(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {

@@ -66,6 +66,7 @@ function choose(cell) {
     byId("command").replaceChildren(...words.flatMap((word, k) =>
       k === 0 ? [element("span", word)] : [" ", element("span", `--${word}`)]));
   }
+  showOrbit(cell);
   updateReadout();
   updateLink();
   draw();

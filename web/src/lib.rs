@@ -1,0 +1,146 @@
+//! The engine of reports: computes the motion of one cell in the browser.
+//!
+//! `scripts/wasm.sh` compiles this crate to WebAssembly. `rattlemap::show::report` puts it into `report.html`, where a worker
+//! calls [`orbit`] with the command that replays the selected cell.
+
+use std::sync::atomic::AtomicBool;
+
+use rattlemap::map::scene::{FigureStyle, single_cell};
+use rattlemap::model_file::{DEFAULT, FileModel};
+use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
+use rattlemap::show::orbit_spectrum::samples_per_period;
+use rattlemap::show::orbit_summary::summary;
+use rattlemap_dynamics::model::{REST, State};
+use rattlemap_dynamics::orbit::{self, Class, Settings};
+use serde_json::{Map, Value, json};
+use wasm_bindgen::prelude::wasm_bindgen;
+
+/// Width in points of the figures beside the map. The time history is drawn below it, in its default width.
+const ASIDE: f64 = 250.0;
+
+/// Longest window of an analysis in forcing periods, about a second of work. The program allows 65,536.
+const LONGEST_WINDOW: u32 = 8192;
+
+/// Computes the motion of a `rattlemap orbit` command, and draws it.
+///
+/// `command` is the text that a report shows for a cell. `model` is the text of the map's own model file; it is empty for a
+/// built-in model. Returns a JSON object: `summary`, the text that the command prints, and `figures`, an SVG image by the
+/// name of its file; or `error`, a message.
+#[wasm_bindgen]
+pub fn orbit(command: &str, model: &str) -> String {
+    let object = computed(command, model).unwrap_or_else(|error| json!({ "error": error }));
+    object.to_string()
+}
+
+fn computed(command: &str, text: &str) -> Result<Value, String> {
+    let message = |error: &dyn std::error::Error| error.to_string();
+    let Request { model, sets, start, settings } = Request::parse(command)?;
+    let model = match FileModel::built_in(model) {
+        Some(model) => model,
+        None => FileModel::parse(text, model).map_err(|error| message(&error))?,
+    };
+    let cell = single_cell(&model, &sets).map_err(|error| message(&error))?;
+    let (never, silent) = (AtomicBool::new(false), |_, _| ());
+    let analysed =
+        orbit::analyse_until(&*cell, start, &settings, LONGEST_WINDOW, orbit::EVENT_PERIODS, &never, &silent);
+    let Some(motion) = analysed.map_err(|error| message(&error))? else {
+        return Err("the analysis was stopped".to_owned());
+    };
+    let mut figures = Map::new();
+    if motion.class != Class::Failed {
+        let samples = samples_per_period(&cell.oscillator().map_err(|error| message(&error))?);
+        let trace = orbit::trace(&*cell, motion.strobe, motion.strobe_meshing, motion.cycle_periods, samples)
+            .map_err(|error| message(&error))?;
+        let plot = OrbitPlot::new(&*cell, &motion, &trace).map_err(|error| message(&error))?;
+        let wide = FigureStyle::default();
+        let narrow =
+            FigureStyle { width: Some(ASIDE), title: Some(String::new()), legend: false, ..wide.clone() };
+        for figure in OrbitFigure::ALL {
+            let style = if figure == OrbitFigure::TimeHistory { &wide } else { &narrow };
+            figures.insert(figure.name().to_owned(), json!(figure.svg(style, &plot)));
+        }
+    }
+    Ok(json!({ "summary": summary(&*cell, &motion, None), "figures": figures }))
+}
+
+/// The arguments of a command.
+struct Request<'c> {
+    /// Name of a built-in model, or of the map's own model file.
+    model: &'c str,
+    sets: Vec<String>,
+    start: State,
+    settings: Settings,
+}
+
+impl<'c> Request<'c> {
+    /// Reads a command that a report shows. The last of several values counts.
+    fn parse(command: &'c str) -> Result<Request<'c>, String> {
+        let mut request =
+            Request { model: DEFAULT, sets: Vec::new(), start: REST, settings: Settings::default() };
+        let arguments = command.trim().strip_prefix("rattlemap orbit").ok_or("not a command of an orbit")?;
+        for argument in arguments.split(" --").map(str::trim).filter(|argument| !argument.is_empty()) {
+            let wrong = || format!("--{argument} cannot be read");
+            match argument.split_once(' ').ok_or_else(wrong)? {
+                ("set", value) => request.sets.push(value.to_owned()),
+                ("model", value) => request.model = value,
+                ("transient", value) => {
+                    request.settings.transient_periods = value.parse().map_err(|_| wrong())?
+                }
+                ("start", value) => {
+                    request.start = REST;
+                    for (n, number) in value.split(',').enumerate() {
+                        *request.start.get_mut(n).ok_or_else(wrong)? = number.parse().map_err(|_| wrong())?;
+                    }
+                }
+                _ => return Err(wrong()),
+            }
+        }
+        Ok(request)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn result(command: &str, model: &str) -> Value {
+        serde_json::from_str(&orbit(command, model)).unwrap()
+    }
+
+    #[test]
+    fn a_command_gives_the_summary_and_the_figures_of_its_motion() {
+        let found = result("rattlemap orbit --set e=0.06 --transient 500 --start 0.1,0,-0.25,1", "");
+        let summary = found["summary"].as_str().unwrap();
+        assert!(summary.contains("\nclass                 periodic, period 1\n"), "{summary}");
+        assert!(summary.contains("\npattern               135462\n"), "{summary}");
+        for name in ["phase_plane", "time_history", "gap"] {
+            assert!(found["figures"][name].as_str().unwrap().starts_with("<svg "), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_text_of_a_models_own_file_is_read() {
+        let text = include_str!("../../models/two_masses.toml").replace("two-masses", "mine");
+        let found = result("rattlemap orbit --set omega=1.2 --model model.toml", &text);
+        assert_eq!(
+            found["summary"],
+            result("rattlemap orbit --set omega=1.2 --model two-masses", "")["summary"]
+        );
+    }
+
+    #[test]
+    fn wrong_commands_are_errors() {
+        for (command, expected) in [
+            ("rattlemap map s.toml", "not a command of an orbit"),
+            ("rattlemap orbit --set e=2", "e"),
+            ("rattlemap orbit --start 1,2,3,4,5", "--start 1,2,3,4,5 cannot be read"),
+            ("rattlemap orbit --json", "--json cannot be read"),
+        ] {
+            let found = result(command, "");
+            assert!(
+                found["error"].as_str().is_some_and(|error| error.contains(expected)),
+                "{command}: {found}"
+            );
+        }
+    }
+}
