@@ -30,7 +30,7 @@ const PERIOD: u64 = 40;
 const FLOW: u64 = 100_000;
 /// Address space that a graphics driver needs, in bytes: the software driver's, which fails without a message if it has less.
 const DRIVER: u64 = 2_000_000_000;
-/// Size of a report without cells, in bytes.
+/// Bytes of a report besides its cells, most of them its engine.
 const PAGE: u64 = 950_000;
 /// Pixels of the largest figure, twice, in bytes.
 const FIGURE: u64 = 2 * 2048 * 2048 * 4;
@@ -278,7 +278,7 @@ fn disk(scene: &Scene) -> [u64; 2] {
     [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
 }
 
-/// Bytes of the report without its cells: the engine that computes orbits.
+/// Bytes of the report, if there is one, besides its cells.
 fn page(scene: &Scene) -> u64 {
     if scene.outputs().files.contains(&Format::Html) { PAGE } else { 0 }
 }

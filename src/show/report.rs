@@ -5,7 +5,7 @@
 //!
 //! A click on a cell computes its motion: the page contains `web/` as WebAssembly.
 //!
-//! The page's security policy allows only its own script, style and engine. Texts from a scene or a manifest are never executed.
+//! The page's security policy allows only its own script and style, and what the script makes. Texts from a scene or a manifest are never executed.
 
 use std::io::{self, Write};
 
@@ -45,12 +45,12 @@ const SCRIPT: &str = concat!(
 );
 
 /// The engine that computes orbits in the page, compressed WebAssembly, and the script of its worker. `scripts/wasm.sh` makes
-/// both from `web/`.
+/// `engine.wasm.gz` and `engine.js` from `web/`.
 #[cfg(not(target_arch = "wasm32"))]
 const ENGINE: &[u8] = include_bytes!("report/engine.wasm.gz");
 #[cfg(not(target_arch = "wasm32"))]
 const WORKER: &str = concat!(include_str!("report/engine.js"), include_str!("report/worker.js"));
-// The engine does not contain itself.
+// The engine is built from this library, before it exists.
 #[cfg(target_arch = "wasm32")]
 const ENGINE: &[u8] = &[];
 #[cfg(target_arch = "wasm32")]
@@ -110,8 +110,10 @@ pub fn write(
         let starts: Vec<[f64; 4]> = (0..cells.count()).map(|id| cells.start(id)).collect();
         data["starts"] = packed("f64", &starts);
     }
-    let [style, script] = [STYLE, SCRIPT].map(inline);
-    let (engine, worker) = (STANDARD.encode(ENGINE), inline(WORKER));
+    // The script contains that of the worker, so that the policy's hash covers both.
+    let worker = json!(WORKER).to_string().replace('<', "\\u003c");
+    let [style, script] = [STYLE, &format!("{SCRIPT}const WORKER = {worker};\n")].map(inline);
+    let engine = STANDARD.encode(ENGINE);
     let policy = policy(&style, &script);
     let title = scene.title().replace('&', "&amp;").replace('<', "&lt;");
     // The data are long, so they are neither searched for marks nor copied.
@@ -121,7 +123,6 @@ pub fn write(
         ("@TITLE@", Some(&title)),
         ("@STYLE@", Some(&style)),
         ("@ENGINE@", Some(&engine)),
-        ("@WORKER@", Some(&worker)),
         ("@DATA@", None),
         ("@SCRIPT@", Some(&script)),
     ] {
@@ -166,8 +167,8 @@ fn own_text(model: &FileModel) -> &str {
     if model.is_built_in() { "" } else { &model.definition().text }
 }
 
-/// Returns the security policy: a browser may run the page's script and style, identified by their hashes, and a worker that
-/// the script makes; it may show images that the script makes.
+/// Returns the security policy. A browser may use the page's script and style, which their hashes identify. The script may start
+/// workers, compile WebAssembly and show images that it makes itself.
 fn policy(style: &str, script: &str) -> String {
     let [style, script] =
         [style, script].map(|part| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(part))));

@@ -1,7 +1,7 @@
 //! The engine of reports: computes the motion of one cell in the browser.
 //!
 //! `scripts/wasm.sh` compiles this crate to WebAssembly. `rattlemap::show::report` puts it into `report.html`, where a worker
-//! calls [`orbit`] with the command that replays the selected cell.
+//! calls [`orbit()`] with the command that replays the selected cell.
 
 use std::sync::atomic::AtomicBool;
 
@@ -10,22 +10,20 @@ use rattlemap::model_file::{DEFAULT, FileModel};
 use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
 use rattlemap::show::orbit_spectrum::samples_per_period;
 use rattlemap::show::orbit_summary::summary;
-use rattlemap_dynamics::model::{REST, State};
+use rattlemap_dynamics::model::{Model, REST, State};
 use rattlemap_dynamics::orbit::{self, Class, Settings};
 use serde_json::{Map, Value, json};
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// Width in points of the figures beside the map. The time history is drawn below it, in its default width.
+/// Width in points of gap and phase planes, which stand beside the map. The time history stands below the map and has the
+/// default width.
 const ASIDE: f64 = 250.0;
-
-/// Longest window of an analysis in forcing periods, about a second of work. The program allows 65,536.
-const LONGEST_WINDOW: u32 = 8192;
 
 /// Computes the motion of a `rattlemap orbit` command, and draws it.
 ///
 /// `command` is the text that a report shows for a cell. `model` is the text of the map's own model file; it is empty for a
-/// built-in model. Returns a JSON object: `summary`, the text that the command prints, and `figures`, an SVG image by the
-/// name of its file; or `error`, a message.
+/// built-in model. Returns a JSON object: `summary`, the text that the command prints, and `figures`, SVG images, keyed by
+/// the figure's name; or `error`, a message.
 #[wasm_bindgen]
 pub fn orbit(command: &str, model: &str) -> String {
     let object = computed(command, model).unwrap_or_else(|error| json!({ "error": error }));
@@ -34,15 +32,31 @@ pub fn orbit(command: &str, model: &str) -> String {
 
 fn computed(command: &str, text: &str) -> Result<Value, String> {
     let message = |error: &dyn std::error::Error| error.to_string();
-    let Request { model, sets, start, settings } = Request::parse(command)?;
+    let Request { model, sets, start: (start, components), settings } = Request::parse(command)?;
     let model = match FileModel::built_in(model) {
         Some(model) => model,
+        None if text.is_empty() => return Err(format!("the report has no file of the model {model}")),
         None => FileModel::parse(text, model).map_err(|error| message(&error))?,
     };
+    if components.is_some_and(|count| count != model.state_names().len())
+        || !start.iter().all(|x| x.is_finite())
+    {
+        return Err(format!(
+            "--start: it must be finite numbers, the model's {}",
+            model.state_names().join(", ")
+        ));
+    }
     let cell = single_cell(&model, &sets).map_err(|error| message(&error))?;
     let (never, silent) = (AtomicBool::new(false), |_, _| ());
-    let analysed =
-        orbit::analyse_until(&*cell, start, &settings, LONGEST_WINDOW, orbit::EVENT_PERIODS, &never, &silent);
+    let analysed = orbit::analyse_until(
+        &*cell,
+        start,
+        &settings,
+        orbit::LONGEST_WINDOW,
+        orbit::EVENT_PERIODS,
+        &never,
+        &silent,
+    );
     let Some(motion) = analysed.map_err(|error| message(&error))? else {
         return Err("the analysis was stopped".to_owned());
     };
@@ -68,16 +82,19 @@ struct Request<'c> {
     /// Name of a built-in model, or of the map's own model file.
     model: &'c str,
     sets: Vec<String>,
-    start: State,
+    /// The start, and the number of components that the command gives.
+    start: (State, Option<usize>),
     settings: Settings,
 }
 
 impl<'c> Request<'c> {
-    /// Reads a command that a report shows. The last of several values counts.
+    /// Reads a command that a report shows. If an option other than `--set` is repeated, the last one counts.
     fn parse(command: &'c str) -> Result<Request<'c>, String> {
         let mut request =
-            Request { model: DEFAULT, sets: Vec::new(), start: REST, settings: Settings::default() };
-        let arguments = command.trim().strip_prefix("rattlemap orbit").ok_or("not a command of an orbit")?;
+            Request { model: DEFAULT, sets: Vec::new(), start: (REST, None), settings: Settings::default() };
+        let arguments = command.trim().strip_prefix("rattlemap orbit");
+        let arguments = arguments.filter(|rest| rest.is_empty() || rest.starts_with(' '));
+        let arguments = arguments.ok_or("not a command of an orbit")?;
         for argument in arguments.split(" --").map(str::trim).filter(|argument| !argument.is_empty()) {
             let wrong = || format!("--{argument} cannot be read");
             match argument.split_once(' ').ok_or_else(wrong)? {
@@ -87,10 +104,11 @@ impl<'c> Request<'c> {
                     request.settings.transient_periods = value.parse().map_err(|_| wrong())?
                 }
                 ("start", value) => {
-                    request.start = REST;
+                    let mut state = REST;
                     for (n, number) in value.split(',').enumerate() {
-                        *request.start.get_mut(n).ok_or_else(wrong)? = number.parse().map_err(|_| wrong())?;
+                        *state.get_mut(n).ok_or_else(wrong)? = number.parse().map_err(|_| wrong())?;
                     }
+                    request.start = (state, Some(value.split(',').count()));
                 }
                 _ => return Err(wrong()),
             }
@@ -135,6 +153,8 @@ mod tests {
             ("rattlemap orbit --set e=2", "e"),
             ("rattlemap orbit --start 1,2,3,4,5", "--start 1,2,3,4,5 cannot be read"),
             ("rattlemap orbit --json", "--json cannot be read"),
+            ("rattlemap orbit --start 1,2", "x1, v1, x2, v2"),
+            ("rattlemap orbit --model model.toml", "no file of the model model.toml"),
         ] {
             let found = result(command, "");
             assert!(

@@ -71,8 +71,8 @@ impl OrbitFigure {
         write_figure(out, format, &self.draw(style, plot))
     }
 
-    /// Draws the figure of an orbit and returns it as SVG. A page calls this, because [`OrbitFigure::write`] links the
-    /// writers of all formats.
+    /// Draws the figure of an orbit and returns it as SVG. WebAssembly calls this, because [`OrbitFigure::write`] would add the
+    /// writers of PNG and PDF to it.
     pub fn svg(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> String {
         svg(&self.draw(style, plot))
     }

@@ -8,8 +8,8 @@ let wasm_bindgen = (function(exports) {
      * Computes the motion of a `rattlemap orbit` command, and draws it.
      *
      * `command` is the text that a report shows for a cell. `model` is the text of the map's own model file; it is empty for a
-     * built-in model. Returns a JSON object: `summary`, the text that the command prints, and `figures`, an SVG image by the
-     * name of its file; or `error`, a message.
+     * built-in model. Returns a JSON object: `summary`, the text that the command prints, and `figures`, SVG images, keyed by
+     * the figure's name; or `error`, a message.
      * @param {string} command
      * @param {string} model
      * @returns {string}

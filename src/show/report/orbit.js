@@ -1,50 +1,81 @@
-// The motion of the selected cell, computed in a worker by the same code as `rattlemap orbit`.
+// The motion of the selected cell. A worker computes it with the code of `rattlemap orbit`.
 
 const FIGURES = ["gap", "phase_plane", "time_history"];
-let orbitWorker = null;
-// The cell whose motion was asked for last, whether the worker is busy, and the cell that it computes.
-let wantedCell = null;
-let isBusy = false;
-let begun = 0;
+// Time in ms after which a newer selection stops a computation.
+const PATIENCE = 300;
 
-// Starts the worker when the first cell is selected: the engine is unpacked only then.
-async function startWorker() {
-  const script = new Blob([byId("worker").textContent], { type: "text/javascript" });
-  orbitWorker = new Worker(URL.createObjectURL(script));
-  orbitWorker.addEventListener("message", ({ data }) => {
-    isBusy = false;
-    if (data.cell === cellName(wantedCell)) showMotion(JSON.parse(data.result));
-    else askWorker();
-  });
-  orbitWorker.addEventListener("error", ({ message }) => showMotion({ error: `the engine cannot run here: ${message}` }));
-  const wasm = await unpack({ data: byId("engine").textContent, type: "u8" });
-  orbitWorker.postMessage({ wasm });
+// The compiled engine, a promise; none before the first selection.
+let engine = null;
+// The worker that is computing or idle; none before the first selection, and after a failure.
+let worker = null;
+// The selected cell whose motion is shown or wanted.
+let wanted = null;
+// The request that the worker computes, with the time at which it began; none if the worker is idle.
+let request = null;
+
+// Compiles the engine once. A page without a selection never unpacks it.
+function compiled() {
+  engine ??= unpack({ data: byId("engine").textContent, type: "u8" }).then((bytes) => WebAssembly.compile(bytes));
+  return engine;
 }
 
-const cellName = (cell) => (cell ? `${cell.i},${cell.j}` : "");
-
-// Asks for the motion of a cell. Only the newest of several cells is computed.
+// Shows the motion of a cell; none hides it.
 function showOrbit(cell) {
-  wantedCell = cell;
+  wanted = cell;
   byId("motion").hidden = byId("orbit").hidden = !cell || map.model_file === null;
   if (byId("motion").hidden) return;
+  const { i, j } = cell;
+  byId("which-motion").textContent = byId("which-orbit").textContent = `Motion of cell ${i}, ${j}`;
   byId("computing").textContent = "computing\u2026";
-  if (!isBusy) askWorker();
+  for (const id of ["motion", "orbit"]) byId(id).setAttribute("aria-busy", "true");
+  if (request && performance.now() - request.begun > PATIENCE) stopWorker();
+  if (!request) compute().catch(fail);
 }
 
-function askWorker() {
-  if (!wantedCell) return;
-  isBusy = true;
-  begun = performance.now();
-  const request = { cell: cellName(wantedCell), command: byId("command").textContent, model: map.model_file };
-  const send = () => orbitWorker.postMessage(request);
-  if (orbitWorker) send();
-  else startWorker().then(send, (error) => showMotion({ error: String(error) }));
+async function compute() {
+  const { i, j } = wanted;
+  const own = { cell: `${i},${j}`, command: byId("command").textContent, model: map.model_file };
+  request = { ...own, begun: performance.now() };
+  const mine = request;
+  const module = await compiled();
+  // A newer selection may have stopped this request.
+  if (request !== mine) return;
+  if (!worker) startWorker(module);
+  worker.postMessage(own);
 }
 
-function showMotion({ summary, figures, error }) {
+function startWorker(module) {
+  const script = URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" }));
+  worker = new Worker(script);
+  worker.addEventListener("message", ({ data: { cell, result, broken } }) => {
+    URL.revokeObjectURL(script);
+    const took = performance.now() - request.begun;
+    request = null;
+    // After a fault the engine's memory may be damaged.
+    if (broken) stopWorker();
+    if (cell === `${wanted?.i},${wanted?.j}`) showMotion(JSON.parse(result), took);
+    else if (wanted) compute().catch(fail);
+  });
+  worker.addEventListener("error", (event) => fail(event.message || "this browser refuses it"));
+  worker.postMessage({ module });
+}
+
+function stopWorker() {
+  worker?.terminate();
+  worker = request = null;
+}
+
+// Reports a failure. The next selection tries again.
+function fail(error) {
+  stopWorker();
+  engine = null;
+  showMotion({ error: `the engine cannot run: ${error}` });
+}
+
+function showMotion({ summary, figures, error }, took) {
+  for (const id of ["motion", "orbit"]) byId(id).removeAttribute("aria-busy");
   byId("computing").textContent = error ? `Not computed: ${error}`
-    : `computed in this page in ${Math.round(performance.now() - begun)} ms; the last digits may differ from the program's`;
+    : `computed in this page in ${Math.round(took)} ms; the last digits may differ from the program's`;
   byId("summary").textContent = summary ?? "";
   for (const name of FIGURES) {
     const image = byId(name);
@@ -54,4 +85,7 @@ function showMotion({ summary, figures, error }) {
   }
 }
 
-byId("numbers").addEventListener("click", () => byId("orbit").scrollIntoView({ behavior: "smooth" }));
+byId("numbers").addEventListener("click", () => {
+  byId("summary").focus({ preventScroll: true });
+  byId("orbit").scrollIntoView({ behavior: "smooth" });
+});

@@ -1,15 +1,14 @@
 
-// Runs in the worker: first receives the engine, then commands.
-let ready = null;
-onmessage = async ({ data }) => {
-  if (data.wasm) {
-    ready = wasm_bindgen({ module_or_path: data.wasm });
+// Runs in the worker, after the code that wasm-bindgen made. It first receives the engine, then commands.
+onmessage = ({ data }) => {
+  if (data.module) {
+    wasm_bindgen.initSync({ module: data.module });
     return;
   }
+  const { cell, command, model } = data;
   try {
-    await ready;
-    postMessage({ cell: data.cell, result: wasm_bindgen.orbit(data.command, data.model) });
+    postMessage({ cell, result: wasm_bindgen.orbit(command, model) });
   } catch (error) {
-    postMessage({ cell: data.cell, result: JSON.stringify({ error: String(error) }) });
+    postMessage({ cell, broken: true, result: JSON.stringify({ error: `the engine stopped (${error}); try the command` }) });
   }
 };
