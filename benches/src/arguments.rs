@@ -104,7 +104,10 @@ pub(crate) struct Scale {
 ///
 /// All motions of the map end after one forcing period, so that lanes cost next to nothing. Prints wall time, processor time of
 /// all threads and that of the main thread for each phase, per million cells, and the device's dispatches, submissions and
-/// waits. Without --gpu, the engine alone then computes the same cells (lanes); "host" is the sum of all phases without its time. Writes host_cost.csv, and the map into a folder of its own. manifest.json there has the time of each file.
+/// waits. Writes host_cost.csv, and the map into a folder of its own. manifest.json there has the time of each file.
+///
+/// Without --gpu, the processor's engine then computes the same cells alone. Row `lanes` is its time. Row `host` is the sum of all
+/// phases minus `lanes`.
 #[derive(Debug, Args)]
 pub(crate) struct HostCost {
     #[command(flatten)]

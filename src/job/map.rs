@@ -270,7 +270,7 @@ impl<'p> MapRun<'p> {
         let clock = Instant::now();
         let MapRun { open: OpenMap { engine, observer, .. }, records: stored, work, done, .. } = self;
         let Work { plan, schedule, records, tally, .. } = work;
-        // The schedule takes the records that it reads at once; the thread that stores all records takes the others.
+        // `sweep::run` keeps the records that a schedule reads. The thread that writes the file keeps those of other maps.
         let mut unread = RecordStore::default();
         let (read, mut kept) = match schedule.reads_records() {
             true => (records, None),
@@ -279,7 +279,7 @@ impl<'p> MapRun<'p> {
         let mut is_first = *done == 0;
         observer.progress(*done, schedule.expected());
         let is_finished = thread::scope(|scope| {
-            // A batch may be large, so none waits in the channel.
+            // The channel holds no batch, because each may take hundreds of megabytes.
             let (sender, batches) = mpsc::sync_channel(0);
             let take = |batch: &[(u32, Record)]| {
                 tally.take(plan, batch);

@@ -19,7 +19,7 @@ const BATCH_SECONDS: f64 = 1.0;
 /// Longest time that records wait until they are stored.
 const STORE_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Number of records from which a batch is stored alone: it is not copied into another, and fills a batch of the file.
+/// A batch of at least this many records is not joined to others, because joining would copy it.
 const LARGE: usize = 1 << 16;
 
 /// Cells per core in an engine's smallest batch.
