@@ -75,7 +75,8 @@ function fail(error) {
 function showMotion({ summary, figures, error }, took) {
   for (const id of ["motion", "orbit"]) byId(id).removeAttribute("aria-busy");
   byId("computing").textContent = error ? `Not computed: ${error}`
-    : `computed in this page in ${Math.round(took)} ms; the last digits may differ from the program's`;
+    : `computed in this page in ${Math.round(took)} ms, over as many periods as the class needs, which may be more than the map's; `
+      + "the last digits may differ from the program's";
   byId("summary").textContent = summary ?? "";
   for (const name of FIGURES) {
     const image = byId(name);
