@@ -22,16 +22,12 @@ report=src/show/report
 gzip -9 --no-name --stdout "$out/rattlemap_web_bg.wasm" > "$report/engine.wasm.gz"
 cp "$out/rattlemap_web.js" "$report/engine.js"
 
-# What the engine is compiled from.
+# What the engine is compiled from. The page's own files are not part of it.
 sources=(
-    Cargo.lock models web dynamics/src src/text src/model_file src/record src/map/scene src/map/scene.rs
-    src/show/drawing src/show/drawing.rs src/show/figure/orbit src/show/figure/orbit.rs
-    src/show/orbit_quantities.rs src/show/orbit_spectrum.rs src/show/orbit_summary.rs
-    src/show/color.rs src/show/instant.rs src/show/names.rs src/show/numbers.rs src/show/parameters.rs
-    src/show/symbols.rs src/show/wall_labels.rs
+    Cargo.lock models web dynamics/src src/lib.rs src/text src/model_file src/record src/map src/findings src/show src/validate
 )
 {
-    find "${sources[@]}" -type f | LC_ALL=C sort | xargs sha256sum | sha256sum
+    find "${sources[@]}" -type f -not -path "$report/*" | LC_ALL=C sort | xargs sha256sum | sha256sum
     sha256sum < "$report/engine.wasm.gz"
     sha256sum < "$report/engine.js"
 } | cut -d ' ' -f 1 > "$report/engine.sha256"

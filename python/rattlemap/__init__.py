@@ -19,6 +19,7 @@ from .check import FileFault, check  # noqa: E402
 from .compare import Comparison, compare  # noqa: E402
 from .devices import Devices, devices  # noqa: E402
 from .errors import EngineError, FolderError, ModelError, RattlemapError, SceneError  # noqa: E402
+from .explore import Explorer, explore  # noqa: E402
 from .folder import open  # noqa: A004, E402
 from .map import map  # noqa: A004, E402
 from .model import Model, gear_pair, load_model  # noqa: E402
@@ -31,6 +32,7 @@ __all__ = [
     "Comparison",
     "Devices",
     "EngineError",
+    "Explorer",
     "FileFault",
     "FolderError",
     "Model",
@@ -46,6 +48,7 @@ __all__ = [
     "check",
     "compare",
     "devices",
+    "explore",
     "gear_pair",
     "load_model",
     "map",

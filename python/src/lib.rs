@@ -6,6 +6,7 @@
 mod arrays;
 mod bifurcation;
 mod devices;
+mod explore;
 mod finished;
 mod map;
 mod model;
@@ -26,6 +27,7 @@ mod _native {
     use super::{
         bifurcation::bifurcation,
         devices::devices,
+        explore::explore_page,
         finished::{check_folder, compare, manifest, validate},
         map::{colors, map},
         model::{Model, models},

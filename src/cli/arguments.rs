@@ -117,6 +117,7 @@ pub(crate) enum Command {
     Merge(Merge),
     Orbit(Orbit),
     Bifurcation(Bifurcation),
+    Explore(Explore),
     Models(Models),
     /// List the processor and the graphics adapters, and the engine that `--engine auto` chooses
     ///
@@ -658,6 +659,54 @@ impl Bifurcation {
         let mut name = self.run.stem().to_owned();
         name.push(format!(".{along}{at}"));
         Path::new("out").join(name)
+    }
+}
+
+/// Open a page in which a map can be explored: zooming and sliders compute
+///
+/// Of a scene, computes a map of at most 65 x 65 cells and writes one page, which needs no other file and no network. The page
+/// computes finer cells of what is visible, in f64, on as many processor cores as the browser offers. A click on a cell shows its
+/// motion; sliders change the parameters; the address of the page keeps all of it. Of the folder of a finished map, opens its
+/// report.html, which computes in the same way.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    rattlemap explore scenes/e_omega.toml\n  \
+    rattlemap explore scenes/e_omega.toml --set F=40 --out f40.html\n  \
+    rattlemap explore out/e_omega")]
+pub(crate) struct Explore {
+    /// Scene of a map, or folder of a finished map
+    #[arg(value_name = "SCENE|DIR")]
+    pub(crate) what: PathBuf,
+
+    /// Set a parameter or a setting of the scene, as in `rattlemap map`. May be repeated. Example: --set F=45
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    pub(crate) set: Vec<String>,
+
+    /// File to write the page to [default: the scene's name with the extension .explore.html, in the current folder; it is
+    /// replaced]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Replace the file that --out names
+    #[arg(long, requires = "out")]
+    pub(crate) force: bool,
+
+    /// Write the page without opening a browser
+    #[arg(long)]
+    pub(crate) no_open: bool,
+
+    /// Print only errors and warnings
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl Explore {
+    /// The file of a scene's page.
+    pub(crate) fn out(&self) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| {
+            let name = self.what.file_stem().map_or_else(|| "map".into(), |stem| stem.to_os_string());
+            Path::new(&name).with_extension("explore.html")
+        })
     }
 }
 

@@ -8,6 +8,7 @@ mod compare;
 mod completions;
 mod console;
 mod devices;
+mod explore;
 pub mod failure;
 mod interrupt;
 mod map;
@@ -54,6 +55,7 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Bifurcation(arguments) => bifurcation::run(&arguments),
         Command::Models(arguments) => models::run(&arguments),
+        Command::Explore(arguments) => explore::run(&arguments),
         Command::Devices => devices::run(),
         Command::Validate(arguments) => validate::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),

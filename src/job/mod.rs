@@ -8,6 +8,7 @@ pub mod dry_run;
 pub mod engine_choice;
 pub mod environment;
 pub mod error;
+pub mod explore;
 mod finished;
 pub mod forecast;
 pub mod map;

@@ -3,7 +3,8 @@
 //! The page's own code is in `report/`. Its data are JSON. Arrays over the cells are little endian numbers, compressed with
 //! gzip and encoded in base64.
 //!
-//! A click on a cell computes its motion: the page contains `web/` as WebAssembly.
+//! The page computes, too: it contains `web/` as WebAssembly. A click on a cell computes its motion. Zooming computes what is
+//! visible with finer cells, and sliders change the parameters of all cells.
 //!
 //! The page's security policy allows only its own script and style, and what the script makes. Texts from a scene or a manifest are never executed.
 
@@ -20,8 +21,9 @@ use sha2::{Digest, Sha256};
 
 use crate::map::scene::{Axis, Quantity, Rule, Scale, Scene, Target};
 use crate::model_file::FileModel;
+use crate::record::Record;
 use crate::show::cells::{Cells, Row, Source};
-use crate::show::color::hex;
+use crate::show::color::{Color, hex};
 use crate::show::error::WriteError;
 use crate::show::layers::{Bar, Layer, NamedColor};
 use crate::show::provenance::Provenance;
@@ -29,6 +31,7 @@ use crate::show::symbols::{axis_label, symbol};
 use crate::show::table::attractors_csv::attractor_name;
 use crate::show::words::{MapWords, WordIndex};
 use crate::show::{caption, refinement, replay};
+use rattlemap_dynamics::model::Parameter;
 use rattlemap_dynamics::orbit::{Class, Status};
 
 const PAGE: &str = include_str!("report/page.html");
@@ -40,6 +43,7 @@ const SCRIPT: &str = concat!(
     include_str!("report/panel.js"),
     include_str!("report/input.js"),
     include_str!("report/orbit.js"),
+    include_str!("report/live.js"),
     include_str!("report/checks.js"),
     include_str!("report/start.js"),
 );
@@ -56,15 +60,14 @@ const ENGINE: &[u8] = &[];
 #[cfg(target_arch = "wasm32")]
 const WORKER: &str = "";
 
-/// Writes the page, with a section on the validation if there was one.
-pub fn write(
-    mut page: impl Write,
+/// Returns the data of the page, with those of the validation if there was one.
+pub fn data(
     cells: &Cells<'_>,
     made: &Provenance<'_>,
     layers: &[Layer],
     words: &MapWords,
     validation: Option<&Value>,
-) -> Result<(), WriteError> {
+) -> Value {
     let scene = cells.scene();
     let components = scene.base().state_names().len();
     let attractors = cells.basins().into_iter().flat_map(|basins| basins.attractors().iter().enumerate());
@@ -73,6 +76,7 @@ pub fn write(
         "title": scene.title(),
         "subtitle": caption::integration(scene),
         "fixed": caption::all_fixed(scene),
+        "parameters": scene.fixed().map(parameter).collect::<Vec<_>>(),
         "made": {
             "engine": made.engine,
             "precision": made.precision,
@@ -92,6 +96,7 @@ pub fn write(
         // Text of the map's own model file; empty for a built-in model, absent for a model that is not a file.
         "model_file": scene.base().downcast_ref::<FileModel>().map(own_text),
         "components": components,
+        "live": live(cells),
         // Start state of the first cell, if axes sweep components of it.
         "start": scene.sweeps_start().then(|| cells.start(0)[..components].to_vec()),
         "layers": layers.par_iter().map(layer).collect::<Vec<_>>(),
@@ -110,12 +115,20 @@ pub fn write(
         let starts: Vec<[f64; 4]> = (0..cells.count()).map(|id| cells.start(id)).collect();
         data["starts"] = packed("f64", &starts);
     }
+    data
+}
+
+/// Writes the page.
+///
+/// # Errors
+/// If a write fails.
+pub fn write(mut page: impl Write, data: &Value) -> Result<(), WriteError> {
     // The script contains that of the worker, so that the policy's hash covers both.
     let worker = json!(WORKER).to_string().replace('<', "\\u003c");
     let [style, script] = [STYLE, &format!("{SCRIPT}const WORKER = {worker};\n")].map(inline);
     let engine = STANDARD.encode(ENGINE);
     let policy = policy(&style, &script);
-    let title = scene.title().replace('&', "&amp;").replace('<', "&lt;");
+    let title = data["title"].as_str().unwrap_or_default().replace('&', "&amp;").replace('<', "&lt;");
     // The data are long, so they are neither searched for marks nor copied.
     let mut rest = PAGE;
     for (mark, text) in [
@@ -130,7 +143,7 @@ pub fn write(
         page.write_all(before.as_bytes())?;
         match text {
             Some(text) => page.write_all(text.as_bytes())?,
-            None => serde_json::to_writer(InScript(&mut page), &data)?,
+            None => serde_json::to_writer(InScript(&mut page), data)?,
         }
         rest = after;
     }
@@ -247,6 +260,29 @@ fn packed<T: NoUninit>(kind: &'static str, values: &[T]) -> Value {
     json!({ "type": kind, "data": STANDARD.encode(bytes.unwrap_or_default()) })
 }
 
+/// Returns what workers of the page need to compute parts of the map: the number of runs per cell and the size of a record.
+/// Null if they cannot, because cells are listed or follow their neighbours, or the model is not a file.
+fn live(cells: &Cells<'_>) -> Option<Value> {
+    let scene = cells.scene();
+    let can = scene.list().is_none()
+        && !scene.start().follows()
+        && scene.base().downcast_ref::<FileModel>().is_some();
+    can.then(|| json!({ "starts": cells.runs() / cells.count(), "record_bytes": size_of::<Record>(), "at_once": false }))
+}
+
+/// Returns a parameter that the page can change. Ends of its range that do not exist are null.
+fn parameter((parameter, value): (&Parameter, f64)) -> Value {
+    let [min, max] = parameter.range.ends();
+    json!({
+        "name": parameter.name,
+        "symbol": symbol(&parameter.name),
+        "label": axis_label(parameter),
+        "value": value,
+        "min": min,
+        "max": max,
+    })
+}
+
 fn axis(axis: &Axis) -> Value {
     let parameter = axis.parameter();
     let mut object = json!({
@@ -268,6 +304,21 @@ fn axis(axis: &Axis) -> Value {
     object
 }
 
+/// Returns, for each colour of the palette, the number of the legend's entry that includes it, if there is one.
+///
+/// Colours without an entry of their own follow the first one of their entry, except that the shades of a bar are one entry.
+fn entries_of(layer: &Layer) -> Vec<Option<usize>> {
+    let position = |color: &Color| layer.entries.iter().position(|entry| entry.color == *color);
+    let shades = layer.bar.as_ref().filter(|_| layer.numbers.is_none()).map_or(0, |bar| bar.colors.len());
+    let (named, shades) = layer.palette.split_at(layer.palette.len() - shades);
+    let of_shades = shades.iter().find_map(position);
+    let following = named.iter().scan(None, |last, color| {
+        *last = position(color).or(*last);
+        Some(*last)
+    });
+    following.chain(shades.iter().map(|_| of_shades)).collect()
+}
+
 fn layer(layer: &Layer) -> Value {
     let entry =
         |entry: &NamedColor| json!({ "color": hex(entry.color), "text": entry.text, "cells": entry.cells });
@@ -286,6 +337,7 @@ fn layer(layer: &Layer) -> Value {
         "title": layer.title,
         "palette": layer.palette.iter().copied().map(hex).collect::<Vec<_>>(),
         "entries": layer.entries.iter().map(entry).collect::<Vec<_>>(),
+        "entry_of": entries_of(layer),
         "bar": layer.bar.as_ref().map(bar),
     });
     // The page gives numbers their colours, because their range follows the view.

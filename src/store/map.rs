@@ -35,7 +35,8 @@ pub use crate::store::manifest::map::{Run, ShardOrigin};
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const WORDS: &str = "words.csv";
-const HTML: &str = "report.html";
+/// Name of the report.
+pub const REPORT: &str = "report.html";
 const ATTRACTORS: &str = "attractors.csv";
 
 /// Layers that have figures, without those of measured quantities, whose names depend on the model.
@@ -50,7 +51,7 @@ const MOST_VALIDATION_BYTES: u64 = 1_000_000_000;
 
 /// Names of all files that are made from a map's records.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
-    let tables = [MANIFEST, CSV, NPY, WORDS, ATTRACTORS, HTML, VALIDATION].map(str::to_owned);
+    let tables = [MANIFEST, CSV, NPY, WORDS, ATTRACTORS, REPORT, VALIDATION].map(str::to_owned);
     let figures = LAYERS.into_iter().flat_map(|layer| names::figures(layer).map(|(_, name)| name));
     tables.into_iter().chain(figures).collect()
 });
@@ -87,7 +88,7 @@ fn write_list(folder: &Folder, list: &List) -> Result<(), OutputError> {
 pub fn formats(folder: &Path) -> Vec<Format> {
     let listed = inventory::listed(&inventory::stored(folder));
     let has = |name: &str| listed.iter().any(|file| file.name == name);
-    let tables = [(Format::Csv, CSV), (Format::Npy, NPY), (Format::Html, HTML)];
+    let tables = [(Format::Csv, CSV), (Format::Npy, NPY), (Format::Html, REPORT)];
     let tables = tables.into_iter().filter(|(_, name)| has(name)).map(|(format, _)| format);
     tables.chain(inventory::figure_formats(folder, "map")).collect()
 }
@@ -146,9 +147,9 @@ pub fn write_validation(
     let object = validation_json::object(cells, validated);
     folder.write_json(VALIDATION, &object)?;
     let mut files = vec![VALIDATION];
-    if folder.path().join(HTML).is_file() {
-        write_files(folder, cells, &validated.made, Some(&object), &|name| name == HTML)?;
-        files.push(HTML);
+    if folder.path().join(REPORT).is_file() {
+        write_files(folder, cells, &validated.made, Some(&object), &|name| name == REPORT)?;
+        files.push(REPORT);
     }
     inventory::update(folder, &files, ("validate", elapsed.as_secs_f64()))?;
     Ok(files)
@@ -268,7 +269,7 @@ fn write_pictures(
 ) -> Result<Vec<String>, OutputError> {
     let asks = |format| cells.scene().outputs().files.contains(&format);
     let mut files = Vec::new();
-    let wants_page = asks(Format::Html) && wanted(HTML);
+    let wants_page = asks(Format::Html) && wanted(REPORT);
     let formats: Vec<Format> = Format::FIGURES.into_iter().filter(|&format| asks(format)).collect();
     let names = |layer: &str| -> Vec<(Format, String)> {
         formats.iter().map(|&format| (format, names::figure(layer, format))).collect()
@@ -295,8 +296,9 @@ fn write_pictures(
         files.extend(figures.into_iter().map(|(.., name)| name));
     }
     if wants_page {
-        folder.replace(HTML, |out| report::write(out, cells, made, &layers, words, validation))?;
-        files.push(HTML.to_owned());
+        let data = report::data(cells, made, &layers, words, validation);
+        folder.replace(REPORT, |out| report::write(out, &data))?;
+        files.push(REPORT.to_owned());
     }
     Ok(files)
 }

@@ -1,7 +1,9 @@
-//! The engine of reports: computes the motion of one cell in the browser.
+//! The engine of reports: computes motions and parts of maps in the browser.
 //!
 //! `scripts/wasm.sh` compiles this crate to WebAssembly. `rattlemap::show::report` puts it into `report.html`, where a worker
 //! calls [`orbit()`] with the command that replays the selected cell.
+
+mod window;
 
 use std::sync::atomic::AtomicBool;
 
@@ -14,6 +16,8 @@ use rattlemap_dynamics::model::{Model, REST, State};
 use rattlemap_dynamics::orbit::{self, Class, Settings};
 use serde_json::{Map, Value, json};
 use wasm_bindgen::prelude::wasm_bindgen;
+
+pub use window::Window;
 
 /// Width in points of gap and phase planes, which stand beside the map. The time history stands below the map and has the
 /// default width.

@@ -50,6 +50,16 @@ impl Range {
             }
     }
 
+    /// Returns the least and the greatest value; infinite where there is no bound.
+    pub fn ends(self) -> [f64; 2] {
+        match self {
+            Range::Positive | Range::NonNegative => [0.0, f64::INFINITY],
+            Range::Unit => [0.0, 1.0],
+            Range::Finite => [f64::NEG_INFINITY, f64::INFINITY],
+            Range::Between { min, max, .. } => [min, max],
+        }
+    }
+
     /// Returns the range in words that complete the sentence "it must be ...".
     pub fn requirement(self) -> Cow<'static, str> {
         Cow::Borrowed(match self {

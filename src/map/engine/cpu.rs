@@ -35,6 +35,12 @@ impl<'p> Cpu<'p> {
         Cpu { plan, flows: Flows::new(plan), under_way: Vec::new(), halt: Arc::default() }
     }
 
+    /// Computes cells at once and returns their records in the same order.
+    pub fn compute(&self, cells: &[Cell]) -> Vec<Record> {
+        // A flag is raised only through an engine that owns this one.
+        cells.par_iter().with_max_len(1).map(|cell| self.cell(cell).unwrap_or_default()).collect()
+    }
+
     pub(super) fn begin(&mut self, cells: &[Cell]) {
         self.under_way.extend(cells);
     }

@@ -26,6 +26,13 @@ pub struct Layer {
     pub(crate) bar: Option<Bar>,
 }
 
+impl Layer {
+    /// Returns the name of the layer's figures.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+}
+
 /// A colour with a name.
 #[derive(Clone, Debug)]
 pub struct NamedColor {

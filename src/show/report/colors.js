@@ -1,5 +1,16 @@
 // The colours of a layer: its range of numbers, which fits the visible cells, and its legend.
 
+// The legend's entry that is shown alone; none shows all.
+let isolated = null;
+// Colour of the cells that are not shown.
+const HIDDEN = "b8b8b8";
+
+// Returns the palette of a layer. If an entry is isolated, all other colours are replaced.
+function isolatedPalette({ palette, entries, entry_of: of }) {
+  const entry = entries.findIndex(({ text }) => text === isolated);
+  return entry < 0 ? palette : palette.map((color, index) => (of[index] === entry ? color : HIDDEN));
+}
+
 // Whether the colours span the numbers of the whole map.
 let spansMap = false;
 
@@ -8,15 +19,16 @@ const BEYOND = 0.005;
 const INSPECTED = 200000;
 
 // Returns the ends of the numbers in the visible cells; those of the whole map if all cells are visible or none has a number.
-function visibleRange({ bar: { low, high }, values: numbers }) {
+function visibleRange({ place, columns: across, rows: up }, { bar: { low, high }, values: numbers }) {
   if (spansMap || showsAll()) return [low, high];
-  const [i0, i1] = visible(map.axes[0], view.left, view.width);
-  const [j0, j1] = visible(map.axes[1], view.bottom, view.height);
+  const [width, height] = [place.width / across, place.height / up];
+  const [i0, i1] = visible(across, (view.left - place.left) / width, view.width / width);
+  const [j0, j1] = visible(up, (view.bottom - place.bottom) / height, view.height / height);
   const step = Math.max(1, Math.ceil(Math.sqrt(((i1 - i0 + 1) * (j1 - j0 + 1)) / INSPECTED)));
   const found = [];
   for (let j = j0; j <= j1; j += step) {
     for (let i = i0; i <= i1; i += step) {
-      const number = numbers[j * columns + i];
+      const number = numbers[j * across + i];
       if (Number.isFinite(number)) found.push(number);
     }
   }
@@ -30,27 +42,23 @@ function visibleRange({ bar: { low, high }, values: numbers }) {
 
 // Returns the index of a number's colour. The last index is for cells without a number.
 function level({ bar: { low, high }, range: [from, to], palette }, number) {
-  const top = palette.length - 2;
-  if (Number.isNaN(number)) return top + 1;
+  const last = palette.length - 2;
+  if (Number.isNaN(number)) return last + 1;
   let share;
   if (low >= 0) share = (number - from) / (to - from);
   // Each side of zero uses all its colours.
   else share = ((number < 0 ? low * Math.min(number / from, 1) : to > 0 ? high * Math.min(number / to, 1) : 0) - low) / (high - low);
-  return Math.round(top * within(share, 0, 1));
+  return Math.round(last * within(share, 0, 1));
 }
 
 // Fits the colours of the current layer to the visible cells.
 function fitColors() {
-  const current = map.layers[layer];
+  const sheet = uppermost();
+  const current = layerOf(sheet);
   if (!current.ready) return;
-  if (current.values) {
-    const range = visibleRange(current);
-    if (!current.range || range.some((end, k) => end !== current.range[k])) {
-      current.range = range;
-      current.picture = null;
-    }
-  }
+  if (current.values) current.range = visibleRange(sheet, current);
   showBar(current);
+  showLegend(sheet, current);
   draw();
 }
 
@@ -80,23 +88,41 @@ function showBar(current) {
 }
 
 function showLayer(index) {
+  if (layer !== index) isolated = null;
   layer = index;
-  const current = map.layers[layer];
   [...byId("layers").children].forEach((button, k) => button.setAttribute("aria-checked", k === layer));
+  fitColors();
+  updateLink();
+}
+
+// Lists the named colours with their shares of the cells. An entry of a layer without numbers can be shown alone.
+function showLegend({ columns: across, rows: up }, current) {
   byId("legend-title").textContent = current.title;
   byId("legend").replaceChildren(...current.entries.map(({ color, text, cells }) => {
     const patch = element("span", undefined, "patch");
     patch.style.background = `#${color}`;
-    const share = (100 * cells) / (columns * rows);
-    const item = element("li");
+    const share = (100 * cells) / (across * up);
+    const few = cells === 1 ? "1 cell" : `${cells} cells`;
     const name = element("span", text);
     name.title = text;
-    const few = cells === 1 ? "1 cell" : `${cells} cells`;
-    item.append(patch, name, element("span", share < 0.1 ? few : `${share.toFixed(1)} %`));
+    const parts = [patch, name, element("span", share < 0.1 ? few : `${share.toFixed(1)} %`)];
+    const item = element("li");
+    if (current.values) {
+      item.append(...parts);
+      return item;
+    }
+    const button = element("button");
+    button.type = "button";
+    button.title = "show these cells alone";
+    button.setAttribute("aria-pressed", text === isolated);
+    button.append(...parts);
+    button.addEventListener("click", () => {
+      isolated = text === isolated ? null : text;
+      fitColors();
+    });
+    item.append(button);
     return item;
   }));
-  fitColors();
-  updateLink();
 }
 
 byId("whole").addEventListener("change", (event) => {

@@ -4,35 +4,91 @@ const map = JSON.parse(document.getElementById("map").textContent);
 const [columns, rows] = map.axes.map((axis) => axis.count);
 const byId = (id) => document.getElementById(id);
 
-let values = {};
-// Start states of cells that follow their neighbours: four numbers per cell.
-let starts = null;
 let layer = 0;
-// The visible part of the map, in cells: its lower left corner and its extent.
+// The visible part of the map, in cells of the program's map: its lower left corner and its extent. Cell i spans i to i + 1.
 const everything = { left: 0, bottom: 0, width: columns, height: rows };
 let view = { ...everything };
+// Cells: a sheet with two indices.
 let pointerCell = null;
 let selectedCell = null;
 
+// A sheet is a map that the page shows: data, unpacked arrays, and the place that it covers, as a view has it.
+const sheetOf = (data, place) => ({ data, place, values: {}, starts: null, columns: data.axes[0].count, rows: data.axes[1].count });
+// The map that the program computed, and the window that this page computes, if there is one.
+const base = sheetOf(map, everything);
+let live = null;
+// Parameters that differ from those of the program's map, by name.
+let changes = {};
+const isChanged = () => Object.keys(changes).length > 0;
+
+// Sheets from the lowest to the uppermost. The program's map has other parameters than a changed window.
+const shown = () => [...(isChanged() ? [] : [base]), ...(live ? [live] : [])];
+// The sheet to which colours and legend belong: the computed window while it covers the view.
+const uppermost = () => (live && (isChanged() || covers(live.made, view)) ? live : base);
+const layerOf = (sheet) => sheet.data.layers.find(({ name }) => name === map.layers[layer].name);
+const covers = (outer, { left, bottom, width, height }) => {
+  const slack = 1e-6 * Math.max(outer.width, outer.height);
+  return left >= outer.left - slack && bottom >= outer.bottom - slack
+    && left + width <= outer.left + outer.width + slack && bottom + height <= outer.bottom + outer.height + slack;
+};
 const showsAll = () => view.width >= columns && view.height >= rows;
 const within = (x, low, high) => Math.min(Math.max(x, low), high);
 
 async function unpack({ data, type }) {
-  const packed = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+  const text = atob(data);
+  const packed = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; k++) packed[k] = text.charCodeAt(k);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const buffer = await new Response(stream).arrayBuffer();
   const types = { u8: Uint8Array, i8: Int8Array, u32: Uint32Array, f32: Float32Array, f64: Float64Array };
   return new types[type](buffer);
 }
 
-const axisValue = ({ min, max, count, values }, i) =>
-  values ? values[i] : i >= count - 1 ? max : Math.min(min + ((max - min) * i) / (count - 1), max);
+// Unpacks the arrays of a sheet.
+async function fill(sheet) {
+  const { data } = sheet;
+  const names = Object.keys(data.values);
+  const unpacked = await Promise.all(names.map((name) => unpack(data.values[name])));
+  sheet.values = Object.fromEntries(names.map((name, k) => [name, unpacked[k]]));
+  if (data.starts) sheet.starts = await unpack(data.starts);
+  for (const derived of data.derived) derived.values = await unpack(derived);
+  await Promise.all(data.layers.map(async (packed) => {
+    if (packed.values) packed.values = await unpack(packed.values);
+    else packed.indices = await unpack(packed.indices);
+    packed.ready = true;
+  }));
+  return sheet;
+}
+
+// Returns the value of an axis at an index, which may lie between two cells of a linear or logarithmic axis.
+function axisValue({ min, max, count, scale, values }, i) {
+  if (i >= count - 1) return max;
+  if (values && Number.isInteger(i)) return values[i];
+  if (scale === "log") return Math.min(min * (max / min) ** (i / (count - 1)), max);
+  return values ? values[Math.round(i)] : Math.min(min + ((max - min) * i) / (count - 1), max);
+}
 // Names and values of the derived parameters in a cell. Each is stored along the axes that it depends on.
-const derivedValues = ({ i, j }) => map.derived.map(({ parameter, along, values: list }) =>
-  [parameter, list?.[(along[1] ? j : 0) * (along[0] ? columns : 1) + (along[0] ? i : 0)]]);
-// Indices of the first and last cell of an axis whose centre is visible.
-const visible = (axis, from, extent) =>
-  [Math.max(0, Math.ceil(from - 0.5)), Math.min(axis.count - 1, Math.floor(from + extent - 0.5))];
+const derivedValues = ({ sheet, i, j }) => sheet.data.derived.map(({ parameter, along, values: list }) =>
+  [parameter, list?.[(along[1] ? j : 0) * (along[0] ? sheet.columns : 1) + (along[0] ? i : 0)]]);
+// Returns the rectangle of a cell, in cells of the program's map.
+function rectangle({ sheet: { place, columns: across, rows: up }, i, j }) {
+  const [width, height] = [place.width / across, place.height / up];
+  return { left: place.left + i * width, bottom: place.bottom + j * height, width, height };
+}
+function centreOf(cell) {
+  const { left, bottom, width, height } = rectangle(cell);
+  return [left + width / 2, bottom + height / 2];
+}
+// Returns the cell of a sheet at a position, or null outside it.
+function cellOf(sheet, u, v) {
+  const { place, columns: across, rows: up } = sheet;
+  const i = Math.floor(((u - place.left) / place.width) * across);
+  const j = Math.floor(((v - place.bottom) / place.height) * up);
+  return i >= 0 && i < across && j >= 0 && j < up ? { sheet, i, j } : null;
+}
+// Indices of the first and last of `count` cells whose centre is visible.
+const visible = (count, from, extent) =>
+  [Math.max(0, Math.ceil(from - 0.5)), Math.min(count - 1, Math.floor(from + extent - 0.5))];
 
 const element = (tag, text, className) => {
   const node = document.createElement(tag);

@@ -9,12 +9,18 @@ const panel = () => {
     height: height - MARGIN.top - MARGIN.bottom };
 };
 
+// Returns the position of a pixel, in cells of the program's map.
+function position(x, y) {
+  const p = panel();
+  return [view.left + ((x - p.x) / p.width) * view.width, view.bottom + ((p.y + p.height - y) / p.height) * view.height];
+}
+
+// Returns the uppermost cell at a pixel, or null.
 function cellAt(x, y) {
   const p = panel();
-  const i = Math.floor(view.left + ((x - p.x) / p.width) * view.width);
-  const j = Math.floor(view.bottom + ((p.y + p.height - y) / p.height) * view.height);
-  const inside = x >= p.x && x <= p.x + p.width && y >= p.y && y <= p.y + p.height;
-  return inside && i >= 0 && i < columns && j >= 0 && j < rows ? { i, j } : null;
+  if (x < p.x || x > p.x + p.width || y < p.y || y > p.y + p.height) return null;
+  const sheets = shown().reverse();
+  return sheets.map((sheet) => cellOf(sheet, ...position(x, y))).find((cell) => cell) ?? null;
 }
 
 // Returns the pixel of a position in cells. Cell i spans i to i + 1.
@@ -63,8 +69,9 @@ function marks(axis, from, extent, most) {
       }
     }
     if (list.length > 1) return list;
+    return ticks(10 ** low, 10 ** high, most).map(([value, text]) => [place(value), text]);
   }
-  // Listed values, or a part of a logarithmic axis without round values.
+  // Listed values.
   const every = Math.max(1, Math.ceil(extent / most));
   const first = Math.max(0, Math.ceil(from - 0.5));
   const cells = [];
@@ -74,67 +81,88 @@ function marks(axis, from, extent, most) {
   return cells;
 }
 
-function paint(layer) {
+// Draws the cells of a sheet, a pixel each. `scale` is the layer whose colours stand for numbers.
+function paint(sheet, own, scale) {
+  const { columns: across, rows: up } = sheet;
   const picture = document.createElement("canvas");
-  [picture.width, picture.height] = [columns, rows];
+  [picture.width, picture.height] = [across, up];
   const brush = picture.getContext("2d");
-  const image = brush.createImageData(columns, rows);
+  const image = brush.createImageData(across, up);
   const pixels = new Uint32Array(image.data.buffer);
-  const palette = Uint32Array.from(layer.palette, (c) => {
+  const palette = Uint32Array.from(own.values ? scale.palette : isolatedPalette(own), (c) => {
     const rgb = parseInt(c, 16);
     return (0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16)) >>> 0;
   });
-  const index = layer.values ? (id) => level(layer, layer.values[id]) : (id) => layer.indices[id];
-  for (let j = 0; j < rows; j++) {
-    const [from, to] = [j * columns, (rows - 1 - j) * columns];
-    for (let i = 0; i < columns; i++) pixels[to + i] = palette[index(from + i)];
+  const index = own.values ? (id) => level(scale, own.values[id]) : (id) => own.indices[id];
+  for (let j = 0; j < up; j++) {
+    const [from, to] = [j * across, (up - 1 - j) * across];
+    for (let i = 0; i < across; i++) pixels[to + i] = palette[index(from + i)];
   }
   brush.putImageData(image, 0, 0);
   return picture;
 }
 
-function draw() {
+// Fits the canvas to its element, and returns the element's size.
+function fitCanvas() {
   const ratio = window.devicePixelRatio || 1;
   const { width, height } = canvas.getBoundingClientRect();
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
     [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   }
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.clearRect(0, 0, width, height);
+  return [width, height];
+}
+
+function draw() {
+  pen.clearRect(0, 0, ...fitCanvas());
   const p = panel();
-  const current = map.layers[layer];
-  if (!current.ready) return;
-  current.picture ??= paint(current);
+  const scale = layerOf(uppermost());
+  if (!scale?.ready) return;
   pen.save();
   pen.beginPath();
   pen.rect(p.x, p.y, p.width, p.height);
   pen.clip();
   // Averaging cells would produce colours that represent something else.
   pen.imageSmoothingEnabled = false;
-  const [x, y] = pixel(0, rows);
-  const [right, bottom] = pixel(columns, 0);
-  pen.drawImage(current.picture, x, y, right - x, bottom - y);
-  for (const [cell, color] of [[pointerCell, "#0008"], [selectedCell, "#000"]]) if (cell) frame(cell, color);
+  const sheets = shown();
+  // Until the first window with other parameters is there, the program's map is faint.
+  pen.globalAlpha = sheets.length ? 1 : 0.3;
+  for (const sheet of sheets.length ? sheets : [base]) {
+    const own = layerOf(sheet);
+    const key = JSON.stringify([own.values ? [scale.range, scale.bar.low, scale.bar.high] : isolated]);
+    if (own.key !== key) [own.key, own.picture] = [key, paint(sheet, own, scale)];
+    box(sheet.place, (...at) => pen.drawImage(own.picture, ...at));
+  }
+  pen.globalAlpha = 1;
+  for (const [cell, color] of [[pointerCell, "#0008"], [selectedCell, "#000"]]) if (cell) frame(rectangle(cell), color, 8);
+  if (drawnRectangle) frame(drawnRectangle, "#000", 0);
   pen.restore();
   drawAxes(p);
 }
 
-function frame({ i, j }, color) {
-  const [x, y] = pixel(i, j + 1);
-  const [right, bottom] = pixel(i + 1, j);
-  // The frame of a small cell is larger than the cell.
-  const grow = Math.max(0, (8 - (right - x)) / 2);
-  const box = [x - grow, y - grow, right - x + 2 * grow, bottom - y + 2 * grow];
-  pen.lineWidth = 3.5;
-  pen.strokeStyle = "#fff";
-  pen.strokeRect(...box);
-  pen.lineWidth = 1.5;
-  pen.strokeStyle = color;
-  pen.strokeRect(...box);
+// Calls a function with the pixels of a rectangle: x, y, width, height.
+function box({ left, bottom, width, height }, use) {
+  const [x, y] = pixel(left, bottom + height);
+  const [right, below] = pixel(left + width, bottom);
+  use(x, y, right - x, below - y);
+}
+
+// Draws a frame around a rectangle, at least as wide as `least` pixels.
+function frame(around, color, least) {
+  box(around, (x, y, width, height) => {
+    const grow = Math.max(0, (least - width) / 2);
+    const at = [x - grow, y - grow, width + 2 * grow, height + 2 * grow];
+    pen.lineWidth = 3.5;
+    pen.strokeStyle = "#fff";
+    pen.strokeRect(...at);
+    pen.lineWidth = 1.5;
+    pen.strokeStyle = color;
+    pen.strokeRect(...at);
+  });
 }
 
 function drawAxes(p) {
-  pen.strokeStyle = pen.fillStyle = "#262626";
+  pen.strokeStyle = pen.fillStyle = getComputedStyle(canvas).color;
   pen.lineWidth = 1;
   pen.strokeRect(p.x + 0.5, p.y + 0.5, p.width - 1, p.height - 1);
   pen.font = "13px system-ui, sans-serif";

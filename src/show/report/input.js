@@ -1,10 +1,13 @@
 // Zooming, panning, choosing a cell with pointer or keys, and the link to what is shown.
 
+// Least extent of a view, in cells: four cells where the page cannot compute finer ones.
+const leastExtent = (axis) => (map.live && axis.scale !== "values" ? 1e-9 * axis.count : Math.min(4, axis.count));
+
 function zoom(factor, x, y) {
   const p = panel();
   const [u, v] = [(x - p.x) / p.width, (p.y + p.height - y) / p.height];
-  const width = Math.min(columns, Math.max(4, view.width * factor));
-  const height = Math.min(rows, Math.max(4, view.height * factor));
+  const width = within(view.width * factor, leastExtent(map.axes[0]), columns);
+  const height = within(view.height * factor, leastExtent(map.axes[1]), rows);
   view = { left: view.left + u * (view.width - width), bottom: view.bottom + v * (view.height - height), width, height };
   keepInside();
 }
@@ -16,7 +19,7 @@ function keepInside() {
   settle();
 }
 
-// Fits colours, scene and link to the view, once it rests.
+// Fits colours, scene, link and the computed window to the view, once it rests.
 let resting = 0;
 function settle() {
   clearTimeout(resting);
@@ -24,11 +27,15 @@ function settle() {
     fitColors();
     showScene();
     updateLink();
+    wish();
   }, 150);
 }
 
 const pointers = new Map();
 let moved = 0;
+// The rectangle that is being drawn with the shift key, and the position where it began.
+let drawnRectangle = null;
+let corner = null;
 
 canvas.addEventListener("wheel", (event) => {
   event.preventDefault();
@@ -39,6 +46,7 @@ canvas.addEventListener("pointerdown", (event) => {
   canvas.setPointerCapture(event.pointerId);
   pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
   moved = 0;
+  corner = event.shiftKey ? position(event.offsetX, event.offsetY) : null;
 });
 
 canvas.addEventListener("pointermove", (event) => {
@@ -54,6 +62,13 @@ canvas.addEventListener("pointermove", (event) => {
   pointers.set(event.pointerId, here);
   moved += Math.hypot(here[0] - before[0], here[1] - before[1]);
   if (moved < 4) return;
+  if (corner) {
+    const [u, v] = position(...here);
+    drawnRectangle = { left: Math.min(u, corner[0]), bottom: Math.min(v, corner[1]),
+      width: Math.abs(u - corner[0]), height: Math.abs(v - corner[1]) };
+    draw();
+    return;
+  }
   canvas.classList.add("dragging");
   const p = panel();
   if (others.length === 1) {
@@ -69,6 +84,11 @@ canvas.addEventListener("pointermove", (event) => {
 canvas.addEventListener("pointerup", (event) => {
   pointers.delete(event.pointerId);
   canvas.classList.remove("dragging");
+  if (drawnRectangle) {
+    showView(drawnRectangle);
+    drawnRectangle = null;
+    return;
+  }
   const cell = cellAt(event.offsetX, event.offsetY);
   if (moved < 4 && cell) choose(cell);
 });
@@ -79,14 +99,17 @@ canvas.addEventListener("pointerleave", () => {
   draw();
 });
 
-function showAll() {
-  view = { ...everything };
+// Shows a rectangle, in cells; it may have to be larger or inside the map.
+function showView({ left, bottom, width, height }) {
+  view = { left, bottom, width: within(width, leastExtent(map.axes[0]), columns), height: within(height, leastExtent(map.axes[1]), rows) };
   keepInside();
 }
-canvas.addEventListener("dblclick", showAll);
+const showAll = () => showView(everything);
+canvas.addEventListener("dblclick", () => showAll());
 
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  // Keys in a field belong to the field.
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "INPUT") return;
   const p = panel();
   const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   const number = Number(event.key);
@@ -96,47 +119,72 @@ document.addEventListener("keydown", (event) => {
   else if (number >= 1 && number <= map.layers.length) showLayer(number - 1);
   else if (steps[event.key]) {
     event.preventDefault();
-    const [di, dj] = steps[event.key];
-    const middle = { i: Math.floor(view.left + view.width / 2), j: Math.floor(view.bottom + view.height / 2) };
+    const sheet = uppermost();
+    const { width, height } = rectangle({ sheet, i: 0, j: 0 });
+    let [u, v] = [view.left + view.width / 2, view.bottom + view.height / 2];
     const from = selectedCell ?? pointerCell;
+    if (from) {
+      const [di, dj] = steps[event.key];
+      [u, v] = centreOf(from);
+      [u, v] = [u + di * width, v + dj * height];
+    }
     pointerCell = null;
-    choose(from ? { i: within(from.i + di, 0, columns - 1), j: within(from.j + dj, 0, rows - 1) } : middle);
+    const { place } = sheet;
+    choose(cellOf(sheet, within(u, place.left + width / 2, place.left + place.width - width / 2),
+      within(v, place.bottom + height / 2, place.bottom + place.height - height / 2)));
     follow(selectedCell);
   }
 });
 
 // Moves the view so that it contains a cell.
-function follow({ i, j }) {
-  const [left, bottom] = [within(view.left, i + 1 - view.width, i), within(view.bottom, j + 1 - view.height, j)];
+function follow(cell) {
+  const { left: i, bottom: j, width, height } = rectangle({ sheet: base, ...cell });
+  const [left, bottom] = [within(view.left, i + width - view.width, i), within(view.bottom, j + height - view.height, j)];
   if (left === view.left && bottom === view.bottom) return;
   view = { ...view, left, bottom };
   keepInside();
 }
 
-// Writes layer, cell, view and choice of colours into the link.
+// Writes layer, parameters, cell, view and choice of colours into the link.
 function updateLink() {
-  const parts = [`layer=${encodeURIComponent(map.layers[layer].name)}`];
-  if (selectedCell) parts.push(`cell=${selectedCell.i},${selectedCell.j}`);
-  if (!showsAll()) parts.push(`view=${[view.left, view.bottom, view.width, view.height].map((x) => Number(x.toFixed(2))).join(",")}`);
+  const parts = ["v=1", `layer=${encodeURIComponent(map.layers[layer].name)}`];
+  for (const [name, value] of Object.entries(changes)) parts.push(`set=${encodeURIComponent(name)}:${value}`);
+  // The position of the cell's centre is a whole number in the program's map.
+  const centre = awaited ?? (selectedCell && centreOf(selectedCell));
+  if (centre) parts.push(`cell=${centre.map((x) => Number((x - 0.5).toPrecision(12))).join(",")}`);
+  if (!showsAll()) parts.push(`view=${[view.left, view.bottom, view.width, view.height].join(",")}`);
   if (spansMap) parts.push("colors=map");
-  history.replaceState(null, "", `#${parts.join("&")}`);
+  try {
+    history.replaceState(null, "", `#${parts.join("&")}`);
+  } catch {
+    // A page in a frame of a notebook has no address of its own.
+  }
 }
+
+// Position of a cell that the link names and that has yet to be computed.
+let awaited = null;
 
 // Shows what the link names; a link may name nothing.
 function readLink() {
   const link = new URLSearchParams(location.hash.slice(1));
   const numbers = (name) => (link.get(name) ?? "").split(",").map((text) => (text === "" ? NaN : Number(text)));
   spansMap = byId("whole").checked = link.get("colors") === "map";
+  const sets = link.getAll("set").map((text) => text.split(":")).map(([name, value]) => [name, Number(value)]);
+  changes = Object.fromEntries(sets.filter(([name, value]) => Number.isFinite(value) && map.parameters.some((own) => own.name === name)));
+  showParameters();
   const [left, bottom, width, height] = numbers("view");
   view = { ...everything };
   if ([left, bottom, width, height].every(Number.isFinite)) {
-    view = { left, bottom, width: within(width, Math.min(4, columns), columns), height: within(height, Math.min(4, rows), rows) };
+    view = { left, bottom, width: within(width, leastExtent(map.axes[0]), columns), height: within(height, leastExtent(map.axes[1]), rows) };
   }
   const [i, j] = numbers("cell");
-  const exists = (index, count) => Number.isInteger(index) && index >= 0 && index < count;
-  selectedCell = exists(i, columns) && exists(j, rows) ? { i, j } : null;
+  const exists = (index, count) => index > -0.5 && index < count - 0.5;
+  const isNamed = exists(i, columns) && exists(j, rows);
+  const isOwn = isNamed && !isChanged() && Number.isInteger(i) && Number.isInteger(j);
   showLayer(Math.max(map.layers.findIndex(({ name }) => name === link.get("layer")), 0));
-  choose(selectedCell);
+  choose(isOwn ? { i, j } : null);
+  awaited = isNamed && !isOwn ? [i + 0.5, j + 0.5] : null;
+  updateLink();
   keepInside();
 }
 addEventListener("hashchange", readLink);

@@ -24,17 +24,22 @@ function showOrbit(cell) {
   wanted = cell;
   byId("motion").hidden = byId("orbit").hidden = !cell || map.model_file === null;
   if (byId("motion").hidden) return;
-  const { i, j } = cell;
-  byId("which-motion").textContent = byId("which-orbit").textContent = `Motion of cell ${i}, ${j}`;
+  byId("which-motion").textContent = byId("which-orbit").textContent = `Motion at ${nameOf(cell)}`;
+  // A notebook that shows this page in a frame reads the selection.
+  if (parent !== window) parent.postMessage({ kind: "rattlemap", command: byId("command").textContent }, "*");
   byId("computing").textContent = "computing\u2026";
   for (const id of ["motion", "orbit"]) byId(id).setAttribute("aria-busy", "true");
   if (request && performance.now() - request.begun > PATIENCE) stopWorker();
   if (!request) compute().catch(fail);
 }
 
+// Names a cell by the values of its axes.
+function nameOf({ sheet: { data }, i, j }) {
+  return data.axes.map((axis, k) => `${axis.symbol} = ${Number(axisValue(axis, [i, j][k]).toPrecision(8))}`).join(", ");
+}
+
 async function compute() {
-  const { i, j } = wanted;
-  const own = { cell: `${i},${j}`, command: byId("command").textContent, model: map.model_file };
+  const own = { task: "orbit", command: byId("command").textContent, model: map.model_file };
   request = { ...own, begun: performance.now() };
   const mine = request;
   const module = await compiled();
@@ -44,20 +49,28 @@ async function compute() {
   worker.postMessage(own);
 }
 
-function startWorker(module) {
+// Starts a worker with the engine. `answer` gets its messages, `failed` a text if it cannot run.
+function newWorker(module, answer, failed) {
   const script = URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" }));
-  worker = new Worker(script);
-  worker.addEventListener("message", ({ data: { cell, result, broken } }) => {
+  const started = new Worker(script);
+  started.addEventListener("message", ({ data }) => {
     URL.revokeObjectURL(script);
+    answer(data);
+  });
+  started.addEventListener("error", (event) => failed(event.message || "this browser refuses it"));
+  started.postMessage({ module });
+  return started;
+}
+
+function startWorker(module) {
+  worker = newWorker(module, ({ command, result, broken }) => {
     const took = performance.now() - request.begun;
     request = null;
     // After a fault the engine's memory may be damaged.
     if (broken) stopWorker();
-    if (cell === `${wanted?.i},${wanted?.j}`) showMotion(JSON.parse(result), took);
+    if (wanted && command === byId("command").textContent) showMotion(JSON.parse(result), took);
     else if (wanted) compute().catch(fail);
-  });
-  worker.addEventListener("error", (event) => fail(event.message || "this browser refuses it"));
-  worker.postMessage({ module });
+  }, fail);
 }
 
 function stopWorker() {

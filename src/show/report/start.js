@@ -1,9 +1,13 @@
 // Fills the page and shows what the link names.
 
+function showFixed({ fixed, model, source }) {
+  byId("fixed").textContent = (fixed ? `Other parameters: ${fixed}. ` : "") + `Model: ${model}.` + (source ? ` Source: ${source}.` : "");
+}
+
 async function start() {
   byId("title").textContent = map.title;
   byId("subtitle").textContent = map.subtitle;
-  byId("fixed").textContent = (map.fixed ? `Other parameters: ${map.fixed}. ` : "") + `Model: ${map.model}.` + (map.source ? ` Source: ${map.source}.` : "");
+  showFixed(map);
   const { engine, precision, device, version, commit } = map.made;
   byId("made").textContent = `Computed by rattlemap ${version} (commit ${commit}) with the engine ${engine} in ${precision}: ${device}.`;
   byId("compute").textContent = map.compute;
@@ -16,16 +20,7 @@ async function start() {
   }));
   if (map.refinement) showRefinement(map.refinement);
   if (map.validation) showValidation(map.validation);
-  const names = Object.keys(map.values);
-  const unpacked = await Promise.all(names.map((name) => unpack(map.values[name])));
-  values = Object.fromEntries(names.map((name, k) => [name, unpacked[k]]));
-  if (map.starts) starts = await unpack(map.starts);
-  for (const derived of map.derived) derived.values = await unpack(derived);
-  await Promise.all(map.layers.map(async (packed) => {
-    if (packed.values) packed.values = await unpack(packed.values);
-    else packed.indices = await unpack(packed.indices);
-    packed.ready = true;
-  }));
+  await fill(base);
   byId("wait").remove();
   readLink();
 }

@@ -1,14 +1,37 @@
 
-// Runs in the worker, after the code that wasm-bindgen made. It first receives the engine, then commands.
-onmessage = ({ data }) => {
-  if (data.module) {
-    wasm_bindgen.initSync({ module: data.module });
+// Runs in a worker, after the code that wasm-bindgen made. It first receives the engine, then requests.
+
+// The window that was computed last, and what defines it.
+let opened = { key: null, window: null };
+
+function windowOf({ key, scene, model, sets }) {
+  if (opened.key !== key) {
+    opened.window?.free();
+    opened = { key: null, window: null };
+    opened = { key, window: new wasm_bindgen.Window(scene, model, sets) };
+  }
+  return opened.window;
+}
+
+const answers = {
+  orbit: ({ command, model }) => ({ command, result: wasm_bindgen.orbit(command, model) }),
+  compute: (request) => ({ records: windowOf(request).compute(request.runs) }),
+  data: (request) => ({ data: windowOf(request).data(request.records) }),
+  figure: (request) => ({ figure: windowOf(request).figure(request.records, request.layer) }),
+};
+
+onmessage = ({ data: request }) => {
+  if (request.module) {
+    wasm_bindgen.initSync({ module: request.module });
     return;
   }
-  const { cell, command, model } = data;
   try {
-    postMessage({ cell, result: wasm_bindgen.orbit(command, model) });
+    const answer = answers[request.task](request);
+    postMessage(answer, answer.records ? [answer.records.buffer] : []);
   } catch (error) {
-    postMessage({ cell, broken: true, result: JSON.stringify({ error: `the engine stopped (${error}); try the command` }) });
+    // A text is an error of the request. Anything else may have damaged the engine's memory.
+    const broken = typeof error !== "string";
+    const text = broken ? `the engine stopped (${error}); try the command` : error;
+    postMessage({ command: request.command, broken, error: text, result: JSON.stringify({ error: text }) });
   }
 };

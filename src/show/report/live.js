@@ -1,0 +1,275 @@
+// Computes the visible part of the map in workers: coarse cells first, and always what is visible now.
+
+// Cells along an axis: of the first picture, and of the last. Each picture has the cells of the one before.
+const COARSEST = 17;
+const FINEST = 257;
+// Time in ms that a request to a worker should take, and time between two pictures of unfinished cells.
+const SPELL = 40;
+const REDRAW = 1000;
+
+// The window that is wanted: its view, scene and progress; none if the program's map suffices.
+let job = null;
+// Workers, each with the job and the runs of its request.
+let pool = [];
+
+// Returns the values that a window needs along an axis, and the part of the axis that they cover, in cells.
+function windowAlong(axis, from, extent) {
+  if (axis.scale === "values") {
+    const [first, last] = visible(axis.count, from, extent);
+    const values = axis.values.slice(first, last + 1);
+    return { values, cover: () => [first, values.length] };
+  }
+  const [first, last] = [Math.max(0, from - 0.5), Math.min(axis.count - 1, from + extent - 0.5)];
+  const cover = (count) => {
+    const cell = (last - first) / (count - 1);
+    return [first + 0.5 - cell / 2, count * cell];
+  };
+  return { min: axisValue(axis, first), max: axisValue(axis, last), cover };
+}
+
+// Begins the window that the view needs, unless it is there or under way.
+function wish() {
+  const isFine = (axis, extent) => axis.scale === "values" || extent >= FINEST;
+  const suffices = !isChanged() && (byId("refine").checked
+    ? (isFine(map.axes[0], view.width) && isFine(map.axes[1], view.height)) || (showsAll() && !map.live?.at_once) : true);
+  if (!map.live || suffices) {
+    stopJob();
+    return;
+  }
+  const along = [windowAlong(map.axes[0], view.left, view.width), windowAlong(map.axes[1], view.bottom, view.height)];
+  if (along.some(({ values, min, max }) => (values ? values.length < 2 : !(min < max)))) return;
+  const key = JSON.stringify([along, changes]);
+  if (job?.key === key) return;
+  // A slider that moves on must not prevent the first picture.
+  if (job && !job.drawn && performance.now() - job.begun < REDRAW) {
+    job.next = true;
+    return;
+  }
+  job = { key, along, view: { ...view }, begun: performance.now(), changes: { ...changes }, level: firstLevel() - 1, drawn: false, next: false };
+  pool.filter(({ request }) => request && performance.now() - request.begun > PATIENCE).forEach(stop);
+  nextLevel();
+}
+
+// Number of cells along an axis at a level.
+const countAt = (level) => (COARSEST - 1) * 2 ** level + 1;
+
+// Returns the first level that is not coarser than what the program's map shows.
+function firstLevel() {
+  if (isChanged()) return 0;
+  const most = Math.max(...map.axes.map((axis, k) => (axis.scale === "values" ? 0 : [view.width, view.height][k])));
+  let level = 0;
+  while (countAt(level) < most && countAt(level + 1) <= FINEST) level += 1;
+  return level;
+}
+
+function stopJob() {
+  job = null;
+  byId("live").textContent = "";
+  byId("save-svg").hidden = true;
+  if (!live) return;
+  live = null;
+  showFixed(map);
+  fitColors();
+  showScene();
+}
+
+// Begins the next finer picture; the last one ends the job.
+function nextLevel() {
+  job.level += 1;
+  byId("save-svg").hidden = true;
+  const count = countAt(job.level);
+  const grown = job.along.some(({ values }) => !values) ? count : COARSEST;
+  if (grown > FINEST || (job.records && grown === COARSEST)) {
+    byId("save-svg").hidden = false;
+    awaited = null;
+    byId("live").textContent = `${job.counts.join(" \u00d7 ")} cells, computed in this page in ${((performance.now() - job.begun) / 1000).toFixed(1)} s`;
+    return;
+  }
+  const earlier = job.records && { records: job.records, counts: job.counts };
+  job.counts = job.along.map(({ values }) => values?.length ?? count);
+  job.ranges = job.along.map(({ values, min, max }, k) => (values ? { values } : { min, max, count: job.counts[k] }));
+  job.scene = sceneOver(map.scene, job.ranges);
+  job.id = `${job.key} ${job.level}`;
+  const { starts, record_bytes: size } = map.live;
+  const [across, up] = job.counts;
+  job.records = new Uint8Array(across * up * starts * size);
+  job.todo = [];
+  // Cells between those of the coarser picture show their neighbour's record until theirs is there.
+  const parts = job.along.map(({ values }) => (values || !earlier ? 1 : 2));
+  const [words, target, source] = [size / 4, new Uint32Array(job.records.buffer), earlier && new Uint32Array(earlier.records.buffer)];
+  for (let run = 0; run < across * up * starts; run++) {
+    const [i, j, start] = [run % across, Math.floor(run / across) % up, Math.floor(run / (across * up))];
+    if (earlier) {
+      const from = (start * earlier.counts[1] + Math.floor(j / parts[1])) * earlier.counts[0] + Math.floor(i / parts[0]);
+      for (let k = 0; k < words; k++) target[run * words + k] = source[from * words + k];
+    }
+    if (!earlier || i % parts[0] || j % parts[1]) job.todo.push(run);
+  }
+  job.next_run = job.ended = 0;
+  job.redrawn = performance.now();
+  job.wants_data = false;
+  employ().catch(failJob);
+}
+
+// Gives work to idle workers.
+async function employ() {
+  const module = await compiled();
+  if (!job) return;
+  const most = within(navigator.hardwareConcurrency || 2, 1, 16);
+  while (pool.length < most) {
+    const member = { request: null, per_ms: 0.2 };
+    member.worker = newWorker(module, (answer) => receive(member, answer), failJob);
+    pool.push(member);
+  }
+  for (const member of pool) if (!member.request) assign(member);
+}
+
+function assign(member) {
+  if (!job) return;
+  const common = { key: job.id, scene: job.scene, model: map.model_file,
+    sets: Object.entries(job.changes).map(([name, value]) => `parameters.${name}=${value}`).join("\n") };
+  const send = (task, own) => {
+    member.request = { job, id: job.id, task, begun: performance.now(), ...own };
+    member.worker.postMessage({ task, ...common, ...own });
+  };
+  if (job.wants_figure) {
+    send("figure", { records: job.records, layer: job.wants_figure });
+    job.wants_figure = null;
+  } else if (job.wants_data) {
+    job.wants_data = false;
+    send("data", { records: job.records });
+  } else if (job.next_run < job.todo.length) {
+    const runs = job.todo.slice(job.next_run, job.next_run + within(Math.round(member.per_ms * SPELL), 4, 2048));
+    job.next_run += runs.length;
+    send("compute", { runs: Uint32Array.from(runs) });
+  }
+}
+
+function receive(member, { records, data, figure, error, broken }) {
+  const { request } = member;
+  member.request = null;
+  if (broken) stop(member);
+  if (error && request.job === job) {
+    failJob(error);
+    return;
+  }
+  if (figure) {
+    save(new Blob([figure], { type: "image/svg+xml" }), `${request.layer}.svg`);
+  } else if (records) {
+    const { record_bytes: size } = map.live;
+    member.per_ms = request.runs.length / Math.max(performance.now() - request.begun, 1);
+    if (request.id === job?.id) {
+      request.runs.forEach((run, k) => job.records.set(records.subarray(k * size, (k + 1) * size), run * size));
+      job.ended += request.runs.length;
+      const isWhole = job.ended === job.todo.length;
+      job.wants_data ||= isWhole || (job.level > 0 && performance.now() - job.redrawn > REDRAW);
+      if (job.wants_data) job.redrawn = performance.now();
+      byId("live").textContent = `computing ${job.counts.join(" \u00d7 ")} cells: ${Math.floor((100 * job.ended) / job.todo.length)} %`;
+    }
+  } else if (data && request.job === job) {
+    const isWhole = request.id === job.id && job.ended === job.todo.length;
+    showWindow(JSON.parse(data), request.job, isWhole).catch(failJob);
+  }
+  employ().catch(failJob);
+}
+
+// Shows the cells of a job, and begins its next level if all of them are there.
+async function showWindow(data, of, isWhole) {
+  const [[left, width], [bottom, height]] = of.along.map(({ cover }, k) => cover(data.axes[k].count));
+  const sheet = await fill(sheetOf(data, { left, bottom, width, height }));
+  if (of !== job) return;
+  sheet.made = of.view;
+  sheet.ranges = of.ranges;
+  live = sheet;
+  of.drawn = true;
+  showFixed(data);
+  fitColors();
+  showScene();
+  if (isWhole) chooseIn(sheet);
+  updateReadout();
+  if (of.next) {
+    of.next = false;
+    wish();
+  } else if (isWhole) {
+    nextLevel();
+  }
+}
+
+// Selects the cell that the link names. If parameters changed, the selected place now has another motion. Finer cells come
+// nearer to the place.
+function chooseIn(sheet) {
+  if (!awaited && selectedCell && selectedCell.sheet.data.fixed !== sheet.data.fixed) awaited = centreOf(selectedCell);
+  const place = awaited;
+  const cell = place && cellOf(sheet, ...place);
+  if (!cell) return;
+  choose(cell);
+  awaited = place;
+  updateLink();
+}
+
+function stop(member) {
+  member.worker.terminate();
+  pool = pool.filter((other) => other !== member);
+}
+
+function failJob(error) {
+  byId("live").textContent = `not computed: ${error.message ?? error}`;
+  job = null;
+}
+
+// Lists the parameters of the map, each with a slider and a field.
+function showParameters() {
+  byId("parameters").hidden = !map.live;
+  byId("sliders").replaceChildren(...map.parameters.map(({ name, symbol, label, value, min, max }) => {
+    const [slider, field] = ["range", "number"].map((type) => Object.assign(element("input"), { type }));
+    const now = changes[name] ?? value;
+    const span = Math.abs(value) || 1;
+    slider.min = Math.max(min ?? -Infinity, value < 0 || min === null ? value - span : 0);
+    slider.max = Math.min(max ?? Infinity, value + span);
+    slider.step = field.step = "any";
+    [slider.value, field.value] = [now, now];
+    slider.setAttribute("aria-label", label);
+    field.setAttribute("aria-label", label);
+    const change = (text) => {
+      const number = Number(text);
+      if (text === "" || !Number.isFinite(number)) return;
+      if (number === value) delete changes[name];
+      else changes[name] = number;
+      [slider.value, field.value] = [number, number];
+      updateLink();
+      draw();
+      wish();
+    };
+    slider.addEventListener("input", () => change(String(Number(Number(slider.value).toPrecision(4)))));
+    field.addEventListener("change", () => change(field.value));
+    const row = element("label");
+    const text = element("span", symbol);
+    text.title = label;
+    row.append(text, slider, field);
+    return row;
+  }));
+}
+
+byId("refine").addEventListener("change", wish);
+byId("restore").addEventListener("click", () => {
+  changes = {};
+  live = null;
+  showParameters();
+  showFixed(map);
+  fitColors();
+  updateLink();
+  wish();
+});
+
+// Offers a file for download.
+function save(blob, name) {
+  const link = Object.assign(element("a"), { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+const fileName = (ending) => `${map.layers[layer].name}.${ending}`;
+byId("save-png").addEventListener("click", () => canvas.toBlob((blob) => save(blob, fileName("png"))));
+byId("save-svg").addEventListener("click", () => {
+  job.wants_figure = map.layers[layer].name;
+  employ().catch(failJob);
+});

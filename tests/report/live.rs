@@ -1,0 +1,145 @@
+//! A page computes: a walk through it in a browser, compared with the program. Skipped without Chromium, with a message on
+//! stderr.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::page::{between, chromium, hashed, skipped, visit};
+
+/// Functions for scripts that wait for workers. The browser's virtual time does not wait for them, so each step takes some
+/// real time.
+const WAITING: &str = r##"
+const said = {};
+const text = (id) => document.getElementById(id).textContent;
+const until = (ready) => new Promise((resolve) => {
+  const look = () => {
+    for (let n = 0, sum = 0; n < 5e6; n++) sum += Math.sqrt(n);
+    if (ready()) resolve();
+    else setTimeout(look, 20);
+  };
+  look();
+});
+const isComputed = () => live && live.columns >= 65 && covers(live.made, view);
+const motion = () => until(() => !document.getElementById("motion").hidden && !text("computing").includes("computing"));
+function finish() {
+  const result = document.createElement("pre");
+  result.id = "said";
+  result.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(said))));
+  document.body.append(result);
+}
+"##;
+
+/// Zooms to a pitchfork, clicks on both sides of it, moves the slider of F, and opens the link to what is shown.
+const WALK: &str = r##"
+async function walk() {
+  await until(() => !document.getElementById("wait"));
+  said.opened = text("title");
+  const [e, omega] = map.axes;
+  const at = ({ min, max, count }, value) => 0.5 + ((value - min) / (max - min)) * (count - 1);
+  const [left, bottom] = [at(e, 0.44), at(omega, 4.15)];
+  showView({ left, bottom, width: at(e, 0.5) - left, height: at(omega, 4.4) - bottom });
+  await until(isComputed);
+  clearTimeout(resting);
+  said.scene = text("scene");
+  said.counts = [live.columns, live.rows];
+  said.classes = [...live.values.class].map((index) => map.classes[index]);
+  said.periods = [...live.values.period];
+  const sides = ["no", "yes"].map((_, flag) => live.values.symmetric.findIndex((own, id) => own === flag && live.values.period[id] === 1));
+  const sheet = live;
+  said.sides = [];
+  for (const id of sides) {
+    choose({ sheet, i: id % sheet.columns, j: Math.floor(id / sheet.columns) });
+    await motion();
+    said.sides.push([text("command"), text("summary")]);
+  }
+  document.getElementById("parameters").open = true;
+  const slider = [...document.querySelectorAll("#sliders label")].find((row) => row.firstChild.textContent === "F").children[1];
+  slider.value = 47;
+  slider.dispatchEvent(new Event("input"));
+  await until(() => live.data.fixed.includes("F = 47") && isComputed());
+  await motion();
+  said.fixed = text("fixed");
+  said.command = text("command");
+  said.link = location.hash;
+  document.getElementById("restore").click();
+  showAll();
+  choose(null);
+  await until(() => text("fixed").includes("F = 50"));
+  location.hash = said.link;
+  readLink();
+  await until(() => live && live.data.fixed.includes("F = 47") && isComputed() && selectedCell);
+  said.again = [location.hash, text("command")];
+  finish();
+}
+walk().catch((error) => { said.error = String(error.stack); finish(); });
+"##;
+
+/// Appends a script to a page, with its hash in the policy, and returns what the script collects.
+fn visited(browser: &str, page: &Path, script: &str) -> Value {
+    let text = fs::read_to_string(page).unwrap();
+    let whole = format!("<script>{WAITING}{script}</script></body>");
+    let own = between(&whole, "<script>", "</script>");
+    let text = text.replacen("script-src ", &format!("script-src {} ", hashed(own)), 1);
+    let copy = page.with_extension("visited.html");
+    fs::write(&copy, text.replacen("</body>", &whole, 1)).unwrap();
+    let said = visit(browser, &copy, 100_000);
+    assert_eq!(said["error"], Value::Null, "{said}");
+    said
+}
+
+fn rattlemap(folder: &TempDir) -> Command {
+    let mut program = Command::cargo_bin("rattlemap").unwrap();
+    program.current_dir(folder.path());
+    program
+}
+
+/// Writes the page of a scene of this repository.
+fn explored(folder: &TempDir, scene: &str) -> PathBuf {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
+    rattlemap(folder)
+        .args(["explore", "--no-open", "--quiet", "--out", "page.html"])
+        .arg(scene)
+        .assert()
+        .success();
+    folder.path().join("page.html")
+}
+
+#[test]
+fn a_walk_through_the_page_shows_what_the_program_computes() {
+    let Some(browser) = chromium() else { return skipped() };
+    let folder = tempfile::tempdir().unwrap();
+    let said = visited(browser, &explored(&folder, "e_omega.toml"), WALK);
+    // The window has the same classes and periods as the program's map of its scene.
+    fs::write(folder.path().join("view.toml"), said["scene"].as_str().unwrap()).unwrap();
+    let formats = "outputs.files=[\"csv\"]";
+    rattlemap(&folder)
+        .args(["map", "view.toml", "--engine", "cpu", "--quiet", "--out", "view", "--set", formats])
+        .assert()
+        .success();
+    let mut reader = csv::Reader::from_path(folder.path().join("view/cells.csv")).unwrap();
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len() as u64, said["counts"][0].as_u64().unwrap() * said["counts"][1].as_u64().unwrap());
+    let differs = |(id, row): &(usize, &csv::StringRecord)| {
+        let period = said["periods"][*id].to_string();
+        row[4] != *said["classes"][*id].as_str().unwrap() || (!row[5].is_empty() && row[5] != period)
+    };
+    // The program uses FMA, the browser does not: cells with long transients may differ.
+    let differing = rows.iter().enumerate().filter(differs).count();
+    assert!(differing <= rows.len() / 200, "{differing} of {}", rows.len());
+    for side in said["sides"].as_array().unwrap() {
+        let [command, summary] = [0, 1].map(|k| side[k].as_str().unwrap());
+        let printed = rattlemap(&folder).args(command.split(' ').skip(1)).output().unwrap();
+        let first = |text: &str| text.lines().take(4).map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(first(summary), first(&String::from_utf8(printed.stdout).unwrap()), "{command}");
+    }
+    let symmetric = [0, 1]
+        .map(|k| said["sides"][k][1].as_str().unwrap().lines().find(|line| line.starts_with("symmetric")));
+    assert_ne!(symmetric[0], symmetric[1], "{said}");
+    let command = said["command"].as_str().unwrap();
+    assert!(command.contains(" --set F=47.0"), "{command}");
+    assert_eq!(said["again"], serde_json::json!([said["link"], command]));
+}
