@@ -63,7 +63,7 @@ class Explorer:
     @property
     def command(self) -> str | None:
         """The command ``rattlemap orbit ...`` of the selected cell; None before a selection."""
-        return None if self._widget is None else self._widget.command or None  # type: ignore[attr-defined]
+        return None if self._widget is None else self._widget.command or None
 
     @property
     def orbit(self) -> Orbit | None:
@@ -175,7 +175,7 @@ def _of_scene(request: _native.Scene, height: int, progress: bool | Report) -> E
     return Explorer(request.__getnewargs__()[2], page, height)
 
 
-@xr.register_dataset_accessor("rattlemap")
+@xr.register_dataset_accessor("rattlemap")  # type: ignore[no-untyped-call]
 class Accessor:
     """Methods of a map: ``ds.rattlemap.explore()``."""
 

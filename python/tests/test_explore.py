@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 import rattlemap as rm
-from conftest import SCENES
 from rattlemap.explore import replayed
 
 
@@ -31,8 +30,8 @@ def test_the_command_of_a_page_names_all_that_differs_from_the_models_defaults()
     assert own.parameters == expected.parameters and own.class_ == expected.class_
 
 
-def test_a_map_can_be_explored(tmp_path: Path) -> None:
-    ds = rm.map(scene=SCENES / "smoke.toml", engine="cpu", progress=False)
+def test_a_map_can_be_explored() -> None:
+    ds = rm.map(rm.gear_pair(F=50), e=(0.5, 0.7, 4), omega=(5, 6, 4), engine="cpu", progress=False)
     assert f">{ds.attrs['title']}</title>" in ds.rattlemap.explore(progress=False).page
     with pytest.raises(rm.SceneError, match="no attributes of a map"):
         ds.drop_attrs().rattlemap.explore()

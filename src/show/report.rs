@@ -30,7 +30,7 @@ use crate::show::provenance::Provenance;
 use crate::show::symbols::{axis_label, symbol};
 use crate::show::table::attractors_csv::attractor_name;
 use crate::show::words::{MapWords, WordIndex};
-use crate::show::{caption, refinement, replay};
+use crate::show::{caption, figure, refinement, replay};
 use rattlemap_dynamics::model::Parameter;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -107,6 +107,8 @@ pub fn data(
         "words": spellings(&words.words),
         "patterns": spellings(&words.patterns),
         "attractors": attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect::<Vec<_>>(),
+        // Values of both axes at the strobe states of attractors.
+        "marks": figure::map::attractors(cells),
         "refinement": refinement::object(cells),
         "validation": validation,
     });

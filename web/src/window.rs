@@ -4,11 +4,13 @@ use rattlemap::map::engine::Cpu;
 use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{FileText, Format, Purpose, Scene};
 use rattlemap::record::Record;
+use rattlemap::record::classify::classify;
 use rattlemap::show::cells::{Cells, Survey};
 use rattlemap::show::layers::Layer;
 use rattlemap::show::provenance::Provenance;
 use rattlemap::show::words::MapWords;
 use rattlemap::show::{figure, layers, report, words};
+use rattlemap_dynamics::orbit::Class;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// The runs of a scene, which may be computed in parts by several workers.
@@ -58,6 +60,20 @@ impl Window {
         bytemuck::pod_collect_to_vec(&Cpu::new(&self.plan).compute(&cells))
     }
 
+    /// Returns two bytes per run: the index of its class, and its period, which is 0 if there is none.
+    ///
+    /// # Panics
+    /// If there is no such run.
+    pub fn labels(&self, runs: &[u32]) -> Vec<u8> {
+        let cells: Vec<Cell> = runs.iter().map(|&run| self.plan.cell(run)).collect();
+        let classes = Cpu::new(&self.plan).compute(&cells).into_iter().map(|record| classify(&record));
+        let label = |class: Class| match class {
+            Class::Periodic { period } => [class.index() as u8, period as u8],
+            _ => [class.index() as u8, 0],
+        };
+        classes.flat_map(label).collect()
+    }
+
     /// Returns the data of a page that shows these records, as JSON. `records` has the bytes of one record per run.
     ///
     /// # Errors
@@ -101,5 +117,38 @@ impl Window {
         let cells = Cells::new(&self.scene, &self.plan, &records).surveyed(&survey);
         let words = words::read(&cells);
         Ok(use_them(&cells, &layers::of(&cells, &words), &words))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = "model = 'two-masses'\n[[axis]]\nparameter = 'omega'\nmin = 1.0\nmax = 1.4\ncount = 5\n\
+                         [[axis]]\nparameter = 'r'\nmin = 0.6\nmax = 0.9\ncount = 4\n[outputs]\nquantities = ['class', 'word']\n";
+
+    #[test]
+    fn parts_of_a_window_give_the_data_of_the_whole() {
+        let window = Window::new(SCENE, "", "").unwrap();
+        let all: Vec<u32> = (0..window.runs() as u32).collect();
+        let whole = window.compute(&all);
+        let parts: Vec<u8> = all.chunks(7).flat_map(|runs| window.compute(runs)).collect();
+        assert_eq!(whole, parts);
+        let data: serde_json::Value = serde_json::from_str(&window.data(&whole).unwrap()).unwrap();
+        assert_eq!((&data["axes"][0]["count"], &data["layers"][0]["name"]), (&5.into(), &"map".into()));
+        assert!(window.figure(&whole, "map").unwrap().starts_with("<svg "));
+        assert_eq!(window.figure(&whole, "impacts"), Err("no such layer".to_owned()));
+        assert_eq!(window.labels(&all).len(), 2 * all.len());
+        assert!(window.data(&whole[1..]).is_err());
+    }
+
+    #[test]
+    fn parameters_are_set_and_wrong_ones_are_errors() {
+        let set = |sets: &str| Window::new(SCENE, "", sets).map(|window| window.scene.settings().to_owned());
+        let text = SCENE.replace("two-masses", "own.toml");
+        assert!(set("parameters.f20=0.3").is_err_and(|error| error.contains("f20")));
+        assert!(Window::new(&text, "", "").is_err_and(|error| error.contains("not in this page")));
+        let followed = format!("{SCENE}[start]\npolicy = 'up'\n");
+        assert!(Window::new(&followed, "", "").is_err_and(|error| error.contains("another map")));
     }
 }

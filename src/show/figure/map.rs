@@ -82,7 +82,7 @@ fn draw_line(canvas: &Canvas, frame: &Frame, parts: &[Vec<Point>], color: Color)
 }
 
 /// Returns the strobe states of all attractors that lie on a map whose axes are both components of the start.
-pub(super) fn attractors(cells: &Cells<'_>) -> Vec<Point> {
+pub(crate) fn attractors(cells: &Cells<'_>) -> Vec<Point> {
     let targets: Vec<Target> = cells.scene().axes().iter().map(|axis| axis.target()).collect();
     let (Some(basins), &[Target::Start(x), Target::Start(y)]) = (cells.basins(), &targets[..]) else {
         return Vec::new();

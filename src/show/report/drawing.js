@@ -45,19 +45,25 @@ function ticks(low, high, most) {
   return list;
 }
 
+// Returns the position of a value of an axis, in cells.
+function placeOf({ min, max, count, scale, values }, value) {
+  if (scale === "values") return values.indexOf(value) + 0.5;
+  const share = scale === "log" ? Math.log(value / min) / Math.log(max / min) : (value - min) / (max - min);
+  return share * (count - 1) + 0.5;
+}
+
 // Returns positions (in cells) and labels of the ticks of an axis. Cell i has its value at i + 0.5.
 function marks(axis, from, extent, most) {
   const { min, max, count, scale, values } = axis;
   if (scale === "linear") {
-    const step = (max - min) / (count - 1);
-    const value = (place) => min + (place - 0.5) * step;
-    return ticks(value(from), value(from + extent), most).map(([at, text]) => [(at - min) / step + 0.5, text]);
+    const value = (place) => min + ((place - 0.5) * (max - min)) / (count - 1);
+    return ticks(value(from), value(from + extent), most).map(([at, text]) => [placeOf(axis, at), text]);
   }
   const label = (value) => String(Number(value.toPrecision(4))).replaceAll("-", "\u2212");
   const list = [];
   if (scale === "log") {
     const step = Math.log10(max / min) / (count - 1);
-    const place = (value) => Math.log10(value / min) / step + 0.5;
+    const place = (value) => placeOf(axis, value);
     const [low, high] = [from, from + extent].map((at) => Math.log10(min) + (at - 0.5) * step);
     const parts = most / (high - low) > 4 ? [1, 2, 5] : [1];
     const every = Math.ceil((high - low) / most);
@@ -135,6 +141,7 @@ function draw() {
   }
   pen.globalAlpha = 1;
   for (const [cell, color] of [[pointerCell, "#0008"], [selectedCell, "#000"]]) if (cell) frame(rectangle(cell), color, 8);
+  for (const [a, b] of uppermost().data.marks) mark(placeOf(map.axes[0], a), placeOf(map.axes[1], b));
   if (drawnRectangle) frame(drawnRectangle, "#000", 0);
   pen.restore();
   drawAxes(p);
@@ -159,6 +166,18 @@ function frame(around, color, least) {
     pen.strokeStyle = color;
     pen.strokeRect(...at);
   });
+}
+
+// Draws a circle at a position, for a strobe state of an attractor.
+function mark(u, v) {
+  const [x, y] = pixel(u, v);
+  for (const [width, color] of [[4, "#fff"], [1.8, "#262626"]]) {
+    pen.beginPath();
+    pen.arc(x, y, 5, 0, 2 * Math.PI);
+    pen.lineWidth = width;
+    pen.strokeStyle = color;
+    pen.stroke();
+  }
 }
 
 function drawAxes(p) {

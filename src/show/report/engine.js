@@ -101,6 +101,22 @@ let wasm_bindgen = (function(exports) {
             }
         }
         /**
+         * Returns two bytes per run: the index of its class, and its period, which is 0 if there is none.
+         *
+         * # Panics
+         * If there is no such run.
+         * @param {Uint32Array | number[]} runs
+         * @returns {Uint8Array}
+         */
+        labels(runs) {
+            const ptr0 = passArray32ToWasm0(runs, wasm.__wbindgen_malloc);
+            const len0 = WASM_VECTOR_LEN;
+            const ret = wasm.window_labels(this.__wbg_ptr, ptr0, len0);
+            var v2 = getArrayU8FromWasm0(ret[0], ret[1]).slice();
+            wasm.__wbindgen_free(ret[0], ret[1] * 1, 1);
+            return v2;
+        }
+        /**
          * Reads a scene. `model` is the text of its model file; it is empty for a built-in model. `sets` has one `NAME=VALUE` per
          * line, which override the scene.
          *

@@ -80,6 +80,7 @@ function nextLevel() {
   const count = countAt(job.level);
   const grown = job.along.some(({ values }) => !values) ? count : COARSEST;
   if (grown > FINEST || (job.records && grown === COARSEST)) {
+    drawSample();
     byId("save-svg").hidden = false;
     awaited = null;
     byId("live").textContent = `${job.counts.join(" \u00d7 ")} cells, computed in this page in ${((performance.now() - job.begun) / 1000).toFixed(1)} s`;
@@ -126,6 +127,12 @@ async function employ() {
 
 function assign(member) {
   if (!job) return;
+  if (sample.wanted) {
+    sample.wanted = false;
+    member.request = { begun: performance.now() };
+    member.worker.postMessage({ task: "labels", key: "sample", scene: sample.scene, model: map.model_file, sets: "", runs: Uint32Array.from(sample.cells) });
+    return;
+  }
   const common = { key: job.id, scene: job.scene, model: map.model_file,
     sets: Object.entries(job.changes).map(([name, value]) => `parameters.${name}=${value}`).join("\n") };
   const send = (task, own) => {
@@ -145,7 +152,7 @@ function assign(member) {
   }
 }
 
-function receive(member, { records, data, figure, error, broken }) {
+function receive(member, { records, data, figure, labels, error, broken }) {
   const { request } = member;
   member.request = null;
   if (broken) stop(member);
@@ -153,7 +160,9 @@ function receive(member, { records, data, figure, error, broken }) {
     failJob(error);
     return;
   }
-  if (figure) {
+  if (labels) {
+    showSample(labels);
+  } else if (figure) {
     save(new Blob([figure], { type: "image/svg+xml" }), `${request.layer}.svg`);
   } else if (records) {
     const { record_bytes: size } = map.live;
@@ -171,6 +180,27 @@ function receive(member, { records, data, figure, error, broken }) {
     showWindow(JSON.parse(data), request.job, isWhole).catch(failJob);
   }
   employ().catch(failJob);
+}
+
+// A sample of the program's map that the page computes again, once.
+const SAMPLED = 64;
+const sample = { wanted: false, cells: null, scene: null };
+
+function drawSample() {
+  const { class: classes, source } = base.values;
+  if (sample.cells || !classes) return;
+  const integrated = Array.from(classes, (_, id) => id).filter((id) => !source || source[id] === 0);
+  sample.cells = Array.from({ length: Math.min(SAMPLED, integrated.length) }, () => integrated[Math.floor(Math.random() * integrated.length)]);
+  sample.scene = sceneOver(map.scene, map.axes.map(({ scale, values, min, max, count }) => (scale === "values" ? { values } : { min, max, count })));
+  sample.wanted = true;
+  employ().catch(failJob);
+}
+
+function showSample(labels) {
+  const { class: classes, period: periods } = base.values;
+  const same = sample.cells.filter((id, k) => labels[2 * k] === classes[id] && labels[2 * k + 1] === periods[id]).length;
+  byId("sample").textContent = `The page computed ${sample.cells.length} random cells of the program's map again: ${same} have the same class and period.`
+    + (same < sample.cells.length ? " Browsers round products and sums separately, so a long transient may end on another motion." : "");
 }
 
 // Shows the cells of a job, and begins its next level if all of them are there.

@@ -13,7 +13,7 @@ let wanted = null;
 // The request that the worker computes, with the time at which it began; none if the worker is idle.
 let request = null;
 
-// Compiles the engine once. A page without a selection never unpacks it.
+// Compiles the engine once.
 function compiled() {
   engine ??= unpack({ data: byId("engine").textContent, type: "u8" }).then((bytes) => WebAssembly.compile(bytes));
   return engine;
@@ -71,6 +71,12 @@ function startWorker(module) {
     if (wanted && command === byId("command").textContent) showMotion(JSON.parse(result), took);
     else if (wanted) compute().catch(fail);
   }, fail);
+}
+
+// Starts the worker before the first selection.
+async function prepareWorker() {
+  const module = await compiled();
+  if (!worker) startWorker(module);
 }
 
 function stopWorker() {

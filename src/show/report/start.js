@@ -23,6 +23,8 @@ async function start() {
   await fill(base);
   byId("wait").remove();
   readLink();
+  // The first selection need not wait for the engine.
+  if (map.model_file !== null) setTimeout(() => prepareWorker().catch(() => {}), 300);
 }
 new ResizeObserver(draw).observe(canvas);
 start().catch((error) => { byId("wait").textContent = `The map cannot be shown: ${error}`; });

@@ -16,6 +16,7 @@ function windowOf({ key, scene, model, sets }) {
 const answers = {
   orbit: ({ command, model }) => ({ command, result: wasm_bindgen.orbit(command, model) }),
   compute: (request) => ({ records: windowOf(request).compute(request.runs) }),
+  labels: (request) => ({ labels: windowOf(request).labels(request.runs) }),
   data: (request) => ({ data: windowOf(request).data(request.records) }),
   figure: (request) => ({ figure: windowOf(request).figure(request.records, request.layer) }),
 };
