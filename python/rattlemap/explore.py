@@ -1,4 +1,4 @@
-"""A map that computes while one looks at it, as a widget of a notebook."""
+"""A page that computes a map on demand, as a widget of a notebook."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ export default { render };
 class Explorer:
     """A page that shows a map and computes what is visible in it. :func:`explore` returns it.
 
-    In a notebook it shows itself. Zooming and sliders compute, and a click on a cell selects it.
+    A notebook displays the page. After a zoom, or a move of a slider, the page computes new cells. A click selects a cell.
     """
 
     def __init__(self, model_file: tuple[str, str] | None, page: str, height: int) -> None:
@@ -125,13 +125,13 @@ def explore(
     progress: bool | Report = True,
     **names: Any,
 ) -> Explorer:
-    """Return a page that computes a map while one looks at it, like ``rattlemap explore``.
+    """Return a page that computes a map on demand, like ``rattlemap explore``.
 
     Parameters
     ----------
     model, scene, set, axes, parameters, quantities, start, settings, **names
-        The map, as in :func:`map`. A count of more than 65 is not needed: the page computes finer cells of what is visible.
-        The number of cells may be left out: ``e=(0, 1)``.
+        The map, as in :func:`map`. Counts above 65 are reduced to 65, because the page computes finer cells of the visible
+        part. The count may be left out: ``e=(0, 1)``.
     height
         Height of the page in a notebook, in pixels.
     progress
@@ -140,7 +140,7 @@ def explore(
     Returns
     -------
     Explorer
-        A notebook shows it, with the package ``anywidget``. ``.orbit`` is the motion of the selected cell.
+        A notebook displays it if the package ``anywidget`` is installed. ``.orbit`` is the motion of the selected cell.
 
     Raises
     ------
@@ -183,10 +183,10 @@ class Accessor:
         self._ds = ds
 
     def explore(self, *, height: int = 760, progress: bool | Report = True) -> Explorer:
-        """Return a page that computes this map while one looks at it; see :func:`explore`."""
+        """Return a page that computes this map on demand; see :func:`explore`."""
         attrs = self._ds.attrs
         if "scene" not in attrs or "model" not in attrs or "axes" not in attrs:
-            raise SceneError("the Dataset has no attributes of a map; use one that rm.map or rm.open has returned")
+            raise SceneError("this Dataset does not describe a map; use one that rm.map or rm.open returned")
         model = json.loads(attrs["model"])
         file = None if model["text"] is None else (f"{model['name']}.toml", model["text"])
         return _of_scene(_native.Scene(attrs["scene"], json.loads(attrs["set"]), file), height, progress)

@@ -1,4 +1,4 @@
-//! Pages that compute a map while one looks at them.
+//! Pages that compute a map on demand.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-"""The page that computes a map, and the motion of a cell that is selected in it."""
+"""The page that computes a map on demand, and the motion of a cell that is selected in it."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ def test_the_command_of_a_page_names_all_that_differs_from_the_models_defaults()
 def test_a_map_can_be_explored() -> None:
     ds = rm.map(rm.gear_pair(F=50), e=(0.5, 0.7, 4), omega=(5, 6, 4), engine="cpu", progress=False)
     assert f">{ds.attrs['title']}</title>" in ds.rattlemap.explore(progress=False).page
-    with pytest.raises(rm.SceneError, match="no attributes of a map"):
+    with pytest.raises(rm.SceneError, match="does not describe a map"):
         ds.drop_attrs().rattlemap.explore()

@@ -662,12 +662,12 @@ impl Bifurcation {
     }
 }
 
-/// Open a page in which a map can be explored: zooming and sliders compute
+/// Open a page that computes a map: zoom for finer cells, move sliders to change parameters
 ///
-/// Of a scene, computes a map of at most 65 x 65 cells and writes one page, which needs no other file and no network. The page
-/// computes finer cells of what is visible, in f64, on as many processor cores as the browser offers. A click on a cell shows its
-/// motion; sliders change the parameters; the address of the page keeps all of it. Of the folder of a finished map, opens its
-/// report.html, which computes in the same way.
+/// For a scene, computes a map of at most 65 x 65 cells and writes one page. The page needs no other file and no network. It
+/// computes finer cells of the visible part, in f64, on as many processor cores as the browser offers. A click on a cell shows
+/// its motion. The page's address stores the view, the selected cell and the parameters. For the folder of a finished map, opens
+/// its report.html, which computes in the same way.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     rattlemap explore scenes/e_omega.toml\n  \
@@ -682,8 +682,8 @@ pub(crate) struct Explore {
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 
-    /// File to write the page to [default: the scene's name with the extension .explore.html, in the current folder; it is
-    /// replaced]
+    /// File to write the page to [default: the scene's name with the extension .explore.html, in the current folder; an
+    /// existing file is overwritten]
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
 

@@ -1,4 +1,4 @@
-//! `rattlemap explore`: opens a page that computes a map while one looks at it.
+//! `rattlemap explore`: opens a page that computes a map on demand.
 
 use std::fs;
 use std::io;
@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &Explore) -> Result<(), Failure> {
     }
     let page = fs::canonicalize(&page).unwrap_or(page);
     if let Err(error) = opener::open_browser(&page) {
-        say::note(format_args!("no browser could be started ({error}); open {} in one", say::path(&page)));
+        say::note(format_args!("could not start a browser ({error}); open {} in a browser yourself", say::path(&page)));
     }
     Ok(())
 }
@@ -64,7 +64,7 @@ fn written(arguments: &Explore) -> Result<PathBuf, Failure> {
     Ok(out)
 }
 
-/// Replaces a file at once, so that an interruption leaves the earlier one.
+/// Replaces a file in one step, so that an interruption never leaves half a file.
 fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let partial = path.with_extension("html.partial");
     fs::write(&partial, bytes)?;

@@ -1,4 +1,4 @@
-//! Makes a page that computes a map while one looks at it.
+//! Makes a page that computes a map on demand.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -15,7 +15,7 @@ use crate::show::{layers, report, words};
 /// Largest number of cells along an axis of the map in the page; the page computes finer ones.
 const COARSE: usize = 65;
 
-/// Returns the scene with so few cells that its map takes seconds. `sets` are the arguments that the scene was loaded with.
+/// Returns the scene with at most 65 cells along each axis, so that its map takes seconds. `sets` are the arguments that the scene was loaded with.
 fn coarse(scene: &Scene, sets: &[String]) -> Result<Scene, SceneError> {
     let axes = scene.axes().iter().enumerate();
     let fine = axes.filter(|(_, axis)| axis.scale() != Scale::Values && axis.count() > COARSE);

@@ -3,8 +3,8 @@
 //! The page's own code is in `report/`. Its data are JSON. Arrays over the cells are little endian numbers, compressed with
 //! gzip and encoded in base64.
 //!
-//! The page computes, too: it contains `web/` as WebAssembly. A click on a cell computes its motion. Zooming computes what is
-//! visible with finer cells, and sliders change the parameters of all cells.
+//! The page can compute: it contains the crate `web/` as WebAssembly. A click on a cell computes its motion. Zooming computes
+//! finer cells of the visible part, and sliders change the parameters of all cells.
 //!
 //! The page's security policy allows only its own script and style, and what the script makes. Texts from a scene or a manifest are never executed.
 
@@ -44,6 +44,7 @@ const SCRIPT: &str = concat!(
     include_str!("report/input.js"),
     include_str!("report/orbit.js"),
     include_str!("report/live.js"),
+    include_str!("report/panels.js"),
     include_str!("report/checks.js"),
     include_str!("report/start.js"),
 );
@@ -188,7 +189,7 @@ fn policy(style: &str, script: &str) -> String {
     let [style, script] =
         [style, script].map(|part| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(part))));
     format!(
-        "default-src 'none'; script-src {script} 'wasm-unsafe-eval'; worker-src blob:; img-src blob:; style-src {style}; \
+        "default-src 'none'; script-src {script} 'wasm-unsafe-eval'; worker-src blob:; img-src blob:; frame-src blob:; style-src {style}; \
          base-uri 'none'; form-action 'none'"
     )
 }
@@ -263,7 +264,8 @@ fn packed<T: NoUninit>(kind: &'static str, values: &[T]) -> Value {
 }
 
 /// Returns what workers of the page need to compute parts of the map: the number of runs per cell and the size of a record.
-/// Null if they cannot, because cells are listed or follow their neighbours, or the model is not a file.
+/// Null if they cannot compute parts: the scene lists its cells, cells start from their neighbours' final states, or the model
+/// has no file.
 fn live(cells: &Cells<'_>) -> Option<Value> {
     let scene = cells.scene();
     let can = scene.list().is_none()
@@ -272,7 +274,7 @@ fn live(cells: &Cells<'_>) -> Option<Value> {
     can.then(|| json!({ "starts": cells.runs() / cells.count(), "record_bytes": size_of::<Record>(), "at_once": false }))
 }
 
-/// Returns a parameter that the page can change. Ends of its range that do not exist are null.
+/// Returns a parameter that the page can change. `min` or `max` is null if the range has no limit on that side.
 fn parameter((parameter, value): (&Parameter, f64)) -> Value {
     let [min, max] = parameter.range.ends();
     json!({
@@ -308,7 +310,8 @@ fn axis(axis: &Axis) -> Value {
 
 /// Returns, for each colour of the palette, the number of the legend's entry that includes it, if there is one.
 ///
-/// Colours without an entry of their own follow the first one of their entry, except that the shades of a bar are one entry.
+/// A colour without an entry belongs to the entry of the nearest earlier colour that has one. All shades of a bar belong to one
+/// entry.
 fn entries_of(layer: &Layer) -> Vec<Option<usize>> {
     let position = |color: &Color| layer.entries.iter().position(|entry| entry.color == *color);
     let shades = layer.bar.as_ref().filter(|_| layer.numbers.is_none()).map_or(0, |bar| bar.colors.len());

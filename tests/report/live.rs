@@ -1,4 +1,4 @@
-//! A page computes: a walk through it in a browser, compared with the program. Skipped without Chromium, with a message on
+//! A walk through a page in a browser: the page computes the same cells as the program. Skipped without Chromium, with a message on
 //! stderr.
 
 use std::fs;
@@ -70,7 +70,7 @@ async function walk() {
   choose(null);
   await until(() => text("fixed").includes("F = 50"));
   location.hash = said.link;
-  readLink();
+  readAddress();
   await until(() => live && live.data.fixed.includes("F = 47") && isComputed() && selectedCell);
   said.again = [location.hash, text("command")];
   finish();

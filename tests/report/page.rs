@@ -251,7 +251,7 @@ fn the_policy_allows_only_the_script_and_style_of_the_page() {
     let style = hashed(between(&page, "<style>", "</style>"));
     let script = hashed(between(&page, "<script>", "</script>"));
     let expected = format!(
-        "default-src 'none'; script-src {script} 'wasm-unsafe-eval'; worker-src blob:; img-src blob:; style-src {style}; \
+        "default-src 'none'; script-src {script} 'wasm-unsafe-eval'; worker-src blob:; img-src blob:; frame-src blob:; style-src {style}; \
          base-uri 'none'; form-action 'none'"
     );
     assert_eq!(policy, expected);
@@ -531,7 +531,7 @@ const KEYS: &str = r#"pointerCell = null;
   showLayer(0);
   choose(null);
   location.hash = said.link;
-  readLink();
+  readAddress();
   said.again = [location.hash, map.layers[layer].name, fact("cell"), view.left, view.width];"#;
 
 #[test]

@@ -38,7 +38,7 @@ impl Window {
             .map_err(|error| error.to_string())?;
         if scene.start().follows() {
             return Err(
-                "cells of this map start where their neighbours end, so a part of it is another map".into()
+                "each cell of this map starts from the final state of its neighbour, so no part can be computed alone".into()
             );
         }
         let plan = Plan::new(&scene);
@@ -77,13 +77,13 @@ impl Window {
     /// Returns the data of a page that shows these records, as JSON. `records` has the bytes of one record per run.
     ///
     /// # Errors
-    /// A number of bytes that is not that of all records.
+    /// If `records` does not have one record per run.
     pub fn data(&self, records: &[u8]) -> Result<String, String> {
         self.shown(records, |cells, layers, words| {
             let made = Provenance {
                 engine: "cpu",
                 precision: "f64",
-                device: "this page",
+                device: "browser",
                 commit: "of the program that wrote it",
             };
             report::data(cells, &made, layers, words, None).to_string()
@@ -93,7 +93,7 @@ impl Window {
     /// Draws a layer of these records as an SVG figure.
     ///
     /// # Errors
-    /// As for [`Window::data`]; a name that is not that of a layer.
+    /// As for [`Window::data`], or if no layer has this name.
     pub fn figure(&self, records: &[u8], layer: &str) -> Result<String, String> {
         self.shown(records, |cells, layers, _| {
             let layer = layers.iter().find(|each| each.name() == layer).ok_or("no such layer")?;
@@ -103,7 +103,7 @@ impl Window {
         })?
     }
 
-    /// Calls a function with the cells that have these records, their layers and words.
+    /// Builds cells, layers and words from records, and passes them to a function.
     fn shown<T>(
         &self,
         records: &[u8],
@@ -149,6 +149,6 @@ mod tests {
         assert!(set("parameters.f20=0.3").is_err_and(|error| error.contains("f20")));
         assert!(Window::new(&text, "", "").is_err_and(|error| error.contains("not in this page")));
         let followed = format!("{SCENE}[start]\npolicy = 'up'\n");
-        assert!(Window::new(&followed, "", "").is_err_and(|error| error.contains("another map")));
+        assert!(Window::new(&followed, "", "").is_err_and(|error| error.contains("final state")));
     }
 }

@@ -35,9 +35,9 @@ impl<'p> Cpu<'p> {
         Cpu { plan, flows: Flows::new(plan), under_way: Vec::new(), halt: Arc::default() }
     }
 
-    /// Computes cells at once and returns their records in the same order.
+    /// Computes all cells before it returns. The records have the order of the cells.
     pub fn compute(&self, cells: &[Cell]) -> Vec<Record> {
-        // A flag is raised only through an engine that owns this one.
+        // Nobody can raise the flag of this engine, so every cell has a record.
         cells.par_iter().with_max_len(1).map(|cell| self.cell(cell).unwrap_or_default()).collect()
     }
 

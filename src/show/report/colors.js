@@ -1,6 +1,6 @@
 // The colours of a layer: its range of numbers, which fits the visible cells, and its legend.
 
-// The legend's entry that is shown alone; none shows all.
+// Text of the only legend entry whose cells are shown; null shows all cells.
 let isolated = null;
 // Colour of the cells that are not shown.
 const HIDDEN = "b8b8b8";
@@ -93,6 +93,7 @@ function showLayer(index) {
   [...byId("layers").children].forEach((button, k) => button.setAttribute("aria-checked", k === layer));
   fitColors();
   updateLink();
+  share();
 }
 
 // Lists the named colours with their shares of the cells. An entry of a layer without numbers can be shown alone.

@@ -1,4 +1,6 @@
 "use strict";
+// The document before this script changes it.
+const pristine = document.documentElement.cloneNode(true);
 // The data of the map, and what the page shows now.
 const map = JSON.parse(document.getElementById("map").textContent);
 const [columns, rows] = map.axes.map((axis) => axis.count);
@@ -8,22 +10,22 @@ let layer = 0;
 // The visible part of the map, in cells of the program's map: its lower left corner and its extent. Cell i spans i to i + 1.
 const everything = { left: 0, bottom: 0, width: columns, height: rows };
 let view = { ...everything };
-// Cells: a sheet with two indices.
+// A cell is an object with a sheet and two indices.
 let pointerCell = null;
 let selectedCell = null;
 
-// A sheet is a map that the page shows: data, unpacked arrays, and the place that it covers, as a view has it.
+// A sheet is a map to draw: its data, its unpacked arrays, and the rectangle that it covers, in cells of the program's map.
 const sheetOf = (data, place) => ({ data, place, values: {}, starts: null, columns: data.axes[0].count, rows: data.axes[1].count });
-// The map that the program computed, and the window that this page computes, if there is one.
+// The map that the program computed, and the part of it that this page computed again with finer cells or other parameters.
 const base = sheetOf(map, everything);
 let live = null;
 // Parameters that differ from those of the program's map, by name.
 let changes = {};
 const isChanged = () => Object.keys(changes).length > 0;
 
-// Sheets from the lowest to the uppermost. The program's map has other parameters than a changed window.
+// The sheets to draw, from bottom to top. After a change of parameters, the program's map is left out.
 const shown = () => [...(isChanged() ? [] : [base]), ...(live ? [live] : [])];
-// The sheet to which colours and legend belong: the computed window while it covers the view.
+// The sheet to which colours and legend belong: the one that this page computed, while it covers the view.
 const uppermost = () => (live && (isChanged() || covers(live.made, view)) ? live : base);
 const layerOf = (sheet) => sheet.data.layers.find(({ name }) => name === map.layers[layer].name);
 const covers = (outer, { left, bottom, width, height }) => {

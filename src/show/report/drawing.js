@@ -87,7 +87,7 @@ function marks(axis, from, extent, most) {
   return cells;
 }
 
-// Draws the cells of a sheet, a pixel each. `scale` is the layer whose colours stand for numbers.
+// Draws a sheet into an image with one pixel per cell. Numbers get the colours of the layer `scale`.
 function paint(sheet, own, scale) {
   const { columns: across, rows: up } = sheet;
   const picture = document.createElement("canvas");
@@ -131,7 +131,7 @@ function draw() {
   // Averaging cells would produce colours that represent something else.
   pen.imageSmoothingEnabled = false;
   const sheets = shown();
-  // Until the first window with other parameters is there, the program's map is faint.
+  // After a change of parameters, the program's map is drawn faintly until the first new picture is computed.
   pen.globalAlpha = sheets.length ? 1 : 0.3;
   for (const sheet of sheets.length ? sheets : [base]) {
     const own = layerOf(sheet);

@@ -1,6 +1,6 @@
 // Zooming, panning, choosing a cell with pointer or keys, and the link to what is shown.
 
-// Least extent of a view, in cells: four cells where the page cannot compute finer ones.
+// Smallest width or height of a view, in cells: four if the page cannot compute finer cells, else almost zero.
 const leastExtent = (axis) => (map.live && axis.scale !== "values" ? 1e-9 * axis.count : Math.min(4, axis.count));
 
 function zoom(factor, x, y) {
@@ -17,9 +17,10 @@ function keepInside() {
   view.bottom = within(view.bottom, 0, rows - view.height);
   draw();
   settle();
+  share();
 }
 
-// Fits colours, scene, link and the computed window to the view, once it rests.
+// Updates colours, scene, link and computed cells 150 ms after the last change of the view.
 let resting = 0;
 function settle() {
   clearTimeout(resting);
@@ -99,7 +100,7 @@ canvas.addEventListener("pointerleave", () => {
   draw();
 });
 
-// Shows a rectangle, in cells; it may have to be larger or inside the map.
+// Shows a rectangle, in cells. One that is too small or outside the map is enlarged or moved.
 function showView({ left, bottom, width, height }) {
   view = { left, bottom, width: within(width, leastExtent(map.axes[0]), columns), height: within(height, leastExtent(map.axes[1]), rows) };
   keepInside();
@@ -108,7 +109,7 @@ const showAll = () => showView(everything);
 canvas.addEventListener("dblclick", () => showAll());
 
 document.addEventListener("keydown", (event) => {
-  // Keys in a field belong to the field.
+  // Keys typed into a field do not control the map.
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "INPUT") return;
   const p = panel();
   const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -145,17 +146,22 @@ function follow(cell) {
   keepInside();
 }
 
+// What the page shows, without a second panel.
+let link = "";
+
 // Writes layer, parameters, cell, view and choice of colours into the link.
 function updateLink() {
   const parts = ["v=1", `layer=${encodeURIComponent(map.layers[layer].name)}`];
   for (const [name, value] of Object.entries(changes)) parts.push(`set=${encodeURIComponent(name)}:${value}`);
-  // The position of the cell's centre is a whole number in the program's map.
+  // The link stores the centre minus 0.5: the index of a cell of the program's map.
   const centre = awaited ?? (selectedCell && centreOf(selectedCell));
   if (centre) parts.push(`cell=${centre.map((x) => Number((x - 0.5).toPrecision(12))).join(",")}`);
   if (!showsAll()) parts.push(`view=${[view.left, view.bottom, view.width, view.height].join(",")}`);
   if (spansMap) parts.push("colors=map");
+  link = parts.join("&");
+  if (isPanel) sharePanel();
   try {
-    history.replaceState(null, "", `#${parts.join("&")}`);
+    history.replaceState(null, "", `#${link}${second ? `&beside=${encodeURIComponent(second.link)}` : ""}`);
   } catch {
     // A page in a frame of a notebook has no address of its own.
   }
@@ -164,12 +170,12 @@ function updateLink() {
 // Position of a cell that the link names and that has yet to be computed.
 let awaited = null;
 
-// Shows what the link names; a link may name nothing.
-function readLink() {
-  const link = new URLSearchParams(location.hash.slice(1));
-  const numbers = (name) => (link.get(name) ?? "").split(",").map((text) => (text === "" ? NaN : Number(text)));
-  spansMap = byId("whole").checked = link.get("colors") === "map";
-  const sets = link.getAll("set").map((text) => text.split(":")).map(([name, value]) => [name, Number(value)]);
+// Shows what a link names; it may name nothing.
+function readLink(text) {
+  const named = new URLSearchParams(text);
+  const numbers = (name) => (named.get(name) ?? "").split(",").map((text) => (text === "" ? NaN : Number(text)));
+  spansMap = byId("whole").checked = named.get("colors") === "map";
+  const sets = named.getAll("set").map((text) => text.split(":")).map(([name, value]) => [name, Number(value)]);
   changes = Object.fromEntries(sets.filter(([name, value]) => Number.isFinite(value) && map.parameters.some((own) => own.name === name)));
   showParameters();
   const [left, bottom, width, height] = numbers("view");
@@ -181,10 +187,13 @@ function readLink() {
   const exists = (index, count) => index > -0.5 && index < count - 0.5;
   const isNamed = exists(i, columns) && exists(j, rows);
   const isOwn = isNamed && !isChanged() && Number.isInteger(i) && Number.isInteger(j);
-  showLayer(Math.max(map.layers.findIndex(({ name }) => name === link.get("layer")), 0));
+  showLayer(Math.max(map.layers.findIndex(({ name }) => name === named.get("layer")), 0));
   choose(isOwn ? { i, j } : null);
   awaited = isNamed && !isOwn ? [i + 0.5, j + 0.5] : null;
+  if (named.get("beside") !== null) openSecond(named.get("beside"));
+  else if (second) closeSecond();
   updateLink();
   keepInside();
 }
-addEventListener("hashchange", readLink);
+const readAddress = () => readLink(location.hash.slice(1));
+addEventListener("hashchange", readAddress);

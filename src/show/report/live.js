@@ -1,13 +1,13 @@
 // Computes the visible part of the map in workers: coarse cells first, and always what is visible now.
 
-// Cells along an axis: of the first picture, and of the last. Each picture has the cells of the one before.
+// Number of cells along an axis in the first and in the last picture. Each picture contains all cells of the previous one.
 const COARSEST = 17;
 const FINEST = 257;
 // Time in ms that a request to a worker should take, and time between two pictures of unfinished cells.
 const SPELL = 40;
 const REDRAW = 1000;
 
-// The window that is wanted: its view, scene and progress; none if the program's map suffices.
+// The part of the map that workers compute now, with its view, scene and progress; null if the program's map is fine enough.
 let job = null;
 // Workers, each with the job and the runs of its request.
 let pool = [];
@@ -40,7 +40,7 @@ function wish() {
   if (along.some(({ values, min, max }) => (values ? values.length < 2 : !(min < max)))) return;
   const key = JSON.stringify([along, changes]);
   if (job?.key === key) return;
-  // A slider that moves on must not prevent the first picture.
+  // A job without a picture is kept for up to a second. Otherwise a moving slider would restart it without end.
   if (job && !job.drawn && performance.now() - job.begun < REDRAW) {
     job.next = true;
     return;
@@ -95,7 +95,7 @@ function nextLevel() {
   const [across, up] = job.counts;
   job.records = new Uint8Array(across * up * starts * size);
   job.todo = [];
-  // Cells between those of the coarser picture show their neighbour's record until theirs is there.
+  // A cell that the coarser picture lacks shows the record of a neighbour until its own is computed.
   const parts = job.along.map(({ values }) => (values || !earlier ? 1 : 2));
   const [words, target, source] = [size / 4, new Uint32Array(job.records.buffer), earlier && new Uint32Array(earlier.records.buffer)];
   for (let run = 0; run < across * up * starts; run++) {
@@ -200,7 +200,7 @@ function showSample(labels) {
   const { class: classes, period: periods } = base.values;
   const same = sample.cells.filter((id, k) => labels[2 * k] === classes[id] && labels[2 * k + 1] === periods[id]).length;
   byId("sample").textContent = `The page computed ${sample.cells.length} random cells of the program's map again: ${same} have the same class and period.`
-    + (same < sample.cells.length ? " Browsers round products and sums separately, so a long transient may end on another motion." : "");
+    + (same < sample.cells.length ? " Unlike the program, browsers round each product before they add it, so a long transient may end on another motion." : "");
 }
 
 // Shows the cells of a job, and begins its next level if all of them are there.
@@ -225,8 +225,8 @@ async function showWindow(data, of, isWhole) {
   }
 }
 
-// Selects the cell that the link names. If parameters changed, the selected place now has another motion. Finer cells come
-// nearer to the place.
+// Selects the cell that the link names. After a change of parameters, selects the cell at the same place again. Each finer
+// picture selects the cell that contains this place.
 function chooseIn(sheet) {
   if (!awaited && selectedCell && selectedCell.sheet.data.fixed !== sheet.data.fixed) awaited = centreOf(selectedCell);
   const place = awaited;

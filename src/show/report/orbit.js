@@ -25,8 +25,8 @@ function showOrbit(cell) {
   byId("motion").hidden = byId("orbit").hidden = !cell || map.model_file === null;
   if (byId("motion").hidden) return;
   byId("which-motion").textContent = byId("which-orbit").textContent = `Motion at ${nameOf(cell)}`;
-  // A notebook that shows this page in a frame reads the selection.
-  if (parent !== window) parent.postMessage({ kind: "rattlemap", command: byId("command").textContent }, "*");
+  // Tells a notebook that shows this page in a frame.
+  if (parent !== window && !isPanel) parent.postMessage({ kind: "rattlemap", command: byId("command").textContent }, "*");
   byId("computing").textContent = "computing\u2026";
   for (const id of ["motion", "orbit"]) byId(id).setAttribute("aria-busy", "true");
   if (request && performance.now() - request.begun > PATIENCE) stopWorker();
@@ -49,7 +49,7 @@ async function compute() {
   worker.postMessage(own);
 }
 
-// Starts a worker with the engine. `answer` gets its messages, `failed` a text if it cannot run.
+// Starts a worker with the engine. Calls `answer` with each message, and `failed` with a text if the worker cannot run.
 function newWorker(module, answer, failed) {
   const script = URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" }));
   const started = new Worker(script);
@@ -57,7 +57,7 @@ function newWorker(module, answer, failed) {
     URL.revokeObjectURL(script);
     answer(data);
   });
-  started.addEventListener("error", (event) => failed(event.message || "this browser refuses it"));
+  started.addEventListener("error", (event) => failed(event.message || "this browser cannot start a worker"));
   started.postMessage({ module });
   return started;
 }

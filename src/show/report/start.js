@@ -22,8 +22,9 @@ async function start() {
   if (map.validation) showValidation(map.validation);
   await fill(base);
   byId("wait").remove();
-  readLink();
-  // The first selection need not wait for the engine.
+  readAddress();
+  if (isPanel) parent.postMessage({ panel: "ready" }, "*");
+  // Starts the worker early, so that the first selection does not wait for it.
   if (map.model_file !== null) setTimeout(() => prepareWorker().catch(() => {}), 300);
 }
 new ResizeObserver(draw).observe(canvas);

@@ -1,7 +1,7 @@
 
 // Runs in a worker, after the code that wasm-bindgen made. It first receives the engine, then requests.
 
-// The window that was computed last, and what defines it.
+// The part of a map that was computed last, and the text that identifies it.
 let opened = { key: null, window: null };
 
 function windowOf({ key, scene, model, sets }) {
@@ -30,9 +30,9 @@ onmessage = ({ data: request }) => {
     const answer = answers[request.task](request);
     postMessage(answer, answer.records ? [answer.records.buffer] : []);
   } catch (error) {
-    // A text is an error of the request. Anything else may have damaged the engine's memory.
+    // An error that is a string means a wrong request. Any other error may have damaged the engine's memory.
     const broken = typeof error !== "string";
-    const text = broken ? `the engine stopped (${error}); try the command` : error;
+    const text = broken ? `the engine stopped (${error}); run the command of this cell in a terminal` : error;
     postMessage({ command: request.command, broken, error: text, result: JSON.stringify({ error: text }) });
   }
 };

@@ -1,0 +1,70 @@
+// A second panel beside the map: this page in a frame, with parameters of its own. Both panels show the same part and layer.
+
+const isPanel = document.documentElement.classList.contains("panel");
+// The second panel: its frame and what it shows; none unless it is open.
+let second = null;
+// What both panels showed last, as text.
+let shared = "";
+
+// Opens the second panel with what a link names.
+function openSecond(text) {
+  if (second) {
+    second.link = text;
+    second.frame.contentWindow.postMessage({ panel: "link", link: text }, "*");
+    return;
+  }
+  const copy = pristine.cloneNode(true);
+  copy.className = "panel";
+  const address = URL.createObjectURL(new Blob([`<!doctype html>${copy.outerHTML}`], { type: "text/html" }));
+  const frame = Object.assign(element("iframe"), { id: "second", title: "The map with other parameters", src: address });
+  frame.addEventListener("load", () => URL.revokeObjectURL(address));
+  second = { frame, link: text };
+  byId("stage").append(frame);
+  byId("stage").classList.add("split");
+  byId("compare").textContent = "Close the second panel";
+}
+
+function closeSecond() {
+  second.frame.remove();
+  second = null;
+  byId("stage").classList.remove("split");
+  byId("compare").textContent = "Compare with other parameters";
+  updateLink();
+}
+
+// Whether this panel knows what to show. Before that, it tells the page nothing.
+let hasJoined = !isPanel;
+
+const partner = () => (isPanel ? parent : second?.frame.contentWindow);
+
+// Tells the other panel which part and layer are shown, if they changed here.
+function share() {
+  const now = JSON.stringify([view, layer]);
+  if (now === shared || !hasJoined) return;
+  shared = now;
+  partner()?.postMessage({ panel: "show", view, layer }, "*");
+}
+
+// Tells the page what the link to its second panel is.
+const sharePanel = () => hasJoined && parent.postMessage({ panel: "state", link }, "*");
+
+addEventListener("message", ({ source, data }) => {
+  if (!data?.panel || source !== partner()) return;
+  if (data.panel === "ready") {
+    second.frame.contentWindow.postMessage({ panel: "link", link: second.link }, "*");
+  } else if (data.panel === "link") {
+    hasJoined = true;
+    readLink(data.link);
+    byId("parameters").open = true;
+  } else if (data.panel === "state") {
+    second.link = data.link;
+    updateLink();
+  } else if (data.panel === "show") {
+    shared = JSON.stringify([data.view, data.layer]);
+    view = data.view;
+    if (layer !== data.layer) showLayer(data.layer);
+    keepInside();
+  }
+});
+
+byId("compare").addEventListener("click", () => (second ? closeSecond() : openSecond(link)));
