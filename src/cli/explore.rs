@@ -28,7 +28,10 @@ pub(crate) fn run(arguments: &Explore) -> Result<(), Failure> {
     }
     let page = fs::canonicalize(&page).unwrap_or(page);
     if let Err(error) = opener::open_browser(&page) {
-        say::note(format_args!("could not start a browser ({error}); open {} in a browser yourself", say::path(&page)));
+        say::note(format_args!(
+            "could not start a browser ({error}); open {} in a browser yourself",
+            say::path(&page)
+        ));
     }
     Ok(())
 }

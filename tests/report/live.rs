@@ -1,5 +1,5 @@
-//! A walk through a page in a browser: the page computes the same cells as the program. Skipped without Chromium, with a message on
-//! stderr.
+//! A walk through a page in a browser: the page computes the same cells as the program. Skipped without Chromium, with a message
+//! on stderr. With the environment variable `RECORD_PAGE`, the walk writes the pictures in results/page.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -51,10 +51,12 @@ async function walk() {
   const sides = ["no", "yes"].map((_, flag) => live.values.symmetric.findIndex((own, id) => own === flag && live.values.period[id] === 1));
   const sheet = live;
   said.sides = [];
+  said.links = [];
   for (const id of sides) {
     choose({ sheet, i: id % sheet.columns, j: Math.floor(id / sheet.columns) });
     await motion();
     said.sides.push([text("command"), text("summary")]);
+    said.links.push(location.hash);
   }
   document.getElementById("parameters").open = true;
   const slider = [...document.querySelectorAll("#sliders label")].find((row) => row.firstChild.textContent === "F").children[1];
@@ -78,17 +80,41 @@ async function walk() {
 walk().catch((error) => { said.error = String(error.stack); finish(); });
 "##;
 
-/// Appends a script to a page, with its hash in the policy, and returns what the script collects.
-fn visited(browser: &str, page: &Path, script: &str) -> Value {
+/// Writes a copy of a page with a script, whose hash the copy's policy allows. Returns its path.
+fn with_script(page: &Path, script: &str) -> PathBuf {
     let text = fs::read_to_string(page).unwrap();
     let whole = format!("<script>{WAITING}{script}</script></body>");
     let own = between(&whole, "<script>", "</script>");
     let text = text.replacen("script-src ", &format!("script-src {} ", hashed(own)), 1);
     let copy = page.with_extension("visited.html");
     fs::write(&copy, text.replacen("</body>", &whole, 1)).unwrap();
-    let said = visit(browser, &copy, 100_000);
+    copy
+}
+
+/// Returns what a script collects in a page.
+fn visited(browser: &str, page: &Path, script: &str) -> Value {
+    let said = visit(browser, &with_script(page, script), 100_000);
     assert_eq!(said["error"], Value::Null, "{said}");
     said
+}
+
+fn side_link(said: &Value, side: usize) -> &str {
+    said["links"][side].as_str().unwrap()
+}
+
+/// Writes results/page/NAME.png: what the page shows for a link, when all its cells are computed.
+fn photograph(browser: &str, page: &Path, name: &str, link: &str) {
+    let script = "until(() => /computed in this page/.test(text(\"live\")) && (!selectedCell || \
+                  !text(\"computing\").includes(\"computing\")));";
+    let copy = with_script(page, script);
+    let picture = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("results/page/{name}.png"));
+    let status = std::process::Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1400,900"])
+        .args(["--virtual-time-budget=400000", &format!("--screenshot={}", picture.display())])
+        .arg(format!("file://{}{link}", copy.display()))
+        .stderr(std::process::Stdio::null())
+        .status();
+    assert!(status.unwrap().success(), "{name}");
 }
 
 fn rattlemap(folder: &TempDir) -> Command {
@@ -142,4 +168,11 @@ fn a_walk_through_the_page_shows_what_the_program_computes() {
     let command = said["command"].as_str().unwrap();
     assert!(command.contains(" --set F=47.0"), "{command}");
     assert_eq!(said["again"], serde_json::json!([said["link"], command]));
+    if std::env::var_os("RECORD_PAGE").is_some() {
+        let page = folder.path().join("page.html");
+        let pictures = [("map", ""), ("pitchfork", side_link(&said, 0)), ("other_side", side_link(&said, 1))];
+        for (name, link) in pictures.into_iter().chain([("slider", said["link"].as_str().unwrap())]) {
+            photograph(browser, &page, name, link);
+        }
+    }
 }

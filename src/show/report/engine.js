@@ -38,7 +38,7 @@ let wasm_bindgen = (function(exports) {
          * Returns the data of a page that shows these records, as JSON. `records` has the bytes of one record per run.
          *
          * # Errors
-         * A number of bytes that is not that of all records.
+         * If `records` does not have one record per run.
          * @param {Uint8Array | number[]} records
          * @returns {string}
          */
@@ -66,7 +66,7 @@ let wasm_bindgen = (function(exports) {
          * Draws a layer of these records as an SVG figure.
          *
          * # Errors
-         * As for [`Window::data`]; a name that is not that of a layer.
+         * As for [`Window::data`], or if no layer has this name.
          * @param {Uint8Array | number[]} records
          * @param {string} layer
          * @returns {string}
