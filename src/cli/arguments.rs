@@ -704,8 +704,9 @@ impl Explore {
     /// The file of a scene's page.
     pub(crate) fn out(&self) -> PathBuf {
         self.out.clone().unwrap_or_else(|| {
-            let name = self.what.file_stem().map_or_else(|| "map".into(), |stem| stem.to_os_string());
-            Path::new(&name).with_extension("explore.html")
+            let mut name = self.what.file_stem().unwrap_or_default().to_os_string();
+            name.push(".explore.html");
+            name.into()
         })
     }
 }

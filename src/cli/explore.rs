@@ -69,7 +69,11 @@ fn written(arguments: &Explore) -> Result<PathBuf, Failure> {
 
 /// Replaces a file in one step, so that an interruption never leaves half a file.
 fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let partial = path.with_extension("html.partial");
-    fs::write(&partial, bytes)?;
-    fs::rename(&partial, path)
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let written = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));
+    if written.is_err() {
+        let _ = fs::remove_file(&partial);
+    }
+    written
 }

@@ -8,7 +8,7 @@ use crate::job::error::JobError;
 use crate::job::map::MapJob;
 use crate::job::observer::Observer;
 use crate::job::scene_file::FILES;
-use crate::map::scene::{CompanionFile, FileText, List, Purpose, Scale, Scene, SceneError};
+use crate::map::scene::{CompanionFile, FileText, Purpose, Scale, Scene, SceneError};
 use crate::model_file::FileModel;
 use crate::show::{layers, report, words};
 
@@ -22,14 +22,9 @@ fn coarse(scene: &Scene, sets: &[String]) -> Result<Scene, SceneError> {
     let counts = fine.map(|(nth, _)| format!("axis.{nth}.count={COARSE}"));
     let sets: Vec<String> =
         sets.iter().cloned().chain(counts).chain([format!("{FILES}[\"html\"]")]).collect();
-    let find = |what: CompanionFile, name: &str| {
-        let model = scene.base().downcast_ref::<FileModel>().map(|model| model.definition().text.clone());
-        let text = match what {
-            CompanionFile::Model => model,
-            CompanionFile::Cells => scene.list().map(List::to_csv),
-        };
-        let text = text.ok_or_else(|| "is not in memory".to_owned())?;
-        Ok(FileText { name: name.to_owned(), text })
+    let find = |_: CompanionFile, name: &str| {
+        let model = scene.base().downcast_ref::<FileModel>().ok_or("has no file")?;
+        Ok(FileText { name: name.to_owned(), text: model.definition().text.clone() })
     };
     Scene::parse_generated(scene.text(), &sets, Purpose::Map, None, &find)
 }
@@ -45,6 +40,13 @@ pub fn page(
     observer: Arc<dyn Observer>,
     halt: &Arc<AtomicBool>,
 ) -> Result<Option<Vec<u8>>, JobError> {
+    if scene.list().is_some() || scene.start().follows() {
+        return Err(JobError::Usage(
+            "a page cannot compute parts of a list of cells, or of a map whose cells start from the final states of their \
+             neighbours; `rattlemap map` writes a report.html that shows the map and the motion of single cells"
+                .to_owned(),
+        ));
+    }
     let scene = &coarse(scene, sets)?;
     let engine = EngineRequest { kind: EngineKind::Cpu, precision: None, adapter: None };
     let job = MapJob { sets, ..MapJob::new(scene, engine) };
@@ -57,9 +59,7 @@ pub fn page(
     let map = run.finish();
     let (cells, words) = (map.cells(), words::read(&map.cells()));
     let mut data = report::data(&cells, &map.description().made, &layers::of(&cells, &words), &words, None);
-    if data["live"].is_object() {
-        data["live"]["at_once"] = true.into();
-    }
+    data["live"]["at_once"] = true.into();
     let mut page = Vec::new();
     report::write(&mut page, &data).map_err(|error| JobError::Failed(error.to_string()))?;
     Ok(Some(page))

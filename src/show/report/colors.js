@@ -56,8 +56,9 @@ function fitColors() {
   const sheet = uppermost();
   const current = layerOf(sheet);
   if (!current.ready) return;
-  if (current.values) current.range = visibleRange(sheet, current);
-  showBar(current);
+  const scale = scaleLayer();
+  if (scale.values) scale.range = visibleRange(scale === current ? sheet : base, scale);
+  showBar(scale.values ? scale : current);
   showLegend(sheet, current);
   draw();
 }

@@ -28,6 +28,10 @@ const shown = () => [...(isChanged() ? [] : [base]), ...(live ? [live] : [])];
 // The sheet to which colours and legend belong: the one that this page computed, while it covers the view.
 const uppermost = () => (live && (isChanged() || covers(live.made, view)) ? live : base);
 const layerOf = (sheet) => sheet.data.layers.find(({ name }) => name === map.layers[layer].name);
+// The layer whose colours stand for numbers: that of the uppermost sheet, or of the program's map.
+const scaleLayer = () => layerOf(spansMap && !isChanged() ? base : uppermost());
+// Whether colours belong to ranks, such as the most common word, which each sheet has for itself.
+const isRanked = ({ name }) => ["word", "pattern"].includes(name) || (name === "map" && map.attractors.length > 0);
 const covers = (outer, { left, bottom, width, height }) => {
   const slack = 1e-6 * Math.max(outer.width, outer.height);
   return left >= outer.left - slack && bottom >= outer.bottom - slack

@@ -122,15 +122,16 @@ function fitCanvas() {
 function draw() {
   pen.clearRect(0, 0, ...fitCanvas());
   const p = panel();
-  const scale = layerOf(uppermost());
+  const scale = scaleLayer();
   if (!scale?.ready) return;
+  if (scale.values) scale.range ??= visibleRange(uppermost(), scale);
   pen.save();
   pen.beginPath();
   pen.rect(p.x, p.y, p.width, p.height);
   pen.clip();
   // Averaging cells would produce colours that represent something else.
   pen.imageSmoothingEnabled = false;
-  const sheets = shown();
+  const sheets = isRanked(scale) && shown().length ? [uppermost()] : shown();
   // After a change of parameters, the program's map is drawn faintly until the first new picture is computed.
   pen.globalAlpha = sheets.length ? 1 : 0.3;
   for (const sheet of sheets.length ? sheets : [base]) {

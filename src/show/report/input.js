@@ -178,6 +178,7 @@ function readLink(text) {
   const sets = named.getAll("set").map((text) => text.split(":")).map(([name, value]) => [name, Number(value)]);
   changes = Object.fromEntries(sets.filter(([name, value]) => Number.isFinite(value) && map.parameters.some((own) => own.name === name)));
   showParameters();
+  dropStale();
   const [left, bottom, width, height] = numbers("view");
   view = { ...everything };
   if ([left, bottom, width, height].every(Number.isFinite)) {

@@ -3,6 +3,8 @@
 // Number of cells along an axis in the first and in the last picture. Each picture contains all cells of the previous one.
 const COARSEST = 17;
 const FINEST = 257;
+// Largest size of the records of a picture, in bytes.
+const MOST_BYTES = 128e6;
 // Time in ms that a request to a worker should take, and time between two pictures of unfinished cells.
 const SPELL = 40;
 const REDRAW = 1000;
@@ -29,11 +31,12 @@ function windowAlong(axis, from, extent) {
 
 // Begins the window that the view needs, unless it is there or under way.
 function wish() {
-  const isFine = (axis, extent) => axis.scale === "values" || extent >= FINEST;
-  const suffices = !isChanged() && (byId("refine").checked
-    ? (isFine(map.axes[0], view.width) && isFine(map.axes[1], view.height)) || (showsAll() && !map.live?.at_once) : true);
+  const extents = map.axes.map((axis, k) => (axis.scale === "values" ? 0 : [view.width, view.height][k]));
+  const isFine = extents.every((extent) => extent === 0) || extents.some((extent) => extent >= FINEST);
+  const suffices = !isChanged() && (isFine || !byId("refine").checked || (showsAll() && !map.live?.at_once));
   if (!map.live || suffices) {
     stopJob();
+    if (awaited) choose(cellOf(base, ...awaited));
     return;
   }
   const along = [windowAlong(map.axes[0], view.left, view.width), windowAlong(map.axes[1], view.bottom, view.height)];
@@ -46,7 +49,8 @@ function wish() {
     return;
   }
   job = { key, along, view: { ...view }, begun: performance.now(), changes: { ...changes }, level: firstLevel() - 1, drawn: false, next: false };
-  pool.filter(({ request }) => request && performance.now() - request.begun > PATIENCE).forEach(stop);
+  // A figure, which the user asked for, is waited for.
+  pool.filter(({ request }) => request && request.task !== "figure" && performance.now() - request.begun > PATIENCE).forEach(stop);
   nextLevel();
 }
 
@@ -66,11 +70,17 @@ function stopJob() {
   job = null;
   byId("live").textContent = "";
   byId("save-svg").hidden = true;
-  if (!live) return;
+  if (live) showMap();
+}
+
+// Shows the program's map alone.
+function showMap() {
   live = null;
   showFixed(map);
   fitColors();
   showScene();
+  pointerCell = null;
+  if (selectedCell && selectedCell.sheet.data.fixed !== map.fixed) choose(cellOf(base, ...centreOf(selectedCell)));
 }
 
 // Begins the next finer picture; the last one ends the job.
@@ -79,7 +89,14 @@ function nextLevel() {
   byId("save-svg").hidden = true;
   const count = countAt(job.level);
   const grown = job.along.some(({ values }) => !values) ? count : COARSEST;
-  if (grown > FINEST || (job.records && grown === COARSEST)) {
+  const { starts, record_bytes: size } = map.live;
+  const counts = job.along.map(({ values }) => values?.length ?? count);
+  const isTooLarge = counts[0] * counts[1] * starts * size > MOST_BYTES;
+  if (isTooLarge && !job.records) {
+    failJob("the cells of this view need too much memory");
+    return;
+  }
+  if (isTooLarge || grown > FINEST || (job.records && grown === COARSEST)) {
     drawSample();
     byId("save-svg").hidden = false;
     awaited = null;
@@ -87,12 +104,11 @@ function nextLevel() {
     return;
   }
   const earlier = job.records && { records: job.records, counts: job.counts };
-  job.counts = job.along.map(({ values }) => values?.length ?? count);
+  job.counts = counts;
   job.ranges = job.along.map(({ values, min, max }, k) => (values ? { values } : { min, max, count: job.counts[k] }));
   job.scene = sceneOver(map.scene, job.ranges);
   job.id = `${job.key} ${job.level}`;
-  const { starts, record_bytes: size } = map.live;
-  const [across, up] = job.counts;
+  const [across, up] = counts;
   job.records = new Uint8Array(across * up * starts * size);
   job.todo = [];
   // A cell that the coarser picture lacks shows the record of a neighbour until its own is computed.
@@ -108,7 +124,7 @@ function nextLevel() {
   }
   job.next_run = job.ended = 0;
   job.redrawn = performance.now();
-  job.wants_data = false;
+  job.wants_data = job.awaits_data = false;
   employ().catch(failJob);
 }
 
@@ -129,7 +145,7 @@ function assign(member) {
   if (!job) return;
   if (sample.wanted) {
     sample.wanted = false;
-    member.request = { begun: performance.now() };
+    member.request = { task: "labels", begun: performance.now() };
     member.worker.postMessage({ task: "labels", key: "sample", scene: sample.scene, model: map.model_file, sets: "", runs: Uint32Array.from(sample.cells) });
     return;
   }
@@ -142,9 +158,10 @@ function assign(member) {
   if (job.wants_figure) {
     send("figure", { records: job.records, layer: job.wants_figure });
     job.wants_figure = null;
-  } else if (job.wants_data) {
+  } else if (job.wants_data && !job.awaits_data) {
     job.wants_data = false;
-    send("data", { records: job.records });
+    job.awaits_data = true;
+    send("data", { records: job.records, whole: job.ended === job.todo.length });
   } else if (job.next_run < job.todo.length) {
     const runs = job.todo.slice(job.next_run, job.next_run + within(Math.round(member.per_ms * SPELL), 4, 2048));
     job.next_run += runs.length;
@@ -156,7 +173,9 @@ function receive(member, { records, data, figure, labels, error, broken }) {
   const { request } = member;
   member.request = null;
   if (broken) stop(member);
-  if (error && request.job === job) {
+  if (error && request.task === "figure") {
+    byId("live").textContent = `no figure: ${error}`;
+  } else if (error && request.job === job) {
     failJob(error);
     return;
   }
@@ -167,17 +186,18 @@ function receive(member, { records, data, figure, labels, error, broken }) {
   } else if (records) {
     const { record_bytes: size } = map.live;
     member.per_ms = request.runs.length / Math.max(performance.now() - request.begun, 1);
-    if (request.id === job?.id) {
+    if (job && request.job === job && request.id === job.id) {
       request.runs.forEach((run, k) => job.records.set(records.subarray(k * size, (k + 1) * size), run * size));
       job.ended += request.runs.length;
       const isWhole = job.ended === job.todo.length;
-      job.wants_data ||= isWhole || (job.level > 0 && performance.now() - job.redrawn > REDRAW);
+      // Cells of a first picture have no coarser neighbours whose records they could show.
+      job.wants_data ||= isWhole || (job.drawn && performance.now() - job.redrawn > REDRAW);
       if (job.wants_data) job.redrawn = performance.now();
       byId("live").textContent = `computing ${job.counts.join(" \u00d7 ")} cells: ${Math.floor((100 * job.ended) / job.todo.length)} %`;
     }
-  } else if (data && request.job === job) {
-    const isWhole = request.id === job.id && job.ended === job.todo.length;
-    showWindow(JSON.parse(data), request.job, isWhole).catch(failJob);
+  } else if (data && request.job === job && request.id === job.id) {
+    job.awaits_data = false;
+    showWindow(JSON.parse(data), request).catch(failJob);
   }
   employ().catch(failJob);
 }
@@ -200,14 +220,16 @@ function showSample(labels) {
   const { class: classes, period: periods } = base.values;
   const same = sample.cells.filter((id, k) => labels[2 * k] === classes[id] && labels[2 * k + 1] === periods[id]).length;
   byId("sample").textContent = `The page computed ${sample.cells.length} random cells of the program's map again: ${same} have the same class and period.`
-    + (same < sample.cells.length ? " Unlike the program, browsers round each product before they add it, so a long transient may end on another motion." : "");
+    + (same === sample.cells.length ? ""
+      : map.made.engine === "cpu" ? " Unlike the program, browsers round each product before they add it, so a long transient may end on another motion."
+        : ` The map was computed by the engine ${map.made.engine} in ${map.made.precision}, the page computes in f64.`);
 }
 
 // Shows the cells of a job, and begins its next level if all of them are there.
-async function showWindow(data, of, isWhole) {
+async function showWindow(data, { job: of, id, whole: isWhole }) {
   const [[left, width], [bottom, height]] = of.along.map(({ cover }, k) => cover(data.axes[k].count));
   const sheet = await fill(sheetOf(data, { left, bottom, width, height }));
-  if (of !== job) return;
+  if (of !== job || id !== job.id) return;
   sheet.made = of.view;
   sheet.ranges = of.ranges;
   live = sheet;
@@ -220,9 +242,8 @@ async function showWindow(data, of, isWhole) {
   if (of.next) {
     of.next = false;
     wish();
-  } else if (isWhole) {
-    nextLevel();
   }
+  if (of === job && isWhole) nextLevel();
 }
 
 // Selects the cell that the link names. After a change of parameters, selects the cell at the same place again. Each finer
@@ -239,12 +260,21 @@ function chooseIn(sheet) {
 
 function stop(member) {
   member.worker.terminate();
+  if (member.request?.task === "labels") sample.wanted = true;
   pool = pool.filter((other) => other !== member);
 }
 
 function failJob(error) {
   byId("live").textContent = `not computed: ${error.message ?? error}`;
+  byId("save-svg").hidden = true;
+  const isOutdated = job?.next;
   job = null;
+  if (isOutdated) wish();
+}
+
+// Removes cells with other parameters once the parameters are those of the map again.
+function dropStale() {
+  if (!isChanged() && live && live.data.fixed !== map.fixed) showMap();
 }
 
 // Lists the parameters of the map, each with a slider and a field.
@@ -266,6 +296,7 @@ function showParameters() {
       if (number === value) delete changes[name];
       else changes[name] = number;
       [slider.value, field.value] = [number, number];
+      dropStale();
       updateLink();
       draw();
       wish();
@@ -283,10 +314,8 @@ function showParameters() {
 byId("refine").addEventListener("change", wish);
 byId("restore").addEventListener("click", () => {
   changes = {};
-  live = null;
   showParameters();
-  showFixed(map);
-  fitColors();
+  dropStale();
   updateLink();
   wish();
 });
@@ -299,7 +328,10 @@ function save(blob, name) {
 }
 const fileName = (ending) => `${map.layers[layer].name}.${ending}`;
 byId("save-png").addEventListener("click", () => canvas.toBlob((blob) => save(blob, fileName("png"))));
+byId("save-model").hidden = !map.model_file;
+byId("save-model").addEventListener("click", () => save(new Blob([map.model_file]), "model.toml"));
 byId("save-svg").addEventListener("click", () => {
+  if (!job) return;
   job.wants_figure = map.layers[layer].name;
   employ().catch(failJob);
 });
