@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     const SCENE: &str = "model = 'two-masses'\n[[axis]]\nparameter = 'omega'\nmin = 1.0\nmax = 1.4\ncount = 5\n\
-                         [[axis]]\nparameter = 'r'\nmin = 0.6\nmax = 0.9\ncount = 4\n[outputs]\nquantities = ['class', 'word']\n";
+                         [[axis]]\nparameter = 'e'\nmin = 0.6\nmax = 0.9\ncount = 4\n[outputs]\nquantities = ['class', 'word']\n";
 
     #[test]
     fn parts_of_a_window_give_the_data_of_the_whole() {
@@ -145,8 +145,9 @@ mod tests {
     #[test]
     fn parameters_are_set_and_wrong_ones_are_errors() {
         let set = |sets: &str| Window::new(SCENE, "", sets).map(|window| window.scene.settings().to_owned());
+        assert!(set("parameters.mu=0.7").is_ok_and(|settings| settings.contains("mu = 0.7")));
         let text = SCENE.replace("two-masses", "own.toml");
-        assert!(set("parameters.f20=0.3").is_err_and(|error| error.contains("f20")));
+        assert!(set("parameters.nothing=0.3").is_err_and(|error| error.contains("nothing")));
         assert!(Window::new(&text, "", "").is_err_and(|error| error.contains("not in this page")));
         let followed = format!("{SCENE}[start]\npolicy = 'up'\n");
         assert!(Window::new(&followed, "", "").is_err_and(|error| error.contains("final state")));
