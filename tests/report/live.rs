@@ -40,16 +40,17 @@ async function walk() {
   said.opened = text("title");
   const [e, omega] = map.axes;
   const at = ({ min, max, count }, value) => 0.5 + ((value - min) / (max - min)) * (count - 1);
-  const [left, bottom] = [at(e, 0.44), at(omega, 4.15)];
-  showView({ left, bottom, width: at(e, 0.5) - left, height: at(omega, 4.4) - bottom });
+  const [left, bottom] = [at(e, 0.5), at(omega, 5.4)];
+  showView({ left, bottom, width: at(e, 0.6) - left, height: at(omega, 5.8) - bottom });
   await until(isComputed);
   clearTimeout(resting);
   said.scene = text("scene");
   said.counts = [live.columns, live.rows];
   said.classes = [...live.values.class].map((index) => map.classes[index]);
   said.periods = [...live.values.period];
-  const sides = ["no", "yes"].map((_, flag) => live.values.symmetric.findIndex((own, id) => own === flag && live.values.period[id] === 1));
   const sheet = live;
+  // Cells of the middle row, far from the pitchfork on both sides.
+  const sides = [8, 56].map((part) => Math.floor(sheet.rows / 2) * sheet.columns + Math.floor((part / 65) * sheet.columns));
   said.sides = [];
   said.links = [];
   for (const id of sides) {
