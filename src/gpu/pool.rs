@@ -281,7 +281,7 @@ mod tests {
     fn a_map_on_a_card_is_waited_for_a_few_times() {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
         let at_once = DEDICATED.at_once >> 10;
-        gpu.policy = DispatchPolicy { round: std::time::Duration::from_secs(60), at_once, ..DEDICATED };
+        gpu.policy = DispatchPolicy { round: std::time::Duration::from_secs(10), at_once, ..DEDICATED };
         let at = |i: u32, count: u32| f64::from(i) / f64::from(count);
         let pairs = (0..32).flat_map(|i| (0..32).map(move |j| (at(i, 32), 1.0 + 11.0 * at(j, 32))));
         let pairs: Vec<_> = pairs.map(|(e, omega)| GearPair { omega, ..GearPair::paper(e) }).collect();
