@@ -42,7 +42,7 @@ fn rows(summary: &str) -> Vec<HashMap<&str, &str>> {
 #[test]
 fn a_measurement_writes_a_table() {
     let out = tempfile::tempdir().unwrap();
-    let summary = measure(&software().unwrap_or_else(|| "vulkan".to_owned()), &out, 1600, 8, &["classes"]);
+    let summary = measure(&software().unwrap_or_else(|| "vulkan".to_owned()), &out, 240, 8, &["classes"]);
     let rows = rows(&summary);
     assert_eq!(rows.len(), 1, "{summary}");
     let row = &rows[0];
