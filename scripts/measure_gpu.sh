@@ -65,7 +65,9 @@ since() { awk -v from="$1" -v to="$(now)" 'BEGIN { printf "%.3f", to - from }'; 
 # A run that is stopped has five seconds to write its results.
 deadline=$((${MEASURE_SECONDS:-480} - 7))
 remaining() { echo $((deadline - SECONDS)); }
-longest_run=$((deadline / 8 > 20 ? deadline / 8 : 20))
+# A run may take its share of the time, and at least 20 s.
+shares=$((${#steps[@]} < 8 ? ${#steps[@]} : 8))
+longest_run=$((deadline / shares > 20 ? deadline / shares : 20))
 
 # limited SECONDS COMMAND...: stops the command after that time or at the deadline. Exit codes: 124 and 137 for a stopped
 # command, 125 for one that was not started.

@@ -23,6 +23,8 @@ pub(super) struct DispatchPolicy {
     pub(super) keep: bool,
     /// Longest time to wait for a submission. A device that takes longer counts as lost.
     pub(super) longest_wait: Duration,
+    /// Time of an iteration of a dispatch on a simulated device. Rounds of a real device are measured.
+    pub(super) simulated: Option<Duration>,
 }
 
 /// A round takes some milliseconds, and seconds on a busy processor.
@@ -38,6 +40,7 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
     late_tangent: true,
     keep: true,
     longest_wait: LONGEST_WAIT,
+    simulated: None,
 };
 
 /// Hardware that shares the processor's memory and draws the screen: the amount of work matters there, too.
@@ -50,6 +53,7 @@ const INTEGRATED: DispatchPolicy = DispatchPolicy {
     late_tangent: true,
     keep: false,
     longest_wait: LONGEST_WAIT,
+    simulated: None,
 };
 
 /// Hardware with room for more lanes than a map has. A round costs the host more than the first lanes of a map cost the
@@ -63,6 +67,7 @@ pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
     late_tangent: false,
     keep: false,
     longest_wait: LONGEST_WAIT,
+    simulated: None,
 };
 
 /// Hardware of a browser, which may be a card or draw the screen of a laptop.

@@ -101,8 +101,8 @@ impl Rounds<'_> {
         let (mut device, mut device_end) = (DeviceTimes::default(), None);
         let mut last_beat = 0;
         let mut before: Option<Round<'_>> = None;
-        let began = Instant::now();
-        let mut last_end = began;
+        let mut last_end = Instant::now();
+        let mut elapsed = Duration::ZERO;
         let mut checked = 0;
         for (slot, check) in (0..2).zip(&checks).cycle() {
             let sent =
@@ -124,8 +124,14 @@ impl Rounds<'_> {
             }
             let all_left = left.iter().sum::<u32>();
             checked += 1;
+            let took = match gpu.policy.simulated {
+                Some(iteration) => iteration * (sent.iterations * dispatches),
+                None => last_end.elapsed(),
+            };
+            last_end = Instant::now();
+            elapsed += took;
             let has_waited = match until {
-                0 => began.elapsed() >= LONGEST_HOLD,
+                0 => elapsed >= LONGEST_HOLD,
                 _ => checked >= gpu.policy.patience,
             };
             if all_left <= until || gpu.is_halted() || has_waited && all_left < self.active_lanes {
@@ -133,10 +139,8 @@ impl Rounds<'_> {
             }
             // The first measured time includes the round that was sent ahead.
             if checked > 1 || !*is_ahead {
-                *iterations = next_iterations(sent.iterations, last_end.elapsed(), gpu.policy.round)
-                    .clamp(fewest, most);
+                *iterations = next_iterations(sent.iterations, took, gpu.policy.round).clamp(fewest, most);
             }
-            last_end = Instant::now();
         }
         // The last round belongs to the measured time, too; what follows waits for it anyway.
         if let (Some(clock), Some(sent)) = (&clock, before) {
