@@ -10,6 +10,8 @@ mod fitting;
 pub mod frame;
 pub mod labels;
 pub mod legend;
+#[cfg(any(test, target_arch = "wasm32"))]
+mod metrics;
 mod pdf;
 mod png;
 mod shapes;

@@ -44,6 +44,7 @@ const SCRIPT: &str = concat!(
     include_str!("report/input.js"),
     include_str!("report/orbit.js"),
     include_str!("report/live.js"),
+    include_str!("report/lanes.js"),
     include_str!("report/panels.js"),
     include_str!("report/checks.js"),
     include_str!("report/start.js"),

@@ -8,7 +8,7 @@ use assert_cmd::Command;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::page::{between, chromium, hashed, skipped, visit};
+use crate::page::{WITHOUT_GRAPHICS, between, chromium, hashed, skipped, visit};
 
 /// Functions for scripts that wait for workers. The browser's virtual time does not wait for them, so each step takes some
 /// real time.
@@ -23,7 +23,13 @@ const until = (ready) => new Promise((resolve) => {
   };
   look();
 });
-const isComputed = () => live && live.columns >= 65 && covers(live.made, view);
+const isComputed = () => live?.isWhole && live.columns >= 65 && covers(live.made, view);
+function sayWindow() {
+  said.scene = text("scene");
+  said.counts = [live.columns, live.rows];
+  said.classes = [...live.values.class].map((index) => map.classes[index]);
+  said.periods = [...live.values.period];
+}
 const motion = () => until(() => !document.getElementById("motion").hidden && !text("computing").includes("computing"));
 function finish() {
   const result = document.createElement("pre");
@@ -44,10 +50,7 @@ async function walk() {
   showView({ left, bottom, width: at(e, 0.6) - left, height: at(omega, 5.8) - bottom });
   await until(isComputed);
   clearTimeout(resting);
-  said.scene = text("scene");
-  said.counts = [live.columns, live.rows];
-  said.classes = [...live.values.class].map((index) => map.classes[index]);
-  said.periods = [...live.values.period];
+  sayWindow();
   const sheet = live;
   // Cells of the middle row, far from the pitchfork on both sides.
   const sides = [8, 56].map((part) => Math.floor(sheet.rows / 2) * sheet.columns + Math.floor((part / 65) * sheet.columns));
@@ -81,6 +84,27 @@ async function walk() {
 walk().catch((error) => { said.error = String(error.stack); finish(); });
 "##;
 
+/// Waits for the shaders, and computes a part of the map with lanes.
+const LANES: &str = r##"
+async function computeOnLanes() {
+  await until(() => !document.getElementById("wait"));
+  await until(() => triedLanes && (!lanes || lanes.isReady));
+  said.has_lanes = lanes !== null;
+  if (lanes) {
+    showView({ left: 8, bottom: 8, width: 12, height: 12 });
+    await until(() => live?.isWhole && live.columns >= 33 && covers(live.made, view));
+    clearTimeout(resting);
+    said.by_lanes = job.by_lanes;
+    sayWindow();
+  }
+  finish();
+}
+computeOnLanes().catch((error) => { said.error = String(error.stack); finish(); });
+"##;
+
+/// Flags of a browser that offers a device without hardware.
+const SOFTWARE_DEVICE: [&str; 2] = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"];
+
 /// Writes a copy of a page with a script, whose hash the copy's policy allows. Returns its path.
 fn with_script(page: &Path, script: &str) -> PathBuf {
     let text = fs::read_to_string(page).unwrap();
@@ -93,8 +117,8 @@ fn with_script(page: &Path, script: &str) -> PathBuf {
 }
 
 /// Returns what a script collects in a page.
-fn visited(browser: &str, page: &Path, script: &str) -> Value {
-    let said = visit(browser, &with_script(page, script), 100_000);
+fn visited(browser: &str, page: &Path, script: &str, query: &str, flags: &[&str]) -> Value {
+    let said = visit(browser, &with_script(page, script), query, flags, 100_000);
     assert_eq!(said["error"], Value::Null, "{said}");
     said
 }
@@ -124,27 +148,24 @@ fn rattlemap(folder: &TempDir) -> Command {
     program
 }
 
-/// Writes the page of a scene of this repository.
-fn explored(folder: &TempDir, scene: &str) -> PathBuf {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
+/// Writes the page of a scene of this repository. The arguments are the scene's name and options.
+fn explored(folder: &TempDir, arguments: &[&str]) -> PathBuf {
     rattlemap(folder)
-        .args(["explore", "--no-open", "--quiet", "--out", "page.html"])
-        .arg(scene)
+        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes"))
+        .args(["explore", "--no-open", "--quiet", "--out"])
+        .arg(folder.path().join("page.html"))
+        .args(arguments)
         .assert()
         .success();
     folder.path().join("page.html")
 }
 
-#[test]
-fn a_walk_through_the_page_shows_what_the_program_computes() {
-    let Some(browser) = chromium() else { return skipped() };
-    let folder = tempfile::tempdir().unwrap();
-    let said = visited(browser, &explored(&folder, "e_omega.toml"), WALK);
-    // The window has the same classes and periods as the program's map of its scene.
+/// Requires that the program computes the same classes and periods for the scene of a page's window, but for a share of cells.
+fn assert_same_map(folder: &TempDir, said: &Value, engine: &[&str], share: f64) {
     fs::write(folder.path().join("view.toml"), said["scene"].as_str().unwrap()).unwrap();
-    let formats = "outputs.files=[\"csv\"]";
-    rattlemap(&folder)
-        .args(["map", "view.toml", "--engine", "cpu", "--quiet", "--out", "view", "--set", formats])
+    rattlemap(folder)
+        .args(["map", "view.toml", "--quiet", "--out", "view", "--set", "outputs.files=[\"csv\"]"])
+        .args(engine)
         .assert()
         .success();
     let mut reader = csv::Reader::from_path(folder.path().join("view/cells.csv")).unwrap();
@@ -154,9 +175,17 @@ fn a_walk_through_the_page_shows_what_the_program_computes() {
         let period = said["periods"][*id].to_string();
         row[4] != *said["classes"][*id].as_str().unwrap() || (!row[5].is_empty() && row[5] != period)
     };
-    // The program uses FMA, the browser does not: cells with long transients may differ.
     let differing = rows.iter().enumerate().filter(differs).count();
-    assert!(differing <= rows.len() / 200, "{differing} of {}", rows.len());
+    assert!(differing as f64 <= share * rows.len() as f64, "{differing} of {}", rows.len());
+}
+
+#[test]
+fn a_walk_through_the_page_shows_what_the_program_computes() {
+    let Some(browser) = chromium() else { return skipped() };
+    let folder = tempfile::tempdir().unwrap();
+    let said = visited(browser, &explored(&folder, &["e_omega.toml"]), WALK, "", &WITHOUT_GRAPHICS);
+    // The program uses FMA, the browser does not: cells with long transients may differ.
+    assert_same_map(&folder, &said, &["--engine", "cpu"], 0.005);
     for side in said["sides"].as_array().unwrap() {
         let [command, summary] = [0, 1].map(|k| side[k].as_str().unwrap());
         let printed = rattlemap(&folder).args(command.split(' ').skip(1)).output().unwrap();
@@ -176,4 +205,16 @@ fn a_walk_through_the_page_shows_what_the_program_computes() {
             photograph(browser, &page, name, link);
         }
     }
+}
+
+/// The browser's own software device computes the page's shaders.
+#[test]
+fn lanes_of_the_page_are_those_of_the_program() {
+    let Some(browser) = chromium() else { return skipped() };
+    let folder = tempfile::tempdir().unwrap();
+    let page = explored(&folder, &["e_omega.toml", "--set", "outputs.quantities=[\"class\"]"]);
+    let said = visited(browser, &page, LANES, "?lanes=software", &SOFTWARE_DEVICE);
+    assert_eq!(said["has_lanes"], true, "{said}");
+    assert_eq!(said["by_lanes"], 33 * 33);
+    assert_same_map(&folder, &said, &["--engine", "gpu", "--precision", "f32"], 0.005);
 }

@@ -116,13 +116,18 @@ pub(crate) fn chromium() -> Option<&'static str> {
     })
 }
 
+/// Flags of a browser that does not use the graphics device.
+pub(crate) const WITHOUT_GRAPHICS: [&str; 1] = ["--disable-gpu"];
+
 /// Opens a page in a browser and returns the texts that the script has collected.
 ///
-/// `patience` is the browser's virtual time in ms after which the script must have finished.
-pub(crate) fn visit(browser: &str, page: &Path, patience: u32) -> Value {
-    let url = format!("file://{}", page.display());
+/// `query` is added to the page's address, and `flags` to the browser's arguments. `patience` is the browser's virtual time in
+/// ms after which the script must have finished.
+pub(crate) fn visit(browser: &str, page: &Path, query: &str, flags: &[&str], patience: u32) -> Value {
+    let url = format!("file://{}{query}", page.display());
     let run = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1300,850"])
+        .args(["--headless", "--no-sandbox", "--window-size=1300,850"])
+        .args(flags)
         .args([&format!("--virtual-time-budget={patience}"), "--dump-dom", &url])
         .stderr(Stdio::null())
         .output()
@@ -214,7 +219,7 @@ impl Report {
         let own = between(&visit_and_read, "<script>", "</script>");
         let page = page.replacen("script-src ", &format!("script-src {} ", hashed(own)), 1);
         fs::write(&visited, page).unwrap();
-        Some(visit(browser, &visited, 10_000))
+        Some(visit(browser, &visited, "", &WITHOUT_GRAPHICS, 10_000))
     }
 }
 

@@ -3,6 +3,8 @@
 //! `scripts/wasm.sh` compiles this crate to WebAssembly. `rattlemap::show::report` puts it into `report.html`, where a worker
 //! calls [`orbit()`] with the command that replays the selected cell.
 
+#[cfg(target_arch = "wasm32")]
+mod lanes;
 mod window;
 
 use std::sync::atomic::AtomicBool;
@@ -17,6 +19,8 @@ use rattlemap_dynamics::orbit::{self, Class, Settings};
 use serde_json::{Map, Value, json};
 use wasm_bindgen::prelude::wasm_bindgen;
 
+#[cfg(target_arch = "wasm32")]
+pub use lanes::Lanes;
 pub use window::Window;
 
 /// Width in points of gap and phase planes, which stand beside the map. The time history stands below the map and has the

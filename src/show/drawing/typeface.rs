@@ -11,6 +11,12 @@ use crate::show::symbols::lowered;
 /// Size and height of superscripts, as shares of the line's type size.
 const RAISED: (f64, f64) = (0.7, 0.36);
 
+/// The typeface's file.
+#[cfg(not(target_arch = "wasm32"))]
+const FILE: &[u8] = UBUNTU_LIGHT;
+#[cfg(target_arch = "wasm32")]
+const FILE: &[u8] = &super::metrics::file::<{ super::metrics::size() }>();
+
 /// A parsed typeface.
 #[derive(Debug)]
 pub(crate) struct Typeface {
@@ -66,7 +72,7 @@ impl Typeface {
     /// Returns the typeface of all figures.
     pub(crate) fn of_figures() -> &'static Typeface {
         static FACE: LazyLock<Typeface> = LazyLock::new(|| {
-            let face = Face::parse(UBUNTU_LIGHT, 0).expect("the bytes of the typeface are compiled in");
+            let face = Face::parse(FILE, 0).expect("the bytes of the typeface are compiled in");
             let units = f64::from(face.units_per_em());
             Typeface { face, units }
         });
@@ -75,7 +81,7 @@ impl Typeface {
 
     /// Returns the typeface's file.
     pub(crate) fn bytes() -> &'static [u8] {
-        UBUNTU_LIGHT
+        FILE
     }
 
     /// Returns the parsed file.

@@ -48,7 +48,7 @@ function wish() {
     job.next = true;
     return;
   }
-  job = { key, along, view: { ...view }, begun: performance.now(), changes: { ...changes }, level: firstLevel() - 1, drawn: false, next: false };
+  job = { key, along, view: { ...view }, begun: performance.now(), changes: { ...changes }, level: firstLevel() - 1, by_lanes: 0, drawn: false, next: false };
   // A figure, which the user asked for, is waited for.
   pool.filter(({ request }) => request && request.task !== "figure" && performance.now() - request.begun > PATIENCE).forEach(stop);
   nextLevel();
@@ -86,6 +86,10 @@ function showMap() {
 // Begins the next finer picture; the last one ends the job.
 function nextLevel() {
   job.level += 1;
+  job.onLanes = lanes?.isReady ?? false;
+  // A fast device begins with the finest picture that it computes at once.
+  while (job.onLanes && !job.records && countAt(job.level + 1) <= FINEST
+    && countAt(job.level + 1) ** 2 * map.live.starts < lanes.per_ms * SPELL) job.level += 1;
   byId("save-svg").hidden = true;
   const count = countAt(job.level);
   const grown = job.along.some(({ values }) => !values) ? count : COARSEST;
@@ -97,10 +101,12 @@ function nextLevel() {
     return;
   }
   if (isTooLarge || grown > FINEST || (job.records && grown === COARSEST)) {
-    drawSample();
+    checkProgram();
+    if (job.by_lanes) checkLanes();
     byId("save-svg").hidden = false;
     awaited = null;
-    byId("live").textContent = `${job.counts.join(" \u00d7 ")} cells, computed in this page in ${((performance.now() - job.begun) / 1000).toFixed(1)} s`;
+    byId("live").textContent = `${job.counts.join(" \u00d7 ")} cells, computed in this page in ${((performance.now() - job.begun) / 1000).toFixed(1)} s`
+      + (job.by_lanes ? `, ${job.by_lanes} of them on the graphics device` : "");
     return;
   }
   const earlier = job.records && { records: job.records, counts: job.counts };
@@ -123,6 +129,7 @@ function nextLevel() {
     if (!earlier || i % parts[0] || j % parts[1]) job.todo.push(run);
   }
   job.next_run = job.ended = 0;
+  job.total = job.todo.length;
   job.redrawn = performance.now();
   job.wants_data = job.awaits_data = false;
   employ().catch(failJob);
@@ -138,40 +145,58 @@ async function employ() {
     member.worker = newWorker(module, (answer) => receive(member, answer), failJob);
     pool.push(member);
   }
-  for (const member of pool) if (!member.request) assign(member);
+  openLanes(module);
+  for (const member of [...pool, ...(lanes ? [lanes] : [])]) if (!member.request) assign(member);
 }
 
 function assign(member) {
   if (!job) return;
-  if (sample.wanted) {
-    sample.wanted = false;
-    member.request = { task: "labels", begun: performance.now() };
-    member.worker.postMessage({ task: "labels", key: "sample", scene: sample.scene, model: map.model_file, sets: "", runs: Uint32Array.from(sample.cells) });
+  const isLanes = member === lanes;
+  if (!isLanes && samples.length) {
+    const sample = samples.shift();
+    member.request = { task: "labels", sample, begun: performance.now() };
+    member.worker.postMessage({ task: "labels", key: "sample", ...sample.window, runs: Uint32Array.from(sample.cells) });
     return;
   }
-  const common = { key: job.id, scene: job.scene, model: map.model_file,
-    sets: Object.entries(job.changes).map(([name, value]) => `parameters.${name}=${value}`).join("\n") };
+  const common = { key: job.id, ...windowOf(job) };
   const send = (task, own) => {
     member.request = { job, id: job.id, task, begun: performance.now(), ...own };
     member.worker.postMessage({ task, ...common, ...own });
   };
-  if (job.wants_figure) {
+  const compute = (task, count) => {
+    const runs = job.todo.slice(job.next_run, job.next_run + count);
+    job.next_run += runs.length;
+    send(task, { runs: Uint32Array.from(runs) });
+  };
+  const isLeft = job.next_run < job.todo.length;
+  if (isLanes) {
+    if (!lanes.isReady) send("prepare", {});
+    else if (isLeft && job.onLanes) compute("lanes", lanesAtOnce());
+  } else if (job.wants_figure) {
     send("figure", { records: job.records, layer: job.wants_figure });
     job.wants_figure = null;
   } else if (job.wants_data && !job.awaits_data) {
     job.wants_data = false;
     job.awaits_data = true;
-    send("data", { records: job.records, whole: job.ended === job.todo.length });
-  } else if (job.next_run < job.todo.length) {
-    const runs = job.todo.slice(job.next_run, job.next_run + within(Math.round(member.per_ms * SPELL), 4, 2048));
-    job.next_run += runs.length;
-    send("compute", { runs: Uint32Array.from(runs) });
+    send("data", { records: job.records, whole: job.ended === job.total });
+  } else if (isLeft && !job.onLanes) {
+    compute("compute", within(Math.round(member.per_ms * SPELL), 4, 2048));
   }
 }
 
-function receive(member, { records, data, figure, labels, error, broken }) {
+// What a worker needs to know to compute the cells of a job.
+const windowOf = ({ scene, changes: changed }) => ({ scene, model: map.model_file,
+  sets: Object.entries(changed).map(([name, value]) => `parameters.${name}=${value}`).join("\n") });
+
+function receive(member, { records, data, figure, labels, opened, prepared, error, broken }) {
   const { request } = member;
+  const isLanes = member === lanes;
+  if (isLanes && (error || opened === false)) {
+    closeLanes();
+    return;
+  }
   member.request = null;
+  if (prepared) member.isReady = true;
   if (broken) stop(member);
   if (error && request.task === "figure") {
     byId("live").textContent = `no figure: ${error}`;
@@ -180,20 +205,22 @@ function receive(member, { records, data, figure, labels, error, broken }) {
     return;
   }
   if (labels) {
-    showSample(labels);
+    request.sample.tell(labels);
   } else if (figure) {
     save(new Blob([figure], { type: "image/svg+xml" }), `${request.layer}.svg`);
   } else if (records) {
     const { record_bytes: size } = map.live;
     member.per_ms = request.runs.length / Math.max(performance.now() - request.begun, 1);
+    if (isLanes && request.runs.length >= FEWEST_LANES) dropSlowLanes();
     if (job && request.job === job && request.id === job.id) {
       request.runs.forEach((run, k) => job.records.set(records.subarray(k * size, (k + 1) * size), run * size));
       job.ended += request.runs.length;
-      const isWhole = job.ended === job.todo.length;
+      if (isLanes) job.by_lanes += request.runs.length;
+      const isWhole = job.ended === job.total;
       // Cells of a first picture have no coarser neighbours whose records they could show.
       job.wants_data ||= isWhole || (job.drawn && performance.now() - job.redrawn > REDRAW);
       if (job.wants_data) job.redrawn = performance.now();
-      byId("live").textContent = `computing ${job.counts.join(" \u00d7 ")} cells: ${Math.floor((100 * job.ended) / job.todo.length)} %`;
+      byId("live").textContent = `computing ${job.counts.join(" \u00d7 ")} cells: ${Math.floor((100 * job.ended) / job.total)} %`;
     }
   } else if (data && request.job === job && request.id === job.id) {
     job.awaits_data = false;
@@ -202,27 +229,41 @@ function receive(member, { records, data, figure, labels, error, broken }) {
   employ().catch(failJob);
 }
 
-// A sample of the program's map that the page computes again, once.
+// Number of cells in a sample.
 const SAMPLED = 64;
-const sample = { wanted: false, cells: null, scene: null };
+// Samples that workers have yet to compute in f64.
+const samples = [];
+let checkedProgram = false;
 
-function drawSample() {
-  const { class: classes, source } = base.values;
-  if (sample.cells || !classes) return;
-  const integrated = Array.from(classes, (_, id) => id).filter((id) => !source || source[id] === 0);
-  sample.cells = Array.from({ length: Math.min(SAMPLED, integrated.length) }, () => integrated[Math.floor(Math.random() * integrated.length)]);
-  sample.scene = sceneOver(map.scene, map.axes.map(({ scale, values, min, max, count }) => (scale === "values" ? { values } : { min, max, count })));
-  sample.wanted = true;
+// Draws some of a sheet's cells, and has a worker compute their class and period again. Calls `tell` with the number of cells
+// and of those that have the same class and period.
+function drawSample({ values: { class: classes, period: periods, source } }, candidates, window, tell) {
+  if (!classes) return;
+  const integrated = (candidates ?? Array.from(classes, (_, id) => id)).filter((id) => id < classes.length && (!source || source[id] === 0));
+  const cells = Array.from({ length: Math.min(SAMPLED, integrated.length) }, () => integrated[Math.floor(Math.random() * integrated.length)]);
+  const isSame = (labels) => (id, k) => labels[2 * k] === classes[id] && labels[2 * k + 1] === periods[id];
+  samples.push({ cells, window, tell: (labels) => tell(cells.length, cells.filter(isSame(labels)).length) });
   employ().catch(failJob);
 }
 
-function showSample(labels) {
-  const { class: classes, period: periods } = base.values;
-  const same = sample.cells.filter((id, k) => labels[2 * k] === classes[id] && labels[2 * k + 1] === periods[id]).length;
-  byId("sample").textContent = `The page computed ${sample.cells.length} random cells of the program's map again: ${same} have the same class and period.`
-    + (same === sample.cells.length ? ""
-      : map.made.engine === "cpu" ? " Unlike the program, browsers round each product before they add it, so a long transient may end on another motion."
-        : ` The map was computed by the engine ${map.made.engine} in ${map.made.precision}, the page computes in f64.`);
+// Compares the program's map with this page, once.
+function checkProgram() {
+  if (checkedProgram) return;
+  checkedProgram = true;
+  const scene = sceneOver(map.scene, map.axes.map(({ scale, values, min, max, count }) => (scale === "values" ? { values } : { min, max, count })));
+  drawSample(base, null, windowOf({ scene, changes: {} }), (all, same) => {
+    byId("sample").textContent = `The page computed ${all} random cells of the program's map again: ${same} have the same class and period.`
+      + (same === all ? ""
+        : map.made.engine === "cpu" ? " Unlike the program, browsers round each product before they add it, so a long transient may end on another motion."
+          : ` The map was computed by the engine ${map.made.engine} in ${map.made.precision}, the page computes in f64.`);
+  });
+}
+
+// Compares the cells of the graphics device with those of the other workers.
+function checkLanes() {
+  drawSample(live, job.onLanes ? job.todo : null, windowOf(job), (all, same) => {
+    byId("lanes").textContent = `The graphics device computes in f32. The page computed ${all} of its random cells again in f64: ${same} have the same class and period.`;
+  });
 }
 
 // Shows the cells of a job, and begins its next level if all of them are there.
@@ -232,6 +273,7 @@ async function showWindow(data, { job: of, id, whole: isWhole }) {
   if (of !== job || id !== job.id) return;
   sheet.made = of.view;
   sheet.ranges = of.ranges;
+  sheet.isWhole = isWhole;
   live = sheet;
   of.drawn = true;
   showFixed(data);
@@ -260,7 +302,7 @@ function chooseIn(sheet) {
 
 function stop(member) {
   member.worker.terminate();
-  if (member.request?.task === "labels") sample.wanted = true;
+  if (member.request?.sample) samples.push(member.request.sample);
   pool = pool.filter((other) => other !== member);
 }
 

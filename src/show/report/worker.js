@@ -13,21 +13,41 @@ function windowOf({ key, scene, model, sets }) {
   return opened.window;
 }
 
+// The browser's graphics device, and the window that it is prepared for.
+let lanes = null;
+let prepared = null;
+
+async function preparedFor(request) {
+  const window = windowOf(request);
+  if (prepared !== window) {
+    prepared = null;
+    await lanes.prepare(window);
+    prepared = window;
+  }
+  return window;
+}
+
 const answers = {
   orbit: ({ command, model }) => ({ command, result: wasm_bindgen.orbit(command, model) }),
   compute: (request) => ({ records: windowOf(request).compute(request.runs) }),
   labels: (request) => ({ labels: windowOf(request).labels(request.runs) }),
   data: (request) => ({ data: windowOf(request).data(request.records) }),
+  open: async ({ software }) => {
+    lanes = await wasm_bindgen.Lanes.open();
+    return { opened: software || lanes.is_hardware() };
+  },
+  prepare: async (request) => ({ prepared: (await preparedFor(request)) !== null }),
+  lanes: async (request) => ({ records: await lanes.compute(await preparedFor(request), request.runs) }),
   figure: (request) => ({ figure: windowOf(request).figure(request.records, request.layer) }),
 };
 
-onmessage = ({ data: request }) => {
+onmessage = async ({ data: request }) => {
   if (request.module) {
     wasm_bindgen.initSync({ module: request.module });
     return;
   }
   try {
-    const answer = answers[request.task](request);
+    const answer = await answers[request.task](request);
     postMessage(answer, answer.records ? [answer.records.buffer] : []);
   } catch (error) {
     // An error that is a string means a wrong request. Any other error may have damaged the engine's memory.
