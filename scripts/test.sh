@@ -5,8 +5,8 @@
 #
 # Installs what is missing: a software Vulkan driver, so that shader tests run on any machine, and Rust's WebAssembly
 # target. With --all it also runs the tests that take minutes, checks the program for Windows and macOS, starts a Slurm
-# cluster of one node, and installs the Python package into an environment of its own. It prints the time of each phase
-# and the ten slowest tests at the end.
+# cluster of one node, opens pages in Chromium, and installs the Python package into an environment of its own. It prints the
+# time of each phase and the ten slowest tests at the end.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -105,6 +105,16 @@ require_slurm() {
     done
 }
 
+# Installs Chromium for the tests that open pages.
+require_browser() {
+    local program
+    for program in chromium chromium-browser google-chrome; do
+        ! command -v "$program" >/dev/null || return 0
+    done
+    say "browser: installing chromium"
+    apt_install chromium || skip "pages in a browser: no Chromium, and $why"
+}
+
 # Compiles the library with each feature alone, and without any. Every other phase has several of them.
 each_feature() {
     cargo check --quiet -p rattlemap --lib --no-default-features
@@ -112,6 +122,15 @@ each_feature() {
     for feature in $(sed -n '/^\[features\]/,/^\[dep/s/^\([a-z]*\) = .*/\1/p' Cargo.toml); do
         cargo check --quiet -p rattlemap --lib --no-default-features --features "$feature"
     done
+}
+
+# Checks the types of the page's scripts.
+page_types() {
+    if ! command -v npx >/dev/null; then
+        skip "types of the page's scripts: no npx (Node.js)"
+        return
+    fi
+    npx --yes --package typescript@7 tsc -p src/show/report
 }
 
 # Runs a command under a title and records its time.
@@ -194,7 +213,10 @@ trap 'rm -f "$log"' EXIT
 
 require_tools
 require_vulkan
-if $all; then require_slurm; fi
+if $all; then
+    require_slurm
+    require_browser
+fi
 phase "format" cargo fmt --all --check
 phase "lints" cargo clippy --workspace --all-targets -- -D warnings
 phase "docs, warnings denied" docs
@@ -203,6 +225,7 @@ phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynam
 phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu,figures --lib
 phase "each feature alone" each_feature
 if $all; then
+    phase "types of the page's scripts" page_types
     phase "the program on Windows" cargo check --target "$windows" -p rattlemap
     phase "the program on macOS" cargo check --target "$macos" -p rattlemap
 fi

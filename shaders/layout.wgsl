@@ -377,15 +377,8 @@ struct Finding {
     // Periods over which impacts were counted.
     counted: u32,
     symmetric: u32,
-    word_length: u32,
-    // Halves of the hash of a word that is too long to be stored.
-    hash_low: u32,
-    hash_high: u32,
-    // Length and hash of the pattern.
-    pattern_length: u32,
-    pattern_hash: array<u32, 2>,
-    // Symbols of the word, then those of the pattern; one unused number if neither is requested.
-    symbols: array<u32, SYMBOLS>,
+    // Word and pattern, by SPELLED_*; one unused number if neither is requested.
+    spelling: array<u32, SPELLING>,
 }
 
 // Lists of slots. The first `slots` entries are the active list: lanes under way, in the order in which they began.

@@ -127,15 +127,20 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
         return;
     }
     (*finding).valid |= VALID_WORD;
-    (*finding).word_length = tally.word_length;
     for (var n = 0u; n < 7u; n++) {
-        (*finding).symbols[n] = tallies[lane].word[n];
+        spell(finding, SPELLED_WORD + n, tallies[lane].word[n]);
     }
+    spell(finding, SPELLED_WORD_LENGTH, tally.word_length);
     if tally.word_length > WORD_SYMBOLS {
         close_hash();
-        (*finding).hash_low = tally.hash_low;
-        (*finding).hash_high = tally.hash_high;
+        spell(finding, SPELLED_WORD_HASH, tally.hash_low);
+        spell(finding, SPELLED_WORD_HASH + 1u, tally.hash_high);
     }
+}
+
+// Stores a number of the word or the pattern. The place is an argument because a constant place must exist in every variant.
+fn spell(finding: ptr<function, Finding>, place: u32, number: u32) {
+    (*finding).spelling[place] = number;
 }
 
 fn read_pattern(finding: ptr<function, Finding>) {
@@ -152,16 +157,17 @@ fn read_pattern(finding: ptr<function, Finding>) {
         length -= 1u;
     }
     (*finding).valid |= VALID_PATTERN;
-    (*finding).pattern_length = length;
     for (var n = 0u; n < 7u; n++) {
-        (*finding).symbols[7u + n] = tallies[lane].pattern[n];
+        spell(finding, SPELLED_PATTERN + n, tallies[lane].pattern[n]);
     }
+    spell(finding, SPELLED_PATTERN_LENGTH, length);
     if length > WORD_SYMBOLS {
         for (var n = 0u; n < 7u; n++) {
             recent = append_symbol(recent, (first >> (3u * n)) & 7u);
             hash += hash_window(recent);
         }
-        (*finding).pattern_hash = array<u32, 2>(hash.x, hash.y);
+        spell(finding, SPELLED_PATTERN_HASH, hash.x);
+        spell(finding, SPELLED_PATTERN_HASH + 1u, hash.y);
     }
 }
 

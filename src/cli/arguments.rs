@@ -665,8 +665,8 @@ impl Bifurcation {
 /// Open a page that computes a map: zoom for finer cells, move sliders to change parameters
 ///
 /// For a scene, computes a map of at most 65 x 65 cells and writes one page. The page needs no other file and no network. It
-/// computes finer cells of the visible part, in f64, on as many processor cores as the browser offers. A click on a cell shows
-/// its motion. The page's address stores the view, the selected cell and the parameters. For the folder of a finished map, opens
+/// computes finer cells of the visible part: in f64 on the processor's cores, or in f32 on the graphics device if the browser
+/// offers it. A click on a cell shows its motion. The page's address stores the view, the selected cell and the parameters. For the folder of a finished map, opens
 /// its report.html, which computes in the same way.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \

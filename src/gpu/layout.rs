@@ -268,12 +268,7 @@ structs! {
         impacts: u32,
         counted: u32,
         symmetric: u32,
-        word_length: u32,
-        hash_low: u32,
-        hash_high: u32,
-        pattern_length: u32,
-        pattern_hash: [u32; 2],
-        symbols: [u32; SYMBOLS],
+        spelling: [u32; SPELLING],
     }
 }
 
@@ -281,13 +276,20 @@ structs! {
 pub(super) const SUMS: usize = 16;
 pub(super) const EXTREMES: usize = 5;
 
-/// Numbers that hold the symbols of a word and of a pattern in a [`Finding`].
-pub(super) const SYMBOLS: usize = 14;
+/// Numbers for a word and a pattern in a [`Finding`].
+pub(super) const SPELLING: usize = 20;
+
+/// Places of these numbers, with their names in the shader: symbols and length. The two halves of the hash follow the length; a
+/// word or pattern has a hash if it is too long to be stored.
+pub(super) const SPELLED_WORD: usize = 0;
+pub(super) const SPELLED_PATTERN: usize = 7;
+pub(super) const SPELLED_WORD_LENGTH: usize = 14;
+pub(super) const SPELLED_PATTERN_LENGTH: usize = 17;
 
 impl Finding {
-    /// Returns the size on the device, in numbers: with or without the symbols of words and patterns.
+    /// Returns the size on the device, in numbers: with or without words and patterns.
     pub const fn length(is_spelled: bool) -> usize {
-        size_of::<Finding>() / size_of::<u32>() - if is_spelled { 0 } else { SYMBOLS - 1 }
+        size_of::<Finding>() / size_of::<u32>() - if is_spelled { 0 } else { SPELLING - 1 }
     }
 }
 

@@ -1,7 +1,10 @@
 //! Conversion of a lane's results to a record.
 
 use super::constants::Constants;
-use super::layout::{Finding, Measured, Reading, SYMBOLS, SYMBOLS_PER_NUMBER};
+use super::layout::{
+    Finding, Measured, Reading, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD, SPELLED_WORD_LENGTH,
+    SYMBOLS_PER_NUMBER,
+};
 use super::measured;
 use crate::record::{Record, WORD_SYMBOLS, joined, measures, valid};
 use rattlemap_dynamics::orbit::Quantities;
@@ -83,31 +86,29 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
         }
     }
     if is_valid(valid::WORD) {
-        match spelled(&finding.symbols[..SYMBOLS / 2], finding.word_length) {
-            Some(word) => record.set_word(&word),
-            None => {
-                record.word_length = finding.word_length;
-                record.word_hash = joined([finding.hash_low, finding.hash_high]);
-            }
+        match spelled(&finding.spelling, SPELLED_WORD, SPELLED_WORD_LENGTH) {
+            Ok(word) => record.set_word(&word),
+            Err(hashed) => (record.word_length, record.word_hash) = hashed,
         }
     }
     if is_valid(valid::PATTERN) {
-        match spelled(&finding.symbols[SYMBOLS / 2..], finding.pattern_length) {
-            Some(pattern) => record.set_pattern(&pattern),
-            None => {
-                record.pattern_length = finding.pattern_length;
-                record.pattern_hash = joined(finding.pattern_hash);
-            }
+        match spelled(&finding.spelling, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH) {
+            Ok(pattern) => record.set_pattern(&pattern),
+            Err(hashed) => (record.pattern_length, record.pattern_hash) = hashed,
         }
     }
     record
 }
 
-/// Returns the word with these symbols, or `None` if it is too long to be stored.
-fn spelled(symbols: &[u32], length: u32) -> Option<Word> {
-    let symbol =
-        |i: usize| b'0' + ((symbols[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8;
-    let length = Some(length as usize).filter(|&length| length <= WORD_SYMBOLS)?;
-    let symbols: [u8; WORD_SYMBOLS] = std::array::from_fn(|i| if i < length { symbol(i) } else { 0 });
-    Some(Word::cyclic(&symbols[..length]))
+/// Returns the word at places of a spelling. If it is too long to be stored, returns its length and hash as an error.
+fn spelled(spelling: &[u32], symbols: usize, length: usize) -> Result<Word, (u32, u64)> {
+    let symbol = |i: usize| {
+        b'0' + ((spelling[symbols + i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8
+    };
+    let count = spelling[length] as usize;
+    if count > WORD_SYMBOLS {
+        return Err((spelling[length], joined([spelling[length + 1], spelling[length + 2]])));
+    }
+    let symbols: [u8; WORD_SYMBOLS] = std::array::from_fn(|i| if i < count { symbol(i) } else { 0 });
+    Ok(Word::cyclic(&symbols[..count]))
 }

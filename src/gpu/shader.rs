@@ -1,7 +1,10 @@
 //! Shader variants: one source, composed of small files.
 
 use super::Measures;
-use super::layout::{BLOCK, CONTACTS, EXTREMES, SUMS, SYMBOLS, SYMBOLS_PER_NUMBER};
+use super::layout::{
+    BLOCK, CONTACTS, EXTREMES, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD, SPELLED_WORD_LENGTH,
+    SPELLING, SUMS, SYMBOLS_PER_NUMBER,
+};
 use super::precision::Precision;
 use super::rules;
 use super::unroll::unroll;
@@ -105,7 +108,13 @@ impl Variant {
             ("WORKGROUP", self.workgroup),
             ("BLOCK", BLOCK),
             ("SUMS", SUMS as u32),
-            ("SYMBOLS", if self.word || self.pattern { SYMBOLS as u32 } else { 1 }),
+            ("SPELLING", if self.word || self.pattern { SPELLING as u32 } else { 1 }),
+            ("SPELLED_WORD", SPELLED_WORD as u32),
+            ("SPELLED_PATTERN", SPELLED_PATTERN as u32),
+            ("SPELLED_WORD_LENGTH", SPELLED_WORD_LENGTH as u32),
+            ("SPELLED_WORD_HASH", SPELLED_WORD_LENGTH as u32 + 1),
+            ("SPELLED_PATTERN_LENGTH", SPELLED_PATTERN_LENGTH as u32),
+            ("SPELLED_PATTERN_HASH", SPELLED_PATTERN_LENGTH as u32 + 1),
             ("EXTREMES", EXTREMES as u32),
             ("WORD_SYMBOLS", WORD_SYMBOLS as u32),
             ("SYMBOLS_PER_NUMBER", SYMBOLS_PER_NUMBER as u32),

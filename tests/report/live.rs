@@ -118,7 +118,7 @@ fn with_script(page: &Path, script: &str) -> PathBuf {
 
 /// Returns what a script collects in a page.
 fn visited(browser: &str, page: &Path, script: &str, query: &str, flags: &[&str]) -> Value {
-    let said = visit(browser, &with_script(page, script), query, flags, 100_000);
+    let said = visit(browser, &with_script(page, script), query, flags, 400_000);
     assert_eq!(said["error"], Value::Null, "{said}");
     said
 }

@@ -46,7 +46,7 @@ impl Lanes {
             _ => self.device.take(),
         };
         let device = previous.ok_or("the device failed before")?;
-        let prepared = Prepared::new(window.plan()).into_owned();
+        let prepared = Prepared::new(&window.plan).into_owned();
         let engine = engine::Gpu::prepared(prepared, device).await.map_err(|error| error.to_string())?;
         self.engine = Some(Engine::Gpu(Box::new(engine)));
         Ok(())
@@ -58,7 +58,7 @@ impl Lanes {
     /// If the device fails, or no window was prepared.
     pub async fn compute(&mut self, window: &Window, runs: Vec<u32>) -> Result<Vec<u8>, String> {
         let engine = self.engine.as_mut().ok_or("no window was prepared")?;
-        let cells: Vec<Cell> = runs.iter().map(|&run| window.plan().cell(run)).collect();
+        let cells: Vec<Cell> = runs.iter().map(|&run| window.plan.cell(run)).collect();
         let records = engine.run(&cells).await.map_err(|error| error.to_string())?;
         Ok(bytemuck::pod_collect_to_vec(&records))
     }

@@ -13,18 +13,11 @@ use rattlemap::show::{figure, layers, report, words};
 use rattlemap_dynamics::orbit::Class;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-impl Window {
-    /// The plan of its runs.
-    pub(crate) fn plan(&self) -> &Plan {
-        &self.plan
-    }
-}
-
 /// The runs of a scene, which may be computed in parts by several workers.
 #[wasm_bindgen]
 pub struct Window {
     scene: Scene,
-    plan: Plan,
+    pub(crate) plan: Plan,
 }
 
 #[wasm_bindgen]

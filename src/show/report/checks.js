@@ -58,6 +58,7 @@ const FIELDS = { word: "word, up to mirror image", pattern: "pattern, up to mirr
 const fieldName = (name) => FIELDS[name] ?? spaced(name);
 
 // Returns the first columns of a cell: a button that shows it on the map, and the values of its parameters.
+/** @param {any} cell */
 function place({ i, j, values }) {
   const go = element("button", `${i}, ${j}`);
   go.type = "button";
@@ -84,7 +85,7 @@ function differing({ kinds, mismatches }) {
   const parameters = map.axes.map((axis) => axis.parameter);
   const line = ({ differences, kind, replay, ...cell }) => ({ bad: kind === "unexplained",
     cells: [...place(cell), differences.map(difference).join("; "), element("code", replay)] });
-  const order = Object.keys(kinds).sort((a, b) => (b === "unexplained") - (a === "unexplained"));
+  const order = Object.keys(kinds).sort((a, b) => Number(b === "unexplained") - Number(a === "unexplained"));
   const groups = order.map((kind) => [kind, mismatches.filter((mismatch) => mismatch.kind === kind)]);
   const box = element("div");
   box.append(element("h3", "Cells that differ, by kind"));

@@ -1,9 +1,11 @@
 "use strict";
 // The document before this script changes it.
+/** @type {any} */
 const pristine = document.documentElement.cloneNode(true);
 // The data of the map, and what the page shows now.
 const map = JSON.parse(document.getElementById("map").textContent);
 const [columns, rows] = map.axes.map((axis) => axis.count);
+/** @type {(id: string) => any} */
 const byId = (id) => document.getElementById(id);
 
 let layer = 0;
@@ -11,13 +13,17 @@ let layer = 0;
 const everything = { left: 0, bottom: 0, width: columns, height: rows };
 let view = { ...everything };
 // A cell is an object with a sheet and two indices.
+/** @type {Cell | null} */
 let pointerCell = null;
+/** @type {Cell | null} */
 let selectedCell = null;
 
 // A sheet is a map to draw: its data, its unpacked arrays, and the rectangle that it covers, in cells of the program's map.
+/** @type {(data: any, place: Place) => Sheet} */
 const sheetOf = (data, place) => ({ data, place, values: {}, starts: null, columns: data.axes[0].count, rows: data.axes[1].count });
 // The map that the program computed, and the part of it that this page computed again with finer cells or other parameters.
 const base = sheetOf(map, everything);
+/** @type {Sheet | null} */
 let live = null;
 // Parameters that differ from those of the program's map, by name.
 let changes = {};

@@ -141,7 +141,8 @@ function draw() {
     box(sheet.place, (...at) => pen.drawImage(own.picture, ...at));
   }
   pen.globalAlpha = 1;
-  for (const [cell, color] of [[pointerCell, "#0008"], [selectedCell, "#000"]]) if (cell) frame(rectangle(cell), color, 8);
+  if (pointerCell) frame(rectangle(pointerCell), "#0008", 8);
+  if (selectedCell) frame(rectangle(selectedCell), "#000", 8);
   for (const [a, b] of uppermost().data.marks) mark(placeOf(map.axes[0], a), placeOf(map.axes[1], b));
   if (drawnRectangle) frame(drawnRectangle, "#000", 0);
   pen.restore();

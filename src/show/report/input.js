@@ -110,7 +110,7 @@ canvas.addEventListener("dblclick", () => showAll());
 
 document.addEventListener("keydown", (event) => {
   // Keys typed into a field do not control the map.
-  if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "INPUT") return;
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target instanceof HTMLInputElement) return;
   const p = panel();
   const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   const number = Number(event.key);

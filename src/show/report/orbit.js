@@ -91,7 +91,7 @@ function fail(error) {
   showMotion({ error: `the engine cannot run: ${error}` });
 }
 
-function showMotion({ summary, figures, error }, took) {
+function showMotion({ summary = null, figures = null, error = null }, took = 0) {
   for (const id of ["motion", "orbit"]) byId(id).removeAttribute("aria-busy");
   byId("computing").textContent = error ? `Not computed: ${error}`
     : `computed in this page in ${Math.round(took)} ms, over as many periods as the class needs, which may be more than the map's; `
