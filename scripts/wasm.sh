@@ -20,7 +20,8 @@ rm -rf "$out"
     --remove-name-section --remove-producers-section --out-dir "$out"
 report=src/show/report
 gzip -9 --no-name --stdout "$out/rattlemap_web_bg.wasm" > "$report/engine.wasm.gz"
-cp "$out/rattlemap_web.js" "$report/engine.js"
+# Comments have addresses of web sites; the page must have none.
+sed '/^ *\/\/ /d' "$out/rattlemap_web.js" > "$report/engine.js"
 
 # What the engine is compiled from. The page's own files are not part of it.
 sources=(

@@ -967,54 +967,44 @@ let wasm_bindgen = (function(exports) {
                 arg0.writeBuffer(arg1, arg2, getArrayU8FromWasm0(arg3, arg4), arg5, arg6);
             }, arguments); },
             __wbindgen_generic_0000000000000001: function(arg0, arg1) {
-                // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 612, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
                 const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h7af06d38255f967f);
                 return ret;
             },
             __wbindgen_generic_0000000000000002: function(arg0, arg1) {
-                // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("GPUDevice")], shim_idx: 512, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
                 const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6);
                 return ret;
             },
             __wbindgen_generic_0000000000000003: function(arg0, arg1) {
-                // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("GPUDeviceLostInfo")], shim_idx: 514, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
                 const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7);
                 return ret;
             },
             __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-                // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("GPUUncapturedErrorEvent")], shim_idx: 514, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
                 const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_15);
                 return ret;
             },
             __wbindgen_generic_0000000000000005: function(arg0, arg1) {
-                // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("any")], shim_idx: 512, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
                 const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_16);
                 return ret;
             },
             __wbindgen_generic_0000000000000006: function(arg0, arg1) {
-                // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("undefined")], shim_idx: 512, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
                 const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17);
                 return ret;
             },
             __wbindgen_generic_0000000000000007: function(arg0) {
-                // Cast intrinsic for `F64 -> Externref`.
                 const ret = arg0;
                 return ret;
             },
             __wbindgen_generic_0000000000000008: function(arg0, arg1) {
-                // Cast intrinsic for `Ref(Slice(U8)) -> NamedExternref("Uint8Array")`.
                 const ret = getArrayU8FromWasm0(arg0, arg1);
                 return ret;
             },
             __wbindgen_generic_0000000000000009: function(arg0, arg1) {
-                // Cast intrinsic for `Ref(String) -> Externref`.
                 const ret = getStringFromWasm0(arg0, arg1);
                 return ret;
             },
             __wbindgen_generic_000000000000000a: function(arg0, arg1) {
                 var v0 = getArrayU8FromWasm0(arg0, arg1).slice();
                 wasm.__wbindgen_free(arg0, arg1 * 1, 1);
-                // Cast intrinsic for `Vector(U8) -> Externref`.
                 const ret = v0;
                 return ret;
             },
@@ -1130,7 +1120,6 @@ let wasm_bindgen = (function(exports) {
 
     function debugString(val) {
         switch (typeof val) {
-            // primitive types
             case 'number':
             case 'boolean':
             case 'undefined':
@@ -1151,38 +1140,28 @@ let wasm_bindgen = (function(exports) {
                 if (val === null) {
                     return 'null';
                 }
-                // objects
                 if (Array.isArray(val)) {
                     return '[' + Array.from(val, debugString).join(', ') + ']';
                 }
-                // errors
                 if (val instanceof Error) {
                     return `${val.name}: ${val.message}\n${val.stack}`;
                 }
 
                 const toStringOutput = toString.call(val);
-                // Test for built-in
                 const className = /\[object ([^\]]+)\]/.exec(toStringOutput)?.[1];
 
-                // Failed to match the standard '[object ClassName]'
                 if (className === undefined) {
                     return toStringOutput;
                 }
                 if (className === 'Object') {
-                    // we're a user defined class or Object
-                    // JSON.stringify avoids problems with cycles, and is generally much
-                    // easier than looping through ownProperties of `val`.
                     try {
                         return 'Object(' + JSON.stringify(val) + ')';
                     } catch (_) {
                         return 'Object';
                     }
                 }
-                // TODO we could test for more things here, like `Set`s and `Map`s.
                 return className;
             }
-            // Per MDN: 'This list of values is exhaustive.'
-            // https://developer.mozilla.org/en-US/docs/Web/JavaScript/Reference/Operators/typeof#description
         }
     }
 
@@ -1252,9 +1231,6 @@ let wasm_bindgen = (function(exports) {
         const state = { a: arg0, b: arg1, cnt: 1 };
         const real = (...args) => {
 
-            // First up with a closure we increment the internal reference
-            // count. This ensures that the Rust closure environment won't
-            // be deallocated while we're invoking it.
             state.cnt++;
             const a = state.a;
             state.a = 0;
