@@ -124,7 +124,7 @@ fn cell(random: &mut Random) -> (GearPair, [f64; 4]) {
     (pair, start)
 }
 
-/// Requires that no cell takes longer than [`LONGEST`].
+/// Requires that no cell takes longer than `LONGEST` typical cells.
 pub fn judge(rows: &[Row]) -> Verdict {
     let Some(all) = rows.first() else {
         return Verdict { holds: false, sentence: "no cell was timed".into() };
