@@ -17,7 +17,7 @@ mod png;
 mod shapes;
 mod style;
 mod svg;
-mod ticks;
+pub(crate) mod ticks;
 mod typeface;
 
 use std::io::Write;

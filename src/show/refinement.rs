@@ -1,8 +1,10 @@
-//! Refinement of an adaptive map as JSON, in manifests and in the report.
+//! Refinement of an adaptive map: as JSON for manifests, and as text.
+
+use std::iter;
 
 use serde_json::{Value, json};
 
-use crate::map::schedule::{Audit, Deviation, Refined};
+use crate::map::schedule::{Audit, Deviation, Errors, Refined};
 use crate::record::measures;
 use crate::show::cells::Cells;
 
@@ -55,4 +57,76 @@ fn deviations(deviation: Deviation, are_counts: bool) -> Value {
         object["off_by_one_interval"] = json!(deviation.off_by_one_interval());
     }
     object
+}
+
+/// Formats a difference with few digits.
+fn short(x: f64) -> String {
+    if x == 0.0 || (1e-3..1e3).contains(&x) {
+        format!("{}", (x * 1e4).round() / 1e4)
+    } else {
+        format!("{x:.1e}")
+    }
+}
+
+/// Returns what an adaptive map reports: the share of integrated cells and the result of the last audit, then one line per
+/// quantity; nothing for other maps.
+pub fn lines(cells: &Cells<'_>) -> Vec<String> {
+    let Some(refined) = cells.refinement() else { return Vec::new() };
+    let count = cells.runs();
+    let share = 100.0 * refined.integrated as f64 / count as f64;
+    let audit = refined.audits.last().map_or(String::new(), |audit| {
+        let [low, high] = audit.interval().map(|rate| 100.0 * rate);
+        let (wrong, sampled, rate) = (audit.wrong, audit.sampled, 100.0 * audit.rate());
+        let words = |wrong: usize, filled: usize, what: &str| match filled {
+            0 => String::new(),
+            _ => format!(", {wrong} of {filled} filled {what}"),
+        };
+        let words = words(audit.wrong_words, audit.words, "words")
+            + &words(audit.wrong_patterns, audit.patterns, "patterns");
+        let exceeds = if audit.rate() > refined.max_error {
+            let allowed = 100.0 * refined.max_error;
+            format!(
+                ", more than refine.max_error allows ({allowed:.2} %): refine.rounds is too small"
+            )
+        } else {
+            String::new()
+        };
+        format!(
+            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}{exceeds}"
+        )
+    });
+    let first = format!("{share:.1} % of {count} cells integrated, the others filled{audit}");
+    let state_names = cells.scene().base().state_names();
+    let errors = refined.audits.last().into_iter().flat_map(|audit| errors(&audit.errors, &state_names));
+    iter::once(first).chain(errors).collect()
+}
+
+/// One line per quantity: how far filled values differ from integrated ones.
+fn errors(errors: &Errors, state_names: &[&str]) -> Vec<String> {
+    let line = |name: &str, deviation: Option<Deviation>, share: fn(&Deviation) -> String| {
+        let deviation = deviation?;
+        let Deviation { compared, empty, median, p95, worst, .. } = deviation;
+        let empty = if empty > 0 { format!(", {empty} left empty") } else { String::new() };
+        let share = share(&deviation);
+        Some(format!(
+            "{name} of {compared} filled cells{empty}: the error is {} in the median, {} at 95 %, {} at most{share}",
+            short(median),
+            short(p95),
+            short(worst)
+        ))
+    };
+    let off_by_one = |impacts: &Deviation| {
+        let (off, rate) = (impacts.off_by_one, 100.0 * impacts.off_by_one_rate());
+        let [low, high] = impacts.off_by_one_interval().map(|rate| 100.0 * rate);
+        format!("; 1 or more in {off} cells, {rate:.2} % (95 %: {low:.2} to {high:.2} %)")
+    };
+    let first = [
+        line("exponent", errors.lyapunov, |_| String::new()),
+        line("impacts per period", errors.impacts, off_by_one),
+        line("mesh fraction", errors.mesh, |_| String::new()),
+    ];
+    let measures = measures::all().filter(|measure| measure.is_of(state_names));
+    let measured = measures
+        .map(|measure| line(&measure.name(state_names), errors.measures[measure.place], |_| String::new()));
+    first.into_iter().chain(measured).flatten().collect()
 }

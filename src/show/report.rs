@@ -20,17 +20,18 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::map::scene::{Axis, Quantity, Rule, Scale, Scene, Target};
+use crate::map::schedule::{Audit, Refined};
 use crate::model_file::FileModel;
 use crate::record::Record;
 use crate::show::cells::{Cells, Row, Source};
 use crate::show::color::{Color, hex};
 use crate::show::error::WriteError;
-use crate::show::layers::{Bar, Layer, NamedColor};
+use crate::show::layers::{Bar, Layer, NamedColor, share};
 use crate::show::provenance::Provenance;
 use crate::show::symbols::{axis_label, symbol};
 use crate::show::table::attractors_csv::attractor_name;
 use crate::show::words::{MapWords, WordIndex};
-use crate::show::{caption, figure, refinement, replay};
+use crate::show::{caption, drawing, figure, refinement, replay};
 use rattlemap_dynamics::model::Parameter;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -38,6 +39,7 @@ const PAGE: &str = include_str!("report/page.html");
 const STYLE: &str = include_str!("report/page.css");
 const SCRIPT: &str = concat!(
     include_str!("report/data.js"),
+    include_str!("report/ticks.js"),
     include_str!("report/drawing.js"),
     include_str!("report/colors.js"),
     include_str!("report/panel.js"),
@@ -111,7 +113,7 @@ pub fn data(
         "attractors": attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect::<Vec<_>>(),
         // Values of both axes at the strobe states of attractors.
         "marks": figure::map::attractors(cells),
-        "refinement": refinement::object(cells),
+        "refinement": cells.refinement().map(|refined| audits(cells, refined)),
         "validation": validation,
     });
     // Start states of cells that follow their neighbours, four numbers per cell.
@@ -193,6 +195,37 @@ fn policy(style: &str, script: &str) -> String {
         "default-src 'none'; script-src {script} 'wasm-unsafe-eval'; worker-src blob:; img-src blob:; frame-src blob:; style-src {style}; \
          base-uri 'none'; form-action 'none'"
     )
+}
+
+/// Returns what an adaptive map reports, and the numbers of wrong cells of all its audits.
+fn audits(cells: &Cells<'_>, refined: &Refined) -> Value {
+    let audit = |audit: &Audit| json!({ "sampled": audit.sampled, "wrong": audit.wrong });
+    json!({ "lines": refinement::lines(cells), "audits": refined.audits.iter().map(audit).collect::<Vec<_>>() })
+}
+
+/// Ticks of a part of an axis, as JSON: `marks`, each a value and its label, which is empty for a minor tick, and `factor`, which
+/// follows the name of the axis if all labels have a common factor.
+///
+/// `ends` are values on a linear axis, decimal logarithms on a logarithmic one, and indices of `listed` values. The part is
+/// `length` long, and labels are `spacing` apart where possible.
+pub fn ticks(scale: Scale, ends: [f64; 2], listed: &[f64], length: f64, spacing: f64) -> Value {
+    let scale = match scale {
+        Scale::Linear => drawing::axis::Scale::Linear,
+        Scale::Log => drawing::axis::Scale::Logarithmic,
+        Scale::Values => drawing::axis::Scale::Listed,
+    };
+    let [low, high] = ends;
+    ticks_of(
+        &drawing::axis::Axis { label: String::new(), low, high, scale, listed: listed.to_vec() },
+        length,
+        spacing,
+    )
+}
+
+fn ticks_of(axis: &drawing::axis::Axis, length: f64, spacing: f64) -> Value {
+    let ticks = drawing::ticks::ticks(axis, length, spacing);
+    let marks: Vec<Value> = ticks.list.iter().map(|tick| json!([axis.value(tick.at), tick.label])).collect();
+    json!({ "marks": marks, "factor": ticks.factor() })
 }
 
 /// Returns the derived parameters in the order of the scene. Values are stored along the axes that they depend on.
@@ -298,6 +331,8 @@ fn axis(axis: &Axis) -> Value {
         "max": axis.max(),
         "count": axis.count(),
         "scale": axis.scale().name(),
+        // The page's engine replaces them when the view changes.
+        "ticks": ticks_of(&figure::map_layout::axis(axis), 10.0, 1.0),
     });
     // Index of the component of the start that the axis sweeps.
     if let Target::Start(component) = axis.target() {
@@ -326,15 +361,18 @@ fn entries_of(layer: &Layer) -> Vec<Option<usize>> {
 }
 
 fn layer(layer: &Layer) -> Value {
-    let entry =
-        |entry: &NamedColor| json!({ "color": hex(entry.color), "text": entry.text, "cells": entry.cells });
+    let count = layer.indices.len();
+    let entry = |entry: &NamedColor| json!({ "color": hex(entry.color), "text": entry.text, "share": share(entry.cells, count) });
     let bar = |bar: &Bar| {
         json!({
             "label": bar.label,
             "colors": bar.colors.iter().step_by(6).copied().map(hex).collect::<Vec<_>>(),
             "low": bar.low,
             "high": bar.high,
-            "left_out": bar.remarks(layer.indices.len()),
+            "left_out": bar.remarks(count),
+            "anchors": bar.anchors(),
+            "is_fixed": bar.is_fixed,
+            "ticks": ticks_of(&bar.axis(), 6.0, 1.0),
         })
     };
     let mut object = json!({

@@ -3,8 +3,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use assert_cmd::Command;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -51,6 +54,8 @@ async function walk() {
   await until(isComputed);
   clearTimeout(resting);
   sayWindow();
+  await until(() => !asked.some((request) => request));
+  said.ticks = map.axes.map(({ ticks }) => ticks.marks.map(([, label]) => label));
   const sheet = live;
   // Cells of the middle row, far from the pitchfork on both sides.
   const sides = [8, 56].map((part) => Math.floor(sheet.rows / 2) * sheet.columns + Math.floor((part / 65) * sheet.columns));
@@ -100,6 +105,22 @@ async function computeOnLanes() {
   finish();
 }
 computeOnLanes().catch((error) => { said.error = String(error.stack); finish(); });
+"##;
+
+/// Computes 33 x 33 cells of the map in a worker.
+const RECORDS: &str = r##"
+async function records() {
+  await until(() => !document.getElementById("wait"));
+  said.scene = sceneOver(map.scene, map.axes.map(({ min, max }) => ({ min, max, count: 33 })));
+  newWorker(await compiled(), ({ records, error }) => {
+    said.error = error;
+    said.records = records && btoa([...records].map((byte) => String.fromCharCode(byte)).join(""));
+    finish();
+  }, (error) => { said.error = error; finish(); }).postMessage({ task: "compute", key: "all", scene: said.scene,
+    model: map.model_file, sets: "", runs: Uint32Array.from({ length: 33 * 33 }, (_, run) => run) });
+  await until(() => document.getElementById("said"));
+}
+records().catch((error) => { said.error = String(error.stack); finish(); });
 "##;
 
 /// Flags of a browser that offers a device without hardware.
@@ -184,6 +205,11 @@ fn a_walk_through_the_page_shows_what_the_program_computes() {
     let Some(browser) = chromium() else { return skipped() };
     let folder = tempfile::tempdir().unwrap();
     let said = visited(browser, &explored(&folder, &["e_omega.toml"]), WALK, "", &WITHOUT_GRAPHICS);
+    // The worker has chosen ticks for the view.
+    for (axis, label) in [(0, "0.56"), (1, "5.60")] {
+        let labels = said["ticks"][axis].as_array().unwrap();
+        assert!(labels.len() >= 4 && labels.contains(&label.into()), "{labels:?}");
+    }
     // The program uses FMA, the browser does not: cells with long transients may differ.
     assert_same_map(&folder, &said, &["--engine", "cpu"], 0.005);
     for side in said["sides"].as_array().unwrap() {
@@ -217,4 +243,38 @@ fn lanes_of_the_page_are_those_of_the_program() {
     assert_eq!(said["has_lanes"], true, "{said}");
     assert_eq!(said["by_lanes"], 33 * 33);
     assert_same_map(&folder, &said, &["--engine", "gpu", "--precision", "f32"], 0.005);
+}
+
+/// Without fused multiplication and addition, and with the same mathematical functions, the program computes the page's records.
+#[test]
+#[ignore = "compiles the library again, without FMA; takes minutes"]
+fn records_of_the_page_have_the_bits_of_a_program_without_fma() {
+    let Some(browser) = chromium() else { return skipped() };
+    for scene in ["e_omega.toml", "gallery/soft_impact.toml", "gallery/two_masses.toml"] {
+        let folder = tempfile::tempdir().unwrap();
+        let said = visited(browser, &explored(&folder, &[scene]), RECORDS, "", &WITHOUT_GRAPHICS);
+        let page = STANDARD.decode(said["records"].as_str().unwrap()).unwrap();
+        let example = [
+            "run",
+            "--quiet",
+            "--package",
+            "rattlemap-web",
+            "--example",
+            "records",
+            "--target-dir",
+            "target/no-fma",
+        ];
+        let program = Command::new(env!("CARGO"))
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .args(example)
+            .env("RUSTFLAGS", "")
+            .write_stdin(said["scene"].as_str().unwrap())
+            .timeout(Duration::from_secs(900))
+            .output()
+            .unwrap();
+        assert!(program.status.success(), "{}", String::from_utf8_lossy(&program.stderr));
+        let size = page.len() / (33 * 33);
+        let differing = page.chunks(size).zip(program.stdout.chunks(size)).filter(|(a, b)| a != b).count();
+        assert_eq!((page.len(), differing), (program.stdout.len(), 0), "{scene}");
+    }
 }

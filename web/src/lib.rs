@@ -9,11 +9,12 @@ mod window;
 
 use std::sync::atomic::AtomicBool;
 
-use rattlemap::map::scene::{FigureStyle, single_cell};
+use rattlemap::map::scene::{FigureStyle, Scale, single_cell};
 use rattlemap::model_file::{DEFAULT, FileModel};
 use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
 use rattlemap::show::orbit_spectrum::samples_per_period;
 use rattlemap::show::orbit_summary::summary;
+use rattlemap::show::report;
 use rattlemap_dynamics::model::{Model, REST, State};
 use rattlemap_dynamics::orbit::{self, Class, Settings};
 use serde_json::{Map, Value, json};
@@ -36,6 +37,14 @@ const ASIDE: f64 = 250.0;
 pub fn orbit(command: &str, model: &str) -> String {
     let object = computed(command, model).unwrap_or_else(|error| json!({ "error": error }));
     object.to_string()
+}
+
+/// Chooses ticks, as JSON: see [`report::ticks`]. `scale` is the scale's name in a scene.
+#[wasm_bindgen]
+pub fn ticks(scale: &str, ends: &[f64], listed: &[f64], length: f64, spacing: f64) -> String {
+    let scale =
+        [Scale::Log, Scale::Values].into_iter().find(|each| each.name() == scale).unwrap_or(Scale::Linear);
+    report::ticks(scale, [ends[0], ends[1]], listed, length, spacing).to_string()
 }
 
 fn computed(command: &str, text: &str) -> Result<Value, String> {
@@ -142,6 +151,20 @@ mod tests {
         for name in ["phase_plane", "time_history", "gap"] {
             assert!(found["figures"][name].as_str().unwrap().starts_with("<svg "), "{name}");
         }
+    }
+
+    #[test]
+    fn ticks_are_values_with_labels() {
+        let found = |scale, ends: [f64; 2], listed: &[f64]| -> Value {
+            serde_json::from_str(&ticks(scale, &ends, listed, 500.0, 90.0)).unwrap()
+        };
+        let linear = found("linear", [0.5, 0.6], &[]);
+        assert_eq!((&linear["marks"][1][1], &linear["factor"]), (&"0.52".into(), &"".into()));
+        assert_eq!(found("linear", [0.0, 2e-7], &[])["factor"], ", in 10\u{207b}\u{2077}");
+        // From 0.1 to 10, with minor ticks.
+        assert_eq!(found("log", [-1.0, 1.0], &[])["marks"].as_array().map(Vec::len), Some(19));
+        let listed = found("values", [-0.5, 2.5], &[2.0, 3.0, 5.5]);
+        assert_eq!(listed["marks"], json!([[2.0, "2"], [3.0, "3"], [5.5, "5.5"]]));
     }
 
     #[test]

@@ -7,9 +7,8 @@ use std::time::Duration;
 use crate::cli::say::{classes, path, quoted};
 use crate::map::engine::{CardReport, Preparation};
 use crate::map::plan::count_classes;
-use crate::map::schedule::{Deviation, Errors, Refined};
-use crate::record::measures;
 use crate::show::cells::Cells;
+use crate::show::refinement;
 use crate::store::map::{Provenance, Run};
 use crate::store::shard::FinishedShard;
 use crate::validate::Rate;
@@ -28,7 +27,7 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
     format!(
         "{integrated} {unit}{speed}; files written in {finishing:.3} s\n{}{}{}",
         cards(&run.cards, unit),
-        cells.refinement().map_or(String::new(), |refined| refinement(refined, count, cells)),
+        refinement::lines(cells).into_iter().map(|line| line + "\n").collect::<String>(),
         classes(count_classes(cells.classes())) + &cells.chaos_ends().map_or(String::new(), chaos_ends),
     )
 }
@@ -103,71 +102,4 @@ fn cards(cards: &[CardReport], unit: &str) -> String {
 fn three_digits(x: f64) -> String {
     let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{x:.digits$}")
-}
-
-/// Formats a difference with few digits.
-fn short(x: f64) -> String {
-    if x == 0.0 || (1e-3..1e3).contains(&x) {
-        format!("{}", (x * 1e4).round() / 1e4)
-    } else {
-        format!("{x:.1e}")
-    }
-}
-
-/// Share of integrated cells of an adaptive map, and the result of its audit.
-fn refinement(refined: &Refined, count: usize, cells: &Cells<'_>) -> String {
-    let share = 100.0 * refined.integrated as f64 / count as f64;
-    let audit = refined.audits.last().map_or(String::new(), |audit| {
-        let [low, high] = audit.interval().map(|rate| 100.0 * rate);
-        let (wrong, sampled, rate) = (audit.wrong, audit.sampled, 100.0 * audit.rate());
-        let words = |wrong: usize, filled: usize, what: &str| match filled {
-            0 => String::new(),
-            _ => format!(", {wrong} of {filled} filled {what}"),
-        };
-        let words = words(audit.wrong_words, audit.words, "words")
-            + &words(audit.wrong_patterns, audit.patterns, "patterns");
-        let exceeds = if audit.rate() > refined.max_error {
-            let allowed = 100.0 * refined.max_error;
-            format!(
-                ", more than refine.max_error allows ({allowed:.2} %): refine.rounds is too small"
-            )
-        } else {
-            String::new()
-        };
-        format!(
-            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}{exceeds}{}",
-            errors(&audit.errors, &cells.scene().base().state_names())
-        )
-    });
-    format!("{share:.1} % of {count} cells integrated, the others filled{audit}\n")
-}
-
-/// One line per quantity: how far filled values differ from integrated ones.
-fn errors(errors: &Errors, state_names: &[&str]) -> String {
-    let line = |name: &str, deviation: Option<Deviation>, share: fn(&Deviation) -> String| {
-        let Some(deviation) = deviation else { return String::new() };
-        let Deviation { compared, empty, median, p95, worst, .. } = deviation;
-        let empty = if empty > 0 { format!(", {empty} left empty") } else { String::new() };
-        let share = share(&deviation);
-        format!(
-            "\n{name} of {compared} filled cells{empty}: the error is {} in the median, {} at 95 %, {} at most{share}",
-            short(median),
-            short(p95),
-            short(worst)
-        )
-    };
-    let off_by_one = |impacts: &Deviation| {
-        let (off, rate) = (impacts.off_by_one, 100.0 * impacts.off_by_one_rate());
-        let [low, high] = impacts.off_by_one_interval().map(|rate| 100.0 * rate);
-        format!("; 1 or more in {off} cells, {rate:.2} % (95 %: {low:.2} to {high:.2} %)")
-    };
-    let first = [
-        line("exponent", errors.lyapunov, |_| String::new()),
-        line("impacts per period", errors.impacts, off_by_one),
-        line("mesh fraction", errors.mesh, |_| String::new()),
-    ];
-    let measures = measures::all().filter(|measure| measure.is_of(state_names));
-    let measured = measures
-        .map(|measure| line(&measure.name(state_names), errors.measures[measure.place], |_| String::new()));
-    first.into_iter().chain(measured).collect()
 }

@@ -91,7 +91,7 @@ impl Axis {
             Scale::Listed => {
                 let last = self.listed.len() - 1;
                 let place = place.clamp(0.0, last as f64);
-                let before = (place as usize).min(last.saturating_sub(1));
+                let before = place as usize;
                 let [from, to] = [before, last.min(before + 1)].map(|i| self.listed[i]);
                 from + (place - before as f64) * (to - from)
             }

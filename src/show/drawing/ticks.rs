@@ -22,11 +22,12 @@ pub(crate) struct Ticks {
 impl Ticks {
     /// Returns the name of the axis, if it has one, with the common factor of its labels.
     pub(crate) fn name(&self, axis: &Axis) -> String {
-        match self.power {
-            _ if axis.label.is_empty() => String::new(),
-            0 => axis.label.clone(),
-            power => format!("{}, in {}", axis.label, power_label(power)),
-        }
+        if axis.label.is_empty() { String::new() } else { axis.label.clone() + &self.factor() }
+    }
+
+    /// Returns what the common factor adds to the name of the axis; nothing if it is 1.
+    pub(crate) fn factor(&self) -> String {
+        if self.power == 0 { String::new() } else { format!(", in {}", power_label(self.power)) }
     }
 }
 
@@ -57,7 +58,7 @@ fn linear(axis: &Axis, most: f64) -> Ticks {
     let first = (axis.low / step - 1e-9).ceil();
     let count = (axis.high / step + 1e-9).floor() - first;
     let largest = axis.low.abs().max(axis.high.abs());
-    let power = match largest >= 1e6 || step < 1e-5 {
+    let power = match largest >= 1e6 || (step < 1e-5 && largest < 1e-2) {
         true => (largest.log10() + 1e-9).floor() as i32,
         false => 0,
     };
@@ -178,6 +179,7 @@ mod tests {
             (-4.1e-7, 2.2e-7, 4.0, vec!["\u{2212}4", "\u{2212}2", "0", "2"], "x, in 10\u{207b}\u{2077}"),
             (0.9e-6, 1.3e-6, 3.0, vec!["1.0", "1.2"], "x, in 10\u{207b}\u{2076}"),
             (0.0, 2.1e6, 2.0, vec!["0", "2"], "x, in 10\u{2076}"),
+            (0.5, 0.500_001_3, 2.0, vec!["0.500000", "0.500001"], "x"),
             (0.0, 2.1e5, 3.0, vec!["0", "100000", "200000"], "x"),
             (0.0, 2.1e-4, 3.0, vec!["0.0000", "0.0001", "0.0002"], "x"),
         ] {

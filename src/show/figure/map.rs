@@ -142,7 +142,14 @@ mod tests {
             palette: vec![[255, 254, 250], [9, 99, 199]],
             numbers: None,
             entries: (0..entries).map(entry).collect(),
-            bar: Some(Bar { label: "exponent".into(), colors, low: -0.4, high: 1.0, beyond }),
+            bar: Some(Bar {
+                label: "exponent".into(),
+                colors,
+                low: -0.4,
+                high: 1.0,
+                is_fixed: false,
+                beyond,
+            }),
         }
     }
 

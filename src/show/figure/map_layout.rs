@@ -324,7 +324,7 @@ fn side(count: usize) -> f64 {
 }
 
 /// Returns an axis that extends by half a cell beyond the first and last values.
-fn axis(axis: &scene::Axis) -> Axis {
+pub(crate) fn axis(axis: &scene::Axis) -> Axis {
     let (min, max, steps) = (axis.min(), axis.max(), (axis.count() - 1) as f64);
     let label = axis_label(axis.parameter());
     match axis.scale() {

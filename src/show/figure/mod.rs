@@ -3,7 +3,7 @@
 pub mod bifurcation;
 pub mod compare;
 pub mod map;
-mod map_layout;
+pub(crate) mod map_layout;
 mod map_lines;
 pub mod orbit;
 #[cfg(test)]

@@ -17,6 +17,8 @@ pub struct Bar {
     pub(crate) colors: Vec<Color>,
     pub(crate) low: f64,
     pub(crate) high: f64,
+    /// Whether the range belongs to the quantity: the ends of an angle have one colour.
+    pub(crate) is_fixed: bool,
     /// Numbers of cells below `low` and above `high`.
     pub(crate) beyond: [usize; 2],
 }
@@ -25,6 +27,14 @@ impl Bar {
     /// Returns the axis of the numbers.
     pub(crate) fn axis(&self) -> Axis {
         Axis::exact(&self.label, self.low, self.high)
+    }
+
+    /// Returns numbers and the indices of their colours: both ends, and zero if there are negative numbers. Between them, indices
+    /// are linear.
+    pub(crate) fn anchors(&self) -> Vec<(f64, f64)> {
+        let last = (self.colors.len() - 1) as f64;
+        let zero = (self.low < 0.0).then(|| (0.0, -self.low / (self.high - self.low) * last));
+        [Some((self.low, 0.0)), zero, Some((self.high, last))].into_iter().flatten().collect()
     }
 
     /// Returns one sentence for each end of the bar beyond which cells lie. `total` is the number of all cells.

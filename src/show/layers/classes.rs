@@ -55,6 +55,7 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         colors: palette[FIRST_SHADE.into()..].to_vec(),
         low: 0.0,
         high,
+        is_fixed: false,
         beyond: count_beyond(exponents(), 0.0, high),
     };
     let chaos = match cells.chaos_ends() {

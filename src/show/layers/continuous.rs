@@ -147,7 +147,14 @@ impl Continuous<'_> {
             numbers: Some(values.iter().map(|&value| value as f32).collect()),
             palette: colors.iter().copied().chain([NO_VALUE]).collect(),
             entries: legend([NamedColor { color: NO_VALUE, text: "no value".to_owned(), cells: absent }]),
-            bar: Some(Bar { label, colors, low, high, beyond: count_beyond(numbers(), low, high) }),
+            bar: Some(Bar {
+                label,
+                colors,
+                low,
+                high,
+                is_fixed: self.colors == Colors::Cyclic,
+                beyond: count_beyond(numbers(), low, high),
+            }),
         }
     }
 }
@@ -184,6 +191,9 @@ mod tests {
         assert!(exponents(|_| -0.1).palette.contains(&diverging(-1.0)));
         assert_eq!(ends(&exponents(|id| if id < 200 { -0.2 } else { 1.9 })), (-0.2, 2.0));
         assert_eq!(ends(&exponents(|_| 0.0)), (0.0, 1.0));
+        let mixed = exponents(|id| if id < 200 { -1.0 } else { 1.0 }).bar.unwrap();
+        assert_eq!(mixed.anchors(), [(-1.0, 0.0), (0.0, 127.0), (1.0, 254.0)]);
+        assert_eq!(mixed.colors[127], diverging(0.0), "zero is white");
     }
 
     #[test]

@@ -3,23 +3,12 @@
 const count = (n, one, many = `${one}s`) => `${n} ${n === 1 ? one : many}`;
 const short = (value) => (typeof value === "number" ? Number(value.toPrecision(4)).toString() : String(value ?? "\u2013"));
 const spaced = (name) => name.replaceAll("_", " ");
-const percent = (rate) => `${Number((100 * rate).toPrecision(2))} %`;
-const interval = (rate, [low, high]) => `${percent(rate)} (95 % interval: ${percent(low)} to ${percent(high)})`;
 
-// Shows how many cells were integrated, and the audit of the filled cells.
-function showRefinement({ integrated, filled, rounds, audits }) {
+// Shows what an adaptive map reports, and how each audit of the filled cells ended.
+function showRefinement({ lines: [first, ...errors], audits }) {
   byId("refined").hidden = false;
-  const last = audits.at(-1);
-  const share = (100 * integrated / (integrated + filled)).toFixed(1);
-  const wrong = (some, wrong, what) => (some ? ` Of ${count(some, `filled ${what}`)} in the sample, ${wrong} were wrong.` : "");
-  byId("audit").textContent = `${share} % of the cells were integrated in ${count(rounds, "round")}. `
-    + "The others were filled from their neighbours. " + (last
-    ? `A random sample of ${count(last.sampled, "filled cell")} was integrated; ${last.wrong} of them were wrong: `
-      + `${interval(last.rate, last.interval)}.`
-      + wrong(last.words, last.wrong_words, "word") + wrong(last.patterns, last.wrong_patterns, "pattern")
-    : "The scene requests no audit.");
-  if (last) byId("audit-errors").append(...Object.keys(last.errors).filter((name) => last.errors[name])
-    .map((name) => element("li", errorText(spaced(name), last.errors[name]))));
+  byId("audit").textContent = first;
+  byId("audit-errors").append(...errors.map((line) => element("li", line)));
   if (audits.length > 1) {
     byId("audits").append(...audits.map((audit, k) => {
       const row = element("tr");
@@ -27,15 +16,6 @@ function showRefinement({ integrated, filled, rounds, audits }) {
       return row;
     }));
   }
-}
-
-// Describes the errors of one quantity of the sampled cells.
-function errorText(name, error) {
-  return `${name}: ${count(error.compared, "filled cell")} compared`
-    + (error.empty ? `, ${error.empty} without a value` : "")
-    + `; median error ${short(error.median)}, 95th percentile ${short(error.p95)}, largest ${short(error.worst)}`
-    + (error.off_by_one_interval
-      ? `; 1 or more in ${error.off_by_one}: ${interval(error.off_by_one_rate, error.off_by_one_interval)}.` : ".");
 }
 
 // Returns a table with a caption. `numbers` are the indices of columns of numbers.

@@ -19,8 +19,8 @@ const BEYOND = 0.005;
 const INSPECTED = 200000;
 
 // Returns the ends of the numbers in the visible cells; those of the whole map if all cells are visible or none has a number.
-function visibleRange({ place, columns: across, rows: up }, { bar: { low, high }, values: numbers }) {
-  if (spansMap || showsAll()) return [low, high];
+function visibleRange({ place, columns: across, rows: up }, { bar: { low, high, anchors, is_fixed: isFixed }, values: numbers }) {
+  if (spansMap || isFixed || showsAll()) return [low, high];
   const [width, height] = [place.width / across, place.height / up];
   const [i0, i1] = visible(across, (view.left - place.left) / width, view.width / width);
   const [j0, j1] = visible(up, (view.bottom - place.bottom) / height, view.height / height);
@@ -36,19 +36,21 @@ function visibleRange({ place, columns: across, rows: up }, { bar: { low, high }
   const last = sorted.length - 1;
   let [from, to] = [sorted[Math.floor(BEYOND * last)], sorted[Math.ceil((1 - BEYOND) * last)]];
   // The colour of zero separates signs, so it keeps its place.
-  if (low < 0) [from, to] = [Math.min(from, 0), Math.max(to, 0)];
+  for (const [zero] of anchors.slice(1, -1)) [from, to] = [Math.min(from, zero), Math.max(to, zero)];
   return from < to ? [from, to] : [low, high];
 }
 
-// Returns the index of a number's colour. The last index is for cells without a number.
-function level({ bar: { low, high }, range: [from, to], palette }, number) {
-  const last = palette.length - 2;
-  if (Number.isNaN(number)) return last + 1;
-  let share;
-  if (low >= 0) share = (number - from) / (to - from);
-  // Each side of zero uses all its colours.
-  else share = ((number < 0 ? low * Math.min(number / from, 1) : to > 0 ? high * Math.min(number / to, 1) : 0) - low) / (high - low);
-  return Math.round(last * within(share, 0, 1));
+// Returns a function from a number to the index of its colour, which is linear between the anchors. The ends of the range
+// replace the outer anchors. The last index is for cells without a number.
+function levels({ bar: { anchors }, range: [from, to], palette }) {
+  const numbers = [from, ...anchors.slice(1, -1).map(([number]) => number), to];
+  return (number) => {
+    if (Number.isNaN(number)) return palette.length - 1;
+    const k = numbers.length > 2 && number > numbers[1] ? 1 : 0;
+    const [x0, x1, y0, y1] = [numbers[k], numbers[k + 1], anchors[k][1], anchors[k + 1][1]];
+    if (number <= x0 && number < x1) return Math.round(y0);
+    return number >= x1 ? Math.round(y1) : Math.round(y0 + ((y1 - y0) * (number - x0)) / (x1 - x0));
+  };
 }
 
 // Fits the colours of the current layer to the visible cells.
@@ -59,7 +61,7 @@ function fitColors() {
   const scale = scaleLayer();
   if (scale.values) scale.range = visibleRange(scale === current ? sheet : base, scale);
   showBar(scale.values ? scale : current);
-  showLegend(sheet, current);
+  showLegend(current);
   draw();
 }
 
@@ -69,12 +71,13 @@ function showBar(current) {
   if (!current.bar) return;
   const { low: least, high: most, label, left_out: beyond, colors: all } = current.bar;
   const [low, high] = current.range ?? [least, most];
-  const colors = current.values
-    ? Array.from({ length: 44 }, (_, k) => current.palette[level(current, low + ((high - low) * k) / 43)]) : all;
+  const level = current.values && levels({ ...current, range: [low, high] });
+  const colors = level ? Array.from({ length: 44 }, (_, k) => current.palette[level(low + ((high - low) * k) / 43)]) : all;
   const ramp = element("div", undefined, "ramp");
   ramp.style.background = `linear-gradient(to right, ${colors.map((c) => `#${c}`).join(",")})`;
   const scale = element("div", undefined, "ticks");
-  for (const [value, text] of ticks(low, high, 6)) {
+  const { marks, factor } = barTicks(current.bar, low, high);
+  for (const [value, text] of marks) {
     const tick = element("span", text);
     const share = (value - low) / (high - low);
     tick.style.left = `${100 * share}%`;
@@ -84,7 +87,8 @@ function showBar(current) {
   }
   const isWhole = low === least && high === most;
   const remarks = isWhole ? beyond : [`The colours fit the visible cells; at most ${100 * BEYOND}\u00a0% of these lie beyond each end.`];
-  byId("bar").append(...(label === current.title ? [] : [element("div", label)]), ramp, scale,
+  const heading = label === current.title ? factor.replace(/^, /, "") : label + factor;
+  byId("bar").append(...(heading ? [element("div", heading)] : []), ramp, scale,
     ...remarks.map((text) => element("div", text, "beyond")));
 }
 
@@ -98,16 +102,14 @@ function showLayer(index) {
 }
 
 // Lists the named colours with their shares of the cells. An entry of a layer without numbers can be shown alone.
-function showLegend({ columns: across, rows: up }, current) {
+function showLegend(current) {
   byId("legend-title").textContent = current.title;
-  byId("legend").replaceChildren(...current.entries.map(({ color, text, cells }) => {
+  byId("legend").replaceChildren(...current.entries.map(({ color, text, share }) => {
     const patch = element("span", undefined, "patch");
     patch.style.background = `#${color}`;
-    const share = (100 * cells) / (across * up);
-    const few = cells === 1 ? "1 cell" : `${cells} cells`;
     const name = element("span", text);
     name.title = text;
-    const parts = [patch, name, element("span", share < 0.1 ? few : `${share.toFixed(1)} %`)];
+    const parts = [patch, name, element("span", share)];
     const item = element("li");
     if (current.values) {
       item.append(...parts);

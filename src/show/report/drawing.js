@@ -30,61 +30,11 @@ function pixel(i, j) {
     p.y + p.height - ((j - view.bottom) / view.height) * p.height];
 }
 
-function ticks(low, high, most) {
-  const rough = (high - low) / Math.max(most, 1);
-  const decade = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((m) => m * decade).find((s) => s >= rough * (1 - 1e-9));
-  const digits = Math.min(12, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)));
-  // Very small and very large numbers have a power of ten.
-  const isPlain = digits < 6 && Math.max(Math.abs(low), Math.abs(high)) < 1e7;
-  const text = (value) => (isPlain || value === 0 ? value.toFixed(isPlain ? digits : 0) : Number(value.toPrecision(6)).toExponential());
-  const list = [];
-  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n++) {
-    list.push([n * step, text(n * step).replace(/^-(?=0\.?0*$)/, "").replaceAll("-", "\u2212")]);
-  }
-  return list;
-}
-
 // Returns the position of a value of an axis, in cells.
 function placeOf({ min, max, count, scale, values }, value) {
   if (scale === "values") return values.indexOf(value) + 0.5;
   const share = scale === "log" ? Math.log(value / min) / Math.log(max / min) : (value - min) / (max - min);
   return share * (count - 1) + 0.5;
-}
-
-// Returns positions (in cells) and labels of the ticks of an axis. Cell i has its value at i + 0.5.
-function marks(axis, from, extent, most) {
-  const { min, max, count, scale, values } = axis;
-  if (scale === "linear") {
-    const value = (place) => min + ((place - 0.5) * (max - min)) / (count - 1);
-    return ticks(value(from), value(from + extent), most).map(([at, text]) => [placeOf(axis, at), text]);
-  }
-  const label = (value) => String(Number(value.toPrecision(4))).replaceAll("-", "\u2212");
-  const list = [];
-  if (scale === "log") {
-    const step = Math.log10(max / min) / (count - 1);
-    const place = (value) => placeOf(axis, value);
-    const [low, high] = [from, from + extent].map((at) => Math.log10(min) + (at - 0.5) * step);
-    const parts = most / (high - low) > 4 ? [1, 2, 5] : [1];
-    const every = Math.ceil((high - low) / most);
-    for (let power = Math.floor(low); power <= Math.ceil(high); power++) {
-      if (power % every) continue;
-      for (const part of parts) {
-        const at = place(part * 10 ** power);
-        if (at >= from && at <= from + extent) list.push([at, label(part * 10 ** power)]);
-      }
-    }
-    if (list.length > 1) return list;
-    return ticks(10 ** low, 10 ** high, most).map(([value, text]) => [place(value), text]);
-  }
-  // Listed values.
-  const every = Math.max(1, Math.ceil(extent / most));
-  const first = Math.max(0, Math.ceil(from - 0.5));
-  const cells = [];
-  for (let i = Math.ceil(first / every) * every; i < count && i + 0.5 <= from + extent; i += every) {
-    cells.push([i + 0.5, label(values[i])]);
-  }
-  return cells;
 }
 
 // Draws a sheet into an image with one pixel per cell. Numbers get the colours of the layer `scale`.
@@ -99,7 +49,8 @@ function paint(sheet, own, scale) {
     const rgb = parseInt(c, 16);
     return (0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16)) >>> 0;
   });
-  const index = own.values ? (id) => level(scale, own.values[id]) : (id) => own.indices[id];
+  const level = own.values && levels(scale);
+  const index = own.values ? (id) => level(own.values[id]) : (id) => own.indices[id];
   for (let j = 0; j < up; j++) {
     const [from, to] = [j * across, (up - 1 - j) * across];
     for (let i = 0; i < across; i++) pixels[to + i] = palette[index(from + i)];
@@ -189,26 +140,28 @@ function drawAxes(p) {
   pen.font = "13px system-ui, sans-serif";
   pen.textAlign = "center";
   pen.textBaseline = "top";
-  for (const [place, text] of marks(map.axes[0], view.left, view.width, p.width / 90)) {
+  const [across, up] = [axisTicks(0, view.left, view.width, p.width), axisTicks(1, view.bottom, view.height, p.height)];
+  for (const [place, text] of across.marks) {
     const [x] = pixel(place, 0);
-    pen.fillRect(Math.round(x), p.y + p.height, 1, 6);
+    pen.fillRect(Math.round(x), p.y + p.height, 1, text ? 6 : 3);
     // The last label must not exceed the edge.
     const half = pen.measureText(text).width / 2;
     pen.fillText(text, Math.min(x, p.x + p.width + MARGIN.right - half), p.y + p.height + 9);
   }
   pen.textAlign = "right";
   pen.textBaseline = "middle";
-  for (const [place, text] of marks(map.axes[1], view.bottom, view.height, p.height / 55)) {
+  for (const [place, text] of up.marks) {
     const [, y] = pixel(0, place);
-    pen.fillRect(p.x - 6, Math.round(y), 6, 1);
+    const length = text ? 6 : 3;
+    pen.fillRect(p.x - length, Math.round(y), length, 1);
     pen.fillText(text, p.x - 9, y);
   }
   pen.font = "14px system-ui, sans-serif";
   pen.textAlign = "center";
-  pen.fillText(map.axes[0].label, p.x + p.width / 2, p.y + p.height + 44, p.width + 60);
+  pen.fillText(map.axes[0].label + across.factor, p.x + p.width / 2, p.y + p.height + 44, p.width + 60);
   pen.save();
   pen.translate(14, p.y + p.height / 2);
   pen.rotate(-Math.PI / 2);
-  pen.fillText(map.axes[1].label, 0, 0, p.height + 40);
+  pen.fillText(map.axes[1].label + up.factor, 0, 0, p.height + 40);
   pen.restore();
 }

@@ -270,6 +270,45 @@ let wasm_bindgen = (function(exports) {
         }
     }
     exports.orbit = orbit;
+
+    /**
+     * Chooses ticks, as JSON: see [`report::ticks`]. `scale` is the scale's name in a scene.
+     * @param {string} scale
+     * @param {Float64Array | number[]} ends
+     * @param {Float64Array | number[]} listed
+     * @param {number} length
+     * @param {number} spacing
+     * @returns {string}
+     */
+    function ticks(scale, ends, listed, length, spacing) {
+        let deferred6_0;
+        let deferred6_1;
+        try {
+            const val4 = +length;
+            const val5 = +spacing;
+            let ptr0, len0, ptr1, len1, ptr2, len2;
+            try {
+                ptr0 = passStringToWasm0(scale, wasm.__wbindgen_malloc, wasm.__wbindgen_realloc);
+                len0 = WASM_VECTOR_LEN;
+                ptr1 = passArrayF64ToWasm0(ends, wasm.__wbindgen_malloc);
+                len1 = WASM_VECTOR_LEN;
+                ptr2 = passArrayF64ToWasm0(listed, wasm.__wbindgen_malloc);
+                len2 = WASM_VECTOR_LEN;
+            } catch (e) {
+                if (ptr2) { wasm.__wbindgen_free(ptr2, len2 * 8, 8); }
+                if (ptr1) { wasm.__wbindgen_free(ptr1, len1 * 8, 8); }
+                if (ptr0) { wasm.__wbindgen_free(ptr0, len0 * 1, 1); }
+                throw e;
+            }
+            const ret = wasm.ticks(ptr0, len0, ptr1, len1, ptr2, len2, val4, val5);
+            deferred6_0 = ret[0];
+            deferred6_1 = ret[1];
+            return getStringFromWasm0(ret[0], ret[1]);
+        } finally {
+            wasm.__wbindgen_free(deferred6_0, deferred6_1, 1);
+        }
+    }
+    exports.ticks = ticks;
     function __wbg_get_imports() {
         const import0 = {
             __proto__: null,
@@ -979,15 +1018,15 @@ let wasm_bindgen = (function(exports) {
                 return ret;
             },
             __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_15);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_16);
                 return ret;
             },
             __wbindgen_generic_0000000000000005: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_16);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17);
                 return ret;
             },
             __wbindgen_generic_0000000000000006: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_18);
                 return ret;
             },
             __wbindgen_generic_0000000000000007: function(arg0) {
@@ -1027,8 +1066,8 @@ let wasm_bindgen = (function(exports) {
         wasm.wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7(arg0, arg1, arg2);
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_15(arg0, arg1, arg2) {
-        wasm.wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_15(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_16(arg0, arg1, arg2) {
+        wasm.wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_16(arg0, arg1, arg2);
     }
 
     function wasm_bindgen__convert__closures_____invoke__h7af06d38255f967f(arg0, arg1, arg2) {
@@ -1045,15 +1084,15 @@ let wasm_bindgen = (function(exports) {
         }
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_16(arg0, arg1, arg2) {
-        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_16(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17(arg0, arg1, arg2) {
+        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17(arg0, arg1, arg2);
         if (ret[1]) {
             throw takeFromExternrefTable0(ret[0]);
         }
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17(arg0, arg1, arg2) {
-        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_18(arg0, arg1, arg2) {
+        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_18(arg0, arg1, arg2);
         if (ret[1]) {
             throw takeFromExternrefTable0(ret[0]);
         }
@@ -1193,6 +1232,14 @@ let wasm_bindgen = (function(exports) {
         return cachedDataViewMemory0;
     }
 
+    let cachedFloat64ArrayMemory0 = null;
+    function getFloat64ArrayMemory0() {
+        if (cachedFloat64ArrayMemory0 === null || cachedFloat64ArrayMemory0.byteLength === 0) {
+            cachedFloat64ArrayMemory0 = new Float64Array(wasm.memory.buffer);
+        }
+        return cachedFloat64ArrayMemory0;
+    }
+
     function getStringFromWasm0(ptr, len) {
         ptr = ptr >>> 0;
         return decodeText(getUint8ArrayMemory0().subarray(ptr, ptr + len));
@@ -1262,6 +1309,13 @@ let wasm_bindgen = (function(exports) {
     function passArray8ToWasm0(arg, malloc) {
         const ptr = malloc(arg.length * 1, 1) >>> 0;
         getUint8ArrayMemory0().set(arg, ptr / 1);
+        WASM_VECTOR_LEN = arg.length;
+        return ptr;
+    }
+
+    function passArrayF64ToWasm0(arg, malloc) {
+        const ptr = malloc(arg.length * 8, 8) >>> 0;
+        getFloat64ArrayMemory0().set(arg, ptr / 8);
         WASM_VECTOR_LEN = arg.length;
         return ptr;
     }
@@ -1336,6 +1390,7 @@ let wasm_bindgen = (function(exports) {
         wasm = instance.exports;
         wasmModule = module;
         cachedDataViewMemory0 = null;
+        cachedFloat64ArrayMemory0 = null;
         cachedUint32ArrayMemory0 = null;
         cachedUint8ArrayMemory0 = null;
         wasm.__wbindgen_start();

@@ -29,6 +29,8 @@ async function preparedFor(request) {
 
 const answers = {
   orbit: ({ command, model }) => ({ command, result: wasm_bindgen.orbit(command, model) }),
+  ticks: ({ id, scale, ends, listed, length, spacing }) =>
+    ({ id, ticks: wasm_bindgen.ticks(scale, Float64Array.from(ends), Float64Array.from(listed), length, spacing) }),
   compute: (request) => ({ records: windowOf(request).compute(request.runs) }),
   labels: (request) => ({ labels: windowOf(request).labels(request.runs) }),
   data: (request) => ({ data: windowOf(request).data(request.records) }),
