@@ -120,13 +120,18 @@ function nextLevel() {
   // A cell that the coarser picture lacks shows the record of a neighbour until its own is computed.
   const parts = job.along.map(({ values }) => (values || !earlier ? 1 : 2));
   const [words, target, source] = [size / 4, new Uint32Array(job.records.buffer), earlier && new Uint32Array(earlier.records.buffer)];
-  for (let run = 0; run < across * up * starts; run++) {
-    const [i, j, start] = [run % across, Math.floor(run / across) % up, Math.floor(run / (across * up))];
-    if (earlier) {
-      const from = (start * earlier.counts[1] + Math.floor(j / parts[1])) * earlier.counts[0] + Math.floor(i / parts[0]);
-      for (let k = 0; k < words; k++) target[run * words + k] = source[from * words + k];
+  for (let line = 0; line < up * starts; line++) {
+    const [j, start] = [line % up, Math.floor(line / up)];
+    const isCopy = earlier && j % parts[1] > 0;
+    if (isCopy) target.copyWithin(line * across * words, (line - 1) * across * words, line * across * words);
+    for (let i = 0; i < across; i++) {
+      const run = line * across + i;
+      if (earlier && !isCopy) {
+        const from = (start * earlier.counts[1] + j / parts[1]) * earlier.counts[0] + Math.floor(i / parts[0]);
+        target.set(source.subarray(from * words, (from + 1) * words), run * words);
+      }
+      if (!earlier || isCopy || i % parts[0]) job.todo.push(run);
     }
-    if (!earlier || i % parts[0] || j % parts[1]) job.todo.push(run);
   }
   job.next_run = job.ended = 0;
   job.total = job.todo.length;
