@@ -37,10 +37,26 @@ fn grows(errors: Real) -> bool {
 
 // Whether growth exceeds that of neutral motion and of rounding. Tangents of a free body, a torus or an undamped
 // oscillation grow in proportion to time, at a double root to its square. Rounding can replace the zero in a shear `1
-// s; 0 1` by d = ULP, which gives growth of sqrt(s ULP); s of one event is at most 1.
+// s; 0 1` by d = ULP, which gives growth of sqrt(s ULP); s of one event is at most 1. Without events the motion is linear,
+// and growth by negative damping is not chaos.
 fn outgrows(errors: Real) -> bool {
     let growth = mean_growth();
-    return exceeds_neutral(growth.x - errors * growth.y);
+    return tally.events > 0u && !is_growing(growth.x) && exceeds_neutral(growth.x - errors * growth.y);
+}
+
+// Returns the length of the first part of the motion, whose displacements later ones are compared with.
+fn early_periods() -> u32 {
+    return max(settings.transient_periods, settings.periods / 2u);
+}
+
+// Whether the motion itself grows, by negative damping or stiffness, at a share of its tangents' growth per period; or whether
+// it is too short to know.
+fn is_growing(growth: Real) -> bool {
+    if flows[cell.flow_index].escape < 0.0 {
+        return false;
+    }
+    let expected = SHARED_GROWTH * growth * (Real(tally.period) - Real(early_periods()));
+    return expected < PLAIN_GROWTH || log(f32(measures.position_scale / measures.early_scale)) > f32(expected);
 }
 
 fn exceeds_neutral(growth: Real) -> bool {

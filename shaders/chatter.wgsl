@@ -203,12 +203,12 @@ fn short_flight() -> Real {
     change = change * t + ($k.0 * $(k-1).0) * abs(gap_terms[$k]);
     //% end
     let last = SHORT_TERMS - 1u;
-    let bound = here.growth + derivative_bound(
+    let bound = here.swell * (here.growth + derivative_bound(
         SHORT_FACTORIAL * gap_terms[last - 1u],
         Real(last) * SHORT_FACTORIAL * gap_terms[last],
         SHORT_FACTORIAL * x_terms[last - 1u],
         Real(last) * SHORT_FACTORIAL * x_terms[last],
-    );
+    ));
     var error = bound;
     let share = t * (1.0 / SHORT);
     //% for k in 2..SHORT_TERMS

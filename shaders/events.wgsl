@@ -157,7 +157,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
         let rest = cube * cube * (1.0 / 14400.0);
         // In the contact onset the second distance is an acceleration, so that its remainder holds two more
         // derivatives.
-        let eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest)
+        let eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest) * here.swell
             + 8.0 * ULP * abs(offsets);
         let first = judge(left.first, right.first, dt, orders.x, eps.x);
         let second = judge(left.second, right.second, dt, orders.y, eps.y);
@@ -323,7 +323,7 @@ fn careful() -> bool {
         motion.q[0] = 0.0;
         motion.q[1] = 0.0;
     }
-    motion.bound += here.growth;
+    motion.bound = here.swell * (motion.bound + here.growth);
     tally.order = 0u;
     if MESH && d > 0u {
         count_meshing(found.tau * share);

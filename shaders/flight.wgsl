@@ -29,6 +29,7 @@ fn scan() -> u32 {
     let m = propagator();
     let row = here.gap_row;
     let growth = here.growth;
+    let swell = here.swell;
     let half = here.turn_half;
     let sine = here.turn_sin;
     let share = here.share;
@@ -89,7 +90,7 @@ fn scan() -> u32 {
         let s1 = s + sine * sheared;
         let c1 = sheared - half * s1;
         let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + with_sine(row[5], row[6], s1));
-        let bound1 = bound + growth;
+        let bound1 = swell * (bound + growth);
         if !(clearance(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
             break;
         }

@@ -13,8 +13,9 @@ struct Domain {
     // Quadratic form of the n-th derivatives that bounds |(n+1)-th derivative of the gap|^2: factors of rate^2, rate
     // * x_rate, x_rate^2, gap^2, gap * x, x^2.
     energy: array<Real, 6>,
-    // Growth of that bound per step, for n = 5.
+    // Growth of that bound per step by the force, for n = 5, and its factor by negative damping and stiffness.
     growth: Real,
+    swell: Real,
     // Forcing angle of one step; tan of half of it; sin of it.
     angle: Real,
     turn_half: Real,
@@ -42,6 +43,8 @@ struct Flow {
     speed: Real,
     // Longest infinite series of impacts that is closed by its limit, in free steps.
     closing: Real,
+    // Sum of the sizes of gap and x beyond which the motion has escaped; negative if energy grows by the force alone.
+    escape: Real,
     // Contact-free motion. `steady`: steady state at phase 0, in lane units. `contact_free_size`: size of the transient (by the
     // free domain's energy form) below which no contact will follow; negative if there is no such size. `transient_growth`:
     // growth of the transient per period, in octaves.
@@ -166,8 +169,9 @@ struct Measures {
     last_block: Real,
     // Strobe state that later strobes are compared with. While a cycle is read, the cycle's start.
     anchor: array<Real, 4>,
-    // Largest position and largest rate at strobes: the units of distances.
+    // Largest position at strobes, and in the first part of the motion; largest rate. They are the units of distances.
     position_scale: Real,
+    early_scale: Real,
     rate_scale: Real,
     // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
     cycle_growth: Real,

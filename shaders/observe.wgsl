@@ -43,6 +43,9 @@ fn begin_period() {
     if tally.period == settings.transient_periods {
         begin_counting();
     }
+    if tally.period == early_periods() {
+        measures.early_scale = measures.position_scale;
+    }
     let decided = settings.max_period > 0u && recurs();
     // The budget includes the periods in which the cycle is read.
     let read_by = tally.period + tally.candidate;

@@ -93,7 +93,7 @@ fn stuck_bound() -> Real {
     let square = here.angle * here.angle;
     let fifth = square * square * here.angle;
     let growth = with_sine(abs(here.x_row[4]), abs(here.x_row[6]), 1.0) * fifth;
-    let x = growth + derivative_bound(0.0, 0.0, 120.0 * x_terms[5], 720.0 * x_terms[6]);
-    let v = growth * here.angle + derivative_bound(0.0, 0.0, 720.0 * x_terms[6], 5040.0 * x_terms[7]);
+    let x = here.swell * (growth + derivative_bound(0.0, 0.0, 120.0 * x_terms[5], 720.0 * x_terms[6]));
+    let v = here.swell * (growth * here.angle + derivative_bound(0.0, 0.0, 720.0 * x_terms[6], 5040.0 * x_terms[7]));
     return (abs(p[2]) * x + abs(p[3]) * v) + with_sine(abs(p[4]), abs(p[6]), 1.0) * (fifth * here.angle);
 }

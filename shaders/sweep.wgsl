@@ -18,8 +18,11 @@ fn sum_of_sizes(q: array<Real, 4>) -> Real {
 }
 
 fn check_finite() {
-    if !is_bounded(sum_of_sizes(motion.q)) {
-        tally.status = STATUS_NON_FINITE;
+    let escape = flows[cell.flow_index].escape;
+    let can_escape = escape > 0.0;
+    let is_beyond = can_escape && abs(motion.q[0]) + abs(motion.q[2]) > escape;
+    if is_beyond || !is_bounded(sum_of_sizes(motion.q)) {
+        tally.status = select(STATUS_NON_FINITE, STATUS_ESCAPE, can_escape);
         motion.q = array<Real, 4>(0.0, 0.0, 0.0, 0.0);
     }
 }

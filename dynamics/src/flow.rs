@@ -32,7 +32,8 @@
 //! |z^(n+1)(t + s)|   <= sqrt(g M^-1 g) sqrt(2 E_n(t + s))        (Cauchy-Schwarz)
 //! ```
 //!
-//! The bound holds at resonance and without damping, and costs one square root. It is tight for slow motion: a stiff
+//! Negative damping and negative stiffness multiply the right side by an exponential (`energy.rs`), and a skew-symmetric, gyroscopic
+//! part of damping does no work. The bound holds at resonance and without damping, and costs one square root. It is tight for slow motion: a stiff
 //! meshing spring that is not excited does not shorten the step.
 
 mod columns;
@@ -83,6 +84,8 @@ pub struct Flow {
     pub walls: [f64; 2],
     /// Scale of length, [`Oscillator::length_scale`].
     pub length: f64,
+    /// Displacement beyond which the motion has escaped: infinite if energy grows by the force alone.
+    pub escape: f64,
     /// The oscillator.
     pub oscillator: Oscillator,
     /// Scale of speed: the scale of length times the rate of free motion.
@@ -99,8 +102,8 @@ pub struct Flow {
     other: usize,
     pub(crate) degrees: usize,
     mass: [[f64; 2]; 2],
-    /// Damping matrices of free motion and of contact with the right and the left wall.
-    damping: [[[f64; 2]; 2]; 3],
+    /// Symmetric parts of the damping matrices of free motion and of contact with the right and the left wall.
+    dissipation: [[[f64; 2]; 2]; 3],
     /// Stiffness and damping along the gap that each wall adds in contact.
     wall_forces: [[f64; 2]; 2],
     compliance: f64,
@@ -152,9 +155,9 @@ impl Flow {
             };
             [damping * compliance, damping * pushed]
         };
-        let damping = |side: Side| match oscillator.contacts[side.index()] {
-            Contact::Rigid => oscillator.free.damping,
-            Contact::Impact | Contact::Elastic => oscillator.meshing[side.index()].damping,
+        let dissipation = |side: Side| match oscillator.contacts[side.index()] {
+            Contact::Rigid => oscillator.free.dissipation(),
+            Contact::Impact | Contact::Elastic => oscillator.meshing[side.index()].dissipation(),
         };
         let meshing = Side::BOTH.map(behind);
         let length = oscillator.length_scale();
@@ -163,6 +166,7 @@ impl Flow {
             omega: oscillator.omega,
             walls: oscillator.walls,
             length,
+            escape: oscillator.escape(),
             oscillator: *oscillator,
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
@@ -173,7 +177,7 @@ impl Flow {
             other,
             degrees: oscillator.degrees,
             mass: oscillator.mass,
-            damping: [oscillator.free.damping, damping(Side::Right), damping(Side::Left)],
+            dissipation: [oscillator.free.dissipation(), dissipation(Side::Right), dissipation(Side::Left)],
             wall_forces: Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)),
             compliance,
             symmetric: oscillator.mirror_symmetric(),
@@ -225,11 +229,11 @@ impl Flow {
         }
     }
 
-    /// Returns the damping matrix of a domain.
-    pub(crate) fn damping(&self, kind: DomainKind) -> [[f64; 2]; 2] {
+    /// Returns the symmetric part of the damping matrix of a domain.
+    pub(crate) fn dissipation(&self, kind: DomainKind) -> [[f64; 2]; 2] {
         match kind {
-            DomainKind::Free => self.damping[0],
-            DomainKind::Meshing(side) => self.damping[1 + side.index()],
+            DomainKind::Free => self.dissipation[0],
+            DomainKind::Meshing(side) => self.dissipation[1 + side.index()],
         }
     }
 

@@ -14,6 +14,7 @@ mod traits;
 
 pub use gear_pair::GearPair;
 pub use non_impacting::NonImpacting;
+pub(crate) use oscillator::is_semidefinite;
 pub use oscillator::{Contact, Domain, Law, Oscillator, OscillatorError};
 pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};
 pub use stops::Stops;

@@ -24,8 +24,8 @@ mod tests;
 mod trace;
 
 pub use analysis::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, NEUTRAL_ORDER, analyse, analyse_flow,
-    analyse_until, status_of,
+    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, NEUTRAL_ORDER, PLAIN_GROWTH, SHARED_GROWTH,
+    analyse, analyse_flow, analyse_until, status_of,
 };
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
@@ -124,11 +124,13 @@ pub enum Status {
     BelowResolution,
     /// A Floquet multiplier of the cycle has modulus 1 within its error: perturbations neither decay nor grow.
     Neutral,
+    /// The motion grows without bound: the oscillator has negative damping or stiffness, and no contact stops it.
+    Escape,
 }
 
 impl Status {
     /// Every status, in the order of its code in records and tables.
-    pub const ALL: [Status; 10] = [
+    pub const ALL: [Status; 11] = [
         Status::Ok,
         Status::Slow,
         Status::NearGrazing,
@@ -139,6 +141,7 @@ impl Status {
         Status::NonFinite,
         Status::BelowResolution,
         Status::Neutral,
+        Status::Escape,
     ];
 
     /// Returns the name in tables and on the command line.
@@ -154,12 +157,16 @@ impl Status {
             Status::NonFinite => "non_finite",
             Status::BelowResolution => "below_resolution",
             Status::Neutral => "neutral",
+            Status::Escape => "escape",
         }
     }
 
     /// Whether the integration could not be continued.
     pub fn is_failure(self) -> bool {
-        matches!(self, Status::CapEvents | Status::CapRoot | Status::TooStiff | Status::NonFinite)
+        matches!(
+            self,
+            Status::CapEvents | Status::CapRoot | Status::TooStiff | Status::NonFinite | Status::Escape
+        )
     }
 
     /// Returns the code in records and tables.

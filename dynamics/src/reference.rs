@@ -232,8 +232,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     }
 
     fn check_finite(&self) -> Result<(), Stop> {
-        let finite = self.q.iter().all(|x| x.abs() < HUGE);
-        if finite { Ok(()) } else { Err(Stop::NonFinite) }
+        let is_finite = self.q.iter().all(|x| x.abs() < HUGE);
+        let stays = self.q[0].abs() + self.q[2].abs() <= self.flow.escape;
+        match is_finite && stays {
+            true => Ok(()),
+            false if self.flow.escape.is_finite() => Err(Stop::Escape),
+            false => Err(Stop::NonFinite),
+        }
     }
 
     fn check_events(&self) -> Result<(), Stop> {

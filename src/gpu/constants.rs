@@ -85,6 +85,7 @@ impl Constants {
             h,
             speed: speed(oscillator) * h,
             closing: CLOSING_ANGLE / free_rate(oscillator) / h,
+            escape: Some(oscillator.escape()).filter(|size| size.is_finite()).unwrap_or(-1.0),
             steady: [0.0; 4],
             contact_free_size: -1.0,
             transient_growth: 0.0,
@@ -234,6 +235,7 @@ fn domain(
         x_row,
         energy,
         growth: growth * angle.powi(5),
+        swell: (oscillator.growth_rate(domain) * h).exp(),
         angle,
         turn_half: (0.5 * angle).tan(),
         turn_sin: angle.sin(),
@@ -247,7 +249,7 @@ fn domain(
 fn power_form(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> [f64; 3] {
     let coordinates = Coordinates::new(oscillator);
     let unit = 2.0 * coordinates.compliance() * h;
-    coordinates.form(domain.damping).map(|x| x * unit)
+    coordinates.form(domain.dissipation()).map(|x| x * unit)
 }
 
 /// Returns the acceleration of the gap, per step `h` squared, that a contact gives per displacement and per rate.
@@ -266,13 +268,16 @@ fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
     let shared: [f64; 7] = std::array::from_fn(|j| other[j] + kick * gap[j]);
     let x_row = [0.0, 0.0, shared[2], shared[3], shared[4], shared[5], shared[6]];
     let angle = oscillator.omega * h;
+    // Rounding could make them negative.
+    let passive = oscillator.growth_rate(&oscillator.free) == 0.0;
     Domain {
         step: step(&[0.0; 7], &x_row, angle),
         gap_row: [0.0; 7],
         x_row,
         // Twice the energy of a derivative of x per mass: factors of its rate squared and of itself squared.
-        energy: [0.0, 0.0, 1.0, 0.0, 0.0, (-shared[2]).max(0.0)],
+        energy: [0.0, 0.0, 1.0, 0.0, 0.0, if passive { (-shared[2]).max(0.0) } else { shared[2].abs() }],
         growth: 0.0,
+        swell: if passive { 1.0 } else { (shared[3].max(0.0) + shared[2].max(0.0).sqrt()).exp() },
         angle,
         turn_half: (0.5 * angle).tan(),
         turn_sin: angle.sin(),
@@ -321,8 +326,9 @@ fn step(gap_row: &[f64; 7], x_row: &[f64; 7], angle: f64) -> [f64; 28] {
 
 /// Returns the energy bound on derivatives of the gap, in units of the step.
 ///
-/// `y^(n)` obeys the equations of motion with the force times `omega^n` and no load. Its energy `2 E = v M v + x K x`
-/// grows by the force alone. With `c^2 = g M^-1 g`:
+/// `y^(n)` obeys the equations of motion with the force times `omega^n` and no load. Its energy `2 E = v M v + x |K| x`
+/// grows by the force, and by negative damping and stiffness as in [`model::Oscillator::growth_rate`]. Without these, and with
+/// `c^2 = g M^-1 g`:
 ///
 /// ```text
 /// |z^(n+1)| <= c sqrt(2 E_n),   d sqrt(2 E_n) / dt <= omega^n sqrt(force M^-1 force + force_sin M^-1 force_sin).
@@ -334,7 +340,7 @@ fn gap_bound(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> 
     let coordinates = Coordinates::new(oscillator);
     let compliance = coordinates.compliance();
     let kinetic = coordinates.form(oscillator.mass).map(|x| x * compliance);
-    let potential = coordinates.form(domain.stiffness).map(|x| x * compliance * h * h);
+    let potential = coordinates.form(oscillator.energy_stiffness(domain)).map(|x| x * compliance * h * h);
     let form = [kinetic[0], kinetic[1], kinetic[2], potential[0], potential[1], potential[2]];
     let pull = coordinates.pull(oscillator.force).hypot(coordinates.pull(oscillator.force_sin));
     (form, compliance.sqrt() * pull * h * h)

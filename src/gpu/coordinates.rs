@@ -146,7 +146,9 @@ impl Coordinates {
             let (mean, half) = (0.5 * (scaled[0] + scaled[2]), 0.5 * (scaled[0] - scaled[2]));
             mean.abs() + half.hypot(scaled[1])
         };
-        (norm(domain.damping), norm(domain.stiffness).sqrt())
+        let [[_, d], [e, _]] = domain.damping;
+        let gyroscopic = (0.5 * (d - e)).abs() * a * c;
+        (norm(domain.dissipation()) + gyroscopic, norm(domain.stiffness).sqrt())
     }
 
     /// Returns the change of the accelerations of the gap and of `x`, per unit of gap rate, by a damper along the gap

@@ -154,6 +154,7 @@ fn meaning(status: Status) -> &'static str {
         Status::Neutral => {
             "a multiplier has modulus 1 within its error: perturbations neither decay nor grow"
         }
+        Status::Escape => "failed: the motion grows without bound",
     }
 }
 

@@ -164,8 +164,7 @@ fn blame(error: &ModelError) -> (Table, &str) {
     let quantity = match error {
         OscillatorError::OutOfRange { quantity, .. }
         | OscillatorError::NotSymmetric { quantity, .. }
-        | OscillatorError::NotAlongGap { quantity, .. }
-        | OscillatorError::NotSemidefinite { quantity, .. } => quantity.as_str(),
+        | OscillatorError::NotAlongGap { quantity, .. } => quantity.as_str(),
         OscillatorError::NotDefinite { .. } => "mass",
         OscillatorError::Walls { .. } => "position",
     };

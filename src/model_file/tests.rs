@@ -163,10 +163,9 @@ restitution = "e" | | m.toml:23:1: `contact.0.restitution` is missing
 at = "s" | at = "s + x" | m.toml:25:6: `contact.0.at = "s + x"` does not fit: `x` is a coordinate
 "2*zeta" | "2*" | m.toml:16:13: `motion.damping.0.0 = "2*"` cannot be read to its end
 "2*zeta" | true | must be an expression in quotes
-"2*zeta" | "-zeta" | m.toml:16:11: `motion.damping = [["-zeta"]]` does not fit: at the defaults of stop, damping in free motion = -0.25: it must be at least 0
 [["1"]] | [["F-1.5"]] | m.toml:15:8: `motion.mass = [["F-1.5"]]` does not fit: at the defaults of stop, mass = 0
 gap = [1] | gap = ["F-1.5"] | m.toml:21:7: `motion.gap = ["F-1.5"]` does not fit: at the defaults of stop, the largest entry of the gap row = 0
-"impact"\nrestitution = "e"\n | "elastic"\nstiffness = -0.5\n | m.toml:27:13: `contact.0.stiffness = -0.5` does not fit: at the defaults of stop, stiffness added in contact with the right wall = -0.5: it must be at least 0 where the wall is elastic
+"impact"\nrestitution = "e"\n | "elastic"\nstiffness = -0.5\n | m.toml:27:13: `contact.0.stiffness = -0.5` does not fit: at the defaults of stop, stiffness added in contact with the right wall = -0.5: it must be at least 0
 [["1"]] | [["1", "0"]] | `motion.mass.0 = ["1", "0"]` is out of range
 at = "s" | at = "1/0" | m.toml:25:6: `contact.0.at = "1/0"` does not fit: at the defaults of stop, position of the right wall = inf
 "e"\n | "2*e"\n | m.toml:27:15: `contact.0.restitution = "2*e"` does not fit: at the defaults of stop, restitution = 1.6
@@ -199,7 +198,7 @@ mass = [["1"]]\n | | m.toml:13:2: `motion.mass` is missing
     check_refusals(
         TWO_DEGREES,
         r#"
-"-c"], ["-c" | "-c"], ["c" | m.toml:14:11: `motion.damping = [["c", "-c"], ["c", "c + d"]]` does not fit: at the defaults of two, damping in free motion = [[0.5, -0.5], [0.5, 0.75]]: the matrix must be symmetric
+"-k"], ["-k" | "-k"], ["k" | m.toml:15:13: `motion.stiffness = [["k", "-k"], ["k", "k+1"]]` does not fit: at the defaults of two, stiffness in free motion = [[3, -3], [3, 4]]: the matrix must be symmetric
 "0.5"], ["0.5" | "5"], ["5" | m.toml:13:8: `motion.mass = [["m", "5"], ["5", "1"]]` does not fit: at the defaults of two, mass = [[2, 5], [5, 1]]: the matrix must be positive definite
 at = "-d" | at = "2*d" | `contact.0.at = "2*d"` does not fit: at the defaults of two, walls at 0.25 and 0.5
 ["va", "vb"] | ["va"] | `motion.velocities = ["va"]` is out of range: it must be a list of names, one for each coordinate

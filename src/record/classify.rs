@@ -2,7 +2,8 @@
 //!
 //! A motion is
 //!
-//! - `failed` if the integration could not continue (`cap_events`, `cap_root`, `too_stiff`, `non_finite`);
+//! - `failed` if the integration could not continue (`cap_events`, `cap_root`, `too_stiff`, `non_finite`,
+//!   `escape`);
 //! - `periodic` if the engine confirmed a period. Recurrence of strobe states is not enough: the orbit must be
 //!   stable;
 //! - `chaotic` if there is no period, the exponent exceeds zero by [`CHAOS_ERRORS`] standard errors, and the motion
@@ -79,8 +80,9 @@ mod tests {
     }
 
     #[test]
-    fn exactly_four_statuses_are_failures() {
-        let failures = [Status::CapEvents, Status::CapRoot, Status::TooStiff, Status::NonFinite];
+    fn exactly_five_statuses_are_failures() {
+        let failures =
+            [Status::CapEvents, Status::CapRoot, Status::TooStiff, Status::NonFinite, Status::Escape];
         for status in Status::ALL {
             let failed = classify(&record(status, 1, 0.2, 0.01)) == Class::Failed;
             assert_eq!(failed, failures.contains(&status), "{status:?}");

@@ -170,6 +170,7 @@ fn status(status: Status) -> &'static str {
             "below_resolution: rounding decides the period; points of the cycle cannot be told apart"
         }
         Status::Neutral => "neutral: a multiplier has modulus 1; perturbations neither decay nor grow",
+        Status::Escape => "escape: the motion grows without bound",
     }
 }
 

@@ -10,6 +10,7 @@ mod counters;
 mod counting;
 mod early_stops;
 mod engines_agree;
+mod growth;
 mod independence;
 mod kinds;
 mod measures;

@@ -47,7 +47,9 @@ mod functions {
 }
 
 fn main() {
-    assert!(!cfg!(target_feature = "fma"), "RUSTFLAGS must be set to nothing");
+    if cfg!(target_feature = "fma") {
+        panic!("RUSTFLAGS must be set to nothing");
+    }
     let mut scene = String::new();
     stdin().read_to_string(&mut scene).expect("a scene on stdin");
     let window = Window::new(&scene, "", "").expect("a scene");

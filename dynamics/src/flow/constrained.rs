@@ -10,13 +10,13 @@
 //! m = t M t, c = t C t, k = t K t, f_cos = t . force, f_sin = t . force_sin
 //! ```
 //!
-//! Its energy `2 E_5 = m x^(6)^2 + k x^(5)^2` grows as in [`crate::flow`]. With `x^(7)` from the equation of motion,
+//! A skew-symmetric part of `C` does not enter `c`. The energy `2 E_5 = m x^(6)^2 + |k| x^(5)^2` grows as in [`crate::flow`]. With `x^(7)` from the equation of motion,
 //! the energy bounds the derivative that the certificate needs:
 //!
 //! ```text
 //! |p^(6)| <= reach sqrt(2 E_5) + |a| omega^6 + |a_v f / m| omega^5
 //! f        = |(f_cos, f_sin)|, a = (a_cos, a_sin)
-//! reach    = |a_x - a_v c / m| / sqrt(m) + |a_v| sqrt(k) / m
+//! reach    = |a_x - a_v c / m| / sqrt(m) + |a_v| sqrt(|k|) / m
 //! ```
 //!
 //! In one degree of freedom `p` is the sum of the forcing and a constant.
@@ -26,7 +26,7 @@ use nalgebra::Matrix4;
 use super::columns::Columns;
 use super::energy::EnergyBound;
 use super::generator::{Generator, generator};
-use crate::model::Oscillator;
+use crate::model::{Oscillator, is_semidefinite};
 
 /// The motion of an oscillator whose gap rests on a rigid wall.
 pub(super) struct ConstrainedMotion {
@@ -37,7 +37,10 @@ pub(super) struct ConstrainedMotion {
     pub(super) pressing: Generator,
     omega: f64,
     mass: f64,
+    /// Modulus of `k`.
     stiffness: f64,
+    /// Bound on the rate at which the root of the energy grows without a force.
+    growth_rate: f64,
     force: f64,
     reach: f64,
     /// Bound on the part of `p^(6)` that the forcing contributes directly.
@@ -65,20 +68,24 @@ impl ConstrainedMotion {
         };
         let mass = square(oscillator.mass);
         // Rounding could make them negative.
-        let [damping, stiffness] =
-            [oscillator.free.damping, oscillator.free.stiffness].map(|m| square(m).max(0.0));
+        let [damping, stiffness] = [oscillator.free.dissipation(), oscillator.free.stiffness].map(|m| {
+            let value = square(m);
+            if is_semidefinite(m) { value.max(0.0) } else { value }
+        });
         let [cos, sin] = [oscillator.force, oscillator.force_sin].map(|f| along[0] * f[0] + along[1] * f[1]);
         let force = cos.hypot(sin);
         let [a_x, a_v, a_cos, a_sin] = [2, 3, 4, 5].map(|j| free[(1, j)]);
         ConstrainedMotion {
             generator,
-            rate: (damping / mass + (stiffness / mass).sqrt()).max(omega),
+            rate: ((damping / mass).abs() + (stiffness / mass).abs().sqrt()).max(omega),
             pressing,
             omega,
             mass,
-            stiffness,
+            stiffness: stiffness.abs(),
+            growth_rate: (-damping / mass).max(0.0) + (-stiffness / mass).max(0.0).sqrt(),
             force,
-            reach: (a_x - a_v * damping / mass).abs() / mass.sqrt() + a_v.abs() * stiffness.sqrt() / mass,
+            reach: (a_x - a_v * damping / mass).abs() / mass.sqrt()
+                + a_v.abs() * stiffness.abs().sqrt() / mass,
             forced: a_cos.hypot(a_sin) * omega.powi(6) + (a_v * force / mass).abs() * omega.powi(5),
         }
     }
@@ -94,7 +101,7 @@ impl ConstrainedMotion {
         root[(1, 3)] = energy * self.mass.sqrt();
         let columns = fifth.weighted(&root).plus_constant(2, weight * self.forced);
         let growth = scale * self.reach * self.omega.powi(5) * self.force / self.mass.sqrt() * unit;
-        EnergyBound::of(columns, growth)
+        EnergyBound::of(columns, growth, self.growth_rate * unit)
     }
 }
 

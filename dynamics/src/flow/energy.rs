@@ -19,16 +19,19 @@ const LEAST_ENERGY: f64 = 1e-280;
 #[derive(Clone, Debug)]
 pub(crate) struct EnergyBound {
     columns: Columns,
+    /// Growth by the force per Taylor step.
     growth: f64,
+    /// Exponent of the growth by negative damping and negative stiffness per Taylor step; 0 without these.
+    exponent: f64,
 }
 
 impl EnergyBound {
     /// The bound of a constant gap: zero.
-    pub(super) const NONE: EnergyBound = EnergyBound { columns: Columns::ZERO, growth: 0.0 };
+    pub(super) const NONE: EnergyBound = EnergyBound { columns: Columns::ZERO, growth: 0.0, exponent: 0.0 };
 
-    /// Builds a bound: the norm of the columns' product with `a`, plus `growth` per Taylor step.
-    pub(super) fn of(columns: Columns, growth: f64) -> EnergyBound {
-        EnergyBound { columns, growth }
+    /// Builds a bound: the norm of the columns' product with `a`, plus `growth` per Taylor step, times an exponential.
+    pub(super) fn of(columns: Columns, growth: f64, exponent: f64) -> EnergyBound {
+        EnergyBound { columns, growth, exponent }
     }
 
     /// Builds the bound from the energy of `y^(n)`; `term` is `(G unit)^n / n!` and `unit` the Taylor step.
@@ -49,6 +52,7 @@ impl EnergyBound {
         EnergyBound {
             columns: term.weighted(&(energy_root(oscillator, domain) * power)),
             growth: scale * drive * oscillator.omega.powi(n as i32) * unit,
+            exponent: oscillator.growth_rate(domain) * unit,
         }
     }
 
@@ -62,14 +66,15 @@ impl EnergyBound {
         } else {
             energy.sqrt()
         };
-        fma(self.growth, u, root)
+        let bound = fma(self.growth, u, root);
+        if self.exponent == 0.0 { bound } else { bound * (self.exponent * u).exp() }
     }
 }
 
-/// Returns a matrix `L` with `|L q|^2 = v M v + x K x`.
+/// Returns a matrix `R` with `|R q|^2 = v M v + x |K| x`, the energy of [`Oscillator::growth_rate`].
 fn energy_root(oscillator: &Oscillator, domain: &Domain) -> Matrix4<f64> {
     let back = displacement_matrix(oscillator).try_inverse().expect("the gap row is not zero");
-    let k = domain.stiffness;
+    let k = oscillator.energy_stiffness(domain);
     let eigen = Matrix2::new(k[0][0], k[0][1], k[1][0], k[1][1]).symmetric_eigen();
     let root = Matrix2::from_diagonal(&eigen.eigenvalues.map(|l| l.max(0.0).sqrt()))
         * eigen.eigenvectors.transpose();
@@ -83,4 +88,56 @@ fn energy_root(oscillator: &Oscillator, domain: &Domain) -> Matrix4<f64> {
         }
     }
     l
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::flow::{Flow, Gap, Phasor};
+    use crate::model::{Domain, GearPair, Oscillator};
+
+    #[test]
+    fn the_sixth_derivative_of_the_gap_stays_within_its_bound() {
+        let good = GearPair::paper(0.5).oscillator().unwrap();
+        let with = |damping, stiffness| {
+            let free = Domain { damping, stiffness, load: [1.0, -2.0] };
+            Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..good }
+        };
+        let passive = [[30.0, 4.0], [4.0, 11.0]];
+        let oscillators = [
+            good,
+            with([[2.0, -0.7], [-0.7, 0.9]], passive),
+            // Negative damping.
+            with([[-1.0, 0.3], [0.3, 0.4]], passive),
+            // Gyroscopic.
+            with([[0.2, 3.0], [-3.0, 0.1]], passive),
+            // A saddle, and hills along both coordinates.
+            with([[0.2, 0.0], [0.0, 0.1]], [[30.0, 24.0], [24.0, 11.0]]),
+            with([[0.0; 2]; 2], [[-9.0, 2.0], [2.0, -3.0]]),
+            with([[-0.5, 1.0], [-1.0, -0.2]], [[-9.0, 2.0], [2.0, 3.0]]),
+        ];
+        for oscillator in oscillators {
+            oscillator.validate().unwrap();
+            let flow = Flow::new(&oscillator);
+            let mut largest = 0.0f64;
+            for n in 0..2000u32 {
+                let t = f64::from(n);
+                let size = 10f64.powf(-4.0 + 6.0 * (0.618 * t).fract());
+                let q: Gap = [2.0, 5.0, 2.0, 5.0].map(|x| x * size);
+                let q = std::array::from_fn(|i| q[i] * (t * (0.7 + 0.31 * i as f64)).sin());
+                let phasor: Phasor = [(0.9 * t).cos(), (0.9 * t).sin()];
+                for u in [1.0, 0.25] {
+                    let bound = flow.free.gap_bound.remainder(&q, &phasor, u) * 14400.0;
+                    for part in 0..=16 {
+                        let tau = u * flow.free.unit * f64::from(part) / 16.0;
+                        let sixth =
+                            flow.free.pressing_derivative(&q, &phasor, tau, 4) * flow.free.unit.powi(6);
+                        let share = sixth.abs() / bound;
+                        assert!(share <= 1.0 + 1e-12, "{share} of the bound: {oscillator:?}, {q:?}");
+                        largest = largest.max(share);
+                    }
+                }
+            }
+            assert!(largest > 0.3, "the bound is not tight: largest share {largest}: {oscillator:?}");
+        }
+    }
 }

@@ -37,17 +37,13 @@ pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
 
 /// Returns a bound on all rates of the domain: of the forcing, and of the mass-scaled system by its norm.
 pub(super) fn rate(oscillator: &Oscillator, domain: &Domain) -> f64 {
-    let [[first, _], [below, second]] = oscillator.mass_root();
-    let root = Vector2::new(first.recip(), second.recip());
-    let norm = |m: [[f64; 2]; 2]| {
-        let m = Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
-        let scaled = if below == 0.0 {
-            m.component_mul(&(root * root.transpose()))
-        } else {
-            let inverse = Matrix2::new(root[0], 0.0, -below * root[0] * root[1], root[1]);
-            inverse * m * inverse.transpose()
-        };
-        scaled.symmetric_eigenvalues().abs().max()
-    };
-    (norm(domain.damping) + norm(domain.stiffness).sqrt()).max(oscillator.omega)
+    let norm = |m: [[f64; 2]; 2]| oscillator.mass_scaled(m).symmetric_eigenvalues().abs().max();
+    let damping = norm(domain.dissipation()) + gyroscopic_rate(oscillator, domain);
+    (damping + norm(domain.stiffness).sqrt()).max(oscillator.omega)
+}
+
+/// Returns the norm of the mass-scaled skew-symmetric part of damping.
+fn gyroscopic_rate(oscillator: &Oscillator, domain: &Domain) -> f64 {
+    let ([[_, b], [c, _]], [[first, _], [_, second]]) = (domain.damping, oscillator.mass_root());
+    (0.5 * (b - c)).abs() / (first * second)
 }

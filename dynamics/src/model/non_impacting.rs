@@ -1,7 +1,7 @@
 //! Steady motion that never touches a wall.
 //!
 //! Free motion is the sum of a steady response `x_s` and a transient `q = x - x_s`, which obeys the free equations
-//! without force or load. The transient's energy `2 E = q' M q' + q K q` never grows, so the gap stays within
+//! without force or load. Without negative damping, the transient's energy `2 E = q' M q' + q K q` never grows, so the gap stays within
 //!
 //! ```text
 //! |z - z_0| <= |g . X| + sqrt(2 E g K^-1 g),   z_0 = g . K^-1 load
@@ -12,7 +12,7 @@
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
 
-use super::{Oscillator, State};
+use super::{Oscillator, State, is_semidefinite};
 
 /// Margin for rounding: of the distance to a wall, relative to twice the scale of length, and of the decay rate,
 /// relative to the excitation frequency.
@@ -41,6 +41,10 @@ impl NonImpacting {
     }
 
     fn of_two_degrees(oscillator: &Oscillator) -> Option<NonImpacting> {
+        // Otherwise the energy of a transient can grow, even if the transient decays in the end.
+        if !is_semidefinite(oscillator.free.dissipation()) {
+            return None;
+        }
         let Oscillator { omega, walls, mass, .. } = *oscillator;
         let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
         let (stiffness, damping) = (matrix(oscillator.free.stiffness), matrix(oscillator.free.damping));

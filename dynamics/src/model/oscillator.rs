@@ -1,5 +1,6 @@
 //! Oscillators and contact laws: masses, linear domains, walls.
 
+use nalgebra::{Matrix2, Vector2};
 use thiserror::Error;
 
 use super::Side;
@@ -52,14 +53,6 @@ pub enum OscillatorError {
         /// The matrix.
         matrix: [[f64; 2]; 2],
     },
-    /// A damping or stiffness matrix that is not positive semidefinite.
-    #[error("{quantity} = {}: the matrix must be positive semidefinite", written(.matrix))]
-    NotSemidefinite {
-        /// Name of the matrix.
-        quantity: String,
-        /// The matrix.
-        matrix: [[f64; 2]; 2],
-    },
 }
 
 /// Writes a matrix for a message.
@@ -70,8 +63,8 @@ fn written(matrix: &[[f64; 2]; 2]) -> String {
 
 /// One linear domain: `M x'' + damping x' + stiffness x = force cos(omega t) + force_sin sin(omega t) + load`.
 ///
-/// Damping and stiffness are symmetric and positive semidefinite. The energy bounds of the event certificate need
-/// that (see [`crate::flow`]).
+/// Stiffness is symmetric. Damping may have a skew-symmetric part, as gyroscopic forces do, which does no work. Negative
+/// eigenvalues are allowed: energy then grows, at a rate that [`crate::flow`] bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
     /// Damping matrix.
@@ -84,6 +77,9 @@ pub struct Domain {
 
 /// Lower bound of [`Oscillator::length_scale`], which must not be zero.
 const LEAST_LENGTH: f64 = 1e-150;
+
+/// Displacement, in scales of length, from which no motion is expected to return.
+const ESCAPE: f64 = 1e9;
 
 /// The contact type of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,6 +190,51 @@ impl Oscillator {
         [[first, 0.0], [m / first, (m2 - m / m1 * m).sqrt()]]
     }
 
+    /// Returns `L^-1 A L^-T` for a symmetric matrix `A`, with the mass matrix `L L^T`.
+    pub(crate) fn mass_scaled(&self, m: [[f64; 2]; 2]) -> Matrix2<f64> {
+        let [[first, _], [below, second]] = self.mass_root();
+        let root = Vector2::new(first.recip(), second.recip());
+        let m = Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
+        if below == 0.0 {
+            return m.component_mul(&(root * root.transpose()));
+        }
+        let inverse = Matrix2::new(root[0], 0.0, -below * root[0] * root[1], root[1]);
+        inverse * m * inverse.transpose()
+    }
+
+    /// Returns a bound on the rate at which the root of the energy `2 E = v M v + x |K| x` of free motion in a domain grows without a
+    /// force.
+    ///
+    /// In mass-scaled coordinates, `C = L^-1 damping L^-T` and `K = L^-1 stiffness L^-T`, and `|K|` has the eigenvectors of `K` and
+    /// the moduli of its eigenvalues. Then
+    ///
+    /// ```text
+    /// E' = v f - v C v + v (|K| - K) x <= |f| sqrt(2 E) + (c + sqrt(k)) 2 E
+    /// ```
+    ///
+    /// where `-c` and `-k` are the lowest eigenvalues of the symmetric part of `C` and of `K`, or 0 if these are positive. The bound is
+    /// sharp for motion that leaves the top of a hill. It is 0 without negative damping and stiffness.
+    pub fn growth_rate(&self, domain: &Domain) -> f64 {
+        let below_zero = |m: [[f64; 2]; 2]| match is_semidefinite(m) {
+            true => 0.0,
+            false => (-self.mass_scaled(m).symmetric_eigenvalues().min()).max(0.0),
+        };
+        below_zero(domain.dissipation()) + below_zero(domain.stiffness).sqrt()
+    }
+
+    /// Returns `|K|` of [`growth_rate`](Self::growth_rate): the stiffness, with the moduli of its eigenvalues relative to the mass.
+    pub fn energy_stiffness(&self, domain: &Domain) -> [[f64; 2]; 2] {
+        if is_semidefinite(domain.stiffness) {
+            return domain.stiffness;
+        }
+        let mut eigen = self.mass_scaled(domain.stiffness).symmetric_eigen();
+        eigen.eigenvalues.apply(|l| *l = l.abs());
+        let [[first, _], [below, second]] = self.mass_root();
+        let root = Matrix2::new(first, 0.0, below, second);
+        let k = root * eigen.recompose() * root.transpose();
+        [[k[(0, 0)], k[(0, 1)]], [k[(0, 1)], k[(1, 1)]]]
+    }
+
     /// Checks everything that [`crate::flow`] and [`mod@crate::reference`] assume.
     ///
     /// # Errors
@@ -240,9 +281,7 @@ impl Oscillator {
         {
             if self.has_motion_behind(side) {
                 self.meshing[side.index()].validate(self.degrees, place)?;
-            }
-            if self.is_elastic(side) {
-                self.validate_elastic(side, place)?;
+                self.validate_wall(side, place)?;
             }
         }
         if self.degrees == 1 { self.validate_single() } else { Ok(()) }
@@ -270,8 +309,17 @@ impl Oscillator {
         ]
     }
 
-    /// Checks that an elastic wall acts along the gap row only, and that the force is continuous at the wall.
-    fn validate_elastic(&self, side: Side, place: &str) -> Result<(), OscillatorError> {
+    /// Returns the displacement beyond which the motion counts as escaped. It is infinite if energy grows by the force alone.
+    pub fn escape(&self) -> f64 {
+        let behind = Side::BOTH.into_iter().filter(|&side| self.has_motion_behind(side));
+        let mut domains = behind.map(|side| &self.meshing[side.index()]).chain([&self.free]);
+        let grows = domains.any(|domain| self.growth_rate(domain) > 0.0);
+        if grows { ESCAPE * self.length_scale() } else { f64::INFINITY }
+    }
+
+    /// Checks that spring and damper behind a wall are not negative. An elastic wall must act along the gap row only, and the
+    /// force must be continuous at the wall.
+    fn validate_wall(&self, side: Side, place: &str) -> Result<(), OscillatorError> {
         let (behind, free, g) = (&self.meshing[side.index()], &self.free, self.gap);
         let [stiffness, damping] = self.wall_stiffness_and_damping(side);
         let matrices = [
@@ -286,11 +334,14 @@ impl Oscillator {
             };
             let quantity = || format!("{name} added in {place}");
             let least = -MATRIX_TOLERANCE * size / (g[0] * g[0] + g[1] * g[1]);
-            require(added >= least, quantity, added, "at least 0 where the wall is elastic")?;
-            if !(added >= 0.0 && pairs.into_iter().all(is_along)) {
+            require(added >= least, quantity, added, "at least 0")?;
+            if self.is_elastic(side) && !(added >= 0.0 && pairs.into_iter().all(is_along)) {
                 let quantity = format!("{name} in {place}");
                 return Err(OscillatorError::NotAlongGap { quantity, matrix });
             }
+        }
+        if !self.is_elastic(side) {
+            return Ok(());
         }
         let wall = self.wall(side);
         // The stiffness is a difference of matrices, and has the rounding error of their largest entry.
@@ -324,6 +375,7 @@ impl Oscillator {
             none("load 2", domain.load[1])?;
             for (name, matrix) in [("damping", domain.damping), ("stiffness", domain.stiffness)] {
                 none(&format!("{name} 1, 2"), matrix[0][1])?;
+                none(&format!("{name} 2, 1"), matrix[1][0])?;
                 none(&format!("{name} 2, 2"), matrix[1][1])?;
             }
         }
@@ -335,10 +387,10 @@ impl Oscillator {
     /// It is half the distance of the walls. If a wall is missing or both coincide, it is
     ///
     /// ```text
-    /// max(|wall|, |D force|, |D load|),   D = (K + omega^2 M)^-1
+    /// max(|wall|, |D force|, |D load|),   D = (|K| + omega^2 M)^-1
     /// ```
     ///
-    /// over the existing walls and both displacements, with `K` and `load` of free motion. `|D force|` is the amplitude
+    /// over the existing walls and both displacements, with [`|K|`](Self::energy_stiffness) and `load` of free motion. `|D force|` is the amplitude
     /// of the forced deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
     /// or none it is the distance that the load moves a mass in a radian of the forcing. The scale is finite for
     /// every oscillator.
@@ -358,7 +410,7 @@ impl Oscillator {
     }
 
     fn deflections(&self, force: [f64; 2]) -> [f64; 2] {
-        let [[k1, k], [_, k2]] = self.free.stiffness;
+        let [[k1, k], [_, k2]] = self.energy_stiffness(&self.free);
         let [[m1, m], [_, m2]] = self.mass;
         let [a, b, m] = [m1, m2, m].map(|m| m * self.omega * self.omega);
         let (a, b, k) = (a + k1, b + k2, m + k);
@@ -379,27 +431,32 @@ impl Oscillator {
 }
 
 impl Domain {
+    /// Returns the symmetric part of the damping matrix, the part that does work.
+    pub fn dissipation(&self) -> [[f64; 2]; 2] {
+        let [[a, b], [c, d]] = self.damping;
+        let mixed = if b == c { b } else { 0.5 * (b + c) };
+        [[a, mixed], [mixed, d]]
+    }
+
     /// Checks the domain of an oscillator of `degrees` degrees of freedom. `place` names it in messages.
     fn validate(&self, degrees: usize, place: &str) -> Result<(), OscillatorError> {
         for (name, matrix) in [("damping", self.damping), ("stiffness", self.stiffness)] {
             let quantity = || format!("{name} in {place}");
             matrix.as_flattened().iter().try_for_each(|&entry| finite(quantity, entry))?;
-            let [[a, b], [c, d]] = matrix;
-            if degrees == 1 {
-                // The other entries have a check of their own.
-                require(a >= 0.0, quantity, a, "at least 0")?;
-                continue;
-            }
-            if b != c {
-                return Err(OscillatorError::NotSymmetric { quantity: quantity(), matrix });
-            }
-            // An overflow of the products passes the check, which is harmless.
-            if !(a >= 0.0 && d >= 0.0 && a * d * (1.0 + MATRIX_TOLERANCE) >= b * b) {
-                return Err(OscillatorError::NotSemidefinite { quantity: quantity(), matrix });
-            }
+        }
+        let matrix = self.stiffness;
+        // The second coordinate of a single oscillator has checks of its own.
+        if degrees == 2 && matrix[0][1] != matrix[1][0] {
+            let quantity = format!("stiffness in {place}");
+            return Err(OscillatorError::NotSymmetric { quantity, matrix });
         }
         self.load.into_iter().try_for_each(|load| finite(|| format!("load in {place}"), load))
     }
+}
+
+/// Whether a symmetric matrix has no negative eigenvalue, except for rounding. An overflow of the products counts as none.
+pub(crate) fn is_semidefinite([[a, b], [_, d]]: [[f64; 2]; 2]) -> bool {
+    a >= 0.0 && d >= 0.0 && a * d * (1.0 + MATRIX_TOLERANCE) >= b * b
 }
 
 /// Returns `c` if the difference of two matrices is `c row row^T`.
@@ -504,22 +561,12 @@ mod tests {
             "walls at -0.5 and 0.5: the right one must lie above the left one"
         );
         assert_eq!(
-            slip(|o| o.free.damping[0][1] = 0.1),
-            "damping in free motion = [[0.6, 0.1], [0, 0.6]]: the matrix must be symmetric"
+            slip(|o| o.free.stiffness[0][1] = 0.1),
+            "stiffness in free motion = [[30, 0.1], [0, 20]]: the matrix must be symmetric"
         );
         assert_eq!(
-            slip(|o| o.meshing[1].stiffness = [[1.0, 2.0], [2.0, 1.0]]),
-            "stiffness in contact with the left wall = [[1, 2], [2, 1]]: the matrix must be positive \
-             semidefinite"
-        );
-        let single = Oscillator {
-            degrees: 1,
-            free: Domain { damping: [[-0.1 - 0.2, 0.0], [0.0; 2]], ..good.free },
-            ..good
-        };
-        assert_eq!(
-            single.validate().unwrap_err().to_string(),
-            "damping in free motion = -0.3: it must be at least 0"
+            slip(|o| o.free.damping[0][1] = f64::NAN),
+            "damping in free motion = NaN: it must be a finite number"
         );
         assert_eq!(
             slip(|o| o.meshing[0].load[0] = f64::INFINITY),

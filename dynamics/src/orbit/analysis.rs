@@ -32,6 +32,12 @@ pub const LONGEST_WINDOW: u32 = 32_768;
 /// ratio of the size of the motion to rounding.
 pub const ESCAPE_GROWTH: f64 = 40.0;
 
+/// Share of the tangents' exponent at which the displacements grow at least, if the motion itself grows.
+pub const SHARED_GROWTH: f64 = 0.25;
+
+/// Logarithm of the smallest growth that shows whether a motion grows: largest displacements fluctuate.
+pub const PLAIN_GROWTH: f64 = 0.5;
+
 /// Periods in which a new tangent vector turns to the most expanding direction.
 pub(super) const TANGENT_PERIODS: u32 = 50;
 
@@ -110,6 +116,16 @@ pub(super) fn neutral_growth(from: u32, periods: f64) -> f64 {
     NEUTRAL_ORDER * ((f64::from(from) + periods) / f64::from(from.max(1))).ln()
 }
 
+/// Whether a motion grows, by negative damping or stiffness, or is too short to know. Its tangents then grow, too, without chaos.
+/// `exponent` is theirs, per forcing period.
+pub(super) fn is_growing(flow: &Flow, strobes: &[State], exponent: f64) -> bool {
+    let largest = |part: &[State]| part.iter().fold(0.0, |most: f64, y| most.max(y[0].abs()).max(y[2].abs()));
+    let (first, second) = strobes.split_at(strobes.len() / 2);
+    let growth = (largest(second) / largest(first)).ln();
+    let expected = SHARED_GROWTH * exponent * second.len() as f64;
+    flow.escape.is_finite() && (growth > expected || expected < PLAIN_GROWTH)
+}
+
 /// Returns the status of a motion that a stop has ended.
 pub fn status_of(stop: Stop) -> Status {
     match stop {
@@ -117,6 +133,7 @@ pub fn status_of(stop: Stop) -> Status {
         Stop::CapRoot => Status::CapRoot,
         Stop::TooStiff => Status::TooStiff,
         Stop::NonFinite => Status::NonFinite,
+        Stop::Escape => Status::Escape,
     }
 }
 
@@ -299,8 +316,12 @@ impl Analysis<'_> {
     }
 
     /// Whether nearby motions separate by more than in an escape from an unstable cycle, and by far more than in
-    /// neutral motion, where they separate in proportion to time.
+    /// neutral motion, where they separate in proportion to time. Without contact the motion is linear and not chaotic.
     fn is_chaotic(&self, window: &Window) -> bool {
+        let is_linear = window.impacts_per_period == 0.0 && window.mesh_fraction == 0.0;
+        if is_linear || is_growing(self.flow, &window.strobes, window.lyapunov * self.flow.period) {
+            return false;
+        }
         let least = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error;
         least * window.strobes.len() as f64 * self.flow.period > ESCAPE_GROWTH
     }

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::CHAOS_ERRORS;
 use super::analysis::{
-    APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, ROUNDING, neutral_growth, status_of,
+    APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, ROUNDING, is_growing, neutral_growth, status_of,
 };
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
@@ -532,7 +532,11 @@ impl<'a> CellRun<'a> {
         let periods = averaged.len().saturating_sub(1) as f64;
         let is_neutral =
             |rate: f64| rate * periods * period <= neutral_growth(self.budget.exponent_from(), periods);
-        let slow = least.is_some_and(is_neutral)
+        // Without contact the motion is linear: growth by negative damping is not chaos.
+        let is_linear = self.counts.last() == self.counts.get(self.budget.exponent_from() as usize);
+        let slow = is_linear
+            || lyapunov.is_some_and(|(mean, _)| is_growing(self.analysis.flow, &self.strobes, mean * period))
+            || least.is_some_and(is_neutral)
             || 2.0 * near_saddle_periods as f64 >= span && least.is_none_or(is_escape);
         let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
         let is_quasi_periodic = self.strobes.len() > self.budget.periods() as usize

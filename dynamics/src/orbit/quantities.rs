@@ -235,7 +235,7 @@ impl<'f> Meter<'f> {
         for (moments, value) in self.displacements.iter_mut().zip([x1, x2, q[0]]) {
             moments.integrate(weight, value, phasor);
         }
-        let [[c1, c], [_, c2]] = self.flow.damping(self.kind);
+        let [[c1, c], [_, c2]] = self.flow.dissipation(self.kind);
         self.dissipated += weight * (c1 * v1 * v1 + 2.0 * c * v1 * v2 + c2 * v2 * v2);
         if let Some(force) = self.compliant_force(q) {
             self.force.square += weight * force * force;

@@ -29,6 +29,9 @@ pub enum Stop {
     /// The state is not finite.
     #[error("the state is not finite")]
     NonFinite,
+    /// A displacement exceeds [`Flow::escape`](crate::flow::Flow::escape).
+    #[error("the motion grows without bound")]
+    Escape,
 }
 
 /// The kind of an event.

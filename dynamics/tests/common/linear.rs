@@ -2,7 +2,7 @@
 
 use rattlemap_dynamics::model::{Contact, Domain, Oscillator, Side};
 
-/// `x'' + 2 gamma x' + square x = force cos(omega t) + load`, underdamped.
+/// `x'' + 2 gamma x' + square x = force cos(omega t) + load`, not critically damped.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Linear {
     pub(crate) gamma: f64,
@@ -28,8 +28,10 @@ impl Linear {
 
     /// Returns the fundamental matrix of free motion over a time `tau`, by rows.
     pub(crate) fn fundamental(&self, tau: f64) -> [[f64; 2]; 2] {
-        let own = (self.square - self.gamma * self.gamma).sqrt();
-        let (sin, cos) = (own * tau).sin_cos();
+        let split = self.square - self.gamma * self.gamma;
+        let own = split.abs().sqrt();
+        let angle = own * tau;
+        let (sin, cos) = if split > 0.0 { angle.sin_cos() } else { (angle.sinh(), angle.cosh()) };
         let (decay, lean) = ((-self.gamma * tau).exp(), self.gamma / own * sin);
         [[decay * (cos + lean), decay * sin / own], [-decay * self.square / own * sin, decay * (cos - lean)]]
     }

@@ -36,19 +36,23 @@ fn bilinear(free: Linear, at: f64, stiffness: f64, damping: f64) -> Bilinear {
 #[test]
 fn a_bilinear_oscillator_agrees_with_two_linear_flights() {
     let mut damped = 0;
-    for (gamma, omega, load, at, stiffness, damping) in [
-        (0.05, 0.8, 0.0, 0.0, 8.0, 0.0),
-        (0.05, 1.5, 0.0, 0.2, 8.0, 0.0),
-        (0.05, 2.1, 0.1, 0.0, 24.0, 1.5),
-        (0.1, 1.2, 0.0, -0.5, 3.0, 0.4),
-        (0.02, 1.3, -0.2, 0.5, 100.0, 6.0),
+    for (gamma, square, omega, load, at, stiffness, damping) in [
+        (0.05, 1.0, 0.8, 0.0, 0.0, 8.0, 0.0),
+        (0.05, 1.0, 1.5, 0.0, 0.2, 8.0, 0.0),
+        (0.05, 1.0, 2.1, 0.1, 0.0, 24.0, 1.5),
+        (0.1, 1.0, 1.2, 0.0, -0.5, 3.0, 0.4),
+        (0.02, 1.0, 1.3, -0.2, 0.5, 100.0, 6.0),
+        // Negative damping, which the damper behind the wall outweighs; and a hill.
+        (-0.02, 1.0, 1.5, 0.0, 0.2, 8.0, 1.5),
+        (0.1, -0.3, 1.2, 1.0, 0.2, 8.0, 1.0),
+        (-0.02, -0.3, 1.2, 1.0, 0.2, 8.0, 2.0),
     ] {
-        let free = Linear { gamma, square: 1.0, force: 1.0, load, omega };
+        let free = Linear { gamma, square, force: 1.0, load, omega };
         let Bilinear { free, behind, oscillator } = bilinear(free, at, stiffness, damping);
         oscillator.validate().expect("an elastic wall");
         let flow = Flow::new(&oscillator);
         let orbit = analyse_flow(&flow, LAW, REST, &Settings::default(), 8);
-        let case = format!("gamma {gamma}, omega {omega}: {orbit:?}");
+        let case = format!("gamma {gamma}, square {square}, omega {omega}: {orbit:?}");
         assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Ok), "{case}");
         assert_eq!((orbit.word.time_order().as_str(), orbit.impacts_per_period), ("12", 0.0), "{case}");
         let start =
@@ -71,7 +75,7 @@ fn a_bilinear_oscillator_agrees_with_two_linear_flights() {
         assert!((0..2).all(|i| near(ours[i], exact[i], 1e-11)), "{ours:?}, {exact:?}: {case}");
         damped += u32::from(damping > 0.0);
     }
-    assert_eq!(damped, 3);
+    assert_eq!(damped, 6);
 }
 
 /// Returns the tangents, the state and the events of one period.

@@ -102,10 +102,10 @@ fn errors_of_built_scenes_name_the_field() {
 /// Cells without motion are found before the computation: at corners by the scene, elsewhere by the plan.
 #[test]
 fn cells_without_motion_are_named_before_anything_is_computed() {
-    let scene = |damping: &str| {
+    let scene = |mass: &str| {
         let text = format!(
-            "name = 'driven'\n[parameters]\nF = 1\nomega = 9\n[motion]\ncoordinates = ['x']\nmass = [[1]]\n\
-             damping = [['{damping}']]\nforce = ['F']\nfrequency = 'omega'\ngap = [1]\n\
+            "name = 'driven'\n[parameters]\nF = 1\nomega = 9\n[motion]\ncoordinates = ['x']\nmass = [['{mass}']]\n\
+             force = ['F']\nfrequency = 'omega'\ngap = [1]\n\
              [[contact]]\nside = 'right'\nat = 1\nlaw = 'impact'\nrestitution = 0.5\n"
         );
         let model = FileModel::parse(&text, "driven.toml").unwrap();
@@ -114,11 +114,11 @@ fn cells_without_motion_are_named_before_anything_is_computed() {
     let corner = scene("omega - 1.2").unwrap_err();
     assert_says(
         &corner.to_string(),
-        &["scene: at F = 1, omega = 1: damping in free motion = -0.2: it must be at least 0"],
+        &["scene: at F = 1, omega = 1: mass = -0.2: it must be finite and greater than 0"],
     );
     let plan = Plan::new(&scene("(omega - 1.8)*(omega - 2.2)").unwrap());
     let inside = plan.check().unwrap_err();
     assert!(matches!(inside.reason, ModelError::Oscillator(OscillatorError::OutOfRange { .. })));
-    assert_says(&inside.to_string(), &["omega = 2: damping in free motion"]);
+    assert_says(&inside.to_string(), &["omega = 2: mass = -0.04"]);
     assert_eq!(Plan::new(&scene("omega").unwrap()).check(), Ok(()));
 }
