@@ -25,7 +25,7 @@ sed '/^ *\/\/ /d' "$out/rattlemap_web.js" > "$report/engine.js"
 
 # What the engine is compiled from. The page's own files are not part of it.
 sources=(
-    Cargo.lock models web dynamics/src src/lib.rs src/text src/model_file src/record src/map src/findings src/gpu src/show src/validate
+    Cargo.lock models web/Cargo.toml web/src dynamics/src src/lib.rs src/text src/model_file src/record src/map src/findings src/gpu src/show src/validate
     shaders
 )
 {
