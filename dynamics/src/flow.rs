@@ -167,7 +167,7 @@ impl Flow {
             walls: oscillator.walls,
             length,
             escape: oscillator.escape(),
-            oscillator: *oscillator,
+            oscillator: oscillator.clone(),
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
             contacts: oscillator.contacts,

@@ -15,7 +15,10 @@ mod traits;
 pub use gear_pair::GearPair;
 pub use non_impacting::NonImpacting;
 pub(crate) use oscillator::is_semidefinite;
-pub use oscillator::{Contact, Domain, Law, Oscillator, OscillatorError};
+pub use oscillator::{
+    Contact, Domain, HIGHEST_ORDER, Harmonic, Law, MOST_CHANGES, MOST_HARMONICS, MOST_STAGES, Oscillator,
+    OscillatorError, Stage,
+};
 pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};
 pub use stops::Stops;
 pub use traits::{CloneModel, Model, ModelError};

@@ -382,8 +382,8 @@ mod tests {
         ];
         let turned = |pair: GearPair| pair.oscillator().unwrap().at_phase(0.3);
         let coupled =
-            |of: Oscillator| Oscillator { mass: [[of.mass[0][0], 0.4], [0.4, of.mass[1][1]]], ..of };
-        pairs.into_iter().map(turned).flat_map(|of| [of, coupled(of)]).collect()
+            |of: &Oscillator| Oscillator { mass: [[of.mass[0][0], 0.4], [0.4, of.mass[1][1]]], ..of.clone() };
+        pairs.into_iter().map(turned).flat_map(|of| [coupled(&of), of]).collect()
     }
 
     /// By Padé approximants of the whole matrix.
@@ -415,7 +415,7 @@ mod tests {
     fn a_symmetric_oscillator_has_mirrored_domains_to_the_bit() {
         for oscillator in oscillators() {
             for contact in [Contact::Impact, Contact::Rigid, Contact::Elastic] {
-                let oscillator = Oscillator { contacts: [contact; 2], ..oscillator };
+                let oscillator = Oscillator { contacts: [contact; 2], ..oscillator.clone() };
                 assert!(oscillator.mirror_symmetric());
                 let Flow { domains: [_, _, left], walls, h, .. } =
                     Constants::new(&oscillator, None).unwrap().flow;

@@ -217,6 +217,9 @@ impl Definition {
             force_sin: vector(&motion.force_sin, of),
             free,
             meshing: [free; 2],
+            harmonics: Vec::new(),
+            stages: Vec::new(),
+            schedule: Vec::new(),
         };
         for side in Side::BOTH {
             let Some(wall) = self.wall(side) else { continue };

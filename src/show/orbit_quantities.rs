@@ -38,7 +38,8 @@ fn approaches(orbit: &Orbit, side: Side) -> Option<[f64; 2]> {
 pub(crate) fn impulses(model: &dyn Model, events: &[Event]) -> Vec<Option<f64>> {
     let (oscillator, flow) = (model.oscillator().ok(), Flow::of(model).ok());
     let of = |event: &Event| {
-        let [before, after] = [event.before, event.after].map(|state| oscillator.map(|o| gap(&o, &state, 1)));
+        let [before, after] =
+            [event.before, event.after].map(|state| oscillator.as_ref().map(|o| gap(o, &state, 1)));
         Some((after? - before?) / flow.as_ref()?.compliance())
     };
     events.iter().map(of).collect()

@@ -67,9 +67,10 @@ impl Spectrum {
             return Ok(None);
         }
         // The last sample belongs to the next period.
-        let values =
-            |velocity| samples[..count].iter().map(move |sample| gap(&oscillator, &sample.state, velocity));
-        let [z, w]: [Vec<f64>; 2] = [0, 1].map(|velocity| values(velocity).collect());
+        let values = |velocity| {
+            samples[..count].iter().map(|sample| gap(&oscillator, &sample.state, velocity)).collect()
+        };
+        let [z, w]: [Vec<f64>; 2] = [0, 1].map(values);
         let span = cycle.unwrap_or(WINDOW);
         let frequencies =
             (0..=(wanted / 10).min(per_period / 4) * span as usize).map(|k| k as f64 / f64::from(span));

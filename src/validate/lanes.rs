@@ -139,7 +139,7 @@ pub async fn run_lanes(
     let mut numbered: Vec<_> = (0..).zip(records).collect();
     let of = |i: u32| {
         let lane = &lanes[i as usize];
-        (flows[lane.flow as usize], laws[lane.law as usize])
+        (flows[lane.flow as usize].clone(), laws[lane.law as usize])
     };
     compare_at_sections(gpu, &mut numbered, of, settings).await?;
     Ok(numbered.into_iter().map(|(_, record)| record).collect())

@@ -127,6 +127,9 @@ impl Walled {
             omega: self.free.omega,
             force: [self.free.force, 0.0],
             force_sin: [0.0; 2],
+            harmonics: Vec::new(),
+            stages: Vec::new(),
+            schedule: Vec::new(),
             free: self.free.domain(),
             meshing: [self.behind(0).domain(), self.behind(1).domain()],
         };

@@ -45,6 +45,9 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
         omega,
         force: [1.0, 0.0],
         force_sin: [0.0; 2],
+        harmonics: Vec::new(),
+        stages: Vec::new(),
+        schedule: Vec::new(),
         free: domain,
         meshing: [domain; 2],
     };
@@ -103,6 +106,9 @@ impl Damper {
             omega: self.omega,
             force: [self.force, 0.0],
             force_sin: [0.0; 2],
+            harmonics: Vec::new(),
+            stages: Vec::new(),
+            schedule: Vec::new(),
             free: domain,
             meshing: [domain; 2],
         };
@@ -171,8 +177,8 @@ fn motion(o: &Oscillator, e: f64) -> Motion {
 }
 
 /// Returns the symmetric orbits that approach the right wall at the impact.
-pub(crate) fn symmetric(&(oscillator, law): &(Oscillator, Law)) -> Vec<Symmetric> {
-    let Motion { gap, generator, impact, steady } = motion(&oscillator, law.restitution[0]);
+pub(crate) fn symmetric((oscillator, law): &(Oscillator, Law)) -> Vec<Symmetric> {
+    let Motion { gap, generator, impact, steady } = motion(oscillator, law.restitution[0]);
     let (omega, delta) = (oscillator.omega, oscillator.walls[0]);
     let half = PI / omega;
     let e = (generator * half).exp();
@@ -252,7 +258,7 @@ fn symmetric_orbits_agree_with_the_closed_form() {
     let mut stable: BTreeMap<String, usize> = BTreeMap::new();
     let default = ("energy sink, as in the gallery".to_owned(), SINK.pair());
     for (what, (oscillator, law)) in clearances().into_iter().chain([default]) {
-        for orbit in symmetric(&(oscillator, law)).iter().filter(|orbit| orbit.is_free_between) {
+        for orbit in symmetric(&(oscillator.clone(), law)).iter().filter(|orbit| orbit.is_free_between) {
             let found = followed(&oscillator, law, orbit.strobe, 1);
             assert_eq!(found.events.len(), 2);
             let monodromy = orbit.half * orbit.half;

@@ -63,14 +63,14 @@ fn known_cycles() -> Vec<Known> {
         }
     }
     for (what, (oscillator, law)) in clearance::clearances() {
-        for orbit in clearance::symmetric(&(oscillator, law)) {
+        for orbit in clearance::symmetric(&(oscillator.clone(), law)) {
             let monodromy: Matrix4<f64> = orbit.half * orbit.half;
             let [re, im] = multipliers(&monodromy).unwrap()[0];
             let radius = re.hypot(im);
             if orbit.is_free_between && radius < 1.0 {
                 list.push(Known {
                     what: what.clone(),
-                    oscillator,
+                    oscillator: oscillator.clone(),
                     law,
                     period: 1,
                     strobe: orbit.strobe,
@@ -178,7 +178,7 @@ fn the_reference_finds_known_cycles() {
 
 fn check_lanes(precision: Precision, bars: [f64; 2]) {
     let known_cycles = known_cycles();
-    let flows: Vec<Oscillator> = known_cycles.iter().map(|known| known.oscillator).collect();
+    let flows: Vec<Oscillator> = known_cycles.iter().map(|known| known.oscillator.clone()).collect();
     let laws: Vec<Law> = known_cycles.iter().map(|known| known.law).collect();
     let lanes: Vec<Lane> =
         (0..).zip(&known_cycles).map(|(i, known)| Lane { flow: i, law: i, start: start(known) }).collect();

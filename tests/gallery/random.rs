@@ -294,7 +294,7 @@ fn validate(
 /// models, within its interval.
 fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
     let cells: Vec<RandomCell> = seeds.map(|seed| random_cell(u64::from(seed))).filter(is_bounded).collect();
-    let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.oscillator).collect();
+    let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.oscillator.clone()).collect();
     let laws: Vec<Law> = cells.iter().map(|cell| cell.law).collect();
     let lanes: Vec<Lane> =
         (0..).zip(&cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.start }).collect();

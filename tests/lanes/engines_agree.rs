@@ -310,7 +310,7 @@ fn one_wall_agrees_with_the_reference() {
         .iter()
         .map(|pair| {
             let pair = pair.oscillator().unwrap();
-            Oscillator { walls: [pair.walls[0], f64::NEG_INFINITY], ..pair }
+            Oscillator { walls: [pair.walls[0], f64::NEG_INFINITY], ..pair.clone() }
         })
         .collect();
     let laws: Vec<Law> = pairs.iter().map(GearPair::law).collect();

@@ -90,7 +90,7 @@ fn motion_that_nothing_stops_escapes_on_every_engine() {
         ("a hill beside one wall", cell(&model(SINGLE, ONE_WALL, [0.1, -1.0, 0.0]), &[("e", 0.0)])),
         ("negative damping beside one wall", cell(&model(SINGLE, ONE_WALL, [-0.2, 1.0, 0.0]), &[("e", 1.0)])),
     ];
-    let cells = cases.map(|case| case.1);
+    let cells = cases.clone().map(|case| case.1);
     let expect = |engine: &str, records: &[Record]| {
         for ((what, _), record) in cases.iter().zip(records) {
             assert_eq!(

@@ -20,7 +20,7 @@ fn lanes(
     measures: Option<Measures>,
 ) -> Vec<(Option<Quantities>, Option<[f64; 2]>, u32)> {
     let mut gpu = open(precision);
-    let flows: Vec<Oscillator> = cases.iter().map(|case| case.0).collect();
+    let flows: Vec<Oscillator> = cases.iter().map(|case| case.0.clone()).collect();
     let laws: Vec<Law> = cases.iter().map(|case| case.1).collect();
     let settings = LaneSettings { measures, multiplier: true, ..LaneSettings::default() };
     pollster::block_on(async {

@@ -39,7 +39,7 @@ fn every_engine_names_neutral_and_quasi_periodic_motion() {
         ("undamped", undamped(3f64.sqrt(), [0.1, 0.2, 0.0, 0.0]), Class::QuasiPeriodic, Status::Ok),
         ("a torus", gallery("two-masses", [("omega", 0.625), ("e", 1.0)]), Class::QuasiPeriodic, Status::Ok),
     ];
-    let cells = cases.map(|case| case.1);
+    let cells = cases.clone().map(|case| case.1);
     let expect = |engine: &str, records: &[rattlemap::record::Record]| {
         for ((what, _, class, expected), record) in cases.iter().zip(records) {
             let found = (classify(record), status(record));
@@ -48,7 +48,7 @@ fn every_engine_names_neutral_and_quasi_periodic_motion() {
         }
     };
     let measured = |(oscillator, law, start): Cell| measure(&Flow::new(&oscillator), law, start, &BUDGET);
-    expect("reference", &cells.map(|cell| measured_record(&measured(cell), &Needs::EVERYTHING)));
+    expect("reference", &cells.clone().map(|cell| measured_record(&measured(cell), &Needs::EVERYTHING)));
     let settings = LaneSettings { undecided_periods: 1584, ..LaneSettings::default() };
     for precision in Precision::ALL {
         expect(&format!("{precision:?}"), &kinds::run(precision, &cells, &settings).unwrap());

@@ -114,7 +114,7 @@ fn in_coordinates(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
         force_sin: covariant(o.force_sin),
         free: domain(&o.free),
         meshing: [domain(&o.meshing[0]), domain(&o.meshing[1])],
-        ..*o
+        ..o.clone()
     }
 }
 
@@ -148,7 +148,7 @@ fn a_start_behind_a_rigid_wall_begins_on_the_wall() {
     let oscillator = Oscillator { contacts: [Contact::Rigid; 2], ..paper(0.0, 5.6).oscillator().unwrap() };
     let flight = Flight::new(&oscillator, Law::both(0.0, 0.0), [0.9, 0.0, 0.1, 0.0]);
     assert_eq!((flight.q, flight.meshing()), ([0.5, 0.0, 0.1, 0.0], None));
-    let soft = Oscillator { contacts: [Contact::Elastic; 2], ..oscillator };
+    let soft = Oscillator { contacts: [Contact::Elastic; 2], ..oscillator.clone() };
     let flight = Flight::new(&soft, Law::both(0.0, 0.0), [0.9, 0.0, 0.1, 0.0]);
     assert_eq!(flight.meshing(), Some(Side::Right));
 }

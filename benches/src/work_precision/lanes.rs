@@ -53,7 +53,7 @@ impl Device {
         let lanes: Vec<Lane> = subjects
             .iter()
             .map(|subject| Lane {
-                flow: index_of(&mut flows, subject.oscillator),
+                flow: index_of(&mut flows, subject.oscillator.clone()),
                 law: index_of(&mut laws, subject.law),
                 start: subject.start,
             })

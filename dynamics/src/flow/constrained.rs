@@ -118,9 +118,9 @@ mod tests {
             stiffness: [[30.0, 4.0], [4.0, 11.0]],
             load: [1.0, -2.0],
         };
-        let full = Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..pair };
-        let single = Oscillator { gap: [1.0, 0.0], force: [5.0, 0.0], ..pair };
-        let sine = Oscillator { force: [0.0; 2], force_sin: [20.0, -40.0], ..full };
+        let full = Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..pair.clone() };
+        let single = Oscillator { gap: [1.0, 0.0], force: [5.0, 0.0], ..pair.clone() };
+        let sine = Oscillator { force: [0.0; 2], force_sin: [20.0, -40.0], ..full.clone() };
         let mut largest = 0.0f64;
         for oscillator in [pair, full, single, sine] {
             let flow = Flow::new(&oscillator);

@@ -100,11 +100,11 @@ mod tests {
         let good = GearPair::paper(0.5).oscillator().unwrap();
         let with = |damping, stiffness| {
             let free = Domain { damping, stiffness, load: [1.0, -2.0] };
-            Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..good }
+            Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..good.clone() }
         };
         let passive = [[30.0, 4.0], [4.0, 11.0]];
         let oscillators = [
-            good,
+            good.clone(),
             with([[2.0, -0.7], [-0.7, 0.9]], passive),
             // Negative damping.
             with([[-1.0, 0.3], [0.3, 0.4]], passive),

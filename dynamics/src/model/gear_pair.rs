@@ -59,6 +59,9 @@ impl GearPair {
             omega: self.omega,
             force: [self.force, 0.0],
             force_sin: [0.0; 2],
+            harmonics: Vec::new(),
+            stages: Vec::new(),
+            schedule: Vec::new(),
             free,
             meshing: [meshing(1.0), meshing(-1.0)],
         };

@@ -139,7 +139,7 @@ impl NonImpacting {
 
 /// Replaces the degree of freedom `resting` by a copy of the other that does not enter the gap.
 fn with_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
-    let (mut copied, moving) = (*oscillator, 1 - resting);
+    let (mut copied, moving) = (oscillator.clone(), 1 - resting);
     let share = copied.mass[resting][resting] / copied.mass[moving][moving];
     let free = &mut copied.free;
     free.stiffness[resting][resting] = share * free.stiffness[moving][moving];

@@ -1,6 +1,6 @@
 //! Oscillators and contact laws: masses, linear domains, walls.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Complex, Matrix2, Vector2};
 use thiserror::Error;
 
 use super::Side;
@@ -78,6 +78,9 @@ pub struct Domain {
 /// Lower bound of [`Oscillator::length_scale`], which must not be zero.
 const LEAST_LENGTH: f64 = 1e-150;
 
+/// Distance of phases, in turns, that is rounding.
+const SAME_PHASE: f64 = 1e-12;
+
 /// Displacement, in scales of length, from which no motion is expected to return.
 const ESCAPE: f64 = 1e9;
 
@@ -94,8 +97,40 @@ pub enum Contact {
     Elastic,
 }
 
-/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may be missing.
+/// One harmonic of the force: `cos cos(order omega t) + sin sin(order omega t)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Harmonic {
+    /// Order, 2 to [`HIGHEST_ORDER`].
+    pub order: u32,
+    /// Factor of the cosine.
+    pub cos: [f64; 2],
+    /// Factor of the sine.
+    pub sin: [f64; 2],
+}
+
+/// Highest order of a harmonic.
+pub const HIGHEST_ORDER: u32 = 64;
+
+/// Largest number of harmonics beside the first.
+pub const MOST_HARMONICS: usize = 7;
+
+/// The linear domains of a part of the forcing period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stage {
+    /// Motion between the walls.
+    pub free: Domain,
+    /// Motion in lasting contact with the right and the left wall; ignored for rigid and missing walls.
+    pub meshing: [Domain; 2],
+}
+
+/// Largest number of stages.
+pub const MOST_STAGES: usize = 8;
+
+/// Largest number of changes of the stage in a forcing period.
+pub const MOST_CHANGES: usize = 1024;
+
+/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may be missing.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Oscillator {
     /// Degrees of freedom: 1 or 2. With 1, the second displacement has a mass of 1, no forces and no part in the gap,
     /// and its state is 0.
@@ -118,6 +153,13 @@ pub struct Oscillator {
     pub free: Domain,
     /// Motion in lasting contact with the right and the left wall; ignored for rigid and missing walls.
     pub meshing: [Domain; 2],
+    /// Further harmonics of the force, in increasing order.
+    pub harmonics: Vec<Harmonic>,
+    /// Further stages. Stage 0 is `free` and `meshing`, stage `i` is `stages[i - 1]`.
+    pub stages: Vec<Stage>,
+    /// Changes of the stage in a forcing period: the phase in turns, in `[0, 1)` and increasing, and the stage that begins
+    /// there. The last one holds up to the first. Empty if stage 0 holds always.
+    pub schedule: Vec<(f64, usize)>,
 }
 
 impl Oscillator {
@@ -129,16 +171,65 @@ impl Oscillator {
     /// Returns the oscillator whose phase 0 is this phase of the forcing, in radians.
     pub fn at_phase(&self, phase: f64) -> Oscillator {
         if phase == 0.0 {
-            return *self;
+            return self.clone();
         }
         // Half a turn changes the sign only: no rounding error adds a sine to the force.
         let (sin, cos) = if phase == std::f64::consts::PI { (0.0, -1.0) } else { phase.sin_cos() };
-        let turned = |i: usize| {
-            let (f, g) = (self.force[i], self.force_sin[i]);
-            [cos * f + sin * g, cos * g - sin * f]
+        let turned = |force: [f64; 2], force_sin: [f64; 2], [cos, sin]: [f64; 2]| {
+            let pairs = [0, 1].map(|i| {
+                let (f, g) = (force[i], force_sin[i]);
+                [cos * f + sin * g, cos * g - sin * f]
+            });
+            [0, 1].map(|part| pairs.map(|pair| pair[part]))
         };
-        let [[f1, g1], [f2, g2]] = [turned(0), turned(1)];
-        Oscillator { force: [f1, f2], force_sin: [g1, g2], ..*self }
+        let [force, force_sin] = turned(self.force, self.force_sin, [cos, sin]);
+        let harmonic = |harmonic: &Harmonic| {
+            let power = Complex::new(cos, sin).powu(harmonic.order);
+            let [cos, sin] = turned(harmonic.cos, harmonic.sin, [power.re, power.im]);
+            Harmonic { cos, sin, ..*harmonic }
+        };
+        let turns = phase / std::f64::consts::TAU;
+        // Rounding may give a whole turn.
+        let later =
+            |begins: f64| Some((begins - turns).rem_euclid(1.0)).filter(|&phase| phase < 1.0).unwrap_or(0.0);
+        let mut schedule: Vec<_> =
+            self.schedule.iter().map(|&(begins, stage)| (later(begins), stage)).collect();
+        schedule.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let harmonics = self.harmonics.iter().map(harmonic).collect();
+        Oscillator { force, force_sin, harmonics, schedule, ..self.clone() }
+    }
+
+    /// Returns the number of stages, 1 or more.
+    pub fn stage_count(&self) -> usize {
+        1 + self.stages.len()
+    }
+
+    /// Returns the stage that holds at phase 0: the one that begins there, or the last one of the schedule.
+    pub fn first_stage(&self) -> usize {
+        match self.schedule.first() {
+            Some(&(0.0, stage)) => stage,
+            _ => self.schedule.last().map_or(0, |&(_, stage)| stage),
+        }
+    }
+
+    /// Returns the oscillator in which a stage holds always.
+    pub fn in_stage(&self, stage: usize) -> Oscillator {
+        let Stage { free, meshing } = match stage {
+            0 => Stage { free: self.free, meshing: self.meshing },
+            _ => self.stages[stage - 1],
+        };
+        Oscillator { free, meshing, stages: Vec::new(), schedule: Vec::new(), ..self.clone() }
+    }
+
+    /// Returns the highest order of the force's harmonics, 1 or more.
+    pub fn highest_order(&self) -> u32 {
+        self.harmonics.iter().map(|harmonic| harmonic.order).max().unwrap_or(1)
+    }
+
+    /// Returns all harmonics of the force, the first one too.
+    pub fn all_harmonics(&self) -> impl Iterator<Item = Harmonic> + '_ {
+        let first = Harmonic { order: 1, cos: self.force, sin: self.force_sin };
+        std::iter::once(first).chain(self.harmonics.iter().copied())
     }
 
     pub(crate) fn wall(&self, side: Side) -> f64 {
@@ -284,7 +375,52 @@ impl Oscillator {
                 self.validate_wall(side, place)?;
             }
         }
-        if self.degrees == 1 { self.validate_single() } else { Ok(()) }
+        self.validate_harmonics()?;
+        if self.degrees == 1 {
+            self.validate_single()?;
+        }
+        self.validate_stages()
+    }
+
+    fn validate_harmonics(&self) -> Result<(), OscillatorError> {
+        let count = self.harmonics.len();
+        let few = "at most 7, beside the first";
+        require(count <= MOST_HARMONICS, || "the number of harmonics".to_owned(), count as f64, few)?;
+        for (i, Harmonic { order, cos, sin }) in self.harmonics.iter().enumerate() {
+            let is_known = (2..=HIGHEST_ORDER).contains(order);
+            require(is_known, || "order of a harmonic".to_owned(), f64::from(*order), "2 to 64")?;
+            let is_new = self.harmonics[..i].iter().all(|other| other.order < *order);
+            let increasing = "above those before it";
+            require(is_new, || "order of a harmonic".to_owned(), f64::from(*order), increasing)?;
+            for (name, factors) in [("cosine", cos), ("sine", sin)] {
+                let quantity = || format!("{name} of harmonic {order}");
+                factors.iter().try_for_each(|&factor| finite(quantity, factor))?;
+                let single = "0, since one degree of freedom has no second displacement";
+                require(self.degrees == 2 || factors[1] == 0.0, quantity, factors[1], single)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_stages(&self) -> Result<(), OscillatorError> {
+        let (count, changes) = (self.stage_count(), self.schedule.len());
+        require(count <= MOST_STAGES, || "the number of stages".to_owned(), count as f64, "1 to 8")?;
+        let few = "at most 1024";
+        require(
+            changes <= MOST_CHANGES,
+            || "the number of changes of the stage".to_owned(),
+            changes as f64,
+            few,
+        )?;
+        let mut before = -1.0;
+        for &(begins, stage) in &self.schedule {
+            let quantity = || "phase of a stage".to_owned();
+            let in_order = "in [0, 1) and above those before it";
+            require(begins > before && (0.0..1.0).contains(&begins), quantity, begins, in_order)?;
+            require(stage < count, || "index of a stage".to_owned(), stage as f64, "that of a stage")?;
+            before = begins;
+        }
+        (1..count).try_for_each(|stage| self.in_stage(stage).validate())
     }
 
     /// Whether a wall exists and motion can continue behind it.
@@ -313,7 +449,8 @@ impl Oscillator {
     pub fn escape(&self) -> f64 {
         let behind = Side::BOTH.into_iter().filter(|&side| self.has_motion_behind(side));
         let mut domains = behind.map(|side| &self.meshing[side.index()]).chain([&self.free]);
-        let grows = domains.any(|domain| self.growth_rate(domain) > 0.0);
+        // Stages can do work: parametric resonance.
+        let grows = !self.stages.is_empty() || domains.any(|domain| self.growth_rate(domain) > 0.0);
         if grows { ESCAPE * self.length_scale() } else { f64::INFINITY }
     }
 
@@ -403,16 +540,23 @@ impl Oscillator {
         if half.is_finite() && half > 0.0 {
             return half;
         }
-        let [cos, sin, load] = [self.force, self.force_sin, self.free.load].map(|f| self.deflections(f));
-        let deflections = [0, 1].map(|i| cos[i].hypot(sin[i]).max(load[i].abs()));
+        let [cos, sin, load] =
+            [self.force, self.force_sin, self.free.load].map(|f| self.deflections(f, self.omega));
+        let mut swings = [0, 1].map(|i| cos[i].hypot(sin[i]));
+        for Harmonic { order, cos, sin } in &self.harmonics {
+            let [cos, sin] = [cos, sin].map(|f| self.deflections(*f, self.omega * f64::from(*order)));
+            swings = [0, 1].map(|i| swings[i] + cos[i].hypot(sin[i]));
+        }
+        let of_stages = (1..self.stage_count()).map(|stage| self.in_stage(stage).length_scale());
+        let deflections = [0, 1].map(|i| swings[i].max(load[i].abs()));
         let walls = self.walls.map(f64::abs).into_iter().filter(|wall| wall.is_finite());
-        walls.chain(deflections).fold(LEAST_LENGTH, f64::max)
+        walls.chain(deflections).chain(of_stages).fold(LEAST_LENGTH, f64::max)
     }
 
-    fn deflections(&self, force: [f64; 2]) -> [f64; 2] {
+    fn deflections(&self, force: [f64; 2], omega: f64) -> [f64; 2] {
         let [[k1, k], [_, k2]] = self.energy_stiffness(&self.free);
         let [[m1, m], [_, m2]] = self.mass;
-        let [a, b, m] = [m1, m2, m].map(|m| m * self.omega * self.omega);
+        let [a, b, m] = [m1, m2, m].map(|m| m * omega * omega);
         let (a, b, k) = (a + k1, b + k2, m + k);
         let determinant = a * b - k * k;
         let [f1, f2] = force;
@@ -420,14 +564,36 @@ impl Oscillator {
     }
 
     /// Whether the walls and the domains behind them are mirror images, so that `(y, t) -> (-y, t + T/2)` maps
-    /// solutions to solutions.
+    /// solutions to solutions. The force must then have odd harmonics only, and stages must recur, mirrored, after half a
+    /// period.
     pub fn mirror_symmetric(&self) -> bool {
-        let mirrored = |domain: &Domain| Domain { load: domain.load.map(|value| -value), ..*domain };
+        let stage = |stage: usize| match stage {
+            0 => Stage { free: self.free, meshing: self.meshing },
+            _ => self.stages[stage - 1],
+        };
+        let is_mirrored = |a: Stage, b: Stage| {
+            a.free == mirrored(&b.free)
+                && (!self.has_motion_behind(Side::Right)
+                    || a.meshing[0] == mirrored(&b.meshing[1]) && b.meshing[0] == mirrored(&a.meshing[1]))
+        };
+        let half = self.schedule.len() / 2;
+        let recurs = |(i, &(begins, index)): (usize, &(f64, usize))| {
+            let (later, mirror) = self.schedule[i + half];
+            (later - begins - 0.5).abs() < SAME_PHASE && is_mirrored(stage(index), stage(mirror))
+        };
         self.walls[0] == -self.walls[1]
             && self.contacts[0] == self.contacts[1]
-            && self.free == mirrored(&self.free)
-            && (!self.has_motion_behind(Side::Right) || self.meshing[0] == mirrored(&self.meshing[1]))
+            && self.harmonics.iter().all(|harmonic| harmonic.order % 2 == 1)
+            && match self.schedule.len() {
+                0 => is_mirrored(stage(0), stage(0)),
+                changes => changes % 2 == 0 && self.schedule.iter().enumerate().take(half).all(recurs),
+            }
     }
+}
+
+/// Returns the mirror image of a domain: the load has the opposite sign.
+fn mirrored(domain: &Domain) -> Domain {
+    Domain { load: domain.load.map(|value| -value), ..*domain }
 }
 
 impl Domain {
@@ -532,10 +698,10 @@ mod tests {
     fn errors_name_the_quantity_and_its_value() {
         let good = GearPair::paper(0.5).oscillator().unwrap();
         assert_eq!(good.validate(), Ok(()));
-        let one_wall = Oscillator { walls: [0.5, f64::NEG_INFINITY], ..good };
+        let one_wall = Oscillator { walls: [0.5, f64::NEG_INFINITY], ..good.clone() };
         assert_eq!(one_wall.validate(), Ok(()));
         let slip = |change: fn(&mut Oscillator)| {
-            let mut oscillator = good;
+            let mut oscillator = good.clone();
             change(&mut oscillator);
             oscillator.validate().unwrap_err().to_string()
         };
@@ -604,7 +770,7 @@ mod tests {
     fn length_scale_of_two_walls_is_half_their_distance() {
         let pair = GearPair::paper(0.5).oscillator().unwrap();
         assert_eq!(pair.length_scale(), 0.5);
-        assert_eq!(Oscillator { walls: [0.7, 0.2], ..pair }.length_scale(), 0.5 * (0.7 - 0.2));
+        assert_eq!(Oscillator { walls: [0.7, 0.2], ..pair.clone() }.length_scale(), 0.5 * (0.7 - 0.2));
     }
 
     /// With `omega = 1` the supports of 30 and 20 on masses of 2 and 1 give `K + omega^2 M` of 32 and 21.
@@ -612,14 +778,14 @@ mod tests {
     fn length_scale_of_one_wall_is_the_largest_of_position_and_deflections() {
         let pair = Oscillator { omega: 1.0, ..GearPair::paper(0.5).oscillator().unwrap() };
         let with = |walls: [f64; 2], force: [f64; 2], load: [f64; 2]| {
-            Oscillator { walls, force, free: Domain { load, ..pair.free }, ..pair }.length_scale()
+            Oscillator { walls, force, free: Domain { load, ..pair.free }, ..pair.clone() }.length_scale()
         };
         let one = [-0.25, f64::NEG_INFINITY];
         assert_eq!(with(one, [0.0; 2], [0.0; 2]), 0.25);
         assert_eq!(with(one, [-16.0, 0.0], [0.0; 2]), 0.5);
         assert_eq!(with(one, [16.0, 0.0], [0.0, 63.0]), 3.0);
         assert_eq!(with([0.0, 0.0], [16.0, 0.0], [0.0; 2]), 0.5);
-        let sine = Oscillator { walls: one, force: [12.0, 0.0], force_sin: [16.0, 0.0], ..pair };
+        let sine = Oscillator { walls: one, force: [12.0, 0.0], force_sin: [16.0, 0.0], ..pair.clone() };
         assert_eq!(sine.length_scale(), 0.625, "the amplitude is 20");
         assert_eq!(with([f64::INFINITY, f64::NEG_INFINITY], [0.0; 2], [0.0; 2]), LEAST_LENGTH);
     }

@@ -44,6 +44,9 @@ impl Stops {
             omega: self.omega,
             force: [self.force, 0.0],
             force_sin: [0.0; 2],
+            harmonics: Vec::new(),
+            stages: Vec::new(),
+            schedule: Vec::new(),
             free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0] },
             meshing: [stop(1.0), stop(-1.0)],
         };

@@ -65,6 +65,9 @@ impl Linear {
             omega: self.omega,
             force: [self.force, 0.0],
             force_sin: [0.0; 2],
+            harmonics: Vec::new(),
+            stages: Vec::new(),
+            schedule: Vec::new(),
             free,
             meshing: [free; 2],
         }

@@ -14,7 +14,7 @@ use rattlemap_dynamics::stability::UNIT;
 type Matrix = [[f64; 2]; 2];
 
 /// An oscillator, its law and a start.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Case {
     oscillator: Oscillator,
     law: Law,
@@ -115,6 +115,9 @@ fn cases() -> impl Strategy<Value = Case> {
                 force_sin,
                 free,
                 meshing: [free; 2],
+                harmonics: Vec::new(),
+                stages: Vec::new(),
+                schedule: Vec::new(),
             };
             let mut start = [y[0], 3.0 * y[1], y[2], 3.0 * y[3]];
             if is_single {
@@ -129,7 +132,7 @@ fn cases() -> impl Strategy<Value = Case> {
                     force_sin: [force_sin[0], 0.0],
                     free,
                     meshing: [free; 2],
-                    ..oscillator
+                    ..oscillator.clone()
                 };
                 start = [y[0], 3.0 * y[1], 0.0, 0.0];
             }
@@ -430,7 +433,7 @@ proptest! {
             force_sin: row(o.force_sin),
             free,
             meshing: [free; 2],
-            ..*o
+            ..o.clone()
         };
         let other = walled(plain, o.walls, o.contacts, case.behind);
         // Rounding may make a singular matrix indefinite.
@@ -464,7 +467,7 @@ proptest! {
         let none = [[0.0; 2]; 2];
         let free = Domain { damping: none, ..o.free };
         let contacts = o.contacts.map(|contact| if contact == Contact::Elastic { contact } else { Contact::Impact });
-        let plain = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], force: [0.0; 2], force_sin: [0.0; 2], free, meshing: [free; 2], ..*o };
+        let plain = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], force: [0.0; 2], force_sin: [0.0; 2], free, meshing: [free; 2], ..o.clone() };
         let behind = case.behind.map(|[k, _]| [k, 0.0]);
         let conservative = walled(plain, o.walls, contacts, behind);
         let flow = Flow::new(&conservative);
@@ -516,6 +519,9 @@ fn forces_with_different_phases_have_the_closed_form_response() {
         force_sin,
         free,
         meshing: [free; 2],
+        harmonics: Vec::new(),
+        stages: Vec::new(),
+        schedule: Vec::new(),
     };
     oscillator.validate().unwrap();
     let entry = |i: usize, j: usize| {

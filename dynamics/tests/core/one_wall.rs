@@ -31,7 +31,7 @@ impl ImpactOscillator {
             stiffness: [[1.0, 0.0], [0.0, 4.0]],
             ..single.free
         };
-        let plain = Oscillator { degrees: 2, free, meshing: [free; 2], ..single };
+        let plain = Oscillator { degrees: 2, free, meshing: [free; 2], ..single.clone() };
         with_wall(plain, Side::Right, self.sigma, Contact::Impact, [1000.0, 1.0])
     }
 
@@ -104,7 +104,7 @@ fn an_oscillator_with_a_left_wall_is_the_mirror_image_of_one_with_a_right_wall()
             force: right.force.map(|x| -x),
             free: mirrored(&right.free),
             meshing: [mirrored(&right.meshing[1]), mirrored(&right.meshing[0])],
-            ..right
+            ..right.clone()
         };
         assert_eq!(left.length_scale(), right.length_scale());
         let (_, [x, v]) = case.orbit();
@@ -125,7 +125,7 @@ fn an_oscillator_with_a_left_wall_is_the_mirror_image_of_one_with_a_right_wall()
 fn a_wall_out_of_reach_does_not_change_the_motion() {
     let case = ImpactOscillator { gamma: 0.05, omega: 1.5, sigma: 5.0, e: 0.8 };
     let near_wall = case.oscillator();
-    let no_wall = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], ..near_wall };
+    let no_wall = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], ..near_wall.clone() };
     let orbits: Vec<Orbit> = [near_wall, no_wall]
         .iter()
         .map(|oscillator| {
@@ -209,7 +209,7 @@ pub(crate) fn in_units(
         force_sin: oscillator.force_sin.map(|f| force * f),
         free: domain(&oscillator.free),
         meshing: [domain(&oscillator.meshing[0]), domain(&oscillator.meshing[1])],
-        ..*oscillator
+        ..oscillator.clone()
     };
     assert_eq!(scaled.length_scale(), length * oscillator.length_scale());
     let [x1, v1, x2, v2] = start;
@@ -246,7 +246,7 @@ fn a_unit_of_length_that_is_a_power_of_two_changes_no_bit() {
     for case in gear_pairs_and_impact_oscillators() {
         let ours = measured(&case);
         for length in [2f64.powi(-20), 2f64.powi(20)] {
-            let (oscillator, law, start) = case;
+            let (oscillator, law, start) = case.clone();
             let mut theirs = measured(&in_units(&oscillator, law, start, length, 1.0));
             theirs.strobe = theirs.strobe.map(|x| x / length);
             assert_eq!(format!("{theirs:?}"), format!("{ours:?}"), "{length:e}: {case:?}");
@@ -261,7 +261,7 @@ fn a_unit_of_time_that_is_a_power_of_two_changes_no_class() {
     for case in gear_pairs_and_impact_oscillators() {
         let ours = measured(&case);
         for rate in [2f64.powi(-20), 2f64.powi(20)] {
-            let (oscillator, law, start) = case;
+            let (oscillator, law, start) = case.clone();
             let theirs = measured(&in_units(&oscillator, law, start, 1.0, rate));
             let say = || format!("{rate:e}: {case:?}\n{ours:?}\n{theirs:?}");
             assert_eq!((theirs.period, theirs.status), (ours.period, ours.status), "{}", say());

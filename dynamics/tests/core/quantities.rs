@@ -145,7 +145,7 @@ fn compliant_and_rigid_contacts_close_the_balance() {
     let rigid = with_wall(table.oscillator(), Side::Right, 0.0, Contact::Rigid, [0.0, 0.0]);
     for (oscillator, law, start) in [
         (elastic, Law::both(0.5, 0.0), REST),
-        (rigid, Law::both(0.0, 0.0), REST),
+        (rigid.clone(), Law::both(0.0, 0.0), REST),
         (rigid, Law::both(0.4, 0.0), REST),
     ] {
         let flow = Flow::new(&oscillator);

@@ -55,7 +55,7 @@ pub(crate) async fn compare_at_sections(
     for early_stop in [settings.early_stop, false] {
         let mut open = Vec::new();
         for batch in runs.chunk_by(|a, b| a.sine == b.sine).flat_map(|alike| alike.chunks(BATCH)) {
-            let flows: Vec<_> = batch.iter().map(|run| run.section.flow.oscillator).collect();
+            let flows: Vec<_> = batch.iter().map(|run| run.section.flow.oscillator.clone()).collect();
             let laws: Vec<_> = batch.iter().map(|run| run.law).collect();
             let lanes = (0..).zip(batch).map(|(i, run)| Lane { flow: i, law: i, start: run.section.start });
             let settings = LaneSettings { sine: batch[0].sine, early_stop, ..*settings };

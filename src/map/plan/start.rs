@@ -87,7 +87,7 @@ mod tests {
             ([f64::INFINITY, 0.25], [0.25, 4.25]),
             ([f64::INFINITY, f64::NEG_INFINITY], [-2.0, 2.0]),
         ] {
-            let oscillator = Oscillator { walls, force: [64.0, 0.0], omega: 1.0, ..pair };
+            let oscillator = Oscillator { walls, force: [64.0, 0.0], omega: 1.0, ..pair.clone() };
             for nth in 1..200 {
                 let y = starts.random(nth, &oscillator);
                 let gap = y[0] - y[2];

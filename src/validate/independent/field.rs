@@ -131,7 +131,7 @@ mod tests {
         let pair = GearPair::paper(0.5).oscillator().unwrap();
         for gap in [[1.0, -1.0], [0.3, 2.0], [0.0, -1.5], [-2.0, 0.5]] {
             let oscillator =
-                Oscillator { mass: [[2.0, 0.7], [0.7, 1.0]], gap, force_sin: [-20.0, 30.0], ..pair };
+                Oscillator { mass: [[2.0, 0.7], [0.7, 1.0]], gap, force_sin: [-20.0, 30.0], ..pair.clone() };
             let coordinates = Coordinates::new(&oscillator);
             let y = [0.3, -1.2, 0.9, 2.1];
             let q = coordinates.gap(&y);

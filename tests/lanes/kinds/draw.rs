@@ -77,8 +77,21 @@ pub(super) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
     };
     let omega = draw.between(0.6, 4.0);
     let force_sin = [0.0; 2];
-    let oscillator =
-        Oscillator { degrees, mass, gap, walls, contacts, omega, force, force_sin, free, meshing };
+    let oscillator = Oscillator {
+        degrees,
+        mass,
+        gap,
+        walls,
+        contacts,
+        omega,
+        force,
+        force_sin,
+        free,
+        meshing,
+        harmonics: Vec::new(),
+        stages: Vec::new(),
+        schedule: Vec::new(),
+    };
     oscillator.validate().expect("a valid oscillator");
     let mut start = [0; 4].map(|_| draw.between(-0.4, 0.4));
     if degrees == 1 {

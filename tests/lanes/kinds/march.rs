@@ -44,7 +44,7 @@ impl March {
         let [[a, b], [c, d]] = oscillator.mass;
         let [x1, v1, x2, v2] = start;
         let mut march = March {
-            oscillator: *oscillator,
+            oscillator: oscillator.clone(),
             law,
             inverse_mass: Matrix2::new(a, b, c, d).try_inverse().unwrap(),
             gap: Vector2::from(oscillator.gap),

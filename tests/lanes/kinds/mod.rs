@@ -31,7 +31,7 @@ fn cells_with_sine() -> Vec<Cell> {
     let with_sine = |(oscillator, law, start): Cell| {
         let size = oscillator.force[0];
         let second = if oscillator.degrees == 1 { 0.0 } else { -0.5 * size };
-        (Oscillator { force_sin: [0.8 * size, second], ..oscillator }, law, start)
+        (Oscillator { force_sin: [0.8 * size, second], ..oscillator.clone() }, law, start)
     };
     cells().into_iter().step_by(2).map(with_sine).collect()
 }
@@ -42,7 +42,7 @@ pub(super) fn run(
     cells: &[Cell],
     settings: &LaneSettings,
 ) -> Result<Vec<Record>, GpuError> {
-    let flows: Vec<_> = cells.iter().map(|cell| cell.0).collect();
+    let flows: Vec<_> = cells.iter().map(|cell| cell.0.clone()).collect();
     let laws: Vec<_> = cells.iter().map(|cell| cell.1).collect();
     let lanes: Vec<_> = (0..).zip(cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.2 }).collect();
     pollster::block_on(open(precision).run(&flows, &laws, &lanes, settings))
@@ -241,7 +241,7 @@ pub(super) fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) 
         force_sin: oscillator.force_sin.map(|force| force * size * rate * rate),
         free: domain(&oscillator.free),
         meshing: oscillator.meshing.each_ref().map(domain),
-        ..*oscillator
+        ..oscillator.clone()
     };
     let law = Law { mesh_speed: law.mesh_speed.map(|speed| speed * size * rate), ..*law };
     let [x1, v1, x2, v2] = *start;
