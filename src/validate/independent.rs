@@ -8,6 +8,8 @@
 pub mod dop853;
 pub mod field;
 pub mod flight;
+#[cfg(test)]
+mod tests;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -127,6 +129,7 @@ impl Strobed<'_> {
             return Some(false);
         }
         phases.extend([0.0, 1.0]);
+        phases.extend(self.flight.change_phases());
         phases.sort_by(f64::total_cmp);
         let longest = phases.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
         let from = 0.5 * (longest[0] + longest[1]) * self.period;

@@ -62,7 +62,7 @@ impl Grid {
             // One whole step, or parts between events.
             while offset < self.h {
                 let (t, rest) = (start + offset, self.h - offset);
-                let (field, y) = (*flight.field(), flight.q);
+                let (field, y) = (flight.field().clone(), flight.q);
                 let after = |tau: f64| {
                     let cos = [t, t + 0.5 * tau, t + tau].map(|t| (self.omega * t).cos());
                     runge_kutta(&field, &y, tau, cos)

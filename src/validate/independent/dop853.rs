@@ -122,26 +122,38 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// Integrates from one time since phase 0 to another; none if the integration fails.
+    /// Integrates from one time since phase 0 to another; none if the integration fails. A change of the stage at `until`
+    /// is made, one at `from` is not.
     pub fn advance(&self, flight: &mut Flight, from: f64, until: f64) -> Option<()> {
         let mut t = from;
+        while let Some((change, stage)) = flight.next_change(t).filter(|(change, _)| *change <= until) {
+            self.advance_in_stage(flight, t, change)?;
+            flight.change_stage(stage, change);
+            t = change;
+        }
+        if t == until && t > from { Some(()) } else { self.advance_in_stage(flight, t, until) }
+    }
+
+    /// Integrates within a stage.
+    fn advance_in_stage(&self, flight: &mut Flight, from: f64, until: f64) -> Option<()> {
+        let mut t = from;
         for _ in 0..ENDINGS {
-            let (found, field, start) = (Cell::new(None), *flight.field(), flight.q);
+            let (found, field, start) = (Cell::new(None), flight.field(), flight.q);
             let mut last = (0.0, start);
             let watch = |x: f64, y: &Gap| {
                 let (begun, q) = std::mem::replace(&mut last, (x, *y));
-                let after = |tau| self.after(&field, q, t + begun, tau).unwrap_or(q);
+                let after = |tau| self.after(field, q, t + begun, tau).unwrap_or(q);
                 let sighting = flight.find_ending(begun == 0.0, &q, t + begun, x - begun, y, after);
                 found.set(sighting.map(|sighting| StepWithEnding { start: begun, y: q, sighting }));
                 sighting.is_some()
             };
-            let end = self.run(&field, start, t, until - t, flight.longest_step(), watch)?;
+            let end = self.run(field, start, t, until - t, flight.longest_step(), watch)?;
             let Some(StepWithEnding { start, y, sighting }) = found.get() else {
                 flight.q = end;
                 flight.leave_wall();
                 return end.iter().all(|x| x.is_finite()).then_some(());
             };
-            let after = |tau| self.after(&field, y, t + start, tau).unwrap_or([f64::NAN; 4]);
+            let after = |tau| self.after(field, y, t + start, tau).unwrap_or([f64::NAN; 4]);
             let tau = flight.locate(start == 0.0, t + start, sighting, after)?;
             flight.q = after(tau);
             t += start + tau;

@@ -1,10 +1,10 @@
 //! Equations of motion in gap coordinates `(z, w, x, v)`: the gap and its rate, and the displacement with the smaller share
 //! of the gap and its velocity.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Complex, Matrix2, Vector2};
 
 use rattlemap_dynamics::flow::{Gap, Phasor};
-use rattlemap_dynamics::model::{Domain, Oscillator, State};
+use rattlemap_dynamics::model::{Domain, Harmonic, Oscillator, State};
 
 /// Conversion between displacements and gap coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -50,13 +50,22 @@ fn inverse(m: [[f64; 2]; 2]) -> Matrix2<f64> {
     Matrix2::new(d, -b, -c, a) / (a * d - b * c)
 }
 
-/// The equations of motion of one domain in gap coordinates, solved for the accelerations.
+/// Factors of cosine and sine of a harmonic of the force in the accelerations of gap and displacement.
 #[derive(Clone, Copy, Debug)]
+struct Drive {
+    order: u32,
+    factors: [[f64; 2]; 2],
+}
+
+/// The equations of motion of one domain in gap coordinates, solved for the accelerations.
+#[derive(Clone, Debug)]
 pub struct Equations {
     /// Coefficients of `(z, w, x, v)` in the accelerations of the gap and of the displacement.
     rows: [[f64; 4]; 2],
     /// Factors of cosine and sine of the forcing's phase.
     force: [[f64; 2]; 2],
+    /// Further harmonics.
+    harmonics: Vec<Drive>,
     load: [f64; 2],
 }
 
@@ -79,9 +88,12 @@ impl Equations {
             |m: [[f64; 2]; 2]| -per_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * from_gap;
         let (k, c) = (matrix(domain.stiffness), matrix(domain.damping));
         let vector = |f: [f64; 2]| (per_mass * Vector2::from(f)).into();
+        let drive =
+            |&Harmonic { order, cos, sin }: &Harmonic| Drive { order, factors: [cos, sin].map(vector) };
         Equations {
             rows: [0, 1].map(|i| [k[(i, 0)], c[(i, 0)], k[(i, 1)], c[(i, 1)]]),
             force: [vector(oscillator.force), vector(oscillator.force_sin)],
+            harmonics: oscillator.harmonics.iter().map(drive).collect(),
             load: vector(domain.load),
         }
     }
@@ -92,25 +104,59 @@ impl Equations {
         let of = |pair: [f64; 2]| [0.0, pair[1] - kick * pair[0]];
         let [gap, kept] = self.rows;
         let row = std::array::from_fn(|j| kept[j] - kick * gap[j]);
-        Equations { rows: [[0.0; 4], row], force: self.force.map(of), load: of(self.load) }
+        let drive = |drive: &Drive| Drive { factors: drive.factors.map(of), ..*drive };
+        Equations {
+            rows: [[0.0; 4], row],
+            force: self.force.map(of),
+            harmonics: self.harmonics.iter().map(drive).collect(),
+            load: of(self.load),
+        }
     }
 
     /// Returns the accelerations of gap and displacement, given the cosine and the sine of the forcing's phase.
     #[inline(always)]
     pub fn accelerations(&self, q: &Gap, [cos, sin]: Phasor) -> [f64; 2] {
         let [by_cos, by_sin] = &self.force;
-        [0, 1].map(|i| {
+        let plain = [0, 1].map(|i| {
             let r = &self.rows[i];
             let drive = by_cos[i] * cos + (self.load[i] + by_sin[i] * sin);
             (r[0] * q[0] + r[1] * q[1]) + (r[2] * q[2] + r[3] * q[3]) + drive
-        })
+        });
+        if self.harmonics.is_empty() { plain } else { self.with_harmonics(plain, [cos, sin], 0.0, 0) }
     }
 
-    /// Returns the rate of the gap's acceleration, given the rates of the state and of the forcing's cosine and sine.
-    pub(super) fn gap_rate(&self, rates: &Gap, [cos, sin]: Phasor) -> f64 {
-        let row = self.rows[0].iter().zip(rates);
-        let [by_cos, by_sin] = &self.force;
-        row.map(|(a, rate)| a * rate).sum::<f64>() + by_cos[0] * cos + by_sin[0] * sin
+    /// Adds the derivative of the given degree of the further harmonics to accelerations.
+    fn with_harmonics(&self, mut sum: [f64; 2], [cos, sin]: Phasor, omega: f64, degree: u32) -> [f64; 2] {
+        for Drive { order, factors: [by_cos, by_sin] } in &self.harmonics {
+            // Each derivative of `exp(i n omega t)` is a factor of `i n omega`.
+            let rate = Complex::new(0.0, f64::from(*order) * omega);
+            let power = Complex::new(cos, sin).powu(*order) * rate.powu(degree);
+            (0..2).for_each(|i| sum[i] += by_cos[i] * power.re + by_sin[i] * power.im);
+        }
+        sum
+    }
+
+    /// Returns the derivatives of first and second degree of the gap's acceleration by these equations, along the motion by
+    /// the equations `along`.
+    pub(super) fn gap_rates(&self, along: &Equations, q: &Gap, phasor: Phasor, omega: f64) -> [f64; 2] {
+        let [cos, sin] = phasor;
+        let change = |field: &Equations, rates: &Gap, [cos, sin]: Phasor, degree: u32| {
+            let [by_cos, by_sin] = &field.force;
+            let plain = [0, 1].map(|i| {
+                let row = field.rows[i].iter().zip(rates);
+                row.map(|(a, rate)| a * rate).sum::<f64>() + by_cos[i] * cos + by_sin[i] * sin
+            });
+            if field.harmonics.is_empty() {
+                plain
+            } else {
+                field.with_harmonics(plain, phasor, omega, degree)
+            }
+        };
+        let [a, b] = along.accelerations(q, phasor);
+        let (rates, turned) = ([q[1], a, q[3], b], [-omega * sin, omega * cos]);
+        let [c, d] = change(along, &rates, turned, 1);
+        let second = change(self, &[a, c, b, d], [-omega * omega * cos, -omega * omega * sin], 2);
+        [change(self, &rates, turned, 1)[0], second[0]]
     }
 
     /// Returns an upper bound of the undamped frequencies.

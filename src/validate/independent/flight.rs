@@ -1,9 +1,11 @@
 //! Flights and contacts for an integrator with time steps: finds where a step meets a wall and applies the contact law.
 //! The equations of motion are in gap coordinates `(z, w, x, v)`, in which a gap can be set exactly to a wall.
 
+use std::sync::Arc;
+
 use super::field::{Coordinates, Equations};
 use rattlemap_dynamics::flow::{Gap, Phasor};
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, Stage, State};
 use rattlemap_dynamics::reference::EventKind;
 
 /// Largest number of iterations of a root search.
@@ -86,8 +88,15 @@ pub struct Flight {
     omega: f64,
     law: Law,
     coordinates: Coordinates,
-    /// Equations of free motion, and of lasting contact with the right and the left wall.
-    fields: [Equations; 3],
+    /// For each stage, the equations of free motion, and of lasting contact with the right and the left wall.
+    fields: Arc<[[Equations; 3]]>,
+    /// The present stage.
+    stage: usize,
+    /// Changes of the stage: phase in turns, and the stage that begins there.
+    schedule: Arc<[(f64, usize)]>,
+    period: f64,
+    /// Largest of the angular frequencies of the force.
+    fastest: f64,
     mode: Mode,
     /// The ending at which the present motion starts, and the order of that root.
     from: Option<(Ending, u32)>,
@@ -102,24 +111,39 @@ impl Flight {
     /// wall.
     pub fn new(oscillator: &Oscillator, law: Law, start: State) -> Flight {
         let coordinates = Coordinates::new(oscillator);
-        let free = Equations::new(oscillator, &oscillator.free);
-        let behind = |side: Side| match oscillator.contacts[side.index()] {
-            _ if oscillator.walls[side.index()].is_infinite() => free,
-            Contact::Rigid => free.held(&coordinates),
-            _ => Equations::new(oscillator, &oscillator.meshing[side.index()]),
+        let fields_of = |Stage { free, meshing }: Stage| {
+            let free = Equations::new(oscillator, &free);
+            let behind = |side: Side| match oscillator.contacts[side.index()] {
+                _ if oscillator.walls[side.index()].is_infinite() => free.clone(),
+                Contact::Rigid => free.held(&coordinates),
+                _ => Equations::new(oscillator, &meshing[side.index()]),
+            };
+            let [right, left] = Side::BOTH.map(behind);
+            [free, right, left]
         };
+        let first = Stage { free: oscillator.free, meshing: oscillator.meshing };
+        let stages = std::iter::once(first).chain(oscillator.stages.iter().copied());
+        let highest = oscillator.harmonics.iter().map(|harmonic| harmonic.order).fold(1, u32::max);
         let mut flight = Flight {
             walls: oscillator.walls,
             contacts: oscillator.contacts,
             omega: oscillator.omega,
             law,
             coordinates,
-            fields: [free, behind(Side::Right), behind(Side::Left)],
+            fields: stages.map(fields_of).collect(),
+            stage: 0,
+            schedule: oscillator.schedule.as_slice().into(),
+            period: oscillator.period(),
+            fastest: f64::from(highest) * oscillator.omega,
             mode: Mode::Free,
             from: None,
             q: coordinates.gap(&start),
             events: Vec::new(),
         };
+        // The stage that begins at phase 0 holds there, otherwise the last one.
+        let begun =
+            flight.schedule.iter().filter(|(phase, _)| *phase == 0.0).chain(flight.schedule.last()).next();
+        flight.stage = begun.map_or(0, |&(_, stage)| stage);
         let beyond = |side: &Side| flight.beyond(*side, &flight.q) > 0.0;
         if let Some(side) = Side::BOTH.into_iter().find(beyond) {
             match flight.is_rigid(side) {
@@ -160,7 +184,7 @@ impl Flight {
     #[inline]
     pub fn field(&self) -> &Equations {
         match self.meshing() {
-            None => &self.fields[0],
+            None => self.free_field(),
             Some(side) => self.meshing_field(side),
         }
     }
@@ -169,8 +193,41 @@ impl Flight {
     /// onset.
     pub fn longest_step(&self) -> f64 {
         let field =
-            if let Mode::Onset(side) = self.mode { self.meshing_field(side) } else { &self.fields[0] };
-        field.rate().max(self.omega).recip()
+            if let Mode::Onset(side) = self.mode { self.meshing_field(side) } else { self.free_field() };
+        field.rate().max(self.fastest).recip()
+    }
+
+    /// Returns the phases in turns at which the stage changes.
+    pub fn change_phases(&self) -> impl Iterator<Item = f64> + '_ {
+        self.schedule.iter().map(|&(phase, _)| phase)
+    }
+
+    /// Returns the time of the first change of the stage after `t`, a time since phase 0 of some period, and the stage that
+    /// begins there.
+    pub fn next_change(&self, t: f64) -> Option<(f64, usize)> {
+        let periods = (t / self.period).floor().max(0.0);
+        let of_period =
+            |n: f64| self.schedule.iter().map(move |&(phase, stage)| ((n + phase) * self.period, stage));
+        // Rounding may put `t` at a whole period into the period before.
+        [0.0, 1.0, 2.0].into_iter().flat_map(|n| of_period(periods + n)).find(|(at, _)| *at > t)
+    }
+
+    /// Changes the stage at the present state. What depends on the forces is decided again: whether a gap stays at rest on a
+    /// rigid wall, and whether a contact onset goes on.
+    pub fn change_stage(&mut self, stage: usize, t: f64) {
+        self.stage = stage;
+        // The phase of a whole period is 0 without rounding.
+        let exact = t % self.period;
+        match self.mode {
+            Mode::Stuck(side) if !self.presses(self.free_field(), side, &self.q, exact) => {
+                self.leave(side, exact);
+                self.record(t, EventKind::MeshEnd, side);
+            }
+            Mode::Onset(side) if self.pressing(self.meshing_field(side), side, &self.q, exact) <= 0.0 => {
+                self.act(Ending::PressingEnds(side), t, false);
+            }
+            _ => {}
+        }
     }
 
     /// Records that the next step does not start on a wall.
@@ -179,8 +236,12 @@ impl Flight {
         self.from = None;
     }
 
+    fn free_field(&self) -> &Equations {
+        &self.fields[self.stage][0]
+    }
+
     fn meshing_field(&self, side: Side) -> &Equations {
-        &self.fields[if side == Side::Right { 1 } else { 2 }]
+        &self.fields[self.stage][if side == Side::Right { 1 } else { 2 }]
     }
 
     fn wall(&self, side: Side) -> f64 {
@@ -206,14 +267,14 @@ impl Flight {
     /// Whether the equations of a domain press a gap at rest into a wall. The first derivative that is not zero decides.
     fn presses(&self, field: &Equations, side: Side, q: &Gap, t: f64) -> bool {
         let pressing = self.pressing(field, side, q, t);
-        pressing > 0.0 || pressing == 0.0 && self.pressing_rate(field, field, side, q, t) > 0.0
+        let rates = || field.gap_rates(field, q, self.phasor(t), self.omega).map(|rate| side.sign() * rate);
+        pressing > 0.0
+            || pressing == 0.0 && rates().into_iter().find(|rate| *rate != 0.0).is_some_and(|rate| rate > 0.0)
     }
 
     /// Returns the rate of the acceleration into a wall by the equations `of`, along the motion by the equations `along`.
     fn pressing_rate(&self, of: &Equations, along: &Equations, side: Side, q: &Gap, t: f64) -> f64 {
-        let [cos, sin] = self.phasor(t);
-        let [a, b] = along.accelerations(q, [cos, sin]);
-        side.sign() * of.gap_rate(&[q[1], a, q[3], b], [-self.omega * sin, self.omega * cos])
+        side.sign() * of.gap_rates(along, q, self.phasor(t), self.omega)[0]
     }
 
     /// Lists the endings that are possible now. The list may repeat one.
@@ -239,7 +300,7 @@ impl Flight {
             Ending::MeshEnds(side) => (self.beyond(side, q), rate(side)),
             Ending::PressingEnds(side) => (self.pressing(self.field(), side, q, t), 0.0),
             Ending::PulledOff(side) => {
-                let free = &self.fields[0];
+                let free = self.free_field();
                 (self.pressing(free, side, q, t), self.pressing_rate(free, self.field(), side, q, t))
             }
         }
@@ -394,6 +455,9 @@ impl Flight {
                 self.record(t, EventKind::MeshEnd, side.mirrored());
                 self.contact(side, t, false);
             }
+            Ending::PulledOff(side) if settling && self.presses(self.free_field(), side, &self.q, t) => {
+                self.from = Some((ending, 1));
+            }
             Ending::PulledOff(side) => {
                 self.mode = Mode::Free;
                 self.from = Some((Ending::Contact(side), 3));
@@ -406,7 +470,8 @@ impl Flight {
     fn contact(&mut self, side: Side, t: f64, settling: bool) {
         self.put_on_wall(side);
         let closing = side.sign() * self.q[1];
-        if settling && (closing < 0.0 || closing == 0.0 && !self.presses(&self.fields[0], side, &self.q, t)) {
+        if settling && (closing < 0.0 || closing == 0.0 && !self.presses(self.free_field(), side, &self.q, t))
+        {
             self.leave(side, t);
         } else if self.contacts[side.index()] == Contact::Elastic {
             // The motion continues without a jump.
@@ -429,12 +494,12 @@ impl Flight {
         };
         let (after, at_rest) = (kicked(e), kicked(0.0));
         let presses = |q: &Gap| {
-            self.presses(&self.fields[0], side, q, t)
+            self.presses(self.free_field(), side, q, t)
                 && (self.is_rigid(side) || self.presses(self.meshing_field(side), side, q, t))
         };
         let is_slow = leaving <= self.law.mesh_speed[side.index()];
         let is_series_over = !is_slow && e < 1.0 && self.law.mesh_speed[side.index()] == 0.0 && {
-            let pressing = self.pressing(&self.fields[0], side, &at_rest, t);
+            let pressing = self.pressing(self.free_field(), side, &at_rest, t);
             let is_pressed = pressing > 0.0 && presses(&at_rest);
             is_pressed && 2.0 * leaving < SERIES_ENDS * (1.0 - e) * pressing * self.longest_step()
         };
@@ -462,7 +527,7 @@ impl Flight {
         self.mode = Mode::Free;
         let order = match self.q[1] == 0.0 {
             false => 1,
-            true if self.pressing(&self.fields[0], side, &self.q, t) != 0.0 => 2,
+            true if self.pressing(self.free_field(), side, &self.q, t) != 0.0 => 2,
             true => 3,
         };
         self.from = Some((Ending::Contact(side), order));
