@@ -1,0 +1,202 @@
+//! Random models with harmonics and stages.
+
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, Side, Stage, State};
+
+use crate::common::linear::with_wall;
+
+/// A reproducible sequence of numbers: SplitMix64.
+pub(crate) struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn chance(&mut self, share: f64) -> bool {
+        self.unit() < share
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    fn even(&mut self, reach: f64) -> f64 {
+        self.between(-reach, reach)
+    }
+
+    fn logarithmic(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.unit())
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.unit() * count as f64) as usize
+    }
+}
+
+/// What a random model has beside a plain one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    pub(crate) harmonics: bool,
+    pub(crate) stages: bool,
+    /// Wide ranges: any signs of damping and stiffness, skew damping, very large and very small rates.
+    pub(crate) wide: bool,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    pub(crate) oscillator: Oscillator,
+    pub(crate) law: Law,
+    /// Between the walls.
+    pub(crate) start: State,
+}
+
+type Matrix = [[f64; 2]; 2];
+
+/// Returns a symmetric matrix with this diagonal, positive if the diagonal is.
+fn symmetric(random: &mut Random, [a, b]: [f64; 2]) -> Matrix {
+    let coupling = if random.chance(0.5) { random.even(0.7) * (a * b).abs().sqrt() } else { 0.0 };
+    [[a, coupling], [coupling, b]]
+}
+
+fn times(m: Matrix, factor: f64) -> Matrix {
+    m.map(|row| row.map(|x| factor * x))
+}
+
+/// Returns the model of a seed.
+pub(crate) fn case(seed: u64, shape: Shape) -> Case {
+    let random = &mut Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
+    let is_single = random.chance(0.5);
+    let rates = if shape.wide { random.logarithmic(0.03, 30.0) } else { 1.0 };
+    let masses = [random.logarithmic(0.5, 2.0), random.logarithmic(0.5, 2.0)];
+    let stiff = [0, 1].map(|i| masses[i] * random.logarithmic(1.0, 40.0) * rates * rates);
+    let ratio = [random.logarithmic(0.04, 0.4), random.logarithmic(0.04, 0.4)];
+    let damp = [0, 1].map(|i| 2.0 * ratio[i] * (masses[i] * stiff[i]).sqrt());
+    let mass = symmetric(random, masses);
+    let (mut stiffness, mut damping) = (symmetric(random, stiff), symmetric(random, damp));
+    if shape.wide {
+        if random.chance(0.2) {
+            damping = times(damping, -random.logarithmic(1e-3, 1.0));
+        } else if random.chance(0.2) {
+            damping = times(damping, random.logarithmic(1.0, 30.0));
+        }
+        if random.chance(0.2) {
+            stiffness[0][0] *= -random.logarithmic(0.01, 1.0);
+        }
+        if random.chance(0.3) {
+            let skew = random.even(2.0 * damp[0]);
+            (damping[0][1], damping[1][0]) = (damping[0][1] + skew, damping[1][0] - skew);
+        }
+    }
+    let omega = random.logarithmic(0.8, 5.0) * if shape.wide { random.logarithmic(0.01, 10.0) } else { 1.0 };
+    let gap = match random.below(3) {
+        0 => [1.0, -1.0],
+        1 if !is_single => [0.0, random.between(1.0, 2.0)],
+        _ => [random.between(1.0, 2.0), random.even(2.0)],
+    };
+    let none = [0.0; 2];
+    let pair = |random: &mut Random, reach: f64| [random.even(reach), random.even(reach)];
+    let load = if random.chance(0.4) { none } else { pair(random, 6.0) };
+    let free = Domain { damping, stiffness, load };
+    let contact = |random: &mut Random| [Contact::Impact, Contact::Rigid, Contact::Elastic][random.below(3)];
+    let behind = |random: &mut Random| {
+        let k = random.logarithmic(20.0, if shape.wide { 1e5 } else { 1e3 });
+        [k, if random.chance(0.3) { 0.0 } else { random.logarithmic(0.1, 5.0) }]
+    };
+    let [right, left] = [random.between(0.05, 0.8), -random.between(0.05, 0.8)];
+    let walls = match random.below(4) {
+        0 => [right, f64::NEG_INFINITY],
+        1 => [f64::INFINITY, left],
+        _ => [right, left],
+    };
+    let mut oscillator = Oscillator {
+        degrees: 2,
+        mass,
+        gap,
+        walls,
+        contacts: [contact(random), contact(random)],
+        omega,
+        force: pair(random, 10.0),
+        force_sin: if random.chance(0.5) { none } else { pair(random, 10.0) },
+        free,
+        meshing: [free; 2],
+        harmonics: Vec::new(),
+        stages: Vec::new(),
+        schedule: Vec::new(),
+    };
+    if shape.harmonics {
+        let count = 1 + random.below(4);
+        let highest = if random.chance(0.1) { 24 } else { 8 };
+        let mut orders: Vec<u32> = (0..count).map(|_| 2 + random.below(highest - 1) as u32).collect();
+        orders.sort_unstable();
+        orders.dedup();
+        let harmonic = |random: &mut Random, order| {
+            let (cos, sin) = (pair(random, 8.0), pair(random, 8.0));
+            Harmonic { order, cos, sin: if random.chance(0.3) { none } else { sin } }
+        };
+        oscillator.harmonics = orders.into_iter().map(|order| harmonic(random, order)).collect();
+    }
+    if is_single {
+        single(&mut oscillator);
+    }
+    let first = [behind(random), behind(random)];
+    let plain = oscillator.clone();
+    let walled = |free: Domain, behind: [[f64; 2]; 2]| {
+        let of_stage = Oscillator { free, meshing: [free; 2], ..plain.clone() };
+        Side::BOTH.into_iter().filter(|side| walls[side.index()].is_finite()).fold(of_stage, |o, side| {
+            with_wall(o, side, walls[side.index()], plain.contacts[side.index()], behind[side.index()])
+        })
+    };
+    oscillator = walled(oscillator.free, first);
+    if shape.stages {
+        for _ in 0..1 + random.below(3) {
+            let factors = [random.logarithmic(0.5, 2.0), random.logarithmic(0.6, 2.5)];
+            let moved = if random.chance(0.3) { none } else { pair(random, 15.0) };
+            let Domain { damping, stiffness, load } = oscillator.free;
+            let load = [load[0] + moved[0], if is_single { 0.0 } else { load[1] + moved[1] }];
+            let (damping, stiffness) = (times(damping, factors[1]), times(stiffness, factors[0]));
+            let stage = walled(
+                Domain { damping, stiffness, load },
+                first.map(|[k, c]| [k * factors[1], c * factors[0]]),
+            );
+            oscillator.stages.push(Stage { free: stage.free, meshing: stage.meshing });
+        }
+        let mut phases: Vec<f64> = (0..2 + random.below(4)).map(|_| random.unit()).collect();
+        if random.chance(0.4) {
+            phases[0] = 0.0;
+        }
+        phases.sort_by(f64::total_cmp);
+        let count = oscillator.stage_count();
+        oscillator.schedule = phases.iter().enumerate().map(|(i, &phase)| (phase, (i + 1) % count)).collect();
+    }
+    oscillator.validate().unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
+    let restitution = [0; 2].map(|_| if random.chance(0.25) { 0.0 } else { random.between(0.0, 0.9) });
+    // Without a mesh speed, impacts can be infinitely many.
+    let mesh_speed =
+        restitution.map(|e| if e == 0.0 && random.chance(0.3) { 0.0 } else { random.logarithmic(0.01, 2.0) });
+    // The gap is half of the nearer wall.
+    let inside = 0.5 * if walls[0].is_finite() { walls[0] } else { walls[1] };
+    let mut start = [0.0, random.even(1.0), 0.0, random.even(1.0)];
+    let other = oscillator.other();
+    start[2 * (1 - other)] = inside / oscillator.gap[1 - other];
+    if is_single {
+        start[3] = 0.0;
+    }
+    Case { oscillator, law: Law { restitution, mesh_speed }, start }
+}
+
+/// Removes the second coordinate.
+fn single(o: &mut Oscillator) {
+    let first = |m: Matrix| [[m[0][0], 0.0], [0.0, 0.0]];
+    let Domain { damping, stiffness, load } = o.free;
+    o.degrees = 1;
+    o.mass = [[o.mass[0][0], 0.0], [0.0, 1.0]];
+    o.gap[1] = 0.0;
+    o.free = Domain { damping: first(damping), stiffness: first(stiffness), load: [load[0], 0.0] };
+    (o.force[1], o.force_sin[1]) = (0.0, 0.0);
+    for harmonic in &mut o.harmonics {
+        (harmonic.cos[1], harmonic.sin[1]) = (0.0, 0.0);
+    }
+}

@@ -1,0 +1,54 @@
+//! Compares the judge with an integrator by matrix exponentials, on random models with harmonics and stages.
+
+use rayon::prelude::*;
+
+use crate::motion::{Mode, Motion, System, What};
+use crate::random::{Shape, case};
+use rattlemap::validate::independent::dop853::Solver;
+use rattlemap::validate::independent::flight::Flight;
+use rattlemap_dynamics::reference::EventKind;
+
+/// Forcing periods of a comparison.
+const PERIODS: usize = 3;
+
+/// Largest difference of states, relative to the size of the motion and the growth of tangents.
+const AGREEMENT: f64 = 1e-9;
+
+#[test]
+fn the_judge_agrees_with_matrix_exponentials() {
+    let shapes = [(true, false), (false, true), (true, true)];
+    let cases = (0..300u64).map(|seed| (seed, shapes[seed as usize % 3]));
+    let off: Vec<(u64, f64, bool, [usize; 2])> = cases
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .filter_map(|(seed, (harmonics, stages))| {
+            let case = case(seed, Shape { harmonics, stages, wide: false });
+            let (oscillator, system) = (&case.oscillator, System::new(&case.oscillator));
+            let mut ours = Motion::new(&system, case.law, case.start, Mode::Free);
+            let mut judge = Flight::new(oscillator, case.law, case.start);
+            ours.carry_tangents();
+            let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
+            for _ in 0..PERIODS {
+                ours.advance_period()?;
+                solver.advance(&mut judge, 0.0, oscillator.period())?;
+            }
+            let theirs = judge.events.iter().map(|ended| match ended.kind {
+                EventKind::Impact => (What::Impact, ended.side),
+                EventKind::MeshStart => (What::Begins, ended.side),
+                EventKind::MeshEnd => (What::Ends, ended.side),
+            });
+            let same = theirs.eq(ours.events.iter().copied());
+            let (a, b) = (ours.state(), judge.state());
+            let size = a.iter().fold(0.0f64, |size, x| size.max(x.abs()));
+            let off = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size;
+            // Rounding errors grow as tangents do.
+            let growth = ours.tangents?.amax().max(1.0);
+            Some((seed, off / growth, same, ours.by_stage))
+        })
+        .collect();
+    let differ: Vec<_> = off.iter().filter(|(_, off, same, _)| !same || *off >= AGREEMENT).collect();
+    // Changes of the stage release gaps at rest and end contact onsets.
+    let by_stage = [0, 1].map(|i| off.iter().map(|(.., by_stage)| by_stage[i]).sum::<usize>());
+    assert!(by_stage[0] > 10 && by_stage[1] > 0, "{by_stage:?}");
+    assert!(off.len() > 290 && differ.is_empty(), "{} {differ:?}", off.len());
+}
