@@ -43,6 +43,7 @@ mod expansion;
 mod gap_polynomial;
 mod generator;
 mod linear;
+mod row;
 mod short_flight;
 mod taylor;
 
@@ -51,6 +52,7 @@ use nalgebra::Matrix2;
 pub(crate) use expansion::{EXPANSION_REACH, Expansion, TERMS, turned};
 pub use linear::LinearFlow;
 pub(crate) use linear::Step;
+pub(crate) use row::Row;
 pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 
@@ -111,6 +113,9 @@ pub struct Flow {
     non_impacting: Option<NonImpacting>,
     free: LinearFlow,
     meshing: [LinearFlow; 2],
+    /// Flows of the further stages, and the changes of the stage: time since phase 0, and the stage that begins there.
+    stages: Vec<Flow>,
+    schedule: Vec<(f64, usize)>,
 }
 
 impl Flow {
@@ -135,6 +140,26 @@ impl Flow {
 
     /// Computes the flow of an oscillator that [`Oscillator::validate`] accepts.
     pub fn new(oscillator: &Oscillator) -> Flow {
+        let mut flow = Flow::in_one_stage(oscillator);
+        if oscillator.schedule.is_empty() {
+            return flow;
+        }
+        flow.schedule =
+            oscillator.schedule.iter().map(|&(turns, stage)| (turns * flow.period, stage)).collect();
+        flow.stages =
+            (1..oscillator.stage_count()).map(|i| Flow::in_one_stage(&oscillator.in_stage(i))).collect();
+        // Units are the same in all stages.
+        let speed =
+            flow.stages.iter().map(|stage| stage.free.rate).fold(flow.free.rate, f64::max) * flow.length;
+        flow.speed = speed;
+        for stage in &mut flow.stages {
+            (stage.length, stage.speed, stage.escape) = (flow.length, speed, flow.escape);
+        }
+        flow
+    }
+
+    /// Computes the flow of the first stage.
+    fn in_one_stage(oscillator: &Oscillator) -> Flow {
         let other = oscillator.other();
         let free = LinearFlow::new(oscillator, &oscillator.free);
         let compliance = oscillator.mobility(oscillator.gap);
@@ -185,7 +210,14 @@ impl Flow {
                 .or_else(|| NonImpacting::with_one_at_rest(oscillator)),
             free,
             meshing,
+            stages: Vec::new(),
+            schedule: Vec::new(),
         }
+    }
+
+    /// Returns the flow of a stage.
+    fn stage(&self, stage: usize) -> &Flow {
+        if stage == 0 { self } else { &self.stages[stage - 1] }
     }
 
     /// Returns the flow whose phase 0 is this phase of the forcing, in turns.
@@ -196,7 +228,8 @@ impl Flow {
     /// Returns the memory that the flow occupies, in bytes.
     pub fn bytes(&self) -> usize {
         let domains = [&self.free, &self.meshing[0], &self.meshing[1]];
-        size_of::<Flow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>()
+        let of_stages = self.stages.iter().map(Flow::bytes).sum::<usize>();
+        size_of::<Flow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>() + of_stages
     }
 
     /// Whether `(y, t) -> (-y, t + T/2)` maps solutions to solutions: both walls and their laws are alike.
@@ -210,7 +243,7 @@ impl Flow {
         self.non_impacting.as_ref()
     }
 
-    /// Returns the linear flow of one domain.
+    /// Returns the linear flow of one domain in the first stage.
     #[inline]
     pub fn domain(&self, kind: DomainKind) -> &LinearFlow {
         match kind {
@@ -286,12 +319,60 @@ impl Flow {
         g0 * (m2 * y[3] + m * y[1]) - g1 * (m1 * y[1] + m * y[3])
     }
 
-    /// Returns the state after a time `tau >= 0` in one domain, starting at forcing phase `phase` in radians. Walls
-    /// are ignored.
+    /// Returns the state after a time `tau >= 0` in one domain of the first stage, starting at forcing phase `phase` in
+    /// radians. Walls are ignored.
     pub fn propagate(&self, kind: DomainKind, y: State, phase: f64, tau: f64) -> State {
         let (sin, cos) = phase.sin_cos();
         let q = self.domain(kind).propagate(self.to_gap(y), [cos, sin], tau);
         self.to_state(q)
+    }
+}
+
+/// The stage of a motion, from its changes in a forcing period.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Staged<'f> {
+    whole: &'f Flow,
+    /// Index of the next change in the schedule.
+    next: usize,
+    /// The flow of the present stage.
+    pub(crate) flow: &'f Flow,
+}
+
+impl<'f> Staged<'f> {
+    /// Begins at phase 0.
+    pub(crate) fn new(whole: &'f Flow) -> Staged<'f> {
+        let mut staged = Staged { whole, next: 0, flow: whole };
+        staged.restart();
+        staged
+    }
+
+    /// Returns the flow of all stages.
+    #[inline]
+    pub(crate) fn whole(&self) -> &'f Flow {
+        self.whole
+    }
+
+    /// Returns to phase 0.
+    #[inline]
+    pub(crate) fn restart(&mut self) {
+        let schedule = &self.whole.schedule;
+        let Some(&(_, last)) = schedule.last() else { return };
+        (self.next, self.flow) = (0, self.whole.stage(last));
+        if schedule[0].0 == 0.0 {
+            self.change();
+        }
+    }
+
+    /// Returns the time of the next change since phase 0, if one is left in this period.
+    #[inline]
+    pub(crate) fn next_change(&self) -> Option<f64> {
+        self.whole.schedule.get(self.next).map(|&(time, _)| time)
+    }
+
+    /// Enters the next stage.
+    pub(crate) fn change(&mut self) {
+        self.flow = self.whole.stage(self.whole.schedule[self.next].1);
+        self.next += 1;
     }
 }
 
@@ -304,4 +385,15 @@ fn power_of_two(x: f64) -> f64 {
 fn displacement_matrix(oscillator: &Oscillator) -> Matrix2<f64> {
     let second = oscillator.other() as f64;
     Matrix2::new(oscillator.gap[0], oscillator.gap[1], 1.0 - second, second)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use crate::model::Harmonic;
+
+    /// Returns harmonics of order 2 and 5.
+    pub(crate) fn two_harmonics() -> Vec<Harmonic> {
+        let second = Harmonic { order: 2, cos: [7.0, -3.0], sin: [2.0, 1.0] };
+        vec![second, Harmonic { order: 5, cos: [0.5, 2.0], sin: [-4.0, 0.3] }]
+    }
 }

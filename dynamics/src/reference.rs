@@ -22,6 +22,7 @@ mod elastic;
 mod event;
 mod localisation;
 mod short_flight;
+mod stages;
 mod start;
 mod step_verdict;
 mod sticking;
@@ -35,7 +36,7 @@ pub use event::{EVENTS_PER_PERIOD_CAP, EventKind, GapEvent, Observer, STEPS_PER_
 use step_verdict::{Crossing, StepVerdict};
 pub use tangent::NO_SPEED;
 
-use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Step};
+use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Staged, Step};
 use crate::model::{Law, Side, State};
 
 /// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
@@ -78,7 +79,9 @@ impl Mode {
 /// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix.
 #[derive(Clone, Debug)]
 pub struct Trajectory<'f, const N: usize = 0> {
+    /// The flow of the present stage.
     flow: &'f Flow,
+    staged: Staged<'f>,
     law: Law,
     mode: Mode,
     /// The wall of the last event, which determines the next symbol together with the wall of the next event.
@@ -121,7 +124,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     /// Returns the flow.
     pub fn flow(&self) -> &'f Flow {
-        self.flow
+        self.staged.whole()
     }
 
     /// Returns the present state.
@@ -210,6 +213,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.period += 1;
         self.events_in_period = 0;
         self.steps_in_period = 0;
+        self.begin_stages(observer);
         Ok(())
     }
 
@@ -221,14 +225,20 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if self.allowance.is_halted() {
             return Err(Stop::TooStiff);
         }
-        self.goal = until;
-        if let Some(side) = self.pending.take() {
-            self.contact(side, observer);
+        loop {
+            let change = self.staged.next_change().filter(|&time| time <= until);
+            self.goal = change.unwrap_or(until);
+            if let Some(side) = self.pending.take() {
+                self.contact(side, observer);
+            }
+            while self.clock.time() < self.goal {
+                self.step(self.goal, observer)?;
+            }
+            if change.is_none() {
+                return self.check_finite();
+            }
+            self.change_stage(observer);
         }
-        while self.clock.time() < until {
-            self.step(until, observer)?;
-        }
-        self.check_finite()
     }
 
     fn check_finite(&self) -> Result<(), Stop> {

@@ -26,6 +26,7 @@ use nalgebra::Matrix4;
 use super::columns::Columns;
 use super::energy::EnergyBound;
 use super::generator::{Generator, generator};
+use super::row::Row;
 use crate::model::{Oscillator, is_semidefinite};
 
 /// The motion of an oscillator whose gap rests on a rigid wall.
@@ -33,15 +34,15 @@ pub(super) struct ConstrainedMotion {
     pub(super) generator: Generator,
     /// Bound on all rates.
     pub(super) rate: f64,
-    /// A matrix whose first row is that of `p` on `a`.
-    pub(super) pressing: Generator,
-    omega: f64,
+    /// The row of `p`.
+    pub(super) pressing: Row,
     mass: f64,
     /// Modulus of `k`.
     stiffness: f64,
     /// Bound on the rate at which the root of the energy grows without a force.
     growth_rate: f64,
-    force: f64,
+    /// Sum of `(n omega)^5 f_n` over the harmonics.
+    fifth_of_force: f64,
     reach: f64,
     /// Bound on the part of `p^(6)` that the forcing contributes directly.
     forced: f64,
@@ -51,13 +52,16 @@ impl ConstrainedMotion {
     /// Derives the motion; `kick` is the change of `v` per unit of approach speed that the wall removes.
     pub(super) fn new(oscillator: &Oscillator, kick: f64) -> ConstrainedMotion {
         let free = generator(oscillator, &oscillator.free);
-        let mut generator = free;
-        let mut pressing = Generator::zeros();
+        let pressing = free.row(1);
+        let mut generator = free.clone();
         for j in 0..7 {
-            pressing[(0, j)] = free[(1, j)];
-            generator[(0, j)] = 0.0;
-            generator[(1, j)] = 0.0;
-            generator[(3, j)] += kick * free[(1, j)];
+            generator.matrix[(0, j)] = 0.0;
+            generator.matrix[(1, j)] = 0.0;
+            generator.matrix[(3, j)] += kick * free.matrix[(1, j)];
+        }
+        for wave in &mut generator.waves {
+            wave.other = [0, 1].map(|i| wave.other[i] + kick * wave.gap[i]);
+            wave.gap = [0.0; 2];
         }
         let (omega, other) = (oscillator.omega, oscillator.other());
         let mut along = [1.0; 2];
@@ -72,21 +76,32 @@ impl ConstrainedMotion {
             let value = square(m);
             if is_semidefinite(m) { value.max(0.0) } else { value }
         });
-        let [cos, sin] = [oscillator.force, oscillator.force_sin].map(|f| along[0] * f[0] + along[1] * f[1]);
-        let force = cos.hypot(sin);
-        let [a_x, a_v, a_cos, a_sin] = [2, 3, 4, 5].map(|j| free[(1, j)]);
+        let [a_x, a_v, a_cos, a_sin] = [2, 3, 4, 5].map(|j| free.matrix[(1, j)]);
+        let force = |cos: [f64; 2], sin: [f64; 2]| {
+            let [cos, sin] = [cos, sin].map(|f| along[0] * f[0] + along[1] * f[1]);
+            cos.hypot(sin)
+        };
+        let first = force(oscillator.force, oscillator.force_sin);
+        let mut fifth_of_force = omega.powi(5) * first;
+        let mut forced = a_cos.hypot(a_sin) * omega.powi(6) + (a_v * first / mass).abs() * omega.powi(5);
+        for (wave, harmonic) in free.waves.iter().zip(&oscillator.harmonics) {
+            let rate = omega * f64::from(wave.order);
+            let fifth = rate.powi(5) * force(harmonic.cos, harmonic.sin);
+            fifth_of_force += fifth;
+            forced += wave.gap[0].hypot(wave.gap[1]) * rate.powi(6) + (a_v / mass).abs() * fifth;
+        }
         ConstrainedMotion {
             generator,
-            rate: ((damping / mass).abs() + (stiffness / mass).abs().sqrt()).max(omega),
+            rate: ((damping / mass).abs() + (stiffness / mass).abs().sqrt())
+                .max(omega * f64::from(oscillator.highest_order())),
             pressing,
-            omega,
             mass,
             stiffness: stiffness.abs(),
             growth_rate: (-damping / mass).max(0.0) + (-stiffness / mass).max(0.0).sqrt(),
-            force,
+            fifth_of_force,
             reach: (a_x - a_v * damping / mass).abs() / mass.sqrt()
                 + a_v.abs() * stiffness.abs().sqrt() / mass,
-            forced: a_cos.hypot(a_sin) * omega.powi(6) + (a_v * force / mass).abs() * omega.powi(5),
+            forced,
         }
     }
 
@@ -100,7 +115,7 @@ impl ConstrainedMotion {
         root[(0, 2)] = energy * self.stiffness.sqrt();
         root[(1, 3)] = energy * self.mass.sqrt();
         let columns = fifth.weighted(&root).plus_constant(2, weight * self.forced);
-        let growth = scale * self.reach * self.omega.powi(5) * self.force / self.mass.sqrt() * unit;
+        let growth = scale * self.reach * self.fifth_of_force / self.mass.sqrt() * unit;
         EnergyBound::of(columns, growth, self.growth_rate * unit)
     }
 }
@@ -122,7 +137,9 @@ mod tests {
         let single = Oscillator { gap: [1.0, 0.0], force: [5.0, 0.0], ..pair.clone() };
         let sine = Oscillator { force: [0.0; 2], force_sin: [20.0, -40.0], ..full.clone() };
         let mut largest = 0.0f64;
-        for oscillator in [pair, full, single, sine] {
+        let mut harmonics = full.clone();
+        harmonics.harmonics = crate::flow::tests::two_harmonics();
+        for oscillator in [pair, full, single, sine, harmonics] {
             let flow = Flow::new(&oscillator);
             let linear = &flow.meshing[Side::Right.index()];
             for n in 0..2000u32 {

@@ -46,12 +46,17 @@ impl EnergyBound {
         let scale = reach * unit.powi(6) / 14400.0;
         let [cos, sin] = [oscillator.force, oscillator.force_sin].map(|f| oscillator.mobility(f));
         let drive = (cos + sin).sqrt();
+        let higher = oscillator.harmonics.iter().map(|harmonic| {
+            let [cos, sin] = [harmonic.cos, harmonic.sin].map(|f| oscillator.mobility(f));
+            (cos + sin).sqrt() * (oscillator.omega * f64::from(harmonic.order)).powi(n as i32)
+        });
+        let higher: f64 = higher.sum();
         let factorial: u32 = (1..=n).product();
         // If the powers overflow, the bound is NaN and certifies no step.
         let power = scale / unit.powi(n as i32) * f64::from(factorial);
         EnergyBound {
             columns: term.weighted(&(energy_root(oscillator, domain) * power)),
-            growth: scale * drive * oscillator.omega.powi(n as i32) * unit,
+            growth: scale * drive * oscillator.omega.powi(n as i32) * unit + scale * higher * unit,
             exponent: oscillator.growth_rate(domain) * unit,
         }
     }
@@ -92,6 +97,7 @@ fn energy_root(oscillator: &Oscillator, domain: &Domain) -> Matrix4<f64> {
 
 #[cfg(test)]
 mod tests {
+    use crate::flow::tests::two_harmonics;
     use crate::flow::{Flow, Gap, Phasor};
     use crate::model::{Domain, GearPair, Oscillator};
 
@@ -115,7 +121,8 @@ mod tests {
             with([[0.0; 2]; 2], [[-9.0, 2.0], [2.0, -3.0]]),
             with([[-0.5, 1.0], [-1.0, -0.2]], [[-9.0, 2.0], [2.0, 3.0]]),
         ];
-        for oscillator in oscillators {
+        let harmonics = Oscillator { harmonics: two_harmonics(), ..oscillators[1].clone() };
+        for oscillator in oscillators.into_iter().chain([harmonics]) {
             oscillator.validate().unwrap();
             let flow = Flow::new(&oscillator);
             let mut largest = 0.0f64;

@@ -84,17 +84,17 @@ impl Grid {
     pub(super) fn new(table: &[Columns], wholes: usize) -> Grid {
         // A part is a product of at most two sums, so errors do not accumulate.
         let sum = |i: usize| partial_sum(table, i as f64 / PARTS as f64);
-        let mut parts = vec![Columns::ZERO; PARTS];
+        let mut parts = vec![table[0].cleared(); PARTS];
         for i in 1..PARTS {
             let fine = i % COARSER;
             parts[i] = if i < COARSER || fine == 0 { sum(i) } else { parts[fine].after(&parts[i - fine]) };
         }
         let mut whole = Vec::with_capacity(wholes + 1);
-        whole.extend([Columns::ZERO, sum(PARTS)]);
+        whole.extend([table[0].cleared(), sum(PARTS)]);
         for i in 2..=wholes {
             whole.push(whole[i / 2].after(&whole[i - i / 2]));
         }
-        Grid { parts, wholes: whole, terms: std::array::from_fn(|n| table[n]) }
+        Grid { parts, wholes: whole, terms: std::array::from_fn(|n| table[n].clone()) }
     }
 
     /// Returns the propagator, minus the identity, of a time `u` that is a multiple of [`FINEST_PART`].

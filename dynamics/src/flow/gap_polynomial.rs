@@ -3,6 +3,7 @@
 use wide::f64x4;
 
 use super::columns::Columns;
+use super::row::{Row, power};
 use super::{Gap, Phasor};
 use crate::certificate::Bernstein;
 
@@ -11,21 +12,38 @@ use crate::certificate::Bernstein;
 #[derive(Clone, Debug)]
 pub(crate) struct GapPolynomial {
     columns: [[f64x4; 2]; 7],
+    /// Orders of the higher harmonics, and the columns of their `cos` and `sin`.
+    waves: Vec<(u32, [[f64x4; 2]; 2])>,
 }
 
 impl GapPolynomial {
     /// Builds the matrix from the propagator of a step `h`, minus the identity, and the row of `z''`.
-    pub(super) fn new(propagator: &Columns, curvature: &[f64; 7], h: f64) -> GapPolynomial {
+    pub(super) fn new(propagator: &Columns, curvature: &Row, h: f64) -> GapPolynomial {
         let slope = [0.0, h, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let bend = curvature.map(|x| h * h * x);
-        let rise = propagator.row(0);
-        let slope_end: [f64; 7] = std::array::from_fn(|j| slope[j] + h * propagator.row(1)[j]);
-        let bend_gained = propagator.left(&bend);
-        let bend_end: [f64; 7] = std::array::from_fn(|j| bend[j] + bend_gained[j]);
+        let scaled = |(order, factors): &(u32, [f64; 2])| (*order, factors.map(|x| h * h * x));
+        let bend = Row {
+            base: curvature.base.map(|x| h * h * x),
+            waves: curvature.waves.iter().map(scaled).collect(),
+        };
+        let [rise, rate] = [propagator.row(0), propagator.row(1)];
+        let gained = propagator.left(&bend);
+        let coefficients = |slope: f64, bend: f64, rise: f64, rate: f64, gained: f64| {
+            Bernstein::from_zero(slope, bend, rise, slope + h * rate, bend + gained).wide()
+        };
         let columns = std::array::from_fn(|j| {
-            Bernstein::from_zero(slope[j], bend[j], rise[j], slope_end[j], bend_end[j]).wide()
+            coefficients(slope[j], bend.base[j], rise.base[j], rate.base[j], gained.base[j])
         });
-        GapPolynomial { columns }
+        let of_wave = |k: usize, i: usize| {
+            let [bend, rise, rate, gained] = [&bend, &rise, &rate, &gained].map(|row| row.waves[k].1[i]);
+            coefficients(0.0, bend, rise, rate, gained)
+        };
+        let wave = |(k, &(order, _)): (usize, &(u32, [f64; 2]))| (order, [0, 1].map(|i| of_wave(k, i)));
+        GapPolynomial { columns, waves: bend.waves.iter().enumerate().map(wave).collect() }
+    }
+
+    /// Returns the bytes on the heap.
+    pub(super) fn heap_bytes(&self) -> usize {
+        self.waves.capacity() * size_of::<(u32, [[f64x4; 2]; 2])>()
     }
 
     /// Returns the polynomial for a start in the state `(q, phasor)`.
@@ -37,6 +55,16 @@ impl GapPolynomial {
             let state = c[0][i].mul_add(a[0], c[1][i] * a[1]) + c[2][i].mul_add(a[2], c[3][i] * a[3]);
             state + c[4][i].mul_add(a[4], c[5][i].mul_add(a[5], c[6][i]))
         };
-        Bernstein::from_wide(q[0], [half(0), half(1)])
+        let halves = [half(0), half(1)];
+        Bernstein::from_wide(q[0], if self.waves.is_empty() { halves } else { self.waved(halves, phasor) })
+    }
+
+    /// Adds the higher harmonics.
+    #[inline(never)]
+    fn waved(&self, halves: [f64x4; 2], phasor: &Phasor) -> [f64x4; 2] {
+        self.waves.iter().fold(halves, |sum, (order, [cos, sin])| {
+            let [c, s] = power(phasor, *order).map(f64x4::splat);
+            [0, 1].map(|i| sum[i] + cos[i].mul_add(c, sin[i] * s))
+        })
     }
 }

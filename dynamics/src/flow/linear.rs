@@ -1,6 +1,6 @@
 //! One linear forced domain: generator, Taylor table, propagators.
 
-use nalgebra::{Matrix4, SMatrix};
+use nalgebra::Matrix4;
 use wide::f64x4;
 
 use super::columns::Columns;
@@ -9,15 +9,11 @@ use super::energy::EnergyBound;
 use super::expansion::{FINEST_PART, Grid};
 use super::gap_polynomial::GapPolynomial;
 use super::generator::{Generator, generator, rate};
+use super::row::Row;
 use super::short_flight::ShortFlight;
 use super::taylor::{RADIUS, partial_sum, taylor_table};
 use super::{Gap, Phasor};
-use crate::fused::fma;
 use crate::model::{Domain, Oscillator};
-
-/// Largest `|G| h` that [`LinearFlow::propagate`] sums directly before doubling. Half the Taylor radius has the
-/// smallest error.
-const DOUBLING_RADIUS: f64 = 0.5 * RADIUS;
 
 /// Number of halvings of the Taylor step: enough to resolve every grazing above rounding.
 const FINE_LEVELS: usize = 26;
@@ -74,7 +70,7 @@ pub struct LinearFlow {
     field: Columns,
     /// Rows of `z'', z''', z''''` on `a`. For motion on a rigid wall: rows of the acceleration that the wall cancels,
     /// and of its first two derivatives.
-    gap_rates: [[f64; 7]; 3],
+    gap_rates: [Row; 3],
     /// Bound on `z^(6)`, for the gap itself; zero for motion on a rigid wall.
     pub(crate) gap_bound: EnergyBound,
     /// Bound on the sixth derivative of [`acceleration`](Self::acceleration).
@@ -84,8 +80,11 @@ pub struct LinearFlow {
 impl LinearFlow {
     /// Returns the bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
+        let of_step = |step: &Step| step.propagator.heap_bytes() + step.gap_polynomial.heap_bytes();
+        let columns = self.table.capacity() + self.grid.stored();
         self.steps.capacity() * size_of::<Step>()
-            + (self.table.capacity() + self.grid.stored()) * size_of::<Columns>()
+            + self.steps.iter().map(of_step).sum::<usize>()
+            + columns * (size_of::<Columns>() + self.field.heap_bytes())
     }
 
     pub(super) fn new(oscillator: &Oscillator, domain: &Domain) -> LinearFlow {
@@ -95,7 +94,8 @@ impl LinearFlow {
             let bound = |n: u32| EnergyBound::new(oscillator, domain, &table[n as usize - 1], n, unit);
             [bound(5), bound(7)]
         };
-        LinearFlow::assemble(oscillator, generator, rate, generator * generator, bounds)
+        let pressing = generator.row(1);
+        LinearFlow::assemble(oscillator, generator, rate, pressing, bounds)
     }
 
     /// Builds the flow of a gap at rest on a rigid wall, while the other displacement moves. Its
@@ -103,16 +103,16 @@ impl LinearFlow {
     pub(super) fn on_rigid_wall(oscillator: &Oscillator, kick: f64) -> LinearFlow {
         let motion = ConstrainedMotion::new(oscillator, kick);
         let bounds = |table: &[Columns], unit: f64| [EnergyBound::NONE, motion.bound(&table[4], unit)];
-        LinearFlow::assemble(oscillator, motion.generator, motion.rate, motion.pressing, bounds)
+        let (generator, pressing) = (motion.generator.clone(), motion.pressing.clone());
+        LinearFlow::assemble(oscillator, generator, motion.rate, pressing, bounds)
     }
 
-    /// Builds the flow of a system `a' = G a`. The first row of `pressing` is that of
-    /// [`acceleration`](Self::acceleration).
+    /// Builds the flow of a system `a' = G a`. `pressing` is the row of [`acceleration`](Self::acceleration).
     fn assemble(
         oscillator: &Oscillator,
         generator: Generator,
         rate: f64,
-        pressing: Generator,
+        pressing: Row,
         bounds: impl Fn(&[Columns], f64) -> [EnergyBound; 2],
     ) -> LinearFlow {
         let unit = RADIUS / rate;
@@ -124,12 +124,9 @@ impl LinearFlow {
         let coarse = fit.clamp(0.0, COARSE_LEVELS as f64) as usize;
         let grid = Grid::new(&table, 1 << coarse);
 
-        let mut power = pressing;
-        let gap_rates = std::array::from_fn(|_| {
-            let rates = std::array::from_fn(|j| power[(0, j)]);
-            power *= generator;
-            rates
-        });
+        let slope = generator.derivative(&pressing);
+        let curvature = generator.derivative(&slope);
+        let gap_rates = [pressing, slope, curvature];
         let [gap_bound, pressing_bound] = bounds(&table, unit);
         let mut linear = LinearFlow {
             field: columns,
@@ -176,65 +173,60 @@ impl LinearFlow {
     /// Returns the relative acceleration `w' = z''`; for motion on a rigid wall, the one that the wall cancels.
     #[inline]
     pub fn acceleration(&self, q: &Gap, phasor: &Phasor) -> f64 {
-        dot(&self.gap_rates[0], q, phasor)
+        self.gap_rates[0].dot(q, phasor)
     }
 
     /// Returns [`acceleration`](Self::acceleration) and its first two derivatives.
     #[inline]
     pub(crate) fn acceleration_rates(&self, q: &Gap, phasor: &Phasor) -> [f64; 3] {
-        self.gap_rates.map(|row| dot(&row, q, phasor))
+        self.gap_rates.each_ref().map(|row| row.dot(q, phasor))
     }
 
-    /// Returns the row of [`acceleration`](Self::acceleration) on `a = (z, w, x, v, cos, sin, 1)`.
-    pub(crate) fn acceleration_row(&self) -> &[f64; 7] {
+    /// Returns the row of [`acceleration`](Self::acceleration).
+    pub(crate) fn acceleration_row(&self) -> &Row {
         &self.gap_rates[0]
     }
 
-    /// Returns the row of the second displacement's acceleration on `a`.
-    pub(crate) fn second_acceleration_row(&self) -> [f64; 7] {
-        std::array::from_fn(|j| self.generator[(3, j)])
+    /// Returns the row of the second displacement's acceleration.
+    pub(crate) fn second_acceleration_row(&self) -> Row {
+        self.generator.row(3)
     }
 
     /// Returns the fundamental matrix `exp(A tau)` in gap coordinates.
     pub fn fundamental(&self, tau: f64) -> Matrix4<f64> {
-        Matrix4::identity() + self.propagator_minus_identity(tau).fixed_view::<4, 4>(0, 0)
+        let units = std::array::from_fn(|j| std::array::from_fn(|i| f64::from(u8::from(i == j))));
+        let (step, count, rest) = self.whole_steps(tau);
+        let carry = |columns: [Gap; 4], _| columns.map(|u| step.propagator.carry_tangent(&u));
+        let columns = self.grid.carry(rest * self.per_unit, (0..count).fold(units, carry));
+        Matrix4::from_fn(|i, j| columns[j][i])
     }
 
-    /// Returns the state after any time `tau >= 0`.
-    ///
-    /// It scales and squares the Taylor table. The error is that of rounding in `|G| tau`.
+    /// Returns the state after a time `tau >= 0`: whole steps of the longest length and the rest.
     pub fn propagate(&self, q: Gap, phasor: Phasor, tau: f64) -> Gap {
-        let a = SMatrix::<f64, 7, 1>::from([q[0], q[1], q[2], q[3], phasor[0], phasor[1], 1.0]);
-        let change = self.propagator_minus_identity(tau) * a;
-        std::array::from_fn(|i| q[i] + change[i])
+        let (step, count, rest) = self.whole_steps(tau);
+        let (q, phasor) = (0..count).fold((q, phasor), |(q, phasor), _| step.end(&q, &phasor));
+        let u = rest * self.per_unit;
+        let expansion = self.grid.expansion(&q, &phasor, u);
+        expansion.state(u - expansion.start)
     }
 
-    /// Returns `exp(G tau)` minus the identity, which loses fewer digits in squaring than `exp(G tau)`.
-    fn propagator_minus_identity(&self, tau: f64) -> Generator {
-        let doublings = (self.rate * tau / DOUBLING_RADIUS).log2().ceil().max(0.0) as i32;
-        let u = tau / self.unit * 0.5f64.powi(doublings);
-        let part = partial_sum(&self.table, u).matrix();
-        (0..doublings).fold(part, |less, _| less * less + less * 2.0)
+    /// Returns the longest step, how often it fits into a time, and the rest.
+    fn whole_steps(&self, tau: f64) -> (&Step, u64, f64) {
+        let step = &self.steps[0];
+        let count = (tau / step.h).floor();
+        (step, count as u64, (-count).mul_add(step.h, tau).max(0.0))
     }
 
     /// Returns the `n`-th derivative of [`acceleration`](Self::acceleration) after a time `tau`.
     #[cfg(test)]
     pub(super) fn pressing_derivative(&self, q: &Gap, phasor: &Phasor, tau: f64, n: u32) -> f64 {
-        let a = SMatrix::<f64, 7, 1>::from([q[0], q[1], q[2], q[3], phasor[0], phasor[1], 1.0]);
-        let later = a + self.propagator_minus_identity(tau) * a;
-        let derivative = (0..n).fold(later, |a, _| self.generator * a);
-        SMatrix::<f64, 1, 7>::from(self.gap_rates[0]).dot(&derivative.transpose())
+        let (sin, cos) = (phasor[1].atan2(phasor[0]) + self.generator.matrix[(5, 4)] * tau).sin_cos();
+        let row = (0..n).fold(self.gap_rates[0].clone(), |row, _| self.generator.derivative(&row));
+        row.dot(&self.propagate(*q, *phasor, tau), &[cos, sin])
     }
 
     /// Returns the trace of the generator on `q`: the growth rate of phase volume.
     pub fn trace(&self) -> f64 {
-        self.generator.fixed_view::<4, 4>(0, 0).trace()
+        self.generator.matrix.fixed_view::<4, 4>(0, 0).trace()
     }
-}
-
-#[inline]
-fn dot(row: &[f64; 7], q: &Gap, phasor: &Phasor) -> f64 {
-    let gap = fma(row[0], q[0], fma(row[1], q[1], row[6]));
-    let other = fma(row[2], q[2], row[3] * q[3]);
-    gap + fma(row[4], phasor[0], fma(row[5], phasor[1], other))
 }

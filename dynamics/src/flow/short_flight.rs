@@ -8,6 +8,7 @@
 use wide::f64x4;
 
 use super::columns::Columns;
+use super::row::{Row, power};
 use super::{Gap, Phasor};
 use crate::fused::fma;
 
@@ -49,6 +50,8 @@ const fn weights(w: [[f64; 4]; WIDTH]) -> Series {
 #[derive(Clone, Debug)]
 pub(crate) struct ShortFlight {
     columns: [[f64x4; 2 * WIDTH]; 7],
+    /// Orders of the higher harmonics, and the columns of their `cos` and `sin`.
+    waves: Vec<(u32, [[f64x4; 2 * WIDTH]; 2])>,
 }
 
 /// The changes of the gap and of the second displacement, in powers of the time in Taylor steps.
@@ -85,12 +88,21 @@ impl Powers {
 impl ShortFlight {
     /// Builds the matrix from the Taylor table.
     pub(super) fn new(table: &[Columns]) -> ShortFlight {
-        let coefficient = |row: usize, n: usize, j: usize| table[n].row(row)[j];
-        let quad = |row: usize, i: usize, j: usize| {
-            f64x4::from(std::array::from_fn::<f64, 4, _>(|n| coefficient(row, 4 * i + n, j)))
+        let rows: Vec<[Row; 2]> = table.iter().map(|term| [term.row(0), term.row(2)]).collect();
+        let column = |of: &dyn Fn(&Row) -> f64| {
+            std::array::from_fn(|i| {
+                let quad = |n: usize| of(&rows[4 * (i % WIDTH) + n][i / WIDTH]);
+                f64x4::from(std::array::from_fn::<f64, 4, _>(quad))
+            })
         };
-        let column = |j: usize| std::array::from_fn(|i| quad(2 * (i / WIDTH), i % WIDTH, j));
-        ShortFlight { columns: std::array::from_fn(column) }
+        let wave = |k: usize| {
+            let order = rows[0][0].waves[k].0;
+            (order, [0, 1].map(|part| column(&|row| row.waves[k].1[part])))
+        };
+        ShortFlight {
+            columns: std::array::from_fn(|j| column(&|row| row.base[j])),
+            waves: (0..rows[0][0].waves.len()).map(wave).collect(),
+        }
     }
 
     /// Returns the series of a flight from a state.
@@ -102,7 +114,20 @@ impl ShortFlight {
             let state = c[0][i].mul_add(a[0], c[1][i] * a[1]) + c[2][i].mul_add(a[2], c[3][i] * a[3]);
             state + c[4][i].mul_add(a[4], c[5][i].mul_add(a[5], c[6][i]))
         };
-        FlightSeries { gap: [quad(0), quad(1), quad(2)], other: [quad(3), quad(4), quad(5)] }
+        let series = FlightSeries { gap: [quad(0), quad(1), quad(2)], other: [quad(3), quad(4), quad(5)] };
+        if self.waves.is_empty() { series } else { self.waved(series, phasor) }
+    }
+
+    /// Adds the higher harmonics.
+    #[inline(never)]
+    fn waved(&self, series: FlightSeries, phasor: &Phasor) -> FlightSeries {
+        self.waves.iter().fold(series, |sum, (order, [cos, sin])| {
+            let [c, s] = power(phasor, *order).map(f64x4::splat);
+            let plus = |part: &Series, from: usize| {
+                std::array::from_fn(|i| part[i] + cos[from + i].mul_add(c, sin[from + i] * s))
+            };
+            FlightSeries { gap: plus(&sum.gap, 0), other: plus(&sum.other, WIDTH) }
+        })
     }
 }
 

@@ -4,15 +4,15 @@
 //! without force or load. Without negative damping, the transient's energy `2 E = q' M q' + q K q` never grows, so the gap stays within
 //!
 //! ```text
-//! |z - z_0| <= |g . X| + sqrt(2 E g K^-1 g),   z_0 = g . K^-1 load
+//! |z - z_0| <= sum |g . X_n| + sqrt(2 E g K^-1 g),   z_0 = g . K^-1 load
 //! ```
 //!
-//! for all time, with `X` the complex amplitude of the steady response (Cauchy-Schwarz in the inner product of K). If
+//! for all time, with `X_n` the complex amplitudes of the steady response to each harmonic (Cauchy-Schwarz in the inner product of K). If
 //! that interval lies between the walls, the motion has no further event.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
 
-use super::{Oscillator, State, is_semidefinite};
+use super::{Harmonic, Oscillator, State, is_semidefinite};
 
 /// Margin for rounding: of the distance to a wall, relative to twice the scale of length, and of the decay rate,
 /// relative to the excitation frequency.
@@ -32,7 +32,8 @@ pub struct NonImpacting {
 }
 
 impl NonImpacting {
-    /// Computes the contact-free steady motion. Returns none if it touches a wall or is not stable.
+    /// Computes the contact-free steady motion. Returns none if it touches a wall or is not stable, or if the oscillator has
+    /// stages.
     pub fn new(oscillator: &Oscillator) -> Option<NonImpacting> {
         if oscillator.degrees == 1 {
             return NonImpacting::of_two_degrees(&with_copy(oscillator, 1));
@@ -41,6 +42,9 @@ impl NonImpacting {
     }
 
     fn of_two_degrees(oscillator: &Oscillator) -> Option<NonImpacting> {
+        if !oscillator.schedule.is_empty() {
+            return None;
+        }
         // Otherwise the energy of a transient can grow, even if the transient decays in the end.
         if !is_semidefinite(oscillator.free.dissipation()) {
             return None;
@@ -51,21 +55,35 @@ impl NonImpacting {
         let gap = Vector2::from(oscillator.gap);
         let compliance = stiffness.cholesky()?.inverse();
         let inertia = matrix(mass) * (omega * omega);
-        let dynamic =
-            (stiffness - inertia).map(Complex::from) + damping.map(|c| Complex::new(0.0, omega * c));
-        // A zero sine must not change the sign of a zero: 0 - 0 is 0.
-        let force = [0, 1].map(|i| Complex::new(oscillator.force[i], 0.0 - oscillator.force_sin[i]));
-        let amplitude = dynamic.try_inverse()? * Vector2::from(force);
+        let response = |harmonic: Harmonic| {
+            let (omega, inertia) = match harmonic.order {
+                1 => (omega, inertia),
+                n => (omega * f64::from(n), inertia * f64::from(n * n)),
+            };
+            let dynamic =
+                (stiffness - inertia).map(Complex::from) + damping.map(|c| Complex::new(0.0, omega * c));
+            // A zero sine must not change the sign of a zero: 0 - 0 is 0.
+            let force = [0, 1].map(|i| Complex::new(harmonic.cos[i], 0.0 - harmonic.sin[i]));
+            Some((omega, dynamic.try_inverse()? * Vector2::from(force)))
+        };
+        let responses = oscillator.all_harmonics().map(response).collect::<Option<Vec<_>>>()?;
         let middle = compliance * Vector2::from(oscillator.free.load);
-        let swing = gap.map(Complex::from).dot(&amplitude).norm();
+        let swing: f64 = responses.iter().map(|(_, x)| gap.map(Complex::from).dot(x).norm()).sum();
         let room = (walls[0] - gap.dot(&middle)).min(gap.dot(&middle) - walls[1]) - swing;
         let reach = (room - MARGIN * 2.0 * oscillator.length_scale()) / gap.dot(&(compliance * gap)).sqrt();
         let inverse_mass = matrix(oscillator.inverse_mass());
         let slowest = || slowest(&(inverse_mass * stiffness), &(inverse_mass * damping));
         // Eigenvalues take longest: they come last.
         let slowest = (reach > 0.0).then(slowest).filter(|slowest| slowest.re < -MARGIN * omega)?;
-        let steady = [0, 1].map(|i| [amplitude[i].re + middle[i], -omega * amplitude[i].im]);
-        let steady = [steady[0][0], steady[0][1], steady[1][0], steady[1][1]];
+        // Added to -0, a zero keeps its sign.
+        let mut steady = [-0.0; 4];
+        for (omega, amplitude) in &responses {
+            for i in 0..2 {
+                steady[2 * i] += amplitude[i].re;
+                steady[2 * i + 1] -= omega * amplitude[i].im;
+            }
+        }
+        (0..2).for_each(|i| steady[2 * i] += middle[i]);
         Some(NonImpacting { steady, mass, stiffness, reach, slowest, resting: None })
     }
 
@@ -73,12 +91,15 @@ impl NonImpacting {
     /// the walls, stays at rest. The one at rest may be undamped; then the motion is neutral.
     pub fn with_one_at_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
-            let Oscillator { gap, force, force_sin, free, mass, .. } = *oscillator;
+            let Oscillator { gap, free, mass, .. } = *oscillator;
             let moving = 1 - resting;
             let is_coupled =
                 [free.stiffness, free.damping, mass].iter().any(|m| m[0][1] != 0.0 || m[1][0] != 0.0);
-            let stays =
-                !is_coupled && [force, force_sin, free.load].iter().all(|pushes| pushes[resting] == 0.0);
+            let stays = !is_coupled
+                && free.load[resting] == 0.0
+                && oscillator
+                    .all_harmonics()
+                    .all(|harmonic| [harmonic.cos, harmonic.sin].iter().all(|pushes| pushes[resting] == 0.0));
             if !stays || gap[moving] == 0.0 {
                 return None;
             }

@@ -4,7 +4,7 @@
 //! and the meter evaluates the exact flow there: integrals by Gauss-Legendre quadrature of order 16 over pieces of at
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
-use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor};
+use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Staged};
 use crate::model::Contact;
 use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
 
@@ -123,7 +123,9 @@ impl Moments {
 /// Measures a trajectory from its events.
 #[derive(Clone, Debug)]
 pub(super) struct Meter<'f> {
+    /// The flow of the present stage.
     flow: &'f Flow,
+    staged: Staged<'f>,
     /// Domain, state and time since phase 0 at the beginning of the present flight.
     kind: DomainKind,
     q: Gap,
@@ -142,8 +144,10 @@ impl<'f> Meter<'f> {
     /// Begins at phase 0, at the present state of a trajectory.
     pub(super) fn new(flow: &'f Flow, trajectory: &Trajectory<'_>) -> Meter<'f> {
         let kind = trajectory.meshing().map_or(DomainKind::Free, DomainKind::Meshing);
+        let staged = Staged::new(flow);
         Meter {
-            flow,
+            flow: staged.flow,
+            staged,
             kind,
             q: flow.to_gap(trajectory.state()),
             t: 0.0,
@@ -192,13 +196,31 @@ impl<'f> Meter<'f> {
     /// Continues the present flight to phase 0 of `period`.
     fn complete_periods(&mut self, period: u64) {
         while self.period < period {
-            self.q = self.fly(self.flow.period - self.t);
+            self.fly_to(self.flow.period);
             self.t = 0.0;
+            self.staged.restart();
+            self.flow = self.staged.flow;
             self.period += 1;
         }
     }
 
-    /// Measures the present flight over a time, and returns its end.
+    /// Measures the present flight up to a time since phase 0. Changes of the stage at that time are still to come.
+    fn fly_to(&mut self, until: f64) {
+        while let Some(change) = self.staged.next_change().filter(|&change| change < until) {
+            if change > self.t {
+                self.q = self.fly(change - self.t);
+                self.t = change;
+            }
+            self.staged.change();
+            self.flow = self.staged.flow;
+        }
+        if until > self.t {
+            self.q = self.fly(until - self.t);
+        }
+        self.t = until;
+    }
+
+    /// Measures the present flight over a time within one stage, and returns its end.
     fn fly(&mut self, duration: f64) -> Gap {
         let (flow, kind) = (self.flow, self.kind);
         let linear = flow.domain(kind);
@@ -327,8 +349,8 @@ impl Observer for Meter<'_> {
             let middle = [end[0], end[1], 0.5 * (begin[2] + end[2]), 0.5 * (begin[3] + end[3])];
             let (sin, cos) = (self.flow.omega * (self.t + 0.5 * duration)).sin_cos();
             self.integrate(duration, &middle, [cos, sin]);
-        } else if duration > 0.0 {
-            self.fly(duration);
+        } else {
+            self.fly_to(event.t);
         }
         self.contact(event);
         self.kind = match event.kind {

@@ -1,7 +1,7 @@
 //! Infinite chatter: one jump over a convergent series of impacts.
 
 use super::{EventKind, Observer, Trajectory};
-use crate::flow::{DomainKind, Gap, LinearFlow, Phasor, RADIUS};
+use crate::flow::{DomainKind, Gap, LinearFlow, Phasor, RADIUS, Row};
 use crate::model::{Contact, Side};
 
 /// Longest duration of a series that is replaced by its closed form, in Taylor steps of free motion. The error of the
@@ -36,20 +36,20 @@ impl Sliding {
     fn new(free: &LinearFlow, closed: &Gap, phasor: &Phasor, omega: f64, kick: f64) -> Sliding {
         let row = free.acceleration_row();
         let second = free.second_acceleration_row();
-        let shared: [f64; 7] = std::array::from_fn(|j| second[j] + kick * row[j]);
+        let shared = second.plus(kick, row);
         let [_, acceleration, _, v_free] = free.field(closed, phasor);
         let v_rate = v_free + kick * acceleration;
-        let forcing = |row: &[f64; 7]| omega * (row[5] * phasor[0] - row[4] * phasor[1]);
-        let change = |row: &[f64; 7]| row[2] * closed[3] + row[3] * v_rate + forcing(row);
+        let change =
+            |row: &Row| row.base[2] * closed[3] + row.base[3] * v_rate + row.forcing_rate(phasor, omega);
         Sliding {
             acceleration,
             acceleration_rate: change(row),
-            gradient: [row[2], row[3]],
+            gradient: [row.base[2], row.base[3]],
             v_rate,
             v_jerk: change(&shared),
-            v_gradient: [shared[2], shared[3]],
-            damping: kick * row[3] - row[1],
-            drag: shared[1] - kick * shared[3],
+            v_gradient: [shared.base[2], shared.base[3]],
+            damping: kick * row.base[3] - row.base[1],
+            drag: shared.base[1] - kick * shared.base[3],
         }
     }
 }

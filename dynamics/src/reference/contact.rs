@@ -65,7 +65,7 @@ impl<const N: usize> Trajectory<'_, N> {
             Crossing::PressingEnds(side) if self.mode == Mode::Stuck(side) => self.release(side, observer),
             Crossing::PressingEnds(side) => {
                 let linear = self.flow.domain(DomainKind::Meshing(side));
-                let row = linear.acceleration_row();
+                let row = &linear.acceleration_row().base;
                 let normal = [row[0], row[1], row[2], row[3]];
                 let rate = linear.acceleration_rates(&self.q, &self.phasor)[1];
                 self.end_meshing(side, &normal, rate, observer);

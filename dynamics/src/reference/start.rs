@@ -2,7 +2,7 @@
 
 use super::clock::Clock;
 use super::{Allowance, Mode, Trajectory, Work};
-use crate::flow::{DomainKind, Flow};
+use crate::flow::{DomainKind, Flow, Staged};
 use crate::model::{Contact, Law, Side, State};
 
 /// Distance of a gap that lies on a wall, relative to the wall's position or the scale of length.
@@ -37,10 +37,11 @@ impl<'f> Trajectory<'f, 0> {
 impl<'f, const N: usize> Trajectory<'f, N> {
     /// Starts a trajectory with tangent vectors in the coordinates of [`State`].
     pub fn with_tangents(flow: &'f Flow, law: Law, y: State, tangents: [State; N]) -> Self {
-        let levels =
-            [DomainKind::Free, DomainKind::Meshing(Side::Right)].map(|d| flow.domain(d).taylor_level);
+        let staged = Staged::new(flow);
+        let flow = staged.flow;
         let mut trajectory = Trajectory {
             flow,
+            staged,
             law,
             mode: Mode::Free,
             origin: None,
@@ -52,7 +53,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             clock: Clock::default(),
             goal: 0.0,
             period: 0,
-            level: levels,
+            level: [DomainKind::Free, DomainKind::Meshing(Side::Right)].map(|d| flow.domain(d).taylor_level),
             tangents: tangents.map(|u| flow.tangent_to_gap(u)),
             log_scale: 0.0,
             events_in_period: 0,
@@ -70,6 +71,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     pub fn carrying<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         Trajectory {
             flow: self.flow,
+            staged: self.staged,
             law: self.law,
             mode: self.mode,
             origin: self.origin,
@@ -108,7 +110,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         y: State,
         tangents: [State; M],
     ) -> Trajectory<'f, M> {
-        let mut started = Trajectory::with_tangents(self.flow, self.law, y, tangents);
+        let mut started = Trajectory::with_tangents(self.flow(), self.law, y, tangents);
         started.allowance = self.allowance();
         // At an elastic wall the gap alone determines the mode.
         let is_elastic = |side: Side| self.flow.contacts[side.index()] == Contact::Elastic;

@@ -39,7 +39,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.q = self.at_rest_on(side);
         if N > 0 {
             let kick = self.flow.kick;
-            let row = self.flow.domain(DomainKind::Meshing(side)).second_acceleration_row();
+            let row = self.flow.domain(DomainKind::Meshing(side)).second_acceleration_row().base;
             let drag = row[1] - kick * row[3];
             self.tangents =
                 self.tangents.map(|[z, w, x, v]| [0.0, 0.0, x + kick * z, v + kick * w - drag * z]);

@@ -1,0 +1,64 @@
+//! Rows of coefficients on `a = (z, w, x, v, cos, sin, 1)` and on the phasors of higher harmonics.
+
+use nalgebra::Complex;
+
+use super::{Gap, Phasor};
+use crate::fused::fma;
+
+/// A linear functional of the state and the forcing.
+#[derive(Clone, Debug)]
+pub(crate) struct Row {
+    /// Factors of `(z, w, x, v, cos, sin, 1)`.
+    pub(crate) base: [f64; 7],
+    /// Orders of the higher harmonics, and the factors of their `cos` and `sin`.
+    pub(crate) waves: Vec<(u32, [f64; 2])>,
+}
+
+impl Row {
+    /// Returns the product with `a`.
+    #[inline]
+    pub(crate) fn dot(&self, q: &Gap, phasor: &Phasor) -> f64 {
+        let row = &self.base;
+        let gap = fma(row[0], q[0], fma(row[1], q[1], row[6]));
+        let other = fma(row[2], q[2], row[3] * q[3]);
+        let first = gap + fma(row[4], phasor[0], fma(row[5], phasor[1], other));
+        if self.waves.is_empty() { first } else { first + self.waved(phasor) }
+    }
+
+    #[inline(never)]
+    fn waved(&self, phasor: &Phasor) -> f64 {
+        let term = |&(order, [cos, sin]): &(u32, [f64; 2])| {
+            let [c, s] = power(phasor, order);
+            fma(cos, c, sin * s)
+        };
+        self.waves.iter().map(term).sum()
+    }
+
+    /// Returns the time derivative of the part that depends on the forcing; `omega` is the frequency.
+    pub(crate) fn forcing_rate(&self, phasor: &Phasor, omega: f64) -> f64 {
+        let first = omega * (self.base[5] * phasor[0] - self.base[4] * phasor[1]);
+        let term = |&(order, [cos, sin]): &(u32, [f64; 2])| {
+            let [c, s] = power(phasor, order);
+            f64::from(order) * omega * (sin * c - cos * s)
+        };
+        self.waves.iter().map(term).fold(first, |sum, term| sum + term)
+    }
+
+    /// Returns the sum of two rows, the second one multiplied by a factor.
+    pub(crate) fn plus(&self, factor: f64, other: &Row) -> Row {
+        let waves = self.waves.iter().zip(&other.waves);
+        let wave = |(&(order, a), (_, b)): (&(u32, [f64; 2]), &(u32, [f64; 2]))| {
+            (order, std::array::from_fn(|i| a[i] + factor * b[i]))
+        };
+        Row {
+            base: std::array::from_fn(|j| self.base[j] + factor * other.base[j]),
+            waves: waves.map(wave).collect(),
+        }
+    }
+}
+
+/// Returns the phasor of a harmonic: the complex power of the first one.
+pub(crate) fn power(phasor: &Phasor, order: u32) -> Phasor {
+    let power = Complex::new(phasor[0], phasor[1]).powu(order);
+    [power.re, power.im]
+}

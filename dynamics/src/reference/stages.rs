@@ -1,0 +1,54 @@
+//! Changes of the stage at given phases.
+//!
+//! State and tangents are continuous there, because the phase of a change is the same for all neighbouring motions. A gap in
+//! front of a wall stays in free motion, and a gap behind a wall stays in contact. A contact that depends on a force is
+//! decided anew: a gap at rest on a rigid wall, and a contact onset.
+
+use super::{EventKind, Mode, Observer, Trajectory};
+use crate::flow::DomainKind;
+
+impl<const N: usize> Trajectory<'_, N> {
+    /// Enters the next stage.
+    #[inline(never)]
+    pub(super) fn change_stage(&mut self, observer: &mut impl Observer) {
+        self.staged.change();
+        self.enter_stage(observer);
+    }
+
+    /// Enters the stage that holds at phase 0.
+    #[inline]
+    pub(super) fn begin_stages(&mut self, observer: &mut impl Observer) {
+        self.staged.restart();
+        if !std::ptr::eq(self.flow, self.staged.flow) {
+            self.enter_stage(observer);
+        }
+    }
+
+    fn enter_stage(&mut self, observer: &mut impl Observer) {
+        self.flow = self.staged.flow;
+        self.short_flight = false;
+        let levels = |kind: DomainKind| self.flow.domain(kind).levels - 1;
+        let in_contact = self.meshing().map_or(self.level[1], |side| levels(DomainKind::Meshing(side)));
+        self.level = [self.level[0].min(levels(DomainKind::Free)), self.level[1].min(in_contact)];
+        match self.mode {
+            Mode::Stuck(side) if !self.presses(DomainKind::Meshing(side), side, &self.q) => {
+                self.record(EventKind::MeshEnd, side, self.q, observer);
+                self.leave(side);
+            }
+            Mode::Onset(side) => {
+                let meshing = self.flow.domain(DomainKind::Meshing(side));
+                if side.sign() * meshing.acceleration(&self.q, &self.phasor) <= 0.0 {
+                    self.record(EventKind::MeshEnd, side, self.q, observer);
+                    self.mode = Mode::Free;
+                    // A contact that begins at this instant starts on its wall.
+                    self.from_wall = self.from_wall.map(|_| (side, 1));
+                }
+            }
+            _ => {}
+        }
+        // The gap is on a wall if an event occurs at this instant. At rest, the new acceleration decides.
+        if let (Some((side, _)), 0.0) = (self.from_wall, self.q[1]) {
+            self.from_wall = Some((side, self.rest_order(self.mode.domain())));
+        }
+    }
+}
