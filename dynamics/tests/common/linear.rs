@@ -1,6 +1,6 @@
 //! Linear motion of one degree of freedom in closed form, and oscillators with walls.
 
-use rattlemap_dynamics::model::{Contact, Domain, Oscillator, Side};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Oscillator, Side, Stage};
 
 /// `x'' + 2 gamma x' + square x = force cos(omega t) + load`, not critically damped.
 #[derive(Clone, Copy, Debug)]
@@ -88,6 +88,26 @@ pub(crate) fn invariants([[a, b], [c, d]]: [[f64; 2]; 2]) -> [f64; 2] {
 pub(crate) fn invariants_of(multipliers: &[[f64; 2]]) -> [f64; 2] {
     let [[a, b], [c, d]] = multipliers else { panic!("not two eigenvalues: {multipliers:?}") };
     [a + c, a * c - b * d]
+}
+
+/// Returns an oscillator with other domains and forces, in all stages and harmonics.
+pub(crate) fn transformed(
+    o: &Oscillator,
+    domain: impl Fn(&Domain) -> Domain,
+    force: impl Fn([f64; 2]) -> [f64; 2],
+) -> Oscillator {
+    let both = |meshing: &[Domain; 2]| [domain(&meshing[0]), domain(&meshing[1])];
+    let stage = |stage: &Stage| Stage { free: domain(&stage.free), meshing: both(&stage.meshing) };
+    let harmonic = |h: &Harmonic| Harmonic { cos: force(h.cos), sin: force(h.sin), ..*h };
+    Oscillator {
+        force: force(o.force),
+        force_sin: force(o.force_sin),
+        free: domain(&o.free),
+        meshing: both(&o.meshing),
+        harmonics: o.harmonics.iter().map(harmonic).collect(),
+        stages: o.stages.iter().map(stage).collect(),
+        ..o.clone()
+    }
 }
 
 /// Adds a wall to an oscillator, with a spring and a damper along the gap row behind it.

@@ -1,13 +1,15 @@
-//! Invariants of all oscillators: any masses, any gap row, any walls with any contacts and laws.
+//! Invariants of all oscillators: any masses, any gap row, any walls with any contacts and laws, harmonics and stages.
 
-use crate::common::linear::with_wall;
+use crate::common::linear::{transformed, with_wall};
 use crate::common::{departure, size};
 use crate::one_wall::in_units;
 use crate::properties::{COMPARABLE_EVENTS, logarithmic, or_zero};
 use nalgebra::Complex;
 use proptest::prelude::*;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Law, NonImpacting, Oscillator, Side, State};
+use rattlemap_dynamics::model::{
+    Contact, Domain, Harmonic, Law, NonImpacting, Oscillator, Side, Stage, State,
+};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
@@ -94,7 +96,20 @@ fn cases() -> impl Strategy<Value = Case> {
     let behind = || (logarithmic(10.0, 3e3), or_none(0.0..5.0)).prop_map(|(k, c)| [k, c]);
     let walls = (walls(), [contacts(), contacts()], [behind(), behind()]);
     let start = prop::array::uniform4(-1.0..1.0f64);
-    (prop::bool::weighted(0.25), motion, forcing, walls, laws(), start).prop_map(
+    let harmonic =
+        (2..=9u32, pair(10.0), pair(10.0)).prop_map(|(order, cos, sin)| Harmonic { order, cos, sin });
+    let harmonics = prop::collection::vec(harmonic, 0..=2).prop_map(|mut harmonics| {
+        harmonics.sort_by_key(|harmonic| harmonic.order);
+        harmonics.dedup_by_key(|harmonic| harmonic.order);
+        harmonics
+    });
+    let stages = prop::collection::vec((0.5..2.0f64, 0.5..2.0f64, pair(8.0)), 0..=2);
+    let phases = prop::collection::vec(or_none(0.0..1.0), 1..5).prop_map(|mut phases| {
+        phases.sort_by(f64::total_cmp);
+        phases.dedup();
+        phases
+    });
+    (prop::bool::weighted(0.25), motion, forcing, walls, laws(), start, (harmonics, stages, phases)).prop_map(
         |(
             is_single,
             (mass, damping, stiffness, gap),
@@ -102,6 +117,7 @@ fn cases() -> impl Strategy<Value = Case> {
             (at, contacts, behind),
             law,
             y,
+            (harmonics, stages, phases),
         )| {
             let free = Domain { damping, stiffness, load };
             let mut oscillator = Oscillator {
@@ -115,7 +131,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 force_sin,
                 free,
                 meshing: [free; 2],
-                harmonics: Vec::new(),
+                harmonics,
                 stages: Vec::new(),
                 schedule: Vec::new(),
             };
@@ -128,17 +144,41 @@ fn cases() -> impl Strategy<Value = Case> {
                     degrees: 1,
                     mass: [[mass[0][0], 0.0], [0.0, 1.0]],
                     gap: [if gap[0] == 0.0 { -1.0 } else { gap[0] }, 0.0],
-                    force: [force[0], 0.0],
-                    force_sin: [force_sin[0], 0.0],
-                    free,
-                    meshing: [free; 2],
-                    ..oscillator.clone()
+                    ..transformed(&oscillator, |_| free, |force| [force[0], 0.0])
                 };
                 start = [y[0], 3.0 * y[1], 0.0, 0.0];
             }
-            Case { oscillator: walled(oscillator, at, contacts, behind), law, start, behind }
+            let changed = |&(k, c, by): &(f64, f64, [f64; 2])| {
+                let Domain { damping, stiffness, load } = oscillator.free;
+                let times = |m: Matrix, factor: f64| m.map(|row| row.map(|x| factor * x));
+                let load = [load[0] + by[0], load[1] + if is_single { 0.0 } else { by[1] }];
+                Domain { damping: times(damping, c), stiffness: times(stiffness, k), load }
+            };
+            let frees: Vec<Domain> = stages.iter().map(changed).collect();
+            if !frees.is_empty() {
+                let count = frees.len() + 1;
+                oscillator.schedule =
+                    phases.iter().enumerate().map(|(i, &phase)| (phase, (i + 1) % count)).collect();
+            }
+            Case { oscillator: staged(oscillator, &frees, at, contacts, behind), law, start, behind }
         },
     )
+}
+
+/// Adds walls to an oscillator, and stages with other free domains between these walls.
+fn staged(
+    plain: Oscillator,
+    frees: &[Domain],
+    at: [f64; 2],
+    contacts: [Contact; 2],
+    behind: [[f64; 2]; 2],
+) -> Oscillator {
+    let stage = |&free: &Domain| {
+        let of_stage = Oscillator { free, meshing: [free; 2], ..plain.clone() };
+        let Oscillator { free, meshing, .. } = walled(of_stage, at, contacts, behind);
+        Stage { free, meshing }
+    };
+    Oscillator { stages: frees.iter().map(stage).collect(), ..walled(plain.clone(), at, contacts, behind) }
 }
 
 fn walled(plain: Oscillator, at: [f64; 2], contacts: [Contact; 2], behind: [[f64; 2]; 2]) -> Oscillator {
@@ -424,18 +464,15 @@ proptest! {
             [[whole[0][0], whole[0][1]], [below, whole[1][1]]]
         };
         let o = &case.oscillator;
-        let free = Domain { damping: congruent(o.free.damping), stiffness: congruent(o.free.stiffness), load: row(o.free.load) };
+        let domain = |d: &Domain| Domain { damping: congruent(d.damping), stiffness: congruent(d.stiffness), load: row(d.load) };
         let plain = Oscillator {
             mass: congruent(o.mass),
             gap: row(o.gap),
             walls: [f64::INFINITY, f64::NEG_INFINITY],
-            force: row(o.force),
-            force_sin: row(o.force_sin),
-            free,
-            meshing: [free; 2],
-            ..o.clone()
+            ..transformed(o, domain, row)
         };
-        let other = walled(plain, o.walls, o.contacts, case.behind);
+        let frees: Vec<Domain> = plain.stages.iter().map(|stage| stage.free).collect();
+        let other = staged(plain, &frees, o.walls, o.contacts, case.behind);
         // Rounding may make a singular matrix indefinite.
         prop_assume!(other.validate().is_ok());
         let back = |x: [f64; 2]| [
@@ -460,6 +497,52 @@ proptest! {
         prop_assert!(off < 1e-10 * growth(&ours) * size(ours.state()), "off by {off:e}");
     }
 
+    /// A change to a stage that is equal to the present one only ends steps.
+    #[test]
+    fn a_change_to_an_equal_stage_changes_nothing(case in cases(), turn in 1e-3..1.0f64) {
+        let o = &case.oscillator;
+        let mut changed = o.clone();
+        let before = o.schedule.iter().rev().find(|(phase, _)| *phase <= turn).or(o.schedule.last());
+        let held = before.map_or(0, |&(_, stage)| stage);
+        let copy = o.in_stage(held);
+        changed.stages.push(Stage { free: copy.free, meshing: copy.meshing });
+        changed.schedule.push((turn, o.stage_count()));
+        changed.schedule.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (flow, other) = (flow_of(&case), Flow::new(&changed));
+        let mut ours = Trajectory::with_tangents(&flow, case.law, case.start, UNIT);
+        let mut theirs = Trajectory::new(&other, case.law, case.start);
+        let (mut events, mut others): (Vec<GapEvent>, Vec<GapEvent>) = (Vec::new(), Vec::new());
+        prop_assume!(goes_on(ours.advance_period(&mut events)));
+        prop_assume!(goes_on(theirs.advance_period(&mut others)));
+        prop_assume!(!ours.near_grazing() && growth(&ours) < GROWTH && !is_narrow(&case, &events));
+        prop_assume!(events.len() <= COMPARABLE_EVENTS);
+        prop_assert_eq!(kinds(&events), kinds(&others));
+        let off = departure(theirs.state(), ours.state());
+        prop_assert!(off < 1e-12 * growth(&ours) * size(ours.state()), "off by {off:e}");
+    }
+
+    /// Two periods of a force are one period of its second harmonic, at half of the frequency.
+    #[test]
+    fn a_harmonic_is_a_force_of_a_multiple_of_the_frequency(case in cases()) {
+        let o = &case.oscillator;
+        let plain = Oscillator { harmonics: Vec::new(), stages: Vec::new(), schedule: Vec::new(), ..o.clone() };
+        let harmonics = vec![Harmonic { order: 2, cos: o.force, sin: o.force_sin }];
+        let slow = Oscillator { omega: 0.5 * o.omega, force: [0.0; 2], force_sin: [0.0; 2], harmonics, ..plain.clone() };
+        slow.validate().unwrap();
+        let (flow, other) = (Flow::new(&plain), Flow::new(&slow));
+        let mut ours = Trajectory::with_tangents(&flow, case.law, case.start, UNIT);
+        let mut theirs = Trajectory::new(&other, case.law, case.start);
+        let (mut events, mut others): (Vec<GapEvent>, Vec<GapEvent>) = (Vec::new(), Vec::new());
+        prop_assume!(goes_on(ours.advance_period(&mut events)));
+        prop_assume!(goes_on(ours.advance_period(&mut events)));
+        prop_assume!(goes_on(theirs.advance_period(&mut others)));
+        prop_assume!(!ours.near_grazing() && growth(&ours) < GROWTH && !is_narrow(&case, &events));
+        prop_assume!(events.len() <= COMPARABLE_EVENTS);
+        prop_assert_eq!(kinds(&events), kinds(&others));
+        let off = departure(theirs.state(), ours.state());
+        prop_assert!(off < 1e-12 * growth(&ours) * size(ours.state()), "off by {off:e}");
+    }
+
     /// There is no damping, no forcing and no loss in impacts; the springs behind walls store energy.
     #[test]
     fn conservative_motion_keeps_its_energy(case in cases()) {
@@ -467,7 +550,12 @@ proptest! {
         let none = [[0.0; 2]; 2];
         let free = Domain { damping: none, ..o.free };
         let contacts = o.contacts.map(|contact| if contact == Contact::Elastic { contact } else { Contact::Impact });
-        let plain = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], force: [0.0; 2], force_sin: [0.0; 2], free, meshing: [free; 2], ..o.clone() };
+        let plain = Oscillator {
+            walls: [f64::INFINITY, f64::NEG_INFINITY],
+            stages: Vec::new(),
+            schedule: Vec::new(),
+            ..transformed(o, |_| free, |_| [0.0; 2])
+        };
         let behind = case.behind.map(|[k, _]| [k, 0.0]);
         let conservative = walled(plain, o.walls, contacts, behind);
         let flow = Flow::new(&conservative);

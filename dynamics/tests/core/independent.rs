@@ -16,8 +16,8 @@ use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 use rayon::prelude::*;
 
 use crate::common::BUDGET;
-use cycle::{Cycle, distance, follow, settle};
-use motion::{Mode, Motion, System, What};
+use cycle::{Cycle, follow, settle};
+use motion::{Mode, Motion, System, What, distance};
 use random::{Case, Shape, case};
 
 const PLAIN: Shape = Shape { harmonics: false, stages: false, wide: false };
@@ -25,8 +25,14 @@ const PLAIN: Shape = Shape { harmonics: false, stages: false, wide: false };
 /// Forcing periods from the start in which states and events are compared.
 const FIRST: usize = 5;
 
-/// Largest difference after these periods, relative to the size of the motion and the growth of tangents.
+/// Largest difference after these periods, relative to the size of the motion.
 const FIRST_OFF: f64 = 1e-10;
+
+/// Rounding errors may have this multiple of the effect of known errors, [`Motion::shaken`].
+const NOISES: f64 = 20.0;
+
+/// Motions in which this effect is larger are not compared further.
+const MOST_NOISE: f64 = 1e-6;
 
 /// Largest difference of the strobe states of a cycle, relative to the size of the motion.
 const STROBE_OFF: f64 = 1e-10;
@@ -45,9 +51,9 @@ const MOST_PERIODS: usize = 200;
 enum Agreement {
     /// Both settle on the same cycle.
     Cycle,
-    /// The reference's cycle is one, but the other motion does not settle on it: it is too slow, or rounding leads to another.
+    /// The reference's cycle is one, but the other motion does not settle on it: it is too slow, or chaos leads it elsewhere.
     OtherEnd,
-    /// The reference finds no cycle.
+    /// The reference finds no cycle, or rounding decides its period.
     NoCycle,
 }
 
@@ -60,31 +66,36 @@ struct Compared {
     by_stage: [usize; 2],
 }
 
-/// Compares states and events of the first periods. Returns the difference, and [`Motion::by_stage`].
+/// Compares states and events of the first periods. Returns the largest difference, and [`Motion::by_stage`].
 fn first_periods(case: &Case, system: &System) -> Result<(f64, [usize; 2]), String> {
     let flow = Flow::new(&case.oscillator);
     let mut theirs = Trajectory::new(&flow, case.law, case.start);
     let mut ours = Motion::new(system, case.law, case.start, Mode::Free);
-    ours.carry_tangents();
-    let (mut events, mut worst) = (Vec::<GapEvent>::new(), 0.0f64);
-    for _ in 0..FIRST {
-        theirs.advance_period(&mut events).map_err(|stop| stop.to_string())?;
-        ours.advance_period().ok_or("the exponentials do not end")?;
-        let growth = ours.tangents.map_or(1.0, |tangents| tangents.amax().max(1.0));
-        let off = distance(ours.state(), theirs.state(), case.oscillator.omega) / growth;
-        if off.is_nan() || off > FIRST_OFF {
-            return Err(format!("off by {off:e} at growth {growth:e}"));
-        }
-        worst = worst.max(off);
-    }
+    let mut shaken = ours.shaken();
     let of = |event: &GapEvent| match event.kind {
         EventKind::Impact => (What::Impact, event.side),
         EventKind::MeshStart => (What::Begins, event.side),
         EventKind::MeshEnd => (What::Ends, event.side),
     };
-    let theirs: Vec<_> = events.iter().map(of).collect();
-    if ours.events != theirs {
-        return Err(format!("events {:?} but {theirs:?}", ours.events));
+    let mut worst = 0.0f64;
+    for period in 0..FIRST {
+        let mut events = Vec::<GapEvent>::new();
+        theirs.advance_period(&mut events).map_err(|stop| stop.to_string())?;
+        ours.events.clear();
+        let noise = ours.advance_period().and_then(|()| ours.noise(&mut shaken));
+        let noise = noise.ok_or("the exponentials do not end")?;
+        if noise > MOST_NOISE {
+            break;
+        }
+        let off = distance(ours.state(), theirs.state(), ours.rate());
+        if off.is_nan() || off > FIRST_OFF + NOISES * noise {
+            return Err(format!("off by {off:e} with noise {noise:e} in period {period}"));
+        }
+        worst = worst.max(off);
+        let events: Vec<_> = events.iter().map(of).collect();
+        if ours.events != events {
+            return Err(format!("events {:?} but {events:?} in period {period}", ours.events));
+        }
     }
     Ok((worst, ours.by_stage))
 }
@@ -125,7 +136,9 @@ fn same_cycle(case: &Case, ours: &Cycle, measured: &Measurement, orbit: &Orbit) 
         ),
         (
             "meshing",
-            [measured.mesh_fraction, orbit.mesh_fraction].iter().all(|n| (n - ours.meshes).abs() < MESH_OFF),
+            [measured.mesh_fraction, orbit.mesh_fraction]
+                .iter()
+                .all(|n| (n - ours.meshes).abs() < MESH_OFF + NOISES * ours.noise),
         ),
     ];
     match agree.iter().find(|(_, agrees)| !agrees) {
@@ -134,56 +147,96 @@ fn same_cycle(case: &Case, ours: &Cycle, measured: &Measurement, orbit: &Orbit) 
     }
 }
 
+/// Whether the reference also finds a cycle from a state of it that determines the mode.
+fn confirms(case: &Case, flow: &Flow, ours: &Cycle) -> bool {
+    let is_plain = |mode: Mode| matches!(mode, Mode::Free | Mode::Sustained(_));
+    ours.strobes.iter().find(|(_, mode)| is_plain(*mode)).is_none_or(|(state, _)| {
+        measure(flow, case.law, *state, &BUDGET).period == Some(ours.strobes.len() as u32)
+    })
+}
+
 fn compare(case: &Case) -> Result<Compared, String> {
     let (system, flow) = (System::new(&case.oscillator), Flow::new(&case.oscillator));
     let (first, by_stage) = first_periods(case, &system)?;
+    let found = |agreement, [at, by]: [f64; 2]| Ok(Compared { agreement, off: [first, at, by], by_stage });
     let measured = measure(&flow, case.law, case.start, &BUDGET);
     let ours = settle(&system, case.law, case.start, MOST_PERIODS);
-    let Some(period) = measured.period else {
-        return match ours {
-            None => Ok(Compared { agreement: Agreement::NoCycle, off: [first, 0.0, 0.0], by_stage }),
-            Some(ours) => Err(format!("a cycle {ours:?}\n{measured:?}")),
-        };
-    };
-    let orbit = analyse_flow(&flow, case.law, case.start, &BUDGET.settings, EVENT_PERIODS);
-    if let Some([at, by]) = ours.as_ref().and_then(|ours| same_cycle(case, ours, &measured, &orbit).ok()) {
-        return Ok(Compared { agreement: Agreement::Cycle, off: [first, at, by], by_stage });
+    let of_period =
+        |period| (period, analyse_flow(&flow, case.law, case.start, &BUDGET.settings, EVENT_PERIODS));
+    let theirs = measured.period.map(of_period);
+    if let (Some(ours), Some((_, orbit))) = (&ours, &theirs)
+        && let Ok(off) = same_cycle(case, ours, &measured, orbit)
+    {
+        return found(Agreement::Cycle, off);
     }
+    if let Some(ours) = ours.filter(|ours| !confirms(case, &flow, ours)) {
+        return Err(format!("a cycle {ours:?}\n{measured:?}\n{theirs:?}"));
+    }
+    let decides = |status| measured.status == Status::BelowResolution || status == Status::BelowResolution;
+    let Some((period, orbit)) = theirs.filter(|(_, orbit)| !decides(orbit.status)) else {
+        return found(Agreement::NoCycle, [0.0; 2]);
+    };
     let start = Motion::new(&system, case.law, orbit.strobe, mode_of(case, &orbit));
     let followed = follow(&start, period as usize).ok_or("the reference's cycle does not end")?;
-    if followed.off > STROBE_OFF {
+    if followed.noise > MOST_NOISE {
+        return found(Agreement::NoCycle, [0.0; 2]);
+    }
+    if followed.off > STROBE_OFF + NOISES * followed.noise {
         return Err(format!("no cycle: {followed:?}\n{orbit:?}"));
     }
-    let [at, by] = same_cycle(case, &followed, &measured, &orbit)?;
-    Ok(Compared { agreement: Agreement::OtherEnd, off: [first, at, by], by_stage })
+    found(Agreement::OtherEnd, same_cycle(case, &followed, &measured, &orbit)?)
 }
 
-/// Compares 200 models. At least this share settles on the same cycle.
-fn check(shape: Shape, share: f64) {
-    let all: Vec<_> = (0..200u64).into_par_iter().map(|seed| (seed, compare(&case(seed, shape)))).collect();
+/// Compares models. At least this share settles on the same cycle.
+fn check(shape: Shape, seeds: std::ops::Range<u64>, share: f64) {
+    let count = seeds.end - seeds.start;
+    let all: Vec<_> = seeds.into_par_iter().map(|seed| (seed, compare(&case(seed, shape)))).collect();
     let mut failures = Vec::new();
-    let (mut worst, mut by_stage, mut count) = ([0.0f64; 3], [0; 2], [0; 3]);
+    let (mut worst, mut by_stage, mut found) = ([0.0f64; 3], [0; 2], [0; 3]);
     for (seed, compared) in all {
         match compared {
             Ok(compared) => {
                 worst = std::array::from_fn(|i| worst[i].max(compared.off[i]));
                 by_stage = [0, 1].map(|i| by_stage[i] + compared.by_stage[i]);
-                count[compared.agreement as usize] += 1;
+                found[compared.agreement as usize] += 1;
             }
             Err(error) => failures.push(format!("{seed}: {error}\n{:?}", case(seed, shape))),
         }
     }
     println!(
-        "{count:?} cycles, other ends, no cycles; off by {worst:?}; {by_stage:?} rests and onsets end by a stage"
+        "{found:?} cycles, other ends, no cycles; off by {worst:?}; {by_stage:?} rests and onsets end by a stage"
     );
     assert!(failures.is_empty(), "{} fail:\n{}", failures.len(), failures.join("\n"));
-    assert!(f64::from(count[0]) >= share * 200.0 && count[1] <= 10, "{count:?}");
-    assert!(by_stage[0] > 20 && by_stage[1] > 2 || !shape.stages, "{by_stage:?}");
+    assert!(f64::from(found[0]) >= share * count as f64 && 20 * found[1] <= count as u32, "{found:?}");
+    assert!(by_stage[0] > 20 && by_stage[1] > 0 || !shape.stages, "{by_stage:?}");
 }
 
 #[test]
 fn plain_models_agree_with_matrix_exponentials() {
-    check(PLAIN, 0.9);
+    check(PLAIN, 0..200, 0.9);
+}
+
+#[test]
+fn models_with_harmonics_agree_with_matrix_exponentials() {
+    check(Shape { harmonics: true, ..PLAIN }, 0..200, 0.8);
+}
+
+#[test]
+fn models_with_stages_agree_with_matrix_exponentials() {
+    check(Shape { stages: true, ..PLAIN }, 0..200, 0.8);
+}
+
+#[test]
+fn models_with_harmonics_and_stages_agree_with_matrix_exponentials() {
+    check(Shape { harmonics: true, stages: true, ..PLAIN }, 0..200, 0.8);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn five_thousand_models_of_each_shape_agree_with_matrix_exponentials() {
+    for (harmonics, stages) in [(false, false), (true, false), (false, true), (true, true)] {
+        check(Shape { harmonics, stages, wide: false }, 200..5200, 0.8);
+    }
 }
 
 /// Longest time for one model.

@@ -1,6 +1,6 @@
 //! Classification of oscillators with one wall, against closed forms, and the effect of units.
 
-use crate::common::linear::{Linear, with_wall};
+use crate::common::linear::{Linear, transformed, with_wall};
 use crate::common::{BUDGET, near};
 use crate::single_stop::{Family, Impacting};
 use rattlemap_dynamics::flow::Flow;
@@ -205,11 +205,7 @@ pub(crate) fn in_units(
     let scaled = Oscillator {
         walls: oscillator.walls.map(|wall| length * wall),
         omega: rate * oscillator.omega,
-        force: oscillator.force.map(|f| force * f),
-        force_sin: oscillator.force_sin.map(|f| force * f),
-        free: domain(&oscillator.free),
-        meshing: [domain(&oscillator.meshing[0]), domain(&oscillator.meshing[1])],
-        ..oscillator.clone()
+        ..transformed(oscillator, domain, |f| f.map(|f| force * f))
     };
     assert_eq!(scaled.length_scale(), length * oscillator.length_scale());
     let [x1, v1, x2, v2] = start;

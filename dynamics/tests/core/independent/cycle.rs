@@ -4,7 +4,7 @@ use nalgebra::{Matrix4, Vector4};
 use rattlemap_dynamics::model::{Law, State};
 use rattlemap_dynamics::word::Word;
 
-use super::motion::{Mode, Motion, System, What};
+use super::motion::{Mode, Motion, System, What, distance};
 
 /// Longest cycle that is searched, in forcing periods.
 pub(crate) const LONGEST: usize = 12;
@@ -28,14 +28,8 @@ pub(crate) struct Cycle {
     pub(crate) meshes: f64,
     /// Distance of the end from the start, relative to the size of the motion.
     pub(crate) off: f64,
-}
-
-/// Returns the largest difference of two states relative to the larger state, with velocities divided by a rate.
-pub(crate) fn distance(a: State, b: State, rate: f64) -> f64 {
-    let scaled = |y: State| [y[0], y[1] / rate, y[2], y[3] / rate];
-    let (a, b) = (Vector4::from(scaled(a)), Vector4::from(scaled(b)));
-    let apart = (a - b).amax();
-    if apart == 0.0 { 0.0 } else { apart / a.amax().max(b.amax()) }
+    /// Largest distance of a motion with larger rounding errors at phase 0.
+    pub(crate) noise: f64,
 }
 
 fn image(motion: &mut Motion, periods: usize) -> Option<(Vector4<f64>, Matrix4<f64>)> {
@@ -65,11 +59,14 @@ pub(crate) fn follow(start: &Motion, period: usize) -> Option<Cycle> {
     }
     motion.set_state(start.state());
     motion.clear();
+    let mut shaken = motion.shaken();
     let mut strobes = Vec::new();
     motion.carry_tangents();
+    let mut noise = 0.0f64;
     for _ in 0..period {
         strobes.push((motion.state(), motion.mode));
         motion.advance_period()?;
+        noise = noise.max(motion.noise(&mut shaken)?);
     }
     Some(Cycle {
         radius: derivative(&motion)?.complex_eigenvalues().iter().map(|m| m.norm()).fold(0.0, f64::max),
@@ -77,6 +74,7 @@ pub(crate) fn follow(start: &Motion, period: usize) -> Option<Cycle> {
         impacts: motion.events.iter().filter(|event| event.0 == What::Impact).count(),
         meshes: motion.meshing_time / (period as f64 * system.period),
         off: distance(motion.state(), start.state(), rate),
+        noise,
         strobes,
     })
 }

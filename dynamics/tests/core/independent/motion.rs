@@ -18,12 +18,23 @@ const ANGLE: f64 = 0.2;
 /// Terms of Taylor series: `0.2^15 / 15!` is far below rounding.
 const TERMS: usize = 15;
 
+/// Relative errors of velocities that stand for those of rounding, which are smaller.
+const SHAKEN: f64 = 1e-12;
+
 /// Largest number of events in a part of a period.
 const MOST_EVENTS: u32 = 20_000;
 
 type Vector = SVector<f64, SIZE>;
 type Row = RowSVector<f64, SIZE>;
 type Generator = SMatrix<f64, SIZE, SIZE>;
+
+/// Returns the largest difference of two states relative to the larger state, with velocities divided by a rate.
+pub(crate) fn distance(a: State, b: State, rate: f64) -> f64 {
+    let scaled = |y: State| [y[0], y[1] / rate, y[2], y[3] / rate];
+    let (a, b) = (Vector4::from(scaled(a)), Vector4::from(scaled(b)));
+    let apart = (a - b).amax();
+    if apart == 0.0 { 0.0 } else { apart / a.amax().max(b.amax()) }
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mode {
@@ -75,7 +86,8 @@ struct Linear {
 
 impl Linear {
     fn new(a: Generator, fastest: f64) -> Linear {
-        let h = ANGLE / fastest;
+        // With few digits, sums of steps have hardly any rounding error.
+        let h = f64::from((ANGLE / fastest) as f32);
         Linear { a, step: (h, exponential(a * h)) }
     }
 
@@ -213,6 +225,8 @@ pub(crate) struct Motion<'a> {
     pub(crate) events: Vec<(What, Side)>,
     pub(crate) symbols: Vec<u8>,
     pub(crate) meshing_time: f64,
+    /// Relative errors of the velocities that are added in turn at events.
+    shaken: [f64; 4],
     /// Rests on rigid walls and contact onsets that a change of the stage has ended.
     pub(crate) by_stage: [usize; 2],
 }
@@ -245,6 +259,7 @@ impl<'a> Motion<'a> {
             events: Vec::new(),
             symbols: Vec::new(),
             meshing_time: 0.0,
+            shaken: [0.0; 4],
             by_stage: [0; 2],
         };
         motion.begin_period();
@@ -254,6 +269,21 @@ impl<'a> Motion<'a> {
     /// Returns the rate that velocities are compared in.
     pub(crate) fn rate(&self) -> f64 {
         std::f64::consts::TAU / self.system.period
+    }
+
+    /// Returns the same motion with errors of velocities at each event that are larger than those of rounding: once of one sign, and
+    /// once of two signs, since errors can cancel.
+    pub(crate) fn shaken(&self) -> [Motion<'a>; 2] {
+        let with = |signs: [f64; 4]| Motion { shaken: signs.map(|sign| SHAKEN * sign), ..self.clone() };
+        [with([1.0; 4]), with([1.0, 1.0, -1.0, -1.0])]
+    }
+
+    /// Advances both shaken motions. Returns their largest distance from this one.
+    pub(crate) fn noise(&self, shaken: &mut [Motion<'a>; 2]) -> Option<f64> {
+        let [a, b] = shaken;
+        a.advance_period().and(b.advance_period())?;
+        let off = |other: &Motion| distance(self.state(), other.state(), self.rate());
+        Some(off(a).max(off(b)))
     }
 
     pub(crate) fn state(&self) -> State {
@@ -372,7 +402,7 @@ impl<'a> Motion<'a> {
 
     /// Integrates to a time within the present stage.
     fn run(&mut self, until: f64) -> Option<()> {
-        let mut events = 0;
+        let mut events = 0u32;
         while self.t < until {
             let linear = self.linear(self.domain_index());
             let (h, is_whole) = match until - self.t {
@@ -414,6 +444,9 @@ impl<'a> Motion<'a> {
                 Some((_, end, at)) => {
                     (self.y, self.t) = (at, self.t + share * h);
                     self.act(end, share == 0.0);
+                    let error = self.shaken[events as usize % 4];
+                    self.y[1] *= 1.0 + error;
+                    self.y[3] *= 1.0 + error;
                     events += 1;
                     if events > MOST_EVENTS {
                         return None;
