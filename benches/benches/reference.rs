@@ -5,6 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use rattlemap_bench::shapes::SHAPES;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, State};
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
@@ -137,6 +138,31 @@ fn per_period_of_a_map(c: &mut Criterion) {
     group.finish();
 }
 
+/// Times one motion with further harmonics and stages.
+fn per_period_by_shape(c: &mut Criterion) {
+    let size = size();
+    let cells = grid(size.side, [4.5, 12.0]);
+    let mut group = c.benchmark_group("per period, by shape");
+    group.throughput(Throughput::Elements(cells.len() as u64 * size.periods));
+    group.sample_size(10);
+    for shape in SHAPES {
+        let shaped: Vec<_> = cells
+            .iter()
+            .map(|Cell { pair, .. }| {
+                let flow = Flow::new(&shape.of(&pair.oscillator().expect("valid parameters")));
+                Cell { pair: *pair, flow }
+            })
+            .collect();
+        let start = trajectories_of(&shaped, size.transient, []);
+        let work = |trajectories: &mut Vec<Trajectory<'_, 0>>| {
+            trajectories.iter_mut().for_each(|trajectory| advance(trajectory, size.periods));
+        };
+        let name = format!("{} harmonics, {} stages", 1 + shape.harmonics, shape.stages);
+        group.bench_function(name, |b| b.iter_batched_ref(|| start.clone(), work, BatchSize::LargeInput));
+    }
+    group.finish();
+}
+
 fn flow(c: &mut Criterion) {
     let oscillator = GearPair::paper(0.5).oscillator().expect("valid parameters");
     c.bench_function("flow of one frequency", |b| b.iter(|| Flow::new(black_box(&oscillator))));
@@ -146,6 +172,6 @@ criterion_group! {
     name = benches;
     // Plots would need fonts of the system.
     config = Criterion::default().without_plots();
-    targets = per_period, per_period_with_tangent, per_event, per_period_of_a_map, flow
+    targets = per_period, per_period_with_tangent, per_event, per_period_of_a_map, per_period_by_shape, flow
 }
 criterion_main!(benches);

@@ -4,6 +4,7 @@ pub mod host_cost;
 pub mod phase;
 pub mod scale;
 pub mod scaling;
+pub mod shapes;
 pub mod stress;
 pub mod work_precision;
 

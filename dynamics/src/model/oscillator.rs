@@ -84,6 +84,9 @@ const SAME_PHASE: f64 = 1e-12;
 /// Displacement, in scales of length, from which no motion is expected to return.
 const ESCAPE: f64 = 1e9;
 
+/// Displacement from which no motion is expected to return if nothing gives a scale of length: no force, no load, and no wall but at 0.
+const ESCAPE_WITHOUT_SCALE: f64 = 1e100;
+
 /// The contact type of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contact {
@@ -451,7 +454,11 @@ impl Oscillator {
         let mut domains = behind.map(|side| &self.meshing[side.index()]).chain([&self.free]);
         // Stages can do work: parametric resonance.
         let grows = !self.stages.is_empty() || domains.any(|domain| self.growth_rate(domain) > 0.0);
-        if grows { ESCAPE * self.length_scale() } else { f64::INFINITY }
+        match self.length_scale() {
+            _ if !grows => f64::INFINITY,
+            LEAST_LENGTH => ESCAPE_WITHOUT_SCALE,
+            length => ESCAPE * length,
+        }
     }
 
     /// Checks that spring and damper behind a wall are not negative. An elastic wall must act along the gap row only, and the

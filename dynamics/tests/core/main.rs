@@ -17,6 +17,7 @@ mod properties;
 mod quantities;
 mod resonance;
 mod single_stop;
+mod stages;
 mod sticking;
 mod stops;
 mod stress;
