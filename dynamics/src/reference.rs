@@ -208,12 +208,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     pub fn advance_period(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
         let period = self.flow.period;
         self.advance_to(period, observer)?;
-        self.clock.set(0.0);
         self.phasor = [1.0, 0.0];
+        // What a change at phase 0 ends belongs to this period.
+        self.begin_stages(observer);
+        self.clock.set(0.0);
         self.period += 1;
         self.events_in_period = 0;
         self.steps_in_period = 0;
-        self.begin_stages(observer);
         Ok(())
     }
 

@@ -9,7 +9,7 @@ use rattlemap_dynamics::model::{
     Contact, Domain, Harmonic, Law, NonImpacting, Oscillator, Side, Stage, State,
 };
 use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow, measure};
-use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
 const LAW: Law = Law { restitution: [0.0; 2], mesh_speed: [0.0; 2] };
 
@@ -92,6 +92,22 @@ fn a_change_of_the_load_releases_a_mass_at_rest() {
     assert!(near(on, returns, 1e-14) && near(off, 0.8, 1e-14), "{times:?}");
     let speed = orbit.events[0].before[1];
     assert!(near(speed, 0.08_f64.sqrt() * TAU, 1e-13), "{speed}");
+}
+
+/// A mass falls with 20 until a stage lifts it with 2 at phase 0. The contact ends in the period that ends there.
+#[test]
+fn a_release_at_phase_0_belongs_to_the_period_before() {
+    let loaded = |load: f64| Linear { gamma: 0.5, square: 0.0, force: 0.0, load, omega: 1.0 };
+    let free = staged(loaded(-20.0), &[loaded(2.0)], &[(0.0, 1), (0.3, 0)]);
+    let flow = Flow::new(&Oscillator { walls: [f64::INFINITY, 0.0], ..free });
+    let mut trajectory = Trajectory::new(&flow, LAW, REST);
+    let mut events: Vec<GapEvent> = Vec::new();
+    (0..2).for_each(|_| trajectory.advance_period(&mut events).unwrap());
+    let ends = events.iter().filter(|event| event.kind == EventKind::MeshEnd);
+    assert_eq!(ends.map(|event| (event.period, event.t)).collect::<Vec<_>>(), [(0, TAU), (1, TAU)]);
+    assert_eq!(measure(&flow, LAW, REST, &BUDGET).period, Some(1));
+    let orbit = analyse_flow(&flow, LAW, REST, &Settings::default(), 1);
+    assert_eq!((orbit.class, orbit.word.time_order().as_str()), (Class::Periodic { period: 1 }, "45"));
 }
 
 /// A contact behind a wall keeps its mode when the stiffness there changes.
