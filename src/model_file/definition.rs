@@ -1,12 +1,12 @@
 //! The contents of a model file, and the oscillator and contact law that it defines.
 
 use rattlemap_dynamics::model::{
-    Contact, Domain, Law, ModelError, Oscillator, OscillatorError, Parameter, Shapes, Side,
+    Contact, Domain, Harmonic, Law, ModelError, Oscillator, OscillatorError, Parameter, Shapes, Side, Stage,
 };
 
 use super::contact::{self, Wall, WallLaw};
-use super::entry::Names;
-use super::motion::{self, Motion};
+use super::entry::{Names, Staged};
+use super::motion::{self, ForceHarmonic, Motion};
 use super::{FileModel, parameters};
 use crate::text::document::{self, Node, Value};
 use crate::text::error::SceneError;
@@ -14,8 +14,8 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Keys outside of any table, and the names of the tables.
-const MODEL_KEYS: [&str; 8] =
-    ["name", "title", "summary", "source", "notes", "parameters", "motion", "contact"];
+const MODEL_KEYS: [&str; 9] =
+    ["name", "title", "summary", "source", "notes", "parameters", "motion", "harmonic", "contact"];
 
 /// Largest number of characters of a model's name, which occurs in scenes and file names.
 const LONGEST_MODEL_NAME: usize = 40;
@@ -69,10 +69,11 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let notes = root.get("notes").map(|field| field.lines(LONGEST_NOTES)).transpose()?;
     let written = parameters::read(&root)?;
     let names: Vec<&str> = written.iter().map(|parameter| parameter.name.as_str()).collect();
-    let names = Names { parameters: &names, states: &[] };
+    let names = Names { parameters: &names, states: &[], stages: 1 };
     let motion = motion::read(&root, names)?;
     let states: Vec<&str> = motion.state_names().collect();
-    let walls = contact::read(&root, Names { states: &states, ..names })?;
+    let stages = motion.stage_count();
+    let walls = contact::read(&root, Names { states: &states, stages, ..names })?;
     let shapes = |index: usize| {
         let uses = |entry: &Expression| entry.uses().contains(&index);
         let at_walls = walls.iter().flatten();
@@ -177,6 +178,7 @@ fn blame(error: &ModelError) -> (Table, &str) {
         "entry" | "the" => (Table::Motion, "gap"),
         "excitation" => (Table::Motion, "frequency"),
         "position" => (Table::Wall(side), "at"),
+        "phase" => (Table::Motion, "stages"),
         "load" if side.is_some() => (Table::Wall(side), "at"),
         "mesh" => (Table::Wall(side), "mesh_speed"),
         "restitution" => (Table::Wall(side), "restitution"),
@@ -195,32 +197,13 @@ impl Definition {
     pub(super) fn oscillator(&self, values: &[f64]) -> Result<Oscillator, OscillatorError> {
         let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
         let motion = &self.motion;
-        let free = Domain {
-            damping: matrix(&motion.damping, of),
-            stiffness: matrix(&motion.stiffness, of),
-            load: vector(&motion.load, of),
-        };
-        let gap = vector(&motion.gap, of);
         let mut mass = matrix(&motion.mass, of);
         if motion.degrees() == 1 {
             // The second displacement does not exist; its mass must not be 0.
             mass[1][1] = 1.0;
         }
-        let mut oscillator = Oscillator {
-            degrees: motion.degrees(),
-            mass,
-            gap,
-            walls: [f64::INFINITY, f64::NEG_INFINITY],
-            contacts: [Contact::Rigid; 2],
-            omega: of(&motion.frequency),
-            force: vector(&motion.force, of),
-            force_sin: vector(&motion.force_sin, of),
-            free,
-            meshing: [free; 2],
-            harmonics: Vec::new(),
-            stages: Vec::new(),
-            schedule: Vec::new(),
-        };
+        let gap = vector(&motion.gap, of);
+        let mut walls = [f64::INFINITY, f64::NEG_INFINITY];
         for side in Side::BOTH {
             let Some(wall) = self.wall(side) else { continue };
             let at = of(&wall.at);
@@ -234,15 +217,55 @@ impl Definition {
                     requirement: "a finite number",
                 });
             }
-            let i = side.index();
-            oscillator.walls[i] = at;
-            oscillator.contacts[i] = wall.contact();
-            if let Some(spring) = &wall.spring {
-                oscillator.meshing[i] =
-                    with_spring(free, gap, at, of(&spring.stiffness), of(&spring.damping));
-            }
+            walls[side.index()] = at;
         }
-        Ok(oscillator)
+        let stage = |stage: usize| {
+            let of = |entry: &Staged| of(entry.in_stage(stage));
+            let free = Domain {
+                damping: matrix(&motion.damping, of),
+                stiffness: matrix(&motion.stiffness, of),
+                load: vector(&motion.load, of),
+            };
+            let behind = |side: Side| match self.wall(side).and_then(|wall| wall.spring.as_ref()) {
+                Some(spring) => {
+                    with_spring(free, gap, walls[side.index()], of(&spring.stiffness), of(&spring.damping))
+                }
+                None => free,
+            };
+            Stage { free, meshing: Side::BOTH.map(behind) }
+        };
+        let harmonic = |harmonic: &ForceHarmonic| Harmonic {
+            order: harmonic.order,
+            cos: vector(&harmonic.cos, of),
+            sin: vector(&harmonic.sin, of),
+        };
+        let contact = |side: Side| self.wall(side).map_or(Contact::Rigid, Wall::contact);
+        let Stage { free, meshing } = stage(0);
+        let first = harmonic(&motion.harmonics[0]);
+        Ok(Oscillator {
+            degrees: motion.degrees(),
+            mass,
+            gap,
+            walls,
+            contacts: Side::BOTH.map(contact),
+            omega: of(&motion.frequency),
+            force: first.cos,
+            force_sin: first.sin,
+            free,
+            meshing,
+            harmonics: motion.harmonics[1..].iter().map(harmonic).collect(),
+            stages: (1..motion.stage_count()).map(stage).collect(),
+            schedule: self.schedule(of),
+        })
+    }
+
+    /// Returns the changes of the stage in a forcing period.
+    fn schedule(&self, of: impl Fn(&Expression) -> f64) -> Vec<(f64, usize)> {
+        let Motion { stages, repeat, .. } = &self.motion;
+        let phases: Vec<f64> = stages.iter().map(of).collect();
+        let turns = f64::from(*repeat);
+        let once = |i: u32| phases.iter().map(move |phase| (phase + f64::from(i)) / turns).zip(0..);
+        (0..*repeat).flat_map(once).collect()
     }
 
     /// Builds the contact law for values of the parameters.
@@ -279,7 +302,7 @@ fn plus(a: f64, b: f64) -> f64 {
     if a == 0.0 { b } else { a + b }
 }
 
-fn matrix(rows: &[Vec<Expression>], of: impl Fn(&Expression) -> f64) -> [[f64; 2]; 2] {
+fn matrix<E>(rows: &[Vec<E>], of: impl Fn(&E) -> f64) -> [[f64; 2]; 2] {
     let mut matrix = [[0.0; 2]; 2];
     for (row, entries) in matrix.iter_mut().zip(rows) {
         *row = vector(entries, &of);
@@ -287,7 +310,7 @@ fn matrix(rows: &[Vec<Expression>], of: impl Fn(&Expression) -> f64) -> [[f64; 2
     matrix
 }
 
-fn vector(entries: &[Expression], of: impl Fn(&Expression) -> f64) -> [f64; 2] {
+fn vector<E>(entries: &[E], of: impl Fn(&E) -> f64) -> [f64; 2] {
     let mut vector = [0.0; 2];
     for (number, entry) in vector.iter_mut().zip(entries) {
         *number = of(entry);

@@ -1,6 +1,6 @@
 //! Reading of model files: the values of valid files, and every kind of error.
 
-use rattlemap_dynamics::model::{Contact, Domain, Model, Range, Shapes, Side};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Model, Range, Shapes, Side};
 
 use super::*;
 use crate::text::test_cases;
@@ -145,8 +145,24 @@ fn errors_name_the_field_and_the_limit() {
 ["x"] | ["x", "y", "q"] | m.toml:14:15: `motion.coordinates = ["x", "y", "q"]` is out of range: it must be one or two names: a model has at most two degrees of freedom
 ["x"] | [] | at most two degrees of freedom
 gap = [1] | gap = [1]\nforce2 = ["F"] | m.toml:22:1: unknown field `motion.force2 = ["F"]`; did you mean `force`?
-gap = [1] | gap = [1]\nharmonics = 2 | one harmonic force and one gap row
-"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry: the force is one harmonic
+gap = [1] | gap = [1]\nharmonics = 2 | a model has one or two coordinates and one gap row
+"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry, the frequency of the forcing period; write further harmonics of the force as [[harmonic]]
+gap = [1] | gap = [1]\nrepeat = 2 | m.toml:22:10: `motion.repeat = 2` does not fit: it repeats stages, but the model has none
+gap = [1] | gap = [1]\nstages = [0] | `motion.stages = 1 phases` is out of range: it must be a list of 2 to 8 phases in [0, 1)
+gap = [1] | gap = [1]\nstages = [0, 0.5]\nrepeat = 513 | `motion.repeat = 513` is out of range: it must be a whole number from 1 to 512
+gap = [1] | gap = [1]\nstages = [0.5, 0.2] | m.toml:22:10: `motion.stages = [0.5, 0.2]` does not fit: at the defaults of stop, phase of a stage = 0.2: it must be in [0, 1) and above those before it
+gap = [1] | gap = [1]\nstages = [0, "s + 1"] | phase of a stage = 1.2: it must be in [0, 1)
+"2*zeta" | [1, 2] | `motion.damping.0.0 = [1, 2]` does not fit: a list has one value per stage, but the model has no stages; write `motion.stages`
+["-0.5"]\nfrequency = "omega"\n | [[1, 2, 3]]\nfrequency = "omega"\nstages = [0, 0.5]\n | `motion.load.0 = 3 entries` is out of range: it must be one entry, or a list of 2, one for each stage
+[["1"]] | [[[1, 2]]] | `motion.mass.0.0 = [1, 2]` has the wrong type: it must be an expression in quotes
+frequency = "omega"\ngap = [1] | frequency = "omega"\nstages = [0, 0.5]\ngap = [[1, 2]] | `motion.gap.0 = [1, 2]` has the wrong type
+at = "s" | at = [1, 2] | `contact.0.at = [1, 2]` has the wrong type
+restitution = "e" | restitution = [0.1, 0.2]\n[[harmonic]]\norder = 2\ncos = [1] | `contact.0.restitution = [0.1, 0.2]` has the wrong type
+[[contact]] | [[harmonic]]\norder = 1\ncos = [1]\n[[contact]] | `harmonic.0.order = 1` is out of range: it must be a whole number from 2 to 64
+[[contact]] | [[harmonic]]\ncos = [1]\n[[contact]] | `harmonic.0.order` is missing
+[[contact]] | [[harmonic]]\norder = 3\n[[contact]] | `harmonic.0.cos` is missing; write the amplitudes of the cosine, or of the sine as `sin`
+[[contact]] | [[harmonic]]\norder = 3\ncos = [1, 2]\n[[contact]] | `harmonic.0.cos = [1, 2]` is out of range: it must be amplitudes of one harmonic: a list of one entry
+[[contact]] | [[harmonic]]\norder = 3\ncos = [1]\n[[harmonic]]\norder = 3\nsin = [1]\n[[contact]] | `harmonic.1.order = 3` does not fit: there is already a harmonic of this order
 gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry
 [[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact = 3 tables` is out of range: it must be one or two tables, [[contact]]: a model has at most two walls
 [[contact]] | [[contact]]\nside = "right"\nat = 1\nlaw = "impact"\nrestitution = 1\n[[contact]] | m.toml:29:8: `contact.1.side = "right"` does not fit: there is already a wall on this side
@@ -325,4 +341,51 @@ fn a_force_has_a_cosine_and_a_sine() {
         ONE_DEGREE,
         "gap = [1] | force_sin = [1, 2]\\ngap = [1] | a list of one entry, one for each coordinate",
     );
+}
+
+#[test]
+fn harmonics_are_sorted_and_stages_are_repeated() {
+    let text = ONE_DEGREE
+        .replace("gap = [1]", "gap = [1]\nstages = [\"s\", \"0.6\"]\nrepeat = 2")
+        .replace("[[\"2*zeta\"]]", "[[[\"zeta\", \"2*zeta\"]]]")
+        .replace(
+            "[[contact]]",
+            "[[harmonic]]\norder = 5\nsin = [\"2*F\"]\n[[harmonic]]\norder = 2\ncos = [\"e\"]\n[[contact]]",
+        )
+        .replace("restitution = \"e\"", "restitution = \"e\"\nstiffness = [10, \"k\"]");
+    let model = read(&text);
+    let oscillator = model.oscillator().unwrap();
+    let harmonic = |order, cos, sin| Harmonic { order, cos: [cos, 0.0], sin: [sin, 0.0] };
+    assert_eq!(oscillator.harmonics, [harmonic(2, 0.8, 0.0), harmonic(5, 0.0, 3.0)]);
+    assert_eq!(oscillator.schedule, [(0.1, 0), (0.3, 1), (0.6, 0), (0.8, 1)]);
+    let [second] = &oscillator.stages[..] else { panic!("{:?}", oscillator.stages) };
+    assert_eq!((oscillator.free.damping[0][0], second.free.damping[0][0]), (0.25, 0.5));
+    let k = model.get("k").unwrap();
+    assert_eq!(oscillator.meshing[0].stiffness[0][0], 11.0);
+    assert_eq!((second.meshing[0].stiffness[0][0], second.meshing[0].load[0]), (1.0 + k, k * 0.2 - 0.5));
+    let shapes = |name: &str| model.parameters()[model.index(name).unwrap()].shapes;
+    assert_eq!(
+        (shapes("s"), shapes("e"), shapes("k")),
+        (Shapes::Oscillator, Shapes::Both, Shapes::Oscillator)
+    );
+    let lines = model.equations();
+    assert!(lines.contains(
+        &"stages of 1/2 of a period: 1 from s, 2 from 0.6; [a | b] is a in the first stage, b in the second".to_owned()
+    ));
+    let free = &lines[4];
+    assert!(
+        free.contains("[zeta | 2*zeta] x'") && free.contains("e cos(2 omega t) + 2*F sin(5 omega t)"),
+        "{free}"
+    );
+}
+
+/// Equal values in all stages give the motion of a model without stages.
+#[test]
+fn a_list_of_equal_values_is_one_value() {
+    let staged = ONE_DEGREE
+        .replace("gap = [1]", "gap = [1]\nstages = [0, 0.6]")
+        .replace("[[\"2*zeta\"]]", "[[[\"2*zeta\", \"2*zeta\"]]]");
+    let [plain, staged] = [ONE_DEGREE, &staged].map(|text| read(text).oscillator().unwrap());
+    assert_eq!((staged.free, staged.meshing), (plain.free, plain.meshing));
+    assert_eq!((staged.stages[0].free, staged.stages[0].meshing), (plain.free, plain.meshing));
 }
