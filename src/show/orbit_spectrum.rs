@@ -19,12 +19,18 @@ const WINDOWS: u32 = 7;
 const CYCLE_SAMPLES: usize = 1 << 20;
 const WINDOW_SAMPLES: usize = 1 << 19;
 
-/// Returns the samples per forcing period that figures need: 400, or 20 per oscillation of the teeth in meshing if that is more.
+/// Returns the samples per forcing period that figures need: 400, or 20 for each oscillation of the teeth in meshing, each
+/// oscillation of the highest harmonic and each stage if that is more.
 pub fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let stiffness =
-        Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)[0]).into_iter().fold(0.0, f64::max);
-    let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
-    (20.0 * ringing).clamp(400.0, 50_000.0) as usize
+    let ringing = |stage: usize| {
+        let stage = oscillator.in_stage(stage);
+        let stiffness = Side::BOTH.map(|side| stage.wall_stiffness_and_damping(side)[0]);
+        let stiffness = stiffness.into_iter().fold(0.0, f64::max);
+        (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega
+    };
+    let ringing = (0..oscillator.stage_count()).map(ringing);
+    let forced = [f64::from(oscillator.highest_order()), oscillator.schedule.len() as f64];
+    (20.0 * ringing.chain(forced).fold(0.0, f64::max)).clamp(400.0, 50_000.0) as usize
 }
 
 /// Amplitudes at one frequency.
