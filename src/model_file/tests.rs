@@ -509,14 +509,11 @@ stages = [0, "eps - 1"] | stages = ["0"] | `motion.stages = ["0"]` is out of ran
 stages = [0, "eps - 1"] | stages = "eps" | `motion.stages = "eps"` has the wrong type: it must be a list of 2 to 8 phases
 stages = [0, "eps - 1"] | stages = [0, "x"] | `x` is a coordinate
 stages = [0, "eps - 1"] | stages = [0, "eps"] | m.toml:18:10: `motion.stages = [0, "eps"]` does not fit: at the defaults of mesh, phase at which stage 2 begins = 1.5: it must be at least 0, less than 1, and greater than the phase before it
-stages = [0, "eps - 1"] | repeat = 20
-stages = [0, "eps"] | phase at which stage 2 begins = 1.5: it must be
+stages = [0, "eps - 1"] | repeat = 20\nstages = [0, "eps"] | phase at which stage 2 begins = 1.5: it must be
 stages = [0, "eps - 1"] | stages = ["-0.1", 0] | phase at which stage 1 begins = -0.1
 stages = [0, "eps - 1"] | stages = [0.5, "eps - 1"] | phase at which stage 2 begins = 0.5
-gap = [1, -1] | gap = [1, -1]
-repeat = 0 | `motion.repeat = 0` is out of range: it must be a whole number from 1 to 512
-gap = [1, -1] | gap = [1, -1]
-repeat = 2.5 | `motion.repeat = 2.5` has the wrong type: it must be a whole number
+gap = [1, -1] | gap = [1, -1]\nrepeat = 0 | `motion.repeat = 0` is out of range: it must be a whole number from 1 to 512
+gap = [1, -1] | gap = [1, -1]\nrepeat = 2.5 | `motion.repeat = 2.5` has the wrong type: it must be a whole number
 [0, ["F", "-F"]] | [["F", "-F"]] | `motion.load = [["F", "-F"]]` is out of range: it must be amplitudes of one harmonic, or constant loads: a list of two entries, one for each coordinate; an entry may be a list with one value for each stage
 [[1, 0], [0, 2]] | [[[1, 2], 0], [0, 2]] | m.toml:12:10: `motion.mass.0.0 = [1, 2]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping and load
 at = 0.5 | at = [0.5, 1] | `contact.0.at = [0.5, 1]` has the wrong type: it must be one number or expression; a list
