@@ -40,6 +40,7 @@ mod columns;
 mod constrained;
 mod energy;
 mod expansion;
+mod few;
 mod gap_polynomial;
 mod generator;
 mod linear;

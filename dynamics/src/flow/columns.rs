@@ -4,6 +4,7 @@
 use nalgebra::Matrix4;
 use wide::f64x4;
 
+use super::few::Few;
 use super::generator::Generator;
 use super::row::{Row, power};
 use super::{Gap, Phasor};
@@ -13,7 +14,7 @@ use super::{Gap, Phasor};
 pub(crate) struct Columns {
     columns: [f64x4; 7],
     rotation: Phasor,
-    waves: Vec<Wave>,
+    waves: Few<Wave>,
 }
 
 /// The columns of a higher harmonic's `cos` and `sin`, and the rotation of its phasor.
@@ -53,7 +54,7 @@ fn rotated([c, s]: Phasor, p: &Phasor) -> Phasor {
 
 impl Columns {
     pub(super) const ZERO: Columns =
-        Columns { columns: [f64x4::ZERO; 7], rotation: [0.0; 2], waves: Vec::new() };
+        Columns { columns: [f64x4::ZERO; 7], rotation: [0.0; 2], waves: Few::NONE };
 
     /// Returns zeros for the same harmonics.
     pub(super) fn cleared(&self) -> Columns {
@@ -80,7 +81,7 @@ impl Columns {
 
     /// Returns the bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
-        self.waves.capacity() * size_of::<Wave>()
+        self.waves.heap_bytes()
     }
 
     pub(super) fn row(&self, i: usize) -> Row {
@@ -107,7 +108,7 @@ impl Columns {
             let turned = turned(factors, wave.rotation);
             (order, [0, 1].map(|i| along(&wave.columns[i]) + turned[i]))
         };
-        Row { base: product, waves: self.waves.iter().zip(&row.waves).map(wave).collect() }
+        Row { base: product, waves: self.waves.iter().zip(row.waves.iter()).map(wave).collect() }
     }
 
     /// Returns the product of two matrices whose row of the constant is zero.
@@ -137,14 +138,14 @@ impl Columns {
                 inner(6),
             ],
             rotation: self.rotate(&other.rotation),
-            waves: self.waves.iter().zip(&other.waves).map(wave).collect(),
+            waves: self.waves.iter().zip(other.waves.iter()).map(wave).collect(),
         }
     }
 
     /// Returns `(1 + A) (1 + B) - 1`, the composition of two propagators that are stored minus the identity.
     pub(super) fn after(&self, first: &Columns) -> Columns {
         let product = self.times(first);
-        let waves = self.waves.iter().zip(&first.waves);
+        let waves = self.waves.iter().zip(first.waves.iter());
         let sums = waves.map(|(a, b)| a.with(b, |a, b| a + b, |a, b| a + b));
         Columns {
             columns: std::array::from_fn(|j| product.columns[j] + (self.columns[j] + first.columns[j])),
@@ -202,7 +203,7 @@ impl Columns {
                 sum.columns[j] = sum.columns[j].mul_add(wide, term.columns[j]);
             }
             sum.rotation = [sum.rotation[0] * u + term.rotation[0], sum.rotation[1] * u + term.rotation[1]];
-            for (sum, term) in sum.waves.iter_mut().zip(&term.waves) {
+            for (sum, term) in sum.waves.iter_mut().zip(term.waves.iter()) {
                 *sum = sum.with(term, |a, b| a.mul_add(wide, b), |a, b| a * u + b);
             }
         }
@@ -235,21 +236,27 @@ impl Columns {
     }
 
     /// Returns the products with the phasors of higher harmonics.
+    #[cold]
     #[inline(never)]
-    fn waved(&self, phasor: &Phasor) -> f64x4 {
+    pub(super) fn waved(&self, phasor: &Phasor) -> f64x4 {
         let terms = self.waves.iter().map(|wave| wave.forcing(power(phasor, wave.order)));
         terms.fold(f64x4::ZERO, |sum, term| sum + term)
     }
 
-    /// Returns `sum_j column_j a_j` with the fewest products, for many matrices in parallel.
+    /// Whether the force has higher harmonics.
+    #[inline(always)]
+    pub(super) fn has_waves(&self) -> bool {
+        !self.waves.is_empty()
+    }
+
+    /// Returns `sum_j column_j a_j` with the fewest products, for many matrices in parallel. Higher harmonics are left out.
     #[inline(always)]
     pub(super) fn apply_lean(&self, q: &Gap, phasor: &Phasor) -> f64x4 {
         let c = &self.columns;
         let [q0, q1, q2, q3] = q.map(f64x4::splat);
         let [cos, sin] = phasor.map(f64x4::splat);
         let gap = c[2].mul_add(q2, c[1].mul_add(q1, c[0].mul_add(q0, c[6])));
-        let first = gap + c[5].mul_add(sin, c[4].mul_add(cos, c[3] * q3));
-        if self.waves.is_empty() { first } else { first + self.waved(phasor) }
+        gap + c[5].mul_add(sin, c[4].mul_add(cos, c[3] * q3))
     }
 
     /// Applies the propagator, stored minus the identity, to a tangent vector.

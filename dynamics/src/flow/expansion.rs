@@ -129,13 +129,17 @@ impl Grid {
         p = step.carry_phasor(&p);
         let there = start + change;
         let here = there.to_array();
-        Expansion {
-            start: instant,
-            change,
-            q: there,
-            terms: std::array::from_fn(|n| self.terms[n].apply_lean(&here, &p)),
-            phasor: p,
+        let mut terms = std::array::from_fn(|n| self.terms[n].apply_lean(&here, &p));
+        if self.terms[0].has_waves() {
+            self.add_waves(&mut terms, &p);
         }
+        Expansion { start: instant, change, q: there, terms, phasor: p }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn add_waves(&self, terms: &mut [f64x4; TERMS], phasor: &Phasor) {
+        terms.iter_mut().zip(&self.terms).for_each(|(term, columns)| *term += columns.waved(phasor));
     }
 
     /// Returns tangent vectors after `u` Taylor steps.

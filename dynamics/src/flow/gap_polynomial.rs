@@ -3,6 +3,7 @@
 use wide::f64x4;
 
 use super::columns::Columns;
+use super::few::Few;
 use super::row::{Row, power};
 use super::{Gap, Phasor};
 use crate::certificate::Bernstein;
@@ -12,13 +13,14 @@ use crate::certificate::Bernstein;
 #[derive(Clone, Debug)]
 pub(crate) struct GapPolynomial {
     columns: [[f64x4; 2]; 7],
-    /// Orders of the higher harmonics, and the columns of their `cos` and `sin`.
-    waves: Vec<(u32, [[f64x4; 2]; 2])>,
 }
 
+/// A higher harmonic in the coefficients: its order, and the columns of its `cos` and `sin`.
+pub(crate) type GapWave = (u32, [[f64x4; 2]; 2]);
+
 impl GapPolynomial {
-    /// Builds the matrix from the propagator of a step `h`, minus the identity, and the row of `z''`.
-    pub(super) fn new(propagator: &Columns, curvature: &Row, h: f64) -> GapPolynomial {
+    /// Builds the matrix, and the higher harmonics, from the propagator of a step `h`, minus the identity, and the row of `z''`.
+    pub(super) fn new(propagator: &Columns, curvature: &Row, h: f64) -> (GapPolynomial, Few<GapWave>) {
         let slope = [0.0, h, 0.0, 0.0, 0.0, 0.0, 0.0];
         let scaled = |(order, factors): &(u32, [f64; 2])| (*order, factors.map(|x| h * h * x));
         let bend = Row {
@@ -38,17 +40,12 @@ impl GapPolynomial {
             coefficients(0.0, bend, rise, rate, gained)
         };
         let wave = |(k, &(order, _)): (usize, &(u32, [f64; 2]))| (order, [0, 1].map(|i| of_wave(k, i)));
-        GapPolynomial { columns, waves: bend.waves.iter().enumerate().map(wave).collect() }
-    }
-
-    /// Returns the bytes on the heap.
-    pub(super) fn heap_bytes(&self) -> usize {
-        self.waves.capacity() * size_of::<(u32, [[f64x4; 2]; 2])>()
+        (GapPolynomial { columns }, bend.waves.iter().enumerate().map(wave).collect())
     }
 
     /// Returns the polynomial for a start in the state `(q, phasor)`.
     #[inline(always)]
-    pub(crate) fn from(&self, q: &Gap, phasor: &Phasor) -> Bernstein {
+    pub(crate) fn from(&self, q: &Gap, phasor: &Phasor, waves: &Few<GapWave>) -> Bernstein {
         let c = &self.columns;
         let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]].map(f64x4::splat);
         let half = |i: usize| {
@@ -56,15 +53,16 @@ impl GapPolynomial {
             state + c[4][i].mul_add(a[4], c[5][i].mul_add(a[5], c[6][i]))
         };
         let halves = [half(0), half(1)];
-        Bernstein::from_wide(q[0], if self.waves.is_empty() { halves } else { self.waved(halves, phasor) })
+        Bernstein::from_wide(q[0], if waves.is_empty() { halves } else { with_waves(halves, phasor, waves) })
     }
+}
 
-    /// Adds the higher harmonics.
-    #[inline(never)]
-    fn waved(&self, halves: [f64x4; 2], phasor: &Phasor) -> [f64x4; 2] {
-        self.waves.iter().fold(halves, |sum, (order, [cos, sin])| {
-            let [c, s] = power(phasor, *order).map(f64x4::splat);
-            [0, 1].map(|i| sum[i] + cos[i].mul_add(c, sin[i] * s))
-        })
-    }
+/// Adds the higher harmonics.
+#[cold]
+#[inline(never)]
+fn with_waves(halves: [f64x4; 2], phasor: &Phasor, waves: &[GapWave]) -> [f64x4; 2] {
+    waves.iter().fold(halves, |sum, (order, [cos, sin])| {
+        let [c, s] = power(phasor, *order).map(f64x4::splat);
+        [0, 1].map(|i| sum[i] + cos[i].mul_add(c, sin[i] * s))
+    })
 }

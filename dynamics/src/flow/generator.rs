@@ -48,7 +48,7 @@ impl Generator {
         };
         Row {
             base: std::array::from_fn(|j| base[j]),
-            waves: row.waves.iter().zip(&self.waves).map(wave).collect(),
+            waves: row.waves.iter().zip(self.waves.iter()).map(wave).collect(),
         }
     }
 }

@@ -7,12 +7,14 @@ use super::columns::Columns;
 use super::constrained::ConstrainedMotion;
 use super::energy::EnergyBound;
 use super::expansion::{FINEST_PART, Grid};
-use super::gap_polynomial::GapPolynomial;
+use super::few::Few;
+use super::gap_polynomial::{GapPolynomial, GapWave};
 use super::generator::{Generator, generator, rate};
 use super::row::Row;
 use super::short_flight::ShortFlight;
 use super::taylor::{RADIUS, partial_sum, taylor_table};
 use super::{Gap, Phasor};
+use crate::certificate::Bernstein;
 use crate::model::{Domain, Oscillator};
 
 /// Number of halvings of the Taylor step: enough to resolve every grazing above rounding.
@@ -33,10 +35,17 @@ pub(crate) struct Step {
     pub(crate) u6: f64,
     /// The propagator, minus the identity.
     pub(crate) propagator: Columns,
-    pub(crate) gap_polynomial: GapPolynomial,
+    gap_polynomial: GapPolynomial,
+    gap_waves: Few<GapWave>,
 }
 
 impl Step {
+    /// Returns the gap over the step from a state.
+    #[inline(always)]
+    pub(crate) fn gap(&self, q: &Gap, phasor: &Phasor) -> Bernstein {
+        self.gap_polynomial.from(q, phasor, &self.gap_waves)
+    }
+
     #[inline(always)]
     pub(crate) fn end(&self, q: &Gap, phasor: &Phasor) -> (Gap, Phasor) {
         let change = self.propagator.apply(q, phasor);
@@ -80,7 +89,7 @@ pub struct LinearFlow {
 impl LinearFlow {
     /// Returns the bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
-        let of_step = |step: &Step| step.propagator.heap_bytes() + step.gap_polynomial.heap_bytes();
+        let of_step = |step: &Step| step.propagator.heap_bytes() + step.gap_waves.heap_bytes();
         let columns = self.table.capacity() + self.grid.stored();
         self.steps.capacity() * size_of::<Step>()
             + self.steps.iter().map(of_step).sum::<usize>()
@@ -160,8 +169,8 @@ impl LinearFlow {
         let u = 0.5f64.powi(level as i32 - self.taylor_level as i32);
         let propagator = if u < FINEST_PART { partial_sum(&self.table, u) } else { self.grid.propagator(u) };
         let h = u * self.unit;
-        let gap_polynomial = GapPolynomial::new(&propagator, &self.gap_rates[0], h);
-        Step { h, u, u6: u.powi(6), propagator, gap_polynomial }
+        let (gap_polynomial, gap_waves) = GapPolynomial::new(&propagator, &self.gap_rates[0], h);
+        Step { h, u, u6: u.powi(6), propagator, gap_polynomial, gap_waves }
     }
 
     /// Returns the vector field `(w, w', v, v')` at a point.

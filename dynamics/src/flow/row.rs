@@ -2,6 +2,7 @@
 
 use nalgebra::Complex;
 
+use super::few::Few;
 use super::{Gap, Phasor};
 use crate::fused::fma;
 
@@ -11,7 +12,7 @@ pub(crate) struct Row {
     /// Factors of `(z, w, x, v, cos, sin, 1)`.
     pub(crate) base: [f64; 7],
     /// Orders of the higher harmonics, and the factors of their `cos` and `sin`.
-    pub(crate) waves: Vec<(u32, [f64; 2])>,
+    pub(crate) waves: Few<(u32, [f64; 2])>,
 }
 
 impl Row {
@@ -25,6 +26,7 @@ impl Row {
         if self.waves.is_empty() { first } else { first + self.waved(phasor) }
     }
 
+    #[cold]
     #[inline(never)]
     fn waved(&self, phasor: &Phasor) -> f64 {
         let term = |&(order, [cos, sin]): &(u32, [f64; 2])| {
@@ -46,7 +48,7 @@ impl Row {
 
     /// Returns the sum of two rows, the second one multiplied by a factor.
     pub(crate) fn plus(&self, factor: f64, other: &Row) -> Row {
-        let waves = self.waves.iter().zip(&other.waves);
+        let waves = self.waves.iter().zip(other.waves.iter());
         let wave = |(&(order, a), (_, b)): (&(u32, [f64; 2]), &(u32, [f64; 2]))| {
             (order, std::array::from_fn(|i| a[i] + factor * b[i]))
         };

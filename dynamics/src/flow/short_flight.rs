@@ -8,6 +8,7 @@
 use wide::f64x4;
 
 use super::columns::Columns;
+use super::few::Few;
 use super::row::{Row, power};
 use super::{Gap, Phasor};
 use crate::fused::fma;
@@ -51,7 +52,7 @@ const fn weights(w: [[f64; 4]; WIDTH]) -> Series {
 pub(crate) struct ShortFlight {
     columns: [[f64x4; 2 * WIDTH]; 7],
     /// Orders of the higher harmonics, and the columns of their `cos` and `sin`.
-    waves: Vec<(u32, [[f64x4; 2 * WIDTH]; 2])>,
+    waves: Few<(u32, [[f64x4; 2 * WIDTH]; 2])>,
 }
 
 /// The changes of the gap and of the second displacement, in powers of the time in Taylor steps.
@@ -119,6 +120,7 @@ impl ShortFlight {
     }
 
     /// Adds the higher harmonics.
+    #[cold]
     #[inline(never)]
     fn waved(&self, series: FlightSeries, phasor: &Phasor) -> FlightSeries {
         self.waves.iter().fold(series, |sum, (order, [cos, sin])| {

@@ -39,7 +39,7 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Checks everything that could end the flight within one step.
     #[inline(always)]
     pub(super) fn step_verdict(&self, linear: &LinearFlow, step: &Step) -> StepVerdict {
-        let gap = step.gap_polynomial.from(&self.q, &self.phasor);
+        let gap = step.gap(&self.q, &self.phasor);
         let remainder = step.u6 * linear.gap_bound.remainder(&self.q, &self.phasor, step.u);
         let order = self.from_wall.map_or(0, |(_, order)| order);
         let [right, left] = self.flow.walls;
