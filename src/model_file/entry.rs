@@ -1,4 +1,4 @@
-//! Entries of vectors and matrices: numbers or expressions in parameters.
+//! Entries of vectors and matrices: numbers or expressions in parameters, or one of these for each stage.
 
 use crate::text::document::Value;
 use crate::text::error::SceneError;
@@ -6,8 +6,83 @@ use crate::text::expression::{Expression, ExpressionError};
 use crate::text::section::{Field, Section};
 
 /// What entries are, for messages.
-const CONSTANT: &str =
-    "entries are constants of a cell; time enters only through `frequency`, coordinates do not enter";
+const CONSTANT: &str = "entries are constants of a cell; time enters only through `frequency` and `stages`, coordinates do not enter";
+
+/// Lists with one value for each stage, for messages.
+const LISTS: &str = "a list with one value for each stage belongs to stiffness, damping and load";
+
+/// An entry of stiffness, damping or load: one value, or one for each stage.
+#[derive(Clone, Debug)]
+pub struct Staged(Vec<Expression>);
+
+impl Staged {
+    /// Returns the value in a stage.
+    pub fn in_stage(&self, stage: usize) -> &Expression {
+        match &self.0[..] {
+            [one] => one,
+            each => &each[stage],
+        }
+    }
+}
+
+/// An entry of a vector or a matrix.
+pub(super) trait Entry: Clone {
+    /// Whether the entry may be a list with one value for each stage.
+    const MAY_CHANGE: bool;
+
+    /// Reads an entry.
+    fn read(field: &Field<'_>, names: Names<'_>) -> Result<Self, SceneError>;
+
+    /// Returns the entry 0.
+    fn zero() -> Self;
+
+    /// Returns the value, or those of all stages.
+    fn values(&self) -> &[Expression];
+}
+
+impl Entry for Expression {
+    const MAY_CHANGE: bool = false;
+
+    fn read(field: &Field<'_>, names: Names<'_>) -> Result<Expression, SceneError> {
+        names.entry(field)
+    }
+
+    fn zero() -> Expression {
+        Expression::number(0.0)
+    }
+
+    fn values(&self) -> &[Expression] {
+        std::slice::from_ref(self)
+    }
+}
+
+impl Entry for Staged {
+    const MAY_CHANGE: bool = true;
+
+    fn read(field: &Field<'_>, names: Names<'_>) -> Result<Staged, SceneError> {
+        let Value::List(items) = &field.node.value else { return Ok(Staged(vec![names.entry(field)?])) };
+        if names.stages == 0 {
+            return Err(field.conflict(
+                "a list has one value for each stage, but the model has no stages; write `stages` in [motion], or one value",
+            ));
+        }
+        if items.len() != names.stages {
+            return Err(field.out_of_range(&format!(
+                "one value, or a list of {} values, one for each stage",
+                names.stages
+            )));
+        }
+        Ok(Staged(field.list("")?.iter().map(|item| names.entry(item)).collect::<Result<_, _>>()?))
+    }
+
+    fn zero() -> Staged {
+        Staged(vec![Expression::zero()])
+    }
+
+    fn values(&self) -> &[Expression] {
+        &self.0
+    }
+}
 
 /// Names in entries.
 #[derive(Clone, Copy)]
@@ -16,60 +91,21 @@ pub(super) struct Names<'a> {
     pub(super) parameters: &'a [&'a str],
     /// Names of the state's components, each displacement before its velocity. Entries must not contain them.
     pub(super) states: &'a [&'a str],
-    /// Number of stages; 1 if the model has none.
+    /// Number of stages; 0 if the model has none.
     pub(super) stages: usize,
 }
 
-/// An entry that may have one value per stage.
-#[derive(Clone, Debug)]
-pub struct Staged(Vec<Expression>);
-
-impl Staged {
-    /// Returns an entry that is a number in every stage.
-    pub(super) fn number(number: f64) -> Staged {
-        Staged(vec![Expression::number(number)])
-    }
-
-    /// Returns the value of a stage.
-    pub(super) fn in_stage(&self, stage: usize) -> &Expression {
-        &self.0[if self.0.len() == 1 { 0 } else { stage }]
-    }
-
-    /// Returns all values.
-    pub(super) fn values(&self) -> &[Expression] {
-        &self.0
-    }
-}
-
 impl Names<'_> {
-    /// Reads an entry that may be a list with one value per stage.
-    pub(super) fn staged(self, field: &Field<'_>) -> Result<Staged, SceneError> {
-        let Value::List(_) = &field.node.value else { return Ok(Staged(vec![self.entry(field)?])) };
-        let values = field.list("")?;
-        match self.stages {
-            1 => Err(field.conflict(
-                "a list has one value per stage, but the model has no stages; write `motion.stages`",
-            )),
-            count if values.len() != count => {
-                let requirement = format!("one entry, or a list of {count}, one for each stage");
-                Err(field.wrong_count(values.len(), "entries", &requirement))
-            }
-            _ => values.iter().map(|value| self.entry(value)).collect::<Result<_, _>>().map(Staged),
-        }
-    }
-
     /// Reads one entry.
     pub(super) fn entry(self, field: &Field<'_>) -> Result<Expression, SceneError> {
-        if let (Value::List(_), 2..) = (&field.node.value, self.stages) {
-            return Err(field.wrong_type(
-                "one entry: only stiffness, damping and load may be lists with one value per stage",
-            ));
-        }
         if let Value::Text(text) = &field.node.value
             && let Err(ExpressionError::Unknown { name }) = Expression::parse(text, self.parameters)
             && let Some(remedy) = self.remedy(&name)
         {
             return Err(field.conflict(remedy));
+        }
+        if let Value::List(_) = field.node.value {
+            return Err(field.wrong_type(&format!("one number or expression; {LISTS}")));
         }
         let all = match self.parameters {
             [] => "the model has no parameters".to_owned(),
@@ -84,36 +120,35 @@ impl Names<'_> {
             Some(i) if i % 2 == 0 => ("a coordinate", format!("write the factor of {name} in `stiffness`")),
             Some(_) => ("a velocity", format!("write the factor of {name} in `damping`")),
             None if name == "t" || name == "time" => {
-                ("the time", "write the amplitude of the harmonic force in `force`".to_owned())
+                let force = "write the amplitude of the harmonic force in `force`, and a stiffness that changes with time \
+                             in `stages`";
+                ("the time", force.to_owned())
             }
             None => return None,
         };
         Some(format!("`{name}` is {what}, and {CONSTANT}; {remedy}"))
     }
 
-    /// Reads a list of one entry per coordinate with `read`. `what` names it in messages.
-    pub(super) fn vector<T>(
+    /// Reads a list of one entry per coordinate. `what` names it in messages.
+    pub(super) fn vector<T: Entry>(
         self,
         field: &Field<'_>,
         count: usize,
         what: &str,
-        read: impl Fn(Self, &Field<'_>) -> Result<T, SceneError>,
     ) -> Result<Vec<T>, SceneError> {
-        let requirement = format!("{what}: a list of {}, one for each coordinate", entries(count));
+        let mut requirement = format!("{what}: a list of {}, one for each coordinate", entries(count));
+        if T::MAY_CHANGE && self.stages > 0 {
+            requirement += "; an entry may be a list with one value for each stage";
+        }
         let items = field.list(&requirement)?;
         if items.len() != count {
             return Err(field.out_of_range(&requirement));
         }
-        items.iter().map(|item| read(self, item)).collect()
+        items.iter().map(|item| T::read(item, self)).collect()
     }
 
-    /// Reads a square matrix, row by row, with `read`.
-    pub(super) fn matrix<T>(
-        self,
-        field: &Field<'_>,
-        count: usize,
-        read: impl Fn(Self, &Field<'_>) -> Result<T, SceneError> + Copy,
-    ) -> Result<Vec<Vec<T>>, SceneError> {
+    /// Reads a square matrix, row by row.
+    pub(super) fn matrix<T: Entry>(self, field: &Field<'_>, count: usize) -> Result<Vec<Vec<T>>, SceneError> {
         let requirement = match count {
             1 => "a matrix of one row, such as [[\"1\"]]",
             _ => "a matrix of two rows, such as [[\"m1\", \"0\"], [\"0\", \"m2\"]]",
@@ -122,32 +157,32 @@ impl Names<'_> {
         if rows.len() != count {
             return Err(field.out_of_range(requirement));
         }
-        rows.iter().map(|row| self.vector(row, count, "a row", read)).collect()
+        rows.iter().map(|row| self.vector(row, count, "a row")).collect()
     }
 
     /// Reads a list of one entry per coordinate; zeros if it is missing.
-    pub(super) fn vector_or_zeros(
+    pub(super) fn vector_or_zeros<T: Entry>(
         self,
         section: &Section<'_>,
         name: &str,
         count: usize,
-    ) -> Result<Vec<Expression>, SceneError> {
+    ) -> Result<Vec<T>, SceneError> {
         match section.get(name) {
-            Some(field) => self.vector(&field, count, "amplitudes of one harmonic", Self::entry),
-            None => Ok(vec![Expression::number(0.0); count]),
+            Some(field) => self.vector(&field, count, "amplitudes of one harmonic, or constant loads"),
+            None => Ok(vec![T::zero(); count]),
         }
     }
 
-    /// Reads a square matrix whose entries may differ between stages; zeros if it is missing.
-    pub(super) fn matrix_or_zeros(
+    /// Reads a square matrix; zeros if it is missing.
+    pub(super) fn matrix_or_zeros<T: Entry>(
         self,
         section: &Section<'_>,
         name: &str,
         count: usize,
-    ) -> Result<Vec<Vec<Staged>>, SceneError> {
+    ) -> Result<Vec<Vec<T>>, SceneError> {
         match section.get(name) {
-            Some(field) => self.matrix(&field, count, Self::staged),
-            None => Ok(vec![vec![Staged::number(0.0); count]; count]),
+            Some(field) => self.matrix(&field, count),
+            None => Ok(vec![vec![T::zero(); count]; count]),
         }
     }
 }

@@ -3,43 +3,9 @@
 use rattlemap_dynamics::model::{Contact, Side};
 
 use super::definition::Definition;
-use super::entry::Staged;
+use super::entry::Entry;
+use super::motion::Motion;
 use crate::text::expression::Expression;
-
-/// An entry as a coefficient in an equation.
-pub(crate) trait Coefficient {
-    /// Returns the number, if the entry is one.
-    fn number(&self) -> Option<f64>;
-    /// Returns the entry as written; a number in its shortest form.
-    fn text(&self) -> String;
-}
-
-impl Coefficient for Expression {
-    fn number(&self) -> Option<f64> {
-        self.as_number()
-    }
-
-    fn text(&self) -> String {
-        self.as_number().map_or_else(|| Expression::text(self).to_owned(), |number| number.to_string())
-    }
-}
-
-/// The values of all stages are written as `[first | second]`.
-impl Coefficient for Staged {
-    fn number(&self) -> Option<f64> {
-        let numbers: Option<Vec<f64>> = self.values().iter().map(Expression::as_number).collect();
-        let numbers = numbers?;
-        numbers.iter().all(|number| *number == numbers[0]).then_some(numbers[0])
-    }
-
-    fn text(&self) -> String {
-        match (self.values(), self.number()) {
-            (_, Some(number)) => number.to_string(),
-            ([single], None) => text(single),
-            (values, None) => format!("[{}]", values.iter().map(text).collect::<Vec<_>>().join(" | ")),
-        }
-    }
-}
 
 /// Returns the equations as lines: free motion, then contact with each wall. `z` and `w` name the gap and its velocity.
 pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
@@ -48,7 +14,7 @@ pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
         format!("gap   {}", row(&motion.gap, &motion.coordinates, z)),
         format!("rate  {}", row(&motion.gap, &motion.velocities, w)),
     ];
-    lines.extend(stages(definition));
+    lines.extend(stages(motion));
     lines.push(format!("free, {}", between(definition, z)));
     lines.extend(equations(definition, None).map(|line| format!("    {line}")));
     for side in Side::BOTH {
@@ -68,19 +34,6 @@ pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
     lines
 }
 
-/// Returns a line that explains the stages, if there are any.
-fn stages(definition: &Definition) -> Option<String> {
-    let motion = &definition.motion;
-    let begins = motion.stages.iter().enumerate().map(|(i, phase)| format!("{} from {}", i + 1, text(phase)));
-    let whole = match motion.repeat {
-        1 => "a period".to_owned(),
-        repeat => format!("1/{repeat} of a period"),
-    };
-    let list = begins.collect::<Vec<_>>().join(", ");
-    (!motion.stages.is_empty())
-        .then(|| format!("stages of {whole}: {list}; [a | b] is a in the first stage, b in the second"))
-}
-
 /// Returns the name of a side.
 pub(super) fn name(side: Side) -> &'static str {
     match side {
@@ -89,8 +42,27 @@ pub(super) fn name(side: Side) -> &'static str {
     }
 }
 
-fn row(entries: &[impl Coefficient], names: &[String], result: &str) -> String {
+fn row(entries: &[Expression], names: &[String], result: &str) -> String {
     format!("{result} = {}", sum(entries.iter().zip(names).map(|(entry, name)| product(entry, name))))
+}
+
+/// Returns when each stage begins, and how entries that change are written; nothing without stages.
+fn stages(motion: &Motion) -> Vec<String> {
+    if motion.stages.is_empty() {
+        return Vec::new();
+    }
+    let count = motion.stages.len();
+    let begins = (1..=count).zip(&motion.stages).map(|(i, phase)| format!("{i} from phase {}", text(phase)));
+    let begins = begins.collect::<Vec<_>>().join(", ");
+    let span = match motion.repeat {
+        1 => "each forcing period".to_owned(),
+        repeat => format!("each 1/{repeat} of the forcing period"),
+    };
+    let stages = (1..=count).map(|i| format!("stage {i}")).collect::<Vec<_>>().join(" | ");
+    vec![
+        format!("stages  {begins} of {span}"),
+        format!("        [{stages}] lists the values of an entry that changes"),
+    ]
 }
 
 /// Returns the range of the gap in free motion.
@@ -119,19 +91,32 @@ fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Ite
             terms(&motion.stiffness[i], &displacements),
             vec![along],
         ];
-        let phase = product(&motion.frequency, "t").unwrap_or_else(|| "0".to_owned());
-        let harmonics = motion.harmonics.iter().flat_map(|harmonic| {
-            let order = if harmonic.order == 1 { String::new() } else { format!("{} ", harmonic.order) };
-            [(&harmonic.cos, "cos"), (&harmonic.sin, "sin")]
-                .map(|(factors, wave)| product(&factors[i], &format!("{wave}({order}{phase})")))
-        });
-        let right = harmonics.chain([constant(&motion.load[i])]);
-        format!("{} = {}", sum(left.into_iter().flatten()), sum(right))
+        let waves = |order: u32, cos: &Expression, sin: &Expression| {
+            let phase = phase(&motion.frequency, order);
+            [product(cos, &format!("cos({phase})")), product(sin, &format!("sin({phase})"))]
+        };
+        let further = motion.harmonics.iter().flat_map(|h| waves(h.order, &h.cos[i], &h.sin[i]));
+        let force = waves(1, &motion.force[i], &motion.force_sin[i]).into_iter().chain(further);
+        format!("{} = {}", sum(left.into_iter().flatten()), sum(force.chain([constant(&motion.load[i])])))
     })
 }
 
-fn terms(entries: &[impl Coefficient], names: &[String]) -> Vec<Option<String>> {
+fn terms(entries: &[impl Entry], names: &[String]) -> Vec<Option<String>> {
     entries.iter().zip(names).map(|(entry, name)| product(entry, name)).collect()
+}
+
+/// Returns the phase of a harmonic at the time `t`, such as `2 omega t`.
+fn phase(frequency: &Expression, order: u32) -> String {
+    let multiple = match (order, frequency.as_number()) {
+        (1, _) => return product(frequency, "t").unwrap_or_else(|| "0".to_owned()),
+        (_, Some(number)) => (f64::from(order) * number).to_string(),
+        _ => {
+            let factor = factor(frequency);
+            let times = if factor.contains(['*', '/', '^']) { "*" } else { " " };
+            format!("{order}{times}{factor}")
+        }
+    };
+    format!("{multiple} t")
 }
 
 /// Joins terms with their signs; `0` without terms.
@@ -148,17 +133,35 @@ fn sum(terms: impl IntoIterator<Item = Option<String>>) -> String {
 }
 
 /// Returns `coefficient name`; none if the coefficient is 0.
-fn product(coefficient: &impl Coefficient, name: &str) -> Option<String> {
-    match coefficient.number() {
-        Some(0.0) => None,
-        Some(1.0) => Some(name.to_owned()),
-        Some(-1.0) => Some(format!("-{name}")),
-        _ => Some(format!("{} {name}", factor(coefficient))),
+fn product(coefficient: &impl Entry, name: &str) -> Option<String> {
+    let factor = match same(coefficient) {
+        Some(one) => match one.as_number() {
+            Some(0.0) => return None,
+            Some(1.0) => return Some(name.to_owned()),
+            Some(-1.0) => return Some(format!("-{name}")),
+            _ => factor(one),
+        },
+        None => list(coefficient),
+    };
+    Some(format!("{factor} {name}"))
+}
+
+fn constant(load: &impl Entry) -> Option<String> {
+    match same(load) {
+        Some(one) => (one.as_number() != Some(0.0)).then(|| text(one)),
+        None => Some(list(load)),
     }
 }
 
-fn constant(load: &impl Coefficient) -> Option<String> {
-    (load.number() != Some(0.0)).then(|| text(load))
+/// Returns the value of an entry if it is the same in all stages.
+fn same(entry: &impl Entry) -> Option<&Expression> {
+    let (first, others) = entry.values().split_first()?;
+    others.iter().all(|other| text(other) == text(first)).then_some(first)
+}
+
+/// Writes the values of an entry in all stages.
+fn list(entry: &impl Entry) -> String {
+    format!("[{}]", entry.values().iter().map(text).collect::<Vec<_>>().join(" | "))
 }
 
 /// Returns `name - entry`.
@@ -172,7 +175,7 @@ fn minus(name: &str, entry: &Expression) -> String {
 }
 
 /// Returns an entry as a factor, in parentheses if it is a sum.
-pub(crate) fn factor(entry: &impl Coefficient) -> String {
+pub(crate) fn factor(entry: &Expression) -> String {
     let text = text(entry);
     match is_product(text.strip_prefix('-').unwrap_or(&text)) {
         true => text,
@@ -180,20 +183,24 @@ pub(crate) fn factor(entry: &impl Coefficient) -> String {
     }
 }
 
-/// Whether a text has no sum outside of parentheses and brackets. The sign of an exponent looks like a sum, which only adds
+/// Whether a text has no sum outside of parentheses. The sign of an exponent looks like a sum, which only adds
 /// parentheses.
 fn is_product(text: &str) -> bool {
     let mut depth = 0;
     text.chars().all(|c| {
         match c {
-            '(' | '[' => depth += 1,
-            ')' | ']' => depth -= 1,
+            '(' => depth += 1,
+            ')' => depth -= 1,
             _ => {}
         }
         depth > 0 || !matches!(c, '+' | '-')
     })
 }
 
-fn text(entry: &impl Coefficient) -> String {
-    entry.text()
+/// Returns an entry as written; a number in its shortest form.
+fn text(entry: &Expression) -> String {
+    match entry.as_number() {
+        Some(number) => number.to_string(),
+        None => entry.text().to_owned(),
+    }
 }
