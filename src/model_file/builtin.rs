@@ -26,6 +26,8 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("impact-damper", include_str!("../../models/impact_damper.toml")),
     ("energy-sink", include_str!("../../models/energy_sink.toml")),
     ("loose-gear", include_str!("../../models/loose_gear.toml")),
+    ("mesh-stiffness", include_str!("../../models/mesh_stiffness.toml")),
+    ("meissner", include_str!("../../models/meissner.toml")),
 ];
 
 /// The built-in models, read once. A test shows that each can be read.

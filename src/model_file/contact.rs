@@ -2,7 +2,7 @@
 
 use rattlemap_dynamics::model::{Contact, Side};
 
-use super::entry::Names;
+use super::entry::{Entry, Names, Staged};
 use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
@@ -39,9 +39,9 @@ pub enum WallLaw {
 #[derive(Clone, Debug)]
 pub struct WallSpring {
     /// Stiffness.
-    pub stiffness: Expression,
+    pub stiffness: Staged,
     /// Damping.
-    pub damping: Expression,
+    pub damping: Staged,
 }
 
 #[derive(Clone, Copy)]
@@ -63,7 +63,7 @@ impl Wall {
     /// Returns the entries on which the oscillator depends.
     pub(super) fn shaping_oscillator(&self) -> impl Iterator<Item = &Expression> {
         let spring = self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping]);
-        spring.chain([&self.at])
+        spring.flat_map(Entry::values).chain([&self.at])
     }
 
     /// Returns the entries on which the contact law depends.
@@ -105,13 +105,13 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
     let at = names.entry(&at)?;
     let law = section.require("law", "write law = \"impact\" or law = \"elastic\"")?;
     let entry = |name: &str| section.get(name).map(|field| names.entry(&field)).transpose();
-    let zero = || Expression::number(0.0);
-    let (stiffness, damping) = (entry("stiffness")?, entry("damping")?);
+    let staged = |name: &str| section.get(name).map(|field| Staged::read(&field, names)).transpose();
+    let (stiffness, damping) = (staged("stiffness")?, staged("damping")?);
     let law = match law.choice(&[("impact", LawKind::Impact), ("elastic", LawKind::Elastic)])? {
         LawKind::Impact => {
             let restitution = section.require("restitution", "an impact needs one: w+ = -restitution w-")?;
             let restitution = names.entry(&restitution)?;
-            WallLaw::Impact { restitution, mesh_speed: entry("mesh_speed")?.unwrap_or_else(zero) }
+            WallLaw::Impact { restitution, mesh_speed: entry("mesh_speed")?.unwrap_or_else(Entry::zero) }
         }
         LawKind::Elastic => {
             for name in ["restitution", "mesh_speed"] {
@@ -126,8 +126,8 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
         }
     };
     let spring = (stiffness.is_some() || damping.is_some()).then(|| WallSpring {
-        stiffness: stiffness.unwrap_or_else(zero),
-        damping: damping.unwrap_or_else(zero),
+        stiffness: stiffness.unwrap_or_else(Entry::zero),
+        damping: damping.unwrap_or_else(Entry::zero),
     });
     Ok((which, side, Wall { at, law, spring }))
 }

@@ -1,11 +1,12 @@
 //! The contents of a model file, and the oscillator and contact law that it defines.
 
 use rattlemap_dynamics::model::{
-    Contact, Domain, Law, ModelError, Oscillator, OscillatorError, Parameter, Shapes, Side,
+    Contact, Domain, Harmonic, Law, ModelError, Oscillator, OscillatorError, Parameter, Shapes, Side, Stage,
 };
 
 use super::contact::{self, Wall, WallLaw};
-use super::entry::Names;
+use super::entry::{Names, Staged};
+use super::harmonic::HarmonicForce;
 use super::motion::{self, Motion};
 use super::{FileModel, parameters};
 use crate::text::document::{self, Node, Value};
@@ -14,8 +15,8 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Keys outside of any table, and the names of the tables.
-const MODEL_KEYS: [&str; 8] =
-    ["name", "title", "summary", "source", "notes", "parameters", "motion", "contact"];
+const MODEL_KEYS: [&str; 9] =
+    ["name", "title", "summary", "source", "notes", "parameters", "motion", "harmonic", "contact"];
 
 /// Largest number of characters of a model's name, which occurs in scenes and file names.
 const LONGEST_MODEL_NAME: usize = 40;
@@ -69,10 +70,10 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let notes = root.get("notes").map(|field| field.lines(LONGEST_NOTES)).transpose()?;
     let written = parameters::read(&root)?;
     let names: Vec<&str> = written.iter().map(|parameter| parameter.name.as_str()).collect();
-    let names = Names { parameters: &names, states: &[] };
+    let names = Names { parameters: &names, states: &[], stages: 0 };
     let motion = motion::read(&root, names)?;
     let states: Vec<&str> = motion.state_names().collect();
-    let walls = contact::read(&root, Names { states: &states, ..names })?;
+    let walls = contact::read(&root, Names { states: &states, stages: motion.stages.len(), ..names })?;
     let shapes = |index: usize| {
         let uses = |entry: &Expression| entry.uses().contains(&index);
         let at_walls = walls.iter().flatten();
@@ -130,20 +131,20 @@ fn read_name(field: &Field<'_>) -> Result<String, SceneError> {
 /// Builds the error for a model without motion at its defaults, at the place of the field with the error.
 fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) -> SceneError {
     let (table, key) = blame(error);
-    let wall = |of: &Field<'_>, has: &dyn Fn(&str) -> bool| match (&of.node.value, table) {
-        (Value::Table(fields), Table::Wall(side)) => {
-            let is_there = |side: Side| match fields.get("side").map(|node| &node.value) {
-                Some(Value::Text(name)) => (name == "right") == (side == Side::Right),
-                _ => false,
-            };
-            side.is_none_or(is_there) && fields.keys().any(|name| has(name))
-        }
-        _ => false,
+    let is_meant = |of: &Field<'_>| {
+        let Value::Table(fields) = &of.node.value else { return false };
+        let is = match (table, fields.get("side").or(fields.get("order")).map(|node| &node.value)) {
+            (Table::Wall(None), _) => true,
+            (Table::Wall(Some(side)), Some(Value::Text(name))) => (name == "right") == (side == Side::Right),
+            (Table::Harmonic(order), Some(Value::Integer(own))) => *own == order,
+            _ => false,
+        };
+        is && fields.contains_key(key)
     };
-    let contacts = root.get("contact").and_then(|field| field.list("").ok()).unwrap_or_default();
-    let contact = contacts.iter().find(|contact| wall(contact, &|name| name == key));
-    let opened = match contact {
-        Some(contact) => Section::open_any(contact.node, &contact.path),
+    let list = if let Table::Harmonic(_) = table { "harmonic" } else { "contact" };
+    let items = root.get(list).and_then(|field| field.list("").ok()).unwrap_or_default();
+    let opened = match items.iter().find(|item| is_meant(item)) {
+        Some(item) => Section::open_any(item.node, &item.path),
         None => root.get("motion").and_then(|motion| Section::open_any(motion.node, &motion.path)),
     };
     match opened.and_then(|section| section.get(key)) {
@@ -156,6 +157,8 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
 enum Table {
     Motion,
     Wall(Option<Side>),
+    /// The harmonic of an order.
+    Harmonic(i64),
 }
 
 /// Returns the table and the key of the quantity that an error names.
@@ -176,6 +179,11 @@ fn blame(error: &ModelError) -> (Table, &str) {
     match quantity.split(' ').next().unwrap_or_default() {
         "entry" | "the" => (Table::Motion, "gap"),
         "excitation" => (Table::Motion, "frequency"),
+        "phase" => (Table::Motion, "stages"),
+        name @ ("cosine" | "sine") => {
+            let order = quantity.rsplit(' ').next().and_then(|order| order.parse().ok());
+            (Table::Harmonic(order.unwrap_or_default()), if name == "sine" { "sin" } else { "cos" })
+        }
         "position" => (Table::Wall(side), "at"),
         "load" if side.is_some() => (Table::Wall(side), "at"),
         "mesh" => (Table::Wall(side), "mesh_speed"),
@@ -195,32 +203,13 @@ impl Definition {
     pub(super) fn oscillator(&self, values: &[f64]) -> Result<Oscillator, OscillatorError> {
         let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
         let motion = &self.motion;
-        let free = Domain {
-            damping: matrix(&motion.damping, of),
-            stiffness: matrix(&motion.stiffness, of),
-            load: vector(&motion.load, of),
-        };
         let gap = vector(&motion.gap, of);
         let mut mass = matrix(&motion.mass, of);
         if motion.degrees() == 1 {
             // The second displacement does not exist; its mass must not be 0.
             mass[1][1] = 1.0;
         }
-        let mut oscillator = Oscillator {
-            degrees: motion.degrees(),
-            mass,
-            gap,
-            walls: [f64::INFINITY, f64::NEG_INFINITY],
-            contacts: [Contact::Rigid; 2],
-            omega: of(&motion.frequency),
-            force: vector(&motion.force, of),
-            force_sin: vector(&motion.force_sin, of),
-            free,
-            meshing: [free; 2],
-            harmonics: Vec::new(),
-            stages: Vec::new(),
-            schedule: Vec::new(),
-        };
+        let (mut walls, mut contacts) = ([f64::INFINITY, f64::NEG_INFINITY], [Contact::Rigid; 2]);
         for side in Side::BOTH {
             let Some(wall) = self.wall(side) else { continue };
             let at = of(&wall.at);
@@ -234,15 +223,51 @@ impl Definition {
                     requirement: "a finite number",
                 });
             }
-            let i = side.index();
-            oscillator.walls[i] = at;
-            oscillator.contacts[i] = wall.contact();
-            if let Some(spring) = &wall.spring {
-                oscillator.meshing[i] =
-                    with_spring(free, gap, at, of(&spring.stiffness), of(&spring.damping));
-            }
+            walls[side.index()] = at;
+            contacts[side.index()] = wall.contact();
         }
-        Ok(oscillator)
+        let stage = |stage: usize| {
+            let of = |entry: &Staged| of(entry.in_stage(stage));
+            let free = Domain {
+                damping: matrix(&motion.damping, of),
+                stiffness: matrix(&motion.stiffness, of),
+                load: vector(&motion.load, of),
+            };
+            let meshing =
+                Side::BOTH.map(|side| match self.wall(side).and_then(|wall| wall.spring.as_ref()) {
+                    Some(spring) => with_spring(
+                        free,
+                        gap,
+                        walls[side.index()],
+                        of(&spring.stiffness),
+                        of(&spring.damping),
+                    ),
+                    None => free,
+                });
+            Stage { free, meshing }
+        };
+        let harmonic = |harmonic: &HarmonicForce| Harmonic {
+            order: harmonic.order,
+            cos: vector(&harmonic.cos, of),
+            sin: vector(&harmonic.sin, of),
+        };
+        let phases: Vec<f64> = motion.stages.iter().map(of).collect();
+        let Stage { free, meshing } = stage(0);
+        Ok(Oscillator {
+            degrees: motion.degrees(),
+            mass,
+            gap,
+            walls,
+            contacts,
+            omega: of(&motion.frequency),
+            force: vector(&motion.force, of),
+            force_sin: vector(&motion.force_sin, of),
+            free,
+            meshing,
+            harmonics: motion.harmonics.iter().map(harmonic).collect(),
+            stages: (1..motion.stages.len()).map(stage).collect(),
+            schedule: Oscillator::repeated(&phases, motion.repeat)?,
+        })
     }
 
     /// Builds the contact law for values of the parameters.
@@ -279,7 +304,7 @@ fn plus(a: f64, b: f64) -> f64 {
     if a == 0.0 { b } else { a + b }
 }
 
-fn matrix(rows: &[Vec<Expression>], of: impl Fn(&Expression) -> f64) -> [[f64; 2]; 2] {
+fn matrix<T>(rows: &[Vec<T>], of: impl Fn(&T) -> f64) -> [[f64; 2]; 2] {
     let mut matrix = [[0.0; 2]; 2];
     for (row, entries) in matrix.iter_mut().zip(rows) {
         *row = vector(entries, &of);
@@ -287,7 +312,7 @@ fn matrix(rows: &[Vec<Expression>], of: impl Fn(&Expression) -> f64) -> [[f64; 2
     matrix
 }
 
-fn vector(entries: &[Expression], of: impl Fn(&Expression) -> f64) -> [f64; 2] {
+fn vector<T>(entries: &[T], of: impl Fn(&T) -> f64) -> [f64; 2] {
     let mut vector = [0.0; 2];
     for (number, entry) in vector.iter_mut().zip(entries) {
         *number = of(entry);

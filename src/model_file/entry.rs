@@ -1,4 +1,4 @@
-//! Entries of vectors and matrices: numbers or expressions in parameters.
+//! Entries of vectors and matrices: numbers or expressions in parameters, or one of these for each stage.
 
 use crate::text::document::Value;
 use crate::text::error::SceneError;
@@ -6,8 +6,83 @@ use crate::text::expression::{Expression, ExpressionError};
 use crate::text::section::{Field, Section};
 
 /// What entries are, for messages.
-const CONSTANT: &str =
-    "entries are constants of a cell; time enters only through `frequency`, coordinates do not enter";
+const CONSTANT: &str = "entries are constants of a cell; time enters only through `frequency` and `stages`, coordinates do not enter";
+
+/// Lists with one value for each stage, for messages.
+const LISTS: &str = "a list with one value for each stage belongs to stiffness, damping and load";
+
+/// An entry of stiffness, damping or load: one value, or one for each stage.
+#[derive(Clone, Debug)]
+pub struct Staged(Vec<Expression>);
+
+impl Staged {
+    /// Returns the value in a stage.
+    pub fn in_stage(&self, stage: usize) -> &Expression {
+        match &self.0[..] {
+            [one] => one,
+            each => &each[stage],
+        }
+    }
+}
+
+/// An entry of a vector or a matrix.
+pub(super) trait Entry: Clone {
+    /// Whether the entry may be a list with one value for each stage.
+    const MAY_CHANGE: bool;
+
+    /// Reads an entry.
+    fn read(field: &Field<'_>, names: Names<'_>) -> Result<Self, SceneError>;
+
+    /// Returns the entry 0.
+    fn zero() -> Self;
+
+    /// Returns the value, or those of all stages.
+    fn values(&self) -> &[Expression];
+}
+
+impl Entry for Expression {
+    const MAY_CHANGE: bool = false;
+
+    fn read(field: &Field<'_>, names: Names<'_>) -> Result<Expression, SceneError> {
+        names.entry(field)
+    }
+
+    fn zero() -> Expression {
+        Expression::number(0.0)
+    }
+
+    fn values(&self) -> &[Expression] {
+        std::slice::from_ref(self)
+    }
+}
+
+impl Entry for Staged {
+    const MAY_CHANGE: bool = true;
+
+    fn read(field: &Field<'_>, names: Names<'_>) -> Result<Staged, SceneError> {
+        let Value::List(items) = &field.node.value else { return Ok(Staged(vec![names.entry(field)?])) };
+        if names.stages == 0 {
+            return Err(field.conflict(
+                "a list has one value for each stage, but the model has no stages; write `stages` in [motion], or one value",
+            ));
+        }
+        if items.len() != names.stages {
+            return Err(field.out_of_range(&format!(
+                "one value, or a list of {} values, one for each stage",
+                names.stages
+            )));
+        }
+        Ok(Staged(field.list("")?.iter().map(|item| names.entry(item)).collect::<Result<_, _>>()?))
+    }
+
+    fn zero() -> Staged {
+        Staged(vec![Expression::zero()])
+    }
+
+    fn values(&self) -> &[Expression] {
+        &self.0
+    }
+}
 
 /// Names in entries.
 #[derive(Clone, Copy)]
@@ -16,6 +91,8 @@ pub(super) struct Names<'a> {
     pub(super) parameters: &'a [&'a str],
     /// Names of the state's components, each displacement before its velocity. Entries must not contain them.
     pub(super) states: &'a [&'a str],
+    /// Number of stages; 0 if the model has none.
+    pub(super) stages: usize,
 }
 
 impl Names<'_> {
@@ -26,6 +103,9 @@ impl Names<'_> {
             && let Some(remedy) = self.remedy(&name)
         {
             return Err(field.conflict(remedy));
+        }
+        if let Value::List(_) = field.node.value {
+            return Err(field.wrong_type(&format!("one number or expression; {LISTS}")));
         }
         let all = match self.parameters {
             [] => "the model has no parameters".to_owned(),
@@ -40,7 +120,9 @@ impl Names<'_> {
             Some(i) if i % 2 == 0 => ("a coordinate", format!("write the factor of {name} in `stiffness`")),
             Some(_) => ("a velocity", format!("write the factor of {name} in `damping`")),
             None if name == "t" || name == "time" => {
-                ("the time", "write the amplitude of the harmonic force in `force`".to_owned())
+                let force = "write the amplitude of the harmonic force in `force`, and a stiffness that changes with time \
+                             in `stages`";
+                ("the time", force.to_owned())
             }
             None => return None,
         };
@@ -48,22 +130,25 @@ impl Names<'_> {
     }
 
     /// Reads a list of one entry per coordinate. `what` names it in messages.
-    pub(super) fn vector(
+    pub(super) fn vector<T: Entry>(
         self,
         field: &Field<'_>,
         count: usize,
         what: &str,
-    ) -> Result<Vec<Expression>, SceneError> {
-        let requirement = format!("{what}: a list of {}, one for each coordinate", entries(count));
+    ) -> Result<Vec<T>, SceneError> {
+        let mut requirement = format!("{what}: a list of {}, one for each coordinate", entries(count));
+        if T::MAY_CHANGE && self.stages > 0 {
+            requirement += "; an entry may be a list with one value for each stage";
+        }
         let items = field.list(&requirement)?;
         if items.len() != count {
             return Err(field.out_of_range(&requirement));
         }
-        items.iter().map(|item| self.entry(item)).collect()
+        items.iter().map(|item| T::read(item, self)).collect()
     }
 
     /// Reads a square matrix, row by row.
-    pub(super) fn matrix(self, field: &Field<'_>, count: usize) -> Result<Vec<Vec<Expression>>, SceneError> {
+    pub(super) fn matrix<T: Entry>(self, field: &Field<'_>, count: usize) -> Result<Vec<Vec<T>>, SceneError> {
         let requirement = match count {
             1 => "a matrix of one row, such as [[\"1\"]]",
             _ => "a matrix of two rows, such as [[\"m1\", \"0\"], [\"0\", \"m2\"]]",
@@ -76,28 +161,28 @@ impl Names<'_> {
     }
 
     /// Reads a list of one entry per coordinate; zeros if it is missing.
-    pub(super) fn vector_or_zeros(
+    pub(super) fn vector_or_zeros<T: Entry>(
         self,
         section: &Section<'_>,
         name: &str,
         count: usize,
-    ) -> Result<Vec<Expression>, SceneError> {
+    ) -> Result<Vec<T>, SceneError> {
         match section.get(name) {
             Some(field) => self.vector(&field, count, "amplitudes of one harmonic, or constant loads"),
-            None => Ok(vec![Expression::number(0.0); count]),
+            None => Ok(vec![T::zero(); count]),
         }
     }
 
     /// Reads a square matrix; zeros if it is missing.
-    pub(super) fn matrix_or_zeros(
+    pub(super) fn matrix_or_zeros<T: Entry>(
         self,
         section: &Section<'_>,
         name: &str,
         count: usize,
-    ) -> Result<Vec<Vec<Expression>>, SceneError> {
+    ) -> Result<Vec<Vec<T>>, SceneError> {
         match section.get(name) {
             Some(field) => self.matrix(&field, count),
-            None => Ok(vec![vec![Expression::number(0.0); count]; count]),
+            None => Ok(vec![vec![T::zero(); count]; count]),
         }
     }
 }

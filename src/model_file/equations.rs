@@ -3,6 +3,8 @@
 use rattlemap_dynamics::model::{Contact, Side};
 
 use super::definition::Definition;
+use super::entry::Entry;
+use super::motion::Motion;
 use crate::text::expression::Expression;
 
 /// Returns the equations as lines: free motion, then contact with each wall. `z` and `w` name the gap and its velocity.
@@ -11,8 +13,9 @@ pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
     let mut lines = vec![
         format!("gap   {}", row(&motion.gap, &motion.coordinates, z)),
         format!("rate  {}", row(&motion.gap, &motion.velocities, w)),
-        format!("free, {}", between(definition, z)),
     ];
+    lines.extend(stages(motion));
+    lines.push(format!("free, {}", between(definition, z)));
     lines.extend(equations(definition, None).map(|line| format!("    {line}")));
     for side in Side::BOTH {
         let Some(wall) = definition.wall(side) else { continue };
@@ -43,6 +46,25 @@ fn row(entries: &[Expression], names: &[String], result: &str) -> String {
     format!("{result} = {}", sum(entries.iter().zip(names).map(|(entry, name)| product(entry, name))))
 }
 
+/// Returns when each stage begins, and how entries that change are written; nothing without stages.
+fn stages(motion: &Motion) -> Vec<String> {
+    if motion.stages.is_empty() {
+        return Vec::new();
+    }
+    let count = motion.stages.len();
+    let begins = (1..=count).zip(&motion.stages).map(|(i, phase)| format!("{i} from phase {}", text(phase)));
+    let begins = begins.collect::<Vec<_>>().join(", ");
+    let span = match motion.repeat {
+        1 => "each forcing period".to_owned(),
+        repeat => format!("each 1/{repeat} of the forcing period"),
+    };
+    let stages = (1..=count).map(|i| format!("stage {i}")).collect::<Vec<_>>().join(" | ");
+    vec![
+        format!("stages  {begins} of {span}"),
+        format!("        [{stages}] lists the values of an entry that changes"),
+    ]
+}
+
 /// Returns the range of the gap in free motion.
 fn between(definition: &Definition, z: &str) -> String {
     let at = |side| definition.wall(side).map(|wall| text(&wall.at));
@@ -62,9 +84,6 @@ fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Ite
     };
     let [accelerations, rates, displacements] = ["''", "'", ""].map(rate);
     (0..motion.degrees()).map(move |i| {
-        let terms = |entries: &[Expression], names: &[String]| -> Vec<Option<String>> {
-            entries.iter().zip(names).map(|(entry, name)| product(entry, name)).collect()
-        };
         let along = force.and_then(|force| product(&motion.gap[i], force));
         let left = [
             terms(&motion.mass[i], &accelerations),
@@ -72,14 +91,32 @@ fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Ite
             terms(&motion.stiffness[i], &displacements),
             vec![along],
         ];
-        let phase = product(&motion.frequency, "t").unwrap_or_else(|| "0".to_owned());
-        let right = [
-            product(&motion.force[i], &format!("cos({phase})")),
-            product(&motion.force_sin[i], &format!("sin({phase})")),
-            constant(&motion.load[i]),
-        ];
-        format!("{} = {}", sum(left.into_iter().flatten()), sum(right))
+        let waves = |order: u32, cos: &Expression, sin: &Expression| {
+            let phase = phase(&motion.frequency, order);
+            [product(cos, &format!("cos({phase})")), product(sin, &format!("sin({phase})"))]
+        };
+        let further = motion.harmonics.iter().flat_map(|h| waves(h.order, &h.cos[i], &h.sin[i]));
+        let force = waves(1, &motion.force[i], &motion.force_sin[i]).into_iter().chain(further);
+        format!("{} = {}", sum(left.into_iter().flatten()), sum(force.chain([constant(&motion.load[i])])))
     })
+}
+
+fn terms(entries: &[impl Entry], names: &[String]) -> Vec<Option<String>> {
+    entries.iter().zip(names).map(|(entry, name)| product(entry, name)).collect()
+}
+
+/// Returns the phase of a harmonic at the time `t`, such as `2 omega t`.
+fn phase(frequency: &Expression, order: u32) -> String {
+    let multiple = match (order, frequency.as_number()) {
+        (1, _) => return product(frequency, "t").unwrap_or_else(|| "0".to_owned()),
+        (_, Some(number)) => (f64::from(order) * number).to_string(),
+        _ => {
+            let factor = factor(frequency);
+            let times = if factor.contains(['*', '/', '^']) { "*" } else { " " };
+            format!("{order}{times}{factor}")
+        }
+    };
+    format!("{multiple} t")
 }
 
 /// Joins terms with their signs; `0` without terms.
@@ -96,17 +133,35 @@ fn sum(terms: impl IntoIterator<Item = Option<String>>) -> String {
 }
 
 /// Returns `coefficient name`; none if the coefficient is 0.
-fn product(coefficient: &Expression, name: &str) -> Option<String> {
-    match coefficient.as_number() {
-        Some(0.0) => None,
-        Some(1.0) => Some(name.to_owned()),
-        Some(-1.0) => Some(format!("-{name}")),
-        _ => Some(format!("{} {name}", factor(coefficient))),
+fn product(coefficient: &impl Entry, name: &str) -> Option<String> {
+    let factor = match same(coefficient) {
+        Some(one) => match one.as_number() {
+            Some(0.0) => return None,
+            Some(1.0) => return Some(name.to_owned()),
+            Some(-1.0) => return Some(format!("-{name}")),
+            _ => factor(one),
+        },
+        None => list(coefficient),
+    };
+    Some(format!("{factor} {name}"))
+}
+
+fn constant(load: &impl Entry) -> Option<String> {
+    match same(load) {
+        Some(one) => (one.as_number() != Some(0.0)).then(|| text(one)),
+        None => Some(list(load)),
     }
 }
 
-fn constant(load: &Expression) -> Option<String> {
-    (load.as_number() != Some(0.0)).then(|| text(load))
+/// Returns the value of an entry if it is the same in all stages.
+fn same(entry: &impl Entry) -> Option<&Expression> {
+    let (first, others) = entry.values().split_first()?;
+    others.iter().all(|other| text(other) == text(first)).then_some(first)
+}
+
+/// Writes the values of an entry in all stages.
+fn list(entry: &impl Entry) -> String {
+    format!("[{}]", entry.values().iter().map(text).collect::<Vec<_>>().join(" | "))
 }
 
 /// Returns `name - entry`.

@@ -1,7 +1,8 @@
 //! Model files: names, parameters and matrices in TOML, read into a [`Model`]. Pure.
 //!
 //! A file defines `M x'' + C x' + K x = force cos(frequency t) + force_sin sin(frequency t) + load` in one or two
-//! coordinates, a gap `z = g . x`, and one or two walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
+//! coordinates, a gap `z = g . x`, and one or two walls. The force may have further harmonics. `C`, `K` and `load` may change
+//! at given phases of the period. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
 //! f64. `docs/models.md` describes each key.
 
 mod builtin;
@@ -9,6 +10,7 @@ mod contact;
 mod definition;
 mod entry;
 mod equations;
+mod harmonic;
 mod motion;
 mod parameters;
 #[cfg(test)]
@@ -21,8 +23,10 @@ use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter, U
 pub use builtin::{BUILT_IN, DEFAULT, MODEL_FILE};
 pub use contact::{Wall, WallLaw, WallSpring};
 pub use definition::Definition;
+pub use entry::Staged;
 #[cfg(feature = "job")]
 pub(crate) use equations::factor;
+pub use harmonic::HarmonicForce;
 
 use crate::text::error::SceneError;
 

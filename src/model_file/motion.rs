@@ -1,22 +1,23 @@
 //! `[motion]`: coordinates, matrices, forcing and the gap.
 
-use super::entry::Names;
+use super::entry::{Entry, Names, Staged};
+use super::harmonic::{self, HarmonicForce};
 use super::parameters::{check_name, read_unit};
 use crate::text::document::Value;
 use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
-use rattlemap_dynamics::model::Units;
+use rattlemap_dynamics::model::{MOST_CHANGES, MOST_STAGES, Units};
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
-const MOTION_KEYS: [&str; 14] = [
+const MOTION_KEYS: [&str; 16] = [
     "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "force_sin", "load", "frequency",
-    "gap", "units", "gap_unit", "time_unit",
+    "stages", "repeat", "gap", "units", "gap_unit", "time_unit",
 ];
 
 /// Limits of all models, for messages.
-const LIMITS: &str = "a model has one or two coordinates, one harmonic force and one gap row";
+const LIMITS: &str = "a model has one or two coordinates and one gap row; further harmonics of the force are tables, [[harmonic]]";
 
 /// Largest number of characters of a body's name.
 const LONGEST_BODY: usize = 40;
@@ -33,17 +34,23 @@ pub struct Motion {
     /// Mass matrix, row by row.
     pub mass: Vec<Vec<Expression>>,
     /// Damping matrix.
-    pub damping: Vec<Vec<Expression>>,
+    pub damping: Vec<Vec<Staged>>,
     /// Stiffness matrix.
-    pub stiffness: Vec<Vec<Expression>>,
-    /// Factors of the cosine in the harmonic force.
+    pub stiffness: Vec<Vec<Staged>>,
+    /// Factors of the cosine in the first harmonic of the force.
     pub force: Vec<Expression>,
     /// Factors of the sine.
     pub force_sin: Vec<Expression>,
+    /// Further harmonics, in increasing order.
+    pub harmonics: Vec<HarmonicForce>,
     /// Constant load.
-    pub load: Vec<Expression>,
+    pub load: Vec<Staged>,
     /// Excitation frequency.
     pub frequency: Expression,
+    /// Phases at which the stages begin, in turns; empty without stages.
+    pub stages: Vec<Expression>,
+    /// How often the stages recur in a forcing period.
+    pub repeat: u32,
     /// Gap row: the gap is `gap . x`.
     pub gap: Vec<Expression>,
     /// Units of coordinates, gap and time.
@@ -63,9 +70,11 @@ impl Motion {
 
     /// Returns all entries.
     pub(super) fn entries(&self) -> impl Iterator<Item = &Expression> {
-        let matrices = [&self.mass, &self.damping, &self.stiffness].into_iter().flatten().flatten();
-        let vectors = [&self.force, &self.force_sin, &self.load, &self.gap].into_iter().flatten();
-        matrices.chain(vectors).chain([&self.frequency])
+        let staged = [&self.damping, &self.stiffness].into_iter().flatten().flatten().chain(&self.load);
+        let harmonics = self.harmonics.iter().flat_map(|harmonic| [&harmonic.cos, &harmonic.sin]);
+        let vectors = [&self.force, &self.force_sin, &self.stages, &self.gap].into_iter();
+        let constant = vectors.chain(&self.mass).chain(harmonics).flatten();
+        staged.flat_map(Entry::values).chain(constant).chain([&self.frequency])
     }
 }
 
@@ -114,6 +123,8 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         None => coordinates.clone(),
     };
     let names = Names { states: &states, ..names };
+    let (stages, repeat) = read_stages(&section, names)?;
+    let names = Names { stages: stages.len(), ..names };
     let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
     let gap = section.require("gap", "write the gap row, such as gap = [\"1\"]: z = gap . x")?;
     let gap = names.vector(&gap, count, "one gap row")?;
@@ -124,8 +135,11 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         stiffness: names.matrix_or_zeros(&section, "stiffness", count)?,
         force: names.vector_or_zeros(&section, "force", count)?,
         force_sin: names.vector_or_zeros(&section, "force_sin", count)?,
+        harmonics: harmonic::read(root, names, count)?,
         load: names.vector_or_zeros(&section, "load", count)?,
         frequency: read_frequency(&section, names)?,
+        stages,
+        repeat,
         gap,
         coordinates,
         velocities,
@@ -162,10 +176,35 @@ fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression,
     )?;
     match field.node.value {
         Value::List(_) => Err(field.wrong_type(
-            "one entry: the force is one harmonic, force cos(frequency t) + force_sin sin(frequency t)",
+            "one entry, the frequency of the first harmonic, force cos(frequency t) + force_sin sin(frequency t); write \
+             multiples of it as [[harmonic]]",
         )),
         _ => names.entry(&field),
     }
+}
+
+/// Reads the phases at which stages begin, and how often these recur.
+fn read_stages(section: &Section<'_>, names: Names<'_>) -> Result<(Vec<Expression>, u32), SceneError> {
+    let repeat = section.get("repeat");
+    let Some(field) = section.get("stages") else {
+        return match repeat {
+            Some(field) => {
+                Err(field
+                    .conflict("it repeats the stages, but the model has none; write `stages` or remove it"))
+            }
+            None => Ok((Vec::new(), 1)),
+        };
+    };
+    let phases = format!(
+        "a list of 2 to {MOST_STAGES} phases at which stages begin, from 0 to 1, such as [\"0\", \"0.5\"]"
+    );
+    let items = field.list(&phases)?;
+    if !(2..=MOST_STAGES).contains(&items.len()) {
+        return Err(field.out_of_range(&phases));
+    }
+    let most = (MOST_CHANGES / items.len()) as u32;
+    let repeat = repeat.map_or(Ok(1), |field| field.whole(1..=most))?;
+    Ok((items.iter().map(|item| names.entry(item)).collect::<Result<_, _>>()?, repeat))
 }
 
 fn read_names(field: &Field<'_>, expected: &str) -> Result<Vec<String>, SceneError> {

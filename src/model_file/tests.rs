@@ -1,6 +1,6 @@
 //! Reading of model files: the values of valid files, and every kind of error.
 
-use rattlemap_dynamics::model::{Contact, Domain, Model, Range, Shapes, Side};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Model, Range, Shapes, Side};
 
 use super::*;
 use crate::text::test_cases;
@@ -145,8 +145,8 @@ fn errors_name_the_field_and_the_limit() {
 ["x"] | ["x", "y", "q"] | m.toml:14:15: `motion.coordinates = ["x", "y", "q"]` is out of range: it must be one or two names: a model has at most two degrees of freedom
 ["x"] | [] | at most two degrees of freedom
 gap = [1] | gap = [1]\nforce2 = ["F"] | m.toml:22:1: unknown field `motion.force2 = ["F"]`; did you mean `force`?
-gap = [1] | gap = [1]\nharmonics = 2 | one harmonic force and one gap row
-"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry: the force is one harmonic
+gap = [1] | gap = [1]\nharmonics = 2 | one gap row; further harmonics of the force are tables, [[harmonic]]
+"omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry, the frequency of the first harmonic, force cos(frequency t) + force_sin sin(frequency t); write multiples of it as [[harmonic]]
 gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry
 [[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact = 3 tables` is out of range: it must be one or two tables, [[contact]]: a model has at most two walls
 [[contact]] | [[contact]]\nside = "right"\nat = 1\nlaw = "impact"\nrestitution = 1\n[[contact]] | m.toml:29:8: `contact.1.side = "right"` does not fit: there is already a wall on this side
@@ -156,9 +156,9 @@ restitution = "e" | | m.toml:23:1: `contact.0.restitution` is missing
 "impact" | "sticky" | `contact.0.law = "sticky"` is not known; valid names: impact, elastic
 "2*zeta" | "2*zta" | m.toml:16:13: `motion.damping.0.0 = "2*zta"` has an unknown name, `zta`: did you mean `zeta`?
 "2*zeta" | "2*y" | has an unknown name, `y`
-"2*zeta" | "x^2" | m.toml:16:13: `motion.damping.0.0 = "x^2"` does not fit: `x` is a coordinate, and entries are constants of a cell; time enters only through `frequency`, coordinates do not enter; write the factor of x in `stiffness`
+"2*zeta" | "x^2" | m.toml:16:13: `motion.damping.0.0 = "x^2"` does not fit: `x` is a coordinate, and entries are constants of a cell; time enters only through `frequency` and `stages`, coordinates do not enter; write the factor of x in `stiffness`
 "2*zeta" | "zeta*v" | `v` is a velocity, and entries are constants of a cell
-"F*omega^2" | "F*cos(omega*t)" | m.toml:18:10: `motion.force.0 = "F*cos(omega*t)"` does not fit: `t` is the time, and entries are constants of a cell
+"F*omega^2" | "F*cos(omega*t)" | m.toml:18:10: `motion.force.0 = "F*cos(omega*t)"` does not fit: `t` is the time, and entries are constants of a cell; time enters only through `frequency` and `stages`, coordinates do not enter; write the amplitude of the harmonic force in `force`, and a stiffness that changes with time in `stages`
 "F*omega^2" | "time" | `time` is the time
 at = "s" | at = "s + x" | m.toml:25:6: `contact.0.at = "s + x"` does not fit: `x` is a coordinate
 "2*zeta" | "2*" | m.toml:16:13: `motion.damping.0.0 = "2*"` cannot be read to its end
@@ -324,5 +324,215 @@ fn a_force_has_a_cosine_and_a_sine() {
     check_refusals(
         ONE_DEGREE,
         "gap = [1] | force_sin = [1, 2]\\ngap = [1] | a list of one entry, one for each coordinate",
+    );
+}
+
+/// Tables and keys that a model of one degree of freedom gets.
+const HARMONICS: &str = r#"
+[[harmonic]]
+order = 4
+cos = ["F/s"]
+sin = [-1]
+
+[[harmonic]]
+order = 2
+sin = ["-2*F"]
+"#;
+
+#[test]
+fn harmonics_are_read_in_the_order_of_their_frequencies() {
+    let mut model = read(&format!("{ONE_DEGREE}{HARMONICS}"));
+    let oscillator = model.oscillator().unwrap();
+    let [second, fourth] = &oscillator.harmonics[..] else { panic!("{oscillator:?}") };
+    assert_eq!(*second, Harmonic { order: 2, cos: [0.0; 2], sin: [-3.0, 0.0] });
+    assert_eq!(*fourth, Harmonic { order: 4, cos: [7.5, 0.0], sin: [-1.0, 0.0] });
+    let line = "    x'' + 2*zeta x' + x = F*omega^2 cos(omega t) - 2*F sin(2 omega t) + F/s cos(4 omega t) - sin(4 omega t) - 0.5";
+    assert_eq!(model.equations()[3], line);
+    // Half a turn later odd harmonics have the other sign.
+    assert!(model.set_start_phase(std::f64::consts::PI));
+    let later = model.oscillator().unwrap();
+    assert_eq!((later.force, &later.harmonics), ([-6.0, 0.0], &oscillator.harmonics));
+    let text = ONE_DEGREE.replace("e = {", "a = 1\ne = {") + &HARMONICS.replace("-2*F", "a");
+    let model = read(&text);
+    assert!(model.parameters()[model.index("a").unwrap()].shapes.oscillator());
+}
+
+#[test]
+fn frequencies_of_harmonics_are_written_in_usual_notation() {
+    let at = |frequency: &str| {
+        let text = ONE_DEGREE.replace("\"omega\"\ngap", &format!("\"{frequency}\"\ngap")) + HARMONICS;
+        let line = read(&text).equations()[3].clone();
+        line.split_once("2*F sin(").unwrap().1.split_once(')').unwrap().0.to_owned()
+    };
+    assert_eq!(
+        ["omega", "1.5", "omega*s", "omega/2"].map(at),
+        ["2 omega t", "3 t", "2*omega*s t", "2*omega/2 t"]
+    );
+}
+
+#[test]
+fn errors_in_harmonics_name_the_field() {
+    check_refusals(
+        &format!("{ONE_DEGREE}{HARMONICS}"),
+        r#"
+order = 2 | order = 1 | m.toml:35:9: `harmonic.1.order = 1` does not fit: order 1 is `force` and `force_sin` in [motion]
+order = 2 | order = 65 | `harmonic.1.order = 65` is out of range: it must be a whole number from 2 to 64
+order = 2 | order = "2" | `harmonic.1.order = "2"` has the wrong type: it must be a whole number from 2 to 64
+order = 2 | order = 4 | `harmonic.1.order = 4` does not fit: there is already a harmonic of this order
+order = 2 | | `harmonic.1.order` is missing; write order = 2 for twice the frequency
+sin = ["-2*F"] | | `harmonic.1.cos` is missing; a harmonic needs cos, sin or both
+sin = ["-2*F"] | tan = [1] | unknown field `harmonic.1.tan = [1]`; valid names: order, cos, sin
+sin = ["-2*F"] | sin = [1, 2] | `harmonic.1.sin = [1, 2]` is out of range
+sin = ["-2*F"] | sin = [[1, 2]] | `harmonic.1.sin.0 = [1, 2]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping and load
+sin = ["-2*F"] | sin = ["sin(2*t)"] | `t` is the time
+sin = ["-2*F"] | sin = ["1/0"] | m.toml:36:7: `harmonic.1.sin = ["1/0"]` does not fit: at the defaults of stop, sine of harmonic 2 = inf
+cos = ["F/s"] | cos = ["log(-1)"] | m.toml:31:7: `harmonic.0.cos = ["log(-1)"]` does not fit: at the defaults of stop, cosine of harmonic 4 = NaN
+gap = [1] | gap = [1]\nharmonic = 2 | unknown field `motion.harmonic = 2`
+"#,
+    );
+    let many: String = (2..10).map(|order| format!("[[harmonic]]\norder = {order}\ncos = [1]\n")).collect();
+    check_refusals(
+        ONE_DEGREE,
+        &format!(
+            "[motion] | {}[motion] | `harmonic = 8 tables` is out of range: it must be at most 7 tables",
+            many.replace('\n', "\\n")
+        ),
+    );
+    check_refusals(
+        ONE_DEGREE,
+        "[motion] | [harmonic]\\norder = 2\\n[motion] | `harmonic = { ... }` has the wrong type: it must be at most 7 tables, [[harmonic]]",
+    );
+}
+
+const STAGES: &str = r#"name = "mesh"
+
+[parameters]
+eps = { default = 1.5, min = 1.0, max = 2.0 }
+k1 = 4.0
+k2 = 3.0
+c = 0.5
+F = 0.25
+
+[motion]
+coordinates = ["x", "y"]
+mass = [[1, 0], [0, 2]]
+damping = [[["c", "2*c"], 0], [0, 1]]
+stiffness = [[["k1", "k2"], -1], [-1, 5]]
+load = [0, ["F", "-F"]]
+frequency = 2
+gap = [1, -1]
+stages = [0, "eps - 1"]
+
+[[contact]]
+side = "right"
+at = 0.5
+law = "elastic"
+stiffness = ["10*k1", "10*k2"]
+damping = [1, "c"]
+
+[[contact]]
+side = "left"
+at = "-1"
+law = "impact"
+restitution = 0.5
+stiffness = 20
+"#;
+
+#[test]
+fn stages_have_their_own_domains() {
+    let model = read(STAGES);
+    let oscillator = model.oscillator().unwrap();
+    assert_eq!(oscillator.schedule, [(0.0, 0), (0.5, 1)]);
+    let [second] = &oscillator.stages[..] else { panic!("{oscillator:?}") };
+    let domain = |damping: f64, stiffness: f64, load: f64| Domain {
+        damping: [[damping, 0.0], [0.0, 1.0]],
+        stiffness: [[stiffness, -1.0], [-1.0, 5.0]],
+        load: [0.0, load],
+    };
+    assert_eq!([oscillator.free, second.free], [domain(0.5, 4.0, 0.25), domain(1.0, 3.0, -0.25)]);
+    // The spring adds k g g' to the stiffness and k at g to the load.
+    let [before, after] = [oscillator.meshing[0], second.meshing[0]];
+    assert_eq!((before.stiffness, before.load), ([[44.0, -41.0], [-41.0, 45.0]], [20.0, -19.75]));
+    assert_eq!((after.stiffness, after.load), ([[33.0, -31.0], [-31.0, 35.0]], [15.0, -15.25]));
+    assert_eq!((before.damping, after.damping), ([[1.5, -1.0], [-1.0, 2.0]], [[1.5, -0.5], [-0.5, 1.5]]));
+    assert_eq!(second.meshing[1].stiffness, [[23.0, -21.0], [-21.0, 25.0]]);
+    for name in ["eps", "k1", "k2", "c", "F"] {
+        assert_eq!(model.parameters()[model.index(name).unwrap()].shapes, Shapes::Oscillator, "{name}");
+    }
+    let repeated = read(&STAGES.replace("stages = [0", "repeat = 4\nstages = [0.25"));
+    let phases =
+        [(0.0625, 0), (0.125, 1), (0.3125, 0), (0.375, 1), (0.5625, 0), (0.625, 1), (0.8125, 0), (0.875, 1)];
+    assert_eq!(repeated.oscillator().unwrap().schedule, phases);
+    assert_eq!(
+        model.equations()[2..8],
+        [
+            "stages  1 from phase 0, 2 from phase eps - 1 of each forcing period",
+            "        [stage 1 | stage 2] lists the values of an entry that changes",
+            "free, -1 < z < 0.5",
+            "    x'' + [c | 2*c] x' + [k1 | k2] x - y = 0",
+            "    2 y'' + y' - x + 5 y = [F | -F]",
+            "behind the right wall, with N = [10*k1 | 10*k2] (z - 0.5) + [1 | c] w",
+        ]
+    );
+    let line = &repeated.equations()[2];
+    assert_eq!(line, "stages  1 from phase 0.25, 2 from phase eps - 1 of each 1/4 of the forcing period");
+}
+
+#[test]
+fn equal_stages_have_the_domains_of_a_model_without_stages() {
+    let plain = STAGES.replace("[\"c\", \"2*c\"]", "\"c\"").replace("[\"k1\", \"k2\"]", "\"k1\"");
+    let plain = plain.replace("[\"F\", \"-F\"]", "\"F\"").replace("[\"10*k1\", \"10*k2\"]", "\"k1\"");
+    let plain = plain.replace("[1, \"c\"]", "\"c\"");
+    let lists = ["c", "k1", "F"].into_iter().fold(plain.clone(), |text, name| {
+        let (head, rest) = text.split_once("[motion]").unwrap();
+        let quoted = format!("\"{name}\"");
+        format!("{head}[motion]{}", rest.replace(&quoted, &format!("[{quoted}, {quoted}]")))
+    });
+    let without = read(&plain.replace("stages = [0, \"eps - 1\"]", ""));
+    let with = read(&lists);
+    let (a, b) = (without.oscillator().unwrap(), with.oscillator().unwrap());
+    assert!(lists.contains(r#"["k1", "k1"]"#) && a.stages.is_empty() && a.schedule.is_empty());
+    assert_eq!(format!("{a:?}"), format!("{:?}", b.in_stage(0)), "to the bit");
+    assert_eq!(format!("{a:?}"), format!("{:?}", b.in_stage(1)));
+    assert_eq!(without.equations()[2..], with.equations()[4..]);
+}
+
+#[test]
+fn errors_in_stages_name_the_field_and_the_stage() {
+    check_refusals(
+        STAGES,
+        r#"
+stages = [0, "eps - 1"] | | m.toml:13:13: `motion.damping.0.0 = ["c", "2*c"]` does not fit: a list has one value for each stage, but the model has no stages; write `stages` in [motion], or one value
+stages = [0, "eps - 1"] | repeat = 2 | m.toml:18:10: `motion.repeat = 2` does not fit: it repeats the stages, but the model has none
+stages = [0, "eps - 1"] | stages = [0, 0.2, 0.5] | m.toml:13:13: `motion.damping.0.0 = ["c", "2*c"]` is out of range: it must be one value, or a list of 3 values, one for each stage
+stages = [0, "eps - 1"] | stages = ["0"] | `motion.stages = ["0"]` is out of range: it must be a list of 2 to 8 phases at which stages begin
+stages = [0, "eps - 1"] | stages = "eps" | `motion.stages = "eps"` has the wrong type: it must be a list of 2 to 8 phases
+stages = [0, "eps - 1"] | stages = [0, "x"] | `x` is a coordinate
+stages = [0, "eps - 1"] | stages = [0, "eps"] | m.toml:18:10: `motion.stages = [0, "eps"]` does not fit: at the defaults of mesh, phase at which stage 2 begins = 1.5: it must be at least 0, less than 1, and greater than the phase before it
+stages = [0, "eps - 1"] | repeat = 20\nstages = [0, "eps"] | phase at which stage 2 begins = 1.5: it must be
+stages = [0, "eps - 1"] | stages = ["-0.1", 0] | phase at which stage 1 begins = -0.1
+stages = [0, "eps - 1"] | stages = [0.5, "eps - 1"] | phase at which stage 2 begins = 0.5
+gap = [1, -1] | gap = [1, -1]\nrepeat = 0 | `motion.repeat = 0` is out of range: it must be a whole number from 1 to 512
+gap = [1, -1] | gap = [1, -1]\nrepeat = 2.5 | `motion.repeat = 2.5` has the wrong type: it must be a whole number
+[0, ["F", "-F"]] | [["F", "-F"]] | `motion.load = [["F", "-F"]]` is out of range: it must be amplitudes of one harmonic, or constant loads: a list of two entries, one for each coordinate; an entry may be a list with one value for each stage
+[[1, 0], [0, 2]] | [[[1, 2], 0], [0, 2]] | m.toml:12:10: `motion.mass.0.0 = [1, 2]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping and load
+at = 0.5 | at = [0.5, 1] | `contact.0.at = [0.5, 1]` has the wrong type: it must be one number or expression; a list
+restitution = 0.5 | restitution = [0.5, 1] | `contact.1.restitution = [0.5, 1]` has the wrong type: it must be one number or expression; a list
+"10*k2"] | "10*k2", 1] | m.toml:24:13: `contact.0.stiffness = ["10*k1", "10*k2", 1]` is out of range: it must be one value, or a list of 2 values
+["10*k1", "10*k2"] | ["10*k1", ["k2"]] | `contact.0.stiffness.1 = ["k2"]` has the wrong type
+"10*k2" | "-k2" | m.toml:24:13: `contact.0.stiffness = ["10*k1", "-k2"]` does not fit: at the defaults of mesh, stiffness added in contact with the right wall in stage 2 = -3: it must be at least 0
+-1], [-1, | [0, 1]], [[0, 2], | `motion.stiffness = [[["k1", "k2"], [0, 1]], [[0, 2], 5]]` does not fit: at the defaults of mesh, stiffness in free motion in stage 2 = [[3, 1], [2, 5]]: the matrix must be symmetric
+"#,
+    );
+}
+
+#[test]
+fn phases_out_of_order_are_found_for_later_values() {
+    let mut model = read(STAGES);
+    model.set("eps", 2.0).unwrap();
+    let error = model.oscillator().unwrap_err().to_string();
+    assert!(
+        error.starts_with("phase at which stage 2 begins = 1: it must be at least 0, less than 1"),
+        "{error}"
     );
 }

@@ -19,12 +19,18 @@ const WINDOWS: u32 = 7;
 const CYCLE_SAMPLES: usize = 1 << 20;
 const WINDOW_SAMPLES: usize = 1 << 19;
 
-/// Returns the samples per forcing period that figures need: 400, or 20 per oscillation of the teeth in meshing if that is more.
+/// Returns the samples per forcing period that figures need: 400, or 20 for each oscillation of the teeth in meshing, each
+/// oscillation of the highest harmonic and each stage if that is more.
 pub fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let stiffness =
-        Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)[0]).into_iter().fold(0.0, f64::max);
-    let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
-    (20.0 * ringing).clamp(400.0, 50_000.0) as usize
+    let ringing = |stage: usize| {
+        let stage = oscillator.in_stage(stage);
+        let stiffness = Side::BOTH.map(|side| stage.wall_stiffness_and_damping(side)[0]);
+        let stiffness = stiffness.into_iter().fold(0.0, f64::max);
+        (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega
+    };
+    let ringing = (0..oscillator.stage_count()).map(ringing);
+    let forced = [f64::from(oscillator.highest_order()), oscillator.schedule.len() as f64];
+    (20.0 * ringing.chain(forced).fold(0.0, f64::max)).clamp(400.0, 50_000.0) as usize
 }
 
 /// Amplitudes at one frequency.
@@ -153,7 +159,7 @@ fn amplitudes(parts: &[&[f64]], window: impl Fn(f64) -> f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::model::{GearPair, REST};
+    use rattlemap_dynamics::model::{GearPair, Harmonic, REST, Stage};
     use rattlemap_dynamics::orbit::{Settings, analyse};
 
     fn spectrum(pair: &GearPair) -> (Orbit, Spectrum) {
@@ -177,6 +183,17 @@ mod tests {
             }
         }
         assert_eq!(spectrum.lines.len(), 41);
+    }
+
+    #[test]
+    fn samples_resolve_the_highest_harmonic_and_each_stage() {
+        let plain = GearPair { k: 1.0, ..GearPair::paper(0.5) }.oscillator().unwrap();
+        let highest = Harmonic { order: 64, cos: [1.0; 2], sin: [0.0; 2] };
+        let high = Oscillator { harmonics: vec![highest], ..plain.clone() };
+        let schedule = Oscillator::repeated(&[0.0, 0.5], 40).unwrap();
+        let stages = vec![Stage { free: plain.free, meshing: plain.meshing }];
+        let staged = Oscillator { stages, schedule, ..plain.clone() };
+        assert_eq!([plain, high, staged].map(|o| samples_per_period(&o)), [400, 64 * 20, 80 * 20]);
     }
 
     /// Parseval's theorem.

@@ -265,6 +265,23 @@ fn an_unforced_motion_does_not_depend_on_the_frequency() {
 }
 
 #[test]
+fn harmonics_and_stages_are_printed_and_computed() {
+    let folder = empty();
+    let gear = format!("{}\n{}", toml(7), toml(6).replace("F2", "0.1*F"));
+    fs::write(folder.path().join("my-gear.toml"), gear).unwrap();
+    let page = stdout(&folder, "models my-gear.toml");
+    for part in [
+        "stages  1 from phase 0, 2 from phase eps - 1 of each 1/20 of the forcing period",
+        "x'' + 0.1 x' = F cos(Omega t) + 0.1*F cos(2 Omega t) - 0.3*F sin(2 Omega t) + 0.1",
+        "N = [k2 | k1] (z - 1)",
+    ] {
+        assert!(page.contains(part), "{part} is not in\n{page}");
+    }
+    let orbit: Value = serde_json::from_str(&stdout(&folder, "orbit --model my-gear.toml --json")).unwrap();
+    assert_eq!(orbit["class"], "periodic", "{orbit}");
+}
+
+#[test]
 fn a_start_needs_as_many_numbers_as_the_models_state() {
     let start = |model: &str, start: &str| {
         let run = rattlemap(&empty()).args(["orbit", "--model", model, "--start", start, "--json"]).assert();

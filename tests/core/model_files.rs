@@ -53,11 +53,11 @@ proptest! {
 
 /// Values of every type, most of them invalid.
 #[rustfmt::skip]
-const VALUES: [&str; 32] = [
+const VALUES: [&str; 36] = [
     "0", "-0.0", "1e308", "1e400", "inf", "nan", "99999999999999999999", "true", "\"e\"", "\"x\"", "\"t\"",
     "\"sqrt\"", "\"2*omega^\"", "\"-k^(e - \"", "\"1/0\"", "\"log(-1)\"", "\"right\"", "\"left\"",
     "\"elastic\"", "\"impact\"", "[]", "[1]", "[\"x\", \"y\"]", "[[1]]", "[[1, 0], [0, 1]]",
-    "[[1, 2], [2, 1]]", "[[1, 2], [3]]", "{ default = 1, min = 2 }",
+    "[[1, 2], [2, 1]]", "[0, 0.5]", "[[[1, 2]]]", "[[1, 2]]", "[{ order = 2, cos = [1] }]", "[[1, 2], [3]]", "{ default = 1, min = 2 }",
     "{ default = 1.0, min = 0, open = true }", "{ min = nan }", "1979-05-27", "\"\u{fffd}\\u0000\"",
 ];
 

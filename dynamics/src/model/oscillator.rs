@@ -55,6 +55,19 @@ pub enum OscillatorError {
     },
 }
 
+impl OscillatorError {
+    /// Adds the stage, counted from 1, to the quantity.
+    fn in_stage(mut self, stage: usize) -> OscillatorError {
+        if let OscillatorError::OutOfRange { quantity, .. }
+        | OscillatorError::NotSymmetric { quantity, .. }
+        | OscillatorError::NotAlongGap { quantity, .. } = &mut self
+        {
+            *quantity += &format!(" in stage {stage}");
+        }
+        self
+    }
+}
+
 /// Writes a matrix for a message.
 fn written(matrix: &[[f64; 2]; 2]) -> String {
     let row = |row: &[f64; 2]| format!("[{}, {}]", significant(row[0]), significant(row[1]));
@@ -200,6 +213,22 @@ impl Oscillator {
         schedule.sort_by(|a, b| a.0.total_cmp(&b.0));
         let harmonics = self.harmonics.iter().map(harmonic).collect();
         Oscillator { force, force_sin, harmonics, schedule, ..self.clone() }
+    }
+
+    /// Returns the [`schedule`](Self::schedule) of stages that begin at these phases, in order, and recur `repeat` times in a forcing
+    /// period.
+    ///
+    /// # Errors
+    /// [`OscillatorError::OutOfRange`] for the first phase that is not in `[0, 1)`, or not above the one before it.
+    pub fn repeated(phases: &[f64], repeat: u32) -> Result<Vec<(f64, usize)>, OscillatorError> {
+        let once: Vec<(f64, usize)> = phases.iter().copied().zip(0..).collect();
+        check_phases(&once)?;
+        let nth = |i: u32| {
+            let later =
+                move |&(phase, stage): &(f64, usize)| ((phase + f64::from(i)) / f64::from(repeat), stage);
+            once.iter().map(later)
+        };
+        Ok((0..repeat).flat_map(nth).collect())
     }
 
     /// Returns the number of stages, 1 or more.
@@ -415,15 +444,12 @@ impl Oscillator {
             changes as f64,
             few,
         )?;
-        let mut before = -1.0;
-        for &(begins, stage) in &self.schedule {
-            let quantity = || "phase of a stage".to_owned();
-            let in_order = "in [0, 1) and above those before it";
-            require(begins > before && (0.0..1.0).contains(&begins), quantity, begins, in_order)?;
+        check_phases(&self.schedule)?;
+        for &(_, stage) in &self.schedule {
             require(stage < count, || "index of a stage".to_owned(), stage as f64, "that of a stage")?;
-            before = begins;
         }
-        (1..count).try_for_each(|stage| self.in_stage(stage).validate())
+        (1..count)
+            .try_for_each(|stage| self.in_stage(stage).validate().map_err(|error| error.in_stage(stage + 1)))
     }
 
     /// Whether a wall exists and motion can continue behind it.
@@ -596,6 +622,17 @@ impl Oscillator {
                 changes => changes % 2 == 0 && self.schedule.iter().enumerate().take(half).all(recurs),
             }
     }
+}
+
+/// Checks that phases at which stages begin are in `[0, 1)` and increase.
+fn check_phases(schedule: &[(f64, usize)]) -> Result<(), OscillatorError> {
+    let mut before = f64::NEG_INFINITY;
+    schedule.iter().try_for_each(|&(begins, stage)| {
+        let is_allowed = (0.0..1.0).contains(&begins) && begins > before;
+        before = begins;
+        let quantity = || format!("phase at which stage {} begins", stage + 1);
+        require(is_allowed, quantity, begins, "at least 0, less than 1, and greater than the phase before it")
+    })
 }
 
 /// Returns the mirror image of a domain: the load has the opposite sign.
