@@ -48,13 +48,11 @@ impl Row {
 
     /// Returns the sum of two rows, the second one multiplied by a factor.
     pub(crate) fn plus(&self, factor: f64, other: &Row) -> Row {
-        let waves = self.waves.iter().zip(other.waves.iter());
-        let wave = |(&(order, a), (_, b)): (&(u32, [f64; 2]), &(u32, [f64; 2]))| {
-            (order, std::array::from_fn(|i| a[i] + factor * b[i]))
-        };
+        let sum = |a: [f64; 2], b: [f64; 2]| std::array::from_fn(|i| a[i] + factor * b[i]);
+        let both = self.waves.iter().zip(other.waves.iter());
         Row {
             base: std::array::from_fn(|j| self.base[j] + factor * other.base[j]),
-            waves: waves.map(wave).collect(),
+            waves: both.map(|(&(order, a), &(_, b))| (order, sum(a, b))).collect(),
         }
     }
 }
