@@ -42,6 +42,9 @@ use crate::model::{Law, Side, State};
 /// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
 const RESCALE_STEPS: u64 = 16;
 
+/// Number of steps after which motion in a long period is tested for escape: a large displacement makes all steps short.
+const ESCAPE_STEPS: u64 = 1024;
+
 /// Largest entry of a state that counts as finite.
 const HUGE: f64 = 1e150;
 
@@ -283,6 +286,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             self.steps_in_period += 1;
             if self.steps_in_period > STEPS_PER_PERIOD_CAP || self.work.steps > self.allowance.steps {
                 return Err(self.too_many_steps());
+            }
+            if self.steps_in_period.is_multiple_of(ESCAPE_STEPS) {
+                self.check_finite()?;
             }
             let computed;
             let step = match linear.step(level) {

@@ -37,7 +37,7 @@ const MOST_NOISE: f64 = 1e-6;
 /// Largest difference of the strobe states of a cycle, relative to the size of the motion.
 const STROBE_OFF: f64 = 1e-10;
 
-/// Largest difference of the moduli of largest multipliers.
+/// Largest difference of the moduli of largest multipliers, per forcing period of the cycle.
 const MULTIPLIER_OFF: f64 = 1e-7;
 
 /// Largest difference of the share of time in contact.
@@ -126,7 +126,10 @@ fn same_cycle(case: &Case, ours: &Cycle, measured: &Measurement, orbit: &Orbit) 
     let agree = [
         ("period", measured.period == Some(period) && orbit.class == Class::Periodic { period }),
         ("state", at < STROBE_OFF),
-        ("multiplier", radii.iter().all(|radius| (ours.radius - radius).abs() < MULTIPLIER_OFF)),
+        (
+            "multiplier",
+            radii.iter().all(|radius| (ours.radius - radius).abs() < MULTIPLIER_OFF * f64::from(period)),
+        ),
         ("word", measured.word.as_ref() == Some(&ours.word) && orbit.word == ours.word),
         (
             "impacts",

@@ -4,7 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::common::{BUDGET, REST, apart, flow_of, negated, paper, sign, strobe, work_since};
-use rattlemap_dynamics::model::{GearPair, Side, State};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse, measure, measure_until};
 use rattlemap_dynamics::reference::{EVENTS_PER_PERIOD_CAP, GapEvent, Stop, Trajectory, Work};
 use rayon::prelude::*;
@@ -90,6 +91,32 @@ fn extremes() -> Vec<(&'static str, GearPair)> {
         ("light against heavy", GearPair { m1: 1e-3, m2: 1e3, ..p }),
         ("heavy against light", GearPair { m1: 1e3, m2: 1e-3, e: 0.1, ..p }),
     ]
+}
+
+/// In one forcing period the first mass falls down a hill by a factor of `e^390`, while the second one vibrates in the gap.
+#[test]
+fn an_escape_within_a_long_period_takes_bounded_work() {
+    let free = Domain {
+        damping: [[1.0, 0.0], [0.0, 8.0]],
+        stiffness: [[-15.0, 0.0], [0.0, 500.0]],
+        load: [0.0, 1.0],
+    };
+    let oscillator = Oscillator {
+        degrees: 2,
+        mass: [[1.0, 0.0], [0.0, 1.0]],
+        gap: [0.0, 1.0],
+        walls: [0.7, f64::NEG_INFINITY],
+        contacts: [Contact::Rigid; 2],
+        omega: 0.053,
+        force: [7.0, 8.0],
+        free,
+        meshing: [free; 2],
+        ..paper(0.5, 1.0).oscillator().unwrap()
+    };
+    let flow = Flow::new(&oscillator);
+    let mut trajectory = Trajectory::new(&flow, Law::both(0.5, 0.0), [0.0, 0.0, 0.1, 0.0]);
+    assert_eq!(trajectory.advance_period(&mut ()), Err(Stop::Escape));
+    assert!(trajectory.work().steps < 10_000, "{:?}", trajectory.work());
 }
 
 #[test]
