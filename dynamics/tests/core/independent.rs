@@ -242,7 +242,7 @@ fn five_thousand_models_of_each_shape_agree_with_matrix_exponentials() {
     }
 }
 
-/// Longest time for one model.
+/// Longest time for one model on an idle processor.
 const LONGEST_TIME: Duration = Duration::from_secs(2);
 
 /// Measures models of wide ranges. Every motion must end in time, with finite numbers.
@@ -265,9 +265,10 @@ fn check_ends(seeds: std::ops::Range<u64>) {
     let of = |status| ends.iter().filter(|end| end.2 == status).count();
     let statuses = Status::ALL.map(|status| (status.name(), of(status)));
     println!("{statuses:?}; the slowest: {slowest:?}");
+    let slow: Vec<_> = ends.iter().filter(|end| end.0 >= LONGEST_TIME).collect();
     let wrong: Vec<_> = ends.iter().filter(|end| !end.3).collect();
     assert!(wrong.is_empty(), "not finite: {wrong:?}");
-    assert!(slowest.0 < LONGEST_TIME, "{slowest:?}");
+    assert!(slow.is_empty(), "{slow:?}");
     assert!(2 * of(Status::Ok) > ends.len(), "{statuses:?}");
 }
 
