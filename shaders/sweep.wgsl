@@ -53,6 +53,9 @@ fn load_lane(i: u32) {
     motion = motions[i].now;
     tally = tallies[i].now;
     iterations = 0u;
+    if STAGES {
+        cell.flow_index = flow_of_stage();
+    }
     if KEEP {
         measures = motions[i].measures;
         search = tallies[i].search;
@@ -105,6 +108,9 @@ fn fly_to_stop_phase() -> bool {
 fn flight_to_chatter() -> bool {
     chatters = false;
     while has_work() && !chatters && iterations < settings.iterations {
+        if STAGES {
+            change_stage();
+        }
         if scan() == SCAN_BUDGET {
             break;
         }
@@ -128,6 +134,7 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     load_lane(selected_lane(i));
     fetch_constants();
     load_tangent();
+    sync_overtones(tally.step, motion.theta);
     if motion.bound == 0.0 {
         // A start: no pass has computed the bound yet.
         renew_bound();
@@ -137,11 +144,17 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         if fly_to_stop_phase() {
             if MEASURE {
                 measure_period();
+                if STAGES {
+                    begin_stages();
+                }
                 continue;
             }
             load_strobe_state();
             if tally.step >= shape.steps {
                 begin_period();
+                if STAGES {
+                    begin_stages();
+                }
             } else {
                 compare_mirror();
             }

@@ -299,8 +299,9 @@ fn glide_short(u: array<Real, 4>, tau: Real) -> array<Real, 4> {
 // Returns the present vector field, per free step.
 fn field() -> array<Real, 4> {
     let square = here.substeps * here.substeps;
-    let a = acceleration(here.gap_row, here.share, motion.q);
-    let b = acceleration(here.x_row, here.share, motion.q);
+    let pull = present_pull();
+    let a = acceleration(pull.gap_row, pull.share, motion.q, pull.gap_place);
+    let b = acceleration(pull.x_row, pull.share, motion.q, pull.x_place);
     return array<Real, 4>(motion.q[1], square * a, motion.q[3], square * b);
 }
 

@@ -89,6 +89,10 @@ structs! {
         degrees: u32,
         must_rest: u32,
         contacts: [u32; 2],
+        harmonics: u32,
+        harmonic_count: u32,
+        schedule: u32,
+        changes: u32,
     }
 
     /// Contact law of the right and of the left wall.
@@ -193,6 +197,7 @@ structs! {
         recent: u32,
         strobe_distance: u32,
         itinerary: u32,
+        next_change: u32,
         has_read: u32,
         cycle: u32,
         failed_readings: u32,
@@ -240,7 +245,7 @@ structs! {
         pattern_length: u32,
         pattern_hash: [u32; 2],
         pattern_recent: u32,
-        ended: [u32; 26],
+        ended: [u32; 27],
         is_measured: u32,
     }
 
