@@ -175,9 +175,11 @@ struct Measures {
     last_block: Real,
     // Strobe state that later strobes are compared with. While a cycle is read, the cycle's start.
     anchor: array<Real, 4>,
-    // Largest position at strobes, and in the first part of the motion; largest rate. They are the units of distances.
+    // Largest position at strobes, and in the first part of the motion; largest rate there; largest rate. The positions and rates
+    // of the whole motion are the units of distances.
     position_scale: Real,
     early_scale: Real,
+    early_rate_scale: Real,
     rate_scale: Real,
     // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
     cycle_growth: Real,
@@ -343,6 +345,8 @@ struct Tally {
     // after which they start again.
     column_scalings: u32,
     is_superstable: u32,
+    // 1 if the columns have left the range of numbers: the cycle is unstable.
+    has_overflowed: u32,
     // Symbols of the word, ten to a number.
     word: array<u32, 7>,
     // The pattern: one symbol for every run of equal symbols. Stored and hashed like the word.

@@ -285,10 +285,13 @@ pub(super) fn phasors(steps: u32) -> impl Iterator<Item = [f64; 2]> {
 
 /// Returns a bound on all rates of a domain: the forcing, and the spectral norms of the mass-scaled system. An
 /// overdamped mode can decay as fast as all of the damping. With half of the damping, the terms that single precision
-/// omits would keep 9e-6 of such a mode.
+/// omits would keep 9e-6 of such a mode. A gyroscopic mode, and one on a hill, can be faster than both.
 fn rate(oscillator: &model::Oscillator, domain: &model::Domain) -> f64 {
     let (damping, frequency) = Coordinates::new(oscillator).norms(domain);
-    (0.5 * damping + frequency.max(0.5 * damping)).max(fastest_force(oscillator))
+    let half = 0.5 * damping;
+    let is_passive = domain.damping[0][1] == domain.damping[1][0] && oscillator.growth_rate(domain) == 0.0;
+    let turning = if is_passive { frequency.max(half) } else { frequency.hypot(half) };
+    (half + turning).max(fastest_force(oscillator))
 }
 
 /// Returns the frequency of the highest harmonic.
