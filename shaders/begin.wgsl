@@ -14,10 +14,6 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     tally.strobe_distance = FAR_FROM_STROBE;
     motion.q = starts[lane];
     motion.phasor = array<Real, 2>(1.0, 0.0);
-    if STAGES {
-        restart_schedule();
-        cell.flow_index = flow_of_stage();
-    }
     let walls = flows[cell.flow_index].walls;
     if motion.q[0] > walls[0] {
         start_behind_wall(SIDE_RIGHT);

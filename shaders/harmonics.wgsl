@@ -28,8 +28,10 @@ fn place_of_step(domain: u32) -> u32 {
     return place_of_gap(domain) + 2u;
 }
 
+// Returns a pair of a harmonic. The first pairs of the buffer are the zeros of a harmonic that the flow does not have.
 fn harmonic_pair(n: u32, place: u32) -> vec2<Real> {
-    let pair = pairs[shape.harmonics + PAIRS_PER_HARMONIC * n + place];
+    let first = select(0u, shape.harmonics + PAIRS_PER_HARMONIC * n, n < shape.harmonic_count);
+    let pair = pairs[first + place];
     return vec2<Real>(pair[0], pair[1]);
 }
 
@@ -40,7 +42,7 @@ fn order_of(n: u32) -> Real {
 // Computes the phasors of the harmonics at a step and a fraction. They depend on these alone, wherever a dispatch ends.
 fn sync_overtones(step: u32, theta: Real) {
     //% for k in 0..HARMONICS
-    if $ku < shape.harmonic_count {
+    {
         let start = pairs[shape.phasors + (u32(order_of($ku)) * step) % shape.steps];
         let turn = small_turn(theta * order_of($ku) * (here.angle * here.substeps));
         overtones[$k] = vec2<Real>(
@@ -71,7 +73,7 @@ fn derivative_of(phasor: vec2<Real>, angle: Real, order: u32) -> vec2<Real> {
 fn with_derivative(rest: Real, place: u32, angle: Real, order: u32) -> Real {
     var sum = rest;
     //% for k in 0..HARMONICS
-    if $ku < shape.harmonic_count {
+    {
         sum += dot(harmonic_pair($ku, place), derivative_of(overtones[$k], order_of($ku) * angle, order));
     }
     //% end
@@ -87,7 +89,7 @@ fn with_harmonics(rest: Real, place: u32) -> Real {
 fn with_sizes(rest: Real, place: u32) -> Real {
     var sum = rest;
     //% for k in 0..HARMONICS
-    if $ku < shape.harmonic_count {
+    {
         sum += dot(abs(harmonic_pair($ku, place)), abs(overtones[$k]));
     }
     //% end
@@ -98,7 +100,7 @@ fn with_sizes(rest: Real, place: u32) -> Real {
 fn with_bound(rest: Real, place: u32, order: u32) -> Real {
     var sum = rest;
     //% for k in 0..HARMONICS
-    if $ku < shape.harmonic_count {
+    {
         let angle = order_of($ku) * here.angle;
         let square = angle * angle;
         let size = dot(abs(harmonic_pair($ku, place)), vec2<Real>(1.0, 1.0));
@@ -118,7 +120,7 @@ fn expand_harmonics(gap_place: u32, x_place: u32) {
     x_force[$k] = 0.0;
     //% end
     //% for k in 0..HARMONICS
-    if $ku < shape.harmonic_count {
+    {
         expand_harmonic(overtones[$k], order_of($ku) * here.angle, harmonic_pair($ku, gap_place), harmonic_pair($ku, x_place));
     }
     //% end

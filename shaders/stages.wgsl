@@ -56,14 +56,10 @@ fn change_stage() {
     }
 }
 
-// Enters the stage that holds at phase 0, after a period is completed.
-fn begin_stages() {
-    restart_schedule();
-    if flow_of_stage() == cell.flow_index {
-        load_change();
-    } else {
-        enter_stage();
-    }
+// Returns to the begin of the schedule at phase 0. The last stage holds until the first change, which may be there.
+fn restart_schedule() {
+    tally.next_change = 0u;
+    load_change();
 }
 
 // Enters a stage: state and tangent vectors are continuous. A contact that depends on a force is decided anew: a gap at rest on
@@ -73,7 +69,6 @@ fn enter_stage() {
     let spring = flows[cell.flow_index].springs[side][0];
     cell.flow_index = flow_of_stage();
     fetch_constants();
-    sync_phasor();
     if sticks() {
         if !presses(stuck_pull(side), side, motion.q) {
             leave_contact(side);
@@ -92,7 +87,7 @@ fn enter_stage() {
         // An event has put the gap on a wall at this instant. At rest, the new acceleration decides.
         tally.order = select(1u, 2u, motion.q[1] == 0.0);
     }
-    renew_bound();
+    motion.bound = 0.0;
 }
 
 // Ends a contact.
@@ -101,11 +96,4 @@ fn leave_contact(side: u32) {
     motion.q[0] += walls[side];
     tally.mode = MODE_FREE;
     enter(0u);
-}
-
-// Returns to the begin of the schedule at phase 0.
-fn restart_schedule() {
-    let place = pairs[shapes[cell.flow_index].schedule];
-    let is_first = shapes[cell.flow_index].changes > 0u && place[0] == 0.0 && place[1] == 0.0;
-    tally.next_change = select(0u, 1u, is_first);
 }

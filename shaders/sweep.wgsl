@@ -53,9 +53,6 @@ fn load_lane(i: u32) {
     motion = motions[i].now;
     tally = tallies[i].now;
     iterations = 0u;
-    if STAGES {
-        cell.flow_index = flow_of_stage();
-    }
     if KEEP {
         measures = motions[i].measures;
         search = tallies[i].search;
@@ -110,6 +107,9 @@ fn flight_to_chatter() -> bool {
     while has_work() && !chatters && iterations < settings.iterations {
         if STAGES {
             change_stage();
+            if motion.bound == 0.0 {
+                renew_bound();
+            }
         }
         if scan() == SCAN_BUDGET {
             break;
@@ -132,10 +132,13 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     load_lane(selected_lane(i));
+    if STAGES {
+        cell.flow_index = flow_of_stage();
+    }
     fetch_constants();
     load_tangent();
     sync_overtones(tally.step, motion.theta);
-    if motion.bound == 0.0 {
+    if !STAGES && motion.bound == 0.0 {
         // A start: no pass has computed the bound yet.
         renew_bound();
     }
@@ -145,7 +148,7 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
             if MEASURE {
                 measure_period();
                 if STAGES {
-                    begin_stages();
+                    restart_schedule();
                 }
                 continue;
             }
@@ -153,7 +156,7 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
             if tally.step >= shape.steps {
                 begin_period();
                 if STAGES {
-                    begin_stages();
+                    restart_schedule();
                 }
             } else {
                 compare_mirror();

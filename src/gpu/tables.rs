@@ -28,7 +28,7 @@ pub struct Tables {
     /// All flows in their first stages, then their further stages.
     pub(super) flows: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
-    /// Phasors of the first harmonic, constants of the higher ones, and changes of stages.
+    /// Zeros of a missing harmonic; phasors of the first harmonic, constants of the higher ones, and changes of stages.
     pub(super) pairs: wgpu::Buffer,
     pub(super) laws: wgpu::Buffer,
 }
@@ -98,7 +98,7 @@ impl Tables {
         let mut shapes = Vec::with_capacity(flows);
         // Constants of further stages follow those of all flows.
         let mut further = Vec::new();
-        let mut pairs = Vec::new();
+        let mut pairs = vec![[0.0; 2]; PAIRS_PER_HARMONIC];
         // Flows with equal steps share their phasors.
         let mut places = HashMap::new();
         let (mut flow_of_another_kind, mut flow_with_sine) = (None, None);
