@@ -44,7 +44,7 @@ fn outgrows(errors: Real) -> bool {
     return tally.events > 0u && !is_growing(growth.x) && exceeds_neutral(growth.x - errors * growth.y);
 }
 
-// Returns the length of the first part of the motion, whose displacements later ones are compared with.
+// Returns the length of the first part of the motion, whose displacements and rates later ones are compared with.
 fn early_periods() -> u32 {
     return max(settings.transient_periods, settings.periods / 2u);
 }
@@ -56,7 +56,9 @@ fn is_growing(growth: Real) -> bool {
         return false;
     }
     let expected = SHARED_GROWTH * growth * (Real(tally.period) - Real(early_periods()));
-    return expected < PLAIN_GROWTH || log(f32(measures.position_scale / measures.early_scale)) > f32(expected);
+    // Between two walls only the rates can grow.
+    let growth_of_scales = max(measures.position_scale / measures.early_scale, measures.rate_scale / measures.early_rate_scale);
+    return expected < PLAIN_GROWTH || log(f32(growth_of_scales)) > f32(expected);
 }
 
 fn exceeds_neutral(growth: Real) -> bool {

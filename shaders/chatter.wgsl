@@ -22,8 +22,8 @@ fn close_chatter(side: u32, u: Real) {
     let rate = motion.q[3] + kick * motion.q[1];
     let closed = array<Real, 4>(motion.q[0], 0.0, motion.q[2], rate);
     // The wall takes up the acceleration of the gap; x receives its share of that force.
-    let wall_acceleration = acceleration(here.gap_row, here.share, closed);
-    let v_rate = acceleration(here.x_row, here.share, closed) + kick * wall_acceleration;
+    let wall_acceleration = acceleration(here.gap_row, here.share, closed, place_of_gap(0u));
+    let v_rate = acceleration(here.x_row, here.share, closed, place_of_x(0u)) + kick * wall_acceleration;
     let pressing = sign * wall_acceleration;
     let whole = 2.0 * u / (pressing * (1.0 - e));
     if !(pressing > 0.0 && whole < closing) {
@@ -31,19 +31,21 @@ fn close_chatter(side: u32, u: Real) {
     }
     let row = here.gap_row;
     let sine_rate = here.angle * motion.phasor[0];
-    let change =
-        sign * with_sine(row[2] * rate + row[3] * v_rate - row[4] * here.angle * motion.phasor[1], row[6], sine_rate);
+    let first = with_sine(row[2] * rate + row[3] * v_rate - row[4] * here.angle * motion.phasor[1], row[6], sine_rate);
+    let change = sign * with_derivative(first, place_of_gap(0u), here.angle, 1u);
     let damping = kick * row[3] - row[1];
     let lasts = whole * (1.0 - (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole);
     // A sequence that a stop phase interrupts continues impact by impact, until it fits before the next one.
-    if lasts <= 0.0 || lasts >= steps_to_stop_phase(next_stop_phase()) {
+    if lasts <= 0.0 || lasts >= steps_to_stop(next_stop_phase()) {
         return;
     }
     let across = here.x_row;
     let v_by_x = across[2] + kick * row[2];
     let v_by_v = across[3] + kick * row[3];
     let unforced = v_by_x * rate + v_by_v * v_rate;
-    let v_jerk = with_sine(unforced - (across[4] + kick * row[4]) * here.angle * motion.phasor[1], across[6] + kick * row[6], sine_rate);
+    let forced = with_sine(unforced - (across[4] + kick * row[4]) * here.angle * motion.phasor[1], across[6] + kick * row[6], sine_rate);
+    let of_gap = kick * with_derivative(0.0, place_of_gap(0u), here.angle, 1u);
+    let v_jerk = with_term(with_derivative(forced, place_of_x(0u), here.angle, 1u), of_gap);
     if EXPONENT {
         // A neighbour leaves at another time, and so at another speed and under another pressing acceleration: its
         // sequence ends later by `late_by`.
@@ -74,6 +76,7 @@ fn close_chatter(side: u32, u: Real) {
     motion.q = ends;
     advance_phase(lasts);
     turn_phasor(lasts);
+    sync_overtones(tally.step, motion.theta);
     count_event(side);
     tally.mode = MODE_SUSTAINED + side;
     tally.order = 2u;
@@ -91,7 +94,7 @@ var<private> chatters: bool;
 // flights follow.
 fn begins_chatter(side: u32, u: Real) -> bool {
     let e = restitution(side);
-    let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
+    let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q, place_of_gap(0u));
     let is_short = u > 0.0 && 2.0 * u < SHORT * pressing;
     return mesh_speed(side) <= FOLLOWED_MESH_SPEED * speed && is_short && e * e * u > least_leaving(side, pressing);
 }
@@ -127,7 +130,7 @@ fn follow_chatter(side: u32) {
     for (var n = 0u; n < SHORT_FLIGHTS; n++) {
         expand_short();
         let t = short_flight();
-        if !(t > 0.0 && elapsed + t < 1.0 && t < steps_to_stop_phase(next_stop_phase())) {
+        if !(t > 0.0 && elapsed + t < 1.0 && t < steps_to_stop(next_stop_phase())) {
             break;
         }
         let end = short_end(t);
@@ -143,6 +146,7 @@ fn follow_chatter(side: u32) {
         advance_phase(t);
         motion.phasor = begun;
         turn_phasor(elapsed);
+        sync_overtones(tally.step, motion.theta);
         tally.passes_in_period += 1u;
         tally.impacts += 1u;
         count_event(side);
@@ -164,6 +168,7 @@ fn expand_short() {
     let angle = here.angle;
     var c = motion.phasor[0];
     var s = motion.phasor[1];
+    expand_harmonics(place_of_gap(0u), place_of_x(0u));
     gap_terms[0] = q[0];
     gap_terms[1] = q[1];
     x_terms[0] = q[2];

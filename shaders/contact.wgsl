@@ -23,16 +23,17 @@ fn with_sine(rest: Real, factor: Real, s: Real) -> Real {
     return rest;
 }
 
-// Returns an acceleration from its row, in units of the domain's step. `q` is in lane units.
-fn acceleration(row: array<Real, 7>, share: Real, q: array<Real, 4>) -> Real {
+// Returns an acceleration from its row, in units of the domain's step. `q` is in lane units, and `place` is that of the
+// harmonics' part.
+fn acceleration(row: array<Real, 7>, share: Real, q: array<Real, 4>, place: u32) -> Real {
     return (row[0] * q[0] + row[2] * q[2]) + share * (row[1] * q[1] + row[3] * q[3])
-        + (row[4] * motion.phasor[0] + with_sine(row[5], row[6], motion.phasor[1]));
+        + with_harmonics(row[4] * motion.phasor[0] + with_sine(row[5], row[6], motion.phasor[1]), place);
 }
 
 // Whether the gap is pressed into the wall: the first nonzero derivative, from the second on, points into it.
 fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
-    var first = acceleration(pull.gap_row, pull.share, q);
-    if first == 0.0 || (q[1] == 0.0 && abs(first) <= balance(pull.gap_row, pull.share, q)) {
+    var first = acceleration(pull.gap_row, pull.share, q, pull.gap_place);
+    if first == 0.0 || (q[1] == 0.0 && abs(first) <= balance(pull.gap_row, pull.share, q, pull.gap_place)) {
         first = later_derivative(pull, q);
     }
     return sign_of(side) * first > 0.0;
@@ -41,9 +42,9 @@ fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
 // Returns the size up to which an acceleration of a gap at rest counts as zero. Where its terms cancel, its sign is
 // rounding, and depends on the order of summation and on the domain. If two domains disagreed, the gap would leave its
 // wall and be pressed back for ever.
-fn balance(row: array<Real, 7>, share: Real, q: array<Real, 4>) -> Real {
+fn balance(row: array<Real, 7>, share: Real, q: array<Real, 4>, place: u32) -> Real {
     return 4.0 * ULP * ((abs(row[0] * q[0]) + abs(row[2] * q[2])) + share * abs(row[3] * q[3])
-        + (abs(row[4] * motion.phasor[0]) + with_sine(abs(row[5]), abs(row[6]), abs(motion.phasor[1]))));
+        + with_sizes(abs(row[4] * motion.phasor[0]) + with_sine(abs(row[5]), abs(row[6]), abs(motion.phasor[1])), place));
 }
 
 // Returns the first nonzero derivative of the gap from the third to the fifth.
@@ -55,13 +56,13 @@ fn later_derivative(pull: Pull, q: array<Real, 4>) -> Real {
     var z = pull.share * q[1];
     var w: Real = 0.0;
     var x = pull.share * q[3];
-    var v = acceleration(r, pull.share, q);
+    var v = acceleration(r, pull.share, q, pull.x_place);
     var c = -pull.angle * motion.phasor[1];
     var s = pull.angle * motion.phasor[0];
     //% for k in 3..6
     {
-        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + with_sine(g[4] * c, g[6], s);
-        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + with_sine(r[4] * c, r[6], s);
+        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + with_derivative(with_sine(g[4] * c, g[6], s), pull.gap_place, pull.angle, $ku - 2u);
+        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + with_derivative(with_sine(r[4] * c, r[6], s), pull.x_place, pull.angle, $ku - 2u);
         first = select(first, a, first == 0.0);
         z = w;
         w = a;
@@ -107,7 +108,7 @@ fn contact(side: u32, settling: bool) -> Jump {
     var after = motion.q;
     after[1] = -sign * leaving;
     after[3] += kick * (sign * (1.0 + e) * approach);
-    let pressed = presses(Pull(here.gap_row, here.x_row, here.share, here.angle), side, after);
+    let pressed = presses(present_pull(), side, after);
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], -e, kick * (1.0 + e), 0.0);
     // A start on or beyond the wall (within rounding, too) is a contact only if the gap closes.
     if settling && (closing < 0.0 || (closing == 0.0 && !pressed)) {

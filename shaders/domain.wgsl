@@ -27,6 +27,9 @@ fn fetch_constants() {
     h = flows[f].h;
     speed = flows[f].speed;
     closing = flows[f].closing;
+    if STAGES {
+        load_change();
+    }
     if KEEP {
         free = flows[f].domains[0];
         on_right = flows[f].domains[1];
@@ -72,17 +75,26 @@ struct Pull {
     x_row: array<Real, 7>,
     share: Real,
     angle: Real,
+    // Places of the harmonics' parts.
+    gap_place: u32,
+    x_place: u32,
+}
+
+// Accelerations in the domain that governs the motion.
+fn present_pull() -> Pull {
+    let d = domain_of(tally.mode);
+    return Pull(here.gap_row, here.x_row, here.share, here.angle, place_of_gap(d), place_of_x(d));
 }
 
 // Accelerations while meshing on a side.
 fn meshing_pull(side: u32) -> Pull {
+    let d = 1u + side;
     if !KEEP {
         let f = cell.flow_index;
-        let d = 1u + side;
-        return Pull(flows[f].domains[d].gap_row, flows[f].domains[d].x_row, flows[f].domains[d].share, flows[f].domains[d].angle);
+        return Pull(flows[f].domains[d].gap_row, flows[f].domains[d].x_row, flows[f].domains[d].share, flows[f].domains[d].angle, place_of_gap(d), place_of_x(d));
     }
     if side == SIDE_RIGHT {
-        return Pull(on_right.gap_row, on_right.x_row, on_right.share, on_right.angle);
+        return Pull(on_right.gap_row, on_right.x_row, on_right.share, on_right.angle, place_of_gap(d), place_of_x(d));
     }
-    return Pull(on_left.gap_row, on_left.x_row, on_left.share, on_left.angle);
+    return Pull(on_left.gap_row, on_left.x_row, on_left.share, on_left.angle, place_of_gap(d), place_of_x(d));
 }

@@ -14,7 +14,7 @@ fn is_elastic(side: u32) -> bool {
 fn enter_elastic(side: u32) -> Jump {
     let closing = sign_of(side) * motion.q[1];
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
-    let is_pressed = closing == 0.0 && presses(Pull(here.gap_row, here.x_row, here.share, here.angle), side, motion.q);
+    let is_pressed = closing == 0.0 && presses(present_pull(), side, motion.q);
     if closing > 0.0 || is_pressed {
         jump.event = true;
         jump.mode = MODE_SUSTAINED + side;
@@ -30,7 +30,7 @@ fn stays_behind(side: u32) -> bool {
         return false;
     }
     let rest = array<Real, 4>(0.0, 0.0, motion.q[2], motion.q[3]);
-    return presses(Pull(here.gap_row, here.x_row, here.share, here.angle), side, rest);
+    return presses(present_pull(), side, rest);
 }
 
 // Sets the change of tangent vectors across a wall with a damper, inwards (`way` = 1) or outwards (-1). The fields of

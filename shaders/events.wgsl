@@ -296,7 +296,7 @@ fn careful() -> bool {
     }
     balanced = 0.0;
     if tally.order == 2u {
-        let most = balance(here.gap_row, share, motion.q);
+        let most = balance(here.gap_row, share, motion.q, place_of_gap(d));
         if abs(gap_terms[2]) <= 0.5 * most {
             gap_terms[2] = 0.0;
             tally.order = 3u;
@@ -306,7 +306,13 @@ fn careful() -> bool {
     let stop = next_stop_phase();
     let part = steps_to_stop_phase(stop) * substeps;
     let lands = part <= 1.0 && tally.step + 1u == stop;
-    let len = min(part, Real(1.0));
+    var len = min(part, Real(1.0));
+    var changes = false;
+    if STAGES {
+        let to_change = steps_to_change() * substeps;
+        changes = to_change <= len && (tally.step == change_step || tally.step + 1u == change_step);
+        len = select(len, to_change, changes);
+    }
     let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
     let order = select(vec2<u32>(tally.order, 0u), vec2<u32>(0u, tally.order), on_second);
     let found = first_event(len, here.growth, order);
@@ -329,14 +335,18 @@ fn careful() -> bool {
         count_meshing(found.tau * share);
     }
     advance_phase(found.tau * share);
-    if lands && !found.event {
+    if changes && !found.event {
+        tally.step = change_step;
+        motion.theta = change_theta;
+    } else if lands && !found.event {
         tally.step = stop;
         motion.theta = 0.0;
     }
     check_finite();
     turn_phasor(found.tau);
+    sync_overtones(tally.step, motion.theta);
     crossing = Crossing();
-    let flight_pull = Pull(here.gap_row, here.x_row, here.share, here.angle);
+    let flight_pull = present_pull();
     if found.event {
         act(found.second, found.tau);
     }

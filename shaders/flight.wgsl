@@ -54,7 +54,7 @@ fn scan() -> u32 {
     var theta = motion.theta;
     var n = tally.step;
     var bound = motion.bound;
-    var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + (row[4] * c + with_sine(row[5], row[6], s));
+    var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + with_harmonics(row[4] * c + with_sine(row[5], row[6], s), place_of_gap(d));
     if tally.is_scan_interrupted == 1u {
         a = motion.bend;
     }
@@ -76,20 +76,23 @@ fn scan() -> u32 {
         let next_theta = theta + share;
         let wraps = next_theta >= 1.0;
         let next_n = n + select(0u, 1u, wraps);
-        if next_n >= stop {
+        let next_at = select(next_theta, next_theta - 1.0, wraps);
+        if next_n >= stop || (STAGES && is_at_change(next_n, next_at)) {
             break;
         }
         iterations += price;
-        let z1 = z + (((m[0] * z + m[1] * w) + (m[2] * x + m[3] * v)) + ((m[4] * c + m[5] * s) + m[6]));
-        let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + m[13]));
-        let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + m[20]));
-        let v1 = v + (((m[21] * z + m[22] * w) + (m[23] * x + m[24] * v)) + ((m[25] * c + m[26] * s) + m[27]));
+        let z1 = z + (((m[0] * z + m[1] * w) + (m[2] * x + m[3] * v)) + ((m[4] * c + m[5] * s) + with_harmonics(m[6], place_of_step(d))));
+        let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + with_harmonics(m[13], place_of_step(d) + 1u)));
+        let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + with_harmonics(m[20], place_of_step(d) + 2u)));
+        let v1 = v + (((m[21] * z + m[22] * w) + (m[23] * x + m[24] * v)) + ((m[25] * c + m[26] * s) + with_harmonics(m[27], place_of_step(d) + 3u)));
         // The phasor turns by three shears. The usual form is `c + ((cos - 1) c - sin s)`. Drivers reorder it, and then
         // `c + (cos - 1) c` loses digits below rounding, in the same direction at every step.
         let sheared = c - half * s;
         let s1 = s + sine * sheared;
         let c1 = sheared - half * s1;
-        let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + with_sine(row[5], row[6], s1));
+        sync_overtones(next_n, next_at);
+        let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1))
+            + with_harmonics(row[4] * c1 + with_sine(row[5], row[6], s1), place_of_gap(d));
         let bound1 = swell * (bound + growth);
         if !(clearance(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
             break;
@@ -113,7 +116,7 @@ fn scan() -> u32 {
         s = s1;
         a = a1;
         bound = bound1;
-        theta = select(next_theta, next_theta - 1.0, wraps);
+        theta = next_at;
         n = next_n;
         step_count += 1u;
     }

@@ -29,7 +29,7 @@ struct Domain {
     substeps: Real,
 }
 
-// Constants that lanes share if they differ in the contact law alone.
+// Constants that lanes share if they differ in the contact law alone. A flow with stages has one such struct for each.
 struct Flow {
     // Free motion, meshing on the right, meshing on the left. Meshing domains measure the gap from their wall.
     domains: array<Domain, 3>,
@@ -67,7 +67,7 @@ struct Flow {
 struct FlowShape {
     // Free steps per forcing period.
     steps: u32,
-    // Index of its first phasor.
+    // Index in `pairs` of its first phasor.
     phasors: u32,
     // Number of displacements. With one, the second rests at 0.
     degrees: u32,
@@ -75,6 +75,12 @@ struct FlowShape {
     must_rest: u32,
     // CONTACT_* of the right and of the left wall.
     contacts: array<u32, 2>,
+    // Index in `pairs` of its harmonics beside the first (harmonics.wgsl), and their number.
+    harmonics: u32,
+    harmonic_count: u32,
+    // Index in `pairs` of the changes of its stage (stages.wgsl), and their number; 0 if there are none.
+    schedule: u32,
+    changes: u32,
 }
 
 // Contact law of the right and of the left wall: restitution, and the largest leaving speed at which a pressed
@@ -169,9 +175,11 @@ struct Measures {
     last_block: Real,
     // Strobe state that later strobes are compared with. While a cycle is read, the cycle's start.
     anchor: array<Real, 4>,
-    // Largest position at strobes, and in the first part of the motion; largest rate. They are the units of distances.
+    // Largest position at strobes, and in the first part of the motion; largest rate there; largest rate. The positions and rates
+    // of the whole motion are the units of distances.
     position_scale: Real,
     early_scale: Real,
+    early_rate_scale: Real,
     rate_scale: Real,
     // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
     cycle_growth: Real,
@@ -253,6 +261,8 @@ struct TallyNow {
     strobe_distance: u32,
     // Hash of the present period's events.
     itinerary: u32,
+    // Number of changes of the stage in the present period so far.
+    next_change: u32,
 }
 
 // Search for a cycle, updated at strobes.
@@ -335,6 +345,8 @@ struct Tally {
     // after which they start again.
     column_scalings: u32,
     is_superstable: u32,
+    // 1 if the columns have left the range of numbers: the cycle is unstable.
+    has_overflowed: u32,
     // Symbols of the word, ten to a number.
     word: array<u32, 7>,
     // The pattern: one symbol for every run of equal symbols. Stored and hashed like the word.
@@ -407,7 +419,7 @@ const STAGE_MEASURING: u32 = 4u; // the lane is decided, and its motion is measu
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read> flows: array<Flow>;
 @group(0) @binding(2) var<storage, read> shapes: array<FlowShape>;
-@group(0) @binding(3) var<storage, read> phasors: array<array<Real, 2>>;
+@group(0) @binding(3) var<storage, read> pairs: array<array<Real, 2>>;
 @group(0) @binding(4) var<storage, read> laws: array<Law>;
 @group(0) @binding(5) var<storage, read> cells: array<Cell>;
 @group(0) @binding(6) var<storage, read_write> motions: array<Motion>;

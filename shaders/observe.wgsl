@@ -45,6 +45,7 @@ fn begin_period() {
     }
     if tally.period == early_periods() {
         measures.early_scale = measures.position_scale;
+        measures.early_rate_scale = measures.rate_scale;
     }
     let decided = settings.max_period > 0u && recurs();
     // The budget includes the periods in which the cycle is read.
@@ -144,6 +145,7 @@ fn begin_reading() {
         motions[lane].stretch = array<Real, 3>(1.0, 1.0, 1.0);
         tallies[lane].column_scalings = 0u;
         tallies[lane].is_superstable = 0u;
+        tallies[lane].has_overflowed = 0u;
     }
 }
 

@@ -2,8 +2,9 @@
 
 // Computes the phasor at `theta` of a free step after step `n`, from the table and by angle addition.
 fn sync_phasor() {
-    motion.phasor = phasors[shape.phasors + tally.step];
+    motion.phasor = pairs[shape.phasors + tally.step];
     turn_phasor(motion.theta * here.substeps);
+    sync_overtones(tally.step, motion.theta);
 }
 
 // Turns the phasor by a part of a step.
@@ -40,6 +41,14 @@ fn steps_to_stop_phase(stop: u32) -> Real {
         return 1.0;
     }
     return 1.0 - motion.theta;
+}
+
+// Returns the free steps to the next stop phase or change of the stage; 1 stands for "one or more".
+fn steps_to_stop(stop: u32) -> Real {
+    if STAGES {
+        return min(steps_to_stop_phase(stop), steps_to_change());
+    }
+    return steps_to_stop_phase(stop);
 }
 
 // Returns the step at which the lane must stop: phase 0, or half a period in the middle period of a cycle that is

@@ -20,7 +20,7 @@ fn is_onset() -> bool {
 // Returns the constants of the accelerations of x and of a gap that rests on its wall.
 fn stuck_pull(side: u32) -> Pull {
     let behind = meshing_pull(side);
-    return Pull(flows[cell.flow_index].pressing[side], behind.x_row, behind.share, behind.angle);
+    return Pull(flows[cell.flow_index].pressing[side], behind.x_row, behind.share, behind.angle, PLACE_OF_PRESSING + side, behind.x_place);
 }
 
 // Makes a gap that has come to rest stick, if the load presses it: the wall takes all of its rate. Returns no event
@@ -50,13 +50,15 @@ fn let_go(side: u32) -> Jump {
 // Returns the order of the root of the pressing acceleration where sticking begins: 1 if the load is balanced.
 fn stuck_order(side: u32) -> u32 {
     let pull = stuck_pull(side);
-    let pressing = acceleration(pull.gap_row, pull.share, motion.q);
-    return select(0u, 1u, abs(pressing) <= balance(pull.gap_row, pull.share, motion.q));
+    let pressing = acceleration(pull.gap_row, pull.share, motion.q, pull.gap_place);
+    return select(0u, 1u, abs(pressing) <= balance(pull.gap_row, pull.share, motion.q, pull.gap_place));
 }
 
 // Expands the motion of x while the gap sticks. The acceleration that the wall takes up replaces the gap's series.
 fn expand_stuck() {
-    let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
+    let side = side_of(tally.mode);
+    let p = flows[cell.flow_index].pressing[side];
+    expand_harmonics(PLACE_OF_PRESSING + side, place_of_x(1u + side));
     let r = here.x_row;
     let angle = here.angle;
     var c = motion.phasor[0];
@@ -69,9 +71,9 @@ fn expand_stuck() {
     //% for k in 0..TERMS
     {
         x_terms[$k] = x;
-        gap_terms[$k] = (p[2] * x + p[3] * v) + (p[4] * c + with_sine(load_gap, p[6], s));
+        gap_terms[$k] = (p[2] * x + p[3] * v) + with_term(p[4] * c + with_sine(load_gap, p[6], s), gap_force[$k]);
         let turn: Real = 1.0 / $(k+1).0;
-        let next = turn * ((r[2] * x + r[3] * v) + (r[4] * c + with_sine(load_x, r[6], s)));
+        let next = turn * ((r[2] * x + r[3] * v) + with_term(r[4] * c + with_sine(load_x, r[6], s), x_force[$k]));
         x = turn * v;
         v = next;
         load_gap = 0.0;
@@ -89,11 +91,16 @@ fn expand_stuck() {
 // Returns a bound on the sixth derivative of that acceleration over the step. It is a sum of x, its rate and the
 // forcing, whose derivatives are bounded by the energy of the differentiated motion.
 fn stuck_bound() -> Real {
-    let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
+    let side = side_of(tally.mode);
+    let place = place_of_x(1u + side);
+    let p = flows[cell.flow_index].pressing[side];
     let square = here.angle * here.angle;
     let fifth = square * square * here.angle;
-    let growth = with_sine(abs(here.x_row[4]), abs(here.x_row[6]), 1.0) * fifth;
+    let force = with_sine(abs(here.x_row[4]), abs(here.x_row[6]), 1.0) * fifth;
+    let growth = with_bound(force, place, 5u);
+    let later_growth = with_bound(force * here.angle, place, 6u);
     let x = here.swell * (growth + derivative_bound(0.0, 0.0, 120.0 * x_terms[5], 720.0 * x_terms[6]));
-    let v = here.swell * (growth * here.angle + derivative_bound(0.0, 0.0, 720.0 * x_terms[6], 5040.0 * x_terms[7]));
-    return (abs(p[2]) * x + abs(p[3]) * v) + with_sine(abs(p[4]), abs(p[6]), 1.0) * (fifth * here.angle);
+    let v = here.swell * (later_growth + derivative_bound(0.0, 0.0, 720.0 * x_terms[6], 5040.0 * x_terms[7]));
+    let pressing = with_sine(abs(p[4]), abs(p[6]), 1.0) * (fifth * here.angle);
+    return (abs(p[2]) * x + abs(p[3]) * v) + with_bound(pressing, PLACE_OF_PRESSING + side, 6u);
 }

@@ -105,6 +105,12 @@ fn fly_to_stop_phase() -> bool {
 fn flight_to_chatter() -> bool {
     chatters = false;
     while has_work() && !chatters && iterations < settings.iterations {
+        if STAGES {
+            change_stage();
+            if motion.bound == 0.0 {
+                renew_bound();
+            }
+        }
         if scan() == SCAN_BUDGET {
             break;
         }
@@ -126,9 +132,13 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     load_lane(selected_lane(i));
+    if STAGES {
+        cell.flow_index = flow_of_stage();
+    }
     fetch_constants();
     load_tangent();
-    if motion.bound == 0.0 {
+    sync_overtones(tally.step, motion.theta);
+    if !STAGES && motion.bound == 0.0 {
         // A start: no pass has computed the bound yet.
         renew_bound();
     }
@@ -137,11 +147,17 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         if fly_to_stop_phase() {
             if MEASURE {
                 measure_period();
+                if STAGES {
+                    restart_schedule();
+                }
                 continue;
             }
             load_strobe_state();
             if tally.step >= shape.steps {
                 begin_period();
+                if STAGES {
+                    restart_schedule();
+                }
             } else {
                 compare_mirror();
             }

@@ -111,6 +111,10 @@ fn begin_columns() {
 // Keeps the columns of the monodromy matrix in range after an event, and measures how much perturbations grow between
 // two instants of the cycle: rounding at the first one is amplified until the second.
 fn check_columns() {
+    if has_unbounded_columns() {
+        tallies[lane].has_overflowed = 1u;
+        begin_columns();
+    }
     let size = size_of_columns();
     if size == 0.0 {
         // All neighbours have become the same motion. New perturbations grow from here on.
@@ -133,6 +137,17 @@ fn check_columns() {
         motions[lane].stretch[0] *= LARGE;
         tallies[lane].column_scalings += 1u;
     }
+}
+
+// Whether an entry of the columns is not a number, or is so large that the next one may not be. The functions `max` and `<` may
+// leave out what is not a number, and a sum does not.
+fn has_unbounded_columns() -> bool {
+    var total: Real = 0.0;
+    for (var i = 0u; i < 4u; i++) {
+        iterations += 1u;
+        total += sum_of_sizes(tangent(i));
+    }
+    return !is_bounded(total);
 }
 
 // Returns the largest entry of the columns, with rates divided by the forcing frequency.
@@ -299,8 +314,9 @@ fn glide_short(u: array<Real, 4>, tau: Real) -> array<Real, 4> {
 // Returns the present vector field, per free step.
 fn field() -> array<Real, 4> {
     let square = here.substeps * here.substeps;
-    let a = acceleration(here.gap_row, here.share, motion.q);
-    let b = acceleration(here.x_row, here.share, motion.q);
+    let pull = present_pull();
+    let a = acceleration(pull.gap_row, pull.share, motion.q, pull.gap_place);
+    let b = acceleration(pull.x_row, pull.share, motion.q, pull.x_place);
     return array<Real, 4>(motion.q[1], square * a, motion.q[3], square * b);
 }
 
@@ -340,6 +356,11 @@ fn close(u: array<Real, 4>) -> array<Real, 4> {
 fn renormalise() -> Real {
     var u = tangent(0u);
     let size = largest(u);
+    if !is_bounded(sum_of_sizes(u)) {
+        // The vector has left the range of numbers: returns a large growth, and starts with a new vector.
+        set_tangent(0u, initial_tangent());
+        return 100.0;
+    }
     if !(size > 1e-30) {
         // Superstable: returns a large loss, and starts with a new vector.
         set_tangent(0u, initial_tangent());

@@ -15,6 +15,8 @@ fn expand() {
     let angle = here.angle;
     var c = motion.phasor[0];
     var s = motion.phasor[1];
+    let d = domain_of(tally.mode);
+    expand_harmonics(place_of_gap(d), place_of_x(d));
     gap_terms[0] = q[0];
     gap_terms[1] = share * q[1];
     x_terms[0] = q[2];
@@ -28,8 +30,8 @@ fn expand() {
         let x = x_terms[$k];
         let v = $(k+1).0 * x_terms[$(k+1)];
         let next: Real = 1.0 / ($(k+1).0 * $(k+2).0);
-        gap_terms[$(k+2)] = next * (((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + with_sine(load_gap, g[6], s)));
-        x_terms[$(k+2)] = next * (((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + with_sine(load_x, r[6], s)));
+        gap_terms[$(k+2)] = next * (((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + with_term(g[4] * c + with_sine(load_gap, g[6], s), gap_force[$k]));
+        x_terms[$(k+2)] = next * (((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + with_term(r[4] * c + with_sine(load_x, r[6], s), x_force[$k]));
         load_gap = 0.0;
         load_x = 0.0;
         let turn = angle * (1.0 / $(k+1).0);
@@ -50,6 +52,7 @@ fn derivative_bound(z: Real, w: Real, x: Real, v: Real) -> Real {
 
 // Bounds the sixth derivative of the gap at the present state, from five derivatives.
 fn renew_bound() {
+    let d = domain_of(tally.mode);
     let g = here.gap_row;
     let r = here.x_row;
     // Derivatives of order k and k + 1; of the forcing, order k.
@@ -63,8 +66,10 @@ fn renew_bound() {
     var load_x = r[5];
     //% for k in 0..5
     {
-        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + with_sine(load_gap, g[6], s));
-        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + with_sine(load_x, r[6], s));
+        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v))
+            + with_derivative(g[4] * c + with_sine(load_gap, g[6], s), place_of_gap(d), here.angle, $ku);
+        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v))
+            + with_derivative(r[4] * c + with_sine(load_x, r[6], s), place_of_x(d), here.angle, $ku);
         z = w;
         w = a;
         x = v;

@@ -19,11 +19,37 @@ const NOWHERE: f64 = 1e12;
 /// Terms of the matrix exponential over one step, in which the fastest mode turns by at most a radian.
 const EXPONENTIAL_TERMS: u32 = 30;
 
+/// Pairs of real numbers that the shader reads for each higher harmonic of a flow (`shaders/harmonics.wgsl`).
+pub(super) const PAIRS_PER_HARMONIC: usize = 21;
+
+/// A change of the stage in a forcing period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Change {
+    /// Free steps since phase 0: whole ones, and the fraction of the next one.
+    pub(super) step: u32,
+    pub(super) theta: f64,
+    /// The stage that begins.
+    pub(super) stage: usize,
+}
+
+/// Constants that the shader reads for one stage.
+#[derive(Clone, Debug)]
+pub(super) struct StageConstants {
+    pub(super) flow: Flow,
+    /// The higher harmonics, [`PAIRS_PER_HARMONIC`] for each.
+    pub(super) harmonics: Vec<[f64; 2]>,
+}
+
 /// Constants of one oscillator.
 #[derive(Clone, Debug)]
 pub struct Constants {
-    /// Constants that the shader reads.
+    /// Constants that the shader reads; of stage 0.
     pub flow: Flow,
+    /// The higher harmonics in stage 0, [`PAIRS_PER_HARMONIC`] for each.
+    pub(super) harmonics: Vec<[f64; 2]>,
+    /// The further stages, and the changes of the stage. Both are empty if stage 0 holds always.
+    pub(super) stages: Vec<StageConstants>,
+    pub(super) changes: Vec<Change>,
     /// Free steps per forcing period.
     pub steps: u32,
     /// Whether the mirror image of a motion is a motion.
@@ -45,7 +71,8 @@ impl Constants {
     /// Returns the free steps per forcing period: `requested`, or as many as the motion needs. Returns `None` if
     /// there are too many for a lane.
     pub fn steps(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<u32> {
-        let angle = oscillator.period() * rate(oscillator, &oscillator.free);
+        let of_stages = oscillator.stages.iter().map(|stage| rate(oscillator, &stage.free));
+        let angle = oscillator.period() * of_stages.fold(rate(oscillator, &oscillator.free), f64::max);
         let needed = (angle / STEP_ANGLE).ceil().max(8.0);
         // An even number, so that half a period is a whole number of steps.
         let steps = 2.0 * (0.5 * f64::from(requested.unwrap_or(0)).max(needed)).ceil();
@@ -56,19 +83,20 @@ impl Constants {
     pub fn new(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<Constants> {
         let steps = Constants::steps(oscillator, requested)?;
         let period = oscillator.period();
-        let h = period / f64::from(steps);
-        let walls = walls(oscillator);
+        let common = Common::new(oscillator, period / f64::from(steps));
         let coordinates = Coordinates::new(oscillator);
-        let right = behind_wall(oscillator, 0, walls[0], h);
-        let left = match oscillator.mirror_symmetric() {
-            true => mirrored(right),
-            false => behind_wall(oscillator, 1, walls[1], h),
-        };
-        let held = |wall: f64| rows(oscillator, &oscillator.free, wall, h)[0];
-        let damper =
-            |behind: &model::Domain| coordinates.damper(&oscillator.free, behind).map(|rate| -h * rate);
+        let (mut stages, mut changes) = (Vec::new(), Vec::new());
+        if !oscillator.schedule.is_empty() {
+            let further = 1..oscillator.stage_count();
+            stages = further.map(|stage| stage_constants(&oscillator.in_stage(stage), &common)).collect();
+            changes = changes_of(oscillator, steps);
+        }
+        let StageConstants { flow, harmonics } = stage_constants(oscillator, &common);
         let mut constants = Constants {
-            flow: Zeroable::zeroed(),
+            flow,
+            harmonics,
+            stages,
+            changes,
             steps,
             mirror_symmetric: oscillator.mirror_symmetric(),
             degrees: oscillator.degrees as u32,
@@ -78,27 +106,11 @@ impl Constants {
             has_sine: has_sine(oscillator),
             coordinates,
         };
-        constants.flow = Flow {
-            domains: [domain(oscillator, &oscillator.free, 0.0, h, 1.0), right, left],
-            walls,
-            kick: coordinates.kick(),
-            h,
-            speed: speed(oscillator) * h,
-            closing: CLOSING_ANGLE / free_rate(oscillator) / h,
-            escape: Some(oscillator.escape()).filter(|size| size.is_finite()).unwrap_or(-1.0),
-            steady: [0.0; 4],
-            contact_free_size: -1.0,
-            transient_growth: 0.0,
-            pressing: walls.map(held),
-            damper: oscillator.meshing.each_ref().map(damper),
-            springs: Side::BOTH.map(|side| springs(oscillator, side, h)),
-            displacements: coordinates.displacements(),
-        };
         if let Some(motion) = non_impacting(oscillator) {
             constants.must_rest = motion.resting().is_some();
             constants.flow.steady = constants.to_lane(motion.steady());
             // In units of the free domain's energy form.
-            constants.flow.contact_free_size = h * (coordinates.compliance() * motion.reach()).sqrt();
+            constants.flow.contact_free_size = common.h * (coordinates.compliance() * motion.reach()).sqrt();
             constants.flow.transient_growth = motion.exponent() * period / std::f64::consts::LN_2;
         }
         Some(constants)
@@ -134,6 +146,106 @@ impl Constants {
     }
 }
 
+/// Constants that all stages have in common.
+struct Common {
+    /// Length of a free step.
+    h: f64,
+    /// Steps of contact with each wall per free step.
+    substeps: [f64; 2],
+    walls: [f64; 2],
+    /// Unit of speeds.
+    speed: f64,
+    escape: f64,
+}
+
+impl Common {
+    fn new(oscillator: &model::Oscillator, h: f64) -> Common {
+        let substeps = |side: usize| {
+            let of_stages = oscillator.stages.iter().map(|stage| &stage.meshing[side]);
+            let rates = of_stages.chain([&oscillator.meshing[side]]).map(|behind| rate(oscillator, behind));
+            (h * rates.fold(0.0, f64::max) / STEP_ANGLE).max(1.0).log2().ceil().exp2()
+        };
+        Common {
+            h,
+            substeps: [0, 1].map(substeps),
+            walls: walls(oscillator),
+            speed: speed(oscillator),
+            escape: Some(oscillator.escape()).filter(|size| size.is_finite()).unwrap_or(-1.0),
+        }
+    }
+
+    fn domains(&self, oscillator: &model::Oscillator) -> [Domain; 3] {
+        let behind =
+            |side: usize| behind_wall(oscillator, side, self.walls[side], self.h, self.substeps[side]);
+        let right = behind(0);
+        // Without stages, only this stage counts.
+        let is_mirrored = oscillator.schedule.is_empty() && oscillator.mirror_symmetric();
+        let left = if is_mirrored { mirrored(right) } else { behind(1) };
+        [domain(oscillator, &oscillator.free, 0.0, self.h, 1.0), right, left]
+    }
+
+    /// Returns the accelerations of a gap that rests on the right and on the left wall.
+    fn pressing(&self, oscillator: &model::Oscillator) -> [[f64; 7]; 2] {
+        self.walls.map(|wall| rows(oscillator, &oscillator.free, wall, self.h)[0])
+    }
+}
+
+/// Derives the constants of an oscillator's stage 0.
+fn stage_constants(oscillator: &model::Oscillator, common: &Common) -> StageConstants {
+    let (h, coordinates) = (common.h, Coordinates::new(oscillator));
+    let damper = |behind: &model::Domain| coordinates.damper(&oscillator.free, behind).map(|rate| -h * rate);
+    let mut domains = common.domains(oscillator);
+    let mut harmonics = Vec::with_capacity(PAIRS_PER_HARMONIC * oscillator.harmonics.len());
+    for &model::Harmonic { order, cos, sin } in &oscillator.harmonics {
+        // A harmonic acts like the first one at a multiple of the frequency.
+        let omega = oscillator.omega * f64::from(order);
+        let none = Vec::new();
+        let alone =
+            model::Oscillator { omega, force: cos, force_sin: sin, harmonics: none, ..oscillator.clone() };
+        let waves = common.domains(&alone);
+        harmonics.push([f64::from(order), 0.0]);
+        harmonics.extend(common.pressing(&alone).map(factors));
+        for (domain, wave) in domains.iter_mut().zip(waves) {
+            domain.growth += wave.growth;
+            harmonics.extend([wave.gap_row, wave.x_row].map(factors));
+            harmonics.extend([0, 1, 2, 3].map(|row| [wave.step[7 * row + 4], wave.step[7 * row + 5]]));
+        }
+    }
+    let flow = Flow {
+        domains,
+        walls: common.walls,
+        kick: coordinates.kick(),
+        h,
+        speed: common.speed * h,
+        closing: CLOSING_ANGLE / free_rate(oscillator) / h,
+        escape: common.escape,
+        steady: [0.0; 4],
+        contact_free_size: -1.0,
+        transient_growth: 0.0,
+        pressing: common.pressing(oscillator),
+        damper: oscillator.meshing.each_ref().map(damper),
+        springs: Side::BOTH.map(|side| springs(oscillator, side, h)),
+        displacements: coordinates.displacements(),
+    };
+    StageConstants { flow, harmonics }
+}
+
+/// Returns the factors of cosine and sine in an acceleration.
+fn factors(row: [f64; 7]) -> [f64; 2] {
+    [row[4], row[6]]
+}
+
+/// Returns the changes of the stage in a forcing period.
+fn changes_of(oscillator: &model::Oscillator, steps: u32) -> Vec<Change> {
+    let change = |&(turns, stage): &(f64, usize)| {
+        let position = turns * f64::from(steps);
+        // Rounding may give a whole period.
+        let step = position.floor().min(f64::from(steps - 1));
+        Change { step: step as u32, theta: position - step, stage }
+    };
+    oscillator.schedule.iter().map(change).collect()
+}
+
 /// Whether a wall exists and is elastic or rigid.
 pub fn has_elastic_or_rigid_wall(oscillator: &model::Oscillator) -> bool {
     let mut walls = oscillator.contacts.iter().zip(oscillator.walls);
@@ -143,6 +255,16 @@ pub fn has_elastic_or_rigid_wall(oscillator: &model::Oscillator) -> bool {
 /// Whether the force has a sine.
 pub fn has_sine(oscillator: &model::Oscillator) -> bool {
     oscillator.force_sin != [0.0; 2]
+}
+
+/// Returns the number of harmonics of the force beside the first.
+pub fn higher_harmonics(oscillator: &model::Oscillator) -> u32 {
+    oscillator.harmonics.len() as u32
+}
+
+/// Whether the domains change in a forcing period.
+pub fn has_stages(oscillator: &model::Oscillator) -> bool {
+    !oscillator.schedule.is_empty()
 }
 
 /// Returns the motion without contacts. It may require that `x` is at rest, which a lane knows exactly.
@@ -163,15 +285,24 @@ pub(super) fn phasors(steps: u32) -> impl Iterator<Item = [f64; 2]> {
 
 /// Returns a bound on all rates of a domain: the forcing, and the spectral norms of the mass-scaled system. An
 /// overdamped mode can decay as fast as all of the damping. With half of the damping, the terms that single precision
-/// omits would keep 9e-6 of such a mode.
+/// omits would keep 9e-6 of such a mode. A gyroscopic mode, and one on a hill, can be faster than both.
 fn rate(oscillator: &model::Oscillator, domain: &model::Domain) -> f64 {
     let (damping, frequency) = Coordinates::new(oscillator).norms(domain);
-    (0.5 * damping + frequency.max(0.5 * damping)).max(oscillator.omega)
+    let half = 0.5 * damping;
+    let is_passive = domain.damping[0][1] == domain.damping[1][0] && oscillator.growth_rate(domain) == 0.0;
+    let turning = if is_passive { frequency.max(half) } else { frequency.hypot(half) };
+    (half + turning).max(fastest_force(oscillator))
 }
 
-/// Returns the unit of speeds: the scale of length times the rate of free motion.
+/// Returns the frequency of the highest harmonic.
+fn fastest_force(oscillator: &model::Oscillator) -> f64 {
+    oscillator.omega * f64::from(oscillator.highest_order())
+}
+
+/// Returns the unit of speeds: the scale of length times the rate of free motion, the highest one of all stages.
 pub(super) fn speed(oscillator: &model::Oscillator) -> f64 {
-    oscillator.length_scale() * free_rate(oscillator)
+    let further = (1..oscillator.stage_count()).map(|stage| free_rate(&oscillator.in_stage(stage)));
+    oscillator.length_scale() * further.fold(free_rate(oscillator), f64::max)
 }
 
 /// Returns the positions of the walls; a missing wall is out of reach.
@@ -184,7 +315,7 @@ fn walls(oscillator: &model::Oscillator) -> [f64; 2] {
 /// same.
 fn free_rate(oscillator: &model::Oscillator) -> f64 {
     let (damping, frequency) = Coordinates::new(oscillator).norms(&oscillator.free);
-    (damping + frequency).max(oscillator.omega)
+    (damping + frequency).max(fastest_force(oscillator))
 }
 
 /// Returns the accelerations of the gap and of the other displacement in units of a step `h`, with the gap measured
@@ -206,16 +337,20 @@ fn rows(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64, h: f6
 }
 
 /// Returns the domain of lasting contact. Constants of a missing wall are never read.
-fn behind_wall(oscillator: &model::Oscillator, side: usize, wall: f64, free_step: f64) -> Domain {
+fn behind_wall(
+    oscillator: &model::Oscillator,
+    side: usize,
+    wall: f64,
+    free_step: f64,
+    substeps: f64,
+) -> Domain {
     if oscillator.walls[side].is_infinite() {
         return Domain::zeroed();
     }
     if oscillator.contacts[side] == Contact::Rigid {
         return held(oscillator, wall, free_step);
     }
-    let behind = &oscillator.meshing[side];
-    let substeps = (free_step * rate(oscillator, behind) / STEP_ANGLE).max(1.0).log2().ceil().exp2();
-    domain(oscillator, behind, wall, free_step, substeps)
+    domain(oscillator, &oscillator.meshing[side], wall, free_step, substeps)
 }
 
 fn domain(
@@ -419,7 +554,8 @@ mod tests {
                 assert!(oscillator.mirror_symmetric());
                 let Flow { domains: [_, _, left], walls, h, .. } =
                     Constants::new(&oscillator, None).unwrap().flow;
-                assert_eq!(left, behind_wall(&oscillator, 1, walls[1], h));
+                let Common { substeps, .. } = Common::new(&oscillator, h);
+                assert_eq!(left, behind_wall(&oscillator, 1, walls[1], h, substeps[1]));
             }
         }
     }

@@ -9,7 +9,7 @@ use super::dispatch_policy::DispatchPolicy;
 use super::panics::{PanicFree, catch_panic};
 use super::{Gpu, GpuError, Precision, Variant};
 
-/// Whether the shader writes to each storage binding, from 1 on: flows, shapes, phasors, laws, cells, motions,
+/// Whether the shader writes to each storage binding, from 1 on: flows, shapes, pairs, laws, cells, motions,
 /// tallies, queue, starts, readings, findings, blocks, measured, workgroups.
 const WRITES: [bool; 14] =
     [false, false, false, false, false, true, true, true, false, true, true, true, true, true];

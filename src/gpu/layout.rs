@@ -89,6 +89,10 @@ structs! {
         degrees: u32,
         must_rest: u32,
         contacts: [u32; 2],
+        harmonics: u32,
+        harmonic_count: u32,
+        schedule: u32,
+        changes: u32,
     }
 
     /// Contact law of the right and of the left wall.
@@ -147,6 +151,7 @@ structs! {
         anchor: [f64; 4],
         position_scale: f64,
         early_scale: f64,
+        early_rate_scale: f64,
         rate_scale: f64,
         cycle_growth: f64,
         cycle_stretch: f64,
@@ -193,6 +198,7 @@ structs! {
         recent: u32,
         strobe_distance: u32,
         itinerary: u32,
+        next_change: u32,
         has_read: u32,
         cycle: u32,
         failed_readings: u32,
@@ -235,12 +241,13 @@ structs! {
         itineraries: [u32; TRAIL],
         column_scalings: u32,
         is_superstable: u32,
+        has_overflowed: u32,
         word: [u32; 7],
         pattern: [u32; 7],
         pattern_length: u32,
         pattern_hash: [u32; 2],
         pattern_recent: u32,
-        ended: [u32; 26],
+        ended: [u32; 27],
         is_measured: u32,
     }
 

@@ -44,7 +44,7 @@ pub use adapter::{
     AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_card, is_hardware,
     narrowed_by,
 };
-pub use constants::{Constants, has_elastic_or_rigid_wall, has_sine};
+pub use constants::{Constants, has_elastic_or_rigid_wall, has_sine, has_stages, higher_harmonics};
 pub use error::GpuError;
 pub use pool::Pool;
 pub use precision::Precision;
@@ -117,6 +117,10 @@ pub struct LaneSettings {
     pub kinds: bool,
     /// Whether forces may have a sine.
     pub sine: bool,
+    /// Most harmonics of a force beside the first.
+    pub harmonics: u32,
+    /// Whether domains may change in a forcing period.
+    pub stages: bool,
     /// What is measured on lanes whose class is decided.
     pub measures: Option<Measures>,
     /// Whether records contain the largest multiplier of cycles.
@@ -181,6 +185,8 @@ impl Default for LaneSettings {
             chatter: true,
             kinds: true,
             sine: true,
+            harmonics: 0,
+            stages: false,
             measures: None,
             multiplier: false,
             exponent_from: 100,
@@ -435,7 +441,7 @@ impl Gpu {
     /// [`GpuError::WrongAnswer`] if the device computes something else; other errors of the device.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
         let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, .. } = *settings;
-        let LaneSettings { chatter, kinds, sine, .. } = *settings;
+        let LaneSettings { chatter, kinds, sine, harmonics, stages, .. } = *settings;
         let keep = self.policy.keep;
         // Where it saves time, lanes run without the tangent vector until they need it.
         let growths: &[bool] = match (exponent, self.policy.late_tangent) {
@@ -456,6 +462,8 @@ impl Gpu {
             chatter,
             kinds,
             sine,
+            harmonics,
+            stages,
             measures: None,
             keep,
         };

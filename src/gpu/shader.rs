@@ -1,6 +1,7 @@
 //! Shader variants: one source, composed of small files.
 
 use super::Measures;
+use super::constants::PAIRS_PER_HARMONIC;
 use super::layout::{
     BLOCK, CONTACTS, EXTREMES, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD, SPELLED_WORD_LENGTH,
     SPELLING, SUMS, SYMBOLS_PER_NUMBER,
@@ -36,6 +37,10 @@ pub struct Variant {
     pub kinds: bool,
     /// Whether forces may have a sine.
     pub sine: bool,
+    /// Most harmonics of a force beside the first.
+    pub harmonics: u32,
+    /// Whether domains may change in a forcing period.
+    pub stages: bool,
     /// What this variant measures on lanes whose class is decided; none in a variant that decides classes.
     pub measures: Option<Measures>,
     /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
@@ -50,6 +55,8 @@ const BODY: &str = concat!(
     include_str!("../../shaders/layout.wgsl"),
     include_str!("../../shaders/domain.wgsl"),
     include_str!("../../shaders/phase.wgsl"),
+    include_str!("../../shaders/harmonics.wgsl"),
+    include_str!("../../shaders/stages.wgsl"),
     include_str!("../../shaders/contact.wgsl"),
     include_str!("../../shaders/elastic.wgsl"),
     include_str!("../../shaders/rigid.wgsl"),
@@ -88,6 +95,8 @@ impl Variant {
             chatter: true,
             kinds: true,
             sine: true,
+            harmonics: 0,
+            stages: false,
             measures: None,
             keep: false,
         }
@@ -100,7 +109,8 @@ impl Variant {
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
         let names = ["TERMS", "SHORT_TERMS"].map(|name| (name, count(real, name)));
-        let body = unroll(BODY, &names);
+        let [terms, short_terms] = names;
+        let body = unroll(BODY, &[terms, short_terms, ("HARMONICS", self.harmonics)]);
         let valid = VALID.map(|(name, bits)| (format!("VALID_{name}"), bits));
         let status = Status::ALL.map(|s| (format!("STATUS_{}", s.name().to_uppercase()), s.code()));
         let contacts = CONTACTS.map(|(name, code)| (format!("CONTACT_{name}"), code));
@@ -116,6 +126,8 @@ impl Variant {
             ("SPELLED_PATTERN_LENGTH", SPELLED_PATTERN_LENGTH as u32),
             ("SPELLED_PATTERN_HASH", SPELLED_PATTERN_LENGTH as u32 + 1),
             ("EXTREMES", EXTREMES as u32),
+            ("HARMONICS", self.harmonics),
+            ("PAIRS_PER_HARMONIC", PAIRS_PER_HARMONIC as u32),
             ("WORD_SYMBOLS", WORD_SYMBOLS as u32),
             ("SYMBOLS_PER_NUMBER", SYMBOLS_PER_NUMBER as u32),
         ]
@@ -133,6 +145,7 @@ impl Variant {
             ("CHATTER", self.chatter),
             ("KINDS", self.kinds),
             ("SINE", self.sine),
+            ("STAGES", self.stages),
             ("MEASURE", self.measures.is_some()),
             ("EXTREME", self.measures.is_some_and(|measures| measures.extremes)),
             ("MOMENTS", self.measures.is_some_and(|measures| measures.moments)),

@@ -102,7 +102,7 @@ impl Slots {
             &self.settings,
             &tables.flows,
             &tables.shapes,
-            &tables.phasors,
+            &tables.pairs,
             &tables.laws,
             &self.cells,
             &self.motions,

@@ -4,12 +4,13 @@ use std::collections::HashMap;
 
 use bytemuck::Zeroable;
 
-use super::constants::{Constants, phasors as phasors_of};
+use super::constants::{Change, Constants, PAIRS_PER_HARMONIC, phasors as phasors_of};
 use super::guard::with_error_scopes;
 use super::layout::{self, Flow, FlowShape, contact_code};
+use super::precision::Precision;
 use super::transfer::{buffer, reals, upload};
 use super::{Gpu, GpuError};
-use rattlemap_dynamics::model::Law;
+use rattlemap_dynamics::model::{Law, Oscillator};
 
 /// Flows and laws, uploaded once for any number of runs.
 pub struct Tables {
@@ -21,9 +22,14 @@ pub struct Tables {
     pub(super) flow_of_another_kind: Option<usize>,
     /// The first flow whose force has a sine.
     pub(super) flow_with_sine: Option<usize>,
+    /// The first flow that has most harmonics beside the first, with their number; and the first flow with stages.
+    pub(super) flow_with_most_harmonics: Option<(usize, u32)>,
+    pub(super) flow_with_stages: Option<usize>,
+    /// All flows in their first stages, then their further stages.
     pub(super) flows: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
-    pub(super) phasors: wgpu::Buffer,
+    /// Zeros of a missing harmonic; phasors of the first harmonic, constants of the higher ones, and changes of stages.
+    pub(super) pairs: wgpu::Buffer,
     pub(super) laws: wgpu::Buffer,
 }
 
@@ -41,10 +47,25 @@ pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
 /// Returns the most bytes of memory that the constants of one flow take, and those of all phasors for its steps, which
 /// flows with equal steps share.
-pub(crate) fn bytes(steps: Option<u32>) -> [u64; 2] {
+pub(crate) fn bytes(oscillator: &Oscillator, steps: Option<u32>) -> [u64; 2] {
     let phasors = steps.map_or(0, |steps| u64::from(steps) + 1);
-    let flow = size_of::<Constants>() + size_of::<FlowShape>();
-    [flow as u64, phasors * size_of::<[f64; 2]>() as u64].map(|bytes| COPIES * bytes)
+    let pair = size_of::<[f64; 2]>();
+    let stage = size_of::<Constants>()
+        + size_of::<FlowShape>()
+        + PAIRS_PER_HARMONIC * pair * oscillator.harmonics.len();
+    let flow = stage * oscillator.stage_count() + 2 * pair * oscillator.schedule.len();
+    [flow as u64, phasors * pair as u64].map(|bytes| COPIES * bytes)
+}
+
+/// Returns the pairs that describe a change of the stage: whole free steps and the fraction of the next one, and the flow
+/// that begins.
+fn pairs_of(change: &Change, flow: u32, precision: Precision) -> [[f64; 2]; 2] {
+    // The fraction stays below 1 where it is rounded.
+    let rounding = match precision {
+        Precision::F32 => f64::from(f32::EPSILON),
+        Precision::F64 => f64::EPSILON,
+    };
+    [[f64::from(change.step), change.theta.min(1.0 - 0.5 * rounding)], [f64::from(flow), 0.0]]
 }
 
 impl Tables {
@@ -55,7 +76,7 @@ impl Tables {
 
     /// Returns the bytes of device memory.
     pub(crate) fn bytes(&self) -> u64 {
-        [&self.flows, &self.shapes, &self.phasors, &self.laws].map(wgpu::Buffer::size).iter().sum()
+        [&self.flows, &self.shapes, &self.pairs, &self.laws].map(wgpu::Buffer::size).iter().sum()
     }
 
     /// Returns the constants, for the next tables to overwrite.
@@ -75,10 +96,13 @@ impl Tables {
     ) -> Result<Tables, GpuError> {
         let flows = constants.len();
         let mut shapes = Vec::with_capacity(flows);
-        let mut phasors = Vec::new();
+        // Constants of further stages follow those of all flows.
+        let mut further = Vec::new();
+        let mut pairs = vec![[0.0; 2]; PAIRS_PER_HARMONIC];
         // Flows with equal steps share their phasors.
         let mut places = HashMap::new();
         let (mut flow_of_another_kind, mut flow_with_sine) = (None, None);
+        let (mut flow_with_most_harmonics, mut flow_with_stages) = (None, None);
         for (i, constants) in constants.iter().enumerate() {
             // Lanes of a missing flow are refused before they start.
             let Some(constants) = constants else {
@@ -86,50 +110,85 @@ impl Tables {
                 continue;
             };
             let place = *places.entry(constants.steps).or_insert_with_key(|&steps| {
-                let place = phasors.len() as u32;
-                phasors.extend(phasors_of(steps));
+                let place = pairs.len() as u32;
+                pairs.extend(phasors_of(steps));
                 place
             });
-            shapes.push(FlowShape {
-                steps: constants.steps,
-                phasors: place,
-                must_rest: constants.must_rest.into(),
-                degrees: constants.degrees,
-                contacts: constants.contacts.map(contact_code),
-            });
+            let schedule = pairs.len() as u32;
+            let first = flows + further.len() - 1;
+            pairs.extend(constants.changes.iter().flat_map(|change| {
+                let flow = if change.stage == 0 { i } else { first + change.stage };
+                pairs_of(change, flow as u32, gpu.precision)
+            }));
+            let mut shape = |harmonics: &[[f64; 2]]| {
+                let place_of_harmonics = pairs.len() as u32;
+                pairs.extend(harmonics);
+                FlowShape {
+                    steps: constants.steps,
+                    phasors: place,
+                    must_rest: constants.must_rest.into(),
+                    degrees: constants.degrees,
+                    contacts: constants.contacts.map(contact_code),
+                    harmonics: place_of_harmonics,
+                    harmonic_count: (harmonics.len() / PAIRS_PER_HARMONIC) as u32,
+                    schedule,
+                    changes: constants.changes.len() as u32,
+                }
+            };
+            shapes.push(shape(&constants.harmonics));
+            further.extend(constants.stages.iter().map(|stage| (stage.flow, shape(&stage.harmonics))));
             flow_of_another_kind = flow_of_another_kind.or(constants.has_elastic_or_rigid_wall.then_some(i));
             flow_with_sine = flow_with_sine.or(constants.has_sine.then_some(i));
+            let count = shapes[i].harmonic_count;
+            if count > flow_with_most_harmonics.map_or(0, |(_, most)| most) {
+                flow_with_most_harmonics = Some((i, count));
+            }
+            flow_with_stages = flow_with_stages.or((!constants.changes.is_empty()).then_some(i));
         }
-        phasors.push([1.0, 0.0]);
+        pairs.push([1.0, 0.0]);
+        shapes.extend(further.iter().map(|(_, shape)| shape));
         let law = |law: &Law| layout::Law { restitution: law.restitution, mesh_speed: law.mesh_speed };
         let rows: Vec<layout::Law> = laws.iter().map(law).collect();
-        let phasors = reals(&phasors, gpu.precision);
+        let pairs = reals(&pairs, gpu.precision);
         let flow_size = size_of::<Flow>() / size_of::<f64>() * gpu.precision.bytes();
         let allowed = gpu.device.limits().max_storage_buffer_binding_size;
-        let needed = (flows * flow_size).max(phasors.len()) as u64;
+        let needed = (shapes.len() * flow_size).max(pairs.len()) as u64;
         if needed > allowed {
             return Err(GpuError::TooManyFlows { flows, needed, allowed });
         }
         let make = || Tables {
-            flows: upload_flows(gpu, &constants, flow_size),
+            flows: upload_flows(gpu, &constants, &further, flow_size),
             shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
-            phasors: upload(gpu, "phasors", &phasors),
+            pairs: upload(gpu, "phasors", &pairs),
             laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
             constants,
             is_even: laws.iter().map(Law::is_symmetric).collect(),
             flow_of_another_kind,
             flow_with_sine,
+            flow_with_most_harmonics,
+            flow_with_stages,
         };
         with_error_scopes(gpu, "flows", flows, make).await
     }
 }
 
-/// Rounds the constants of flows and uploads them; `size` is that of a flow in the lanes' precision.
-fn upload_flows(gpu: &Gpu, constants: &[Option<Constants>], size: usize) -> wgpu::Buffer {
-    let (buffer, none) = (buffer(gpu, "flows", constants.len() * size), Flow::zeroed());
+/// Rounds the constants of flows and uploads them, those of further stages last; `size` is that of a flow in the lanes'
+/// precision.
+fn upload_flows(
+    gpu: &Gpu,
+    constants: &[Option<Constants>],
+    further: &[(Flow, FlowShape)],
+    size: usize,
+) -> wgpu::Buffer {
+    let count = constants.len();
+    let (buffer, none) = (buffer(gpu, "flows", (count + further.len()) * size), Flow::zeroed());
     for (n, part) in constants.chunks(FLOWS_AT_A_TIME).enumerate() {
         let flows = part.iter().map(|constants| constants.as_ref().map_or(&none, |c| &c.flow));
         gpu.write(&buffer, (n * FLOWS_AT_A_TIME * size) as u64, &reals(flows, gpu.precision));
+    }
+    for (n, part) in further.chunks(FLOWS_AT_A_TIME).enumerate() {
+        let flows = part.iter().map(|(flow, _)| flow);
+        gpu.write(&buffer, ((count + n * FLOWS_AT_A_TIME) * size) as u64, &reals(flows, gpu.precision));
     }
     buffer
 }

@@ -353,15 +353,19 @@ fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
         // From the first flow to the last.
         let flow = (flows - 1) * nth / (sampled - 1).max(1);
         let model = scene.points().model(parts.cell(flow as u32));
-        Constants::steps(&model.oscillator().ok()?, steps)
+        let oscillator = model.oscillator().ok()?;
+        let steps = Constants::steps(&oscillator, steps);
+        Some((steps, gpu::table_bytes(&oscillator, steps)))
     };
-    let steps: Vec<u32> = (0..sampled).filter_map(steps_of).collect();
-    let (most, least) = (steps.iter().copied().max(), steps.iter().copied().min());
+    let samples: Vec<(Option<u32>, [u64; 2])> = (0..sampled).filter_map(steps_of).collect();
+    let steps = || samples.iter().filter_map(|&(steps, _)| steps);
+    let (most, least) = (steps().max(), steps().min());
     // Flows with equal steps, which are even, share their phasors.
     let distinct = most.zip(least).map_or(0, |(most, least)| u64::from((most - least) / 2 + 1));
-    let [flow, largest] = gpu::table_bytes(most);
+    let largest_of = |part: usize| samples.iter().map(|(_, bytes)| bytes[part]).max().unwrap_or(0);
+    let [flow, largest] = [0, 1].map(largest_of);
     if stores_flows(flows, runs) {
-        let mean = steps.iter().map(|&steps| gpu::table_bytes(Some(steps))[1]).sum::<u64>() / sampled;
+        let mean = samples.iter().map(|(_, [_, phasors])| phasors).sum::<u64>() / sampled;
         flows * flow + flows.min(distinct) * mean
     } else {
         let together = flows.min(gpu::MOST_FLOWS as u64);
@@ -421,8 +425,10 @@ mod tests {
             let (parts, runs) = (Parts::flows(scene.points()), scene.run_count());
             (lane_tables(scene, &parts, runs), kept_flows(&parts, runs))
         };
-        let one =
-            |scene: &Scene| gpu::table_bytes(Constants::steps(&scene.base().oscillator().unwrap(), None));
+        let one = |scene: &Scene| {
+            let oscillator = scene.base().oscillator().unwrap();
+            gpu::table_bytes(&oscillator, Constants::steps(&oscillator, None))
+        };
         // One flow: e and mesh_speed belong to the contact law.
         let single = scene("mesh_speed", 0.001, 0.01, [300, 300], &[]);
         assert_eq!(sizes(&single), (one(&single).iter().sum(), FLOW));

@@ -19,4 +19,5 @@ mod resonance;
 mod shaders;
 mod standard_errors;
 mod stored;
+mod time;
 mod work;

@@ -9,12 +9,12 @@ use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Budget, Quantities, measure};
 
 /// Everything that lanes measure.
-const MEASURES: Measures = Measures { periods: 128, extremes: true, moments: true };
+pub(super) const MEASURES: Measures = Measures { periods: 128, extremes: true, moments: true };
 
-type Case = (Oscillator, Law, State);
+pub(super) type Case = (Oscillator, Law, State);
 
 /// Runs one lane per case. Returns quantities, multiplier and period of each.
-fn lanes(
+pub(super) fn lanes(
     cases: &[Case],
     precision: Precision,
     measures: Option<Measures>,
@@ -22,7 +22,9 @@ fn lanes(
     let mut gpu = open(precision);
     let flows: Vec<Oscillator> = cases.iter().map(|case| case.0.clone()).collect();
     let laws: Vec<Law> = cases.iter().map(|case| case.1).collect();
-    let settings = LaneSettings { measures, multiplier: true, ..LaneSettings::default() };
+    let harmonics = flows.iter().map(|flow| flow.harmonics.len() as u32).max().unwrap_or(0);
+    let stages = flows.iter().any(|flow| !flow.schedule.is_empty());
+    let settings = LaneSettings { measures, multiplier: true, harmonics, stages, ..LaneSettings::default() };
     pollster::block_on(async {
         let tables = gpu.load(&flows, &laws, None).await.unwrap();
         let mut pool = gpu.pool(&settings).await.unwrap();
@@ -70,7 +72,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// Whether all numbers agree within `within`, relative to the size of the motion.
-fn agree(a: &Quantities, b: &Quantities, omega: f64, within: f64) -> bool {
+pub(super) fn agree(a: &Quantities, b: &Quantities, omega: f64, within: f64) -> bool {
     let size = b.displacements.iter().map(|d| d.rms).fold(0.0, f64::max);
     let speed = size * omega;
     let power = b.dissipated + b.impact_energy;

@@ -39,7 +39,7 @@ fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
 }
 
 /// Returns variants with all quantities, with the class alone, and with some quantities.
-fn variants(precision: Precision) -> [Variant; 15] {
+fn variants(precision: Precision) -> [Variant; 18] {
     let everything = Variant::of(precision);
     let measuring = |extremes, moments| Variant {
         measures: Some(Measures { periods: 1, extremes, moments }),
@@ -65,6 +65,9 @@ fn variants(precision: Precision) -> [Variant; 15] {
         Variant { keep: true, ..measuring(true, true) },
         measuring(false, true),
         measuring(true, false),
+        Variant { harmonics: 7, keep: true, ..class },
+        Variant { harmonics: 1, stages: true, ..everything },
+        Variant { harmonics: 2, stages: true, ..measuring(true, true) },
     ]
 }
 
@@ -76,7 +79,7 @@ static MODULES: LazyLock<Vec<(Variant, naga::Module)>> = LazyLock::new(|| {
 
 #[test]
 fn every_variant_is_valid() {
-    assert_eq!(MODULES.len(), 30);
+    assert_eq!(MODULES.len(), 36);
 }
 
 /// Offsets on the host are scaled by the size of the shader's numbers.

@@ -480,7 +480,9 @@ impl Oscillator {
         let mut domains = behind.map(|side| &self.meshing[side.index()]).chain([&self.free]);
         // Stages can do work: parametric resonance.
         let grows = !self.stages.is_empty() || domains.any(|domain| self.growth_rate(domain) > 0.0);
-        match self.length_scale() {
+        // Walls may be near each other and far from rest, or much nearer than the motion of other coordinates.
+        let of_stages = (0..self.stage_count()).map(|stage| self.in_stage(stage).deflection_scale());
+        match of_stages.fold(self.length_scale(), f64::max) {
             _ if !grows => f64::INFINITY,
             LEAST_LENGTH => ESCAPE_WITHOUT_SCALE,
             length => ESCAPE * length,
@@ -573,6 +575,13 @@ impl Oscillator {
         if half.is_finite() && half > 0.0 {
             return half;
         }
+        let of_stages = (1..self.stage_count()).map(|stage| self.in_stage(stage).deflection_scale());
+        of_stages.fold(self.deflection_scale(), f64::max)
+    }
+
+    /// Returns the largest of the walls' positions and of the deflections of [`length_scale`](Self::length_scale), in the
+    /// first stage.
+    fn deflection_scale(&self) -> f64 {
         let [cos, sin, load] =
             [self.force, self.force_sin, self.free.load].map(|f| self.deflections(f, self.omega));
         let mut swings = [0, 1].map(|i| cos[i].hypot(sin[i]));
@@ -580,10 +589,9 @@ impl Oscillator {
             let [cos, sin] = [cos, sin].map(|f| self.deflections(*f, self.omega * f64::from(*order)));
             swings = [0, 1].map(|i| swings[i] + cos[i].hypot(sin[i]));
         }
-        let of_stages = (1..self.stage_count()).map(|stage| self.in_stage(stage).length_scale());
         let deflections = [0, 1].map(|i| swings[i].max(load[i].abs()));
         let walls = self.walls.map(f64::abs).into_iter().filter(|wall| wall.is_finite());
-        walls.chain(deflections).chain(of_stages).fold(LEAST_LENGTH, f64::max)
+        walls.chain(deflections).fold(LEAST_LENGTH, f64::max)
     }
 
     fn deflections(&self, force: [f64; 2], omega: f64) -> [f64; 2] {
@@ -664,9 +672,10 @@ impl Domain {
     }
 }
 
-/// Whether a symmetric matrix has no negative eigenvalue, except for rounding. An overflow of the products counts as none.
+/// Whether a symmetric matrix has no negative eigenvalue, except for rounding.
 pub(crate) fn is_semidefinite([[a, b], [_, d]]: [[f64; 2]; 2]) -> bool {
-    a >= 0.0 && d >= 0.0 && a * d * (1.0 + MATRIX_TOLERANCE) >= b * b
+    // Products of very large or very small entries would leave the range.
+    a >= 0.0 && d >= 0.0 && a.sqrt() * d.sqrt() * (1.0 + 0.5 * MATRIX_TOLERANCE) >= b.abs()
 }
 
 /// Returns `c` if the difference of two matrices is `c row row^T`.

@@ -6,7 +6,7 @@ use super::approach::{BRANCH_CYCLES, HULL_CYCLES, LINEAR_TOLERANCE, stays};
 use super::itinerary::Recorder;
 use super::quantities::{Meter, Quantities};
 use super::reading::{ON_STROBE_TURNS, Reading};
-use super::recurrence::{Candidate, Metric, RECURRENCE_DISTANCE, candidates};
+use super::recurrence::{Candidate, Metric, RECURRENCE_DISTANCE, candidates, rests};
 use super::regularity::is_regular;
 use super::resolution::{is_below_resolution, too_few_events};
 use super::{Class, Orbit, Section, Settings, Status};
@@ -116,14 +116,18 @@ pub(super) fn neutral_growth(from: u32, periods: f64) -> f64 {
     NEUTRAL_ORDER * ((f64::from(from) + periods) / f64::from(from.max(1))).ln()
 }
 
-/// Whether a motion grows, by negative damping or stiffness, or is too short to know. Its tangents then grow, too, without chaos.
+/// Whether displacements or rates of a motion grow, by negative damping or stiffness, or the motion is too short to know. Its tangents then grow, too, without chaos.
 /// `exponent` is theirs, per forcing period.
 pub(super) fn is_growing(flow: &Flow, strobes: &[State], exponent: f64) -> bool {
-    let largest = |part: &[State]| part.iter().fold(0.0, |most: f64, y| most.max(y[0].abs()).max(y[2].abs()));
     let (first, second) = strobes.split_at(strobes.len() / 2);
-    let growth = (largest(second) / largest(first)).ln();
     let expected = SHARED_GROWTH * exponent * second.len() as f64;
-    flow.escape.is_finite() && (growth > expected || expected < PLAIN_GROWTH)
+    // Between two walls only the rates can grow.
+    let grows = [0, 1].into_iter().any(|i| {
+        let largest =
+            |part: &[State]| part.iter().fold(0.0, |most: f64, y| most.max(y[i].abs()).max(y[i + 2].abs()));
+        (largest(second) / largest(first)).ln() > expected
+    });
+    flow.escape.is_finite() && (grows || expected < PLAIN_GROWTH)
 }
 
 /// Returns the status of a motion that a stop has ended.
@@ -166,6 +170,7 @@ struct Window {
     lyapunov_error: f64,
     impacts_per_period: f64,
     mesh_fraction: f64,
+    events: u64,
 }
 
 pub(super) struct Analysis<'a> {
@@ -316,10 +321,10 @@ impl Analysis<'_> {
     }
 
     /// Whether nearby motions separate by more than in an escape from an unstable cycle, and by far more than in
-    /// neutral motion, where they separate in proportion to time. Without contact the motion is linear and not chaotic.
+    /// neutral motion, where they separate in proportion to time. Without events the motion is linear and not chaotic.
     fn is_chaotic(&self, window: &Window) -> bool {
-        let is_linear = window.impacts_per_period == 0.0 && window.mesh_fraction == 0.0;
-        if is_linear || is_growing(self.flow, &window.strobes, window.lyapunov * self.flow.period) {
+        let grows = || is_growing(self.flow, &window.strobes, window.lyapunov * self.flow.period);
+        if window.events == 0 || grows() || rests(&window.strobes, &window.metric, self.settings.max_period) {
             return false;
         }
         let least = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error;
@@ -343,7 +348,7 @@ impl Analysis<'_> {
             exponent.renormalise(&mut carrier);
         }
         exponent.reset();
-        let (mesh_start, impacts_start) = (carrier.meshing_time(), carrier.work().impacts);
+        let (mesh_start, before) = (carrier.meshing_time(), carrier.work());
         let mut strobes = vec![carrier.state()];
         for _ in 0..length {
             carrier.advance_period(&mut ())?;
@@ -359,7 +364,8 @@ impl Analysis<'_> {
             strobes,
             lyapunov,
             lyapunov_error,
-            impacts_per_period: (carrier.work().impacts - impacts_start) as f64 / span,
+            impacts_per_period: (carrier.work().impacts - before.impacts) as f64 / span,
+            events: carrier.work().events - before.events,
             mesh_fraction: (carrier.meshing_time() - mesh_start) / (span * self.flow.period),
         })
     }

@@ -14,7 +14,7 @@ use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::Quantities;
 use super::reading::{ON_STROBE_TURNS, Reading};
-use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
+use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle, rests};
 use super::regularity::is_regular;
 use super::resolution::too_few_events;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
@@ -161,7 +161,7 @@ fn measure_by_strobes(
         cycle: None,
         approaches: false,
         is_neutral: false,
-        counts: vec![[0.0; 2]],
+        counts: vec![[0.0; 3]],
         itineraries: Vec::new(),
         near_strobe: 0,
         history: SearchHistory::default(),
@@ -209,7 +209,7 @@ struct CellRun<'a> {
     /// Whether the last check found a neutral cycle nearby.
     is_neutral: bool,
     /// Impacts and meshing time up to each strobe.
-    counts: Vec<[f64; 2]>,
+    counts: Vec<[f64; 3]>,
     /// Itinerary of each period.
     itineraries: Vec<Itinerary>,
     /// One bit for each of the last periods: whether it has an event near phase 0.
@@ -260,7 +260,8 @@ impl<'a> CellRun<'a> {
         self.exponent.renormalise(trajectory);
         self.strobes.push(trajectory.state());
         let now = self.strobes.len() as u32 - 1;
-        self.counts.push([trajectory.work().impacts as f64, trajectory.meshing_time()]);
+        let work = trajectory.work();
+        self.counts.push([work.impacts as f64, trajectory.meshing_time(), work.events as f64]);
         if self.budget.early_stop && self.is_non_impacting(trajectory) {
             return Ok(Some(self.non_impacting()));
         }
@@ -532,9 +533,11 @@ impl<'a> CellRun<'a> {
         let periods = averaged.len().saturating_sub(1) as f64;
         let is_neutral =
             |rate: f64| rate * periods * period <= neutral_growth(self.budget.exponent_from(), periods);
-        // Without contact the motion is linear: growth by negative damping is not chaos.
-        let is_linear = self.counts.last() == self.counts.get(self.budget.exponent_from() as usize);
+        // Without events the motion is linear: growth by negative damping is not chaos.
+        let events_at = |n: usize| self.counts.get(n).map(|counts| counts[2]);
+        let is_linear = events_at(self.counts.len() - 1) == events_at(self.budget.exponent_from() as usize);
         let slow = is_linear
+            || rests(window, &Metric::of(window, self.analysis.flow), max_period)
             || lyapunov.is_some_and(|(mean, _)| is_growing(self.analysis.flow, &self.strobes, mean * period))
             || least.is_some_and(is_neutral)
             || 2.0 * near_saddle_periods as f64 >= span && least.is_none_or(is_escape);

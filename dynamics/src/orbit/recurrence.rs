@@ -53,12 +53,24 @@ pub(super) struct Candidate {
     pub(super) distance: f64,
 }
 
+/// Largest distance of two states that are equal but for rounding, relative to the motion.
+const WITHIN_ROUNDING: f64 = 1e-12;
+
 /// Returns the number of last periods over which the states recur at some lag: the motion stays near a periodic
 /// orbit, stable or unstable.
 pub(super) fn near_saddle(strobes: &[State], metric: &Metric, max_period: u32) -> usize {
+    recurring(strobes, metric, max_period, RECURRENCE_DISTANCE)
+}
+
+/// Whether the states recur within rounding at some lag: the motion rests on a cycle, and growth of its tangents is not chaos.
+pub(super) fn rests(strobes: &[State], metric: &Metric, max_period: u32) -> bool {
+    2 * recurring(strobes, metric, max_period, WITHIN_ROUNDING) >= strobes.len()
+}
+
+/// Returns the number of last periods over which the states recur at some lag, within a distance.
+fn recurring(strobes: &[State], metric: &Metric, max_period: u32, within: f64) -> usize {
     let n = strobes.len();
-    let is_near =
-        |i: usize, lag: usize| metric.distance(&strobes[i], &strobes[i - lag]) < RECURRENCE_DISTANCE;
+    let is_near = |i: usize, lag: usize| metric.distance(&strobes[i], &strobes[i - lag]) < within;
     let duration = |lag: usize| (lag..n).rev().take_while(|&i| is_near(i, lag)).count();
     (1..=(max_period as usize).min(n / 2)).fold(0, |most, lag| {
         // A lag that is not near where the longest recurrence ended is not longer.

@@ -1,10 +1,10 @@
 //! Elastic walls: the motion continues behind them, and the state is continuous.
 
 use crate::common::linear::{Linear, invariants, invariants_of, product, with_wall};
-use crate::common::{REST, near};
+use crate::common::{BUDGET, REST, near};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
-use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State};
+use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow, measure};
 use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
 /// Any law: elastic walls ignore it.
@@ -150,5 +150,57 @@ fn a_start_at_rest_on_the_wall_follows_the_load() {
         assert_eq!(trajectory.state()[0] > 0.0, behind);
         assert_eq!(events.len(), usize::from(behind), "{events:?}");
         assert!(!trajectory.near_grazing());
+    }
+}
+
+/// Growth without contact along one coordinate, or of rates between two walls, is not chaos; nor is rest on an unstable cycle.
+#[test]
+fn growth_that_contacts_do_not_share_is_not_chaos() {
+    let linear = |gamma: f64, square: f64| Linear { gamma, square, force: 0.0, load: 0.0, omega: 1.0 };
+    // Impacts between two walls without loss, while negative damping supplies energy.
+    let mut driven = linear(-0.001, 1.0).oscillator();
+    driven.walls = [1.0, -1.0];
+    let bouncing = (driven, Law::both(1.0, 0.0), [0.3, 2.0, 0.0, 0.0]);
+    // A bouncing mass beside an uncoupled one that rests on the top of a hill.
+    let mut pair = linear(0.05, 1.0).oscillator();
+    (pair.degrees, pair.walls, pair.force) = (2, [0.5, -0.5], [2.0, 0.0]);
+    pair.free.stiffness[1][1] = -0.2;
+    pair.validate().unwrap();
+    let beside_a_hill = (pair, Law::both(0.7, 0.0), REST);
+    // Rest behind a wall, where the hill is steeper than the contact's spring.
+    let hill = Linear { load: -1.0, ..linear(0.0, -2.0) };
+    let behind = with_wall(hill.oscillator(), Side::Right, 0.0, Contact::Elastic, [1.0, 0.0]);
+    let at_rest = (behind, Law::both(0.0, 0.0), [1.0, 0.0, 0.0, 0.0]);
+    for (oscillator, law, start) in [bouncing, beside_a_hill, at_rest] {
+        let flow = Flow::new(&oscillator);
+        let found = measure(&flow, law, start, &BUDGET);
+        let is_chaotic = found.period.is_none() && !found.is_quasi_periodic && found.status == Status::Ok;
+        assert!(!is_chaotic, "{found:?}: {oscillator:?}");
+        let orbit = analyse_flow(&flow, law, start, &Settings::default(), 4);
+        assert!(!matches!(orbit.class, Class::Chaotic), "{orbit:?}");
+    }
+}
+
+/// The scale of an escape is not the distance of the walls, if that is much smaller than the motion.
+#[test]
+fn a_narrow_clearance_is_no_escape() {
+    for clearance in [1e-4, 1e-10] {
+        let mut pair = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.3 }.oscillator();
+        (pair.degrees, pair.walls, pair.contacts) = (2, [clearance, -clearance], [Contact::Elastic; 2]);
+        pair.gap = [1.0, -1.0];
+        pair.free = Domain {
+            damping: [[0.1, -0.06], [-0.06, 0.03]],
+            stiffness: [[1.0, 0.0], [0.0, 1.0]],
+            load: [0.0; 2],
+        };
+        let behind = |sign: f64| Domain {
+            stiffness: [[31.0, -30.0], [-30.0, 31.0]],
+            load: [sign * 30.0 * clearance, -sign * 30.0 * clearance],
+            ..pair.free
+        };
+        pair.meshing = [behind(1.0), behind(-1.0)];
+        pair.validate().unwrap();
+        let found = measure(&Flow::new(&pair), Law::both(0.0, 0.0), REST, &BUDGET);
+        assert!(found.status != Status::Escape && found.period == Some(1), "{clearance}: {found:?}");
     }
 }

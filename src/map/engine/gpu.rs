@@ -233,8 +233,9 @@ impl<'p> Gpu<'p> {
         let mut oscillators: Vec<_> = flows.into_par_iter().map(|flow| plan.oscillator(flow)).collect();
         let mut known = HashSet::new();
         let bytes = |lane: &Lane| {
-            let steps = Constants::steps(&oscillators[lane.flow as usize], steps);
-            let [flow, phasors] = gpu::table_bytes(steps);
+            let oscillator = &oscillators[lane.flow as usize];
+            let steps = Constants::steps(oscillator, steps);
+            let [flow, phasors] = gpu::table_bytes(oscillator, steps);
             if known.insert(steps) { flow + phasors } else { flow }
         };
         lanes.truncate(fitting(lanes.iter().map(bytes), self.most_waiting));
@@ -435,6 +436,8 @@ fn settings_after(plan: &Plan, survey: &Survey) -> LaneSettings {
         chatter: survey.chatter,
         kinds: survey.kinds,
         sine: survey.sine,
+        harmonics: survey.harmonics,
+        stages: survey.stages,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
         steps_per_period: requested_steps(plan),
         ..default
@@ -474,6 +477,10 @@ struct Survey {
     kinds: bool,
     /// Whether any force has a sine.
     sine: bool,
+    /// Most harmonics of a force beside the first.
+    harmonics: u32,
+    /// Whether any domains change in a forcing period.
+    stages: bool,
     /// Least and most free steps per forcing period, of flows that lanes can carry.
     steps: Option<[u32; 2]>,
 }
@@ -486,6 +493,8 @@ impl Survey {
             chatter: self.chatter || other.chatter,
             kinds: self.kinds || other.kinds,
             sine: self.sine || other.sine,
+            harmonics: self.harmonics.max(other.harmonics),
+            stages: self.stages || other.stages,
             steps: steps.reduce(|[least, most], [low, high]| [least.min(low), most.max(high)]),
         }
     }
@@ -514,7 +523,8 @@ fn survey_flows<T: Send>(
         let kinds = gpu::has_elastic_or_rigid_wall(&oscillator);
         let sine = gpu::has_sine(&oscillator);
         let steps_used = Constants::steps(&oscillator, steps).map(|n| [n; 2]);
-        let survey = Survey { chatter, kinds, sine, steps: steps_used };
+        let (harmonics, stages) = (gpu::higher_harmonics(&oscillator), gpu::has_stages(&oscillator));
+        let survey = Survey { chatter, kinds, sine, harmonics, stages, steps: steps_used };
         (of(&oscillator, steps), survey)
     })
 }

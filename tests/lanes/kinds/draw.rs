@@ -13,11 +13,11 @@ impl Numbers {
         z ^ (z >> 31)
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * ((self.next() >> 11) as f64 / (1u64 << 53) as f64)
     }
 
-    fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
+    pub(crate) fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
         all[self.next() as usize % all.len()]
     }
 
@@ -31,7 +31,7 @@ impl Numbers {
 
 /// Returns an oscillator with its law and a start. It has one or two displacements; one wall or two, each of any kind
 /// with a law of its own; loads; full mass matrices; gap rows of which either entry may be the larger.
-pub(super) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
+pub(crate) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
     let mut draw = Numbers(seed);
     let degrees = draw.one_of(&[1, 2, 2]);
     let first = |m: [[f64; 2]; 2]| if degrees == 1 { [[m[0][0], 0.0], [0.0, 0.0]] } else { m };

@@ -1,0 +1,288 @@
+//! Further harmonics of the force, and domains that change in a forcing period, on lanes and on the reference.
+//!
+//! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
+
+use crate::common::{BUDGET, apart};
+use crate::kinds::draw::{Numbers, random_cell};
+use crate::kinds::{self, Cell};
+use crate::measures::{self, MEASURES};
+use rattlemap::gpu::{GpuError, LaneSettings, Precision, has_stages, higher_harmonics};
+use rattlemap::map::engine::measured_record;
+use rattlemap::map::plan::Needs;
+use rattlemap::record::Record;
+use rattlemap::record::classify::classify;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, Stage};
+use rattlemap_dynamics::orbit::{Budget, Class, measure};
+use rayon::prelude::*;
+
+const SEEDS: u64 = 48;
+
+/// Returns settings that include what these cells need.
+fn settings(cells: &[Cell]) -> LaneSettings {
+    let harmonics = cells.iter().map(|cell| higher_harmonics(&cell.0)).max().unwrap_or(0);
+    let stages = cells.iter().any(|cell| has_stages(&cell.0));
+    LaneSettings { undecided_periods: 1584, harmonics, stages, ..LaneSettings::default() }
+}
+
+/// Adds one or two harmonics of random orders.
+fn with_harmonics(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
+    let mut draw = Numbers(seed ^ 0x5eed);
+    let mut order = 1;
+    for _ in 0..draw.one_of(&[1, 2]) {
+        order += draw.one_of(&[1, 1, 2, 5]);
+        let mut factors = || {
+            let size = draw.between(-4.0, 4.0);
+            let second = if oscillator.degrees == 1 { 0.0 } else { draw.between(-1.0, 1.0) };
+            [size, second]
+        };
+        let harmonic = Harmonic { order, cos: factors(), sin: factors() };
+        oscillator.harmonics.push(harmonic);
+    }
+    oscillator.validate().unwrap();
+    (oscillator, law, start)
+}
+
+/// Returns a domain whose stiffness and damping have another part along the gap.
+fn changed(domain: &Domain, gap: [f64; 2], stiffness: f64, damping: f64, load: [f64; 2]) -> Domain {
+    let along = |a: [[f64; 2]; 2], by: f64| {
+        [0, 1].map(|i: usize| [0, 1].map(|j: usize| a[i][j] + by * (gap[i] * gap[j])))
+    };
+    Domain {
+        damping: along(domain.damping, damping),
+        stiffness: along(domain.stiffness, stiffness),
+        load: [0, 1].map(|i| domain.load[i] + load[i]),
+    }
+}
+
+/// Adds one or two stages with other free motion and other springs behind the walls, and two to four changes.
+fn with_stages(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
+    let mut draw = Numbers(seed ^ 0x57a6e);
+    let count = draw.one_of(&[1, 2]);
+    let Oscillator { free, meshing, gap, walls, contacts, .. } = oscillator.clone();
+    for _ in 0..count {
+        let (k, c) = (draw.between(0.0, 4.0), draw.between(0.0, 0.3));
+        let pull = draw.between(-1.0, 1.0);
+        let free = changed(&free, gap, k, c, [0, 1].map(|i: usize| pull * gap[i]));
+        let meshing = [0, 1].map(|side: usize| {
+            if contacts[side] == Contact::Rigid || walls[side].is_infinite() {
+                return free;
+            }
+            let (spring, damper) = (draw.between(10.0, 400.0), draw.between(0.0, 4.0));
+            let load = [0, 1].map(|i: usize| spring * walls[side] * gap[i]);
+            changed(&free, gap, spring, damper, load)
+        });
+        oscillator.stages.push(Stage { free, meshing });
+    }
+    let mut phases: Vec<f64> = (0..draw.one_of(&[2, 3, 4])).map(|_| draw.between(0.0, 1.0)).collect();
+    phases.sort_by(f64::total_cmp);
+    phases[0] *= draw.one_of(&[0.0, 1.0]);
+    let stages: Vec<usize> = (0..=count).collect();
+    oscillator.schedule = phases.into_iter().map(|phase| (phase, draw.one_of(&stages))).collect();
+    assert_eq!(meshing, oscillator.meshing);
+    oscillator.validate().unwrap();
+    (oscillator, law, start)
+}
+
+fn harmonic_cells() -> Vec<Cell> {
+    (0..SEEDS).map(|seed| with_harmonics(seed, random_cell(seed))).collect()
+}
+
+fn staged_cells() -> Vec<Cell> {
+    (0..SEEDS).map(|seed| with_stages(seed, random_cell(seed))).collect()
+}
+
+fn cells_with_both() -> Vec<Cell> {
+    (0..SEEDS).map(|seed| with_harmonics(seed, with_stages(seed, random_cell(seed)))).collect()
+}
+
+fn reference((oscillator, law, start): &Cell) -> Record {
+    measured_record(&measure(&Flow::new(oscillator), *law, *start, &BUDGET), &Needs::EVERYTHING)
+}
+
+/// Compares lanes with the reference. At most `most` cells may differ in class, in f64 and in f32.
+fn check(what: &str, cells: &[Cell], most: [usize; 2]) {
+    let expected: Vec<Record> = cells.par_iter().map(reference).collect();
+    for ((precision, bar), most) in [(Precision::F64, 1e-9), (Precision::F32, 1e-3)].into_iter().zip(most) {
+        let found = kinds::run(precision, cells, &settings(cells)).unwrap();
+        let (mut differing, mut cycles, mut errors) = (Vec::new(), 0, Vec::new());
+        for (seed, (ours, theirs)) in found.iter().zip(&expected).enumerate() {
+            if classify(ours) != classify(theirs) {
+                differing.push(format!("{seed}: {:?} | {:?}", classify(ours), classify(theirs)));
+                continue;
+            }
+            if let Class::Periodic { .. } = classify(theirs) {
+                cycles += 1;
+                let error = apart(ours.strobe, theirs.strobe);
+                errors.push((error, seed));
+                let contact = (ours.mesh_fraction - theirs.mesh_fraction).abs();
+                let growth = (ours.lyapunov - theirs.lyapunov).abs();
+                let at = format!("{what}, {precision:?}, seed {seed}: {:?}", cells[seed]);
+                assert!(error < bar, "strobe off by {error:e}: {at}");
+                assert!(contact < bar, "contact {} {}: {at}", ours.mesh_fraction, theirs.mesh_fraction);
+                assert!(
+                    ours.lyapunov == theirs.lyapunov || growth < bar,
+                    "exponent {} {}: {at}",
+                    ours.lyapunov,
+                    theirs.lyapunov
+                );
+                assert_eq!(ours.spelling(), theirs.spelling(), "{at}");
+            }
+        }
+        errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+        println!("{what}, {precision:?}: {cycles} cycles, worst {:?}, {differing:#?}", errors.last());
+        assert!(differing.len() <= most, "{what}, {precision:?}: {differing:#?}");
+        assert!(cycles >= 24, "{what}: {cycles} cycles");
+    }
+}
+
+#[test]
+fn harmonics_agree_with_the_reference() {
+    check("harmonics", &harmonic_cells(), [1, 2]);
+}
+
+#[test]
+fn stages_agree_with_the_reference() {
+    check("stages", &staged_cells(), [1, 2]);
+}
+
+#[test]
+fn harmonics_and_stages_agree_with_the_reference() {
+    check("both", &cells_with_both(), [1, 2]);
+}
+
+/// Where all stages are equal, only the changes' instants interrupt the motion.
+#[test]
+fn equal_stages_give_the_motion_without_stages() {
+    let cells: Vec<Cell> = (0..24).map(random_cell).collect();
+    let staged = cells.iter().map(|(oscillator, law, start)| {
+        let Oscillator { free, meshing, .. } = *oscillator;
+        let schedule = vec![(0.123, 1), (0.5, 0), (0.877, 1)];
+        let staged = Oscillator { stages: vec![Stage { free, meshing }], schedule, ..oscillator.clone() };
+        (staged, *law, *start)
+    });
+    let staged: Vec<Cell> = staged.collect();
+    for (precision, bar) in [(Precision::F64, 1e-9), (Precision::F32, 1e-3)] {
+        let run = |cells: &[Cell]| kinds::run(precision, cells, &settings(cells)).unwrap();
+        for (seed, (plain, staged)) in run(&cells).iter().zip(&run(&staged)).enumerate() {
+            assert_eq!(classify(plain), classify(staged), "{precision:?}, seed {seed}");
+            if plain.period > 0 {
+                let off = apart(plain.strobe, staged.strobe);
+                assert!(off < bar, "{precision:?}, seed {seed}: off by {off:e}");
+                assert_eq!(plain.spelling(), staged.spelling(), "{precision:?}, seed {seed}");
+            }
+        }
+    }
+}
+
+/// The same force, as the second harmonic of half the frequency: a cycle has half as many periods, or one.
+#[test]
+fn a_force_of_second_order_has_twice_the_frequency() {
+    let cells: Vec<Cell> = (0..24).map(random_cell).collect();
+    let slower = cells.iter().map(|(oscillator, law, start)| {
+        let Oscillator { force, force_sin, omega, .. } = *oscillator;
+        let second = Harmonic { order: 2, cos: force, sin: force_sin };
+        let (force, force_sin, omega) = ([0.0; 2], [0.0; 2], 0.5 * omega);
+        let slower = Oscillator { force, force_sin, omega, harmonics: vec![second], ..oscillator.clone() };
+        (slower, *law, *start)
+    });
+    let slower: Vec<Cell> = slower.collect();
+    let run = |cells: &[Cell]| kinds::run(Precision::F64, cells, &settings(cells)).unwrap();
+    let mut compared = 0;
+    for (seed, (plain, slower)) in run(&cells).iter().zip(&run(&slower)).enumerate() {
+        let (Class::Periodic { period, .. }, Class::Periodic { period: slow, .. }) =
+            (classify(plain), classify(slower))
+        else {
+            continue;
+        };
+        let expected = if period % 2 == 0 { period / 2 } else { period };
+        assert_eq!(slow, expected, "seed {seed}");
+        // Other periods end at other strobes of the cycle.
+        if period <= 1 {
+            let off = apart(plain.strobe, slower.strobe);
+            assert!(off < 1e-8, "seed {seed}: off by {off:e}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 8, "{compared} cells");
+}
+
+/// A mass on a rigid wall, which the load of stage 0 presses and that of stage 1 pulls off.
+fn pressed_and_released() -> Vec<Cell> {
+    let (oscillator, ..) = (0..).map(random_cell).find(|cell| cell.0.degrees == 1).unwrap();
+    let domain = |load: f64| Domain {
+        damping: [[0.3, 0.0], [0.0, 0.0]],
+        stiffness: [[1.0, 0.0], [0.0, 0.0]],
+        load: [load, 0.0],
+    };
+    let [pressed, pulled] = [domain(4.0), domain(-4.0)];
+    let of = |i: u32| {
+        let released = 0.3 + 0.02 * f64::from(i);
+        let oscillator = Oscillator {
+            mass: [[1.0, 0.0], [0.0, 1.0]],
+            gap: [1.0, 0.0],
+            walls: [0.5, f64::NEG_INFINITY],
+            contacts: [Contact::Rigid; 2],
+            omega: 0.8,
+            force: [1.0, 0.0],
+            force_sin: [0.0; 2],
+            free: pressed,
+            meshing: [pressed; 2],
+            stages: vec![Stage { free: pulled, meshing: [pulled; 2] }],
+            schedule: vec![(0.0, 0), (released, 1)],
+            ..oscillator.clone()
+        };
+        oscillator.validate().unwrap();
+        (oscillator, Law::both(0.2, 0.0), [0.0; 4])
+    };
+    (0..12).map(of).collect()
+}
+
+#[test]
+fn a_change_of_the_stage_releases_a_gap_at_rest() {
+    let cells = pressed_and_released();
+    let expected: Vec<Record> = cells.par_iter().map(reference).collect();
+    for (precision, bar) in [(Precision::F64, 1e-9), (Precision::F32, 1e-4)] {
+        let found = kinds::run(precision, &cells, &settings(&cells)).unwrap();
+        for (i, (ours, theirs)) in found.iter().zip(&expected).enumerate() {
+            let at = format!("{precision:?}, {i}: {ours:?} {theirs:?}");
+            assert_eq!(classify(ours), classify(theirs), "{at}");
+            assert!(theirs.mesh_fraction > 0.05, "{at}");
+            assert!((ours.mesh_fraction - theirs.mesh_fraction).abs() < bar, "{at}");
+            assert!(apart(ours.strobe, theirs.strobe) < bar, "{at}");
+            assert_eq!(ours.spelling(), theirs.spelling(), "{at}");
+        }
+    }
+}
+
+/// Amplitudes, forces and energies of cycles agree, too.
+#[test]
+fn quantities_agree_with_the_reference() {
+    let budget = Budget { quantities: true, ..BUDGET };
+    for (what, cells) in [("harmonics", harmonic_cells()), ("stages", staged_cells())] {
+        let measured =
+            |(oscillator, law, start): &Cell| measure(&Flow::new(oscillator), *law, *start, &budget);
+        let expected: Vec<_> = cells.par_iter().map(measured).collect();
+        let found = measures::lanes(&cells, Precision::F64, Some(MEASURES));
+        let mut compared = 0;
+        for (seed, ((ours, _, period), theirs)) in found.iter().zip(&expected).enumerate() {
+            if *period == 0 || theirs.period != Some(*period) {
+                continue;
+            }
+            compared += 1;
+            let (ours, theirs) = (ours.unwrap(), theirs.quantities.unwrap());
+            let are_alike = measures::agree(&ours, &theirs, cells[seed].0.omega, 1e-7);
+            assert!(are_alike, "{what}, seed {seed}: {ours:#?} {theirs:#?} {:?}", cells[seed]);
+        }
+        assert!(compared > 24, "{what}: {compared} cells");
+    }
+}
+
+#[test]
+fn excluded_harmonics_and_stages_are_refused() {
+    let few = LaneSettings { harmonics: 0, ..LaneSettings::only(1) };
+    let error = kinds::run(Precision::F32, &harmonic_cells()[..1], &few).unwrap_err();
+    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "harmonics", .. }), "{error}");
+    let error = kinds::run(Precision::F32, &staged_cells()[..1], &LaneSettings::only(1)).unwrap_err();
+    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "stages", .. }), "{error}");
+}
