@@ -224,7 +224,7 @@ pub(crate) fn symmetric((oscillator, law): &(Oscillator, Law)) -> Vec<Symmetric>
     [lag + turn, lag - turn]
         .map(|phase| orbit(phase.rem_euclid(TAU)))
         .into_iter()
-        .filter(|orbit| closing(&oscillator, &orbit.before) > 0.0)
+        .filter(|orbit| closing(oscillator, &orbit.before) > 0.0)
         .collect()
 }
 

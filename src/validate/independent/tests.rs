@@ -109,7 +109,8 @@ fn oscillated([x, v]: [f64; 2], k: f64, t: f64) -> [f64; 2] {
 fn a_stiffness_that_alternates_is_integrated_piece_by_piece() {
     // How often to repeat the list of stiffnesses and the turns that each holds.
     type Pieces = &'static [(f64, f64)];
-    let cases: [(&[(f64, usize)], u32, Pieces); 4] = [
+    type Changes = &'static [(f64, usize)];
+    let cases: [(Changes, u32, Pieces); 4] = [
         (&[(0.0, 1), (0.4, 0)], 3, &[(11.0, 0.4), (3.0, 0.6)]),
         (&[(0.25, 1), (0.7, 0)], 3, &[(3.0, 0.25), (11.0, 0.45), (3.0, 0.3)]),
         (&[(0.25, 1), (0.7, 1), (0.9, 0)], 1, &[(3.0, 0.25), (11.0, 0.55)]),
