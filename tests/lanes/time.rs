@@ -121,7 +121,7 @@ fn check(what: &str, cells: &[Cell], most: [usize; 2]) {
             let growth =
                 if ours.lyapunov == theirs.lyapunov { 0.0 } else { (ours.lyapunov - theirs.lyapunov).abs() };
             let off = error.max(contact).max(growth);
-            if !(off < bar) {
+            if off.is_nan() || off >= bar {
                 differs(format!("state {error:.1e}, contact {contact:.1e}, exponent {growth:.1e}"));
             } else if ours.spelling() != theirs.spelling() {
                 differs(format!("{:?} {:?}", ours.spelling(), theirs.spelling()));
