@@ -62,13 +62,15 @@ fn derived(scene: &Scene) -> impl Iterator<Item = String> {
 /// Describes the start and the length of the integration of a map's cells.
 pub(crate) fn integration(scene: &Scene) -> String {
     let last = scene.axes().last().map_or(String::new(), |axis| symbol(&axis.parameter().name));
+    let components = scene.base().state_names().len();
+    let listed = |state: [f64; 4]| state.map(number)[..components].join(", ");
     let start = match scene.start() {
         Start::Rest if scene.sweeps_start() => "from its own state, the other components 0".to_owned(),
         Start::State(state) if scene.sweeps_start() => {
-            format!("from its own state, the other components of ({})", state.map(number).join(", "))
+            format!("from its own state, the other components of ({})", listed(state))
         }
         Start::Rest => "from rest".to_owned(),
-        Start::State(state) => format!("from ({})", state.map(number).join(", ")),
+        Start::State(state) => format!("from ({})", listed(state)),
         Start::Up => format!("from the attractor at the next lower {last}"),
         Start::Down => format!("from the attractor at the next higher {last}"),
         Start::Both => format!("from the attractors at the next {last} on either side"),

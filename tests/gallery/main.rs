@@ -13,5 +13,6 @@ mod elastic;
 mod engines;
 mod files;
 mod loose_gear;
+mod meissner;
 mod random;
 mod single_impact;

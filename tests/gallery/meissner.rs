@@ -1,0 +1,49 @@
+//! Meissner's equation: the borders of stability in closed form.
+//!
+//! E. Meissner, Schweizerische Bauzeitung 72 (1918) 95: rest is stable if the modulus of the trace of the matrix of one period is
+//! less than 1 plus its determinant.
+
+use nalgebra::{Complex, Matrix2};
+
+use rattlemap::model_file::FileModel;
+use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::orbit::{Class, Settings, analyse};
+
+const ZETA: f64 = 0.01;
+
+/// Returns the matrix of `x'' + 2 ZETA x' + k x = 0` over half a period.
+fn half(k: f64) -> Matrix2<f64> {
+    let t = std::f64::consts::PI;
+    let s = Complex::from(k - ZETA * ZETA).sqrt();
+    let (cos, sin) = ((s * t).cos().re, ((s * t).sin() / s).re);
+    Matrix2::new(cos + ZETA * sin, sin, -k * sin, cos - ZETA * sin) * (-ZETA * t).exp()
+}
+
+/// A small motion meets the stops where rest is unstable, and nowhere else.
+#[test]
+fn small_motion_meets_the_stops_where_rest_is_unstable() {
+    let (mut stable, mut unstable) = (0, 0);
+    for i in 0..31 {
+        for j in 0..9 {
+            let (delta, epsilon) = (0.1 * f64::from(i) - 0.27, 0.13 * f64::from(j));
+            let matrix = half(delta - epsilon) * half(delta + epsilon);
+            let margin = 1.0 + matrix.determinant() - matrix.trace().abs();
+            // Near a border, motion takes long to grow or to decay.
+            if margin.abs() < 0.05 {
+                continue;
+            }
+            let mut model = FileModel::built_in("meissner").expect("built in");
+            [("delta", delta), ("epsilon", epsilon), ("zeta", ZETA)]
+                .into_iter()
+                .for_each(|(name, value)| model.set(name, value).unwrap());
+            let orbit = analyse(&model, [0.01, 0.0, 0.0, 0.0], &Settings::default()).unwrap();
+            let stays = orbit.class == Class::Periodic { period: 1 }
+                && orbit.events.is_empty()
+                && orbit.mesh_fraction == 0.0;
+            assert_eq!(stays, margin > 0.0, "delta = {delta}, epsilon = {epsilon}, {margin}: {orbit:?}");
+            let count = if stays { &mut stable } else { &mut unstable };
+            *count += 1;
+        }
+    }
+    assert!(stable > 80 && unstable > 40, "{stable} stable, {unstable} unstable");
+}
