@@ -194,7 +194,7 @@ fn scan_steps() -> u32 {
     var verdict = SCAN_MARK;
     var going = true;
     while going {
-        motion.phasor = phasors[shape.phasors + n];
+        motion.phasor = pairs[shape.phasors + n];
         var c = motion.phasor[0];
         var s = motion.phasor[1];
         for (var i = 0u; i < SYNC; i++) {
@@ -242,7 +242,7 @@ fn scan_steps() -> u32 {
 // Takes one step, or the rest of a step after an event, up to the next event.
 fn careful_step() {
     iterations += 1u;
-    motion.phasor = phasors[shape.phasors + tally.step];
+    motion.phasor = pairs[shape.phasors + tally.step];
     let q0 = vec4<Real>(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
     let part = 1.0 - motion.theta;
     var q1: vec4<Real>;
