@@ -135,6 +135,11 @@ pub async fn run_lanes(
         .collect();
     let flows: Vec<_> = flows.iter().map(|&flow| plan.oscillator(flow)).collect();
     let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
+    let settings = &LaneSettings {
+        harmonics: flows.iter().map(gpu::higher_harmonics).fold(settings.harmonics, u32::max),
+        stages: settings.stages || flows.iter().any(gpu::has_stages),
+        ..*settings
+    };
     let records = gpu.run(&flows, &laws, &lanes, settings).await?;
     let mut numbered: Vec<_> = (0..).zip(records).collect();
     let of = |i: u32| {

@@ -281,6 +281,20 @@ fn harmonics_and_stages_are_printed_and_computed() {
     assert_eq!(orbit["class"], "periodic", "{orbit}");
 }
 
+/// Lanes of a map with stages and harmonics are computed again for its validation.
+#[test]
+#[ignore = "compiles large shaders; scripts/test.sh --all"]
+fn a_map_with_harmonics_and_stages_is_validated() {
+    let folder = empty();
+    let axis = |name: &str, min: f64, max: f64| {
+        format!("[[axis]]\nparameter = \"{name}\"\nmin = {min}\nmax = {max}\ncount = 4\n")
+    };
+    let scene = format!("model = \"mesh-stiffness\"\n{}{}", axis("omega", 0.6, 1.2), axis("kappa", 0.5, 1.0));
+    fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    run(&folder, "map scene.toml --engine cpu --out out --quiet").code(0);
+    run(&folder, "validate out --samples 16 --quiet").code(0);
+}
+
 #[test]
 fn a_start_needs_as_many_numbers_as_the_models_state() {
     let start = |model: &str, start: &str| {
