@@ -329,39 +329,29 @@ impl Flow {
     }
 }
 
-/// The stage of a motion, from its changes in a forcing period.
+/// The place of a motion in the schedule of stages.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Staged<'f> {
-    whole: &'f Flow,
-    /// Index of the next change in the schedule.
+pub(crate) struct Schedule<'f> {
+    /// The flow with all stages.
+    pub(crate) whole: &'f Flow,
+    /// Index of the next change.
     next: usize,
-    /// The flow of the present stage.
-    pub(crate) flow: &'f Flow,
 }
 
-impl<'f> Staged<'f> {
-    /// Begins at phase 0.
-    pub(crate) fn new(whole: &'f Flow) -> Staged<'f> {
-        let mut staged = Staged { whole, next: 0, flow: whole };
-        staged.restart();
-        staged
+impl<'f> Schedule<'f> {
+    /// Begins at phase 0. Returns the flow of the stage that holds there, too.
+    pub(crate) fn new(whole: &'f Flow) -> (Schedule<'f>, &'f Flow) {
+        let mut schedule = Schedule { whole, next: 0 };
+        let flow = schedule.restart();
+        (schedule, flow)
     }
 
-    /// Returns the flow of all stages.
+    /// Returns to phase 0, and returns the flow of the stage that holds there: the one that begins there, or the last one.
     #[inline]
-    pub(crate) fn whole(&self) -> &'f Flow {
-        self.whole
-    }
-
-    /// Returns to phase 0.
-    #[inline]
-    pub(crate) fn restart(&mut self) {
-        let schedule = &self.whole.schedule;
-        let Some(&(_, last)) = schedule.last() else { return };
-        (self.next, self.flow) = (0, self.whole.stage(last));
-        if schedule[0].0 == 0.0 {
-            self.change();
-        }
+    pub(crate) fn restart(&mut self) -> &'f Flow {
+        self.next = 0;
+        let Some(&(_, last)) = self.whole.schedule.last() else { return self.whole };
+        if self.whole.schedule[0].0 == 0.0 { self.change() } else { self.whole.stage(last) }
     }
 
     /// Returns the time of the next change since phase 0, if one is left in this period.
@@ -370,10 +360,10 @@ impl<'f> Staged<'f> {
         self.whole.schedule.get(self.next).map(|&(time, _)| time)
     }
 
-    /// Enters the next stage.
-    pub(crate) fn change(&mut self) {
-        self.flow = self.whole.stage(self.whole.schedule[self.next].1);
+    /// Passes the next change, and returns the flow of the stage that begins.
+    pub(crate) fn change(&mut self) -> &'f Flow {
         self.next += 1;
+        self.whole.stage(self.whole.schedule[self.next - 1].1)
     }
 }
 

@@ -36,7 +36,7 @@ pub use event::{EVENTS_PER_PERIOD_CAP, EventKind, GapEvent, Observer, STEPS_PER_
 use step_verdict::{Crossing, StepVerdict};
 pub use tangent::NO_SPEED;
 
-use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Staged, Step};
+use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Schedule, Step};
 use crate::model::{Law, Side, State};
 
 /// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
@@ -84,7 +84,7 @@ impl Mode {
 pub struct Trajectory<'f, const N: usize = 0> {
     /// The flow of the present stage.
     flow: &'f Flow,
-    staged: Staged<'f>,
+    schedule: Schedule<'f>,
     law: Law,
     mode: Mode,
     /// The wall of the last event, which determines the next symbol together with the wall of the next event.
@@ -127,7 +127,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     /// Returns the flow.
     pub fn flow(&self) -> &'f Flow {
-        self.staged.whole()
+        self.schedule.whole
     }
 
     /// Returns the present state.
@@ -212,8 +212,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let period = self.flow.period;
         self.advance_to(period, observer)?;
         self.phasor = [1.0, 0.0];
-        // What a change at phase 0 ends belongs to this period.
-        self.begin_stages(observer);
+        let first = self.schedule.restart();
+        if !std::ptr::eq(self.flow, first) {
+            // A contact that this change ends belongs to the period before phase 0.
+            self.enter_stage(first, observer);
+        }
         self.clock.set(0.0);
         self.period += 1;
         self.events_in_period = 0;
@@ -230,18 +233,20 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             return Err(Stop::TooStiff);
         }
         loop {
-            let change = self.staged.next_change().filter(|&time| time <= until);
-            self.goal = change.unwrap_or(until);
+            let change = self.schedule.next_change().filter(|&time| time <= until);
+            let goal = change.unwrap_or(until);
+            self.goal = goal;
             if let Some(side) = self.pending.take() {
                 self.contact(side, observer);
             }
-            while self.clock.time() < self.goal {
-                self.step(self.goal, observer)?;
+            while self.clock.time() < goal {
+                self.step(goal, observer)?;
             }
             if change.is_none() {
                 return self.check_finite();
             }
-            self.change_stage(observer);
+            let flow = self.schedule.change();
+            self.enter_stage(flow, observer);
         }
     }
 

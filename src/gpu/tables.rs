@@ -159,7 +159,7 @@ impl Tables {
         let make = || Tables {
             flows: upload_flows(gpu, &constants, &further, flow_size),
             shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
-            pairs: upload(gpu, "phasors", &pairs),
+            pairs: upload(gpu, "pairs", &pairs),
             laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
             constants,
             is_even: laws.iter().map(Law::is_symmetric).collect(),

@@ -188,7 +188,8 @@ fn equal_stages_give_the_motion_without_stages() {
     }
 }
 
-/// The same force, as the second harmonic of half the frequency: a cycle has half as many periods, or one.
+/// A force may also be written as the second harmonic of half its frequency. A cycle of an even number of periods then has half as
+/// many, and another one as many as before.
 #[test]
 #[ignore = "compiles large shaders; scripts/test.sh --all"]
 fn a_force_of_second_order_has_twice_the_frequency() {

@@ -244,12 +244,17 @@ impl Oscillator {
         }
     }
 
-    /// Returns the oscillator in which a stage holds always.
-    pub fn in_stage(&self, stage: usize) -> Oscillator {
-        let Stage { free, meshing } = match stage {
+    /// Returns the domains of a stage.
+    pub fn stage(&self, stage: usize) -> Stage {
+        match stage {
             0 => Stage { free: self.free, meshing: self.meshing },
             _ => self.stages[stage - 1],
-        };
+        }
+    }
+
+    /// Returns the oscillator in which a stage holds always.
+    pub fn in_stage(&self, stage: usize) -> Oscillator {
+        let Stage { free, meshing } = self.stage(stage);
         Oscillator { free, meshing, stages: Vec::new(), schedule: Vec::new(), ..self.clone() }
     }
 
@@ -608,10 +613,6 @@ impl Oscillator {
     /// solutions to solutions. The force must then have odd harmonics only, and stages must recur, mirrored, after half a
     /// period.
     pub fn mirror_symmetric(&self) -> bool {
-        let stage = |stage: usize| match stage {
-            0 => Stage { free: self.free, meshing: self.meshing },
-            _ => self.stages[stage - 1],
-        };
         let is_mirrored = |a: Stage, b: Stage| {
             a.free == mirrored(&b.free)
                 && (!self.has_motion_behind(Side::Right)
@@ -620,13 +621,13 @@ impl Oscillator {
         let half = self.schedule.len() / 2;
         let recurs = |(i, &(begins, index)): (usize, &(f64, usize))| {
             let (later, mirror) = self.schedule[i + half];
-            (later - begins - 0.5).abs() < SAME_PHASE && is_mirrored(stage(index), stage(mirror))
+            (later - begins - 0.5).abs() < SAME_PHASE && is_mirrored(self.stage(index), self.stage(mirror))
         };
         self.walls[0] == -self.walls[1]
             && self.contacts[0] == self.contacts[1]
             && self.harmonics.iter().all(|harmonic| harmonic.order % 2 == 1)
             && match self.schedule.len() {
-                0 => is_mirrored(stage(0), stage(0)),
+                0 => is_mirrored(self.stage(0), self.stage(0)),
                 changes => changes % 2 == 0 && self.schedule.iter().enumerate().take(half).all(recurs),
             }
     }

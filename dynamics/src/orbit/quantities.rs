@@ -4,7 +4,7 @@
 //! and the meter evaluates the exact flow there: integrals by Gauss-Legendre quadrature of order 16 over pieces of at
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
-use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Staged};
+use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule};
 use crate::model::Contact;
 use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
 
@@ -125,7 +125,7 @@ impl Moments {
 pub(super) struct Meter<'f> {
     /// The flow of the present stage.
     flow: &'f Flow,
-    staged: Staged<'f>,
+    schedule: Schedule<'f>,
     /// Domain, state and time since phase 0 at the beginning of the present flight.
     kind: DomainKind,
     q: Gap,
@@ -144,10 +144,10 @@ impl<'f> Meter<'f> {
     /// Begins at phase 0, at the present state of a trajectory.
     pub(super) fn new(flow: &'f Flow, trajectory: &Trajectory<'_>) -> Meter<'f> {
         let kind = trajectory.meshing().map_or(DomainKind::Free, DomainKind::Meshing);
-        let staged = Staged::new(flow);
+        let (schedule, flow) = Schedule::new(flow);
         Meter {
-            flow: staged.flow,
-            staged,
+            flow,
+            schedule,
             kind,
             q: flow.to_gap(trajectory.state()),
             t: 0.0,
@@ -198,21 +198,19 @@ impl<'f> Meter<'f> {
         while self.period < period {
             self.fly_to(self.flow.period);
             self.t = 0.0;
-            self.staged.restart();
-            self.flow = self.staged.flow;
+            self.flow = self.schedule.restart();
             self.period += 1;
         }
     }
 
     /// Measures the present flight up to a time since phase 0. Changes of the stage at that time are still to come.
     fn fly_to(&mut self, until: f64) {
-        while let Some(change) = self.staged.next_change().filter(|&change| change < until) {
+        while let Some(change) = self.schedule.next_change().filter(|&change| change < until) {
             if change > self.t {
                 self.q = self.fly(change - self.t);
                 self.t = change;
             }
-            self.staged.change();
-            self.flow = self.staged.flow;
+            self.flow = self.schedule.change();
         }
         if until > self.t {
             self.q = self.fly(until - self.t);

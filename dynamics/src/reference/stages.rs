@@ -5,27 +5,14 @@
 //! decided anew: a gap at rest on a rigid wall, and a contact onset.
 
 use super::{EventKind, Mode, Observer, Trajectory};
-use crate::flow::DomainKind;
+use crate::flow::{DomainKind, Flow};
 
-impl<const N: usize> Trajectory<'_, N> {
-    /// Enters the next stage.
+impl<'f, const N: usize> Trajectory<'f, N> {
+    /// Enters a stage, given its flow.
+    #[cold]
     #[inline(never)]
-    pub(super) fn change_stage(&mut self, observer: &mut impl Observer) {
-        self.staged.change();
-        self.enter_stage(observer);
-    }
-
-    /// Enters the stage that holds at phase 0.
-    #[inline]
-    pub(super) fn begin_stages(&mut self, observer: &mut impl Observer) {
-        self.staged.restart();
-        if !std::ptr::eq(self.flow, self.staged.flow) {
-            self.enter_stage(observer);
-        }
-    }
-
-    fn enter_stage(&mut self, observer: &mut impl Observer) {
-        self.flow = self.staged.flow;
+    pub(super) fn enter_stage(&mut self, flow: &'f Flow, observer: &mut impl Observer) {
+        self.flow = flow;
         self.short_flight = false;
         let levels = |kind: DomainKind| self.flow.domain(kind).levels - 1;
         let in_contact = self.meshing().map_or(self.level[1], |side| levels(DomainKind::Meshing(side)));

@@ -2,7 +2,7 @@
 
 use super::clock::Clock;
 use super::{Allowance, Mode, Trajectory, Work};
-use crate::flow::{DomainKind, Flow, Staged};
+use crate::flow::{DomainKind, Flow, Schedule};
 use crate::model::{Contact, Law, Side, State};
 
 /// Distance of a gap that lies on a wall, relative to the wall's position or the scale of length.
@@ -37,11 +37,10 @@ impl<'f> Trajectory<'f, 0> {
 impl<'f, const N: usize> Trajectory<'f, N> {
     /// Starts a trajectory with tangent vectors in the coordinates of [`State`].
     pub fn with_tangents(flow: &'f Flow, law: Law, y: State, tangents: [State; N]) -> Self {
-        let staged = Staged::new(flow);
-        let flow = staged.flow;
+        let (schedule, flow) = Schedule::new(flow);
         let mut trajectory = Trajectory {
             flow,
-            staged,
+            schedule,
             law,
             mode: Mode::Free,
             origin: None,
@@ -71,7 +70,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     pub fn carrying<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         Trajectory {
             flow: self.flow,
-            staged: self.staged,
+            schedule: self.schedule,
             law: self.law,
             mode: self.mode,
             origin: self.origin,

@@ -121,9 +121,7 @@ impl Flight {
             let [right, left] = Side::BOTH.map(behind);
             [free, right, left]
         };
-        let first = Stage { free: oscillator.free, meshing: oscillator.meshing };
-        let stages = std::iter::once(first).chain(oscillator.stages.iter().copied());
-        let highest = oscillator.harmonics.iter().map(|harmonic| harmonic.order).fold(1, u32::max);
+        let stages = (0..oscillator.stage_count()).map(|stage| oscillator.stage(stage));
         let mut flight = Flight {
             walls: oscillator.walls,
             contacts: oscillator.contacts,
@@ -131,19 +129,15 @@ impl Flight {
             law,
             coordinates,
             fields: stages.map(fields_of).collect(),
-            stage: 0,
+            stage: oscillator.first_stage(),
             schedule: oscillator.schedule.as_slice().into(),
             period: oscillator.period(),
-            fastest: f64::from(highest) * oscillator.omega,
+            fastest: f64::from(oscillator.highest_order()) * oscillator.omega,
             mode: Mode::Free,
             from: None,
             q: coordinates.gap(&start),
             events: Vec::new(),
         };
-        // The stage that begins at phase 0 holds there, otherwise the last one.
-        let begun =
-            flight.schedule.iter().filter(|(phase, _)| *phase == 0.0).chain(flight.schedule.last()).next();
-        flight.stage = begun.map_or(0, |&(_, stage)| stage);
         let beyond = |side: &Side| flight.beyond(*side, &flight.q) > 0.0;
         if let Some(side) = Side::BOTH.into_iter().find(beyond) {
             match flight.is_rigid(side) {
