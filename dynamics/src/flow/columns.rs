@@ -232,14 +232,15 @@ impl Columns {
     #[inline(always)]
     pub(crate) fn apply(&self, q: &Gap, phasor: &Phasor) -> f64x4 {
         let first = self.homogeneous(q) + self.forcing(phasor, self.columns[6]);
-        if self.waves.is_empty() { first } else { first + self.waved(phasor) }
+        if self.waves.is_empty() { first } else { first + self.waved(phasor[0], phasor[1]) }
     }
 
-    /// Returns the products with the phasors of higher harmonics.
+    /// Returns the products with the phasors of higher harmonics. The phasor is passed by value, so that callers keep theirs in
+    /// registers.
     #[cold]
     #[inline(never)]
-    pub(super) fn waved(&self, phasor: &Phasor) -> f64x4 {
-        let terms = self.waves.iter().map(|wave| wave.forcing(power(phasor, wave.order)));
+    pub(super) fn waved(&self, cos: f64, sin: f64) -> f64x4 {
+        let terms = self.waves.iter().map(|wave| wave.forcing(power(&[cos, sin], wave.order)));
         terms.fold(f64x4::ZERO, |sum, term| sum + term)
     }
 

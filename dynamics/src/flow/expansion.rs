@@ -129,17 +129,19 @@ impl Grid {
         p = step.carry_phasor(&p);
         let there = start + change;
         let here = there.to_array();
-        let mut terms = std::array::from_fn(|n| self.terms[n].apply_lean(&here, &p));
+        let mut terms: [f64x4; TERMS] = std::array::from_fn(|n| self.terms[n].apply_lean(&here, &p));
         if self.terms[0].has_waves() {
-            self.add_waves(&mut terms, &p);
+            let waves = self.waves(p[0], p[1]);
+            terms = std::array::from_fn(|n| terms[n] + waves[n]);
         }
         Expansion { start: instant, change, q: there, terms, phasor: p }
     }
 
+    /// Returns the part of higher harmonics in the terms.
     #[cold]
     #[inline(never)]
-    fn add_waves(&self, terms: &mut [f64x4; TERMS], phasor: &Phasor) {
-        terms.iter_mut().zip(&self.terms).for_each(|(term, columns)| *term += columns.waved(phasor));
+    fn waves(&self, cos: f64, sin: f64) -> [f64x4; TERMS] {
+        std::array::from_fn(|n| self.terms[n].waved(cos, sin))
     }
 
     /// Returns tangent vectors after `u` Taylor steps.

@@ -52,17 +52,22 @@ impl GapPolynomial {
             let state = c[0][i].mul_add(a[0], c[1][i] * a[1]) + c[2][i].mul_add(a[2], c[3][i] * a[3]);
             state + c[4][i].mul_add(a[4], c[5][i].mul_add(a[5], c[6][i]))
         };
-        let halves = [half(0), half(1)];
-        Bernstein::from_wide(q[0], if waves.is_empty() { halves } else { with_waves(halves, phasor, waves) })
+        let mut halves = [half(0), half(1)];
+        if !waves.is_empty() {
+            let sum = sum(waves, phasor[0], phasor[1]);
+            halves = [halves[0] + sum[0], halves[1] + sum[1]];
+        }
+        Bernstein::from_wide(q[0], halves)
     }
 }
 
-/// Adds the higher harmonics.
+/// Returns the part of the higher harmonics in the coefficients.
 #[cold]
 #[inline(never)]
-fn with_waves(halves: [f64x4; 2], phasor: &Phasor, waves: &[GapWave]) -> [f64x4; 2] {
-    waves.iter().fold(halves, |sum, (order, [cos, sin])| {
-        let [c, s] = power(phasor, *order).map(f64x4::splat);
+fn sum(waves: &[GapWave], cos: f64, sin: f64) -> [f64x4; 2] {
+    let phasor = [cos, sin];
+    waves.iter().fold([f64x4::ZERO; 2], |sum, (order, [cos, sin])| {
+        let [c, s] = power(&phasor, *order).map(f64x4::splat);
         [0, 1].map(|i| sum[i] + cos[i].mul_add(c, sin[i] * s))
     })
 }

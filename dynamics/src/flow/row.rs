@@ -23,14 +23,15 @@ impl Row {
         let gap = fma(row[0], q[0], fma(row[1], q[1], row[6]));
         let other = fma(row[2], q[2], row[3] * q[3]);
         let first = gap + fma(row[4], phasor[0], fma(row[5], phasor[1], other));
-        if self.waves.is_empty() { first } else { first + self.waved(phasor) }
+        if self.waves.is_empty() { first } else { first + self.waved(phasor[0], phasor[1]) }
     }
 
     #[cold]
     #[inline(never)]
-    fn waved(&self, phasor: &Phasor) -> f64 {
+    fn waved(&self, cos: f64, sin: f64) -> f64 {
+        let phasor = [cos, sin];
         let term = |&(order, [cos, sin]): &(u32, [f64; 2])| {
-            let [c, s] = power(phasor, order);
+            let [c, s] = power(&phasor, order);
             fma(cos, c, sin * s)
         };
         self.waves.iter().map(term).sum()

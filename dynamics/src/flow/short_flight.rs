@@ -115,20 +115,22 @@ impl ShortFlight {
             let state = c[0][i].mul_add(a[0], c[1][i] * a[1]) + c[2][i].mul_add(a[2], c[3][i] * a[3]);
             state + c[4][i].mul_add(a[4], c[5][i].mul_add(a[5], c[6][i]))
         };
-        let series = FlightSeries { gap: [quad(0), quad(1), quad(2)], other: [quad(3), quad(4), quad(5)] };
-        if self.waves.is_empty() { series } else { self.waved(series, phasor) }
+        let mut quads = [quad(0), quad(1), quad(2), quad(3), quad(4), quad(5)];
+        if !self.waves.is_empty() {
+            let waves = self.waved(phasor[0], phasor[1]);
+            quads = std::array::from_fn(|i| quads[i] + waves[i]);
+        }
+        FlightSeries { gap: [quads[0], quads[1], quads[2]], other: [quads[3], quads[4], quads[5]] }
     }
 
-    /// Adds the higher harmonics.
+    /// Returns the part of the higher harmonics in both series.
     #[cold]
     #[inline(never)]
-    fn waved(&self, series: FlightSeries, phasor: &Phasor) -> FlightSeries {
-        self.waves.iter().fold(series, |sum, (order, [cos, sin])| {
-            let [c, s] = power(phasor, *order).map(f64x4::splat);
-            let plus = |part: &Series, from: usize| {
-                std::array::from_fn(|i| part[i] + cos[from + i].mul_add(c, sin[from + i] * s))
-            };
-            FlightSeries { gap: plus(&sum.gap, 0), other: plus(&sum.other, WIDTH) }
+    fn waved(&self, cos: f64, sin: f64) -> [f64x4; 2 * WIDTH] {
+        let phasor = [cos, sin];
+        self.waves.iter().fold([f64x4::ZERO; 2 * WIDTH], |sum, (order, [cos, sin])| {
+            let [c, s] = power(&phasor, *order).map(f64x4::splat);
+            std::array::from_fn(|i| sum[i] + cos[i].mul_add(c, sin[i] * s))
         })
     }
 }
