@@ -70,7 +70,7 @@ fn nearly_triangular(m: array<Real, 16>, inverse: Real) -> array<Real, 16> {
 fn spectral_growth() -> Real {
     var m = motions[lane].tangents;
     let whole = largest_entry(m);
-    if tallies[lane].has_overflowed == 1u || !(whole < 1e30) {
+    if tallies[lane].has_overflowed == 1u || !(whole < OUT_OF_RANGE) {
         // Too large, or not a number.
         return 100.0;
     }

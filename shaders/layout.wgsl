@@ -345,7 +345,7 @@ struct Tally {
     // after which they start again.
     column_scalings: u32,
     is_superstable: u32,
-    // 1 if the columns have left the range of numbers: the cycle is unstable.
+    // 1 if a column is lost (OUT_OF_RANGE in tangent.wgsl): the cycle is unstable.
     has_overflowed: u32,
     // Symbols of the word, ten to a number.
     word: array<u32, 7>,

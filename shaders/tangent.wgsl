@@ -111,11 +111,12 @@ fn begin_columns() {
 // Keeps the columns of the monodromy matrix in range after an event, and measures how much perturbations grow between
 // two instants of the cycle: rounding at the first one is amplified until the second.
 fn check_columns() {
-    if has_unbounded_columns() {
+    let size = size_of_columns();
+    if size >= OUT_OF_RANGE {
         tallies[lane].has_overflowed = 1u;
         begin_columns();
+        return;
     }
-    let size = size_of_columns();
     if size == 0.0 {
         // All neighbours have become the same motion. New perturbations grow from here on.
         tallies[lane].is_superstable = 1u;
@@ -139,27 +140,26 @@ fn check_columns() {
     }
 }
 
-// Whether an entry of the columns is not a number, or is so large that the next one may not be. The functions `max` and `<` may
-// leave out what is not a number, and a sum does not.
-fn has_unbounded_columns() -> bool {
-    var total: Real = 0.0;
-    for (var i = 0u; i < 4u; i++) {
-        iterations += 1u;
-        total += sum_of_sizes(tangent(i));
-    }
-    return !is_bounded(total);
+// Size from which a tangent vector counts as lost: its next step may leave the range of single precision.
+const OUT_OF_RANGE: Real = 1e30;
+
+// Whether a vector is below OUT_OF_RANGE. The function `max` may leave out what is not a number, and a sum does not.
+fn is_in_range(u: array<Real, 4>) -> bool {
+    return is_bounded((HUGE / OUT_OF_RANGE) * sum_of_sizes(u));
 }
 
-// Returns the largest entry of the columns, with rates divided by the forcing frequency.
+// Returns the largest entry of the columns, with rates divided by the forcing frequency; OUT_OF_RANGE if a column is lost.
 fn size_of_columns() -> Real {
     let angle = flows[cell.flow_index].domains[0].angle;
     var sizes: array<Real, 4>;
+    var are_in_range = true;
     for (var i = 0u; i < 4u; i++) {
         iterations += 1u;
         let u = tangent(i);
+        are_in_range = are_in_range && is_in_range(u);
         sizes[i] = max(max(abs(u[0]), abs(u[2])), max(abs(u[1]), abs(u[3])) / angle);
     }
-    return max(max(sizes[0], sizes[2]), max(sizes[1], sizes[3]) * angle);
+    return select(OUT_OF_RANGE, max(max(sizes[0], sizes[2]), max(sizes[1], sizes[3]) * angle), are_in_range);
 }
 
 // Returns the largest growth of a perturbation between two instants of the cycle that was read; the second may be in the
@@ -314,9 +314,9 @@ fn glide_short(u: array<Real, 4>, tau: Real) -> array<Real, 4> {
 // Returns the present vector field, per free step.
 fn field() -> array<Real, 4> {
     let square = here.substeps * here.substeps;
-    let pull = present_pull();
-    let a = acceleration(pull.gap_row, pull.share, motion.q, pull.gap_place);
-    let b = acceleration(pull.x_row, pull.share, motion.q, pull.x_place);
+    let d = domain_of(tally.mode);
+    let a = acceleration(here.gap_row, here.share, motion.q, place_of_gap(d));
+    let b = acceleration(here.x_row, here.share, motion.q, place_of_x(d));
     return array<Real, 4>(motion.q[1], square * a, motion.q[3], square * b);
 }
 
@@ -356,8 +356,8 @@ fn close(u: array<Real, 4>) -> array<Real, 4> {
 fn renormalise() -> Real {
     var u = tangent(0u);
     let size = largest(u);
-    if !is_bounded(sum_of_sizes(u)) {
-        // The vector has left the range of numbers: returns a large growth, and starts with a new vector.
+    if !is_in_range(u) {
+        // The vector is lost: returns a large growth, and starts with a new vector.
         set_tangent(0u, initial_tangent());
         return 100.0;
     }
