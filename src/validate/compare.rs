@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use serde::Serialize;
 
+use super::cell::ROUNDING_FACTOR;
 use super::finite::not_finite;
 use crate::findings::attractors::{Basins, NONE};
 use crate::gpu::Precision;
@@ -190,6 +191,8 @@ pub(super) struct Bars<'a> {
     mesh: f64,
     /// Tolerance of measured quantities of a cycle, as [`Group::distance`] has it.
     measured: f64,
+    /// Tolerance of averages, relative to the motion, for a record computed near the cycle: 0 if it was computed on it.
+    off_cycle: f64,
     forcing_period: f64,
     budget: Budget,
     pub(super) labels: Option<Labels<'a>>,
@@ -227,6 +230,9 @@ fn farther_apart(a: &[f64; 2], b: &[f64; 2]) -> Ordering {
     apart(a[0], a[1]).total_cmp(&apart(b[0], b[1]))
 }
 
+/// Largest error of an average that the distance from a cycle explains.
+const FARTHEST_OFF_CYCLE: f64 = 1e-4;
+
 /// Tolerance of impacts per period of a cycle. Impacts are counted, so only the division rounds.
 const IMPACTS_BAR: f64 = 1e-9;
 
@@ -242,7 +248,23 @@ impl Bars<'_> {
             Precision::F32 => (4e-3, 1e-2, 2e-5, 2e-3),
             Precision::F64 => (1e-3, 1e-5, 1e-6, 1e-4),
         };
-        Bars { multiplier, no_multiplier, mesh, measured, forcing_period, budget: *budget, labels: None }
+        Bars {
+            multiplier,
+            no_multiplier,
+            mesh,
+            measured,
+            off_cycle: 0.0,
+            forcing_period,
+            budget: *budget,
+            labels: None,
+        }
+    }
+
+    /// Returns the tolerances of a record whose averages were computed at this distance from its cycle, relative to the motion.
+    /// The averages may be wrong in proportion.
+    pub(super) fn off_cycle(&self, distance: f64) -> Self {
+        let off_cycle = (ROUNDING_FACTOR * distance).min(FARTHEST_OFF_CYCLE);
+        Bars { off_cycle, mesh: self.mesh.max(off_cycle), ..*self }
     }
 
     /// Compares a record with its judge's, for all fields that both have.
@@ -354,7 +376,10 @@ impl Bars<'_> {
         self.push_averages(list, record, judge, [IMPACTS_BAR, self.mesh]);
         self.push_measured(list, record, judge, |group| match group.name == MULTIPLIER {
             true => self.is_same_complex(group, record, judge, period),
-            false => is_within(group.distance(record, judge, SMALL), self.measured),
+            false => {
+                is_within(group.distance(record, judge, SMALL), self.measured)
+                    || is_within(group.distance(record, judge, 1.0), self.off_cycle)
+            }
         });
     }
 
@@ -441,6 +466,12 @@ impl Bars<'_> {
             list.push(compared(field, is_same, || (Value::Number(record), Value::Number(judge))));
         }
     }
+}
+
+/// Returns a record without its exponent and multipliers.
+pub(super) fn without_multipliers(record: Record) -> Record {
+    let bits = GROUPS.iter().filter(|group| group.name == MULTIPLIER).fold(valid::LYAPUNOV, |b, g| b | g.bit);
+    Record { valid: record.valid & !bits, ..record }
 }
 
 /// Builds the comparison of a field. `values` returns the record's value and the judge's.

@@ -1,11 +1,10 @@
 //! Explanations of mismatches.
 
 use super::Kind;
-use super::cell::{Cell, ROUNDING_FACTOR};
+use super::cell::Cell;
 use super::compare::Answer;
 use super::near_cycle::{meets_strobe, on_its_cycle};
 use crate::record::classify::{classify, status};
-use crate::record::distance::apart;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -18,9 +17,6 @@ const PERTURBED_IN_BASINS: u64 = 512;
 
 /// Number of perturbed cells if the transient must be as long as the record's.
 const MANY_PERTURBED: u64 = 48;
-
-/// Largest error of the fraction of meshing that the distance from a cycle explains.
-const MESH_NEAR_CYCLE: f64 = 1e-4;
 
 /// Records of lanes that computed the cell again.
 #[derive(Clone, Copy, Debug, Default)]
@@ -104,22 +100,17 @@ pub(super) fn is_unresolved(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> 
         && claim.periods_run <= cell.longest()
 }
 
-/// Whether a record agrees once its exponent and status are replaced by those of the cycle itself. Its fraction of meshing
-/// may be wrong in proportion to the distance from the cycle.
+/// Whether a record agrees once its exponent and status are replaced by those of the cycle itself. Its averages may be wrong
+/// in proportion to the distance from the cycle.
 fn agrees_on_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     let cycle = &truth.record;
     let is_on_strobe =
         status(claim) == Status::StrobeOnEvent && meets_strobe(cell, cycle.strobe, cycle.period);
     let status = if is_on_strobe { cycle.status } else { claim.status };
     let claim = Record { status, ..*claim };
-    let agrees = |claim: &Record| cell.bars.agree(claim, truth);
-    agrees(&claim)
-        || on_its_cycle(cell, &claim).is_some_and(|(claim, distance)| {
-            let reach = (ROUNDING_FACTOR * distance).min(MESH_NEAR_CYCLE);
-            let is_near = apart(claim.mesh_fraction, cycle.mesh_fraction) <= reach;
-            let mesh_fraction = if is_near { cycle.mesh_fraction } else { claim.mesh_fraction };
-            agrees(&Record { mesh_fraction, ..claim })
-        })
+    cell.bars.agree(&claim, truth)
+        || on_its_cycle(cell, &claim)
+            .is_some_and(|(claim, distance)| cell.bars.off_cycle(distance).agree(&claim, truth))
 }
 
 /// Whether two cycles agree except for their status, and except that one may repeat the other several times.

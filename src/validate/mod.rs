@@ -42,11 +42,11 @@ pub use states::{HORIZON, Off, StateCheck};
 use crate::findings::attractors::Basins;
 use crate::gpu::Precision;
 use crate::map::plan::Plan;
-use crate::record::classify::classify;
+use crate::record::classify::{classify, status};
 use crate::record::{Record, Records, valid};
 use cell::Cell;
 use compare::{Answer, Bars, Compared};
-use rattlemap_dynamics::orbit::{Budget, Class};
+use rattlemap_dynamics::orbit::{Budget, Class, Status};
 
 /// Default number of cells in a sample.
 pub const DEFAULT_SAMPLES: usize = 400;
@@ -430,12 +430,16 @@ fn replay_cell(
     if kind.is_none()
         && let Some(judged) = judged(subject, cell, id, judge, lanes)
     {
+        // A judge that is still approaching the cycle does not know its multipliers.
+        let is_slow = status(&judged) == Status::Slow;
+        let judged = if is_slow { compare::without_multipliers(judged) } else { judged };
         // The second judge is compared with the reference as a lane would be.
         fields = cell.bars.compare(&cell.record, &Answer::new(judged, None));
-        kind = differs(&fields).then(|| match classify(&judged) {
-            // An undecided answer contradicts nothing.
-            Class::Undecided => Kind::Budget,
-            _ => match explain::kind(cell, &judged, &truth, explain::RepeatedLanes::default()) {
+        // An undecided answer contradicts nothing.
+        let is_undecided = [&judged, &truth.record].iter().any(|side| classify(side) == Class::Undecided);
+        kind = differs(&fields).then(|| match is_undecided {
+            true => Kind::Budget,
+            false => match explain::kind(cell, &judged, &truth, explain::RepeatedLanes::default()) {
                 Kind::Unexplained if explain::is_unresolved(cell, &judged, &truth) => Kind::Border,
                 kind => kind,
             },
