@@ -11,9 +11,9 @@ use rattlemap_dynamics::model::{MOST_CHANGES, MOST_STAGES, Units};
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
-const MOTION_KEYS: [&str; 16] = [
+const MOTION_KEYS: [&str; 17] = [
     "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "force_sin", "load", "frequency",
-    "stages", "repeat", "gap", "units", "gap_unit", "time_unit",
+    "stages", "repeat", "gap", "units", "gap_unit", "time_unit", "force_unit",
 ];
 
 /// Limits of all models, for messages.
@@ -53,7 +53,7 @@ pub struct Motion {
     pub repeat: u32,
     /// Gap row: the gap is `gap . x`.
     pub gap: Vec<Expression>,
-    /// Units of coordinates, gap and time.
+    /// Units of coordinates, gap, time and contact forces.
     pub units: Units,
 }
 
@@ -162,11 +162,11 @@ fn read_units(section: &Section<'_>, gap: &[Expression]) -> Result<Units, SceneE
         None => vec![None; gap.len()],
     };
     let unit = |key| section.get(key).map(|field| read_unit(&field)).transpose();
-    let (given, time) = (unit("gap_unit")?, unit("time_unit")?);
+    let (given, time, force) = (unit("gap_unit")?, unit("time_unit")?, unit("force_unit")?);
     let used = gap.iter().zip(&coordinates).filter(|(entry, _)| entry.as_number() != Some(0.0));
     let mut used = used.map(|(entry, unit)| entry.as_number().and(unit.clone()));
     let common = used.next().flatten().filter(|first| used.all(|unit| unit.as_ref() == Some(first)));
-    Ok(Units { coordinates, gap: given.or(common), time })
+    Ok(Units { coordinates, gap: given.or(common), time, force })
 }
 
 fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {

@@ -89,7 +89,7 @@ impl Number {
     }
 }
 
-/// Returns the unit of a number; none for forces and powers, for which models give no unit.
+/// Returns the unit of a number.
 fn unit(number: &Number, units: &Units) -> Option<String> {
     match (number.dimension, number.component) {
         (Dimension::Length | Dimension::Speed, Some(component)) => units.component(component),
@@ -97,7 +97,9 @@ fn unit(number: &Number, units: &Units) -> Option<String> {
         (Dimension::Speed, None) => units.gap_velocity(),
         (Dimension::Rate, _) => units.rate("1"),
         (Dimension::Angle, _) => Some("rad".to_owned()),
-        (Dimension::Force | Dimension::Power | Dimension::None, _) => None,
+        (Dimension::Force, _) => units.force.clone(),
+        (Dimension::Power, _) => units.power(),
+        (Dimension::None, _) => None,
     }
 }
 
@@ -156,21 +158,29 @@ mod tests {
     #[test]
     fn numbers_have_the_units_of_their_displacement_and_of_time() {
         let text = FileModel::built_in("impact-oscillator").unwrap().definition().text.clone();
-        let units = "units = [\"mm\"]\ntime_unit = \"s\"\n";
-        let model =
-            FileModel::parse(&text.replace("[motion]\n", &format!("[motion]\n{units}")), "m.toml").unwrap();
-        let of = |quantity| -> Vec<String> {
-            Number::of(&model, &[quantity])
-                .into_iter()
-                .map(|number| number.unit.unwrap_or_default())
-                .collect()
+        let with = |units: &str| {
+            let text = text.replace("[motion]\n", &format!("[motion]\n{units}\n"));
+            FileModel::parse(&text, "m.toml").unwrap()
         };
+        let units = |model: &FileModel, quantity| -> Vec<String> {
+            let numbers = Number::of(model, &[quantity]).into_iter();
+            numbers.map(|number| number.unit.unwrap_or_default()).collect()
+        };
+        let model = with("units = ['mm']\ntime_unit = 's'");
+        let of = |quantity| units(&model, quantity);
         assert_eq!(of(Quantity::State), ["mm", "mm/s"]);
         assert_eq!(of(Quantity::Harmonic)[..2], ["mm", "rad"]);
         assert_eq!(
             (of(Quantity::ImpactRate), of(Quantity::Dissipated)),
             (vec!["1/s".to_owned()], vec![String::new()])
         );
+        let power = |text: &str| units(&with(&format!("time_unit = 's'\n{text}")), Quantity::ImpactEnergy);
+        assert_eq!(power("units = ['m']\nforce_unit = 'N'"), ["W"]);
+        assert_eq!(power("units = ['rad']\nforce_unit = 'N m'"), ["W"]);
+        assert_eq!(power("units = ['mm']\nforce_unit = 'N'"), ["N mm/s"]);
+        assert_eq!(power("force_unit = 'N'"), [""]);
+        let force = with("force_unit = 'kN'");
+        assert!(units(&force, Quantity::ContactForceMax).iter().all(|unit| unit == "kN"));
         assert_eq!(Number::of(&model, &[Quantity::Rms])[0].label, "root mean square of x [mm]");
     }
 }

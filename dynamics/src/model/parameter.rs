@@ -146,7 +146,7 @@ impl Parameter {
     }
 }
 
-/// Units of a model's state and time; none where the model does not give them.
+/// Units of a model's state, time and forces; none where the model does not give them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Units {
     /// Unit of each coordinate; empty without units.
@@ -155,6 +155,8 @@ pub struct Units {
     pub gap: Option<String>,
     /// Unit of time.
     pub time: Option<String>,
+    /// Unit of contact forces.
+    pub force: Option<String>,
 }
 
 impl Units {
@@ -167,6 +169,15 @@ impl Units {
     /// Returns the unit of the gap's velocity.
     pub fn gap_velocity(&self) -> Option<String> {
         self.rate(self.gap.as_deref()?)
+    }
+
+    /// Returns the unit of power: that of a contact force times that of the gap's velocity.
+    pub fn power(&self) -> Option<String> {
+        let [force, velocity] = [self.force.as_deref()?, &self.gap_velocity()?];
+        match (force, velocity) {
+            ("N", "m/s") | ("N m", "rad/s") => Some("W".to_owned()),
+            _ => Some(format!("{force} {velocity}")),
+        }
     }
 
     /// Returns `unit` per unit of time.
