@@ -176,29 +176,34 @@ impl MapFigure<'_> {
         y
     }
 
-    /// Draws the legend below the map in as many columns as fit, then the bar. Returns the y coordinate below it.
+    /// Draws the legend below the map, then the bar. Returns the y coordinate below it.
+    ///
+    /// The first rows may have columns of their own, so that long names do not take the columns from the short ones below them.
     fn draw_below(&self, canvas: &Canvas, map: Rect, top: f64) -> f64 {
-        let room = canvas.size().0 - 2.0 * EDGE;
+        let columns = |first: usize| {
+            let (head, rest) = self.rows.split_at(first);
+            [head, rest].map(|rows| Columns::fitting(canvas, rows))
+        };
+        let height = |first: &usize| {
+            let lines: usize = columns(*first).iter().map(Columns::lines).sum();
+            lines + usize::from(*first > 0)
+        };
         let has_sections = self.rows.iter().any(|row| row.is_apart);
-        let most = if has_sections { 1 } else { self.rows.len().clamp(1, MOST_COLUMNS) };
-        let widths = |count: usize| -> Vec<f64> {
-            let columns = self.rows.chunks(self.rows.len().div_ceil(count).max(1));
-            let widest = |rows: &[Row]| rows.iter().map(|row| row.width(canvas)).fold(0.0, f64::max);
-            columns.map(|rows| widest(rows).min(room)).collect()
-        };
-        let total = |widths: &[f64]| {
-            widths.iter().map(|width| width + BETWEEN_COLUMNS).sum::<f64>() - BETWEEN_COLUMNS
-        };
-        let count = (1..=most).rev().find(|count| total(&widths(*count)) <= room).unwrap_or(1);
-        let widths = widths(count);
-        let is_narrow = map.left + total(&widths) <= canvas.size().0 - EDGE;
-        let mut left = if is_narrow { map.left } else { EDGE + (room - total(&widths)) / 2.0 };
-        let mut bottom = top;
-        for (rows, width) in self.rows.chunks(self.rows.len().div_ceil(count).max(1)).zip(widths) {
-            let place = Rect { left, top, right: left + width, ..map };
-            bottom = self.draw_rows(canvas, place, rows).max(bottom);
-            left += width + BETWEEN_COLUMNS;
-        }
+        let splits = if has_sections { 1 } else { self.rows.len() };
+        let first = (0..splits).min_by_key(height).unwrap_or(0);
+        let blocks = columns(first);
+        let width = blocks.iter().map(Columns::width).fold(0.0, f64::max);
+        let room = canvas.size().0 - 2.0 * EDGE;
+        let start = map.left.min(EDGE + (room - width) / 2.0);
+        let bottom = blocks.iter().fold(top, |top, columns| {
+            let (mut left, mut bottom) = (start, top);
+            for (rows, width) in &columns.0 {
+                let place = Rect { left, top, right: left + width, ..map };
+                bottom = self.draw_rows(canvas, place, rows).max(bottom);
+                left += width + BETWEEN_COLUMNS;
+            }
+            bottom
+        });
         self.draw_flat_bar(canvas, map, bottom) + EDGE
     }
 
@@ -248,6 +253,34 @@ impl MapFigure<'_> {
             bottom += ROW;
         }
         bottom
+    }
+}
+
+/// Columns of a legend: their rows and widths.
+struct Columns<'a>(Vec<(&'a [Row], f64)>);
+
+impl<'a> Columns<'a> {
+    /// Divides rows among as many columns as fit side by side. Rows with sections stay in one column.
+    fn fitting(canvas: &Canvas, rows: &'a [Row]) -> Self {
+        let room = canvas.size().0 - 2.0 * EDGE;
+        let has_sections = rows.iter().any(|row| row.is_apart);
+        let most = if has_sections { 1 } else { rows.len().clamp(1, MOST_COLUMNS) };
+        let widest = |rows: &[Row]| rows.iter().map(|row| row.width(canvas)).fold(0.0, f64::max);
+        let of = |count: usize| {
+            let columns = rows.chunks(rows.len().div_ceil(count).max(1));
+            Columns(columns.map(|rows| (rows, widest(rows).min(room))).collect())
+        };
+        (2..=most).rev().map(of).find(|columns| columns.width() <= room).unwrap_or_else(|| of(1))
+    }
+
+    /// Returns the number of rows of the longest column.
+    fn lines(&self) -> usize {
+        self.0.iter().map(|(rows, _)| rows.len()).max().unwrap_or(0)
+    }
+
+    /// Returns the width of all columns.
+    fn width(&self) -> f64 {
+        self.0.iter().map(|(_, width)| width + BETWEEN_COLUMNS).sum::<f64>() - BETWEEN_COLUMNS
     }
 }
 

@@ -10,6 +10,8 @@ use crate::show::figure::bifurcation::coloring::{Coloring, both_directions, clas
 /// Height of the strip of classes of one pass, with room for its name beside it; distance from the strip to its name.
 const STRIP: f64 = 24.0;
 const STRIP_NAME: f64 = 10.0;
+/// Radius of the dot that replaces the name in a narrow figure.
+const STRIP_DOT: f64 = 6.0;
 /// Opacity of the band of the standard error.
 pub(crate) const ERROR_BAND: f64 = 0.28;
 /// Least and largest radius of a dot. Dots are larger where columns are farther apart.
@@ -29,10 +31,15 @@ fn strip_name(direction: Direction) -> &'static str {
     }
 }
 
-/// Returns the room for the names of strips right of the panel.
+/// Returns the room for the names of strips right of the panel. In a narrow figure each strip has a dot in the colour of its
+/// direction instead, which the legend explains.
 pub(crate) fn beside(canvas: &Canvas, coloring: Coloring) -> f64 {
     let passes = coloring.passes().iter().take(coloring.strips()).flatten();
-    let widest = passes.map(|pass| canvas.text_width(strip_name(*pass), SMALL)).fold(0.0, f64::max);
+    let width = |direction: &Direction| match canvas.is_default() {
+        true => canvas.text_width(strip_name(*direction), SMALL),
+        false => 2.0 * STRIP_DOT,
+    };
+    let widest = passes.map(width).fold(0.0, f64::max);
     if widest > 0.0 { widest + STRIP_NAME } else { 0.0 }
 }
 
@@ -92,9 +99,12 @@ pub(crate) fn draw(canvas: &Canvas, frame: &Frame, columns: &[Column], coloring:
             let rect = Rect { left: from, right: to, top: bottom - STRIP + 2.0, bottom };
             canvas.fill(rect, run[0].0, 1.0);
         }
-        if let Some(direction) = pass {
-            let at = (right + STRIP_NAME, bottom - STRIP / 2.0 + 1.0);
-            canvas.text(strip_name(direction), at, SMALL, Align::Left, DARK);
+        let Some(direction) = pass else { continue };
+        let (left, middle) = (right + STRIP_NAME, bottom - STRIP / 2.0 + 1.0);
+        if canvas.is_default() {
+            canvas.text(strip_name(direction), (left, middle), SMALL, Align::Left, DARK);
+        } else {
+            canvas.marker((left + STRIP_DOT, middle), Marker::dot(direction_color(direction), STRIP_DOT));
         }
     }
 }
