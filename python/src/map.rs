@@ -61,9 +61,13 @@ pub(crate) fn map<'py>(
     };
     task.check()?;
     let result = worker::run(py, progress, move |watch| {
-        task.compute(watch, |_, run, warnings| {
+        task.compute(watch, |_, run, mut warnings| {
             let map = run.finish();
             let (files, reason) = (map.write()?, map.reason().to_owned());
+            let removed = map.removed();
+            if resume && !removed.is_empty() {
+                warnings.push(format!("removed files of the earlier run: {}", removed.join(", ")));
+            }
             Ok(MapResult { map: map.in_memory()?, reason, warnings, files })
         })
     })?;

@@ -247,6 +247,17 @@ def test_resuming_warns_of_damage(tmp_path: Path) -> None:
     xr.testing.assert_equal(again, whole)
 
 
+def test_resuming_with_fewer_files_warns_of_removed_ones(tmp_path: Path) -> None:
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    axes = (f"[[axis]]\nparameter = '{name}'\nmin = {low}\nmax = {high}\ncount = {n}\n" for name, (low, high, n) in SMALL.items())
+    scene.write_text("".join(axes))
+    rm.map(scene=scene, engine="cpu", out=out, set=["outputs.files=['csv', 'png']"])
+    assert (out / "map.png").exists()
+    with pytest.warns(RuntimeWarning, match="removed files of the earlier run: .*map.png"):
+        rm.map(scene=scene, engine="cpu", out=out, set=["outputs.files=['csv']"], resume=True)
+    assert not (out / "map.png").exists()
+
+
 def test_other_threads_run_and_progress_is_reported() -> None:
     reports: list[tuple[int, int]] = []
     ticks, is_over = 0, threading.Event()

@@ -410,6 +410,11 @@ impl ComputedMap<'_> {
         store::map::write(folder, &self.cells(), &self.description())
     }
 
+    /// Names of results of an earlier run that were removed from the folder and not written again.
+    pub fn removed(&self) -> Vec<String> {
+        self.run.open.folder.map_or_else(Vec::new, Folder::removed)
+    }
+
     /// Time that it took to write each file; they are written side by side.
     pub fn writing_times(&self) -> BTreeMap<String, Duration> {
         self.run.open.folder.map_or_else(BTreeMap::new, Folder::writing_times)
