@@ -114,6 +114,10 @@ pub struct Flow {
     non_impacting: Option<NonImpacting>,
     free: LinearFlow,
     meshing: [LinearFlow; 2],
+    /// Stiffness, damping and constant of the force of the walls in front of this interval, along the gap.
+    held: Option<[f64; 3]>,
+    /// Flows of the intervals behind the first right wall and the first left wall, from the inside to the outside.
+    behind: [Vec<Flow>; 2],
     /// Flows of the further stages, and the changes of the stage: time since phase 0, and the stage that begins there.
     stages: Vec<Flow>,
     schedule: Vec<(f64, usize)>,
@@ -153,14 +157,37 @@ impl Flow {
         let speed =
             flow.stages.iter().map(|stage| stage.free.rate).fold(flow.free.rate, f64::max) * flow.length;
         flow.speed = speed;
-        for stage in &mut flow.stages {
-            (stage.length, stage.speed, stage.escape) = (flow.length, speed, flow.escape);
+        let units = (flow.length, speed, flow.escape);
+        flow.stages.iter_mut().for_each(|stage| stage.set_units(units));
+        flow.behind.iter_mut().flatten().for_each(|interval| interval.set_units(units));
+        flow
+    }
+
+    fn set_units(&mut self, units: (f64, f64, f64)) {
+        (self.length, self.speed, self.escape) = units;
+        self.behind.iter_mut().flatten().for_each(|interval| interval.set_units(units));
+    }
+
+    /// Computes the flow of the first stage, in all intervals between walls.
+    fn in_one_stage(oscillator: &Oscillator) -> Flow {
+        let mut flow = Flow::in_one_interval(oscillator);
+        let units = (flow.length, flow.speed, flow.escape);
+        for side in Side::BOTH {
+            let interval = |nth| {
+                let interval = oscillator.behind(side, nth);
+                let mut flow = Flow::in_one_interval(&interval);
+                flow.held = Some(interval.force_against(&oscillator.free));
+                flow.set_units(units);
+                flow
+            };
+            flow.behind[side.index()] =
+                (1..=oscillator.outer_walls[side.index()].len()).map(interval).collect();
         }
         flow
     }
 
-    /// Computes the flow of the first stage.
-    fn in_one_stage(oscillator: &Oscillator) -> Flow {
+    /// Computes the flow between the first walls, in one stage.
+    fn in_one_interval(oscillator: &Oscillator) -> Flow {
         let other = oscillator.other();
         let free = LinearFlow::new(oscillator, &oscillator.free);
         let compliance = oscillator.mobility(oscillator.gap);
@@ -211,9 +238,54 @@ impl Flow {
                 .or_else(|| NonImpacting::with_one_at_rest(oscillator)),
             free,
             meshing,
+            held: None,
+            behind: Default::default(),
             stages: Vec::new(),
             schedule: Vec::new(),
         }
+    }
+
+    /// Returns the flow of an interval between neighbouring walls: 0 between the first walls, `n` behind the nth right wall, `-n`
+    /// behind the nth left wall. The last wall of a side bounds its last interval.
+    #[inline]
+    pub(crate) fn interval(&self, interval: i32) -> &Flow {
+        match interval {
+            0 => self,
+            1.. => &self.behind[0][interval as usize - 1],
+            _ => &self.behind[1][interval.unsigned_abs() as usize - 1],
+        }
+    }
+
+    /// Whether there is such an [interval](Self::interval).
+    pub(crate) fn has_interval(&self, interval: i32) -> bool {
+        let side = if interval > 0 { 0 } else { 1 };
+        interval.unsigned_abs() as usize <= self.behind[side].len()
+    }
+
+    /// Returns the interval of a gap. A gap on a wall is in the interval before it.
+    pub(crate) fn interval_of(&self, gap: f64) -> i32 {
+        let passed = |side: Side| {
+            let count = self.behind[side.index()].len();
+            // The inner wall of each interval.
+            let wall = |nth: usize| self.interval(side.sign() as i32 * nth as i32).wall(side.mirrored());
+            (1..=count).take_while(|&nth| side.sign() * (gap - wall(nth)) > 0.0).count() as i32
+        };
+        passed(Side::Right) - passed(Side::Left)
+    }
+
+    /// Returns the compliant contacts that last in a domain; none without such contacts.
+    pub(crate) fn contact_force(&self, kind: DomainKind) -> Option<ContactForce> {
+        let own = match kind {
+            DomainKind::Meshing(side) if self.is_compliant(side) => {
+                Some((self.wall_force(side), self.wall(side)))
+            }
+            _ => None,
+        };
+        if own.is_none() && self.held.is_none() {
+            return None;
+        }
+        let ([stiffness, damping], wall) = own.unwrap_or_default();
+        Some(ContactForce { stiffness, damping, wall, held: self.held.unwrap_or_default() })
     }
 
     /// Returns the flow of a stage.
@@ -229,7 +301,8 @@ impl Flow {
     /// Returns the memory that the flow occupies, in bytes.
     pub fn bytes(&self) -> usize {
         let domains = [&self.free, &self.meshing[0], &self.meshing[1]];
-        let of_stages = self.stages.iter().map(Flow::bytes).sum::<usize>();
+        let of_stages =
+            self.stages.iter().chain(self.behind.iter().flatten()).map(Flow::bytes).sum::<usize>();
         size_of::<Flow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>() + of_stages
     }
 
@@ -326,6 +399,30 @@ impl Flow {
         let (sin, cos) = phase.sin_cos();
         let q = self.domain(kind).propagate(self.to_gap(y), [cos, sin], tau);
         self.to_state(q)
+    }
+}
+
+/// The force along the gap of the compliant contacts that last: of the wall of the domain, and of the walls in front of the interval.
+pub(crate) struct ContactForce {
+    stiffness: f64,
+    damping: f64,
+    wall: f64,
+    held: [f64; 3],
+}
+
+impl ContactForce {
+    /// Returns the force, positive to the left.
+    pub(crate) fn at(&self, q: &Gap) -> f64 {
+        let [stiffness, damping, constant] = self.held;
+        let own = self.stiffness * (q[0] - self.wall) + self.damping * q[1];
+        own + (stiffness * q[0] + damping * q[1] + constant)
+    }
+
+    /// Returns the rate of the force, given the acceleration of the gap.
+    pub(crate) fn rate(&self, q: &Gap, acceleration: f64) -> f64 {
+        let [stiffness, damping, _] = self.held;
+        let own = self.stiffness * q[1] + self.damping * acceleration;
+        own + (stiffness * q[1] + damping * acceleration)
     }
 }
 

@@ -79,11 +79,20 @@ impl Mode {
     }
 }
 
+/// Returns the side of an interval behind a wall.
+pub(crate) fn side_of(interval: i32) -> Side {
+    if interval > 0 { Side::Right } else { Side::Left }
+}
+
 /// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix.
 #[derive(Clone, Debug)]
 pub struct Trajectory<'f, const N: usize = 0> {
-    /// The flow of the present stage.
+    /// The flow of the present stage and interval.
     flow: &'f Flow,
+    /// The flow of the present stage, in all intervals.
+    stage: &'f Flow,
+    /// The present interval between walls, [`Flow::interval`].
+    interval: i32,
     schedule: Schedule<'f>,
     law: Law,
     mode: Mode,
@@ -118,7 +127,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Multiplies the gap coordinates by `1 + shares`, to simulate the rounding of a less precise engine. While
     /// meshing, the first one is the distance from the wall. A gap that is just leaving a wall is not changed.
     pub fn perturb(&mut self, shares: [f64; 4]) {
-        let wall = self.meshing().map_or(0.0, |side| self.flow.wall(side));
+        let wall = match self.mode {
+            Mode::Free if self.interval == 0 => 0.0,
+            Mode::Free => self.flow.wall(side_of(self.interval).mirrored()),
+            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => self.flow.wall(side),
+        };
         if self.from_wall.is_none() {
             self.q[0] += shares[0] * (self.q[0] - wall);
         }
@@ -155,9 +168,19 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Returns the wall of the contact that lasts, if one does.
     pub fn meshing(&self) -> Option<Side> {
         match self.mode {
-            Mode::Free => None,
+            Mode::Free => (self.interval != 0).then(|| side_of(self.interval)),
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => Some(side),
         }
+    }
+
+    /// Returns the present interval between walls, [`Flow::interval`].
+    pub(crate) fn interval(&self) -> i32 {
+        self.interval
+    }
+
+    /// Returns the present domain of the interval.
+    pub(crate) fn domain(&self) -> DomainKind {
+        self.mode.domain()
     }
 
     /// Returns the number of completed forcing periods.
@@ -213,7 +236,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.advance_to(period, observer)?;
         self.phasor = [1.0, 0.0];
         let first = self.schedule.restart();
-        if !std::ptr::eq(self.flow, first) {
+        if !std::ptr::eq(self.stage, first) {
             // A contact that this change ends belongs to the period before phase 0.
             self.enter_stage(first, observer);
         }
@@ -403,7 +426,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     #[inline(always)]
     fn count_meshing(&mut self, s: f64) {
-        if self.mode != Mode::Free {
+        if self.mode != Mode::Free || self.interval != 0 {
             self.meshing_time += s;
         }
     }

@@ -130,6 +130,7 @@ impl Walled {
             harmonics: Vec::new(),
             stages: Vec::new(),
             schedule: Vec::new(),
+            outer_walls: Default::default(),
             free: self.free.domain(),
             meshing: [self.behind(0).domain(), self.behind(1).domain()],
         };

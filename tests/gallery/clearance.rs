@@ -48,6 +48,7 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
         harmonics: Vec::new(),
         stages: Vec::new(),
         schedule: Vec::new(),
+        outer_walls: Default::default(),
         free: domain,
         meshing: [domain; 2],
     };
@@ -109,6 +110,7 @@ impl Damper {
             harmonics: Vec::new(),
             stages: Vec::new(),
             schedule: Vec::new(),
+            outer_walls: Default::default(),
             free: domain,
             meshing: [domain; 2],
         };

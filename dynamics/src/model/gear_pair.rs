@@ -62,6 +62,7 @@ impl GearPair {
             harmonics: Vec::new(),
             stages: Vec::new(),
             schedule: Vec::new(),
+            outer_walls: Default::default(),
             free,
             meshing: [meshing(1.0), meshing(-1.0)],
         };

@@ -139,13 +139,28 @@ pub struct Stage {
     pub meshing: [Domain; 2],
 }
 
+/// A further wall behind an elastic one, such as the second stage of a clutch spring or the stop behind a soft buffer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OuterWall {
+    /// Position `z`, farther from the opposite side than the walls before it.
+    pub at: f64,
+    /// Contact type; all walls on a side but the outermost are elastic.
+    pub contact: Contact,
+    /// Motion in lasting contact, in each stage; ignored for a rigid wall.
+    pub meshing: Vec<Domain>,
+}
+
+/// Largest number of walls on a side.
+pub const MOST_WALLS: usize = 4;
+
 /// Largest number of stages.
 pub const MOST_STAGES: usize = 8;
 
 /// Largest number of changes of the stage in a forcing period.
 pub const MOST_CHANGES: usize = 1024;
 
-/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may be missing.
+/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may be missing, and further
+/// walls may lie behind an elastic one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Oscillator {
     /// Degrees of freedom: 1 or 2. With 1, the second displacement has a mass of 1, no forces and no part in the gap,
@@ -176,6 +191,8 @@ pub struct Oscillator {
     /// Changes of the stage in a forcing period: the phase in turns, in `[0, 1)` and increasing, and the stage that begins
     /// there. The last one holds up to the first. Empty if stage 0 holds always.
     pub schedule: Vec<(f64, usize)>,
+    /// Further walls behind the right and the left one, from the inside to the outside.
+    pub outer_walls: [Vec<OuterWall>; 2],
 }
 
 impl Oscillator {
@@ -255,7 +272,51 @@ impl Oscillator {
     /// Returns the oscillator in which a stage holds always.
     pub fn in_stage(&self, stage: usize) -> Oscillator {
         let Stage { free, meshing } = self.stage(stage);
-        Oscillator { free, meshing, stages: Vec::new(), schedule: Vec::new(), ..self.clone() }
+        let mut alone =
+            Oscillator { free, meshing, stages: Vec::new(), schedule: Vec::new(), ..self.clone() };
+        for wall in alone.outer_walls.iter_mut().flatten() {
+            wall.meshing = wall.meshing.get(stage).copied().into_iter().collect();
+        }
+        alone
+    }
+
+    /// Returns the oscillator between two neighbouring walls of a side, in one stage: between the `nth` wall of the side,
+    /// from 1, and the next one. Its free motion is contact with the first `nth` walls.
+    ///
+    /// On the inner wall the motion continues in the interval before.
+    pub(crate) fn behind(&self, side: Side, nth: usize) -> Oscillator {
+        let (i, outer) = (side.index(), &self.outer_walls[side.index()]);
+        let domain = |wall: usize| match wall {
+            0 => self.free,
+            1 => self.meshing[i],
+            _ => outer[wall - 2].meshing[0],
+        };
+        let next = &outer[nth - 1];
+        let mut interval = Oscillator { free: domain(nth), outer_walls: Default::default(), ..self.clone() };
+        interval.walls[i] = next.at;
+        interval.walls[1 - i] = if nth == 1 { self.walls[i] } else { outer[nth - 2].at };
+        interval.contacts[i] = next.contact;
+        interval.contacts[1 - i] = Contact::Elastic;
+        interval.meshing[i] = next.meshing[0];
+        interval.meshing[1 - i] = domain(nth - 1);
+        interval
+    }
+
+    /// Returns stiffness, damping and constant of the force along the gap that free motion of this interval has and `centre` lacks.
+    pub(crate) fn force_against(&self, centre: &Domain) -> [f64; 3] {
+        let g = self.gap;
+        let square = g[0] * g[0] + g[1] * g[1];
+        let load = [0, 1].map(|i| self.free.load[i] - centre.load[i]);
+        [
+            along(g, self.free.stiffness, centre.stiffness),
+            along(g, self.free.damping, centre.damping),
+            -(g[0] * load[0] + g[1] * load[1]) / square,
+        ]
+    }
+
+    /// Returns the number of walls on a side.
+    pub fn wall_count(&self, side: Side) -> usize {
+        usize::from(self.wall(side).is_finite()) + self.outer_walls[side.index()].len()
     }
 
     /// Returns the highest order of the force's harmonics, 1 or more.
@@ -412,11 +473,52 @@ impl Oscillator {
                 self.validate_wall(side, place)?;
             }
         }
+        self.validate_outer_walls()?;
         self.validate_harmonics()?;
         if self.degrees == 1 {
             self.validate_single()?;
         }
         self.validate_stages()
+    }
+
+    fn validate_outer_walls(&self) -> Result<(), OscillatorError> {
+        for side in Side::BOTH {
+            let outer = &self.outer_walls[side.index()];
+            let (count, word) = (self.wall_count(side), ["right", "left"][side.index()]);
+            let name = |nth: usize| format!("wall {nth} on the {} side", word);
+            require(
+                count <= MOST_WALLS,
+                || format!("walls on the {} side", word),
+                count as f64,
+                "at most 4",
+            )?;
+            let mut inner = (self.wall(side), self.is_elastic(side));
+            for (nth, wall) in (2..).zip(outer) {
+                let beyond = side.sign() * (wall.at - inner.0);
+                finite(|| name(nth), wall.at)?;
+                require(beyond > 0.0, || name(nth), wall.at, "farther out than the wall before it")?;
+                let elastic = "elastic, because another wall lies behind it";
+                require(inner.1, || name(nth - 1), inner.0, elastic)?;
+                inner = (wall.at, wall.contact == Contact::Elastic);
+                let stages = "one for each stage";
+                let domains = wall.meshing.len();
+                require(
+                    domains == self.stage_count(),
+                    || format!("domains behind {}", name(nth)),
+                    domains as f64,
+                    stages,
+                )?;
+            }
+            for nth in 1..=outer.len() {
+                let interval = self.behind(side, nth);
+                if interval.has_motion_behind(side) {
+                    let place = format!("contact with {}", name(nth + 1));
+                    interval.meshing[side.index()].validate(self.degrees, &place)?;
+                    interval.validate_wall(side, &place)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     fn validate_harmonics(&self) -> Result<(), OscillatorError> {
@@ -481,8 +583,7 @@ impl Oscillator {
 
     /// Returns the displacement beyond which the motion counts as escaped. It is infinite if energy grows by the force alone.
     pub fn escape(&self) -> f64 {
-        let behind = Side::BOTH.into_iter().filter(|&side| self.has_motion_behind(side));
-        let mut domains = behind.map(|side| &self.meshing[side.index()]).chain([&self.free]);
+        let mut domains = self.domains();
         // Stages can do work: parametric resonance.
         let grows = !self.stages.is_empty() || domains.any(|domain| self.growth_rate(domain) > 0.0);
         // Walls may be near each other and far from rest, or much nearer than the motion of other coordinates.
@@ -492,6 +593,16 @@ impl Oscillator {
             LEAST_LENGTH => ESCAPE_WITHOUT_SCALE,
             length => ESCAPE * length,
         }
+    }
+
+    /// Returns the domains of the first stage in which there is motion.
+    fn domains(&self) -> impl Iterator<Item = &Domain> {
+        let behind = Side::BOTH.into_iter().filter(|&side| self.has_motion_behind(side));
+        let outer = self.outer_walls.iter().flatten().filter(|wall| wall.contact != Contact::Rigid);
+        behind
+            .map(|side| &self.meshing[side.index()])
+            .chain([&self.free])
+            .chain(outer.flat_map(|wall| wall.meshing.first()))
     }
 
     /// Checks that spring and damper behind a wall are not negative. An elastic wall must act along the gap row only, and the
@@ -546,9 +657,7 @@ impl Oscillator {
         none("mass 1, 2", self.mass[0][1])?;
         let mass = self.mass[1][1];
         require(mass == 1.0, || "mass 2".to_owned(), mass, "1 where there is one degree of freedom")?;
-        let behind = Side::BOTH.into_iter().filter(|&side| self.has_motion_behind(side));
-        let domains = behind.map(|side| &self.meshing[side.index()]).chain([&self.free]);
-        for domain in domains {
+        for domain in self.domains() {
             none("load 2", domain.load[1])?;
             for (name, matrix) in [("damping", domain.damping), ("stiffness", domain.stiffness)] {
                 none(&format!("{name} 1, 2"), matrix[0][1])?;
@@ -623,8 +732,18 @@ impl Oscillator {
             let (later, mirror) = self.schedule[i + half];
             (later - begins - 0.5).abs() < SAME_PHASE && is_mirrored(self.stage(index), self.stage(mirror))
         };
+        let [right, left] = &self.outer_walls;
+        let are_mirrored = |(right, left): (&OuterWall, &OuterWall)| {
+            // With stages the mirror image of each domain would have to be looked up; no such model is known.
+            right.at == -left.at
+                && right.contact == left.contact
+                && self.stages.is_empty()
+                && (right.contact == Contact::Rigid || right.meshing[0] == mirrored(&left.meshing[0]))
+        };
         self.walls[0] == -self.walls[1]
             && self.contacts[0] == self.contacts[1]
+            && right.len() == left.len()
+            && right.iter().zip(left).all(are_mirrored)
             && self.harmonics.iter().all(|harmonic| harmonic.order % 2 == 1)
             && match self.schedule.len() {
                 0 => is_mirrored(self.stage(0), self.stage(0)),

@@ -47,6 +47,7 @@ impl Stops {
             harmonics: Vec::new(),
             stages: Vec::new(),
             schedule: Vec::new(),
+            outer_walls: Default::default(),
             free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0] },
             meshing: [stop(1.0), stop(-1.0)],
         };

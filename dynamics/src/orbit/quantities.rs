@@ -6,7 +6,7 @@
 
 use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule};
 use crate::model::Contact;
-use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
+use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory, side_of};
 
 /// Nodes in `(0, 1)` and weights of the Gauss-Legendre quadrature on `[-1, 1]`; the other half is symmetric.
 const GAUSS: [(f64, f64); 4] = [
@@ -123,8 +123,12 @@ impl Moments {
 /// Measures a trajectory from its events.
 #[derive(Clone, Debug)]
 pub(super) struct Meter<'f> {
-    /// The flow of the present stage.
+    /// The flow of the present stage and interval.
     flow: &'f Flow,
+    /// The flow of the present stage, in all intervals.
+    stage: &'f Flow,
+    /// The present interval between walls.
+    interval: i32,
     schedule: Schedule<'f>,
     /// Domain, state and time since phase 0 at the beginning of the present flight.
     kind: DomainKind,
@@ -143,12 +147,15 @@ pub(super) struct Meter<'f> {
 impl<'f> Meter<'f> {
     /// Begins at phase 0, at the present state of a trajectory.
     pub(super) fn new(flow: &'f Flow, trajectory: &Trajectory<'_>) -> Meter<'f> {
-        let kind = trajectory.meshing().map_or(DomainKind::Free, DomainKind::Meshing);
-        let (schedule, flow) = Schedule::new(flow);
+        let (schedule, stage) = Schedule::new(flow);
+        let interval = trajectory.interval();
+        let flow = stage.interval(interval);
         Meter {
             flow,
+            stage,
+            interval,
             schedule,
-            kind,
+            kind: trajectory.domain(),
             q: flow.to_gap(trajectory.state()),
             t: 0.0,
             first_period: trajectory.period(),
@@ -198,7 +205,8 @@ impl<'f> Meter<'f> {
         while self.period < period {
             self.fly_to(self.flow.period);
             self.t = 0.0;
-            self.flow = self.schedule.restart();
+            let first = self.schedule.restart();
+            self.enter_stage(first);
             self.period += 1;
         }
     }
@@ -210,12 +218,17 @@ impl<'f> Meter<'f> {
                 self.q = self.fly(change - self.t);
                 self.t = change;
             }
-            self.flow = self.schedule.change();
+            let next = self.schedule.change();
+            self.enter_stage(next);
         }
         if until > self.t {
             self.q = self.fly(until - self.t);
         }
         self.t = until;
+    }
+
+    fn enter_stage(&mut self, stage: &'f Flow) {
+        (self.stage, self.flow) = (stage, stage.interval(self.interval));
     }
 
     /// Measures the present flight over a time within one stage, and returns its end.
@@ -290,22 +303,20 @@ impl<'f> Meter<'f> {
         match which {
             0 | 1 => self.flow.to_state(*q)[2 * which + 1],
             2 => q[1],
-            _ => match self.kind {
-                DomainKind::Meshing(side) if self.flow.is_compliant(side) => {
-                    let [stiffness, damping] = self.flow.wall_force(side);
-                    stiffness * q[1] + damping * linear.acceleration(q, phasor)
-                }
-                _ => 0.0,
-            },
+            _ => self
+                .flow
+                .contact_force(self.kind)
+                .map_or(0.0, |force| force.rate(q, linear.acceleration(q, phasor))),
         }
     }
 
-    /// Returns the force of a compliant contact, positive if it presses.
+    /// Returns the force of the compliant contacts, positive if it presses.
     fn compliant_force(&self, q: &Gap) -> Option<f64> {
-        let DomainKind::Meshing(side) = self.kind else { return None };
-        let [stiffness, damping] = self.flow.wall_force(side);
-        let depth = q[0] - self.flow.wall(side);
-        self.flow.is_compliant(side).then(|| side.sign() * (stiffness * depth + damping * q[1]))
+        let side = match self.kind {
+            DomainKind::Meshing(side) => side,
+            DomainKind::Free => side_of(self.interval),
+        };
+        self.flow.contact_force(self.kind).map(|force| side.sign() * force.at(q))
     }
 
     /// Whether an event ends an infinite series of impacts that the trajectory replaced by its limit.
@@ -350,11 +361,15 @@ impl Observer for Meter<'_> {
         } else {
             self.fly_to(event.t);
         }
-        self.contact(event);
+        if event.interval == self.interval {
+            self.contact(event);
+        }
         self.kind = match event.kind {
-            EventKind::MeshStart => DomainKind::Meshing(event.side),
-            EventKind::Impact | EventKind::MeshEnd => DomainKind::Free,
+            EventKind::MeshStart if event.interval == self.interval => DomainKind::Meshing(event.side),
+            _ => DomainKind::Free,
         };
+        self.interval = event.interval;
+        self.flow = self.stage.interval(self.interval);
         self.q = event.after;
         self.t = event.t;
         self.include(&event.after);

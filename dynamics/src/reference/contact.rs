@@ -1,7 +1,7 @@
 //! Events at a wall: impact, start and end of meshing, grazing.
 
 use super::sticking::RELEASE_ORDER;
-use super::{Crossing, EventKind, GapEvent, Mode, Observer, Trajectory};
+use super::{Crossing, EventKind, GapEvent, Mode, Observer, Trajectory, side_of};
 use crate::flow::{DomainKind, Gap, LinearFlow};
 use crate::model::{Contact, Side};
 
@@ -197,10 +197,22 @@ impl<const N: usize> Trajectory<'_, N> {
 
     /// Counts and reports an event. The first flight comes from no wall, so it has no symbol.
     pub(super) fn record(&mut self, kind: EventKind, side: Side, before: Gap, observer: &mut impl Observer) {
+        self.record_in(self.interval, kind, side, before, observer);
+    }
+
+    /// Counts and reports an event after which the gap is in a given interval.
+    pub(super) fn record_in(
+        &mut self,
+        interval: i32,
+        kind: EventKind,
+        side: Side,
+        before: Gap,
+        observer: &mut impl Observer,
+    ) {
+        let contact = |side: Side| Some(if side == Side::Right { b'1' } else { b'4' });
         let symbol = match (self.mode, self.origin) {
-            (Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side), _) => {
-                Some(if side == Side::Right { b'1' } else { b'4' })
-            }
+            (Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side), _) => contact(side),
+            (Mode::Free, _) if self.interval != 0 => contact(side_of(self.interval)),
             (Mode::Free, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
             (Mode::Free, Some(Side::Left)) => Some(if side == Side::Left { b'5' } else { b'6' }),
             (Mode::Free, None) => None,
@@ -211,6 +223,7 @@ impl<const N: usize> Trajectory<'_, N> {
         observer.event(&GapEvent {
             kind,
             side,
+            interval,
             symbol,
             period: self.period,
             t: self.clock.time(),

@@ -5,7 +5,7 @@
 //! out, exactly and at any speed. So a crossing of an elastic wall is never too near to grazing, and without a damper
 //! the strobe map is continuously differentiable there.
 
-use super::{EventKind, Observer, Trajectory};
+use super::{EventKind, Observer, Trajectory, side_of};
 use crate::flow::DomainKind;
 use crate::model::Side;
 
@@ -22,6 +22,10 @@ impl<const N: usize> Trajectory<'_, N> {
             return;
         }
         self.cross_damper(side, -1.0);
+        if self.flow_continues(side) {
+            self.pass(side, observer);
+            return;
+        }
         self.record(EventKind::MeshStart, side, self.q, observer);
         self.start_meshing(side, 0.0);
         if closing > 0.0 {
@@ -40,6 +44,24 @@ impl<const N: usize> Trajectory<'_, N> {
         self.cross_damper(side, 1.0);
         self.record(EventKind::MeshEnd, side, self.q, observer);
         self.leave(side);
+    }
+
+    /// Whether another interval lies behind a wall of the present one.
+    fn flow_continues(&self, side: Side) -> bool {
+        self.stage.has_interval(self.interval + side.sign() as i32)
+    }
+
+    /// Enters the interval behind a wall of the present one, from the inside or from the outside.
+    fn pass(&mut self, side: Side, observer: &mut impl Observer) {
+        let next = self.interval + side.sign() as i32;
+        let outwards = next.abs() > self.interval.abs();
+        let kind = if outwards { EventKind::MeshStart } else { EventKind::MeshEnd };
+        let of = side_of(if outwards { next } else { self.interval });
+        self.record_in(next, kind, of, self.q, observer);
+        self.interval = next;
+        self.flow = self.stage.interval(next);
+        self.level[0] = self.level[0].min(self.flow.domain(DomainKind::Free).levels - 1);
+        self.leave(side.mirrored());
     }
 
     /// Applies `S u = u + sign c M^-1 g (n . u)` to every tangent vector.

@@ -52,6 +52,8 @@ pub struct GapEvent {
     pub kind: EventKind,
     /// The wall at which it happened.
     pub side: Side,
+    /// The interval between walls after the event, [`Flow::interval`](crate::flow::Flow).
+    pub(crate) interval: i32,
     /// Symbol `b'1'..=b'6'` of the flight that ends here; none for the first flight, which comes from no wall.
     pub symbol: Option<u8>,
     /// Number of completed forcing periods.

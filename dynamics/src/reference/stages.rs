@@ -12,10 +12,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     #[cold]
     #[inline(never)]
     pub(super) fn enter_stage(&mut self, flow: &'f Flow, observer: &mut impl Observer) {
-        self.flow = flow;
+        self.stage = flow;
+        self.flow = flow.interval(self.interval);
         self.short_flight = false;
         let levels = |kind: DomainKind| self.flow.domain(kind).levels - 1;
-        let in_contact = self.meshing().map_or(self.level[1], |side| levels(DomainKind::Meshing(side)));
+        let in_contact = if self.mode == Mode::Free { self.level[1] } else { levels(self.mode.domain()) };
         self.level = [self.level[0].min(levels(DomainKind::Free)), self.level[1].min(in_contact)];
         match self.mode {
             Mode::Stuck(side) if !self.presses(DomainKind::Meshing(side), side, &self.q) => {

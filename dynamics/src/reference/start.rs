@@ -37,9 +37,13 @@ impl<'f> Trajectory<'f, 0> {
 impl<'f, const N: usize> Trajectory<'f, N> {
     /// Starts a trajectory with tangent vectors in the coordinates of [`State`].
     pub fn with_tangents(flow: &'f Flow, law: Law, y: State, tangents: [State; N]) -> Self {
-        let (schedule, flow) = Schedule::new(flow);
+        let (schedule, stage) = Schedule::new(flow);
+        let interval = stage.interval_of(stage.to_gap(y)[0]);
+        let flow = stage.interval(interval);
         let mut trajectory = Trajectory {
             flow,
+            stage,
+            interval,
             schedule,
             law,
             mode: Mode::Free,
@@ -70,6 +74,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     pub fn carrying<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         Trajectory {
             flow: self.flow,
+            stage: self.stage,
+            interval: self.interval,
             schedule: self.schedule,
             law: self.law,
             mode: self.mode,
@@ -98,12 +104,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     ///
     /// The state alone does not determine the domain: a gap just in front of a wall may be free or in contact onset.
     pub fn at<const M: usize>(&self, y: State, tangents: [State; M]) -> Trajectory<'f, M> {
-        self.start_in(self.mode, self.origin, y, tangents)
+        self.start_in(self.interval, self.mode, self.origin, y, tangents)
     }
 
-    /// Starts a trajectory in a given mode.
+    /// Starts a trajectory in a given mode of an interval. If the state lies in another interval, it determines the mode.
     fn start_in<const M: usize>(
         &self,
+        interval: i32,
         mode: Mode,
         origin: Option<Side>,
         y: State,
@@ -111,8 +118,12 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     ) -> Trajectory<'f, M> {
         let mut started = Trajectory::with_tangents(self.flow(), self.law, y, tangents);
         started.allowance = self.allowance();
+        if started.interval != interval {
+            started.origin = origin;
+            return started;
+        }
         // At an elastic wall the gap alone determines the mode.
-        let is_elastic = |side: Side| self.flow.contacts[side.index()] == Contact::Elastic;
+        let is_elastic = |side: Side| started.flow.contacts[side.index()] == Contact::Elastic;
         if let Mode::Sustained(side) = started.mode
             && is_elastic(side)
         {
@@ -133,7 +144,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     /// Whether another trajectory has the same mode and comes from the same wall.
     pub(crate) fn has_mode_and_origin_of(&self, other: &Trajectory<'_, N>) -> bool {
-        (self.mode, self.origin, self.from_wall) == (other.mode, other.origin, other.from_wall)
+        (self.interval, self.mode, self.origin, self.from_wall)
+            == (other.interval, other.mode, other.origin, other.from_wall)
     }
 
     /// Whether another trajectory is in the same domain. Contact onset and sustained contact count as different,
@@ -143,12 +155,14 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             let wall = self.flow.wall(side);
             (self.q[0] - wall).abs() <= ON_WALL * wall.abs().max(self.flow.length)
         };
-        self.mode == other.mode || self.meshing() == other.meshing() && self.meshing().is_some_and(is_between)
+        self.interval == other.interval
+            && (self.mode == other.mode
+                || self.meshing() == other.meshing() && self.meshing().is_some_and(is_between))
     }
 
     /// Starts a trajectory at phase 0 from the mirror image of the present state, in the mirrored domain.
     pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         let y = self.state().map(|value| -value);
-        self.start_in(self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
+        self.start_in(-self.interval, self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
     }
 }

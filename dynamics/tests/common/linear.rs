@@ -68,6 +68,7 @@ impl Linear {
             harmonics: Vec::new(),
             stages: Vec::new(),
             schedule: Vec::new(),
+            outer_walls: Default::default(),
             free,
             meshing: [free; 2],
         }

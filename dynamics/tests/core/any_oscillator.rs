@@ -134,6 +134,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 harmonics,
                 stages: Vec::new(),
                 schedule: Vec::new(),
+                outer_walls: Default::default(),
             };
             let mut start = [y[0], 3.0 * y[1], y[2], 3.0 * y[3]];
             if is_single {
@@ -530,7 +531,7 @@ proptest! {
     #[test]
     fn a_harmonic_is_a_force_of_a_multiple_of_the_frequency(case in cases()) {
         let o = &case.oscillator;
-        let plain = Oscillator { harmonics: Vec::new(), stages: Vec::new(), schedule: Vec::new(), ..o.clone() };
+        let plain = Oscillator { harmonics: Vec::new(), stages: Vec::new(), schedule: Vec::new(), outer_walls: Default::default(), ..o.clone() };
         let harmonics = vec![Harmonic { order: 2, cos: o.force, sin: o.force_sin }];
         let slow = Oscillator { omega: 0.5 * o.omega, force: [0.0; 2], force_sin: [0.0; 2], harmonics, ..plain.clone() };
         slow.validate().unwrap();
@@ -548,7 +549,7 @@ proptest! {
         let plain = Oscillator {
             walls: [f64::INFINITY, f64::NEG_INFINITY],
             stages: Vec::new(),
-            schedule: Vec::new(),
+            schedule: Vec::new(), outer_walls: Default::default(),
             ..transformed(o, |_| free, |_| [0.0; 2])
         };
         let behind = case.behind.map(|[k, _]| [k, 0.0]);
@@ -605,6 +606,7 @@ fn forces_with_different_phases_have_the_closed_form_response() {
         harmonics: Vec::new(),
         stages: Vec::new(),
         schedule: Vec::new(),
+        outer_walls: Default::default(),
     };
     oscillator.validate().unwrap();
     let entry = |i: usize, j: usize| {

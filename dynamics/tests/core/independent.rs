@@ -20,7 +20,7 @@ use cycle::{Cycle, follow, settle};
 use motion::{Mode, Motion, System, What, distance};
 use random::{Case, Shape, case};
 
-const PLAIN: Shape = Shape { harmonics: false, stages: false, wide: false };
+const PLAIN: Shape = Shape { harmonics: false, stages: false, walls: false, wide: false };
 
 /// Forcing periods from the start in which states and events are compared.
 const FIRST: usize = 5;
@@ -235,10 +235,20 @@ fn models_with_harmonics_and_stages_agree_with_matrix_exponentials() {
 }
 
 #[test]
+fn models_with_further_walls_agree_with_matrix_exponentials() {
+    check(Shape { walls: true, ..PLAIN }, 0..200, 0.8);
+}
+
+#[test]
+fn models_with_further_walls_and_stages_agree_with_matrix_exponentials() {
+    check(Shape { walls: true, stages: true, ..PLAIN }, 0..200, 0.8);
+}
+
+#[test]
 #[ignore = "minutes"]
 fn five_thousand_models_of_each_shape_agree_with_matrix_exponentials() {
     for (harmonics, stages) in [(false, false), (true, false), (false, true), (true, true)] {
-        check(Shape { harmonics, stages, wide: false }, 200..5200, 0.8);
+        check(Shape { harmonics, stages, ..PLAIN }, 200..5200, 0.8);
     }
 }
 
@@ -247,7 +257,7 @@ const LONGEST_TIME: Duration = Duration::from_secs(2);
 
 /// Measures models of wide ranges. Every motion must end in time, with finite numbers.
 fn check_ends(seeds: std::ops::Range<u64>) {
-    let shape = Shape { harmonics: true, stages: true, wide: true };
+    let shape = Shape { harmonics: true, stages: true, walls: false, wide: true };
     let ends: Vec<_> = seeds
         .into_par_iter()
         .map(|seed| {

@@ -26,6 +26,7 @@ fn mass(load: f64, walls: [f64; 2], contact: Contact) -> Oscillator {
         harmonics: Vec::new(),
         stages: Vec::new(),
         schedule: Vec::new(),
+        outer_walls: Default::default(),
     }
 }
 

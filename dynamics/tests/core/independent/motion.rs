@@ -123,6 +123,31 @@ pub(crate) struct System {
     /// Rows of the gap and of its rate.
     z: Row,
     w: Row,
+    /// Systems between further walls on the right and on the left, from the inside to the outside.
+    behind: [Vec<System>; 2],
+}
+
+/// Returns the oscillator between the `nth` wall on a side, from 1, and the next one.
+fn between_walls(o: &Oscillator, side: Side, nth: usize) -> Oscillator {
+    let (i, mut found) = (side.index(), Oscillator { outer_walls: Default::default(), ..o.clone() });
+    let mut walls = vec![(o.walls[i], o.contacts[i])];
+    walls.extend(o.outer_walls[i].iter().map(|wall| (wall.at, wall.contact)));
+    let stages = o.stages.len() + 1;
+    let of = |stage: usize| {
+        let first = if stage == 0 { Stage { free: o.free, meshing: o.meshing } } else { o.stages[stage - 1] };
+        let mut domains = vec![first.free, first.meshing[i]];
+        domains.extend(o.outer_walls[i].iter().map(|wall| wall.meshing[stage]));
+        let mut meshing = [domains[nth]; 2];
+        meshing[i] = domains[nth + 1];
+        meshing[1 - i] = domains[nth - 1];
+        Stage { free: domains[nth], meshing }
+    };
+    (found.walls[i], found.contacts[i]) = walls[nth];
+    (found.walls[1 - i], found.contacts[1 - i]) = (walls[nth - 1].0, Contact::Elastic);
+    let first = of(0);
+    (found.free, found.meshing) = (first.free, first.meshing);
+    found.stages = (1..stages).map(of).collect();
+    found
 }
 
 fn matrix(m: [[f64; 2]; 2]) -> Matrix2<f64> {
@@ -203,6 +228,18 @@ impl System {
             kick,
             z,
             w,
+            behind: Side::BOTH.map(|side| {
+                let count = o.outer_walls[side.index()].len();
+                (1..=count).map(|nth| System::new(&between_walls(o, side, nth))).collect()
+            }),
+        }
+    }
+
+    fn between(&self, interval: i32) -> Option<&System> {
+        match interval {
+            0 => Some(self),
+            1.. => self.behind[0].get(interval as usize - 1),
+            _ => self.behind[1].get(interval.unsigned_abs() as usize - 1),
         }
     }
 }
@@ -210,7 +247,11 @@ impl System {
 /// A motion, with the derivative of its state by that at the start.
 #[derive(Clone)]
 pub(crate) struct Motion<'a> {
+    /// The system between the present walls, and between the first ones.
     pub(crate) system: &'a System,
+    whole: &'a System,
+    /// 0 between the first walls, n behind the nth right wall, -n behind the nth left wall.
+    interval: i32,
     law: Law,
     stage: usize,
     pub(crate) mode: Mode,
@@ -248,6 +289,8 @@ impl<'a> Motion<'a> {
             system.schedule.first().filter(|(phase, _)| *phase == 0.0).or(system.schedule.last());
         let mut motion = Motion {
             system,
+            whole: system,
+            interval: 0,
             law,
             stage: holds_at_0.map_or(0, |&(_, stage)| stage),
             mode,
@@ -263,7 +306,27 @@ impl<'a> Motion<'a> {
             by_stage: [0; 2],
         };
         motion.begin_period();
+        motion.find_interval();
         motion
+    }
+
+    /// Enters the interval of the gap.
+    fn find_interval(&mut self) {
+        let z = (self.system.z * self.y)[0];
+        for side in Side::BOTH {
+            let step = if side == Side::Right { 1 } else { -1 };
+            while sign(side) * (z - self.system.walls[side.index()]) > 0.0
+                && let Some(next) = self.whole.between(self.interval + step)
+            {
+                (self.system, self.interval) = (next, self.interval + step);
+                let (wall, contact) = (next.walls[side.index()], next.contacts[side.index()]);
+                self.mode = match contact {
+                    Contact::Rigid if (z - wall).abs() < 1e-12 => Mode::Stuck(side),
+                    _ if sign(side) * (z - wall) > 0.0 => Mode::Sustained(side),
+                    _ => Mode::Free,
+                };
+            }
+        }
     }
 
     /// Returns the rate that velocities are compared in.
@@ -433,7 +496,7 @@ impl<'a> Motion<'a> {
                 };
                 *tangents = moved * *tangents;
             }
-            if self.mode != Mode::Free {
+            if self.mode != Mode::Free || self.interval != 0 {
                 self.meshing_time += share * h;
             }
             match found {
@@ -570,6 +633,18 @@ impl<'a> Motion<'a> {
             y[3] += change[1];
             y
         };
+        let step = if side == Side::Right { 1 } else { -1 };
+        if let (Contact::Elastic, Some(next)) = (self.contact(side), self.whole.between(self.interval + step))
+        {
+            let outwards = self.interval * step >= 0;
+            let of = if outwards == (side == Side::Right) { Side::Right } else { Side::Left };
+            self.record(if outwards { What::Begins } else { What::Ends }, of);
+            (self.system, self.interval) = (next, self.interval + step);
+            self.jump(&Matrix4::identity(), &self.system.z, &before, 0);
+            let back = if side == Side::Right { Side::Left } else { Side::Right };
+            self.leave(back, closing == 0.0);
+            return;
+        }
         let is_slow = e * closing <= limit;
         let (lasts, next) = match self.contact(side) {
             Contact::Elastic => (true, Mode::Sustained(side)),
@@ -638,6 +713,7 @@ impl<'a> Motion<'a> {
             (Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side), _) => {
                 Some(if side == Side::Right { b'1' } else { b'4' })
             }
+            (Mode::Free, _) if self.interval != 0 => Some(if self.interval > 0 { b'1' } else { b'4' }),
             (Mode::Free, None) => None,
             (Mode::Free, Some(from)) => Some(match (from, from == side) {
                 (Side::Right, true) => b'2',

@@ -1,6 +1,6 @@
 //! Random models with harmonics and stages.
 
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, Side, Stage, State};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, OuterWall, Side, Stage, State};
 
 use crate::common::linear::with_wall;
 
@@ -41,6 +41,8 @@ impl Random {
 pub(crate) struct Shape {
     pub(crate) harmonics: bool,
     pub(crate) stages: bool,
+    /// Further walls behind elastic ones.
+    pub(crate) walls: bool,
     /// Wide ranges: any signs of damping and stiffness, skew damping, very large and very small rates.
     pub(crate) wide: bool,
 }
@@ -125,6 +127,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         harmonics: Vec::new(),
         stages: Vec::new(),
         schedule: Vec::new(),
+        outer_walls: Default::default(),
     };
     if shape.harmonics {
         let count = 1 + random.below(4);
@@ -171,6 +174,9 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         let count = oscillator.stage_count();
         oscillator.schedule = phases.iter().enumerate().map(|(i, &phase)| (phase, (i + 1) % count)).collect();
     }
+    if shape.walls {
+        add_walls(random, &mut oscillator);
+    }
     oscillator.validate().unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
     let restitution = [0; 2].map(|_| if random.chance(0.25) { 0.0 } else { random.between(0.0, 0.9) });
     // Without a mesh speed, impacts can be infinitely many.
@@ -185,6 +191,33 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         start[3] = 0.0;
     }
     Case { oscillator, law: Law { restitution, mesh_speed }, start }
+}
+
+/// Adds one to three walls behind each wall, or behind one of them. All but the last of a side become elastic.
+fn add_walls(random: &mut Random, o: &mut Oscillator) {
+    let only = random.below(3);
+    for side in Side::BOTH.into_iter().filter(|side| o.walls[side.index()].is_finite()) {
+        let i = side.index();
+        if only == i && o.walls[1 - i].is_finite() {
+            continue;
+        }
+        let (last, mut at) = (std::mem::replace(&mut o.contacts[i], Contact::Elastic), o.walls[i]);
+        let mut domains: Vec<Domain> = (0..o.stage_count()).map(|stage| o.stage(stage).meshing[i]).collect();
+        let count = 1 + random.below(3);
+        for nth in 0..count {
+            at += side.sign() * random.logarithmic(0.01, 0.5);
+            for free in &mut domains {
+                let spring = [
+                    random.logarithmic(20.0, 1e3),
+                    if random.chance(0.3) { 0.0 } else { random.logarithmic(0.1, 5.0) },
+                ];
+                let inside = Oscillator { free: *free, ..o.clone() };
+                *free = with_wall(inside, side, at, Contact::Elastic, spring).meshing[i];
+            }
+            let contact = if nth + 1 == count { last } else { Contact::Elastic };
+            o.outer_walls[i].push(OuterWall { at, contact, meshing: domains.clone() });
+        }
+    }
 }
 
 /// Removes the second coordinate.
