@@ -60,6 +60,8 @@ pub struct Event {
     pub before: State,
     /// State just after the event; equal to `before` where meshing ends.
     pub after: State,
+    /// The side of the contact that lasts after the event, if one does.
+    pub meshing: Option<Side>,
 }
 
 /// The class of a motion.

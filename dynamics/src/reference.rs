@@ -178,6 +178,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.interval
     }
 
+    /// Returns the right and the left wall of the present interval.
+    pub(crate) fn walls(&self) -> [f64; 2] {
+        self.flow.walls
+    }
+
     /// Returns the present domain of the interval.
     pub(crate) fn domain(&self) -> DomainKind {
         self.mode.domain()

@@ -69,8 +69,11 @@ pub struct Constants {
 
 impl Constants {
     /// Returns the free steps per forcing period: `requested`, or as many as the motion needs. Returns `None` if
-    /// there are too many for a lane.
+    /// there are too many for a lane, or several walls on one side.
     pub fn steps(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<u32> {
+        if oscillator.has_outer_walls() {
+            return None;
+        }
         let of_stages = oscillator.stages.iter().map(|stage| rate(oscillator, &stage.free));
         let angle = oscillator.period() * of_stages.fold(rate(oscillator, &oscillator.free), f64::max);
         let needed = (angle / STEP_ANGLE).ceil().max(8.0);

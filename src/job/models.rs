@@ -6,7 +6,7 @@ use rattlemap_dynamics::model::{Contact, Model, Parameter, Side};
 use rattlemap_dynamics::orbit::Status;
 use rattlemap_dynamics::word::Word;
 
-use crate::model_file::{FileModel, Wall, WallLaw, factor, gap_names};
+use crate::model_file::{FileModel, Wall, WallLaw, factor, gap_names, wall_name};
 use crate::show::symbols::with_unit;
 
 /// Returns the name and a summary of every built-in model.
@@ -33,8 +33,9 @@ pub fn page(model: &FileModel) -> String {
     );
     let _ = writeln!(text, "\nContact\n");
     for side in Side::BOTH {
-        if let Some(wall) = definition.wall(side) {
-            text += &contact(side, wall, gap_names(model));
+        let walls = &definition.walls[side.index()];
+        for (nth, wall) in (1..).zip(walls) {
+            text += &contact(&wall_name(side, nth, walls.len()), wall, gap_names(model));
         }
     }
     let _ = writeln!(text, "\nParameters\n");
@@ -48,7 +49,7 @@ pub fn page(model: &FileModel) -> String {
     }
     text += &format!(
         "\n{}\n{CLASSES}\n\nStatus: how the integration of a cell ended\n\n",
-        words(definition.walls.each_ref().map(Option::is_some))
+        words(definition.walls.each_ref().map(|walls| !walls.is_empty()))
     );
     for status in Status::ALL {
         let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));
@@ -58,9 +59,12 @@ pub fn page(model: &FileModel) -> String {
 }
 
 /// Describes a wall and its contact law.
-fn contact(side: Side, wall: &Wall, [z, w]: [&str; 2]) -> String {
-    let (name, at) = (if side == Side::Right { "right" } else { "left" }, wall.at.text());
-    let mut text = format!("    The {name} wall is at {z} = {at}. ");
+fn contact(name: &str, wall: &Wall, [z, w]: [&str; 2]) -> String {
+    let at = wall.at.text();
+    let mut text = format!("    {name} is at {z} = {at}. ");
+    if let Some(first) = text.get_mut(4..5) {
+        first.make_ascii_uppercase();
+    }
     match &wall.law {
         WallLaw::Elastic => {
             let _ =

@@ -1,6 +1,6 @@
 //! `[[contact]]`: the walls and their contact laws.
 
-use rattlemap_dynamics::model::{Contact, Side};
+use rattlemap_dynamics::model::{Contact, MOST_WALLS, Side};
 
 use super::entry::{Entry, Names, Staged};
 use crate::text::error::SceneError;
@@ -76,23 +76,30 @@ impl Wall {
     }
 }
 
-/// Reads the right and the left wall.
-pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Option<Wall>; 2], SceneError> {
-    let field = root.require("contact", "write [[contact]] with side, at and law; a model has one or two")?;
-    let two = "one or two tables, [[contact]]: a model has at most two walls, one on each side";
-    let items = field.list(two)?;
-    if !(1..=2).contains(&items.len()) {
-        return Err(field.wrong_count(items.len(), "tables", two));
+/// Reads the walls of the right and of the left side, from the inside to the outside.
+pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Vec<Wall>; 2], SceneError> {
+    let field = root.require("contact", "write [[contact]] with side, at and law")?;
+    let some = "tables, [[contact]]: a model has up to 4 walls on each side";
+    let items = field.list(some)?;
+    if !(1..=2 * MOST_WALLS).contains(&items.len()) {
+        return Err(field.wrong_count(items.len(), "tables", some));
     }
-    let mut walls = [None, None];
+    let mut walls = [Vec::new(), Vec::new()];
     for item in &items {
         let (side, field, wall) = read_one(item, names)?;
-        if walls[side.index()].is_some() {
+        let own: &mut Vec<Wall> = &mut walls[side.index()];
+        if own.last().is_some_and(|inner| matches!(inner.law, WallLaw::Impact { .. })) {
+            return Err(field.conflict(
+                "the wall before it on this side has impacts, so that no motion reaches this one; write the walls of a side from \
+                 the inside to the outside, elastic ones first",
+            ));
+        }
+        if own.len() == MOST_WALLS {
             return Err(
-                field.conflict("there is already a wall on this side; a model has at most one on each side")
+                field.conflict("there are already 4 walls on this side; a model has up to 4 on each side")
             );
         }
-        walls[side.index()] = Some(wall);
+        own.push(wall);
     }
     Ok(walls)
 }

@@ -1,7 +1,8 @@
 //! The contents of a model file, and the oscillator and contact law that it defines.
 
 use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, ModelError, Oscillator, OscillatorError, Parameter, Shapes, Side, Stage,
+    Contact, Domain, Harmonic, Law, ModelError, Oscillator, OscillatorError, OuterWall, Parameter, Shapes,
+    Side, Stage,
 };
 
 use super::contact::{self, Wall, WallLaw};
@@ -49,7 +50,7 @@ pub struct Definition {
     /// Free motion.
     pub motion: Motion,
     /// Right and left wall.
-    pub walls: [Option<Wall>; 2],
+    pub walls: [Vec<Wall>; 2],
 }
 
 /// Definitions are equal if their texts are.
@@ -131,11 +132,16 @@ fn read_name(field: &Field<'_>) -> Result<String, SceneError> {
 /// Builds the error for a model without motion at its defaults, at the place of the field with the error.
 fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) -> SceneError {
     let (table, key) = blame(error);
-    let is_meant = |of: &Field<'_>| {
+    let mut before = 0;
+    let mut is_meant = |of: &Field<'_>| {
         let Value::Table(fields) = &of.node.value else { return false };
         let is = match (table, fields.get("side").or(fields.get("order")).map(|node| &node.value)) {
             (Table::Wall(None), _) => true,
-            (Table::Wall(Some(side)), Some(Value::Text(name))) => (name == "right") == (side == Side::Right),
+            (Table::Wall(Some((side, nth))), Some(Value::Text(name))) => {
+                let is_on_side = (name == "right") == (side == Side::Right);
+                before += usize::from(is_on_side);
+                is_on_side && before == nth
+            }
             (Table::Harmonic(order), Some(Value::Integer(own))) => *own == order,
             _ => false,
         };
@@ -156,7 +162,8 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
 #[derive(Clone, Copy)]
 enum Table {
     Motion,
-    Wall(Option<Side>),
+    /// A wall of a side, counted from 1.
+    Wall(Option<(Side, usize)>),
     /// The harmonic of an order.
     Harmonic(i64),
 }
@@ -176,6 +183,8 @@ fn blame(error: &ModelError) -> (Table, &str) {
         (_, true) => Some(Side::Left),
         _ => None,
     };
+    let nth = quantity.split_once(" wall ").and_then(|(_, nth)| nth.split(' ').next()?.parse().ok());
+    let side = side.map(|side| (side, nth.unwrap_or(1)));
     match quantity.split(' ').next().unwrap_or_default() {
         "entry" | "the" => (Table::Motion, "gap"),
         "excitation" => (Table::Motion, "frequency"),
@@ -194,9 +203,9 @@ fn blame(error: &ModelError) -> (Table, &str) {
 }
 
 impl Definition {
-    /// Returns the wall on a side.
+    /// Returns the first wall on a side.
     pub fn wall(&self, side: Side) -> Option<&Wall> {
-        self.walls[side.index()].as_ref()
+        self.walls[side.index()].first()
     }
 
     /// Builds the oscillator for values of the parameters. The caller validates it.
@@ -226,24 +235,37 @@ impl Definition {
             walls[side.index()] = at;
             contacts[side.index()] = wall.contact();
         }
-        let stage = |stage: usize| {
+        let outer = |side: Side| {
+            let further = self.walls[side.index()].iter().skip(1);
+            further
+                .map(|wall| OuterWall { at: of(&wall.at), contact: wall.contact(), meshing: Vec::new() })
+                .collect()
+        };
+        let mut outer_walls: [Vec<OuterWall>; 2] = Side::BOTH.map(outer);
+        let mut stage = |stage: usize| {
             let of = |entry: &Staged| of(entry.in_stage(stage));
             let free = Domain {
                 damping: matrix(&motion.damping, of),
                 stiffness: matrix(&motion.stiffness, of),
                 load: vector(&motion.load, of),
             };
-            let meshing =
-                Side::BOTH.map(|side| match self.wall(side).and_then(|wall| wall.spring.as_ref()) {
-                    Some(spring) => with_spring(
-                        free,
-                        gap,
-                        walls[side.index()],
-                        of(&spring.stiffness),
-                        of(&spring.damping),
-                    ),
-                    None => free,
-                });
+            let behind = |before: Domain, wall: &Wall, at: f64| match &wall.spring {
+                Some(spring) => with_spring(before, gap, at, of(&spring.stiffness), of(&spring.damping)),
+                None => before,
+            };
+            let meshing = Side::BOTH.map(|side| {
+                let mut domain = free;
+                let own = &self.walls[side.index()];
+                if let Some(wall) = own.first() {
+                    domain = behind(free, wall, walls[side.index()]);
+                }
+                let first = domain;
+                for (wall, outer) in own.iter().skip(1).zip(&mut outer_walls[side.index()]) {
+                    domain = behind(domain, wall, outer.at);
+                    outer.meshing.push(domain);
+                }
+                first
+            });
             Stage { free, meshing }
         };
         let harmonic = |harmonic: &HarmonicForce| Harmonic {
@@ -253,6 +275,7 @@ impl Definition {
         };
         let phases: Vec<f64> = motion.stages.iter().map(of).collect();
         let Stage { free, meshing } = stage(0);
+        let stages = (1..motion.stages.len()).map(stage).collect();
         Ok(Oscillator {
             degrees: motion.degrees(),
             mass,
@@ -265,8 +288,9 @@ impl Definition {
             free,
             meshing,
             harmonics: motion.harmonics.iter().map(harmonic).collect(),
-            stages: (1..motion.stages.len()).map(stage).collect(),
+            stages,
             schedule: Oscillator::repeated(&phases, motion.repeat)?,
+            outer_walls,
         })
     }
 
@@ -275,7 +299,8 @@ impl Definition {
         let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
         let mut law = Law::both(0.0, 0.0);
         for (i, wall) in self.walls.iter().enumerate() {
-            if let Some(Wall { law: WallLaw::Impact { restitution, mesh_speed }, .. }) = wall {
+            // Only the last wall of a side may have impacts.
+            if let Some(Wall { law: WallLaw::Impact { restitution, mesh_speed }, .. }) = wall.last() {
                 law.restitution[i] = of(restitution);
                 law.mesh_speed[i] = of(mesh_speed);
             }

@@ -18,17 +18,19 @@ pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
     lines.push(format!("free, {}", between(definition, z)));
     lines.extend(equations(definition, None).map(|line| format!("    {line}")));
     for side in Side::BOTH {
-        let Some(wall) = definition.wall(side) else { continue };
-        let name = name(side);
-        match (wall.contact(), &wall.spring) {
-            (Contact::Impact | Contact::Elastic, Some(spring)) => {
-                let elastic = product(&spring.stiffness, &format!("({})", minus(z, &wall.at)));
-                let force = sum([elastic, product(&spring.damping, w)]);
-                lines.push(format!("behind the {name} wall, with N = {force}"));
-                lines.extend(equations(definition, Some("N")).map(|line| format!("    {line}")));
+        let walls = &definition.walls[side.index()];
+        let mut forces = Vec::new();
+        for (nth, wall) in (1..).zip(walls) {
+            let name = wall_name(side, nth, walls.len());
+            match (wall.contact(), &wall.spring) {
+                (Contact::Impact | Contact::Elastic, Some(spring)) => {
+                    forces.push(product(&spring.stiffness, &format!("({})", minus(z, &wall.at))));
+                    forces.push(product(&spring.damping, w));
+                    lines.push(format!("behind {name}, with N = {}", sum(forces.clone())));
+                    lines.extend(equations(definition, Some("N")).map(|line| format!("    {line}")));
+                }
+                _ => lines.push(format!("on {name}: {z} stays {}, as long as it is pressed", text(&wall.at))),
             }
-            _ => lines
-                .push(format!("on the {name} wall: {z} stays {}, as long as it is pressed", text(&wall.at))),
         }
     }
     lines
@@ -39,6 +41,14 @@ pub(super) fn name(side: Side) -> &'static str {
     match side {
         Side::Right => "right",
         Side::Left => "left",
+    }
+}
+
+/// Returns the name of the `nth` of several walls on a side.
+pub(crate) fn wall_name(side: Side, nth: usize, count: usize) -> String {
+    match count {
+        1 => format!("the {} wall", name(side)),
+        _ => format!("{} wall {nth}", name(side)),
     }
 }
 

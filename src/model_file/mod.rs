@@ -25,7 +25,7 @@ pub use contact::{Wall, WallLaw, WallSpring};
 pub use definition::Definition;
 pub use entry::Staged;
 #[cfg(feature = "job")]
-pub(crate) use equations::factor;
+pub(crate) use equations::{factor, wall_name};
 pub use harmonic::HarmonicForce;
 
 use crate::text::error::SceneError;

@@ -98,12 +98,16 @@ impl Strobed<'_> {
         for ended in std::mem::take(&mut self.flight.events) {
             self.tally.series |= ended.after_series;
             self.tally.phases.push((ended.t / self.period).fract());
-            match ended.kind {
-                EventKind::Impact => self.tally.impacts += 1,
-                EventKind::MeshStart => meshing_since = Some(ended.t),
-                EventKind::MeshEnd => {
-                    self.tally.meshing_time += ended.t - meshing_since.take().unwrap_or(ended.t);
+            if ended.kind == EventKind::Impact {
+                self.tally.impacts += 1;
+            }
+            match (meshing_since, ended.meshing) {
+                (None, Some(_)) => meshing_since = Some(ended.t),
+                (Some(since), None) => {
+                    self.tally.meshing_time += ended.t - since;
+                    meshing_since = None;
                 }
+                _ => {}
             }
             self.tally.symbols.extend(self.before.map(|before| symbol(before, ended.side)));
             self.before = Some(ended);
@@ -141,9 +145,9 @@ impl Strobed<'_> {
 
 /// Returns the symbol of a flight between two events.
 fn symbol(before: Ended, side: Side) -> u8 {
-    match (before.kind, before.side, side) {
-        (EventKind::MeshStart, Side::Right, _) => b'1',
-        (EventKind::MeshStart, Side::Left, _) => b'4',
+    match (before.meshing, before.side, side) {
+        (Some(Side::Right), ..) => b'1',
+        (Some(Side::Left), ..) => b'4',
         (_, Side::Right, Side::Right) => b'2',
         (_, Side::Right, Side::Left) => b'3',
         (_, Side::Left, Side::Left) => b'5',

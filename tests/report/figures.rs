@@ -80,7 +80,8 @@ fn meshing_orbit() -> (Orbit, Vec<Sample>) {
     let event = |kind, side, turns: f64, kick: f64| {
         let before = state(turns);
         let after = [before[0], before[1] - kick, before[2], before[3] + 2.0 * kick];
-        Event { kind, side, t: turns * PERIOD, t_mod_period: turns * PERIOD, before, after }
+        let meshing = (kind == EventKind::MeshStart).then_some(side);
+        Event { kind, side, t: turns * PERIOD, t_mod_period: turns * PERIOD, before, after, meshing }
     };
     let [start, end] = meshing();
     let events = vec![

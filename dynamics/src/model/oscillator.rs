@@ -284,7 +284,10 @@ impl Oscillator {
     /// from 1, and the next one. Its free motion is contact with the first `nth` walls.
     ///
     /// On the inner wall the motion continues in the interval before.
-    pub(crate) fn behind(&self, side: Side, nth: usize) -> Oscillator {
+    ///
+    /// # Panics
+    /// If the side has no further wall behind the `nth` one.
+    pub fn behind(&self, side: Side, nth: usize) -> Oscillator {
         let (i, outer) = (side.index(), &self.outer_walls[side.index()]);
         let domain = |wall: usize| match wall {
             0 => self.free,
@@ -312,6 +315,11 @@ impl Oscillator {
             along(g, self.free.damping, centre.damping),
             -(g[0] * load[0] + g[1] * load[1]) / square,
         ]
+    }
+
+    /// Whether a side has several walls.
+    pub fn has_outer_walls(&self) -> bool {
+        self.outer_walls.iter().any(|walls| !walls.is_empty())
     }
 
     /// Returns the number of walls on a side.
@@ -485,7 +493,7 @@ impl Oscillator {
         for side in Side::BOTH {
             let outer = &self.outer_walls[side.index()];
             let (count, word) = (self.wall_count(side), ["right", "left"][side.index()]);
-            let name = |nth: usize| format!("wall {nth} on the {} side", word);
+            let name = |nth: usize| format!("{word} wall {nth}");
             require(
                 count <= MOST_WALLS,
                 || format!("walls on the {} side", word),
@@ -495,8 +503,13 @@ impl Oscillator {
             let mut inner = (self.wall(side), self.is_elastic(side));
             for (nth, wall) in (2..).zip(outer) {
                 let beyond = side.sign() * (wall.at - inner.0);
-                finite(|| name(nth), wall.at)?;
-                require(beyond > 0.0, || name(nth), wall.at, "farther out than the wall before it")?;
+                finite(|| format!("position of {}", name(nth)), wall.at)?;
+                require(
+                    beyond > 0.0,
+                    || format!("position of {}", name(nth)),
+                    wall.at,
+                    "farther out than the wall before it",
+                )?;
                 let elastic = "elastic, because another wall lies behind it";
                 require(inner.1, || name(nth - 1), inner.0, elastic)?;
                 inner = (wall.at, wall.contact == Contact::Elastic);

@@ -3,7 +3,7 @@
 use super::Event;
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::{Meter, Quantities};
-use crate::flow::Flow;
+use crate::flow::{DomainKind, Flow};
 use crate::model::{Side, State};
 use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
 use crate::word::Word;
@@ -82,8 +82,9 @@ impl Reading {
 fn passes_wall(flow: &Flow, trajectory: &Trajectory<'_, 0>) -> bool {
     let q = flow.to_gap(trajectory.state());
     let reach = ON_STROBE_TURNS * flow.period * q[1].abs();
-    let is_near = |side| (q[0] - flow.wall(side)).abs() < reach;
-    trajectory.meshing().is_none() && Side::BOTH.into_iter().any(is_near)
+    let between = trajectory.walls();
+    let is_near = |side: Side| (q[0] - between[side.index()]).abs() < reach;
+    trajectory.domain() == DomainKind::Free && Side::BOTH.into_iter().any(is_near)
 }
 
 /// Converts an event to states; `start` is the first period.
@@ -98,5 +99,6 @@ pub(super) fn in_states(flow: &Flow, event: &GapEvent, start: u64) -> Event {
         t_mod_period: within,
         before: flow.to_state(event.before),
         after: flow.to_state(after),
+        meshing: event.meshing_after(),
     }
 }

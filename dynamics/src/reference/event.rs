@@ -2,6 +2,7 @@
 
 use std::ops::AddAssign;
 
+use super::side_of;
 use crate::flow::Gap;
 use crate::model::Side;
 
@@ -64,6 +65,16 @@ pub struct GapEvent {
     pub before: Gap,
     /// Gap coordinates just after the event.
     pub after: Gap,
+}
+
+impl GapEvent {
+    /// Returns the side of the contact that lasts after the event, if one does.
+    pub fn meshing_after(&self) -> Option<Side> {
+        match self.kind {
+            EventKind::MeshStart => Some(self.side),
+            EventKind::Impact | EventKind::MeshEnd => (self.interval != 0).then(|| side_of(self.interval)),
+        }
+    }
 }
 
 /// Receives the events of a trajectory. `()` ignores them, a vector stores them.

@@ -1,11 +1,12 @@
 //! Flights and contacts for an integrator with time steps: finds where a step meets a wall and applies the contact law.
 //! The equations of motion are in gap coordinates `(z, w, x, v)`, in which a gap can be set exactly to a wall.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::field::{Coordinates, Equations};
 use rattlemap_dynamics::flow::{Gap, Phasor};
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, Stage, State};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::reference::EventKind;
 
 /// Largest number of iterations of a root search.
@@ -76,6 +77,8 @@ pub struct Ended {
     pub kind: EventKind,
     /// The wall.
     pub side: Side,
+    /// Side of the contact that lasts after the event.
+    pub meshing: Option<Side>,
     /// Whether the event ends an infinite series of impacts, of which not all are listed.
     pub after_series: bool,
 }
@@ -83,13 +86,14 @@ pub struct Ended {
 /// A motion between walls.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    walls: [f64; 2],
-    contacts: [Contact; 2],
+    /// Intervals between neighbouring walls, from left to right, and the present one.
+    intervals: Arc<[Interval]>,
+    interval: usize,
+    /// The interval between the first walls.
+    centre: usize,
     omega: f64,
     law: Law,
     coordinates: Coordinates,
-    /// For each stage, the equations of free motion, and of lasting contact with the right and the left wall.
-    fields: Arc<[[Equations; 3]]>,
     /// The present stage.
     stage: usize,
     /// Changes of the stage: phase in turns, and the stage that begins there.
@@ -106,29 +110,53 @@ pub struct Flight {
     pub events: Vec<Ended>,
 }
 
+/// The walls of an interval and the motion between them.
+struct Interval {
+    walls: [f64; 2],
+    contacts: [Contact; 2],
+    /// For each stage, the equations of free motion, and of lasting contact with the right and the left wall.
+    fields: Vec<[Equations; 3]>,
+}
+
+impl Interval {
+    /// `nth` is the number of walls in front of the interval, none between the first walls.
+    fn new(oscillator: &Oscillator, coordinates: &Coordinates, side: Side, nth: usize) -> Interval {
+        let of_stage = |stage: usize| {
+            let alone = oscillator.in_stage(stage);
+            if nth == 0 { alone } else { alone.behind(side, nth) }
+        };
+        let fields = |stage: usize| {
+            let oscillator = of_stage(stage);
+            let free = Equations::new(&oscillator, &oscillator.free);
+            let behind = |side: Side| match oscillator.contacts[side.index()] {
+                _ if oscillator.walls[side.index()].is_infinite() => free.clone(),
+                Contact::Rigid => free.held(coordinates),
+                _ => Equations::new(&oscillator, &oscillator.meshing[side.index()]),
+            };
+            let [right, left] = Side::BOTH.map(behind);
+            [free, right, left]
+        };
+        let Oscillator { walls, contacts, .. } = of_stage(0);
+        Interval { walls, contacts, fields: (0..oscillator.stage_count()).map(fields).collect() }
+    }
+}
+
 impl Flight {
     /// Builds a motion from `start` at phase 0. A start beyond a wall is meshing; beyond a rigid wall it is moved to the
     /// wall.
     pub fn new(oscillator: &Oscillator, law: Law, start: State) -> Flight {
         let coordinates = Coordinates::new(oscillator);
-        let fields_of = |Stage { free, meshing }: Stage| {
-            let free = Equations::new(oscillator, &free);
-            let behind = |side: Side| match oscillator.contacts[side.index()] {
-                _ if oscillator.walls[side.index()].is_infinite() => free.clone(),
-                Contact::Rigid => free.held(&coordinates),
-                _ => Equations::new(oscillator, &meshing[side.index()]),
-            };
-            let [right, left] = Side::BOTH.map(behind);
-            [free, right, left]
-        };
-        let stages = (0..oscillator.stage_count()).map(|stage| oscillator.stage(stage));
+        let [right, left] = oscillator.outer_walls.each_ref().map(Vec::len);
+        let interval = |side| move |nth| Interval::new(oscillator, &coordinates, side, nth);
+        let intervals =
+            (1..=left).rev().map(interval(Side::Left)).chain((0..=right).map(interval(Side::Right)));
         let mut flight = Flight {
-            walls: oscillator.walls,
-            contacts: oscillator.contacts,
+            intervals: intervals.collect(),
+            interval: left,
+            centre: left,
             omega: oscillator.omega,
             law,
             coordinates,
-            fields: stages.map(fields_of).collect(),
             stage: oscillator.first_stage(),
             schedule: oscillator.schedule.as_slice().into(),
             period: oscillator.period(),
@@ -138,6 +166,13 @@ impl Flight {
             q: coordinates.gap(&start),
             events: Vec::new(),
         };
+        for side in Side::BOTH {
+            while let Some(next) = flight.next_interval(side)
+                && flight.beyond(side, &flight.q) > 0.0
+            {
+                flight.interval = next;
+            }
+        }
         let beyond = |side: &Side| flight.beyond(*side, &flight.q) > 0.0;
         if let Some(side) = Side::BOTH.into_iter().find(beyond) {
             match flight.is_rigid(side) {
@@ -156,8 +191,25 @@ impl Flight {
     /// Returns the wall of a lasting contact, if there is one.
     pub fn meshing(&self) -> Option<Side> {
         match self.mode {
-            Mode::Free => None,
+            Mode::Free => self.side_of_interval(),
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => Some(side),
+        }
+    }
+
+    /// Returns the side of the present interval; none between the first walls.
+    fn side_of_interval(&self) -> Option<Side> {
+        match self.interval.cmp(&self.centre) {
+            Ordering::Less => Some(Side::Left),
+            Ordering::Equal => None,
+            Ordering::Greater => Some(Side::Right),
+        }
+    }
+
+    /// Returns the interval behind a wall of the present one.
+    fn next_interval(&self, side: Side) -> Option<usize> {
+        match side {
+            Side::Right => Some(self.interval + 1).filter(|next| *next < self.intervals.len()),
+            Side::Left => self.interval.checked_sub(1),
         }
     }
 
@@ -177,9 +229,9 @@ impl Flight {
     /// Returns the present equations of motion.
     #[inline]
     pub fn field(&self) -> &Equations {
-        match self.meshing() {
-            None => self.free_field(),
-            Some(side) => self.meshing_field(side),
+        match self.mode {
+            Mode::Free => self.free_field(),
+            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => self.meshing_field(side),
         }
     }
 
@@ -231,19 +283,23 @@ impl Flight {
     }
 
     fn free_field(&self) -> &Equations {
-        &self.fields[self.stage][0]
+        &self.intervals[self.interval].fields[self.stage][0]
     }
 
     fn meshing_field(&self, side: Side) -> &Equations {
-        &self.fields[self.stage][if side == Side::Right { 1 } else { 2 }]
+        &self.intervals[self.interval].fields[self.stage][if side == Side::Right { 1 } else { 2 }]
     }
 
     fn wall(&self, side: Side) -> f64 {
-        self.walls[side.index()]
+        self.intervals[self.interval].walls[side.index()]
+    }
+
+    fn contact_type(&self, side: Side) -> Contact {
+        self.intervals[self.interval].contacts[side.index()]
     }
 
     fn is_rigid(&self, side: Side) -> bool {
-        self.contacts[side.index()] == Contact::Rigid
+        self.contact_type(side) == Contact::Rigid
     }
 
     /// Returns the penetration of a wall.
@@ -467,7 +523,14 @@ impl Flight {
         if settling && (closing < 0.0 || closing == 0.0 && !self.presses(self.free_field(), side, &self.q, t))
         {
             self.leave(side, t);
-        } else if self.contacts[side.index()] == Contact::Elastic {
+        } else if let (Contact::Elastic, Some(next)) = (self.contact_type(side), self.next_interval(side)) {
+            let before = self.side_of_interval();
+            self.interval = next;
+            let kind =
+                if before == Some(side.mirrored()) { EventKind::MeshEnd } else { EventKind::MeshStart };
+            self.leave(side.mirrored(), t);
+            self.record(t, kind, before.or(self.side_of_interval()).unwrap_or(side));
+        } else if self.contact_type(side) == Contact::Elastic {
             // The motion continues without a jump.
             self.mode = Mode::Sustained(side);
             self.from = Some((Ending::MeshEnds(side), if closing > 0.0 { 1 } else { 2 }));
@@ -528,7 +591,8 @@ impl Flight {
     }
 
     fn record(&mut self, t: f64, kind: EventKind, side: Side) {
-        self.events.push(Ended { t, kind, side, after_series: false });
+        let meshing = self.meshing();
+        self.events.push(Ended { t, kind, side, meshing, after_series: false });
     }
 
     fn put_on_wall(&mut self, side: Side) {

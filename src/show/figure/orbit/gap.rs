@@ -196,6 +196,12 @@ impl OrbitPlot<'_> {
             canvas.fill(behind, DARK, 0.08);
         }
         frame.draw_grid(canvas);
+        for side in Side::BOTH {
+            let outer = self.oscillator.outer_walls[side.index()].iter().map(|wall| frame.at(0.0, wall.at).1);
+            for y in outer.filter(|y| (rect.top..=rect.bottom).contains(y)) {
+                canvas.stroke(&[(rect.left, y), (rect.right, y)], 1.0, wall_color(side));
+            }
+        }
         let x = rect.right + WALL_AWAY;
         for side in walls() {
             let color = wall_color(side);

@@ -90,8 +90,7 @@ impl Pieces {
     /// Ends a piece at an event and starts the next.
     fn cross(&mut self, t: f64, event: &Event) {
         self.open().points.push((t, event.before));
-        let meshing = (event.kind == EventKind::MeshStart).then_some(event.side);
-        self.0.push(Piece { meshing, points: vec![(t, event.after)] });
+        self.0.push(Piece { meshing: event.meshing, points: vec![(t, event.after)] });
     }
 
     fn push(&mut self, t: f64, sample: &Sample) {
@@ -118,7 +117,8 @@ mod tests {
     use super::*;
     fn event(kind: EventKind, t: f64) -> Event {
         let (before, after) = ([0.5, 1.0, 0.0, 0.0], [0.5, 0.2, 0.0, 0.8]);
-        Event { kind, side: Side::Right, t, t_mod_period: t % 2.0, before, after }
+        let meshing = (kind == EventKind::MeshStart).then_some(Side::Right);
+        Event { kind, side: Side::Right, t, t_mod_period: t % 2.0, before, after, meshing }
     }
 
     fn sample(t: f64, meshing: Option<Side>) -> Sample {
