@@ -79,7 +79,7 @@ impl Wall {
 /// Reads the walls of the right and of the left side, from the inside to the outside.
 pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Vec<Wall>; 2], SceneError> {
     let field = root.require("contact", "write [[contact]] with side, at and law")?;
-    let some = "tables, [[contact]]: a model has up to 4 walls on each side";
+    let some = "1 to 8 tables, [[contact]]: a model has up to 4 walls on each side";
     let items = field.list(some)?;
     if !(1..=2 * MOST_WALLS).contains(&items.len()) {
         return Err(field.wrong_count(items.len(), "tables", some));

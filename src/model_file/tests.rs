@@ -148,8 +148,8 @@ gap = [1] | gap = [1]\nforce2 = ["F"] | m.toml:22:1: unknown field `motion.force
 gap = [1] | gap = [1]\nharmonics = 2 | one gap row; further harmonics of the force are tables, [[harmonic]]
 "omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry, the frequency of the first harmonic, force cos(frequency t) + force_sin sin(frequency t); write multiples of it as [[harmonic]]
 gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry
-[[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact = 3 tables` is out of range: it must be one or two tables, [[contact]]: a model has at most two walls
-[[contact]] | [[contact]]\nside = "right"\nat = 1\nlaw = "impact"\nrestitution = 1\n[[contact]] | m.toml:29:8: `contact.1.side = "right"` does not fit: there is already a wall on this side
+[[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact.1.side = "left"` does not fit: the wall before it on this side has impacts
+[[contact]] | [[contact]]\nside = "right"\nat = 1\nlaw = "impact"\nrestitution = 1\n[[contact]] | m.toml:29:8: `contact.1.side = "right"` does not fit: the wall before it on this side has impacts, so that no motion reaches this one; write the walls of a side from the inside to the outside
 "impact" | "elastic" | m.toml:27:15: `contact.0.restitution = "e"` does not fit: it needs law = "impact"
 "impact"\nrestitution = "e" | "elastic" | `contact.0.stiffness` is missing; an elastic wall needs
 restitution = "e" | | m.toml:23:1: `contact.0.restitution` is missing
@@ -229,6 +229,46 @@ fn reserved_names_are_documented() {
     let (section, _) = section.split_once("\n## ").unwrap();
     let listed = section.lines().filter(|line| line.starts_with("    ")).flat_map(str::split_whitespace);
     assert_eq!(listed.collect::<Vec<_>>(), parameters::COLUMNS);
+}
+
+#[test]
+fn a_side_may_have_several_walls() {
+    let wall = |at: &str, rest: &str| format!("[[contact]]\nside = 'right'\nat = '{at}'\n{rest}\n");
+    let elastic = "law = 'elastic'\nstiffness = 'k'\ndamping = 'c'";
+    let (motion, last) = TWO_DEGREES.split_once("[[contact]]\nside = \"right\"").unwrap();
+    let with = |walls: &[String]| format!("{motion}{}", walls.concat());
+    let last = format!("[[contact]]\nside = 'right'{}", last.replace("at = \"d\"", "at = '3*d'"));
+    let model = read(&with(&[wall("d", elastic), wall("2*d", elastic), last.clone()]));
+    let o = model.oscillator().unwrap();
+    assert_eq!((o.walls, o.contacts), ([0.25, -0.25], [Contact::Elastic; 2]));
+    let [right, left] = &o.outer_walls;
+    assert!(left.is_empty());
+    let found = right.iter().map(|wall| (wall.at, wall.contact, wall.meshing[0].stiffness[0][0]));
+    assert!(found.eq([(0.5, Contact::Elastic, 9.0), (0.75, Contact::Impact, 109.0)]), "{right:?}");
+    assert_eq!(right[0].meshing[0].load, [2.25, -4.5]);
+    assert_eq!(model.law(), Law { restitution: [0.5, 0.0], mesh_speed: [0.05, 0.0] });
+    let lines = model.equations();
+    let has = |text: &str| lines.iter().any(|line| line == text);
+    assert!(has("behind right wall 2, with N = k (z - d) + c w + k (z - 2*d) + c w"), "{lines:#?}");
+    let message = |text: &str| FileModel::parse(text, "m.toml").unwrap_err().to_string();
+    let error = message(&with(&[wall("d", elastic), wall("d/2", elastic), last.clone()]));
+    assert!(
+        error.contains("contact.2.at = \"d/2\"")
+            && error.contains("right wall 2 = 0.125: it must be farther out"),
+        "{error}"
+    );
+    let many = vec![wall("d", elastic); 9];
+    assert!(
+        message(&with(&many)).contains("it must be 1 to 8 tables, [[contact]]"),
+        "{}",
+        message(&with(&many))
+    );
+    let five: Vec<String> = (1..6).map(|n| wall(&format!("{n}*d"), elastic)).collect();
+    assert!(
+        message(&with(&five)).contains("there are already 4 walls on this side"),
+        "{}",
+        message(&with(&five))
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 mod cycle;
 mod motion;
-mod random;
+pub(crate) mod random;
 
 use std::time::{Duration, Instant};
 

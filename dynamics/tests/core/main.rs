@@ -22,3 +22,4 @@ mod sticking;
 mod stops;
 mod stress;
 mod tangents;
+mod walls;

@@ -111,6 +111,7 @@ pub struct Flight {
 }
 
 /// The walls of an interval and the motion between them.
+#[derive(Debug)]
 struct Interval {
     walls: [f64; 2],
     contacts: [Contact; 2],

@@ -1,0 +1,161 @@
+//! Several walls on a side of the gap.
+
+use crate::common::linear::with_wall;
+use crate::common::near;
+use crate::independent::random::{Shape, case};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, OscillatorError, OuterWall, Side};
+use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Settings, Status, analyse_flow};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
+
+/// Adds a wall behind the outermost one of a side, with a spring along the gap.
+fn add(o: &mut Oscillator, side: Side, at: f64, contact: Contact, stiffness: f64) {
+    let i = side.index();
+    let inside = o.outer_walls[i].last().map_or(o.meshing[i], |wall| wall.meshing[0]);
+    let behind =
+        with_wall(Oscillator { free: inside, ..o.clone() }, side, at, contact, [stiffness, 0.0]).meshing[i];
+    o.outer_walls[i].push(OuterWall { at, contact, meshing: vec![behind] });
+}
+
+/// A unit mass that moves freely between springs of stiffness 4 at 1 and -1, and more springs of 12 at 2 and -2.
+fn two_stages(omega: f64) -> Oscillator {
+    let free = Domain { damping: [[0.0; 2]; 2], stiffness: [[0.0; 2]; 2], load: [0.0; 2] };
+    let mut o = Oscillator {
+        degrees: 1,
+        mass: [[1.0, 0.0], [0.0, 1.0]],
+        gap: [1.0, 0.0],
+        walls: [f64::INFINITY, f64::NEG_INFINITY],
+        contacts: [Contact::Rigid; 2],
+        omega,
+        force: [0.0; 2],
+        force_sin: [0.0; 2],
+        free,
+        meshing: [free; 2],
+        harmonics: Vec::new(),
+        stages: Vec::new(),
+        schedule: Vec::new(),
+        outer_walls: Default::default(),
+    };
+    for side in Side::BOTH {
+        o = with_wall(o, side, side.sign(), Contact::Elastic, [4.0, 0.0]);
+        add(&mut o, side, 2.0 * side.sign(), Contact::Elastic, 12.0);
+    }
+    o
+}
+
+/// From the middle with the speed `v`: straight to 1 in the time `1 / v`; to 2 on an arc of the frequency 2 around 1; to the
+/// turning point on an arc of the frequency 4 around 1.75, where both springs balance.
+#[test]
+fn free_vibration_of_a_two_stage_spring_has_its_closed_form() {
+    let v = 5.0f64;
+    let second = (v * v - 4.0).sqrt();
+    let quarter = 1.0 / v + (2.0 / v).asin() / 2.0 + (second / 4.0).atan2(0.25) / 4.0;
+    let peak = 1.75 + 0.25f64.hypot(second / 4.0);
+    let o = two_stages(std::f64::consts::TAU / (4.0 * quarter));
+    o.validate().unwrap();
+    let (flow, law) = (Flow::new(&o), Law::both(1.0, 0.0));
+    let start = [0.0, v, 0.0, 0.0];
+    let mut trajectory = Trajectory::<0>::new(&flow, law, start);
+    let mut events: Vec<GapEvent> = Vec::new();
+    for _ in 0..10 {
+        trajectory.advance_period(&mut events).unwrap();
+        let [x, w, ..] = trajectory.state();
+        assert!(near(x, 0.0, 1e-13) && near(w, v, 1e-13), "{x} {w}");
+    }
+    assert_eq!(events.len(), 80);
+    let sides = events[..8].iter().map(|event| (event.kind, event.side, event.before[0]));
+    let expected = [Side::Right, Side::Left].into_iter().flat_map(|side| {
+        [
+            (EventKind::MeshStart, 1.0),
+            (EventKind::MeshStart, 2.0),
+            (EventKind::MeshEnd, 2.0),
+            (EventKind::MeshEnd, 1.0),
+        ]
+        .map(|(kind, at)| (kind, side, side.sign() * at))
+    });
+    assert!(sides.eq(expected), "{events:?}");
+    let in_contact = 1.0 - 1.0 / v / quarter;
+    assert!(near(trajectory.meshing_time(), 40.0 * quarter * in_contact, 1e-12));
+    let symbols: Vec<u8> = events[1..9].iter().filter_map(|event| event.symbol).collect();
+    assert_eq!(symbols, b"11134446".map(|symbol| symbol));
+    let orbit = analyse_flow(&flow, law, start, &Settings::default(), EVENT_PERIODS);
+    let of = orbit.quantities.unwrap();
+    assert!(near(of.displacements[0].amplitude, peak, 1e-12), "{of:?}");
+    let force = 4.0 * (peak - 1.0) + 12.0 * (peak - 2.0);
+    assert!(near(of.contact_force.unwrap()[0], force, 1e-11), "{of:?}");
+}
+
+/// In a cycle the force does as much work as dampers and impacts take.
+#[test]
+fn energy_balances_with_several_walls() {
+    let shape = Shape { harmonics: false, stages: false, walls: true, wide: false };
+    let mut cycles = 0;
+    for seed in 300..400 {
+        let case = case(seed, shape);
+        let flow = Flow::new(&case.oscillator);
+        let orbit = analyse_flow(&flow, case.law, case.start, &Settings::default(), EVENT_PERIODS);
+        let (Class::Periodic { .. }, Status::Ok) = (orbit.class, orbit.status) else { continue };
+        let of = orbit.quantities.unwrap();
+        let o = &case.oscillator;
+        let power = |i: usize| {
+            let [size, phase] = of.displacements[i].harmonic;
+            let factors = [o.force[i], o.force_sin[i]].map(|force| 0.5 * o.omega * size * force);
+            [-factors[0] * phase.sin() - factors[1] * phase.cos(), factors[0].abs() + factors[1].abs()]
+        };
+        // Harmonics of small motion have the rounding error of the mean displacement.
+        let [work, terms] = [0, 1].map(|part| power(0)[part] + power(1)[part]);
+        let taken = of.dissipated + of.impact_energy;
+        assert!(near(work, taken, 1e-10 * taken + 1e-12 * terms), "{seed}: {work} {taken} {terms}");
+        cycles += usize::from(case.oscillator.has_outer_walls());
+    }
+    assert!(cycles > 60, "{cycles}");
+}
+
+/// A spring of stiffness 0 behind a wall does nothing, whatever its wall does to the events.
+#[test]
+fn a_wall_without_a_spring_changes_no_motion() {
+    for at in [1.2, 1.7, 2.5] {
+        let mut o = two_stages(2.0);
+        o.outer_walls = Default::default();
+        o.force = [6.0, 0.0];
+        o.free.damping[0][0] = 0.3;
+        o.meshing.iter_mut().for_each(|behind| behind.damping[0][0] = 0.3);
+        let plain = Flow::new(&o);
+        add(&mut o, Side::Right, at, Contact::Elastic, 0.0);
+        let more = Flow::new(&o);
+        let start = [0.2, 0.0, 0.0, 0.0];
+        let [mut a, mut b] =
+            [&plain, &more].map(|flow| Trajectory::<0>::new(flow, Law::both(0.0, 0.0), start));
+        let mut events = [Vec::<GapEvent>::new(), Vec::new()];
+        for _ in 0..20 {
+            a.advance_period(&mut events[0]).unwrap();
+            b.advance_period(&mut events[1]).unwrap();
+        }
+        assert!(
+            a.state().iter().zip(b.state()).all(|(a, b)| near(*a, b, 1e-12)),
+            "{:?} {:?}",
+            a.state(),
+            b.state()
+        );
+        assert!(near(a.meshing_time(), b.meshing_time(), 1e-12));
+        assert!(events[1].len() > events[0].len(), "the motion does not reach {at}");
+    }
+}
+
+#[test]
+fn walls_in_a_wrong_order_are_refused() {
+    let message = |change: &dyn Fn(&mut Oscillator)| {
+        let mut o = two_stages(1.0);
+        change(&mut o);
+        o.validate().err().as_ref().map(OscillatorError::to_string).unwrap_or_default()
+    };
+    assert_eq!(message(&|_| ()), "");
+    let near = message(&|o| o.outer_walls[0][0].at = 0.5);
+    assert!(near.starts_with("position of right wall 2 = 0.5: it must be farther out"), "{near}");
+    let rigid = message(&|o| o.contacts[1] = Contact::Rigid);
+    assert!(rigid.starts_with("left wall 1 = -1: it must be elastic"), "{rigid}");
+    let many = message(&|o| (3..7).for_each(|at| add(o, Side::Right, f64::from(at), Contact::Elastic, 1.0)));
+    assert!(many.contains("at most 4"), "{many}");
+    let jump = message(&|o| o.outer_walls[0][0].meshing[0].load[0] += 1.0);
+    assert!(jump.contains("contact with right wall 2"), "{jump}");
+}
