@@ -8,8 +8,8 @@ use ttf_parser::{Face, GlyphId};
 use crate::show::drawing::shapes::{Align, Point};
 use crate::show::symbols::lowered;
 
-/// Size and height of superscripts, as shares of the line's type size.
-const RAISED: (f64, f64) = (0.7, 0.36);
+/// Size and height of superscripts, as shares of the line's type size. In the smallest type they have 6 points.
+const RAISED: (f64, f64) = (0.82, 0.34);
 
 /// The typeface's file.
 #[cfg(not(target_arch = "wasm32"))]
