@@ -253,7 +253,7 @@ fn a_side_may_have_several_walls() {
     let message = |text: &str| FileModel::parse(text, "m.toml").unwrap_err().to_string();
     let error = message(&with(&[wall("d", elastic), wall("d/2", elastic), last.clone()]));
     assert!(
-        error.contains("contact.2.at = \"d/2\"")
+        error.contains("contact.2.at = 'd/2'")
             && error.contains("right wall 2 = 0.125: it must be farther out"),
         "{error}"
     );

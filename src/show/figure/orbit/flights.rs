@@ -1,7 +1,7 @@
 //! Symbols of the word and the times of their flights.
 
 use rattlemap_dynamics::model::Side;
-use rattlemap_dynamics::orbit::{Event, EventKind};
+use rattlemap_dynamics::orbit::Event;
 
 /// Figures of more events have no symbols.
 const MOST_EVENTS: usize = 40;
@@ -26,19 +26,20 @@ pub(crate) fn symbols(events: &[(f64, Event)], cycle: Option<f64>) -> Vec<(f64, 
 
 /// Returns the symbol of the flight between two events, by equations (18) to (23) of the paper.
 fn symbol(from: &Event, to: &Event) -> char {
-    match (from.kind == EventKind::MeshStart, from.side, to.side) {
-        (true, Side::Right, _) => '1',
-        (true, Side::Left, _) => '4',
-        (false, Side::Right, Side::Right) => '2',
-        (false, Side::Left, Side::Left) => '5',
-        (false, Side::Right, Side::Left) => '3',
-        (false, Side::Left, Side::Right) => '6',
+    match (from.meshing, from.side, to.side) {
+        (Some(Side::Right), ..) => '1',
+        (Some(Side::Left), ..) => '4',
+        (None, Side::Right, Side::Right) => '2',
+        (None, Side::Left, Side::Left) => '5',
+        (None, Side::Right, Side::Left) => '3',
+        (None, Side::Left, Side::Right) => '6',
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model_file::FileModel;
     use rattlemap_dynamics::model::{GearPair, REST};
     use rattlemap_dynamics::orbit::{self, Orbit, Settings};
     use rattlemap_dynamics::word::Word;
@@ -62,6 +63,22 @@ mod tests {
             assert_eq!(Word::cyclic(&letters), orbit.word, "e = {e}");
             assert!(flights.iter().all(|(t, _)| (0.0..=1.0).contains(t)), "{flights:?}");
         }
+    }
+
+    #[test]
+    fn flights_between_walls_of_a_side_are_contact() {
+        let wall = |side: &str, at: f64, k: f64| {
+            format!("[[contact]]\nside = '{side}'\nat = {at:?}\nlaw = 'elastic'\nstiffness = {k:?}\n")
+        };
+        let motion = "name = 'm'\n[motion]\ncoordinates = ['x']\nmass = [[1]]\ndamping = [[0.1]]\nforce = [3]\nfrequency = 2\n\
+                      gap = [1]\n";
+        let walls = [("right", 0.2, 1.0), ("right", 1.0, 6.0), ("left", -0.2, 1.0), ("left", -0.8, 6.0)];
+        let text = motion.to_owned() + &walls.map(|(side, at, k)| wall(side, at, k)).concat();
+        let model = FileModel::parse(&text, "m.toml").unwrap();
+        let orbit = orbit::analyse(&model, REST, &Settings::default()).unwrap();
+        let flights = flights(&orbit, Some(f64::from(orbit.cycle_periods)));
+        let letters: Vec<u8> = flights.iter().map(|&(_, symbol)| symbol as u8).collect();
+        assert_eq!((Word::cyclic(&letters), letters.len()), (orbit.word, 8), "{letters:?}");
     }
 
     #[test]

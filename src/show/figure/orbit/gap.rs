@@ -197,9 +197,11 @@ impl OrbitPlot<'_> {
         }
         frame.draw_grid(canvas);
         for side in Side::BOTH {
-            let outer = self.oscillator.outer_walls[side.index()].iter().map(|wall| frame.at(0.0, wall.at).1);
-            for y in outer.filter(|y| (rect.top..=rect.bottom).contains(y)) {
-                canvas.stroke(&[(rect.left, y), (rect.right, y)], 1.0, wall_color(side));
+            for (at, width) in self.wall_lines(side).skip(1) {
+                let y = frame.at(0.0, at).1;
+                if (rect.top..=rect.bottom).contains(&y) {
+                    canvas.stroke(&[(rect.left, y), (rect.right, y)], width, wall_color(side));
+                }
             }
         }
         let x = rect.right + WALL_AWAY;

@@ -90,9 +90,11 @@ impl OrbitPlot<'_> {
             return;
         }
         for side in self.motion.walls() {
-            let x = frame.at(self.oscillator.walls[side.index()] / gap[displacement], 0.0).0;
-            if (left..=right).contains(&x) {
-                canvas.stroke(&[(x, top), (x, bottom)], 2.0, wall_color(side));
+            for (at, width) in self.wall_lines(side) {
+                let x = frame.at(at / gap[displacement], 0.0).0;
+                if (left..=right).contains(&x) {
+                    canvas.stroke(&[(x, top), (x, bottom)], width, wall_color(side));
+                }
             }
         }
     }

@@ -189,6 +189,12 @@ impl<'a> OrbitPlot<'a> {
         if Side::BOTH.iter().any(has_impacts) { "meshing" } else { "contact" }
     }
 
+    /// Returns the positions of the walls of a side and the widths of their lines, the first wall first.
+    pub(crate) fn wall_lines(&self, side: Side) -> impl Iterator<Item = (f64, f64)> {
+        let outer = self.oscillator.outer_walls[side.index()].iter().map(|wall| (wall.at, 1.0));
+        std::iter::once((self.oscillator.walls[side.index()], 2.0)).chain(outer)
+    }
+
     /// Returns the contact law of a wall; none without a wall.
     pub(crate) fn contact(&self, side: Side) -> Option<Contact> {
         let i = side.index();
