@@ -1,10 +1,10 @@
 //! Several walls on a side of the gap.
 
-use crate::common::linear::with_wall;
+use crate::common::linear::{Linear, with_wall};
 use crate::common::near;
 use crate::independent::random::{Shape, case};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, OscillatorError, OuterWall, Side};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, OscillatorError, OuterWall, Side};
 use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Settings, Status, analyse_flow};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 
@@ -19,23 +19,7 @@ fn add(o: &mut Oscillator, side: Side, at: f64, contact: Contact, stiffness: f64
 
 /// A unit mass that moves freely between springs of stiffness 4 at 1 and -1, and more springs of 12 at 2 and -2.
 fn two_stages(omega: f64) -> Oscillator {
-    let free = Domain { damping: [[0.0; 2]; 2], stiffness: [[0.0; 2]; 2], load: [0.0; 2] };
-    let mut o = Oscillator {
-        degrees: 1,
-        mass: [[1.0, 0.0], [0.0, 1.0]],
-        gap: [1.0, 0.0],
-        walls: [f64::INFINITY, f64::NEG_INFINITY],
-        contacts: [Contact::Rigid; 2],
-        omega,
-        force: [0.0; 2],
-        force_sin: [0.0; 2],
-        free,
-        meshing: [free; 2],
-        harmonics: Vec::new(),
-        stages: Vec::new(),
-        schedule: Vec::new(),
-        outer_walls: Default::default(),
-    };
+    let mut o = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: 0.0, omega }.oscillator();
     for side in Side::BOTH {
         o = with_wall(o, side, side.sign(), Contact::Elastic, [4.0, 0.0]);
         add(&mut o, side, 2.0 * side.sign(), Contact::Elastic, 12.0);
