@@ -16,7 +16,7 @@ use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
 use rattlemap::model_file::FileModel;
 use rattlemap::record::classify::{classify, status};
-use rattlemap::record::{Record, valid};
+use rattlemap::record::{Record, measures, valid};
 use rattlemap::store::inventory;
 use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
 use rattlemap::validate::{
@@ -154,6 +154,27 @@ fn a_cycle_that_a_search_finds_early_is_reached_later() {
     records[1].lyapunov *= 1.5;
     records[2].mesh_fraction += 2e-4;
     assert_eq!(unexplained(&validate_all(&plan, &records, Precision::F64, true)), [0, 1, 2]);
+}
+
+/// The averages of a lane are those near its cycle. They may be off by the distance from the cycle, and by no more.
+#[test]
+fn averages_near_a_cycle_may_be_off_by_the_distance() {
+    let text = "model = 'gear-pair'\n[[axis]]\nparameter = 'e'\nvalues = [0.6, 0.61]\n[[axis]]\nparameter = 'omega'\n\
+                values = [5.142857142857143, 5.15]\n[outputs]\nquantities = ['class', 'lyapunov', 'amplitude']\n";
+    let plan = Plan::new(&Scene::parse(text, "test", &[], Purpose::Map).unwrap());
+    let mean =
+        measures::all().find(|measure| measure.name(&["x1", "v1", "x2", "v2"]) == "mean_gap").unwrap().place;
+    let found = |distance: f64, off: f64| {
+        let mut records = cpu_records(&plan);
+        records[0].strobe[0] += distance;
+        records[0].measures[mean] += off;
+        let validation = validate_all(&plan, &records, Precision::F64, true);
+        (unexplained(&validation), kinds(&validation).len())
+    };
+    assert_eq!(found(0.0, 0.0), (vec![], 0));
+    assert_eq!(found(1e-5, 1e-5), (vec![], 1));
+    assert_eq!(found(1e-5, 1e-3), (vec![0], 1));
+    assert_eq!(found(0.0, 1e-5), (vec![0], 1));
 }
 
 /// Exchanges records of cells, and computes a map from another start.
