@@ -182,7 +182,7 @@ fn meaning(kind: Kind) -> &'static str {
         }
         Kind::Budget => {
             "a budget too short: one side gives the other's answer with fewer or with more periods, or the motion \
-             settles or separates too slowly to be told"
+             settles or separates too slowly to be told, or the second judge or the reference is undecided"
         }
         Kind::Cap => "a cap ended the lane, as its status says, and does so again",
         Kind::Unexplained => "no computation gives a reason",

@@ -75,7 +75,7 @@ pub enum Kind {
     /// in double precision, both without early stops; or its status says that the period is below the resolution.
     Border,
     /// One engine gives the other's answer with fewer or with more periods, or the motion settles or separates too slowly
-    /// to be decided within the budget.
+    /// to be decided within the budget, or the second judge or the reference is undecided.
     Budget,
     /// A cap ended the lane, and ends it again when it is repeated.
     Cap,
@@ -435,7 +435,7 @@ fn replay_cell(
         let judged = if is_slow { compare::without_multipliers(judged) } else { judged };
         // The second judge is compared with the reference as a lane would be.
         fields = cell.bars.compare(&cell.record, &Answer::new(judged, None));
-        // An undecided answer contradicts nothing.
+        // An undecided answer of either side contradicts nothing.
         let is_undecided = [&judged, &truth.record].iter().any(|side| classify(side) == Class::Undecided);
         kind = differs(&fields).then(|| match is_undecided {
             true => Kind::Budget,
