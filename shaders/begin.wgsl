@@ -16,9 +16,9 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     motion.phasor = array<Real, 2>(1.0, 0.0);
     let walls = flows[cell.flow_index].walls;
     if motion.q[0] > walls[0] {
-        start_behind_wall(SIDE_RIGHT);
+        start_beyond(SIDE_RIGHT);
     } else if motion.q[0] < walls[1] {
-        start_behind_wall(SIDE_LEFT);
+        start_beyond(SIDE_LEFT);
     }
     // The trail needs no initial value: `strobe_count` is its length.
     motions[lane].now = motion;
@@ -34,8 +34,17 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     begin_pattern();
 }
 
-// A start beyond a wall is a sustained contact.
-fn start_behind_wall(side: u32) {
+// A start beyond the last wall of a side is a sustained contact.
+fn start_beyond(side: u32) {
+    if INTERVALS {
+        while sign_of(side) * (motion.q[0] - flows[cell.flow_index].walls[side]) > 0.0 && shapes[cell.flow_index].behind[side] != NO_FLOW {
+            cell.flow_index = shapes[cell.flow_index].behind[side];
+            tally.interval = max(tally.interval, side) + 2u;
+        }
+        if sign_of(side) * (motion.q[0] - flows[cell.flow_index].walls[side]) <= 0.0 {
+            return;
+        }
+    }
     motion.q[0] -= flows[cell.flow_index].walls[side];
     tally.mode = MODE_SUSTAINED + side;
     tally.origin = side;

@@ -191,7 +191,11 @@ fn count_event(side: u32) {
     add_symbol(side);
     keep_strobe_distance();
     // Meshing that ends before the wall is reached belongs to another branch: its mode differs.
-    tally.itinerary = mix_bits(tally.itinerary + 2u * tally.mode + side + 1u);
+    var code = 2u * tally.mode + side + 1u;
+    if INTERVALS {
+        code += 16u * tally.interval;
+    }
+    tally.itinerary = mix_bits(tally.itinerary + code);
     tally.origin = side;
     tally.events += 1u;
     tally.events_in_period += 1u;

@@ -17,9 +17,13 @@ fn enter_elastic(side: u32) -> Jump {
     let is_pressed = closing == 0.0 && presses(present_pull(), side, motion.q);
     if closing > 0.0 || is_pressed {
         jump.event = true;
+        pass_damper(side, 1.0);
+        if INTERVALS && flow_behind(side) != NO_FLOW {
+            jump.mode = MODE_PASSING;
+            return jump;
+        }
         jump.mode = MODE_SUSTAINED + side;
         motion.q[0] = 0.0;
-        pass_damper(side, 1.0);
     }
     return jump;
 }

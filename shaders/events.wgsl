@@ -331,7 +331,7 @@ fn careful() -> bool {
     }
     motion.bound = here.swell * (motion.bound + here.growth);
     tally.order = 0u;
-    if MESH && d > 0u {
+    if MESH && (d > 0u || is_behind_wall()) {
         count_meshing(found.tau * share);
     }
     advance_phase(found.tau * share);
@@ -393,7 +393,9 @@ fn act(second: bool, tau: Real) {
     if sticks() {
         tally.order = 3u;
     }
-    if jump.mode != mode {
+    if INTERVALS && jump.mode == MODE_PASSING {
+        pass_wall(side);
+    } else if jump.mode != mode {
         tally.mode = jump.mode;
         enter(domain_of(jump.mode));
     }

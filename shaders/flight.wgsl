@@ -145,6 +145,7 @@ fn scan() -> u32 {
     if MESH {
         tally.mesh_right += select(0u, step_count, d == 1u);
         tally.mesh_left += select(0u, step_count, d == 2u);
+        tally.mesh_whole += select(0u, step_count, d == 0u && is_behind_wall());
     }
     return verdict;
 }

@@ -29,7 +29,8 @@ struct Domain {
     substeps: Real,
 }
 
-// Constants that lanes share if they differ in the contact law alone. A flow with stages has one such struct for each.
+// Constants that lanes share if they differ in the contact law alone. There is one such struct for each stage and each interval
+// between walls.
 struct Flow {
     // Free motion, meshing on the right, meshing on the left. Meshing domains measure the gap from their wall.
     domains: array<Domain, 3>,
@@ -61,6 +62,9 @@ struct Flow {
     springs: array<array<Real, 2>, 2>,
     // Both displacements of the model as factors of gap and x.
     displacements: array<array<Real, 2>, 2>,
+    // Contact force of the walls that the gap has passed, positive to the left: factors of gap, rate and 1, in the units of
+    // measure.wgsl.
+    held: array<Real, 3>,
 }
 
 // Whole numbers of a flow.
@@ -81,6 +85,8 @@ struct FlowShape {
     // Index in `pairs` of the changes of its stage (stages.wgsl), and their number; 0 if there are none.
     schedule: u32,
     changes: u32,
+    // Flows of the intervals behind the right and behind the left wall, or NO_FLOW (intervals.wgsl).
+    behind: array<u32, 2>,
 }
 
 // Contact law of the right and of the left wall: restitution, and the largest leaving speed at which a pressed
@@ -263,6 +269,8 @@ struct TallyNow {
     itinerary: u32,
     // Number of changes of the stage in the present period so far.
     next_change: u32,
+    // The present interval between walls (intervals.wgsl).
+    interval: u32,
 }
 
 // Search for a cycle, updated at strobes.
@@ -295,9 +303,10 @@ struct Search {
     newton_steps: u32,
     branch: u32,
     branch_period: u32,
-    // MODE_* and SIDE_* of the motion where Newton's method started.
+    // MODE_*, SIDE_* and interval of the motion where Newton's method started.
     newton_start_mode: u32,
     newton_start_origin: u32,
+    newton_start_interval: u32,
     // Divisor of the cycle's period after which the motion came nearest to its start, and that distance in quarter
     // octaves below 1.
     divisor: u32,

@@ -71,7 +71,13 @@ fn add(place: u32, value: Real) {
     motions[lane].sums[place] += value;
 }
 
+// Whether a wall with a spring is in contact.
 fn is_compliant() -> bool {
+    return touches_spring() || is_behind_wall();
+}
+
+// Whether the wall of the present domain has a spring.
+fn touches_spring() -> bool {
     return tally.mode != MODE_FREE && !sticks();
 }
 
@@ -85,11 +91,20 @@ fn measured_state(tau: Real) -> array<Real, 4> {
     return q;
 }
 
-// Returns the force of a compliant contact, positive if it presses. The gap is measured from the wall.
+// Returns the force of the compliant contacts, positive if they press. `q` is in the coordinates of the present domain.
 fn contact_force(q: array<Real, 4>) -> Real {
-    let side = side_of(tally.mode);
-    let wall = flows[cell.flow_index].springs[side];
-    return sign_of(side) * (wall[0] * q[0] + wall[1] * q[1]);
+    var side = side_of(tally.mode);
+    var force: Real = 0.0;
+    if touches_spring() {
+        let wall = flows[cell.flow_index].springs[side];
+        force = wall[0] * q[0] + wall[1] * q[1];
+    }
+    if is_behind_wall() {
+        side = side_of_interval();
+        let held = flows[cell.flow_index].held;
+        force += (held[0] * displaced(q)[2] + held[1] * q[1]) + held[2];
+    }
+    return sign_of(side) * force;
 }
 
 fn include_one(place: u32, value: Real) {
@@ -124,8 +139,15 @@ fn measured_rates(tau: Real) -> array<Real, 4> {
     let rows = flows[cell.flow_index].displacements;
     var force: Real = 0.0;
     if is_compliant() {
-        let wall = flows[cell.flow_index].springs[side_of(tally.mode)];
-        force = wall[0] * q[1] + wall[1] * here.substeps * here.substeps * gap_jet(tau).z;
+        let acceleration = here.substeps * here.substeps * gap_jet(tau).z;
+        if touches_spring() {
+            let wall = flows[cell.flow_index].springs[side_of(tally.mode)];
+            force = wall[0] * q[1] + wall[1] * acceleration;
+        }
+        if is_behind_wall() {
+            let held = flows[cell.flow_index].held;
+            force += held[0] * q[1] + held[1] * acceleration;
+        }
     }
     return array<Real, 4>(rows[0][0] * q[1] + rows[0][1] * q[3], rows[1][0] * q[1] + rows[1][1] * q[3], q[1], force);
 }

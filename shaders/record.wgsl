@@ -12,6 +12,10 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
         motion = motions[lane].ended;
         tally = tallies[lane].ended;
     }
+    if INTERVALS {
+        // Walls are the same in all stages.
+        cell.flow_index = flow_of_interval(cell.flow_index);
+    }
     var reading: Reading;
     var finding: Finding;
     finding.slot = lane;

@@ -7,6 +7,7 @@ fn refine(to: array<Real, 4>) -> bool {
     if search.newton_steps == 0u {
         search.newton_start_mode = tally.mode;
         search.newton_start_origin = tally.origin;
+        search.newton_start_interval = tally.interval;
     }
     let stalls = search.newton_steps > 0u && search.return_distance < search.earlier_return_distance + SHRUNK;
     let is_over = search.newton_steps >= MOST_NEWTON_STEPS || tally.period + tally.candidate > last_period();
@@ -93,6 +94,11 @@ fn return_to_start() {
     motion.q = trail(search.strobe_count);
     tally.mode = search.newton_start_mode;
     tally.origin = search.newton_start_origin;
+    if INTERVALS && tally.interval != search.newton_start_interval {
+        tally.interval = search.newton_start_interval;
+        cell.flow_index = present_flow();
+        fetch_constants();
+    }
     // Newton's method does not start on a wall.
     tally.order = 0u;
     if tally.mode != MODE_FREE {

@@ -9,14 +9,14 @@ const NO_STEP: u32 = 0xffffffffu;
 var<private> change_step: u32;
 var<private> change_theta: Real;
 
-// Returns the flow of the present stage.
-fn flow_of_stage() -> u32 {
-    let count = shapes[cell.flow_index].changes;
+// Returns the flow of the present stage, between the first walls. `flow` is that of the first stage.
+fn flow_of_stage(flow: u32) -> u32 {
+    let count = shapes[flow].changes;
     if count == 0u {
-        return cell.flow_index;
+        return flow;
     }
     let last = select(tally.next_change, count, tally.next_change == 0u) - 1u;
-    return u32(pairs[shapes[cell.flow_index].schedule + 2u * last + 1u][0]);
+    return u32(pairs[shapes[flow].schedule + 2u * last + 1u][0]);
 }
 
 // Loads the place of the next change.
@@ -67,7 +67,7 @@ fn restart_schedule() {
 fn enter_stage() {
     let side = side_of(tally.mode);
     let spring = flows[cell.flow_index].springs[side][0];
-    cell.flow_index = flow_of_stage();
+    cell.flow_index = present_flow();
     fetch_constants();
     if sticks() {
         if !presses(stuck_pull(side), side, motion.q) {

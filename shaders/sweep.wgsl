@@ -132,8 +132,8 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     load_lane(selected_lane(i));
-    if STAGES {
-        cell.flow_index = flow_of_stage();
+    if STAGES || INTERVALS {
+        cell.flow_index = present_flow();
     }
     fetch_constants();
     load_tangent();

@@ -5,6 +5,8 @@ fn add_symbol(side: u32) {
     var symbol: u32;
     if tally.mode != MODE_FREE {
         symbol = select(4u, 1u, side == SIDE_RIGHT);
+    } else if is_behind_wall() {
+        symbol = select(4u, 1u, side_of_interval() == SIDE_RIGHT);
     } else if tally.origin == SIDE_RIGHT {
         symbol = select(3u, 2u, side == SIDE_RIGHT);
     } else if tally.origin == SIDE_LEFT {

@@ -4,6 +4,7 @@ use bytemuck::Zeroable;
 use wide::f64x4;
 
 use super::coordinates::Coordinates;
+use super::features::Features;
 use super::layout::{Domain, Flow};
 use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::{self, Contact, Side};
@@ -28,27 +29,31 @@ pub(super) struct Change {
     /// Free steps since phase 0: whole ones, and the fraction of the next one.
     pub(super) step: u32,
     pub(super) theta: f64,
-    /// The stage that begins.
-    pub(super) stage: usize,
+    /// Page of the stage that begins, between the first walls.
+    pub(super) page: usize,
 }
 
-/// Constants that the shader reads for one stage.
+/// Further constants that the shader reads for one stage and one interval between walls.
 #[derive(Clone, Debug)]
-pub(super) struct StageConstants {
-    pub(super) flow: Flow,
+pub(super) struct Page {
     /// The higher harmonics, [`PAIRS_PER_HARMONIC`] for each.
     pub(super) harmonics: Vec<[f64; 2]>,
+    /// Kinds of the right and of the left wall.
+    pub(super) contacts: [Contact; 2],
+    /// Pages of the intervals behind the right and behind the left wall, in the same stage.
+    pub(super) behind: [Option<usize>; 2],
 }
 
 /// Constants of one oscillator.
 #[derive(Clone, Debug)]
 pub struct Constants {
-    /// Constants that the shader reads; of stage 0.
+    /// Constants that the shader reads in the first stage, between the first walls.
     pub flow: Flow,
-    /// The higher harmonics in stage 0, [`PAIRS_PER_HARMONIC`] for each.
-    pub(super) harmonics: Vec<[f64; 2]>,
-    /// The further stages, and the changes of the stage. Both are empty if stage 0 holds always.
-    pub(super) stages: Vec<StageConstants>,
+    pub(super) page: Page,
+    /// The intervals behind the first walls, from the inside to the outside, right ones first; then all intervals of the
+    /// further stages. `flow` and `page` have number 0.
+    pub(super) further: Vec<(Flow, Page)>,
+    /// Changes of the stage; none if the first stage holds always.
     pub(super) changes: Vec<Change>,
     /// Free steps per forcing period.
     pub steps: u32,
@@ -58,24 +63,23 @@ pub struct Constants {
     pub degrees: u32,
     /// Whether contact-free motion also requires that the displacement `x` rests at 0.
     pub(super) must_rest: bool,
-    /// Kinds of the right and of the left wall.
-    pub contacts: [Contact; 2],
-    /// Whether a wall exists and is elastic or rigid.
-    pub(super) has_elastic_or_rigid_wall: bool,
-    /// Whether the force has a sine.
-    pub(super) has_sine: bool,
+    pub(super) features: Features,
+    /// Positions of rigid walls on the right and on the left; infinite without one.
+    bounds: [f64; 2],
     coordinates: Coordinates,
 }
 
 impl Constants {
     /// Returns the free steps per forcing period: `requested`, or as many as the motion needs. Returns `None` if
-    /// there are too many for a lane, or several walls on one side.
+    /// there are too many for a lane.
     pub fn steps(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<u32> {
-        if oscillator.has_outer_walls() {
-            return None;
-        }
-        let of_stages = oscillator.stages.iter().map(|stage| rate(oscillator, &stage.free));
-        let angle = oscillator.period() * of_stages.fold(rate(oscillator, &oscillator.free), f64::max);
+        let of_stages = oscillator.stages.iter().map(|stage| &stage.free);
+        let passed = Side::BOTH.into_iter().flat_map(|side| {
+            let inner = oscillator.outer_walls[side.index()].len();
+            (0..inner).flat_map(move |nth| behind_nth_wall(oscillator, side, nth))
+        });
+        let rates = of_stages.chain(passed).map(|free| rate(oscillator, free));
+        let angle = oscillator.period() * rates.fold(rate(oscillator, &oscillator.free), f64::max);
         let needed = (angle / STEP_ANGLE).ceil().max(8.0);
         // An even number, so that half a period is a whole number of steps.
         let steps = 2.0 * (0.5 * f64::from(requested.unwrap_or(0)).max(needed)).ceil();
@@ -88,25 +92,32 @@ impl Constants {
         let period = oscillator.period();
         let common = Common::new(oscillator, period / f64::from(steps));
         let coordinates = Coordinates::new(oscillator);
-        let (mut stages, mut changes) = (Vec::new(), Vec::new());
+        let mut pages = pages_of_stage(oscillator, &common, 0);
+        let intervals = pages.len();
+        let mut changes = Vec::new();
         if !oscillator.schedule.is_empty() {
             let further = 1..oscillator.stage_count();
-            stages = further.map(|stage| stage_constants(&oscillator.in_stage(stage), &common)).collect();
-            changes = changes_of(oscillator, steps);
+            pages.extend(further.flat_map(|stage| {
+                pages_of_stage(&oscillator.in_stage(stage), &common, stage * intervals)
+            }));
+            changes = changes_of(oscillator, steps, intervals);
         }
-        let StageConstants { flow, harmonics } = stage_constants(oscillator, &common);
+        let further = pages.split_off(1);
+        let (flow, page) = pages.pop()?;
         let mut constants = Constants {
             flow,
-            harmonics,
-            stages,
+            page,
+            further,
             changes,
             steps,
             mirror_symmetric: oscillator.mirror_symmetric(),
             degrees: oscillator.degrees as u32,
             must_rest: false,
-            contacts: oscillator.contacts,
-            has_elastic_or_rigid_wall: has_elastic_or_rigid_wall(oscillator),
-            has_sine: has_sine(oscillator),
+            features: Features::of(oscillator),
+            bounds: Side::BOTH.map(|side| match oscillator.last_wall(side) {
+                (at, Contact::Rigid) => at,
+                _ => side.sign() * f64::INFINITY,
+            }),
             coordinates,
         };
         if let Some(motion) = non_impacting(oscillator) {
@@ -127,14 +138,8 @@ impl Constants {
     /// Returns a start in lane units. A gap beyond a rigid wall is moved onto it.
     pub(super) fn start(&self, y: model::State) -> [f64; 4] {
         let mut q = self.to_lane(y);
-        let [right, left] = self.flow.walls;
-        let [is_right_rigid, is_left_rigid] = self.contacts.map(|contact| contact == Contact::Rigid);
-        if is_right_rigid {
-            q[0] = q[0].min(right);
-        }
-        if is_left_rigid {
-            q[0] = q[0].max(left);
-        }
+        let [right, left] = self.bounds;
+        q[0] = q[0].min(right).max(left);
         q
     }
 
@@ -149,13 +154,16 @@ impl Constants {
     }
 }
 
-/// Constants that all stages have in common.
+/// Constants that all stages have in common, in one interval between walls.
+#[derive(Clone, Copy)]
 struct Common {
     /// Length of a free step.
     h: f64,
-    /// Steps of contact with each wall per free step.
+    /// Steps of contact with the last wall of each side per free step.
     substeps: [f64; 2],
     walls: [f64; 2],
+    /// Whether motion that reaches the wall enters another interval.
+    is_passed: [bool; 2],
     /// Unit of speeds.
     speed: f64,
     escape: f64,
@@ -163,23 +171,33 @@ struct Common {
 
 impl Common {
     fn new(oscillator: &model::Oscillator, h: f64) -> Common {
-        let substeps = |side: usize| {
-            let of_stages = oscillator.stages.iter().map(|stage| &stage.meshing[side]);
-            let rates = of_stages.chain([&oscillator.meshing[side]]).map(|behind| rate(oscillator, behind));
+        let substeps = |side: Side| {
+            // A gap at rest on a rigid wall moves with free steps.
+            if oscillator.last_wall(side).1 == Contact::Rigid {
+                return 1.0;
+            }
+            let outer = oscillator.outer_walls[side.index()].len();
+            let rates = behind_nth_wall(oscillator, side, outer).map(|behind| rate(oscillator, behind));
             (h * rates.fold(0.0, f64::max) / STEP_ANGLE).max(1.0).log2().ceil().exp2()
         };
         Common {
             h,
-            substeps: [0, 1].map(substeps),
+            substeps: Side::BOTH.map(substeps),
             walls: walls(oscillator),
+            is_passed: oscillator.outer_walls.each_ref().map(|walls| !walls.is_empty()),
             speed: speed(oscillator),
             escape: Some(oscillator.escape()).filter(|size| size.is_finite()).unwrap_or(-1.0),
         }
     }
 
     fn domains(&self, oscillator: &model::Oscillator) -> [Domain; 3] {
-        let behind =
-            |side: usize| behind_wall(oscillator, side, self.walls[side], self.h, self.substeps[side]);
+        let behind = |side: usize| match self.is_passed[side] {
+            true => {
+                let substeps = self.substeps[side];
+                Domain { share: substeps.recip(), substeps, ..Domain::zeroed() }
+            }
+            false => behind_wall(oscillator, side, self.walls[side], self.h, self.substeps[side]),
+        };
         let right = behind(0);
         // Without stages, only this stage counts.
         let is_mirrored = oscillator.schedule.is_empty() && oscillator.mirror_symmetric();
@@ -193,8 +211,46 @@ impl Common {
     }
 }
 
-/// Derives the constants of an oscillator's stage 0.
-fn stage_constants(oscillator: &model::Oscillator, common: &Common) -> StageConstants {
+/// Returns the domains of contact with the `nth` wall of a side, from 0, in all stages.
+fn behind_nth_wall(
+    oscillator: &model::Oscillator,
+    side: Side,
+    nth: usize,
+) -> impl Iterator<Item = &model::Domain> {
+    let i = side.index();
+    let first = oscillator.stages.iter().map(move |stage| &stage.meshing[i]).chain([&oscillator.meshing[i]]);
+    let outer = nth.checked_sub(1).map(|nth| &oscillator.outer_walls[i][nth].meshing);
+    first.filter(move |_| nth == 0).chain(outer.into_iter().flatten())
+}
+
+/// Derives the constants of an oscillator's first stage, in all intervals between walls. Pages are numbered from `first`.
+fn pages_of_stage(oscillator: &model::Oscillator, common: &Common, first: usize) -> Vec<(Flow, Page)> {
+    let [right, left] = oscillator.outer_walls.each_ref().map(Vec::len);
+    let page = |side: Side, nth: usize| first + nth + if side == Side::Left { right } else { 0 };
+    let behind_first = Side::BOTH.map(|side| common.is_passed[side.index()].then(|| page(side, 1)));
+    let mut pages = vec![page_of(oscillator, common, behind_first)];
+    for (side, count) in Side::BOTH.into_iter().zip([right, left]) {
+        for nth in 1..=count {
+            let interval = oscillator.behind(side, nth);
+            let mut behind = [None; 2];
+            behind[side.index()] = (nth < count).then(|| page(side, nth + 1));
+            behind[1 - side.index()] = Some(if nth == 1 { first } else { page(side, nth - 1) });
+            let is_passed = behind.map(|page| page.is_some());
+            let common = Common { walls: interval.walls, is_passed, ..*common };
+            let (mut flow, page) = page_of(&interval, &common, behind);
+            flow.held = held_force(oscillator, &interval, common.h);
+            pages.push((flow, page));
+        }
+    }
+    pages
+}
+
+/// Derives the constants of an oscillator's first stage, between its first walls.
+fn page_of(
+    oscillator: &model::Oscillator,
+    common: &Common,
+    pages_behind: [Option<usize>; 2],
+) -> (Flow, Page) {
     let (h, coordinates) = (common.h, Coordinates::new(oscillator));
     let damper = |behind: &model::Domain| coordinates.damper(&oscillator.free, behind).map(|rate| -h * rate);
     let mut domains = common.domains(oscillator);
@@ -229,8 +285,9 @@ fn stage_constants(oscillator: &model::Oscillator, common: &Common) -> StageCons
         damper: oscillator.meshing.each_ref().map(damper),
         springs: Side::BOTH.map(|side| springs(oscillator, side, h)),
         displacements: coordinates.displacements(),
+        held: [0.0; 3],
     };
-    StageConstants { flow, harmonics }
+    (flow, Page { harmonics, contacts: oscillator.contacts, behind: pages_behind })
 }
 
 /// Returns the factors of cosine and sine in an acceleration.
@@ -239,35 +296,14 @@ fn factors(row: [f64; 7]) -> [f64; 2] {
 }
 
 /// Returns the changes of the stage in a forcing period.
-fn changes_of(oscillator: &model::Oscillator, steps: u32) -> Vec<Change> {
+fn changes_of(oscillator: &model::Oscillator, steps: u32, intervals: usize) -> Vec<Change> {
     let change = |&(turns, stage): &(f64, usize)| {
         let position = turns * f64::from(steps);
         // Rounding may give a whole period.
         let step = position.floor().min(f64::from(steps - 1));
-        Change { step: step as u32, theta: position - step, stage }
+        Change { step: step as u32, theta: position - step, page: stage * intervals }
     };
     oscillator.schedule.iter().map(change).collect()
-}
-
-/// Whether a wall exists and is elastic or rigid.
-pub fn has_elastic_or_rigid_wall(oscillator: &model::Oscillator) -> bool {
-    let mut walls = oscillator.contacts.iter().zip(oscillator.walls);
-    walls.any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite())
-}
-
-/// Whether the force has a sine.
-pub fn has_sine(oscillator: &model::Oscillator) -> bool {
-    oscillator.force_sin != [0.0; 2]
-}
-
-/// Returns the number of harmonics of the force beside the first.
-pub fn higher_harmonics(oscillator: &model::Oscillator) -> u32 {
-    oscillator.harmonics.len() as u32
-}
-
-/// Whether the domains change in a forcing period.
-pub fn has_stages(oscillator: &model::Oscillator) -> bool {
-    !oscillator.schedule.is_empty()
 }
 
 /// Returns the motion without contacts. It may require that `x` is at rest, which a lane knows exactly.
@@ -390,11 +426,19 @@ fn power_form(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) ->
     coordinates.form(domain.dissipation()).map(|x| x * unit)
 }
 
-/// Returns the acceleration of the gap, per step `h` squared, that a contact gives per displacement and per rate.
+/// Returns the contact force of a wall per displacement and per rate of the gap, with rates per step `h`. Forces are
+/// accelerations of the gap per step squared.
 fn springs(oscillator: &model::Oscillator, side: Side, h: f64) -> [f64; 2] {
     let [stiffness, damping] = oscillator.wall_stiffness_and_damping(side);
     let compliance = Coordinates::new(oscillator).compliance();
     [stiffness * compliance * h * h, damping * compliance * h]
+}
+
+/// Returns the force of the walls that the gap has passed, in the units of [`springs`]: factors of gap and rate, and a constant.
+fn held_force(oscillator: &model::Oscillator, interval: &model::Oscillator, h: f64) -> [f64; 3] {
+    let [stiffness, damping, constant] = interval.force_against(&oscillator.free);
+    let compliance = Coordinates::new(oscillator).compliance();
+    [stiffness * compliance * h * h, damping * compliance * h, constant * compliance * h * h]
 }
 
 /// Returns the domain of the other displacement while the gap sticks to a rigid wall. The wall takes up the gap's

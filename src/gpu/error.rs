@@ -74,7 +74,7 @@ pub enum GpuError {
         allowed: u64,
     },
     /// A flow has a feature that the settings exclude.
-    #[error("flow {flow} has {feature}, which the settings exclude; set `{setting}`")]
+    #[error("flow {flow} has {feature}, which the settings exclude; set `features.{setting}`")]
     NotCompiled {
         /// Index of the flow.
         flow: usize,

@@ -80,6 +80,7 @@ structs! {
         damper: [[f64; 2]; 2],
         springs: [[f64; 2]; 2],
         displacements: [[f64; 2]; 2],
+        held: [f64; 3],
     }
 
     /// Whole numbers of a [`Flow`].
@@ -93,6 +94,7 @@ structs! {
         harmonic_count: u32,
         schedule: u32,
         changes: u32,
+        behind: [u32; 2],
     }
 
     /// Contact law of the right and of the left wall.
@@ -199,6 +201,7 @@ structs! {
         strobe_distance: u32,
         itinerary: u32,
         next_change: u32,
+        interval: u32,
         has_read: u32,
         cycle: u32,
         failed_readings: u32,
@@ -218,6 +221,7 @@ structs! {
         branch_period: u32,
         newton_start_mode: u32,
         newton_start_origin: u32,
+        newton_start_interval: u32,
         divisor: u32,
         divisor_distance: u32,
         failed_searches: u32,
@@ -247,7 +251,7 @@ structs! {
         pattern_length: u32,
         pattern_hash: [u32; 2],
         pattern_recent: u32,
-        ended: [u32; 27],
+        ended: [u32; 28],
         is_measured: u32,
     }
 
@@ -314,6 +318,9 @@ pub(super) const BEAT_AT: u64 = 4;
 
 /// Symbols that one number of a word or a pattern holds.
 pub(super) const SYMBOLS_PER_NUMBER: usize = 10;
+
+/// There is no interval behind a wall.
+pub(super) const NO_FLOW: u32 = u32::MAX;
 
 /// Codes of the kinds of contact, with their names in the shader.
 pub(super) const CONTACTS: [(&str, u32); 3] = [("IMPACT", 0), ("RIGID", 1), ("ELASTIC", 2)];

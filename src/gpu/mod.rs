@@ -16,6 +16,7 @@ mod coordinates;
 mod device;
 mod dispatch_policy;
 mod error;
+mod features;
 mod guard;
 pub mod layout;
 mod measured;
@@ -44,7 +45,8 @@ pub use adapter::{
     AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_card, is_hardware,
     narrowed_by,
 };
-pub use constants::{Constants, has_elastic_or_rigid_wall, has_sine, has_stages, higher_harmonics};
+pub use constants::Constants;
+pub use features::Features;
 pub use error::GpuError;
 pub use pool::Pool;
 pub use precision::Precision;
@@ -113,14 +115,8 @@ pub struct LaneSettings {
     pub symmetry: bool,
     /// Whether lanes may follow chatter by short flights. They do so if [`follows_chatter`] is true.
     pub chatter: bool,
-    /// Whether flows may have elastic or rigid walls.
-    pub kinds: bool,
-    /// Whether forces may have a sine.
-    pub sine: bool,
-    /// Most harmonics of a force beside the first.
-    pub harmonics: u32,
-    /// Whether domains may change in a forcing period.
-    pub stages: bool,
+    /// Features that flows may have.
+    pub features: Features,
     /// What is measured on lanes whose class is decided.
     pub measures: Option<Measures>,
     /// Whether records contain the largest multiplier of cycles.
@@ -183,10 +179,7 @@ impl Default for LaneSettings {
             mesh: true,
             symmetry: true,
             chatter: true,
-            kinds: true,
-            sine: true,
-            harmonics: 0,
-            stages: false,
+            features: Features { kinds: true, sine: true, ..Features::default() },
             measures: None,
             multiplier: false,
             exponent_from: 100,
@@ -441,7 +434,7 @@ impl Gpu {
     /// [`GpuError::WrongAnswer`] if the device computes something else; other errors of the device.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
         let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, .. } = *settings;
-        let LaneSettings { chatter, kinds, sine, harmonics, stages, .. } = *settings;
+        let LaneSettings { chatter, features, .. } = *settings;
         let keep = self.policy.keep;
         // Where it saves time, lanes run without the tangent vector until they need it.
         let growths: &[bool] = match (exponent, self.policy.late_tangent) {
@@ -460,18 +453,13 @@ impl Gpu {
             mesh,
             symmetry,
             chatter,
-            kinds,
-            sine,
-            harmonics,
-            stages,
+            features,
             measures: None,
             keep,
         };
         let measuring = settings.measures.map(|measures| Variant {
             // The number of periods does not change the shader.
             measures: Some(Measures { periods: 1, ..measures }),
-            keep,
-            kinds,
             exponent: false,
             growth: false,
             word: false,

@@ -96,20 +96,10 @@ impl Pool {
         if lanes.is_empty() {
             return Ok(());
         }
-        let LaneSettings { kinds, sine, harmonics, stages, .. } = self.settings;
-        if let Some(flow) = tables.flow_of_another_kind.filter(|_| !kinds) {
-            let feature = "an elastic or a rigid wall";
-            return Err(GpuError::NotCompiled { flow, feature, setting: "kinds" });
-        }
-        if let Some(flow) = tables.flow_with_sine.filter(|_| !sine) {
-            return Err(GpuError::NotCompiled { flow, feature: "a force with a sine", setting: "sine" });
-        }
-        if let Some((flow, _)) = tables.flow_with_most_harmonics.filter(|&(_, most)| most > harmonics) {
-            let feature = "more harmonics of the force";
-            return Err(GpuError::NotCompiled { flow, feature, setting: "harmonics" });
-        }
-        if let Some(flow) = tables.flow_with_stages.filter(|_| !stages) {
-            return Err(GpuError::NotCompiled { flow, feature: "stages", setting: "stages" });
+        for &(flow, features) in &tables.features {
+            if let Some((feature, setting)) = features.lacking_in(self.settings.features) {
+                return Err(GpuError::NotCompiled { flow, feature, setting });
+            }
         }
         self.make_room(gpu, lanes.len()).await?;
         // A few lanes had long dispatches; with many more lanes the same dispatches would take longer in proportion.

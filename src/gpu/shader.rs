@@ -2,8 +2,9 @@
 
 use super::Measures;
 use super::constants::PAIRS_PER_HARMONIC;
+use super::features::Features;
 use super::layout::{
-    BLOCK, CONTACTS, EXTREMES, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD, SPELLED_WORD_LENGTH,
+    BLOCK, CONTACTS, EXTREMES, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD, SPELLED_WORD_LENGTH,
     SPELLING, SUMS, SYMBOLS_PER_NUMBER,
 };
 use super::precision::Precision;
@@ -33,14 +34,8 @@ pub struct Variant {
     pub symmetry: bool,
     /// Whether lanes may follow chatter by short flights.
     pub chatter: bool,
-    /// Whether walls may be elastic or rigid.
-    pub kinds: bool,
-    /// Whether forces may have a sine.
-    pub sine: bool,
-    /// Most harmonics of a force beside the first.
-    pub harmonics: u32,
-    /// Whether domains may change in a forcing period.
-    pub stages: bool,
+    /// Features that oscillators may have.
+    pub features: Features,
     /// What this variant measures on lanes whose class is decided; none in a variant that decides classes.
     pub measures: Option<Measures>,
     /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
@@ -57,6 +52,7 @@ const BODY: &str = concat!(
     include_str!("../../shaders/phase.wgsl"),
     include_str!("../../shaders/harmonics.wgsl"),
     include_str!("../../shaders/stages.wgsl"),
+    include_str!("../../shaders/intervals.wgsl"),
     include_str!("../../shaders/contact.wgsl"),
     include_str!("../../shaders/elastic.wgsl"),
     include_str!("../../shaders/rigid.wgsl"),
@@ -93,10 +89,7 @@ impl Variant {
             mesh: true,
             symmetry: true,
             chatter: true,
-            kinds: true,
-            sine: true,
-            harmonics: 0,
-            stages: false,
+            features: Features { kinds: true, sine: true, ..Features::default() },
             measures: None,
             keep: false,
         }
@@ -110,7 +103,7 @@ impl Variant {
         };
         let names = ["TERMS", "SHORT_TERMS"].map(|name| (name, count(real, name)));
         let [terms, short_terms] = names;
-        let body = unroll(BODY, &[terms, short_terms, ("HARMONICS", self.harmonics)]);
+        let body = unroll(BODY, &[terms, short_terms, ("HARMONICS", self.features.harmonics)]);
         let valid = VALID.map(|(name, bits)| (format!("VALID_{name}"), bits));
         let status = Status::ALL.map(|s| (format!("STATUS_{}", s.name().to_uppercase()), s.code()));
         let contacts = CONTACTS.map(|(name, code)| (format!("CONTACT_{name}"), code));
@@ -126,8 +119,9 @@ impl Variant {
             ("SPELLED_PATTERN_LENGTH", SPELLED_PATTERN_LENGTH as u32),
             ("SPELLED_PATTERN_HASH", SPELLED_PATTERN_LENGTH as u32 + 1),
             ("EXTREMES", EXTREMES as u32),
-            ("HARMONICS", self.harmonics),
+            ("HARMONICS", self.features.harmonics),
             ("PAIRS_PER_HARMONIC", PAIRS_PER_HARMONIC as u32),
+            ("NO_FLOW", NO_FLOW),
             ("WORD_SYMBOLS", WORD_SYMBOLS as u32),
             ("SYMBOLS_PER_NUMBER", SYMBOLS_PER_NUMBER as u32),
         ]
@@ -143,9 +137,10 @@ impl Variant {
             ("MESH", self.mesh),
             ("SYMMETRY", self.symmetry),
             ("CHATTER", self.chatter),
-            ("KINDS", self.kinds),
-            ("SINE", self.sine),
-            ("STAGES", self.stages),
+            ("KINDS", self.features.kinds),
+            ("SINE", self.features.sine),
+            ("STAGES", self.features.stages),
+            ("INTERVALS", self.features.intervals),
             ("MEASURE", self.measures.is_some()),
             ("EXTREME", self.measures.is_some_and(|measures| measures.extremes)),
             ("MOMENTS", self.measures.is_some_and(|measures| measures.moments)),

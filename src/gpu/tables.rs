@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use bytemuck::Zeroable;
 
-use super::constants::{Change, Constants, PAIRS_PER_HARMONIC, phasors as phasors_of};
+use super::constants::{Change, Constants, PAIRS_PER_HARMONIC, Page, phasors as phasors_of};
+use super::features::Features;
 use super::guard::with_error_scopes;
-use super::layout::{self, Flow, FlowShape, contact_code};
+use super::layout::{self, Flow, FlowShape, NO_FLOW, contact_code};
 use super::precision::Precision;
 use super::transfer::{buffer, reals, upload};
 use super::{Gpu, GpuError};
@@ -18,14 +19,9 @@ pub struct Tables {
     pub(super) constants: Vec<Option<Constants>>,
     /// Whether each law is the same at both walls.
     pub(super) is_even: Vec<bool>,
-    /// Index of a flow with an elastic or a rigid wall, if there is one.
-    pub(super) flow_of_another_kind: Option<usize>,
-    /// The first flow whose force has a sine.
-    pub(super) flow_with_sine: Option<usize>,
-    /// The first flow that has most harmonics beside the first, with their number; and the first flow with stages.
-    pub(super) flow_with_most_harmonics: Option<(usize, u32)>,
-    pub(super) flow_with_stages: Option<usize>,
-    /// All flows in their first stages, then their further stages.
+    /// Different features of flows, each with the first flow that has them.
+    pub(super) features: Vec<(usize, Features)>,
+    /// The first page of each flow, then the further pages.
     pub(super) flows: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
     /// Zeros of a missing harmonic; phasors of the first harmonic, constants of the higher ones, and changes of stages.
@@ -50,10 +46,11 @@ pub(crate) const MOST_BYTES: u64 = 1 << 30;
 pub(crate) fn bytes(oscillator: &Oscillator, steps: Option<u32>) -> [u64; 2] {
     let phasors = steps.map_or(0, |steps| u64::from(steps) + 1);
     let pair = size_of::<[f64; 2]>();
-    let stage = size_of::<Constants>()
+    let page = size_of::<Constants>()
         + size_of::<FlowShape>()
         + PAIRS_PER_HARMONIC * pair * oscillator.harmonics.len();
-    let flow = stage * oscillator.stage_count() + 2 * pair * oscillator.schedule.len();
+    let intervals = 1 + oscillator.outer_walls.iter().map(Vec::len).sum::<usize>();
+    let flow = page * oscillator.stage_count() * intervals + 2 * pair * oscillator.schedule.len();
     [flow as u64, phasors * pair as u64].map(|bytes| COPIES * bytes)
 }
 
@@ -96,13 +93,12 @@ impl Tables {
     ) -> Result<Tables, GpuError> {
         let flows = constants.len();
         let mut shapes = Vec::with_capacity(flows);
-        // Constants of further stages follow those of all flows.
+        // Further pages follow those of all flows.
         let mut further = Vec::new();
         let mut pairs = vec![[0.0; 2]; PAIRS_PER_HARMONIC];
         // Flows with equal steps share their phasors.
         let mut places = HashMap::new();
-        let (mut flow_of_another_kind, mut flow_with_sine) = (None, None);
-        let (mut flow_with_most_harmonics, mut flow_with_stages) = (None, None);
+        let mut features: Vec<(usize, Features)> = Vec::new();
         for (i, constants) in constants.iter().enumerate() {
             // Lanes of a missing flow are refused before they start.
             let Some(constants) = constants else {
@@ -116,34 +112,30 @@ impl Tables {
             });
             let schedule = pairs.len() as u32;
             let first = flows + further.len() - 1;
-            pairs.extend(constants.changes.iter().flat_map(|change| {
-                let flow = if change.stage == 0 { i } else { first + change.stage };
-                pairs_of(change, flow as u32, gpu.precision)
-            }));
-            let mut shape = |harmonics: &[[f64; 2]]| {
+            let flow_of = |page: usize| if page == 0 { i as u32 } else { (first + page) as u32 };
+            let of_change = |change| pairs_of(change, flow_of(change.page), gpu.precision);
+            pairs.extend(constants.changes.iter().flat_map(of_change));
+            let mut shape = |page: &Page| {
                 let place_of_harmonics = pairs.len() as u32;
-                pairs.extend(harmonics);
+                pairs.extend(&page.harmonics);
                 FlowShape {
                     steps: constants.steps,
                     phasors: place,
                     must_rest: constants.must_rest.into(),
                     degrees: constants.degrees,
-                    contacts: constants.contacts.map(contact_code),
+                    contacts: page.contacts.map(contact_code),
                     harmonics: place_of_harmonics,
-                    harmonic_count: (harmonics.len() / PAIRS_PER_HARMONIC) as u32,
+                    harmonic_count: (page.harmonics.len() / PAIRS_PER_HARMONIC) as u32,
                     schedule,
                     changes: constants.changes.len() as u32,
+                    behind: page.behind.map(|page| page.map_or(NO_FLOW, flow_of)),
                 }
             };
-            shapes.push(shape(&constants.harmonics));
-            further.extend(constants.stages.iter().map(|stage| (stage.flow, shape(&stage.harmonics))));
-            flow_of_another_kind = flow_of_another_kind.or(constants.has_elastic_or_rigid_wall.then_some(i));
-            flow_with_sine = flow_with_sine.or(constants.has_sine.then_some(i));
-            let count = shapes[i].harmonic_count;
-            if count > flow_with_most_harmonics.map_or(0, |(_, most)| most) {
-                flow_with_most_harmonics = Some((i, count));
+            shapes.push(shape(&constants.page));
+            further.extend(constants.further.iter().map(|(flow, page)| (*flow, shape(page))));
+            if features.iter().all(|(_, others)| *others != constants.features) {
+                features.push((i, constants.features));
             }
-            flow_with_stages = flow_with_stages.or((!constants.changes.is_empty()).then_some(i));
         }
         pairs.push([1.0, 0.0]);
         shapes.extend(further.iter().map(|(_, shape)| shape));
@@ -163,16 +155,13 @@ impl Tables {
             laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
             constants,
             is_even: laws.iter().map(Law::is_symmetric).collect(),
-            flow_of_another_kind,
-            flow_with_sine,
-            flow_with_most_harmonics,
-            flow_with_stages,
+            features,
         };
         with_error_scopes(gpu, "flows", flows, make).await
     }
 }
 
-/// Rounds the constants of flows and uploads them, those of further stages last; `size` is that of a flow in the lanes'
+/// Rounds the constants of flows and uploads them, those of further pages last; `size` is that of a flow in the lanes'
 /// precision.
 fn upload_flows(
     gpu: &Gpu,

@@ -87,12 +87,6 @@ pub enum ChoiceError {
         /// The requested adapter.
         adapter: AdapterRequest,
     },
-    /// Lanes know one wall on each side.
-    #[error(
-        "the model has several walls on one side, which only the CPU engine computes; give --engine cpu, and no --precision and \
-         --adapter"
-    )]
-    OuterWalls,
     /// No adapter matches the request.
     #[error(transparent)]
     Adapter(#[from] AdapterError),
@@ -153,13 +147,6 @@ pub async fn open<'p>(plan: &'p Plan, request: &EngineRequest) -> Result<ChosenE
     check(request)?;
     if request.kind == EngineKind::Cpu {
         return Ok(ChosenEngine::cpu(plan, ""));
-    }
-    if plan.has_outer_walls() {
-        let is_free = request.kind == EngineKind::Auto && request.adapter.is_none();
-        return match is_free && request.precision != Some(Precision::F32) {
-            true => Ok(ChosenEngine::cpu(plan, "several walls on one side; using the processor")),
-            false => Err(ChoiceError::OuterWalls),
-        };
     }
     let precision = request.precision.unwrap_or(Precision::F32);
     let (all, environment) = (gpu::adapters().await, AdapterChoice::from_environment());

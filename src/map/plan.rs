@@ -353,11 +353,6 @@ impl Plan {
         self.flows.count()
     }
 
-    /// Whether the model has several walls on a side.
-    pub fn has_outer_walls(&self) -> bool {
-        self.flow_count() > 0 && self.oscillator(0).has_outer_walls()
-    }
-
     /// Whether several runs share a flow, and all flows can be stored.
     pub fn stores_flows(&self) -> bool {
         stores_flows(self.flow_count() as u64, self.run_count() as u64)

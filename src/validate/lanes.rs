@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::Subject;
 use super::sample::Sample;
 use super::states::HORIZON;
-use crate::gpu::{self, Gpu, GpuError, Lane, LaneSettings};
+use crate::gpu::{self, Features, Gpu, GpuError, Lane, LaneSettings};
 use crate::map::engine::{compare_at_sections, drop_unrequested, lane_settings};
 use crate::map::plan::Plan;
 use crate::record::{Record, Records};
@@ -136,8 +136,7 @@ pub async fn run_lanes(
     let flows: Vec<_> = flows.iter().map(|&flow| plan.oscillator(flow)).collect();
     let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
     let settings = &LaneSettings {
-        harmonics: flows.iter().map(gpu::higher_harmonics).fold(settings.harmonics, u32::max),
-        stages: settings.stages || flows.iter().any(gpu::has_stages),
+        features: flows.iter().map(Features::of).fold(settings.features, Features::and),
         ..*settings
     };
     let records = gpu.run(&flows, &laws, &lanes, settings).await?;

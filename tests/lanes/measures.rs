@@ -3,7 +3,7 @@
 use crate::common::gpu::open;
 use crate::common::linear::{Linear, with_wall};
 use crate::common::{BUDGET, REST, near, paper};
-use rattlemap::gpu::{Lane, LaneResult, LaneSettings, Measures, Precision};
+use rattlemap::gpu::{Features, Lane, LaneResult, LaneSettings, Measures, Precision};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Budget, Quantities, measure};
@@ -22,9 +22,9 @@ pub(super) fn lanes(
     let mut gpu = open(precision);
     let flows: Vec<Oscillator> = cases.iter().map(|case| case.0.clone()).collect();
     let laws: Vec<Law> = cases.iter().map(|case| case.1).collect();
-    let harmonics = flows.iter().map(|flow| flow.harmonics.len() as u32).max().unwrap_or(0);
-    let stages = flows.iter().any(|flow| !flow.schedule.is_empty());
-    let settings = LaneSettings { measures, multiplier: true, harmonics, stages, ..LaneSettings::default() };
+    let default = LaneSettings::default();
+    let features = flows.iter().map(Features::of).fold(default.features, Features::and);
+    let settings = LaneSettings { measures, multiplier: true, features, ..default };
     pollster::block_on(async {
         let tables = gpu.load(&flows, &laws, None).await.unwrap();
         let mut pool = gpu.pool(&settings).await.unwrap();

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use rattlemap::gpu::{Measures, Precision, Variant, layout};
+use rattlemap::gpu::{Features, Measures, Precision, Variant, layout};
 
 fn module(variant: Variant) -> (naga::Module, ModuleInfo) {
     let source = variant.source();
@@ -39,7 +39,7 @@ fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
 }
 
 /// Returns variants with all quantities, with the class alone, and with some quantities.
-fn variants(precision: Precision) -> [Variant; 18] {
+fn variants(precision: Precision) -> [Variant; 19] {
     let everything = Variant::of(precision);
     let measuring = |extremes, moments| Variant {
         measures: Some(Measures { periods: 1, extremes, moments }),
@@ -49,6 +49,7 @@ fn variants(precision: Precision) -> [Variant; 18] {
         ..everything
     };
     let class = Variant { word: false, pattern: false, mesh: false, symmetry: false, ..everything };
+    let all = Features { stages: true, ..class.features };
     [
         Variant { keep: true, ..everything },
         Variant { growth: false, ..everything },
@@ -65,9 +66,10 @@ fn variants(precision: Precision) -> [Variant; 18] {
         Variant { keep: true, ..measuring(true, true) },
         measuring(false, true),
         measuring(true, false),
-        Variant { harmonics: 7, keep: true, ..class },
-        Variant { harmonics: 1, stages: true, ..everything },
-        Variant { harmonics: 2, stages: true, ..measuring(true, true) },
+        Variant { features: Features { harmonics: 7, ..class.features }, keep: true, ..class },
+        Variant { features: Features { harmonics: 1, stages: true, ..class.features }, ..everything },
+        Variant { features: Features { harmonics: 2, intervals: true, ..all }, ..measuring(true, true) },
+        Variant { features: Features { intervals: true, ..class.features }, ..everything },
     ]
 }
 
@@ -79,7 +81,7 @@ static MODULES: LazyLock<Vec<(Variant, naga::Module)>> = LazyLock::new(|| {
 
 #[test]
 fn every_variant_is_valid() {
-    assert_eq!(MODULES.len(), 36);
+    assert_eq!(MODULES.len(), 38);
 }
 
 /// Offsets on the host are scaled by the size of the shader's numbers.

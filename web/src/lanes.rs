@@ -41,9 +41,6 @@ impl Lanes {
     /// If the driver refuses a shader, a known answer is wrong, or the flows of the window need too much memory. The device
     /// cannot be used afterwards.
     pub async fn prepare(&mut self, window: &Window) -> Result<(), String> {
-        if window.plan.has_outer_walls() {
-            return Err("lanes know one wall on each side".to_owned());
-        }
         let previous = match self.engine.take() {
             Some(Engine::Gpu(engine)) => Some(engine.into_device()),
             _ => self.device.take(),

@@ -306,7 +306,7 @@ impl Oscillator {
     }
 
     /// Returns stiffness, damping and constant of the force along the gap that free motion of this interval has and `centre` lacks.
-    pub(crate) fn force_against(&self, centre: &Domain) -> [f64; 3] {
+    pub fn force_against(&self, centre: &Domain) -> [f64; 3] {
         let g = self.gap;
         let square = g[0] * g[0] + g[1] * g[1];
         let load = [0, 1].map(|i| self.free.load[i] - centre.load[i]);
@@ -320,6 +320,14 @@ impl Oscillator {
     /// Whether a side has several walls.
     pub fn has_outer_walls(&self) -> bool {
         self.outer_walls.iter().any(|walls| !walls.is_empty())
+    }
+
+    /// Returns position and law of the last wall of a side, from the inside to the outside. A missing wall is infinitely far.
+    pub fn last_wall(&self, side: Side) -> (f64, Contact) {
+        match self.outer_walls[side.index()].last() {
+            Some(wall) => (wall.at, wall.contact),
+            None => (self.wall(side), self.contacts[side.index()]),
+        }
     }
 
     /// Returns the number of walls on a side.

@@ -14,12 +14,12 @@ use web_time::Instant;
 use super::section::is_on_strobe;
 use super::{Device, EngineError, Preparation, compare_at_sections, drop_unrequested};
 use crate::gpu::{
-    self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables, Traffic,
+    self, AdapterId, Constants, Features, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables, Traffic,
 };
 use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};
 use crate::record::Record;
-use rattlemap_dynamics::model::{Contact, Oscillator};
+use rattlemap_dynamics::model::{Contact, Oscillator, Side};
 
 /// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
@@ -434,10 +434,7 @@ fn settings_after(plan: &Plan, survey: &Survey) -> LaneSettings {
         multiplier: plan.needs().has_any(&[Quantity::Multiplier]),
         measures: measures(plan),
         chatter: survey.chatter,
-        kinds: survey.kinds,
-        sine: survey.sine,
-        harmonics: survey.harmonics,
-        stages: survey.stages,
+        features: survey.features,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
         steps_per_period: requested_steps(plan),
         ..default
@@ -473,14 +470,8 @@ fn requested_steps(plan: &Plan) -> Option<u32> {
 struct Survey {
     /// Whether any cell may follow chatter by short flights.
     chatter: bool,
-    /// Whether any wall is elastic or rigid.
-    kinds: bool,
-    /// Whether any force has a sine.
-    sine: bool,
-    /// Most harmonics of a force beside the first.
-    harmonics: u32,
-    /// Whether any domains change in a forcing period.
-    stages: bool,
+    /// Features of all flows.
+    features: Features,
     /// Least and most free steps per forcing period, of flows that lanes can carry.
     steps: Option<[u32; 2]>,
 }
@@ -491,10 +482,7 @@ impl Survey {
         let steps = self.steps.into_iter().chain(other.steps);
         Survey {
             chatter: self.chatter || other.chatter,
-            kinds: self.kinds || other.kinds,
-            sine: self.sine || other.sine,
-            harmonics: self.harmonics.max(other.harmonics),
-            stages: self.stages || other.stages,
+            features: self.features.and(other.features),
             steps: steps.reduce(|[least, most], [low, high]| [least.min(low), most.max(high)]),
         }
     }
@@ -516,15 +504,13 @@ fn survey_flows<T: Send>(
     let steps = requested_steps(plan);
     (0..plan.flow_count() as u32).into_par_iter().map(move |flow| {
         let oscillator = plan.oscillator(flow);
-        let chatter = (0..2).any(|side| {
-            let bounces = oscillator.walls[side].is_finite() && oscillator.contacts[side] != Contact::Elastic;
-            bounces && gpu::follows_chatter(&oscillator, least[side])
+        let chatter = Side::BOTH.into_iter().any(|side| {
+            let (wall, contact) = oscillator.last_wall(side);
+            let bounces = wall.is_finite() && contact != Contact::Elastic;
+            bounces && gpu::follows_chatter(&oscillator, least[side.index()])
         });
-        let kinds = gpu::has_elastic_or_rigid_wall(&oscillator);
-        let sine = gpu::has_sine(&oscillator);
         let steps_used = Constants::steps(&oscillator, steps).map(|n| [n; 2]);
-        let (harmonics, stages) = (gpu::higher_harmonics(&oscillator), gpu::has_stages(&oscillator));
-        let survey = Survey { chatter, kinds, sine, harmonics, stages, steps: steps_used };
+        let survey = Survey { chatter, features: Features::of(&oscillator), steps: steps_used };
         (of(&oscillator, steps), survey)
     })
 }

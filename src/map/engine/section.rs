@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::gpu::{Gpu, GpuError, Lane, LaneSettings, has_sine, rules};
+use crate::gpu::{Gpu, GpuError, Lane, Features, LaneSettings, rules};
 use crate::record::classify::{classify, status};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
@@ -24,8 +24,8 @@ struct SecondRun {
     place: usize,
     section: Section,
     law: Law,
-    /// Whether its shader adds a sine to the force.
-    sine: bool,
+    /// Features that its shader must have.
+    features: Features,
 }
 
 /// Runs the lanes of these records a second time if an event lies at phase 0, and replaces the records whose period the
@@ -44,21 +44,21 @@ pub(crate) async fn compare_at_sections(
         let period = if record.period > 0 { record.period } else { 2 };
         let flow = Flow::new(&oscillator);
         let section = Section::of(&flow, law, record.strobe, period, Allowance::UNLIMITED)?;
-        let sine = settings.sine || has_sine(&section.flow.oscillator);
-        Some(SecondRun { place, section, law, sine })
+        let features = settings.features.and(Features::of(&section.flow.oscillator));
+        Some(SecondRun { place, section, law, features })
     };
     let mut runs: Vec<_> = records.par_iter().enumerate().filter_map(section).collect();
     // A shader that adds a sine to the force may round differently, so these lanes run apart from the others.
-    runs.sort_by_key(|run| run.sine);
+    runs.sort_by_key(|run| run.features.sine);
     let tolerance = STROBE_TOLERANCES * rules::on_strobe(gpu.precision());
     // A lane that begins at rest on its cycle may find no recurrence that contracts: then the whole budget decides.
     for early_stop in [settings.early_stop, false] {
         let mut open = Vec::new();
-        for batch in runs.chunk_by(|a, b| a.sine == b.sine).flat_map(|alike| alike.chunks(BATCH)) {
+        for batch in runs.chunk_by(|a, b| a.features == b.features).flat_map(|alike| alike.chunks(BATCH)) {
             let flows: Vec<_> = batch.iter().map(|run| run.section.flow.oscillator.clone()).collect();
             let laws: Vec<_> = batch.iter().map(|run| run.law).collect();
             let lanes = (0..).zip(batch).map(|(i, run)| Lane { flow: i, law: i, start: run.section.start });
-            let settings = LaneSettings { sine: batch[0].sine, early_stop, ..*settings };
+            let settings = LaneSettings { features: batch[0].features, early_stop, ..*settings };
             let seconds = gpu.run(&flows, &laws, &lanes.collect::<Vec<_>>(), &settings).await?;
             for (run, mut second) in batch.iter().zip(seconds) {
                 let first = &mut records[run.place].1;

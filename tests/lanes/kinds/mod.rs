@@ -8,7 +8,7 @@ use crate::common::gpu::open;
 use draw::random_cell;
 use march::March;
 use nalgebra::Matrix4;
-use rattlemap::gpu::{GpuError, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{Features, GpuError, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
@@ -166,10 +166,11 @@ fn multipliers_agree_with_finite_differences() {
 #[test]
 fn excluded_walls_and_sines_are_refused() {
     let rigid = cells().into_iter().find(may_chatter).unwrap();
-    let settings = LaneSettings { kinds: false, ..LaneSettings::only(1) };
+    let without = |features| LaneSettings { features, ..LaneSettings::only(1) };
+    let settings = without(Features { sine: true, ..Features::default() });
     let error = run(Precision::F32, &[rigid], &settings).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "kinds", .. }), "{error}");
-    let settings = LaneSettings { sine: false, ..LaneSettings::only(1) };
+    let settings = without(Features { kinds: true, ..Features::default() });
     let error = run(Precision::F32, &cells_with_sine()[..1], &settings).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "sine", .. }), "{error}");
 }

@@ -1,4 +1,5 @@
-//! Further harmonics of the force, and domains that change in a forcing period, on lanes and on the reference.
+//! Further harmonics of the force, domains that change in a forcing period, and several walls on a side, on lanes and on the
+//! reference.
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
@@ -6,13 +7,13 @@ use crate::common::{BUDGET, apart};
 use crate::kinds::draw::{Numbers, random_cell};
 use crate::kinds::{self, Cell};
 use crate::measures::{self, MEASURES};
-use rattlemap::gpu::{GpuError, LaneSettings, Precision, has_stages, higher_harmonics};
+use rattlemap::gpu::{Features, GpuError, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, Stage};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, OuterWall, Stage};
 use rattlemap_dynamics::orbit::{Budget, Class, measure};
 use rayon::prelude::*;
 
@@ -20,9 +21,9 @@ const SEEDS: u64 = 48;
 
 /// Returns settings that include what these cells need.
 fn settings(cells: &[Cell]) -> LaneSettings {
-    let harmonics = cells.iter().map(|cell| higher_harmonics(&cell.0)).max().unwrap_or(0);
-    let stages = cells.iter().any(|cell| has_stages(&cell.0));
-    LaneSettings { undecided_periods: 1584, harmonics, stages, ..LaneSettings::default() }
+    let default = LaneSettings::default();
+    let features = cells.iter().map(|cell| Features::of(&cell.0)).fold(default.features, Features::and);
+    LaneSettings { undecided_periods: 1584, features, ..default }
 }
 
 /// Adds one or two harmonics of random orders.
@@ -82,6 +83,52 @@ fn with_stages(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
     assert_eq!(meshing, oscillator.meshing);
     oscillator.validate().unwrap();
     (oscillator, law, start)
+}
+
+/// Makes walls elastic, and puts one to three further walls behind them; only the last one may have another law.
+fn with_walls(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
+    let mut draw = Numbers(seed ^ 0x3a11);
+    let gap = oscillator.gap;
+    let stages: Vec<Domain> = oscillator.stages.iter().map(|stage| stage.free).collect();
+    let mut sides: Vec<usize> = (0..2).filter(|&side| oscillator.walls[side].is_finite()).collect();
+    if sides.len() == 2 && draw.one_of(&[true, false]) {
+        sides.remove(draw.one_of(&[0, 1]));
+    }
+    for side in sides {
+        let count = draw.one_of(&[1, 2, 3]);
+        let sign = [1.0, -1.0][side];
+        let mut at = oscillator.walls[side];
+        let mut before: Vec<Domain> = [oscillator.free].into_iter().chain(stages.clone()).collect();
+        let last = oscillator.contacts[side];
+        oscillator.contacts[side] = Contact::Elastic;
+        for nth in 0..=count {
+            let (k, c) = (draw.between(1.0, 40.0), draw.one_of(&[0.0, 1.0]) * draw.between(0.0, 1.0));
+            let load = [0, 1].map(|i: usize| k * at * gap[i]);
+            let behind: Vec<Domain> =
+                before.iter().map(|domain| changed(domain, gap, k, c, load)).collect();
+            if nth == 0 {
+                oscillator.meshing[side] = behind[0];
+                for (stage, &domain) in oscillator.stages.iter_mut().zip(&behind[1..]) {
+                    stage.meshing[side] = domain;
+                }
+            } else {
+                let contact = if nth == count { last } else { Contact::Elastic };
+                oscillator.outer_walls[side].push(OuterWall { at, contact, meshing: behind.clone() });
+            }
+            before = behind;
+            at += sign * draw.between(0.05, 0.3);
+        }
+    }
+    oscillator.validate().unwrap();
+    (oscillator, law, start)
+}
+
+fn walled_cells() -> Vec<Cell> {
+    (0..SEEDS).map(|seed| with_walls(seed, random_cell(seed))).collect()
+}
+
+fn walled_cells_with_stages() -> Vec<Cell> {
+    (0..SEEDS).map(|seed| with_walls(seed, with_stages(seed, random_cell(seed)))).collect()
 }
 
 fn harmonic_cells() -> Vec<Cell> {
@@ -160,6 +207,17 @@ fn harmonics_and_stages_agree_with_the_reference() {
 #[ignore = "compiles large shaders; scripts/test.sh --all"]
 fn harmonics_and_stages_agree_with_the_reference_in_f32() {
     check("both", &cells_with_both(), &[IN_F32]);
+}
+
+#[test]
+fn several_walls_agree_with_the_reference() {
+    check("walls", &walled_cells(), &[IN_F64, IN_F32]);
+}
+
+#[test]
+#[ignore = "compiles large shaders; scripts/test.sh --all"]
+fn several_walls_and_stages_agree_with_the_reference() {
+    check("walls and stages", &walled_cells_with_stages(), &[IN_F64, IN_F32]);
 }
 
 /// Where all stages are equal, only the changes' instants interrupt the motion.
@@ -275,7 +333,9 @@ fn a_change_of_the_stage_releases_a_gap_at_rest() {
 #[ignore = "compiles large shaders; scripts/test.sh --all"]
 fn quantities_agree_with_the_reference() {
     let budget = Budget { quantities: true, ..BUDGET };
-    for (what, cells) in [("harmonics", harmonic_cells()), ("stages", staged_cells())] {
+    for (what, cells) in
+        [("harmonics", harmonic_cells()), ("stages", staged_cells()), ("walls", walled_cells())]
+    {
         let measured =
             |(oscillator, law, start): &Cell| measure(&Flow::new(oscillator), *law, *start, &budget);
         let expected: Vec<_> = cells.par_iter().map(measured).collect();
@@ -295,10 +355,11 @@ fn quantities_agree_with_the_reference() {
 }
 
 #[test]
-fn excluded_harmonics_and_stages_are_refused() {
-    let few = LaneSettings { harmonics: 0, ..LaneSettings::only(1) };
-    let error = kinds::run(Precision::F32, &harmonic_cells()[..1], &few).unwrap_err();
+fn excluded_features_are_refused() {
+    let error = kinds::run(Precision::F32, &harmonic_cells()[..1], &LaneSettings::only(1)).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "harmonics", .. }), "{error}");
     let error = kinds::run(Precision::F32, &staged_cells()[..1], &LaneSettings::only(1)).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "stages", .. }), "{error}");
+    let error = kinds::run(Precision::F32, &walled_cells()[..1], &LaneSettings::only(1)).unwrap_err();
+    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "intervals", .. }), "{error}");
 }

@@ -1,0 +1,56 @@
+//! Features of oscillators for which shaders have code only if it is needed.
+
+use rattlemap_dynamics::model::{Contact, Oscillator};
+
+/// The features that some oscillators have, or that a shader has code for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Features {
+    /// Elastic or rigid walls.
+    pub kinds: bool,
+    /// Forces with a sine.
+    pub sine: bool,
+    /// Most harmonics of a force beside the first.
+    pub harmonics: u32,
+    /// Domains that change in a forcing period.
+    pub stages: bool,
+    /// Several walls on one side.
+    pub intervals: bool,
+}
+
+impl Features {
+    /// Returns the features of an oscillator.
+    pub fn of(oscillator: &Oscillator) -> Features {
+        let mut walls = oscillator.contacts.iter().zip(oscillator.walls);
+        Features {
+            kinds: walls.any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite()),
+            sine: oscillator.force_sin != [0.0; 2],
+            harmonics: oscillator.harmonics.len() as u32,
+            stages: !oscillator.schedule.is_empty(),
+            intervals: oscillator.has_outer_walls(),
+        }
+    }
+
+    /// Returns the features of both.
+    pub fn and(self, other: Features) -> Features {
+        Features {
+            kinds: self.kinds || other.kinds,
+            sine: self.sine || other.sine,
+            harmonics: self.harmonics.max(other.harmonics),
+            stages: self.stages || other.stages,
+            intervals: self.intervals || other.intervals,
+        }
+    }
+
+    /// Returns a feature that `code` lacks, in words, and the name of its field.
+    pub(super) fn lacking_in(self, code: Features) -> Option<(&'static str, &'static str)> {
+        [
+            (self.kinds > code.kinds, "an elastic or a rigid wall", "kinds"),
+            (self.sine > code.sine, "a force with a sine", "sine"),
+            (self.harmonics > code.harmonics, "more harmonics of the force", "harmonics"),
+            (self.stages > code.stages, "stages", "stages"),
+            (self.intervals > code.intervals, "several walls on one side", "intervals"),
+        ]
+        .into_iter()
+        .find_map(|(lacks, feature, setting)| lacks.then_some((feature, setting)))
+    }
+}
