@@ -157,3 +157,10 @@ fn count_meshing(part: Real) {
     tally.mesh_whole += u32(whole);
     motion.mesh_part -= whole;
 }
+
+// Adds a flight that ends in impacts on the last of several walls: the walls in front of it stay in contact.
+fn count_short_contact(part: Real) {
+    if MESH && is_behind_wall() {
+        count_meshing(part);
+    }
+}

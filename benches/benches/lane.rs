@@ -2,11 +2,12 @@
 
 use std::time::Instant;
 
-use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{AdapterChoice, Features, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator};
 
 use rattlemap::cli::bench::spread::Spread;
+use rattlemap_bench::shapes::{SHAPES, Shape};
 
 /// Returns a variant of the shader.
 type Rewrite = fn(String) -> String;
@@ -53,6 +54,8 @@ struct Size {
     precisions: &'static [Precision],
     /// Whether lanes compute exponents, for each measurement.
     exponents: &'static [bool],
+    /// Shapes of oscillators.
+    shapes: &'static [Shape],
 }
 
 /// Returns the full size for measurements, and a tiny one for tests.
@@ -60,9 +63,13 @@ fn size() -> Size {
     let measured = std::env::args().any(|a| a == "--bench") && !std::env::args().any(|a| a == "--test");
     match measured {
         true => {
-            Size { side: 48, periods: 100, runs: 5, precisions: &Precision::ALL, exponents: &[false, true] }
+            let (precisions, exponents) = (&Precision::ALL, &[false, true]);
+            Size { side: 48, periods: 100, runs: 5, precisions, exponents, shapes: &SHAPES }
         }
-        false => Size { side: 3, periods: 3, runs: 1, precisions: &[Precision::F32], exponents: &[false] },
+        false => {
+            let (precisions, exponents) = (&[Precision::F32], &[false]);
+            Size { side: 3, periods: 3, runs: 1, precisions, exponents, shapes: &SHAPES[..1] }
+        }
     }
 }
 
@@ -88,7 +95,9 @@ impl Plane {
 
     /// Integrates every cell. Returns the seconds and the records.
     fn run(&self, gpu: &mut Gpu, size: &Size, exponent: bool) -> (f64, Vec<Record>) {
-        let settings = LaneSettings { exponent, ..LaneSettings::only(size.periods) };
+        let settings = LaneSettings::only(size.periods);
+        let features = self.flows.iter().map(Features::of).fold(settings.features, Features::and);
+        let settings = LaneSettings { exponent, features, ..settings };
         let start = Instant::now();
         let run = gpu.run(&self.flows, &self.laws, &self.lanes, &settings);
         let records = pollster::block_on(run).expect("the device runs the lanes");
@@ -117,9 +126,42 @@ fn seconds(plane: &Plane, size: &Size, gpus: &mut [Gpu], exponent: bool) -> Vec<
     times.into_iter().map(|times| Spread::of(times).median).collect()
 }
 
+/// Times lanes by the shape of their oscillators. Shapes run by turns.
+fn by_shape(plane: &Plane, size: &Size) {
+    let shaped = |shape: &Shape| Plane {
+        flows: plane.flows.iter().map(|flow| shape.of(flow)).collect(),
+        laws: plane.laws.clone(),
+        lanes: plane.lanes.clone(),
+    };
+    let planes: Vec<Plane> = size.shapes.iter().map(shaped).collect();
+    let lane_periods = plane.lanes.len() as f64 * f64::from(size.periods);
+    for &precision in size.precisions {
+        println!("{precision:?}, by shape");
+        let mut gpu = open(precision, |source| source);
+        for plane in &planes {
+            // Compiles the shader.
+            plane.run(&mut gpu, &Size { periods: 1, ..*size }, false);
+        }
+        let mut times = vec![Vec::new(); planes.len()];
+        for _ in 0..size.runs {
+            for (times, plane) in times.iter_mut().zip(&planes) {
+                times.push(plane.run(&mut gpu, size, false).0);
+            }
+        }
+        let times: Vec<f64> = times.into_iter().map(|times| Spread::of(times).median).collect();
+        for (time, shape) in times.iter().zip(size.shapes) {
+            let (cost, ratio) = (1e6 * time / lane_periods, time / times[0]);
+            println!("  {:<34} {cost:8.2} us per lane-period, {ratio:.2} times the time of the first", shape.name());
+        }
+    }
+}
+
 fn main() {
     let size = size();
     let plane = Plane::new(size.side);
+    if std::env::args().any(|a| a == "shapes") {
+        return by_shape(&plane, &size);
+    }
     let lane_periods = plane.lanes.len() as f64 * f64::from(size.periods);
     println!("{0} x {0} cells, {1} periods from rest, median of {2}", size.side, size.periods, size.runs);
     for &precision in size.precisions {

@@ -138,7 +138,7 @@ fn per_period_of_a_map(c: &mut Criterion) {
     group.finish();
 }
 
-/// Times one motion with further harmonics and stages.
+/// Times one motion with further harmonics, stages and walls.
 fn per_period_by_shape(c: &mut Criterion) {
     let size = size();
     let cells = grid(size.side, [4.5, 12.0]);
@@ -157,8 +157,7 @@ fn per_period_by_shape(c: &mut Criterion) {
         let work = |trajectories: &mut Vec<Trajectory<'_, 0>>| {
             trajectories.iter_mut().for_each(|trajectory| advance(trajectory, size.periods));
         };
-        let name = format!("{} harmonics, {} stages", 1 + shape.harmonics, shape.stages);
-        group.bench_function(name, |b| b.iter_batched_ref(|| start.clone(), work, BatchSize::LargeInput));
+        group.bench_function(shape.name(), |b| b.iter_batched_ref(|| start.clone(), work, BatchSize::LargeInput));
     }
     group.finish();
 }

@@ -28,6 +28,7 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("loose-gear", include_str!("../../models/loose_gear.toml")),
     ("mesh-stiffness", include_str!("../../models/mesh_stiffness.toml")),
     ("meissner", include_str!("../../models/meissner.toml")),
+    ("clutch", include_str!("../../models/clutch.toml")),
 ];
 
 /// The built-in models, read once. A test shows that each can be read.

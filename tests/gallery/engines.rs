@@ -4,6 +4,7 @@ use nalgebra::Matrix4;
 
 use crate::ball::{ball, bounce, window};
 use crate::clearance;
+use crate::clutch;
 use crate::common::apart;
 use crate::common::closed_form::Walled;
 use crate::common::gpu::open;
@@ -11,7 +12,7 @@ use crate::cycle::{eigenvalues, followed};
 use crate::elastic::{backlash, bilinear, soft};
 use crate::loose_gear::gear;
 use crate::single_impact::stable;
-use rattlemap::gpu::{Lane, LaneSettings, Precision};
+use rattlemap::gpu::{Features, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
@@ -80,6 +81,11 @@ fn known_cycles() -> Vec<Known> {
                 });
             }
         }
+    }
+    for clutch::Cycle { oscillator, law, period, strobe: [x, v], radius, impacts } in clutch::cycles() {
+        let what = format!("clutch, omega = {}, F = {}", oscillator.omega, oscillator.force[0]);
+        let (strobe, impacts) = ([x, v, 0.0, 0.0], f64::from(impacts));
+        list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays: false });
     }
     let settling = [
         ("bilinear", bilinear(1.7, 1.0), [0.0, 0.0], 0),
@@ -183,8 +189,10 @@ fn check_lanes(precision: Precision, bars: [f64; 2]) {
     let lanes: Vec<Lane> =
         (0..).zip(&known_cycles).map(|(i, known)| Lane { flow: i, law: i, start: start(known) }).collect();
     let mut gpu = open(precision);
-    let records =
-        pollster::block_on(gpu.run(&flows, &laws, &lanes, &LaneSettings::within(&budget()))).unwrap();
+    let settings = LaneSettings::within(&budget());
+    let features = flows.iter().map(Features::of).fold(settings.features, Features::and);
+    let settings = LaneSettings { features, ..settings };
+    let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &settings)).unwrap();
     let [state, multiplier] = worst(&known_cycles, &records, precision.name());
     assert!(state < bars[0] && multiplier < bars[1], "{state:e} {multiplier:e}");
 }

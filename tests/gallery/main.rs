@@ -9,6 +9,7 @@ mod cycle;
 
 mod ball;
 mod clearance;
+mod clutch;
 mod elastic;
 mod engines;
 mod files;

@@ -107,6 +107,7 @@ impl<const N: usize> Trajectory<'_, N> {
             [0.0, behind, dx + duration * dv, dv + duration * dv_rate - sliding.drag * dz - kick * behind]
         });
         self.clock.advance(duration);
+        self.count_meshing(duration);
         let (sin, cos) = (flow.omega * self.clock.time()).sin_cos();
         self.phasor = [cos, sin];
         let before = self.q;

@@ -1,0 +1,132 @@
+//! A clutch disc with two spring stages and stops: cycles in closed form, from piece to piece of the spring's characteristic.
+
+use nalgebra::Matrix2;
+
+use crate::common::apart;
+use crate::common::closed_form::Linear;
+use crate::cycle::followed;
+use rattlemap::model_file::FileModel;
+use rattlemap_dynamics::model::{Law, Model, Oscillator};
+
+/// `x'' + 2 zeta x' + f(x) = F_m + F cos(omega t)`: f has the slope 0 up to |x| = 1, `SLOPES[1]` up to 2 and `SLOPES[2]` up to the
+/// stops at 4.
+const SLOPES: [f64; 3] = [0.0, 0.15, 1.0];
+const ENDS: [f64; 3] = [1.0, 2.0, 4.0];
+const ZETA: f64 = 0.04;
+const MEAN: f64 = 0.3;
+const RESTITUTION: f64 = 0.4;
+
+/// Steps per period at which the position is compared with the ends of its piece.
+const PLACES: usize = 20_000;
+
+/// A cycle of the clutch.
+pub(crate) struct Cycle {
+    pub(crate) oscillator: Oscillator,
+    pub(crate) law: Law,
+    pub(crate) period: u32,
+    /// Displacement and velocity at phase 0.
+    pub(crate) strobe: [f64; 2],
+    /// Modulus of the largest multiplier.
+    pub(crate) radius: f64,
+    pub(crate) impacts: u32,
+}
+
+/// The motion of one piece, from 0 for the free play: stiffness and load of the right side, mirrored for the left side.
+fn piece(omega: f64, force: f64, piece: usize, sign: f64) -> Linear {
+    let k = SLOPES[piece];
+    let constant: f64 = (1..=piece).map(|n| (SLOPES[n] - SLOPES[n - 1]) * ENDS[n - 1]).sum();
+    Linear { m: 1.0, c: 2.0 * ZETA, k, force, omega, load: MEAN + sign * constant }
+}
+
+/// Returns state, tangent matrix and number of impacts after so many periods.
+fn run(omega: f64, force: f64, start: [f64; 2], periods: u32) -> ([f64; 2], Matrix2<f64>, u32) {
+    let period = std::f64::consts::TAU / omega;
+    let (mut y, mut tangent, mut impacts) = (start, Matrix2::identity(), 0);
+    // The piece by number and sign.
+    let mut n = ENDS.iter().filter(|&&end| y[0].abs() > end).count();
+    let mut sign = y[0].signum();
+    for _ in 0..periods {
+        let (mut t, h) = (0.0, period / PLACES as f64);
+        loop {
+            let field = piece(omega, force, n, sign);
+            let rest = period - t;
+            // Positive within the piece.
+            let inside = |tau: f64| {
+                let x = sign * field.after(t, y, tau)[0];
+                let inner = if n == 0 { x + ENDS[0] } else { x - ENDS[n - 1] };
+                inner.min(ENDS[n] - x)
+            };
+            let steps = (1..).map(|j| h * f64::from(j)).take_while(|&tau| tau < rest).chain([rest]);
+            let left = steps.into_iter().find(|&tau| inside(tau) < 0.0);
+            let flown = match left {
+                None => rest,
+                Some(mut hi) => {
+                    let mut lo = (hi - h).max(0.0);
+                    for _ in 0..60 {
+                        let middle = 0.5 * (lo + hi);
+                        if inside(middle) < 0.0 { hi = middle } else { lo = middle }
+                    }
+                    hi
+                }
+            };
+            y = field.after(t, y, flown);
+            t += flown;
+            let [[a, b], [c, d]] = field.propagator(flown);
+            tangent = Matrix2::new(a, b, c, d) * tangent;
+            if left.is_none() {
+                break;
+            }
+            let is_outwards = y[0] * y[1] > 0.0;
+            if is_outwards && n == 2 {
+                let before = field.acceleration(t, y);
+                let speed = y[1];
+                y = [sign * ENDS[2], -RESTITUTION * speed];
+                let after = field.acceleration(t, y);
+                let jump = -(after + RESTITUTION * before) / speed;
+                tangent = Matrix2::new(-RESTITUTION, 0.0, jump, -RESTITUTION) * tangent;
+                impacts += 1;
+            } else if is_outwards {
+                sign = y[0].signum();
+                n += 1;
+            } else {
+                n -= 1;
+            }
+        }
+    }
+    (y, tangent, impacts)
+}
+
+/// Returns stable cycles: on the idle stage alone, on both stages, and with impacts on both stops.
+pub(crate) fn cycles() -> Vec<Cycle> {
+    [(0.6, 0.15), (0.8, 0.25), (1.1, 0.2), (1.2, 0.4), (0.5, 1.2), (0.7, 1.3), (1.0, 2.5)]
+        .into_iter()
+        .map(|(omega, force)| {
+            let mut model = FileModel::built_in("clutch").expect("built in");
+            [("omega", omega), ("F", force)]
+                .into_iter()
+                .for_each(|(name, value)| model.set(name, value).expect("a parameter"));
+            let (oscillator, law) = (model.oscillator().expect("valid parameters"), model.law());
+            let [x, v, ..] = followed(&oscillator, law, [0.0; 4], 1200).end;
+            let closes = |&period: &u32| {
+                let [a, b] = run(omega, force, [x, v], period).0;
+                (x - a).hypot(v - b) < 1e-12
+            };
+            let period = (1..=4).find(closes).unwrap_or_else(|| panic!("no cycle at {omega}, {force}"));
+            let (strobe, tangent, impacts) = run(omega, force, [x, v], period);
+            let radius = tangent.complex_eigenvalues().iter().fold(0.0f64, |size, mu| size.max(mu.norm()));
+            Cycle { oscillator, law, period, strobe, radius, impacts }
+        })
+        .collect()
+}
+
+/// Motion from rest agrees with the closed forms over three periods.
+#[test]
+fn motion_from_rest_agrees_with_closed_forms() {
+    for cycle in cycles() {
+        let omega = cycle.oscillator.omega;
+        let found = followed(&cycle.oscillator, cycle.law, [0.0; 4], 3);
+        let ([x, v], ..) = run(omega, cycle.oscillator.force[0], [0.0; 2], 3);
+        let off = apart(found.end, [x, v, 0.0, 0.0]);
+        assert!(off < 1e-12, "omega = {omega}: {off:e}");
+    }
+}
