@@ -176,7 +176,7 @@ right_of() {
     esac
     cp "$work/right/validation.json" "$out/validation_$precision.json" 2>/dev/null || true
     # Lines with strata and rates.
-    grep -E 'cells differ|judge:|to the bit|lanes are wrong' "$work/messages" | sed "s/^/$precision, $cells x $cells: /" >>"$out/right.txt" || true
+    grep -E 'of [0-9]+ (random )?cells|to the bit|lanes after' "$work/messages" | sed "s/^/$precision, $cells x $cells: /" >>"$out/right.txt" || true
 }
 
 # timed STEP PRECISION RUN SETTING...: computes a map and writes a row of speed.csv.

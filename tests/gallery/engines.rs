@@ -82,10 +82,11 @@ fn known_cycles() -> Vec<Known> {
             }
         }
     }
-    for clutch::Cycle { oscillator, law, period, strobe: [x, v], radius, impacts } in clutch::cycles() {
+    for cycle in clutch::cycles() {
+        let clutch::Cycle { oscillator, law, period, strobe: [x, v], radius, impacts, stays } = cycle;
         let what = format!("clutch, omega = {}, F = {}", oscillator.omega, oscillator.force[0]);
         let (strobe, impacts) = ([x, v, 0.0, 0.0], f64::from(impacts));
-        list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays: false });
+        list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays });
     }
     let settling = [
         ("bilinear", bilinear(1.7, 1.0), [0.0, 0.0], 0),
