@@ -134,6 +134,6 @@ fn distance_from_last(point: vec4<Real>, to: array<Real, 4>) -> Real {
 // Returns a deviation in units of the motion.
 fn in_units(u: array<Real, 4>) -> vec4<Real> {
     let rate = unit_of_rates();
-    let position = max(measures.position_scale, Real(1e-30));
+    let position = unit_of_positions();
     return vec4<Real>(u[0] / position, u[1] / rate, u[2] / position, u[3] / rate);
 }

@@ -40,7 +40,9 @@ struct Flow {
     kick: Real,
     // Length of a free step in time units.
     h: Real,
-    // Unit of speeds: half the walls' distance times the rate of free motion, per free step.
+    // Scale of length: half the walls' distance.
+    length: Real,
+    // Unit of speeds: the scale of length times the rate of free motion, per free step.
     speed: Real,
     // Longest infinite series of impacts that is closed by its limit, in free steps.
     closing: Real,

@@ -100,13 +100,23 @@ fn closest_of(lags: u32) -> u32 {
 // Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because at
 // a turning point rates are rounding error.
 fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
-    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(measures.position_scale, Real(1e-30));
+    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / unit_of_positions();
     let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / unit_of_rates();
     return max(p, r);
 }
 
+// Returns the unit of positions. Motion that decays to rest has no size of its own; only with stages is there no other test for
+// it (is_non_impacting in observe.wgsl), so the unit then has a lower bound.
+fn unit_of_positions() -> Real {
+    var least: Real = 1e-30;
+    if STAGES && shape.changes > 0u {
+        least = flows[cell.flow_index].length;
+    }
+    return max(measures.position_scale, least);
+}
+
 fn unit_of_rates() -> Real {
-    let least = flows[cell.flow_index].domains[0].angle * measures.position_scale;
+    let least = flows[cell.flow_index].domains[0].angle * unit_of_positions();
     return max(max(measures.rate_scale, least), Real(1e-30));
 }
 

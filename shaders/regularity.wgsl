@@ -62,7 +62,7 @@ fn is_quasi_periodic() -> bool {
         farthest = min(farthest, last_distance_at(lag));
     }
     let d = motions[lane].averages;
-    let unit = 1.0 / max(measures.position_scale, Real(1e-30));
+    let unit = 1.0 / unit_of_positions();
     let size = distance_of(farthest);
     let difference = max(max(abs(d[0]), abs(d[1])) * unit, abs(d[2]) * unit * unit / size);
     let nearest = distance_of(search.recurrence);

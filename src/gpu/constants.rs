@@ -164,6 +164,8 @@ struct Common {
     walls: [f64; 2],
     /// Whether motion that reaches the wall enters another interval.
     is_passed: [bool; 2],
+    /// Scale of length.
+    length: f64,
     /// Unit of speeds.
     speed: f64,
     escape: f64,
@@ -185,6 +187,7 @@ impl Common {
             substeps: Side::BOTH.map(substeps),
             walls: walls(oscillator),
             is_passed: oscillator.outer_walls.each_ref().map(|walls| !walls.is_empty()),
+            length: oscillator.length_scale(),
             speed: speed(oscillator),
             escape: Some(oscillator.escape()).filter(|size| size.is_finite()).unwrap_or(-1.0),
         }
@@ -275,6 +278,7 @@ fn page_of(
         walls: common.walls,
         kick: coordinates.kick(),
         h,
+        length: common.length,
         speed: common.speed * h,
         closing: CLOSING_ANGLE / free_rate(oscillator) / h,
         escape: common.escape,

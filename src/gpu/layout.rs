@@ -70,6 +70,7 @@ structs! {
         walls: [f64; 2],
         kick: f64,
         h: f64,
+        length: f64,
         speed: f64,
         closing: f64,
         escape: f64,
