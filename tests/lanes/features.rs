@@ -330,6 +330,28 @@ fn a_change_of_the_stage_releases_a_gap_at_rest() {
     }
 }
 
+/// Motion that decays to rest is decided as soon as it is small against the distance of the walls.
+#[test]
+fn decaying_motion_with_stages_is_decided() {
+    let cells: Vec<Cell> = [(0.6, 0.1), (1.7, 0.12), (2.4, 0.6), (2.0, 1.1), (0.18, 0.06)]
+        .into_iter()
+        .map(|(delta, epsilon)| {
+            let mut model = FileModel::built_in("meissner").unwrap();
+            [("delta", delta), ("epsilon", epsilon)]
+                .into_iter()
+                .for_each(|(name, value)| model.set(name, value).unwrap());
+            (model.oscillator().unwrap(), model.law(), [0.01, 0.0, 0.0, 0.0])
+        })
+        .collect();
+    let expected: Vec<Record> = cells.par_iter().map(reference).collect();
+    let found = kinds::run(Precision::F64, &cells, &settings(&cells)).unwrap();
+    for (ours, theirs) in found.iter().zip(&expected) {
+        assert_eq!(classify(ours), classify(theirs), "{ours:?} {theirs:?}");
+        assert!(ours.period == 1 && ours.impacts_per_period == 0.0, "{ours:?}");
+        assert!((ours.lyapunov - theirs.lyapunov).abs() < 1e-9, "{ours:?} {theirs:?}");
+    }
+}
+
 /// Amplitudes, forces and energies of cycles agree, too.
 #[test]
 #[ignore = "compiles large shaders; scripts/test.sh --all"]

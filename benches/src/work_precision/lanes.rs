@@ -6,7 +6,7 @@ use super::cells::{Subject, VARIANTS};
 use super::outcome::Outcome;
 use super::{EVENTS, PERIODS, shaders};
 use rattlemap::gpu::{
-    AdapterChoice, Gpu, GpuError, Lane, LaneSettings, Precision, Tables, describe, is_hardware,
+    AdapterChoice, Features, Gpu, GpuError, Lane, LaneSettings, Precision, Tables, describe, is_hardware,
 };
 use rattlemap::record::{Record, valid};
 use rattlemap_dynamics::model::{Law, Oscillator};
@@ -92,7 +92,7 @@ impl Device {
     /// See [`Gpu::run_on`].
     pub fn run(&mut self, tables: &Tables) -> Result<(Duration, Vec<Outcome>), GpuError> {
         // Times of events replace the mesh fraction.
-        let settings = LaneSettings { mesh: false, kinds: false, sine: false, ..LaneSettings::only(PERIODS) };
+        let settings = LaneSettings { mesh: false, features: Features::default(), ..LaneSettings::only(PERIODS) };
         let clock = Instant::now();
         let records = pollster::block_on(self.gpu.run_on(tables, &self.lanes, &settings))?;
         let elapsed = clock.elapsed();
