@@ -151,7 +151,10 @@ fn by_shape(plane: &Plane, size: &Size) {
         let times: Vec<f64> = times.into_iter().map(|times| Spread::of(times).median).collect();
         for (time, shape) in times.iter().zip(size.shapes) {
             let (cost, ratio) = (1e6 * time / lane_periods, time / times[0]);
-            println!("  {:<34} {cost:8.2} us per lane-period, {ratio:.2} times the time of the first", shape.name());
+            println!(
+                "  {:<34} {cost:8.2} us per lane-period, {ratio:.2} times the time of the first",
+                shape.name()
+            );
         }
     }
 }

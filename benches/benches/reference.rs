@@ -157,7 +157,9 @@ fn per_period_by_shape(c: &mut Criterion) {
         let work = |trajectories: &mut Vec<Trajectory<'_, 0>>| {
             trajectories.iter_mut().for_each(|trajectory| advance(trajectory, size.periods));
         };
-        group.bench_function(shape.name(), |b| b.iter_batched_ref(|| start.clone(), work, BatchSize::LargeInput));
+        group.bench_function(shape.name(), |b| {
+            b.iter_batched_ref(|| start.clone(), work, BatchSize::LargeInput)
+        });
     }
     group.finish();
 }

@@ -97,9 +97,11 @@ impl Constants {
         let mut changes = Vec::new();
         if !oscillator.schedule.is_empty() {
             let further = 1..oscillator.stage_count();
-            pages.extend(further.flat_map(|stage| {
-                pages_of_stage(&oscillator.in_stage(stage), &common, stage * intervals)
-            }));
+            pages.extend(
+                further.flat_map(|stage| {
+                    pages_of_stage(&oscillator.in_stage(stage), &common, stage * intervals)
+                }),
+            );
             changes = changes_of(oscillator, steps, intervals);
         }
         let further = pages.split_off(1);

@@ -46,8 +46,8 @@ pub use adapter::{
     narrowed_by,
 };
 pub use constants::Constants;
-pub use features::Features;
 pub use error::GpuError;
+pub use features::Features;
 pub use pool::Pool;
 pub use precision::Precision;
 pub use reading::LaneResult;

@@ -105,8 +105,7 @@ fn with_walls(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
         for nth in 0..=count {
             let (k, c) = (draw.between(1.0, 40.0), draw.one_of(&[0.0, 1.0]) * draw.between(0.0, 1.0));
             let load = [0, 1].map(|i: usize| k * at * gap[i]);
-            let behind: Vec<Domain> =
-                before.iter().map(|domain| changed(domain, gap, k, c, load)).collect();
+            let behind: Vec<Domain> = before.iter().map(|domain| changed(domain, gap, k, c, load)).collect();
             if nth == 0 {
                 oscillator.meshing[side] = behind[0];
                 for (stage, &domain) in oscillator.stages.iter_mut().zip(&behind[1..]) {
@@ -132,7 +131,9 @@ fn walled_cells() -> Vec<Cell> {
 fn chattering_clutches() -> impl Iterator<Item = Cell> {
     [(0.197, 2.496), (0.148, 3.0)].into_iter().map(|(omega, force)| {
         let mut model = FileModel::built_in("clutch").unwrap();
-        [("omega", omega), ("F", force)].into_iter().for_each(|(name, value)| model.set(name, value).unwrap());
+        [("omega", omega), ("F", force)]
+            .into_iter()
+            .for_each(|(name, value)| model.set(name, value).unwrap());
         (model.oscillator().unwrap(), model.law(), [0.0; 4])
     })
 }

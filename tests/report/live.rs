@@ -97,7 +97,8 @@ async function computeOnLanes() {
   said.has_lanes = lanes !== null;
   if (lanes) {
     showView({ left: 8, bottom: 8, width: 12, height: 12 });
-    await until(() => live?.isWhole && live.columns >= 33 && covers(live.made, view));
+    // While the shaders were compiled, the other workers may have computed the whole map, which covers the view.
+    await until(() => live?.isWhole && live.columns >= 33 && live.made.width === view.width);
     clearTimeout(resting);
     said.by_lanes = job.by_lanes;
     sayWindow();

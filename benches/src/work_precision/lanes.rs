@@ -92,7 +92,8 @@ impl Device {
     /// See [`Gpu::run_on`].
     pub fn run(&mut self, tables: &Tables) -> Result<(Duration, Vec<Outcome>), GpuError> {
         // Times of events replace the mesh fraction.
-        let settings = LaneSettings { mesh: false, features: Features::default(), ..LaneSettings::only(PERIODS) };
+        let settings =
+            LaneSettings { mesh: false, features: Features::default(), ..LaneSettings::only(PERIODS) };
         let clock = Instant::now();
         let records = pollster::block_on(self.gpu.run_on(tables, &self.lanes, &settings))?;
         let elapsed = clock.elapsed();

@@ -14,7 +14,8 @@ use web_time::Instant;
 use super::section::is_on_strobe;
 use super::{Device, EngineError, Preparation, compare_at_sections, drop_unrequested};
 use crate::gpu::{
-    self, AdapterId, Constants, Features, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables, Traffic,
+    self, AdapterId, Constants, Features, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables,
+    Traffic,
 };
 use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::gpu::{Gpu, GpuError, Lane, Features, LaneSettings, rules};
+use crate::gpu::{Features, Gpu, GpuError, Lane, LaneSettings, rules};
 use crate::record::classify::{classify, status};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
