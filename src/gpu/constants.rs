@@ -49,6 +49,7 @@ pub(super) struct Page {
 pub struct Constants {
     /// Constants that the shader reads in the first stage, between the first walls.
     pub flow: Flow,
+    /// The rest of these constants.
     pub(super) page: Page,
     /// The intervals behind the first walls, from the inside to the outside, right ones first; then all intervals of the
     /// further stages. `flow` and `page` have number 0.
@@ -197,6 +198,8 @@ impl Common {
 
     fn domains(&self, oscillator: &model::Oscillator) -> [Domain; 3] {
         let behind = |side: usize| match self.is_passed[side] {
+            // Motion never enters this domain. Its share of a step belongs to contact with the last wall, whose time is counted in
+            // such steps.
             true => {
                 let substeps = self.substeps[side];
                 Domain { share: substeps.recip(), substeps, ..Domain::zeroed() }

@@ -44,11 +44,11 @@ impl Features {
     /// Returns a feature that `code` lacks, in words, and the name of its field.
     pub(super) fn lacking_in(self, code: Features) -> Option<(&'static str, &'static str)> {
         [
-            (self.kinds > code.kinds, "an elastic or a rigid wall", "kinds"),
-            (self.sine > code.sine, "a force with a sine", "sine"),
+            (self.kinds && !code.kinds, "an elastic or a rigid wall", "kinds"),
+            (self.sine && !code.sine, "a force with a sine", "sine"),
             (self.harmonics > code.harmonics, "more harmonics of the force", "harmonics"),
-            (self.stages > code.stages, "stages", "stages"),
-            (self.intervals > code.intervals, "several walls on one side", "intervals"),
+            (self.stages && !code.stages, "stages", "stages"),
+            (self.intervals && !code.intervals, "several walls on one side", "intervals"),
         ]
         .into_iter()
         .find_map(|(lacks, feature, setting)| lacks.then_some((feature, setting)))

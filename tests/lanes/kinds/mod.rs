@@ -166,11 +166,11 @@ fn multipliers_agree_with_finite_differences() {
 #[test]
 fn excluded_walls_and_sines_are_refused() {
     let rigid = cells().into_iter().find(may_chatter).unwrap();
-    let without = |features| LaneSettings { features, ..LaneSettings::only(1) };
-    let settings = without(Features { sine: true, ..Features::default() });
+    let with = |features| LaneSettings { features, ..LaneSettings::only(1) };
+    let settings = with(Features { sine: true, ..Features::default() });
     let error = run(Precision::F32, &[rigid], &settings).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "kinds", .. }), "{error}");
-    let settings = without(Features { kinds: true, ..Features::default() });
+    let settings = with(Features { kinds: true, ..Features::default() });
     let error = run(Precision::F32, &cells_with_sine()[..1], &settings).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "sine", .. }), "{error}");
 }
