@@ -158,7 +158,7 @@ fn count_meshing(part: Real) {
     motion.mesh_part -= whole;
 }
 
-// Adds a flight that ends in impacts on the last of several walls: the walls in front of it stay in contact.
+// Counts the time of a short flight from the last of several walls as contact: the springs in front of that wall still press.
 fn count_short_contact(part: Real) {
     if MESH && is_behind_wall() {
         count_meshing(part);

@@ -31,7 +31,7 @@ fn present_flow() -> u32 {
     return flow_of_interval(flow);
 }
 
-// Returns the flow of the present interval. `between` is that between the first walls.
+// Returns the flow of the present interval. `between` is the flow between the first walls.
 fn flow_of_interval(between: u32) -> u32 {
     var flow = between;
     if INTERVALS {

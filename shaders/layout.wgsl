@@ -40,7 +40,7 @@ struct Flow {
     kick: Real,
     // Length of a free step in time units.
     h: Real,
-    // Scale of length: half the walls' distance.
+    // Scale of length: half the distance of the first walls, if there are two.
     length: Real,
     // Unit of speeds: the scale of length times the rate of free motion, per free step.
     speed: Real,

@@ -105,8 +105,9 @@ fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
     return max(p, r);
 }
 
-// Returns the unit of positions. Motion that decays to rest has no size of its own; only with stages is there no other test for
-// it (is_non_impacting in observe.wgsl), so the unit then has a lower bound.
+// Returns the unit of positions: the size of the motion. With stages it is at least the scale of length. Motion that decays to rest
+// would otherwise never come near to rest, because its size decays with it. Without stages, its energy decides that it makes no
+// contact (is_non_impacting in observe.wgsl).
 fn unit_of_positions() -> Real {
     var least: Real = 1e-30;
     if STAGES && shape.changes > 0u {

@@ -33,7 +33,7 @@ pub(crate) struct Cycle {
     pub(crate) stays: bool,
 }
 
-/// The motion of one piece, from 0 for the free play: stiffness and load of the right side, mirrored for the left side.
+/// Returns the equation of motion on one piece of the characteristic: 0 is the free play, 2 the main stage. `sign` is that of x.
 fn piece(omega: f64, force: f64, piece: usize, sign: f64) -> Linear {
     let k = SLOPES[piece];
     let constant: f64 = (1..=piece).map(|n| (SLOPES[n] - SLOPES[n - 1]) * ENDS[n - 1]).sum();
