@@ -44,6 +44,7 @@ mod few;
 mod gap_polynomial;
 mod generator;
 mod linear;
+mod pushing;
 mod row;
 mod short_flight;
 mod taylor;
@@ -53,6 +54,7 @@ use nalgebra::Matrix2;
 pub(crate) use expansion::{EXPANSION_REACH, Expansion, TERMS, turned};
 pub use linear::LinearFlow;
 pub(crate) use linear::Step;
+pub(crate) use pushing::PushingForce;
 pub(crate) use row::Row;
 pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
@@ -101,6 +103,10 @@ pub struct Flow {
     pub(crate) kick: f64,
     /// Decrease of `w'` and `v'` per unit of `w` by the damper behind each elastic wall.
     pub(crate) dampers: [[f64; 2]; 2],
+    /// Decrease of `w'` and `v'` at each elastic wall by its preload.
+    pub(crate) preloads: [[f64; 2]; 2],
+    /// Forces of walls that only push.
+    pub(crate) pushing: [Option<Box<PushingForce>>; 2],
     gap: [f64; 2],
     other: usize,
     pub(crate) degrees: usize,
@@ -196,7 +202,7 @@ impl Flow {
         let behind = |side: Side| match oscillator.contacts[side.index()] {
             _ if oscillator.wall(side).is_infinite() => free.clone(),
             Contact::Rigid => LinearFlow::on_rigid_wall(oscillator, kick),
-            Contact::Impact | Contact::Elastic => {
+            Contact::Impact | Contact::Elastic | Contact::Pushing => {
                 LinearFlow::new(oscillator, &oscillator.meshing[side.index()])
             }
         };
@@ -210,9 +216,19 @@ impl Flow {
         };
         let dissipation = |side: Side| match oscillator.contacts[side.index()] {
             Contact::Rigid => oscillator.free.dissipation(),
-            Contact::Impact | Contact::Elastic => oscillator.meshing[side.index()].dissipation(),
+            _ => oscillator.meshing[side.index()].dissipation(),
+        };
+        let preload = |side: Side| {
+            let push = side.sign() * oscillator.preload(side);
+            [push * compliance, push * pushed]
         };
         let meshing = Side::BOTH.map(behind);
+        let pushing =
+            Side::BOTH.map(|side| PushingForce::new(oscillator, side, [&free, &meshing[side.index()]]));
+        let contacts = Side::BOTH.map(|side| match oscillator.contacts[side.index()] {
+            Contact::Pushing if pushing[side.index()].is_none() => Contact::Elastic,
+            contact => contact,
+        });
         let length = oscillator.length_scale();
         Flow {
             period: oscillator.period(),
@@ -223,9 +239,11 @@ impl Flow {
             oscillator: oscillator.clone(),
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
-            contacts: oscillator.contacts,
+            contacts,
             kick,
             dampers: Side::BOTH.map(damper),
+            preloads: Side::BOTH.map(preload),
+            pushing: pushing.map(|force| force.map(Box::new)),
             gap: oscillator.gap,
             other,
             degrees: oscillator.degrees,
@@ -277,15 +295,15 @@ impl Flow {
     pub(crate) fn contact_force(&self, kind: DomainKind) -> Option<ContactForce> {
         let own = match kind {
             DomainKind::Meshing(side) if self.is_compliant(side) => {
-                Some((self.wall_force(side), self.wall(side)))
+                Some((self.wall_force(side), self.wall(side), side.sign() * self.oscillator.preload(side)))
             }
             _ => None,
         };
         if own.is_none() && self.held.is_none() {
             return None;
         }
-        let ([stiffness, damping], wall) = own.unwrap_or_default();
-        Some(ContactForce { stiffness, damping, wall, held: self.held.unwrap_or_default() })
+        let ([stiffness, damping], wall, preload) = own.unwrap_or_default();
+        Some(ContactForce { stiffness, damping, wall, preload, held: self.held.unwrap_or_default() })
     }
 
     /// Returns the flow of a stage.
@@ -407,6 +425,7 @@ pub(crate) struct ContactForce {
     stiffness: f64,
     damping: f64,
     wall: f64,
+    preload: f64,
     held: [f64; 3],
 }
 
@@ -414,7 +433,7 @@ impl ContactForce {
     /// Returns the force, positive to the left.
     pub(crate) fn at(&self, q: &Gap) -> f64 {
         let [stiffness, damping, constant] = self.held;
-        let own = self.stiffness * (q[0] - self.wall) + self.damping * q[1];
+        let own = self.stiffness * (q[0] - self.wall) + self.damping * q[1] + self.preload;
         own + (stiffness * q[0] + damping * q[1] + constant)
     }
 

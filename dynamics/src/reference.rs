@@ -21,6 +21,7 @@ mod contact;
 mod elastic;
 mod event;
 mod localisation;
+mod pushing;
 mod short_flight;
 mod stages;
 mod start;
@@ -56,6 +57,8 @@ enum Mode {
     Onset(Side),
     /// Sustained contact: meshing with the gap behind the wall; also motion behind an elastic wall.
     Sustained(Side),
+    /// Open contact behind a wall that only pushes.
+    Open(Side),
     /// At rest on a rigid wall and pressed against it.
     Stuck(Side),
 }
@@ -64,7 +67,7 @@ impl Mode {
     #[inline]
     fn domain(self) -> DomainKind {
         match self {
-            Mode::Free => DomainKind::Free,
+            Mode::Free | Mode::Open(_) => DomainKind::Free,
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => DomainKind::Meshing(side),
         }
     }
@@ -72,6 +75,7 @@ impl Mode {
     fn mirrored(self) -> Mode {
         match self {
             Mode::Free => Mode::Free,
+            Mode::Open(side) => Mode::Open(side.mirrored()),
             Mode::Onset(side) => Mode::Onset(side.mirrored()),
             Mode::Sustained(side) => Mode::Sustained(side.mirrored()),
             Mode::Stuck(side) => Mode::Stuck(side.mirrored()),
@@ -100,6 +104,8 @@ pub struct Trajectory<'f, const N: usize = 0> {
     origin: Option<Side>,
     /// If the gap is just leaving a wall: the wall, and the order of the root of the distance at this instant.
     from_wall: Option<(Side, usize)>,
+    /// Order of the root of the pushing wall's force at this instant; 0 if the force is not 0.
+    from_force: usize,
     /// Whether the flight that begins here may be a short flight.
     short_flight: bool,
     /// A contact that must be processed first: the motion starts on this wall.
@@ -130,7 +136,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let wall = match self.mode {
             Mode::Free if self.interval == 0 => 0.0,
             Mode::Free => self.flow.wall(side_of(self.interval).mirrored()),
-            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => self.flow.wall(side),
+            Mode::Onset(side) | Mode::Sustained(side) | Mode::Open(side) | Mode::Stuck(side) => {
+                self.flow.wall(side)
+            }
         };
         if self.from_wall.is_none() {
             self.q[0] += shares[0] * (self.q[0] - wall);
@@ -168,7 +176,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Returns the wall of the contact that lasts, if one does.
     pub fn meshing(&self) -> Option<Side> {
         match self.mode {
-            Mode::Free => (self.interval != 0).then(|| side_of(self.interval)),
+            Mode::Free | Mode::Open(_) => (self.interval != 0).then(|| side_of(self.interval)),
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => Some(side),
         }
     }
@@ -266,6 +274,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             self.goal = goal;
             if let Some(side) = self.pending.take() {
                 self.contact(side, observer);
+                self.check_events()?;
             }
             while self.clock.time() < goal {
                 self.step(goal, observer)?;
@@ -297,7 +306,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Fails if the bound on a step overflows, as it does for extreme rates.
     fn check_bounds(&self, linear: &LinearFlow) -> Result<(), Stop> {
         let bound = match self.mode {
-            Mode::Free | Mode::Sustained(_) => &linear.gap_bound,
+            Mode::Free | Mode::Sustained(_) | Mode::Open(_) => &linear.gap_bound,
             Mode::Onset(_) | Mode::Stuck(_) => &linear.pressing_bound,
         };
         let finite = bound.remainder(&self.q, &self.phasor, 1.0).is_finite();
@@ -312,7 +321,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if std::mem::take(&mut self.short_flight) && self.fly_back(linear, until, observer)? {
             return Ok(());
         }
-        let slot = usize::from(self.mode != Mode::Free);
+        let slot = usize::from(self.mode.domain() != DomainKind::Free);
         let mut level = self.level[slot];
         loop {
             self.work.steps += 1;
@@ -385,7 +394,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     #[inline(always)]
     fn clear_step(&mut self, linear: &LinearFlow, step: &Step, until: f64) {
         let remaining = self.clock.remaining(until);
-        self.from_wall = None;
+        (self.from_wall, self.from_force) = (None, 0);
         if step.h < remaining {
             (self.q, self.phasor) = step.end(&self.q, &self.phasor);
             self.clock.advance(step.h);
@@ -405,7 +414,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     #[inline(always)]
     fn move_to(&mut self, linear: &LinearFlow, s: f64, until: f64) {
         self.move_within(linear, s);
-        self.from_wall = None;
+        (self.from_wall, self.from_force) = (None, 0);
         self.clock.set(until);
     }
 
@@ -431,7 +440,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     #[inline(always)]
     fn count_meshing(&mut self, s: f64) {
-        if self.mode != Mode::Free || self.interval != 0 {
+        if self.mode.domain() != DomainKind::Free || self.interval != 0 {
             self.meshing_time += s;
         }
     }

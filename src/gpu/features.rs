@@ -15,6 +15,8 @@ pub struct Features {
     pub stages: bool,
     /// Several walls on one side.
     pub intervals: bool,
+    /// Walls that only push, or that have a preload. No shader has code for these.
+    pub pushing: bool,
 }
 
 impl Features {
@@ -27,6 +29,7 @@ impl Features {
             harmonics: oscillator.harmonics.len() as u32,
             stages: !oscillator.schedule.is_empty(),
             intervals: oscillator.has_outer_walls(),
+            pushing: oscillator.has_pushing_or_preloaded_walls(),
         }
     }
 
@@ -38,6 +41,7 @@ impl Features {
             harmonics: self.harmonics.max(other.harmonics),
             stages: self.stages || other.stages,
             intervals: self.intervals || other.intervals,
+            pushing: self.pushing || other.pushing,
         }
     }
 
@@ -49,6 +53,7 @@ impl Features {
             (self.harmonics > code.harmonics, "more harmonics of the force", "harmonics"),
             (self.stages && !code.stages, "stages", "stages"),
             (self.intervals && !code.intervals, "several walls on one side", "intervals"),
+            (self.pushing, "a wall that only pushes or has a preload", "pushing"),
         ]
         .into_iter()
         .find_map(|(lacks, feature, setting)| lacks.then_some((feature, setting)))

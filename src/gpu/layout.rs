@@ -332,6 +332,7 @@ pub(super) fn contact_code(contact: Contact) -> u32 {
     match contact {
         Contact::Impact => impact,
         Contact::Rigid => rigid,
-        Contact::Elastic => elastic,
+        // Lanes that have walls that only push are refused, `Features::pushing`.
+        Contact::Elastic | Contact::Pushing => elastic,
     }
 }

@@ -66,9 +66,12 @@ fn contact(name: &str, wall: &Wall, [z, w]: [&str; 2]) -> String {
         first.make_ascii_uppercase();
     }
     match &wall.law {
-        WallLaw::Elastic => {
+        WallLaw::Elastic { pulls } => {
             let _ =
                 writeln!(text, "There is no impact: the motion continues behind the wall until {z} returns.");
+            if !pulls {
+                text += "    The wall only pushes: behind it, contact is open while spring, damper and preload would pull.\n";
+            }
         }
         WallLaw::Impact { restitution, mesh_speed } => {
             let lasts = match mesh_speed.as_number() {

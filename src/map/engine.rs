@@ -60,6 +60,12 @@ pub enum EngineError {
         /// The device's message.
         reason: String,
     },
+    /// Lanes have no code for a part of the model.
+    #[error("graphics devices do not compute {feature}, the processor does (--engine cpu)")]
+    NotOnLanes {
+        /// The part, in words.
+        feature: &'static str,
+    },
     /// The device is lost; the engine computes nothing any more.
     #[error("{device} was lost ({reason})")]
     Lost {
@@ -75,6 +81,7 @@ impl EngineError {
     pub fn reason(&self) -> String {
         match self {
             EngineError::OutOfMemory { cells, .. } => format!("no memory for {cells} cells at a time"),
+            EngineError::NotOnLanes { .. } => self.to_string(),
             EngineError::Refused { reason, .. } | EngineError::Lost { reason, .. } => reason.clone(),
         }
     }

@@ -348,6 +348,12 @@ impl Plan {
         self.flows.of(id as usize % self.cell_count())
     }
 
+    /// Whether lanes have no code for a part of the model, which the reference has.
+    pub fn needs_reference(&self) -> bool {
+        let flows = 0..self.flow_count() as u32;
+        flows.into_par_iter().any(|flow| self.oscillator(flow).has_pushing_or_preloaded_walls())
+    }
+
     /// Returns the number of distinct flows.
     pub fn flow_count(&self) -> usize {
         self.flows.count()

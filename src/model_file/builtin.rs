@@ -29,6 +29,7 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("mesh-stiffness", include_str!("../../models/mesh_stiffness.toml")),
     ("meissner", include_str!("../../models/meissner.toml")),
     ("clutch", include_str!("../../models/clutch.toml")),
+    ("backlash", include_str!("../../models/backlash.toml")),
 ];
 
 /// The built-in models, read once. A test shows that each can be read.

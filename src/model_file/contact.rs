@@ -8,7 +8,8 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Keys of `[[contact]]`.
-const CONTACT_KEYS: [&str; 7] = ["side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping"];
+const CONTACT_KEYS: [&str; 9] =
+    ["side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping", "preload", "pull"];
 
 /// A wall.
 #[derive(Clone, Debug)]
@@ -32,16 +33,21 @@ pub enum WallLaw {
         mesh_speed: Expression,
     },
     /// The motion continues behind the wall without a jump.
-    Elastic,
+    Elastic {
+        /// Whether the contact force may pull towards the wall.
+        pulls: bool,
+    },
 }
 
-/// A spring and a damper along the gap row.
+/// A spring, a damper and a preload along the gap row.
 #[derive(Clone, Debug)]
 pub struct WallSpring {
     /// Stiffness.
     pub stiffness: Staged,
     /// Damping.
     pub damping: Staged,
+    /// Force at the wall, positive away from it.
+    pub preload: Staged,
 }
 
 #[derive(Clone, Copy)]
@@ -54,7 +60,8 @@ impl Wall {
     /// Returns the kind of contact.
     pub fn contact(&self) -> Contact {
         match (&self.law, &self.spring) {
-            (WallLaw::Elastic, _) => Contact::Elastic,
+            (WallLaw::Elastic { pulls: true }, _) => Contact::Elastic,
+            (WallLaw::Elastic { pulls: false }, _) => Contact::Pushing,
             (WallLaw::Impact { .. }, Some(_)) => Contact::Impact,
             (WallLaw::Impact { .. }, None) => Contact::Rigid,
         }
@@ -62,7 +69,8 @@ impl Wall {
 
     /// Returns the entries on which the oscillator depends.
     pub(super) fn shaping_oscillator(&self) -> impl Iterator<Item = &Expression> {
-        let spring = self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping]);
+        let spring =
+            self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping, &spring.preload]);
         spring.flat_map(Entry::values).chain([&self.at])
     }
 
@@ -70,7 +78,7 @@ impl Wall {
     pub(super) fn shaping_law(&self) -> impl Iterator<Item = &Expression> {
         let both = match &self.law {
             WallLaw::Impact { restitution, mesh_speed } => Some([restitution, mesh_speed]),
-            WallLaw::Elastic => None,
+            WallLaw::Elastic { .. } => None,
         };
         both.into_iter().flatten()
     }
@@ -94,6 +102,11 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Vec<Wall>; 2
                  the inside to the outside, elastic ones first",
             ));
         }
+        if own.last().is_some_and(|inner| matches!(inner.law, WallLaw::Elastic { pulls: false })) {
+            return Err(field.conflict(
+                "the wall before it on this side has `pull = false`, which only the last wall of a side may have",
+            ));
+        }
         if own.len() == MOST_WALLS {
             return Err(
                 field.conflict("there are already 4 walls on this side; a model has up to 4 on each side")
@@ -113,9 +126,14 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
     let law = section.require("law", "write law = \"impact\" or law = \"elastic\"")?;
     let entry = |name: &str| section.get(name).map(|field| names.entry(&field)).transpose();
     let staged = |name: &str| section.get(name).map(|field| Staged::read(&field, names)).transpose();
-    let (stiffness, damping) = (staged("stiffness")?, staged("damping")?);
+    let (stiffness, damping, preload) = (staged("stiffness")?, staged("damping")?, staged("preload")?);
     let law = match law.choice(&[("impact", LawKind::Impact), ("elastic", LawKind::Elastic)])? {
         LawKind::Impact => {
+            for name in ["preload", "pull"] {
+                if let Some(field) = section.get(name) {
+                    return Err(field.conflict("it needs law = \"elastic\"; remove it, or change the law"));
+                }
+            }
             let restitution = section.require("restitution", "an impact needs one: w+ = -restitution w-")?;
             let restitution = names.entry(&restitution)?;
             WallLaw::Impact { restitution, mesh_speed: entry("mesh_speed")?.unwrap_or_else(Entry::zero) }
@@ -129,12 +147,13 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
                 }
             }
             section.require("stiffness", "an elastic wall needs the stiffness behind it")?;
-            WallLaw::Elastic
+            WallLaw::Elastic { pulls: section.get("pull").map_or(Ok(true), |field| field.flag())? }
         }
     };
     let spring = (stiffness.is_some() || damping.is_some()).then(|| WallSpring {
         stiffness: stiffness.unwrap_or_else(Entry::zero),
         damping: damping.unwrap_or_else(Entry::zero),
+        preload: preload.unwrap_or_else(Entry::zero),
     });
     Ok((which, side, Wall { at, law, spring }))
 }

@@ -197,7 +197,7 @@ fn blame(error: &ModelError) -> (Table, &str) {
         "load" if side.is_some() => (Table::Wall(side), "at"),
         "mesh" => (Table::Wall(side), "mesh_speed"),
         "restitution" => (Table::Wall(side), "restitution"),
-        key @ ("damping" | "stiffness") if side.is_some() => (Table::Wall(side), key),
+        key @ ("damping" | "stiffness" | "preload") if side.is_some() => (Table::Wall(side), key),
         key => (Table::Motion, key),
     }
 }
@@ -248,20 +248,27 @@ impl Definition {
                 damping: matrix(&motion.damping, of),
                 stiffness: matrix(&motion.stiffness, of),
                 load: vector(&motion.load, of),
+                preload: 0.0,
             };
-            let behind = |before: Domain, wall: &Wall, at: f64| match &wall.spring {
-                Some(spring) => with_spring(before, gap, at, of(&spring.stiffness), of(&spring.damping)),
+            let behind = |before: Domain, wall: &Wall, side: Side, at: f64| match &wall.spring {
+                Some(spring) => {
+                    let (stiffness, preload) = (of(&spring.stiffness), of(&spring.preload));
+                    // A missing preload must not change the sign of a zero.
+                    let push = if preload == 0.0 { 0.0 } else { side.sign() * preload };
+                    let constant = stiffness * at - push;
+                    with_spring(before, gap, [stiffness, of(&spring.damping), constant], preload)
+                }
                 None => before,
             };
             let meshing = Side::BOTH.map(|side| {
                 let mut domain = free;
                 let own = &self.walls[side.index()];
                 if let Some(wall) = own.first() {
-                    domain = behind(free, wall, walls[side.index()]);
+                    domain = behind(free, wall, side, walls[side.index()]);
                 }
                 let first = domain;
                 for (wall, outer) in own.iter().skip(1).zip(&mut outer_walls[side.index()]) {
-                    domain = behind(domain, wall, outer.at);
+                    domain = behind(domain, wall, side, outer.at);
                     outer.meshing.push(domain);
                 }
                 first
@@ -309,18 +316,23 @@ impl Definition {
     }
 }
 
-/// Adds a spring with the force `stiffness (z - at)` and a damper along the gap row.
-fn with_spring(free: Domain, gap: [f64; 2], at: f64, stiffness: f64, damping: f64) -> Domain {
+/// Adds the force `stiffness z + damping w - constant` along the gap row.
+fn with_spring(
+    free: Domain,
+    gap: [f64; 2],
+    [stiffness, damping, constant]: [f64; 3],
+    preload: f64,
+) -> Domain {
     let along = |matrix: [[f64; 2]; 2], k: f64| {
         // The product of the gap entries comes first, so that the matrix is exactly symmetric.
         let entry = |i: usize, j: usize| plus(matrix[i][j], k * (gap[i] * gap[j]));
         [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
     };
-    let force = stiffness * at;
     Domain {
         damping: along(free.damping, damping),
         stiffness: along(free.stiffness, stiffness),
-        load: [plus(free.load[0], force * gap[0]), plus(free.load[1], force * gap[1])],
+        load: [plus(free.load[0], constant * gap[0]), plus(free.load[1], constant * gap[1])],
+        preload,
     }
 }
 

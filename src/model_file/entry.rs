@@ -9,7 +9,7 @@ use crate::text::section::{Field, Section};
 const CONSTANT: &str = "entries are constants of a cell; time enters only through `frequency` and `stages`, coordinates do not enter";
 
 /// Lists with one value for each stage, for messages.
-const LISTS: &str = "a list with one value for each stage belongs to stiffness, damping and load";
+const LISTS: &str = "a list with one value for each stage belongs to stiffness, damping, load and preload";
 
 /// An entry of stiffness, damping or load: one value, or one for each stage.
 #[derive(Clone, Debug)]

@@ -23,9 +23,23 @@ pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
         for (nth, wall) in (1..).zip(walls) {
             let name = wall_name(side, nth, walls.len());
             match (wall.contact(), &wall.spring) {
-                (Contact::Impact | Contact::Elastic, Some(spring)) => {
-                    forces.push(product(&spring.stiffness, &format!("({})", minus(z, &wall.at))));
-                    forces.push(product(&spring.damping, w));
+                (contact @ (Contact::Impact | Contact::Elastic | Contact::Pushing), Some(spring)) => {
+                    let preload = match side {
+                        Side::Right => constant(&spring.preload),
+                        Side::Left => negated(&spring.preload),
+                    };
+                    let own = [
+                        product(&spring.stiffness, &format!("({})", minus(z, &wall.at))),
+                        product(&spring.damping, w),
+                        preload,
+                    ];
+                    match contact {
+                        Contact::Pushing => {
+                            let larger = if side == Side::Right { "max" } else { "min" };
+                            forces.push(Some(format!("{larger}(0, {})", sum(own))));
+                        }
+                        _ => forces.extend(own),
+                    }
                     lines.push(format!("behind {name}, with N = {}", sum(forces.clone())));
                     lines.extend(equations(definition, Some("N")).map(|line| format!("    {line}")));
                 }
@@ -160,6 +174,18 @@ fn constant(load: &impl Entry) -> Option<String> {
     match same(load) {
         Some(one) => (one.as_number() != Some(0.0)).then(|| text(one)),
         None => Some(list(load)),
+    }
+}
+
+/// Returns the negative of an entry; none if the entry is 0.
+fn negated(entry: &impl Entry) -> Option<String> {
+    match same(entry) {
+        Some(one) => match one.as_number() {
+            Some(0.0) => None,
+            Some(number) => Some((-number).to_string()),
+            None => Some(format!("-{}", factor(one))),
+        },
+        None => Some(format!("-{}", list(entry))),
     }
 }
 

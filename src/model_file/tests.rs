@@ -104,8 +104,12 @@ fn all_fields_of_a_file_are_read() {
     assert_eq!(oscillator.force, [6.0, 0.0]);
     assert_eq!(oscillator.walls, [0.2, f64::NEG_INFINITY]);
     assert_eq!(oscillator.contacts[0], Contact::Rigid);
-    let free =
-        Domain { damping: [[0.5, 0.0], [0.0; 2]], stiffness: [[1.0, 0.0], [0.0; 2]], load: [-0.5, 0.0] };
+    let free = Domain {
+        damping: [[0.5, 0.0], [0.0; 2]],
+        stiffness: [[1.0, 0.0], [0.0; 2]],
+        load: [-0.5, 0.0],
+        preload: 0.0,
+    };
     assert_eq!(oscillator.free, free);
     assert_eq!(model.law(), Law { restitution: [0.8, 0.0], mesh_speed: [0.0; 2] });
     let mut other = model.clone();
@@ -272,6 +276,60 @@ fn a_side_may_have_several_walls() {
 }
 
 #[test]
+fn a_wall_may_only_push_and_have_a_preload() {
+    let wall = |side: &str, rest: &str| {
+        format!(
+            "[[contact]]\nside = '{side}'\nat = 'd'\nlaw = 'elastic'\nstiffness = 'k'\ndamping = 'c'\n{rest}\n"
+        )
+    };
+    let (motion, _) = TWO_DEGREES.split_once("[[contact]]").unwrap();
+    let with = |walls: &[String]| format!("{motion}{}", walls.concat());
+    let model = read(&with(&[
+        wall("right", "pull = false\npreload = 'c'"),
+        wall("left", "preload = 0.25").replace("'d'", "'-d'"),
+    ]));
+    let o = model.oscillator().unwrap();
+    assert_eq!(o.contacts, [Contact::Pushing, Contact::Elastic]);
+    let [k, c, d] = ["k", "c", "d"]
+        .map(|name| model.value(model.parameters().iter().position(|p| p.name == name).unwrap()));
+    assert_eq!([o.meshing[0].preload, o.meshing[1].preload], [c, 0.25]);
+    // The spring adds k at g to the load, and the preload pushes away from the wall.
+    let added = |i: usize, j: usize| o.meshing[i].load[j] - o.free.load[j];
+    let pushes = [k * d - c, -k * d + 0.25];
+    for (i, push) in pushes.into_iter().enumerate() {
+        let off = (0..2).map(|j| (added(i, j) - push * o.gap[j]).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-14, "{:?}", o.meshing[i]);
+    }
+    let lines = model.equations();
+    for line in [
+        "behind the right wall, with N = max(0, k (z - d) + c w + c)",
+        "behind the left wall, with N = k (z + d) + c w - 0.25",
+    ] {
+        assert!(lines.iter().any(|known| known == line), "{lines:#?}");
+    }
+    let message = |walls: &[String]| FileModel::parse(&with(walls), "m.toml").unwrap_err().to_string();
+    let inner = message(&[wall("right", "pull = false"), wall("right", "").replace("'d'", "'2*d'")]);
+    assert!(
+        inner.contains(
+            "`contact.1.side = 'right'` does not fit: the wall before it on this side has `pull = false`"
+        ),
+        "{inner}"
+    );
+    let hard = "[[contact]]\nside = 'right'\nat = 'd'\nlaw = 'impact'\nrestitution = 0.5\n".to_owned();
+    for entry in ["pull = false", "preload = 1"] {
+        let error = message(&[format!("{hard}{entry}\n")]);
+        assert!(
+            error.contains(&format!("`contact.0.{entry}` does not fit: it needs law = \"elastic\"")),
+            "{error}"
+        );
+    }
+    assert!(
+        message(&[wall("right", "pull = 1")])
+            .contains("`contact.0.pull = 1` has the wrong type: it must be true or false")
+    );
+}
+
+#[test]
 fn velocities_and_the_gap_have_the_units_of_coordinates_and_time() {
     let units = |of_coordinates: &str, gap: &str| {
         let with = TWO_DEGREES.replace("[motion]", &format!("[motion]\n{of_coordinates}"));
@@ -423,7 +481,7 @@ order = 2 | | `harmonic.1.order` is missing; write order = 2 for twice the frequ
 sin = ["-2*F"] | | `harmonic.1.cos` is missing; a harmonic needs cos, sin or both
 sin = ["-2*F"] | tan = [1] | unknown field `harmonic.1.tan = [1]`; valid names: order, cos, sin
 sin = ["-2*F"] | sin = [1, 2] | `harmonic.1.sin = [1, 2]` is out of range
-sin = ["-2*F"] | sin = [[1, 2]] | `harmonic.1.sin.0 = [1, 2]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping and load
+sin = ["-2*F"] | sin = [[1, 2]] | `harmonic.1.sin.0 = [1, 2]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping, load and preload
 sin = ["-2*F"] | sin = ["sin(2*t)"] | `t` is the time
 sin = ["-2*F"] | sin = ["1/0"] | m.toml:36:7: `harmonic.1.sin = ["1/0"]` does not fit: at the defaults of stop, sine of harmonic 2 = inf
 cos = ["F/s"] | cos = ["log(-1)"] | m.toml:31:7: `harmonic.0.cos = ["log(-1)"]` does not fit: at the defaults of stop, cosine of harmonic 4 = NaN
@@ -488,6 +546,7 @@ fn stages_have_their_own_domains() {
         damping: [[damping, 0.0], [0.0, 1.0]],
         stiffness: [[stiffness, -1.0], [-1.0, 5.0]],
         load: [0.0, load],
+        preload: 0.0,
     };
     assert_eq!([oscillator.free, second.free], [domain(0.5, 4.0, 0.25), domain(1.0, 3.0, -0.25)]);
     // The spring adds k g g' to the stiffness and k at g to the load.
@@ -555,7 +614,7 @@ stages = [0, "eps - 1"] | stages = [0.5, "eps - 1"] | phase at which stage 2 beg
 gap = [1, -1] | gap = [1, -1]\nrepeat = 0 | `motion.repeat = 0` is out of range: it must be a whole number from 1 to 512
 gap = [1, -1] | gap = [1, -1]\nrepeat = 2.5 | `motion.repeat = 2.5` has the wrong type: it must be a whole number
 [0, ["F", "-F"]] | [["F", "-F"]] | `motion.load = [["F", "-F"]]` is out of range: it must be amplitudes of one harmonic, or constant loads: a list of two entries, one for each coordinate; an entry may be a list with one value for each stage
-[[1, 0], [0, 2]] | [[[1, 2], 0], [0, 2]] | m.toml:12:10: `motion.mass.0.0 = [1, 2]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping and load
+[[1, 0], [0, 2]] | [[[1, 2], 0], [0, 2]] | m.toml:12:10: `motion.mass.0.0 = [1, 2]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping, load and preload
 at = 0.5 | at = [0.5, 1] | `contact.0.at = [0.5, 1]` has the wrong type: it must be one number or expression; a list
 restitution = 0.5 | restitution = [0.5, 1] | `contact.1.restitution = [0.5, 1]` has the wrong type: it must be one number or expression; a list
 "10*k2"] | "10*k2", 1] | m.toml:24:13: `contact.0.stiffness = ["10*k1", "10*k2", 1]` is out of range: it must be one value, or a list of 2 values

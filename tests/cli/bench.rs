@@ -12,6 +12,7 @@ fn rows(path: &std::path::Path) -> Vec<Row> {
 }
 
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn every_engine_is_measured_and_agrees() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {

@@ -227,6 +227,7 @@ fn the_cells_of_a_lost_card_go_to_the_other() {
 
 /// The script measures several cards only where there are some.
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn all_cards_are_measured_against_one() {
     let Some(machine) = Machine::new() else { return };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/measure_gpu.sh");

@@ -35,6 +35,7 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
         damping: [[2.0 * ZETA + c, -c], [-c, c]],
         stiffness: [[1.0 + k, -k], [-k, k]],
         load: [0.0; 2],
+        preload: 0.0,
     };
     let oscillator = Oscillator {
         degrees: 2,
@@ -96,8 +97,12 @@ pub(crate) const SINK: Damper = Damper {
 impl Damper {
     pub(crate) fn pair(&self) -> (Oscillator, Law) {
         let first = |value: f64| [[value, 0.0], [0.0; 2]];
-        let domain =
-            Domain { damping: first(self.damping), stiffness: first(self.stiffness), load: [0.0; 2] };
+        let domain = Domain {
+            damping: first(self.damping),
+            stiffness: first(self.stiffness),
+            load: [0.0; 2],
+            preload: 0.0,
+        };
         let oscillator = Oscillator {
             degrees: 2,
             mass: [[self.mass, 0.0], [0.0, self.free_mass]],

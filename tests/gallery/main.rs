@@ -7,6 +7,7 @@
 mod common;
 mod cycle;
 
+mod backlash;
 mod ball;
 mod clearance;
 mod clutch;

@@ -361,6 +361,7 @@ fn lanes_in_f32_agree_on_random_models() {
 }
 
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn lanes_in_f64_agree_on_random_models() {
     lanes_agree(Precision::F64, 0..400, TOLERATED);
 }

@@ -123,6 +123,7 @@ fn differences(
 }
 
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn stopping_early_changes_no_class_of_the_plane() {
     check_plane(By::Reference, 96);
     check_plane(By::Lanes(Precision::F64), 40);

@@ -147,6 +147,7 @@ fn the_published_basins_have_the_published_shares() {
 
 /// A force with a sine and a cosine at another start phase give the same cycles on every engine.
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn engines_agree_on_a_sine_and_on_a_start_phase() {
     const SIDE: u32 = 16;
     let (cosine, phase) = under_cosine(SOUZA);

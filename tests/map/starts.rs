@@ -314,6 +314,7 @@ fn bytes(out: &Path, names: &[&str]) -> Vec<Vec<u8>> {
 }
 
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn files_describe_the_starts_and_resume_to_equal_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -70,6 +70,7 @@ fn check_other_planes(side: u32) {
 }
 
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn other_planes_are_classified_as_the_reference_does() {
     check_other_planes(11);
 }

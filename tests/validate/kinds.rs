@@ -106,6 +106,7 @@ fn in_coordinates(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
         damping: congruent(domain.damping),
         stiffness: congruent(domain.stiffness),
         load: covariant(domain.load),
+        preload: 0.0,
     };
     Oscillator {
         mass: congruent(o.mass),

@@ -420,6 +420,7 @@ fn finds_a_wrong_threshold_in_lanes(precision: Precision) {
 }
 
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn a_threshold_that_is_off_by_a_hundredth_is_found() {
     finds_a_wrong_threshold_in_lanes(Precision::F32);
 }
@@ -670,6 +671,7 @@ fn a_validation_without_a_recomputed_cell_fails() {
 
 /// Another device than the map's may round differently, so the result names it.
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn the_result_names_a_device_other_than_the_maps() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("o");

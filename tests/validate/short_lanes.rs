@@ -134,6 +134,7 @@ fn gears_at_rest_are_released_at_rest() {
 /// The meshing speed is almost zero in units of a lane's step, but not in those of the motion: there are 240 impacts per
 /// period. A lane that judged by its step replaced 83 of them by the limit of an infinite series.
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn a_negligible_meshing_speed_does_not_depend_on_the_step() {
     check_both(&first_plan("slow"), |record, _| (record.impacts_per_period - 240.5).abs() < 1e-9);
 }
@@ -141,6 +142,7 @@ fn a_negligible_meshing_speed_does_not_depend_on_the_step() {
 /// Supports and teeth are so damped that a mode decays by the full damping. A step of one radian of half the damping left
 /// 4e-6 of that mode to terms that single precision omits.
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn damped_modes_are_summed_to_rounding() {
     let [scattered, exact] = plans("damped", 2).try_into().ok().unwrap();
     let record = lane(&exact, Precision::F32);

@@ -105,7 +105,7 @@ mod tests {
     fn the_sixth_derivative_of_the_gap_stays_within_its_bound() {
         let good = GearPair::paper(0.5).oscillator().unwrap();
         let with = |damping, stiffness| {
-            let free = Domain { damping, stiffness, load: [1.0, -2.0] };
+            let free = Domain { damping, stiffness, load: [1.0, -2.0], preload: 0.0 };
             Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..good.clone() }
         };
         let passive = [[30.0, 4.0], [4.0, 11.0]];

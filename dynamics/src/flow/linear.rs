@@ -107,6 +107,11 @@ impl LinearFlow {
         LinearFlow::assemble(oscillator, generator, rate, pressing, bounds)
     }
 
+    /// Returns the bound on `z^(n+1)` in a domain, which must be the one of this flow.
+    pub(super) fn energy_bound(&self, oscillator: &Oscillator, domain: &Domain, n: u32) -> EnergyBound {
+        EnergyBound::new(oscillator, domain, &self.table[n as usize - 1], n, self.unit)
+    }
+
     /// Builds the flow of a gap at rest on a rigid wall, while the other displacement moves. Its
     /// [`acceleration`](Self::acceleration) is the one that the wall cancels.
     pub(super) fn on_rigid_wall(oscillator: &Oscillator, kick: f64) -> LinearFlow {

@@ -44,11 +44,13 @@ impl GearPair {
             damping: [[self.r1, 0.0], [0.0, self.r2]],
             stiffness: [[self.k1, 0.0], [0.0, self.k2]],
             load: [0.0, 0.0],
+            preload: 0.0,
         };
         let meshing = |sign: f64| Domain {
             damping: [[self.r1 + self.r, -self.r], [-self.r, self.r2 + self.r]],
             stiffness: [[self.k1 + self.k, -self.k], [-self.k, self.k2 + self.k]],
             load: [sign * self.k * self.b, -sign * self.k * self.b],
+            preload: 0.0,
         };
         let oscillator = Oscillator {
             degrees: 2,

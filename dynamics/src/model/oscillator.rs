@@ -86,6 +86,9 @@ pub struct Domain {
     pub stiffness: [[f64; 2]; 2],
     /// Constant load.
     pub load: [f64; 2],
+    /// In contact with an elastic wall: the part of the contact force that begins at the wall, positive away from the wall.
+    /// [`load`](Self::load) includes it. Otherwise 0.
+    pub preload: f64,
 }
 
 /// Lower bound of [`Oscillator::length_scale`], which must not be zero.
@@ -111,6 +114,15 @@ pub enum Contact {
     Rigid,
     /// No impact: the motion continues behind the wall, and the state is continuous.
     Elastic,
+    /// An elastic wall that only pushes: behind the wall, its force is the larger of 0 and that of spring, damper and preload.
+    Pushing,
+}
+
+impl Contact {
+    /// Whether the motion continues behind the wall without an impact.
+    pub fn is_elastic(self) -> bool {
+        matches!(self, Contact::Elastic | Contact::Pushing)
+    }
 }
 
 /// One harmonic of the force: `cos cos(order omega t) + sin sin(order omega t)`.
@@ -295,13 +307,14 @@ impl Oscillator {
             _ => outer[wall - 2].meshing[0],
         };
         let next = &outer[nth - 1];
-        let mut interval = Oscillator { free: domain(nth), outer_walls: Default::default(), ..self.clone() };
+        let free = Domain { preload: 0.0, ..domain(nth) };
+        let mut interval = Oscillator { free, outer_walls: Default::default(), ..self.clone() };
         interval.walls[i] = next.at;
         interval.walls[1 - i] = if nth == 1 { self.walls[i] } else { outer[nth - 2].at };
         interval.contacts[i] = next.contact;
         interval.contacts[1 - i] = Contact::Elastic;
         interval.meshing[i] = next.meshing[0];
-        interval.meshing[1 - i] = domain(nth - 1);
+        interval.meshing[1 - i] = Domain { preload: domain(nth).preload, ..domain(nth - 1) };
         interval
     }
 
@@ -320,6 +333,17 @@ impl Oscillator {
     /// Whether a side has several walls.
     pub fn has_outer_walls(&self) -> bool {
         self.outer_walls.iter().any(|walls| !walls.is_empty())
+    }
+
+    /// Whether a wall only pushes or has a preload, in any stage.
+    pub fn has_pushing_or_preloaded_walls(&self) -> bool {
+        let side_has = |side: Side| {
+            let outer = &self.outer_walls[side.index()];
+            let stages = (0..self.stage_count()).map(|stage| self.stage(stage).meshing[side.index()]);
+            let mut domains = stages.chain(outer.iter().flat_map(|wall| wall.meshing.iter().copied()));
+            self.last_wall(side).1 == Contact::Pushing || domains.any(|domain| domain.preload != 0.0)
+        };
+        Side::BOTH.into_iter().any(|side| self.wall(side).is_finite() && side_has(side))
     }
 
     /// Returns position and law of the last wall of a side, from the inside to the outside. A missing wall is infinitely far.
@@ -508,7 +532,8 @@ impl Oscillator {
                 count as f64,
                 "at most 4",
             )?;
-            let mut inner = (self.wall(side), self.is_elastic(side));
+            let mut inner =
+                (self.wall(side), self.is_elastic(side) && self.contacts[side.index()] == Contact::Elastic);
             for (nth, wall) in (2..).zip(outer) {
                 let beyond = side.sign() * (wall.at - inner.0);
                 finite(|| format!("position of {}", name(nth)), wall.at)?;
@@ -518,7 +543,7 @@ impl Oscillator {
                     wall.at,
                     "farther out than the wall before it",
                 )?;
-                let elastic = "elastic, because another wall lies behind it";
+                let elastic = "elastic, with a force that may pull, because another wall lies behind it";
                 require(inner.1, || name(nth - 1), inner.0, elastic)?;
                 inner = (wall.at, wall.contact == Contact::Elastic);
                 let stages = "one for each stage";
@@ -587,7 +612,12 @@ impl Oscillator {
 
     /// Whether a wall exists and is elastic.
     pub(crate) fn is_elastic(&self, side: Side) -> bool {
-        self.wall(side).is_finite() && self.contacts[side.index()] == Contact::Elastic
+        self.wall(side).is_finite() && self.contacts[side.index()].is_elastic()
+    }
+
+    /// Returns the preload of an elastic wall; 0 for other walls.
+    pub fn preload(&self, side: Side) -> f64 {
+        if self.is_elastic(side) { self.meshing[side.index()].preload } else { 0.0 }
     }
 
     /// Returns the stiffness and damping that a wall adds along the gap row; 0 if no motion continues behind it.
@@ -627,7 +657,7 @@ impl Oscillator {
     }
 
     /// Checks that spring and damper behind a wall are not negative. An elastic wall must act along the gap row only, and the
-    /// force must be continuous at the wall.
+    /// force must be continuous at the wall, but for the preload.
     fn validate_wall(&self, side: Side, place: &str) -> Result<(), OscillatorError> {
         let (behind, free, g) = (&self.meshing[side.index()], &self.free, self.gap);
         let [stiffness, damping] = self.wall_stiffness_and_damping(side);
@@ -650,17 +680,24 @@ impl Oscillator {
             }
         }
         if !self.is_elastic(side) {
-            return Ok(());
+            let requirement = "0, because the wall is not elastic";
+            return require(
+                behind.preload == 0.0,
+                || format!("preload in {place}"),
+                behind.preload,
+                requirement,
+            );
         }
         let wall = self.wall(side);
         // The stiffness is a difference of matrices, and has the rounding error of their largest entry.
         let largest = behind.stiffness.as_flattened().iter().fold(0.0f64, |size, x| size.max(x.abs()));
         let least = largest / (g[0] * g[0] + g[1] * g[1]);
         for (i, g) in g.into_iter().enumerate() {
-            let expected = free.load[i] + stiffness * wall * g;
-            let size = free.load[i].abs() + (stiffness.max(least) * wall * g).abs();
+            let push = side.sign() * behind.preload * g;
+            let expected = free.load[i] + stiffness * wall * g - push;
+            let size = free.load[i].abs() + (stiffness.max(least) * wall * g).abs() + push.abs();
             let is_continuous = (behind.load[i] - expected).abs() <= MATRIX_TOLERANCE * size;
-            let requirement = "the load of free motion and the spring's at the wall";
+            let requirement = "the load of free motion, the spring's at the wall and the preload";
             require(is_continuous, || format!("load {} in {place}", i + 1), behind.load[i], requirement)?;
         }
         Ok(())
@@ -694,7 +731,7 @@ impl Oscillator {
     /// It is half the distance of the walls. If a wall is missing or both coincide, it is
     ///
     /// ```text
-    /// max(|wall|, |D force|, |D load|),   D = (|K| + omega^2 M)^-1
+    /// max(|wall|, |D force|, |D load|, |D preload g|),   D = (|K| + omega^2 M)^-1
     /// ```
     ///
     /// over the existing walls and both displacements, with [`|K|`](Self::energy_stiffness) and `load` of free motion. `|D force|` is the amplitude
@@ -726,7 +763,11 @@ impl Oscillator {
         }
         let deflections = [0, 1].map(|i| swings[i].max(load[i].abs()));
         let walls = self.walls.map(f64::abs).into_iter().filter(|wall| wall.is_finite());
-        walls.chain(deflections).fold(LEAST_LENGTH, f64::max)
+        let preloads = self.domains().filter(|domain| domain.preload != 0.0);
+        let preloads = preloads.flat_map(|domain| {
+            self.deflections(self.gap.map(|g| domain.preload * g), self.omega).map(f64::abs)
+        });
+        walls.chain(deflections).chain(preloads).fold(LEAST_LENGTH, f64::max)
     }
 
     fn deflections(&self, force: [f64; 2], omega: f64) -> [f64; 2] {
@@ -809,6 +850,7 @@ impl Domain {
             let quantity = format!("stiffness in {place}");
             return Err(OscillatorError::NotSymmetric { quantity, matrix });
         }
+        finite(|| format!("preload in {place}"), self.preload)?;
         self.load.into_iter().try_for_each(|load| finite(|| format!("load in {place}"), load))
     }
 }

@@ -34,6 +34,7 @@ impl Stops {
             damping: first(self.r + self.stop_damping),
             stiffness: first(self.k + self.stop_stiffness),
             load: [sign * self.stop_stiffness * self.b, 0.0],
+            preload: 0.0,
         };
         let oscillator = Oscillator {
             degrees: 1,
@@ -48,7 +49,7 @@ impl Stops {
             stages: Vec::new(),
             schedule: Vec::new(),
             outer_walls: Default::default(),
-            free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0] },
+            free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0], preload: 0.0 },
             meshing: [stop(1.0), stop(-1.0)],
         };
         oscillator.validate()?;

@@ -5,7 +5,6 @@
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
 use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule};
-use crate::model::Contact;
 use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory, side_of};
 
 /// Nodes in `(0, 1)` and weights of the Gauss-Legendre quadrature on `[-1, 1]`; the other half is symmetric.
@@ -323,7 +322,18 @@ impl<'f> Meter<'f> {
     fn ends_series(&self, event: &GapEvent) -> bool {
         event.kind == EventKind::MeshStart
             && event.before == event.after
-            && self.flow.contacts[event.side.index()] != Contact::Elastic
+            && !self.flow.contacts[event.side.index()].is_elastic()
+    }
+
+    /// Returns the energy of a wall's spring and preload at an event.
+    fn stored(&self, event: &GapEvent) -> f64 {
+        let (side, flow) = (event.side, self.flow);
+        let depth = event.before[0] - flow.wall(side);
+        let of_spring = 0.5 * flow.wall_force(side)[0] * depth * depth;
+        match flow.oscillator.preload(side) {
+            0.0 => of_spring,
+            preload => of_spring + preload * depth.abs(),
+        }
     }
 
     /// Counts the energy that a contact takes at an instant.
@@ -331,9 +341,10 @@ impl<'f> Meter<'f> {
         let (side, flow) = (event.side, self.flow);
         let kinetic = |w: f64| 0.5 * w * w / flow.compliance();
         if event.kind == EventKind::MeshEnd {
-            let depth = event.before[0] - flow.wall(side);
-            self.lost += 0.5 * flow.wall_force(side)[0] * depth * depth;
-        } else if flow.contacts[side.index()] != Contact::Elastic {
+            self.lost += self.stored(event);
+        } else if flow.contacts[side.index()].is_elastic() {
+            self.lost -= self.stored(event);
+        } else {
             if self.ends_series(event) {
                 // The series has taken the energy with which the gap left the wall.
                 self.lost += kinetic(self.q[1]);

@@ -22,7 +22,8 @@ impl<const N: usize> Trajectory<'_, N> {
                 beyond = 0.0;
             }
             if beyond > 0.0 {
-                self.mode = Mode::Sustained(side);
+                self.mode = if self.closes(side) { Mode::Sustained(side) } else { Mode::Open(side) };
+                self.start_from_force(side);
                 self.origin = Some(side);
             } else if beyond == 0.0 {
                 self.origin = Some(side);
@@ -47,9 +48,12 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.mode = Mode::Sustained(side);
                 self.from_wall = Some((side, 1));
             }
-            Crossing::MeshEnds(side) if self.flow.contacts[side.index()] == Contact::Elastic => {
+            Crossing::MeshEnds(side) if self.flow.contacts[side.index()].is_elastic() => {
                 self.come_out(side, observer);
             }
+            Crossing::ForceEnds(side) => self.open(side, observer),
+            Crossing::ForceBegins(side) => self.close(side, observer),
+            Crossing::Returns(side) => self.come_back(side, observer),
             Crossing::MeshEnds(side) => {
                 self.q[0] = self.flow.wall(side);
                 let rate = self.q[1];
@@ -93,7 +97,7 @@ impl<const N: usize> Trajectory<'_, N> {
         observer: &mut impl Observer,
     ) -> bool {
         match contact {
-            Contact::Elastic => self.go_behind(side, observer),
+            Contact::Elastic | Contact::Pushing => self.go_behind(side, observer),
             Contact::Rigid if self.sticks(side) => self.stick(side, observer),
             Contact::Impact | Contact::Rigid => return false,
         }
@@ -212,10 +216,14 @@ impl<const N: usize> Trajectory<'_, N> {
         let contact = |side: Side| Some(if side == Side::Right { b'1' } else { b'4' });
         let symbol = match (self.mode, self.origin) {
             (Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side), _) => contact(side),
-            (Mode::Free, _) if self.interval != 0 => contact(side_of(self.interval)),
-            (Mode::Free, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
-            (Mode::Free, Some(Side::Left)) => Some(if side == Side::Left { b'5' } else { b'6' }),
-            (Mode::Free, None) => None,
+            (Mode::Free | Mode::Open(_), _) if self.interval != 0 => contact(side_of(self.interval)),
+            (Mode::Free | Mode::Open(_), Some(Side::Right)) => {
+                Some(if side == Side::Right { b'2' } else { b'3' })
+            }
+            (Mode::Free | Mode::Open(_), Some(Side::Left)) => {
+                Some(if side == Side::Left { b'5' } else { b'6' })
+            }
+            (Mode::Free | Mode::Open(_), None) => None,
         };
         self.origin = Some(side);
         self.work.events += 1;
@@ -235,7 +243,7 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Corrects a start of a step that rounding has put on or beyond its boundary, as when an event lies within
     /// rounding of the strobe. Returns whether there was anything to correct.
     pub(super) fn settle_start(&mut self, observer: &mut impl Observer) -> bool {
-        if self.from_wall.is_some() {
+        if self.from_wall.is_some() || self.from_force > 0 {
             return false;
         }
         match self.mode {
@@ -244,9 +252,22 @@ impl<const N: usize> Trajectory<'_, N> {
                 let Some(side) = Side::BOTH.into_iter().find(|&side| beyond(side)) else { return false };
                 self.touch(side, observer);
             }
+            Mode::Open(side) => {
+                if side.sign() * (self.q[0] - self.flow.wall(side)) <= 0.0 {
+                    self.act(Crossing::Returns(side), observer);
+                } else if self.closes(side) {
+                    self.act(Crossing::ForceBegins(side), observer);
+                } else {
+                    return false;
+                }
+            }
             Mode::Sustained(side) => {
                 if side.sign() * (self.q[0] - self.flow.wall(side)) > 0.0 {
-                    return false;
+                    if self.closes(side) {
+                        return false;
+                    }
+                    self.act(Crossing::ForceEnds(side), observer);
+                    return true;
                 }
                 if side.sign() * self.q[1] > 0.0 {
                     self.act(Crossing::OnsetEnds(side), observer);
@@ -303,7 +324,10 @@ impl<const N: usize> Trajectory<'_, N> {
         let [right, left] = self.flow.walls.map(|wall| (self.q[0] - wall).abs());
         let nearer = if right <= left { Side::Right } else { Side::Left };
         let is_let_go = self.from_wall == Some((nearer, RELEASE_ORDER));
-        if self.flow.contacts[nearer.index()] != Contact::Elastic && !is_let_go {
+        if self.flow.contacts[nearer.index()].is_elastic() {
+            // A preload makes the force jump at the wall.
+            self.near_grazing |= self.flow.preloads[nearer.index()] != [0.0; 2];
+        } else if !is_let_go {
             self.near_grazing = true;
         }
     }
@@ -326,7 +350,7 @@ impl<const N: usize> Trajectory<'_, N> {
         } else {
             self.clock.set(until);
         }
-        self.from_wall = None;
+        (self.from_wall, self.from_force) = (None, 0);
         self.settle_start(observer);
     }
 }

@@ -4,8 +4,10 @@
 //! saltation matrix `w` cancels: it is `S = I - c M^-1 g n^T` on the way in and `S = I + c M^-1 g n^T` on the way
 //! out, exactly and at any speed. So a crossing of an elastic wall is never too near to grazing, and without a damper
 //! the strobe map is continuously differentiable there.
+//!
+//! A preload `p` makes the force jump at the wall. In the saltation matrix `c + s p / w` then takes the place of `c`.
 
-use super::{EventKind, Observer, Trajectory, side_of};
+use super::{EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, Mode, NO_SPEED, Observer, Trajectory, side_of};
 use crate::flow::DomainKind;
 use crate::model::Side;
 
@@ -21,13 +23,27 @@ impl<const N: usize> Trajectory<'_, N> {
             self.leave(side);
             return;
         }
-        self.cross_damper(side, -1.0);
+        if !self.closes(side) {
+            self.mode = Mode::Open(side);
+            self.from_wall = Some((side, if closing > 0.0 { 1 } else { self.rest_order(DomainKind::Free) }));
+            self.start_from_force(side);
+            return;
+        }
+        if closing == 0.0
+            && self.flow.preloads[side.index()] != [0.0; 2]
+            && !self.presses(DomainKind::Meshing(side), side, &self.q)
+        {
+            // Rest on the wall under a load below the preload is an infinite series of contacts.
+            self.events_in_period = EVENTS_PER_PERIOD_CAP;
+        }
+        self.jump_at_wall(side, -1.0);
         if self.flow_continues(side) {
             self.pass(side, observer);
             return;
         }
         self.record(EventKind::MeshStart, side, self.q, observer);
         self.start_meshing(side, 0.0);
+        self.start_from_force(side);
         if closing > 0.0 {
             self.from_wall = Some((side, 1));
         }
@@ -41,7 +57,7 @@ impl<const N: usize> Trajectory<'_, N> {
             self.from_wall = Some((side, self.rest_order(DomainKind::Meshing(side))));
             return;
         }
-        self.cross_damper(side, 1.0);
+        self.jump_at_wall(side, 1.0);
         self.record(EventKind::MeshEnd, side, self.q, observer);
         self.leave(side);
     }
@@ -64,9 +80,17 @@ impl<const N: usize> Trajectory<'_, N> {
         self.leave(side.mirrored());
     }
 
-    /// Applies `S u = u + sign c M^-1 g (n . u)` to every tangent vector.
-    fn cross_damper(&mut self, side: Side, sign: f64) {
-        let [on_gap, on_other] = self.flow.dampers[side.index()].map(|damper| sign * damper);
+    /// Applies `S u = u + sign (c + s p / w) M^-1 g (n . u)` to every tangent vector.
+    fn jump_at_wall(&mut self, side: Side, sign: f64) {
+        let [mut on_gap, mut on_other] = self.flow.dampers[side.index()].map(|damper| sign * damper);
+        let (preloads, rate) = (self.flow.preloads[side.index()], self.q[1]);
+        if preloads != [0.0; 2] {
+            self.near_grazing |= rate.abs() < GRAZING_SPEED * self.flow.speed;
+            if rate.abs() >= NO_SPEED * self.flow.speed {
+                on_gap += sign * preloads[0] / rate;
+                on_other += sign * preloads[1] / rate;
+            }
+        }
         self.tangents = self.tangents.map(|[z, w, x, v]| [z, w + on_gap * z, x, v + on_other * z]);
     }
 }

@@ -41,7 +41,7 @@ impl<const N: usize> Trajectory<'_, N> {
             if self.before(crossing, linear, &expansion.state(v), &expansion.phasor(linear.turn * v)) {
                 self.move_along(linear, &expansion, u);
                 self.count_meshing(remaining);
-                self.from_wall = None;
+                (self.from_wall, self.from_force) = (None, 0);
                 self.clock.set(until);
                 return Ok(());
             }
@@ -55,7 +55,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.move_along(linear, &expansion, u);
         self.clock.advance(s);
         self.count_meshing(s);
-        self.from_wall = None;
+        (self.from_wall, self.from_force) = (None, 0);
         self.act(crossing, observer);
         self.check_events()
     }
@@ -67,7 +67,11 @@ impl<const N: usize> Trajectory<'_, N> {
             Crossing::Contact(side) | Crossing::OnsetEnds(side) => {
                 side.sign() * (q[0] - self.flow.wall(side)) < 0.0
             }
-            Crossing::MeshEnds(side) => side.sign() * (q[0] - self.flow.wall(side)) > 0.0,
+            Crossing::MeshEnds(side) | Crossing::Returns(side) => {
+                side.sign() * (q[0] - self.flow.wall(side)) > 0.0
+            }
+            Crossing::ForceEnds(side) => self.wall_force(side, linear, q, phasor)[0] > 0.0,
+            Crossing::ForceBegins(side) => self.wall_force(side, linear, q, phasor)[0] < 0.0,
             Crossing::Through(side) => side.sign() * (q[0] - self.flow.wall(side.mirrored())) > 0.0,
             Crossing::PressingEnds(side) => side.sign() * linear.acceleration(q, phasor) > 0.0,
         }
@@ -92,7 +96,10 @@ impl<const N: usize> Trajectory<'_, N> {
             self.work.root_iterations += 1;
             let expansion = linear.grid.expansion(&self.q, &self.phasor, u);
             let root = match crossing {
-                Crossing::Contact(side) | Crossing::OnsetEnds(side) | Crossing::MeshEnds(side) => {
+                Crossing::Contact(side)
+                | Crossing::OnsetEnds(side)
+                | Crossing::MeshEnds(side)
+                | Crossing::Returns(side) => {
                     let mut series = expansion.gap();
                     series[0] += self.q[0] - self.flow.wall(side);
                     root_near(&series, u - expansion.start, u)
@@ -102,7 +109,12 @@ impl<const N: usize> Trajectory<'_, N> {
                     series[0] += self.q[0] - self.flow.wall(side.mirrored());
                     root_near(&series, u - expansion.start, u)
                 }
-                Crossing::PressingEnds(_) => self.pressing_root(linear, &expansion, u),
+                Crossing::PressingEnds(_) => {
+                    root_of(linear, &expansion, u, |q, phasor| linear.acceleration_rates(q, phasor))
+                }
+                Crossing::ForceEnds(side) | Crossing::ForceBegins(side) => {
+                    root_of(linear, &expansion, u, |q, phasor| self.wall_force(side, linear, q, phasor))
+                }
             };
             let next = expansion.start + root.unwrap_or(f64::NAN);
             let is_within = next >= lo * (1.0 - BRACKET_ROUNDING) && next <= hi * (1.0 + BRACKET_ROUNDING);
@@ -124,25 +136,30 @@ impl<const N: usize> Trajectory<'_, N> {
         }
         None
     }
+}
 
-    /// Finds the time on an expansion at which the pressing acceleration vanishes, by Newton's method from `u`.
-    #[inline(never)]
-    fn pressing_root(&self, linear: &LinearFlow, expansion: &Expansion, u: f64) -> Option<f64> {
-        let mut v = u - expansion.start;
-        for _ in 0..POLISH_CAP {
-            let [pressing, rate, bend] =
-                linear.acceleration_rates(&expansion.state(v), &expansion.phasor(linear.turn * v));
-            let delta = -pressing / (rate * linear.unit);
-            v += delta;
-            if v.is_nan() || v.abs() > EXPANSION_REACH {
-                return None;
-            }
-            if delta * delta * (bend * linear.unit).abs() <= ROOT_TOLERANCE * rate.abs() * u {
-                return Some(v);
-            }
+/// Finds the time on an expansion at which a function vanishes, by Newton's method from `u`. `rates` returns the function and its first
+/// two time derivatives.
+#[inline(never)]
+fn root_of(
+    linear: &LinearFlow,
+    expansion: &Expansion,
+    u: f64,
+    rates: impl Fn(&Gap, &Phasor) -> [f64; 3],
+) -> Option<f64> {
+    let mut v = u - expansion.start;
+    for _ in 0..POLISH_CAP {
+        let [value, rate, bend] = rates(&expansion.state(v), &expansion.phasor(linear.turn * v));
+        let delta = -value / (rate * linear.unit);
+        v += delta;
+        if v.is_nan() || v.abs() > EXPANSION_REACH {
+            return None;
         }
-        None
+        if delta * delta * (bend * linear.unit).abs() <= ROOT_TOLERANCE * rate.abs() * u {
+            return Some(v);
+        }
     }
+    None
 }
 
 /// Finds the root of a series near `v`, by reversion of the series there and then Newton steps to rounding. The

@@ -2,7 +2,7 @@
 //!
 //! State and tangents are continuous there, because the phase of a change is the same for all neighbouring motions. A gap in
 //! front of a wall stays in free motion, and a gap behind a wall stays in contact. A contact that depends on a force is
-//! decided anew: a gap at rest on a rigid wall, and a contact onset.
+//! decided anew: a gap at rest on a rigid wall, a contact onset, and a gap behind a wall that only pushes.
 
 use super::{EventKind, Mode, Observer, Trajectory};
 use crate::flow::{DomainKind, Flow};
@@ -31,6 +31,14 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                     // A contact that begins at this instant starts on its wall.
                     self.from_wall = self.from_wall.map(|_| (side, 1));
                 }
+            }
+            Mode::Sustained(side) if !self.closes(side) => {
+                self.open(side, observer);
+                self.start_from_force(side);
+            }
+            Mode::Open(side) if self.closes(side) => {
+                self.close(side, observer);
+                self.start_from_force(side);
             }
             _ => {}
         }

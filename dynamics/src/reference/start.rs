@@ -49,6 +49,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             mode: Mode::Free,
             origin: None,
             from_wall: None,
+            from_force: 0,
             short_flight: false,
             pending: None,
             q: flow.to_gap(y),
@@ -81,6 +82,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             mode: self.mode,
             origin: self.origin,
             from_wall: self.from_wall,
+            from_force: self.from_force,
             short_flight: self.short_flight,
             pending: self.pending,
             q: self.q,
@@ -122,15 +124,15 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             started.origin = origin;
             return started;
         }
-        // At an elastic wall the gap alone determines the mode.
-        let is_elastic = |side: Side| started.flow.contacts[side.index()] == Contact::Elastic;
-        if let Mode::Sustained(side) = started.mode
+        // At an elastic wall the state alone determines the mode.
+        let is_elastic = |side: Side| started.flow.contacts[side.index()].is_elastic();
+        if let Mode::Sustained(side) | Mode::Open(side) = started.mode
             && is_elastic(side)
         {
             return started;
         }
         let mode = match mode {
-            Mode::Sustained(side) if is_elastic(side) => Mode::Free,
+            Mode::Sustained(side) | Mode::Open(side) if is_elastic(side) => Mode::Free,
             mode => mode,
         };
         if let Mode::Stuck(side) = mode {

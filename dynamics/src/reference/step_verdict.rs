@@ -8,6 +8,9 @@ use crate::model::Side;
 /// Distance from a wall that is rounding error, relative to the wall's position or the scale of length.
 const WALL_ROUNDING: f64 = 32.0 * f64::EPSILON;
 
+/// Bounds that no gap is between, so that a step is judged by all its crossings.
+const UNREACHABLE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+
 /// The end of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Crossing {
@@ -21,6 +24,12 @@ pub(super) enum Crossing {
     Through(Side),
     /// Sustained contact ends at its wall.
     MeshEnds(Side),
+    /// The force of a wall that only pushes vanishes: contact ends behind the wall.
+    ForceEnds(Side),
+    /// Spring and damper of a wall that only pushes begin to push: contact begins behind the wall.
+    ForceBegins(Side),
+    /// Motion in open contact returns to its wall; this is not an event.
+    Returns(Side),
 }
 
 /// The verdict on a step.
@@ -45,9 +54,10 @@ impl<const N: usize> Trajectory<'_, N> {
         let [right, left] = self.flow.walls;
         let (floor, ceiling) = match self.mode {
             Mode::Free => (left, right),
+            Mode::Sustained(side) if self.flow.pushing[side.index()].is_some() => UNREACHABLE,
             Mode::Sustained(Side::Right) => (right, f64::INFINITY),
             Mode::Sustained(Side::Left) => (f64::NEG_INFINITY, left),
-            Mode::Onset(_) | Mode::Stuck(_) => (f64::INFINITY, f64::NEG_INFINITY),
+            Mode::Onset(_) | Mode::Open(_) | Mode::Stuck(_) => UNREACHABLE,
         };
         let [above, below] = gap.between(order, remainder, floor, ceiling);
         if above && below {
@@ -65,7 +75,14 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.wall_ahead(&gap, Side::Right, remainder),
                 self.wall_ahead(&gap, Side::Left, remainder),
             ),
-            Mode::Sustained(side) => self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side)),
+            Mode::Sustained(side) => {
+                let ends = self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side));
+                self.earlier_of_force(ends, true, side, linear, step)
+            }
+            Mode::Open(side) => {
+                let returns = self.judge(&gap, side, 1.0, remainder, Crossing::Returns(side));
+                self.earlier_of_force(returns, false, side, linear, step)
+            }
             // `step_at_rest` decides.
             Mode::Stuck(_) => StepVerdict::Unclear,
             Mode::Onset(side) => {
@@ -137,7 +154,7 @@ impl<const N: usize> Trajectory<'_, N> {
 
 /// Returns the earlier of two crossings on a step, if that is certain.
 #[inline(always)]
-fn first_of(a: StepVerdict, b: StepVerdict) -> StepVerdict {
+pub(super) fn first_of(a: StepVerdict, b: StepVerdict) -> StepVerdict {
     match (a, b) {
         (StepVerdict::Clear { roomy: a }, StepVerdict::Clear { roomy: b }) => {
             StepVerdict::Clear { roomy: a && b }

@@ -55,6 +55,7 @@ impl Linear {
             damping: first(2.0 * self.gamma),
             stiffness: first(self.square),
             load: [self.load, 0.0],
+            preload: 0.0,
         };
         Oscillator {
             degrees: 1,
@@ -132,6 +133,15 @@ pub(crate) fn with_wall(
         damping: plus(free.damping, damping),
         stiffness: plus(free.stiffness, stiffness),
         load: [free.load[0] + stiffness * at * g0, free.load[1] + stiffness * at * g1],
+        preload: 0.0,
     };
     walled
+}
+
+/// Adds a preload to the first elastic wall on a side, in the first stage.
+pub(crate) fn with_preload(mut oscillator: Oscillator, side: Side, preload: f64) -> Oscillator {
+    let (gap, domain) = (oscillator.gap, &mut oscillator.meshing[usize::from(side == Side::Left)]);
+    domain.preload = preload;
+    (0..2).for_each(|i| domain.load[i] -= side.sign() * preload * gap[i]);
+    oscillator
 }

@@ -14,6 +14,7 @@ mod one_wall;
 mod orbits;
 mod paper;
 mod properties;
+mod pushing;
 mod quantities;
 mod resonance;
 mod single_stop;

@@ -201,6 +201,7 @@ pub(crate) fn in_units(
         damping: d.damping.map(|row| row.map(|c| rate * c)),
         stiffness: d.stiffness.map(|row| row.map(|k| rate * rate * k)),
         load: d.load.map(|f| force * f),
+        preload: 0.0,
     };
     let scaled = Oscillator {
         walls: oscillator.walls.map(|wall| length * wall),

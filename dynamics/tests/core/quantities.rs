@@ -1,9 +1,9 @@
 //! Measured quantities: energy balance, closed forms, and dense samples of the same motion.
 
-use crate::common::linear::{Linear, with_wall};
+use crate::common::linear::{Linear, with_preload, with_wall};
 use crate::common::{BUDGET, REST, near, paper};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, GearPair, Law, Side};
+use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, Side};
 use rattlemap_dynamics::orbit::{
     Budget, Class, EventKind, Orbit, Quantities, Settings, analyse, analyse_flow, measure, trace,
 };
@@ -141,10 +141,19 @@ fn a_bouncing_ball_has_the_impulses_of_its_cycle() {
 fn compliant_and_rigid_contacts_close_the_balance() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 2.1 };
     let elastic = with_wall(free.oscillator(), Side::Right, 0.1, Contact::Elastic, [24.0, 1.5]);
+    let pushing = Oscillator { contacts: [Contact::Pushing; 2], ..elastic.clone() };
+    let loose =
+        Oscillator { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, -0.2) };
+    let tight =
+        Oscillator { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, 0.1) };
     let table = Linear { gamma: 0.0, square: 0.0, force: 1.2, load: 1.0, omega: 1.0 };
     let rigid = with_wall(table.oscillator(), Side::Right, 0.0, Contact::Rigid, [0.0, 0.0]);
     for (oscillator, law, start) in [
-        (elastic, Law::both(0.5, 0.0), REST),
+        (elastic.clone(), Law::both(0.5, 0.0), REST),
+        (with_preload(elastic, Side::Right, 0.1), Law::both(0.5, 0.0), REST),
+        (pushing, Law::both(0.5, 0.0), REST),
+        (loose, Law::both(0.5, 0.0), REST),
+        (tight, Law::both(0.5, 0.0), REST),
         (rigid.clone(), Law::both(0.0, 0.0), REST),
         (rigid, Law::both(0.4, 0.0), REST),
     ] {
@@ -154,7 +163,7 @@ fn compliant_and_rigid_contacts_close_the_balance() {
         assert!(matches!(orbit.class, Class::Periodic { .. }), "{orbit:?}");
         let work = power(oscillator.force[0], oscillator.omega, of.displacements[0].harmonic);
         assert!(near(work, of.dissipated + of.impact_energy, 1e-10 * work.abs()), "{work} {of:?}");
-        let is_elastic = oscillator.contacts[0] == Contact::Elastic;
+        let (is_elastic, wall) = (oscillator.contacts[0].is_elastic(), &oscillator.meshing[0]);
         assert_eq!(of.contact_force.is_some(), is_elastic, "{of:?}");
         if let Some([largest, rms]) = of.contact_force {
             let samples = 100_000;
@@ -167,7 +176,7 @@ fn compliant_and_rigid_contacts_close_the_balance() {
                             .advance_to(flow.period * f64::from(i) / f64::from(samples), &mut ())
                             .unwrap();
                         let [x, v, ..] = trajectory.state();
-                        trajectory.meshing().map(|_| 24.0 * (x - 0.1) + 1.5 * v)
+                        trajectory.meshing().map(|_| 24.0 * (x - 0.1) + 1.5 * v + wall.preload)
                     })
                     .collect::<Vec<f64>>()
             };

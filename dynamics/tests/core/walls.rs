@@ -72,7 +72,7 @@ fn free_vibration_of_a_two_stage_spring_has_its_closed_form() {
 /// In a cycle the force does as much work as dampers and impacts take.
 #[test]
 fn energy_balances_with_several_walls() {
-    let shape = Shape { harmonics: false, stages: false, walls: true, wide: false };
+    let shape = Shape { walls: true, ..crate::independent::PLAIN };
     let mut cycles = 0;
     for seed in 300..400 {
         let case = case(seed, shape);

@@ -20,7 +20,7 @@ use crate::gpu::{
 use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};
 use crate::record::Record;
-use rattlemap_dynamics::model::{Contact, Oscillator, Side};
+use rattlemap_dynamics::model::{Oscillator, Side};
 
 /// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
@@ -105,6 +105,9 @@ impl<'p> Gpu<'p> {
     pub async fn prepared(prepared: Prepared<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let mut clock = Instant::now();
         let Prepared { plan, constants, survey, took } = prepared;
+        if survey.features.pushing {
+            return Err(EngineError::NotOnLanes { feature: "walls that only push or have a preload" });
+        }
         let settings = settings_after(&plan, &survey);
         let mut engine = Gpu {
             plan,
@@ -507,7 +510,7 @@ fn survey_flows<T: Send>(
         let oscillator = plan.oscillator(flow);
         let chatter = Side::BOTH.into_iter().any(|side| {
             let (wall, contact) = oscillator.last_wall(side);
-            let bounces = wall.is_finite() && contact != Contact::Elastic;
+            let bounces = wall.is_finite() && !contact.is_elastic();
             bounces && gpu::follows_chatter(&oscillator, least[side.index()])
         });
         let steps_used = Constants::steps(&oscillator, steps).map(|n| [n; 2]);

@@ -39,12 +39,18 @@ pub enum Ending {
     Through(Side),
     /// The load pulls the gap off the rigid wall on which it rests.
     PulledOff(Side),
+    /// Behind a wall that only pushes, the force falls to 0.
+    Opens(Side),
+    /// Behind a wall that only pushes, the force rises from 0.
+    Closes(Side),
+    /// A gap behind a wall that does not push now returns to the wall. This is not an event.
+    Returns(Side),
 }
 
 impl Ending {
     /// Whether the gap meets a wall; otherwise an acceleration changes sign.
     fn is_of_gap(self) -> bool {
-        !matches!(self, Ending::PressingEnds(_) | Ending::PulledOff(_))
+        !matches!(self, Ending::PressingEnds(_) | Ending::PulledOff(_) | Ending::Opens(_) | Ending::Closes(_))
     }
 }
 
@@ -53,6 +59,8 @@ enum Mode {
     Free,
     Onset(Side),
     Sustained(Side),
+    /// Behind a wall that only pushes, without a force.
+    Open(Side),
     /// At rest on a rigid wall.
     Stuck(Side),
 }
@@ -117,6 +125,8 @@ struct Interval {
     contacts: [Contact; 2],
     /// For each stage, the equations of free motion, and of lasting contact with the right and the left wall.
     fields: Vec<[Equations; 3]>,
+    /// For each stage, stiffness, damping and preload of the right and of the left wall, if these only push.
+    pushing: Vec<[Option<[f64; 3]>; 2]>,
 }
 
 impl Interval {
@@ -137,8 +147,25 @@ impl Interval {
             let [right, left] = Side::BOTH.map(behind);
             [free, right, left]
         };
+        let pushing = |stage: usize| {
+            let oscillator = of_stage(stage);
+            Side::BOTH.map(|side| {
+                let [stiffness, damping] = oscillator.wall_stiffness_and_damping(side);
+                let force = [stiffness, damping, oscillator.preload(side)];
+                // Without damper and preload it never pulls.
+                let is_pushing =
+                    oscillator.contacts[side.index()] == Contact::Pushing && force[1..] != [0.0; 2];
+                is_pushing.then_some(force)
+            })
+        };
         let Oscillator { walls, contacts, .. } = of_stage(0);
-        Interval { walls, contacts, fields: (0..oscillator.stage_count()).map(fields).collect() }
+        let stages = 0..oscillator.stage_count();
+        Interval {
+            walls,
+            contacts,
+            fields: stages.clone().map(fields).collect(),
+            pushing: stages.map(pushing).collect(),
+        }
     }
 }
 
@@ -178,7 +205,8 @@ impl Flight {
         if let Some(side) = Side::BOTH.into_iter().find(beyond) {
             match flight.is_rigid(side) {
                 true => flight.put_on_wall(side),
-                false => flight.mode = Mode::Sustained(side),
+                false if flight.closes(side, 0.0) => flight.mode = Mode::Sustained(side),
+                false => flight.mode = Mode::Open(side),
             }
         }
         flight
@@ -192,7 +220,7 @@ impl Flight {
     /// Returns the wall of a lasting contact, if there is one.
     pub fn meshing(&self) -> Option<Side> {
         match self.mode {
-            Mode::Free => self.side_of_interval(),
+            Mode::Free | Mode::Open(_) => self.side_of_interval(),
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => Some(side),
         }
     }
@@ -231,7 +259,7 @@ impl Flight {
     #[inline]
     pub fn field(&self) -> &Equations {
         match self.mode {
-            Mode::Free => self.free_field(),
+            Mode::Free | Mode::Open(_) => self.free_field(),
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => self.meshing_field(side),
         }
     }
@@ -239,8 +267,11 @@ impl Flight {
     /// Returns the longest step in which no ending can be missed: a radian of free motion, or of meshing during contact
     /// onset.
     pub fn longest_step(&self) -> f64 {
-        let field =
-            if let Mode::Onset(side) = self.mode { self.meshing_field(side) } else { self.free_field() };
+        let field = match self.mode {
+            Mode::Onset(side) => self.meshing_field(side),
+            Mode::Sustained(side) if self.pushing(side).is_some() => self.meshing_field(side),
+            _ => self.free_field(),
+        };
         field.rate().max(self.fastest).recip()
     }
 
@@ -273,6 +304,14 @@ impl Flight {
             Mode::Onset(side) if self.pressing(self.meshing_field(side), side, &self.q, exact) <= 0.0 => {
                 self.act(Ending::PressingEnds(side), t, false);
             }
+            Mode::Sustained(side) if !self.closes(side, exact) => {
+                self.act(Ending::Opens(side), t, false);
+                self.from = None;
+            }
+            Mode::Open(side) if self.closes(side, exact) => {
+                self.act(Ending::Closes(side), t, false);
+                self.from = None;
+            }
             _ => {}
         }
     }
@@ -301,6 +340,24 @@ impl Flight {
 
     fn is_rigid(&self, side: Side) -> bool {
         self.contact_type(side) == Contact::Rigid
+    }
+
+    fn pushing(&self, side: Side) -> Option<[f64; 3]> {
+        self.intervals[self.interval].pushing[self.stage][side.index()]
+    }
+
+    /// Returns the force of a wall that only pushes, if it could also pull, and its rate by the equations of a domain.
+    fn force(&self, field: &Equations, side: Side, q: &Gap, t: f64) -> (f64, f64) {
+        let Some([k, c, preload]) = self.pushing(side) else { return (f64::INFINITY, 0.0) };
+        let [acceleration, _] = field.accelerations(q, self.phasor(t));
+        let s = side.sign();
+        (k * self.beyond(side, q) + s * c * q[1] + preload, s * (k * q[1] + c * acceleration))
+    }
+
+    /// Whether a wall pushes a gap that is on it or behind it. At a force of 0 its rate decides, and then the penetration's.
+    fn closes(&self, side: Side, t: f64) -> bool {
+        let (force, rate) = self.force(self.free_field(), side, &self.q, t);
+        force > 0.0 || force == 0.0 && (rate > 0.0 || rate == 0.0 && side.sign() * self.q[1] > 0.0)
     }
 
     /// Returns the penetration of a wall.
@@ -332,7 +389,11 @@ impl Flight {
     fn endings(&self) -> [Ending; 3] {
         match self.mode {
             Mode::Free => [Side::Right, Side::Left, Side::Left].map(Ending::Contact),
+            Mode::Sustained(side) if self.pushing(side).is_some() => {
+                [Ending::MeshEnds(side), Ending::Opens(side), Ending::Opens(side)]
+            }
             Mode::Sustained(side) => [Ending::MeshEnds(side); 3],
+            Mode::Open(side) => [Ending::Returns(side), Ending::Closes(side), Ending::Closes(side)],
             Mode::Onset(side) => {
                 [Ending::OnsetEnds(side), Ending::PressingEnds(side), Ending::Through(side.mirrored())]
             }
@@ -348,7 +409,12 @@ impl Flight {
             Ending::Contact(side) | Ending::OnsetEnds(side) | Ending::Through(side) => {
                 (-self.beyond(side, q), -rate(side))
             }
-            Ending::MeshEnds(side) => (self.beyond(side, q), rate(side)),
+            Ending::MeshEnds(side) | Ending::Returns(side) => (self.beyond(side, q), rate(side)),
+            Ending::Opens(side) => self.force(self.field(), side, q, t),
+            Ending::Closes(side) => {
+                let (force, rate) = self.force(self.field(), side, q, t);
+                (-force, -rate)
+            }
             Ending::PressingEnds(side) => (self.pressing(self.field(), side, q, t), 0.0),
             Ending::PulledOff(side) => {
                 let free = self.free_field();
@@ -506,6 +572,21 @@ impl Flight {
                 self.record(t, EventKind::MeshEnd, side.mirrored());
                 self.contact(side, t, false);
             }
+            Ending::Opens(side) => {
+                self.mode = Mode::Open(side);
+                self.from = Some((Ending::Closes(side), 1));
+                self.record(t, EventKind::MeshEnd, side);
+            }
+            Ending::Closes(side) => {
+                self.mode = Mode::Sustained(side);
+                self.from = Some((Ending::Opens(side), 1));
+                self.record(t, EventKind::MeshStart, side);
+            }
+            Ending::Returns(side) if side.sign() * self.q[1] < 0.0 => {
+                self.put_on_wall(side);
+                self.leave(side, t);
+            }
+            Ending::Returns(side) => self.contact(side, t, false),
             Ending::PulledOff(side) if settling && self.presses(self.free_field(), side, &self.q, t) => {
                 self.from = Some((ending, 1));
             }
@@ -531,7 +612,10 @@ impl Flight {
                 if before == Some(side.mirrored()) { EventKind::MeshEnd } else { EventKind::MeshStart };
             self.leave(side.mirrored(), t);
             self.record(t, kind, before.or(self.side_of_interval()).unwrap_or(side));
-        } else if self.contact_type(side) == Contact::Elastic {
+        } else if self.contact_type(side).is_elastic() && !self.closes(side, t) {
+            self.mode = Mode::Open(side);
+            self.from = Some((Ending::Returns(side), if closing > 0.0 { 1 } else { 2 }));
+        } else if self.contact_type(side).is_elastic() {
             // The motion continues without a jump.
             self.mode = Mode::Sustained(side);
             self.from = Some((Ending::MeshEnds(side), if closing > 0.0 { 1 } else { 2 }));

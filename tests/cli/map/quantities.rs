@@ -86,6 +86,7 @@ fn numbers_of_a_map_are_those_of_its_orbits() {
 }
 
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn an_adaptive_map_fills_and_audits_measured_quantities() {
     let refine = "[refine]\nminimum_grid = 4\n[parameters]\ne = 0.6\n";
     let folder = measured("gear-pair", [("k", 100.0, 200.0), ("omega", 9.0, 10.0)], [17, 17], refine);
@@ -105,6 +106,7 @@ fn an_adaptive_map_fills_and_audits_measured_quantities() {
 
 /// The impact oscillator has chaos that ends.
 #[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
 fn chaos_that_ends_is_counted_by_maps_and_by_validations() {
     let folder = with(include_str!("../../../scenes/gallery/impact_oscillator.toml"));
     let few = "--set axis.0.count=16 --set axis.1.count=16 --engine cpu";

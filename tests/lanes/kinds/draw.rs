@@ -39,8 +39,12 @@ pub(crate) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
     let mut gap = [draw.one_of(&[1.0, -1.0]) * draw.between(0.2, 1.5), draw.between(-1.5, 1.5)];
     let mut force = [draw.between(2.0, 8.0), draw.one_of(&[0.0, 1.0]) * draw.between(-3.0, 3.0)];
     let mut load = [0.0; 2].map(|_: f64| draw.one_of(&[0.0, 1.0]) * draw.between(-2.0, 2.0));
-    let free =
-        Domain { damping: first(draw.definite(0.6)), stiffness: first(draw.definite(6.0)), load: [0.0; 2] };
+    let free = Domain {
+        damping: first(draw.definite(0.6)),
+        stiffness: first(draw.definite(6.0)),
+        load: [0.0; 2],
+        preload: 0.0,
+    };
     if degrees == 1 {
         mass = [[mass[0][0], 0.0], [0.0, 1.0]];
         (gap[1], force[1], load[1]) = (0.0, 0.0, 0.0);
@@ -66,13 +70,14 @@ pub(crate) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
             damping: along(free.damping, c),
             stiffness: along(free.stiffness, k),
             load: [0, 1].map(|i: usize| free.load[i] + k * walls[side] * gap[i]),
+            preload: 0.0,
         }
     });
     let law = Law {
         restitution: [0; 2].map(|_| draw.one_of(&[0.0, 0.3, 0.5, 0.8])),
         mesh_speed: contacts.map(|contact| match contact {
             Contact::Rigid => draw.one_of(&[0.0, 0.0, 0.1]),
-            Contact::Impact | Contact::Elastic => 0.02,
+            Contact::Impact | Contact::Elastic | Contact::Pushing => 0.02,
         }),
     };
     let omega = draw.between(0.6, 4.0);

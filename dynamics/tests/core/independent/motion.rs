@@ -13,7 +13,7 @@ pub(crate) const HARMONICS: usize = 5;
 const SIZE: usize = 5 + 2 * HARMONICS;
 
 /// A step, in radians of the fastest rate.
-const ANGLE: f64 = 0.2;
+pub(crate) const ANGLE: f64 = 0.2;
 
 /// Terms of Taylor series: `0.2^15 / 15!` is far below rounding.
 const TERMS: usize = 15;
@@ -43,6 +43,8 @@ pub(crate) enum Mode {
     Onset(Side),
     /// The gap is behind the wall.
     Sustained(Side),
+    /// The gap is behind a wall that only pushes, and no force acts.
+    Open(Side),
     /// The gap is at rest on a rigid wall.
     Stuck(Side),
 }
@@ -62,6 +64,9 @@ enum End {
     FallsBack(Side),
     PressingEnds(Side),
     PulledOff(Side),
+    Opens(Side),
+    Closes(Side),
+    Returns(Side),
 }
 
 /// Returns the exponential of a matrix by scaling and squaring of its series.
@@ -85,9 +90,9 @@ struct Linear {
 }
 
 impl Linear {
-    fn new(a: Generator, fastest: f64) -> Linear {
+    fn new(a: Generator, fastest: f64, angle: f64) -> Linear {
         // With few digits, sums of steps have hardly any rounding error.
-        let h = f64::from((ANGLE / fastest) as f32);
+        let h = f64::from((angle / fastest) as f32);
         Linear { a, step: (h, exponential(a * h)) }
     }
 
@@ -106,6 +111,8 @@ struct Stages {
     domains: [Linear; 3],
     /// Rows of the gap's acceleration in each domain. On a rigid wall it is that of free motion.
     pressing: [Row; 3],
+    /// Rows of the forces of spring, damper and preload behind the right and the left wall, if these only push.
+    pushing: [Option<Row>; 2],
 }
 
 /// An oscillator with its exponentials.
@@ -155,7 +162,8 @@ fn matrix(m: [[f64; 2]; 2]) -> Matrix2<f64> {
 }
 
 impl System {
-    pub(crate) fn new(o: &Oscillator) -> System {
+    /// Builds the system with steps of `angle` radians of the fastest rate.
+    pub(crate) fn new(o: &Oscillator, angle: f64) -> System {
         let mut harmonics = vec![(1, o.force, o.force_sin)];
         harmonics.extend(o.harmonics.iter().map(|h| (h.order, h.cos, h.sin)));
         let per_mass = matrix(o.mass).try_inverse().expect("a mass matrix");
@@ -212,8 +220,22 @@ impl System {
             let [right, left] = Side::BOTH.map(behind);
             let pressing = [(freely, Contact::Elastic), (right.0, o.contacts[0]), (left.0, o.contacts[1])]
                 .map(|(a, contact)| w * if contact == Contact::Rigid { freely } else { a });
-            let domains = [(freely, &free), right, left].map(|(a, domain)| Linear::new(a, rate(domain)));
-            Stages { domains, pressing }
+            let domains =
+                [(freely, &free), right, left].map(|(a, domain)| Linear::new(a, rate(domain), angle));
+            let pushing = Side::BOTH.map(|side| {
+                let (i, g) = (side.index(), Vector2::from(o.gap));
+                let along = |m: Matrix2<f64>| g.dot(&(m * g)) / g.norm_squared().powi(2);
+                let behind = &meshing[i];
+                let k = along(matrix(behind.stiffness) - matrix(free.stiffness));
+                let c = along(matrix(behind.damping) - matrix(free.damping));
+                // Without a damper, the difference of the matrices is rounding.
+                let c = if behind.damping == free.damping { 0.0 } else { c };
+                let mut row = (z * k + w * c) * sign(side);
+                row[4] = behind.preload - sign(side) * k * o.walls[i];
+                let may_pull = c == 0.0 && behind.preload == 0.0;
+                (o.contacts[i] == Contact::Pushing && row[4].is_finite() && !may_pull).then_some(row)
+            });
+            Stages { domains, pressing, pushing }
         };
         let first = Stage { free: o.free, meshing: o.meshing };
         System {
@@ -230,7 +252,7 @@ impl System {
             w,
             behind: Side::BOTH.map(|side| {
                 let count = o.outer_walls[side.index()].len();
-                (1..=count).map(|nth| System::new(&between_walls(o, side, nth))).collect()
+                (1..=count).map(|nth| System::new(&between_walls(o, side, nth), angle)).collect()
             }),
         }
     }
@@ -259,6 +281,8 @@ pub(crate) struct Motion<'a> {
     t: f64,
     /// The wall that the gap is just leaving, and the order of that root.
     leaves: Option<(Side, usize)>,
+    /// Whether the force of a wall that only pushes is zero now.
+    is_unloaded: bool,
     /// The wall of the last event.
     origin: Option<Side>,
     pub(crate) tangents: Option<Matrix4<f64>>,
@@ -297,6 +321,7 @@ impl<'a> Motion<'a> {
             y,
             t: 0.0,
             leaves: None,
+            is_unloaded: false,
             origin: None,
             tangents: None,
             events: Vec::new(),
@@ -307,6 +332,11 @@ impl<'a> Motion<'a> {
         };
         motion.begin_period();
         motion.find_interval();
+        if let Mode::Sustained(side) = motion.mode
+            && !motion.closes(side)
+        {
+            motion.mode = Mode::Open(side);
+        }
         motion
     }
 
@@ -336,17 +366,16 @@ impl<'a> Motion<'a> {
 
     /// Returns the same motion with errors of velocities at each event that are larger than those of rounding: once of one sign, and
     /// once of two signs, since errors can cancel.
-    pub(crate) fn shaken(&self) -> [Motion<'a>; 2] {
+    pub(crate) fn shaken(&self) -> Vec<Motion<'a>> {
         let with = |signs: [f64; 4]| Motion { shaken: signs.map(|sign| SHAKEN * sign), ..self.clone() };
-        [with([1.0; 4]), with([1.0, 1.0, -1.0, -1.0])]
+        vec![with([1.0; 4]), with([1.0, 1.0, -1.0, -1.0])]
     }
 
-    /// Advances both shaken motions. Returns their largest distance from this one.
-    pub(crate) fn noise(&self, shaken: &mut [Motion<'a>; 2]) -> Option<f64> {
-        let [a, b] = shaken;
-        a.advance_period().and(b.advance_period())?;
+    /// Advances the shaken motions. Returns their largest distance from this one.
+    pub(crate) fn noise(&self, shaken: &mut [Motion<'a>]) -> Option<f64> {
+        shaken.iter_mut().try_for_each(Motion::advance_period)?;
         let off = |other: &Motion| distance(self.state(), other.state(), self.rate());
-        Some(off(a).max(off(b)))
+        Some(shaken.iter().map(off).fold(0.0, f64::max))
     }
 
     pub(crate) fn state(&self) -> State {
@@ -412,13 +441,21 @@ impl<'a> Motion<'a> {
                 self.ends(side);
                 self.by_stage[1] += 1;
             }
+            Mode::Sustained(side) if !self.closes(side) => {
+                self.ends(side);
+                self.mode = Mode::Open(side);
+            }
+            Mode::Open(side) if self.closes(side) => {
+                self.record(What::Begins, side);
+                self.mode = Mode::Sustained(side);
+            }
             _ => {}
         }
     }
 
     fn domain_index(&self) -> usize {
         match self.mode {
-            Mode::Free => 0,
+            Mode::Free | Mode::Open(_) => 0,
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => index(side),
         }
     }
@@ -429,6 +466,24 @@ impl<'a> Motion<'a> {
 
     fn contact(&self, side: Side) -> Contact {
         self.system.contacts[side.index()]
+    }
+
+    fn pushing(&self, side: Side) -> Option<Row> {
+        self.system.stages[self.stage].pushing[side.index()]
+    }
+
+    /// Whether a gap behind a wall is in contact.
+    fn closes(&self, side: Side) -> bool {
+        let Some(row) = self.pushing(side) else { return true };
+        let mut y = self.y;
+        for _ in 0..4 {
+            let force = (row * y)[0];
+            if force != 0.0 {
+                return force > 0.0;
+            }
+            y = self.linear(0).a * y;
+        }
+        false
     }
 
     /// Returns the acceleration of the gap into a wall.
@@ -496,16 +551,16 @@ impl<'a> Motion<'a> {
                 };
                 *tangents = moved * *tangents;
             }
-            if self.mode != Mode::Free || self.interval != 0 {
+            if !matches!(self.mode, Mode::Free | Mode::Open(_)) || self.interval != 0 {
                 self.meshing_time += share * h;
             }
             match found {
                 None => {
-                    (self.y, self.leaves) = (next, None);
+                    (self.y, self.leaves, self.is_unloaded) = (next, None, false);
                     self.t = if is_whole { self.t + h } else { until };
                 }
                 Some((_, end, at)) => {
-                    (self.y, self.t) = (at, self.t + share * h);
+                    (self.y, self.t, self.is_unloaded) = (at, self.t + share * h, false);
                     self.act(end, share == 0.0);
                     let error = self.shaken[events as usize % 4];
                     self.y[1] *= 1.0 + error;
@@ -525,7 +580,7 @@ impl<'a> Motion<'a> {
         let (mode, walls) = (self.mode, self.system.walls);
         [Side::Right, Side::Left].into_iter().filter(move |&side| match mode {
             Mode::Free | Mode::Onset(_) => walls[side.index()].is_finite(),
-            Mode::Sustained(own) => side == own,
+            Mode::Sustained(own) | Mode::Open(own) => side == own,
             Mode::Stuck(_) => false,
         })
     }
@@ -533,17 +588,20 @@ impl<'a> Motion<'a> {
     /// Returns the distance to a wall: from inside, or from behind in sustained contact.
     fn distance(&self, side: Side, y: &Vector) -> f64 {
         let inside = sign(side) * (self.system.walls[side.index()] - (self.system.z * y)[0]);
-        if matches!(self.mode, Mode::Sustained(_)) { -inside } else { inside }
+        if matches!(self.mode, Mode::Sustained(_) | Mode::Open(_)) { -inside } else { inside }
     }
 
     fn distance_rate(&self, side: Side, y: &Vector) -> f64 {
         let inside = -sign(side) * (self.system.w * y)[0];
-        if matches!(self.mode, Mode::Sustained(_)) { -inside } else { inside }
+        if matches!(self.mode, Mode::Sustained(_) | Mode::Open(_)) { -inside } else { inside }
     }
 
     /// Whether a step is certainly too far from every wall: the cubic through its ends stays away, with room for its error.
     fn is_clear(&self, next: &Vector, h: f64) -> bool {
-        if self.leaves.is_some() || matches!(self.mode, Mode::Onset(_) | Mode::Stuck(_)) {
+        if self.leaves.is_some() || matches!(self.mode, Mode::Onset(_) | Mode::Stuck(_) | Mode::Open(_)) {
+            return false;
+        }
+        if matches!(self.mode, Mode::Sustained(side) if self.pushing(side).is_some()) {
             return false;
         }
         let row = self.system.w * self.linear(self.domain_index()).a;
@@ -566,6 +624,7 @@ impl<'a> Motion<'a> {
             let order = self.leaves.filter(|leaves| leaves.0 == side).map_or(0, |leaves| leaves.1);
             let end = match self.mode {
                 Mode::Sustained(_) => End::FallsBack(side),
+                Mode::Open(_) => End::Returns(side),
                 Mode::Onset(own) if side == own => End::OnsetEnds(side),
                 _ => End::Reaches(side),
             };
@@ -577,6 +636,15 @@ impl<'a> Motion<'a> {
             let end = if is_onset { End::PressingEnds(side) } else { End::PulledOff(side) };
             // Pressing may begin at zero.
             let order = c.iter().take_while(|c| **c == 0.0).count();
+            ends.extend(first_fall(&c[order..], order > 0).map(|share| (share, end)));
+        }
+        if let Mode::Sustained(side) | Mode::Open(side) = self.mode
+            && let Some(row) = self.pushing(side)
+        {
+            let is_open = matches!(self.mode, Mode::Open(_));
+            let (sign, end) = if is_open { (-1.0, End::Closes(side)) } else { (1.0, End::Opens(side)) };
+            let c: Vec<f64> = series.iter().map(|term| sign * (row * term)[0]).collect();
+            let order = usize::from(self.is_unloaded);
             ends.extend(first_fall(&c[order..], order > 0).map(|share| (share, end)));
         }
         ends.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
@@ -608,6 +676,20 @@ impl<'a> Motion<'a> {
                 self.jump(&Matrix4::identity(), &row, &before, 0);
                 self.ends(side);
             }
+            End::Opens(side) => {
+                let row = self.pushing(side).expect("the wall only pushes");
+                self.jump(&Matrix4::identity(), &row, &self.field(index(side)), 0);
+                self.ends(side);
+                (self.mode, self.is_unloaded) = (Mode::Open(side), true);
+            }
+            End::Closes(side) => {
+                let row = self.pushing(side).expect("the wall only pushes");
+                self.jump(&Matrix4::identity(), &row, &self.field(0), index(side));
+                self.record(What::Begins, side);
+                (self.mode, self.leaves, self.is_unloaded) = (Mode::Sustained(side), None, true);
+            }
+            End::Returns(side) if sign(side) * (self.system.w * self.y)[0] < 0.0 => self.leave(side, false),
+            End::Returns(side) => self.reach(side, false),
             End::PulledOff(side) => {
                 // The acceleration is continuous, so tangents do not jump.
                 self.ends(side);
@@ -645,9 +727,13 @@ impl<'a> Motion<'a> {
             self.leave(back, closing == 0.0);
             return;
         }
+        if self.contact(side) == Contact::Pushing && !self.closes(side) {
+            (self.mode, self.leaves) = (Mode::Open(side), Some((side, 1)));
+            return;
+        }
         let is_slow = e * closing <= limit;
         let (lasts, next) = match self.contact(side) {
-            Contact::Elastic => (true, Mode::Sustained(side)),
+            Contact::Elastic | Contact::Pushing => (true, Mode::Sustained(side)),
             Contact::Rigid => (is_slow && self.presses(0, side, &after(0.0)), Mode::Stuck(side)),
             Contact::Impact => {
                 let y = after(e);
@@ -655,7 +741,7 @@ impl<'a> Motion<'a> {
                 (lasts, if e > 0.0 { Mode::Onset(side) } else { Mode::Sustained(side) })
             }
         };
-        let is_elastic = self.contact(side) == Contact::Elastic;
+        let is_elastic = self.contact(side).is_elastic();
         if lasts && matches!(next, Mode::Stuck(_)) {
             e = 0.0;
         }
@@ -713,9 +799,11 @@ impl<'a> Motion<'a> {
             (Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side), _) => {
                 Some(if side == Side::Right { b'1' } else { b'4' })
             }
-            (Mode::Free, _) if self.interval != 0 => Some(if self.interval > 0 { b'1' } else { b'4' }),
-            (Mode::Free, None) => None,
-            (Mode::Free, Some(from)) => Some(match (from, from == side) {
+            (Mode::Free | Mode::Open(_), _) if self.interval != 0 => {
+                Some(if self.interval > 0 { b'1' } else { b'4' })
+            }
+            (Mode::Free | Mode::Open(_), None) => None,
+            (Mode::Free | Mode::Open(_), Some(from)) => Some(match (from, from == side) {
                 (Side::Right, true) => b'2',
                 (Side::Right, false) => b'3',
                 (Side::Left, true) => b'5',

@@ -43,6 +43,8 @@ pub(crate) struct Shape {
     pub(crate) stages: bool,
     /// Further walls behind elastic ones.
     pub(crate) walls: bool,
+    /// Elastic walls with a preload, of which most only push.
+    pub(crate) pushing: bool,
     /// Wide ranges: any signs of damping and stiffness, skew damping, very large and very small rates.
     pub(crate) wide: bool,
 }
@@ -101,7 +103,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     let none = [0.0; 2];
     let pair = |random: &mut Random, reach: f64| [random.even(reach), random.even(reach)];
     let load = if random.chance(0.4) { none } else { pair(random, 6.0) };
-    let free = Domain { damping, stiffness, load };
+    let free = Domain { damping, stiffness, load, preload: 0.0 };
     let contact = |random: &mut Random| [Contact::Impact, Contact::Rigid, Contact::Elastic][random.below(3)];
     let behind = |random: &mut Random| {
         let k = random.logarithmic(20.0, if shape.wide { 1e5 } else { 1e3 });
@@ -157,11 +159,11 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         for _ in 0..1 + random.below(3) {
             let factors = [random.logarithmic(0.5, 2.0), random.logarithmic(0.6, 2.5)];
             let moved = if random.chance(0.3) { none } else { pair(random, 15.0) };
-            let Domain { damping, stiffness, load } = oscillator.free;
+            let Domain { damping, stiffness, load, .. } = oscillator.free;
             let load = [load[0] + moved[0], if is_single { 0.0 } else { load[1] + moved[1] }];
             let (damping, stiffness) = (times(damping, factors[1]), times(stiffness, factors[0]));
             let stage = walled(
-                Domain { damping, stiffness, load },
+                Domain { damping, stiffness, load, preload: 0.0 },
                 first.map(|[k, c]| [k * factors[1], c * factors[0]]),
             );
             oscillator.stages.push(Stage { free: stage.free, meshing: stage.meshing });
@@ -176,6 +178,9 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     }
     if shape.walls {
         add_walls(random, &mut oscillator);
+    }
+    if shape.pushing {
+        preload_walls(random, &mut oscillator);
     }
     oscillator.validate().unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
     let restitution = [0; 2].map(|_| if random.chance(0.25) { 0.0 } else { random.between(0.0, 0.9) });
@@ -220,14 +225,44 @@ fn add_walls(random: &mut Random, o: &mut Oscillator) {
     }
 }
 
+/// Makes the last wall of each side elastic. Most walls only push, and most have a preload.
+fn preload_walls(random: &mut Random, o: &mut Oscillator) {
+    for side in Side::BOTH.into_iter().filter(|side| o.walls[side.index()].is_finite()) {
+        let (i, gap) = (side.index(), o.gap);
+        let contact = if random.chance(0.8) { Contact::Pushing } else { Contact::Elastic };
+        let sizes = [random.even(4.0), random.even(4.0)];
+        let has_preload = random.chance(0.7);
+        let preload = |domain: &mut Domain, size: f64| {
+            if has_preload {
+                domain.preload = size;
+                (0..2).for_each(|i| domain.load[i] -= side.sign() * size * gap[i]);
+            }
+        };
+        let is_first = o.outer_walls[i].is_empty();
+        if let Some(wall) = o.outer_walls[i].last_mut().filter(|wall| wall.contact != Contact::Rigid) {
+            wall.contact = contact;
+            wall.meshing.iter_mut().enumerate().for_each(|(stage, domain)| preload(domain, sizes[stage % 2]));
+        }
+        if is_first && o.contacts[i] != Contact::Rigid {
+            o.contacts[i] = contact;
+            preload(&mut o.meshing[i], sizes[0]);
+            o.stages
+                .iter_mut()
+                .zip([1, 0, 1])
+                .for_each(|(stage, j)| preload(&mut stage.meshing[i], sizes[j]));
+        }
+    }
+}
+
 /// Removes the second coordinate.
 fn single(o: &mut Oscillator) {
     let first = |m: Matrix| [[m[0][0], 0.0], [0.0, 0.0]];
-    let Domain { damping, stiffness, load } = o.free;
+    let Domain { damping, stiffness, load, .. } = o.free;
     o.degrees = 1;
     o.mass = [[o.mass[0][0], 0.0], [0.0, 1.0]];
     o.gap[1] = 0.0;
-    o.free = Domain { damping: first(damping), stiffness: first(stiffness), load: [load[0], 0.0] };
+    o.free =
+        Domain { damping: first(damping), stiffness: first(stiffness), load: [load[0], 0.0], preload: 0.0 };
     (o.force[1], o.force_sin[1]) = (0.0, 0.0);
     for harmonic in &mut o.harmonics {
         (harmonic.cos[1], harmonic.sin[1]) = (0.0, 0.0);

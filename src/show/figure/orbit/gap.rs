@@ -134,7 +134,7 @@ impl OrbitPlot<'_> {
         if are_two {
             ends.extend([right + 0.25 * length, left - 0.25 * length]);
         }
-        let is_elastic = Side::BOTH.iter().any(|side| self.contact(*side) == Some(Contact::Elastic));
+        let is_elastic = Side::BOTH.iter().any(|side| self.contact(*side).is_some_and(Contact::is_elastic));
         if !are_two || is_elastic {
             ends.extend([high + MOTION_MARGIN * extent, low - MOTION_MARGIN * extent]);
             let near = [(right, right - high, 1.0), (left, low - left, -1.0)];
@@ -150,7 +150,7 @@ impl OrbitPlot<'_> {
     /// would overlap an earlier one are left out.
     fn draw_symbols(&self, canvas: &Canvas, frame: &Frame) {
         let walls = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
-        let is_elastic = |side: Side| self.contact(side) == Some(Contact::Elastic);
+        let is_elastic = |side: Side| self.contact(side).is_some_and(Contact::is_elastic);
         let mut drawn: Vec<Point> = Vec::new();
         for (t, symbol) in flights::symbols(&self.motion.events, self.cycle) {
             let nearest = self.motion.points().min_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
