@@ -101,7 +101,10 @@ pub enum ChoiceError {
 impl ChoiceError {
     /// Whether the request is wrong. Otherwise a device failed.
     pub fn is_usage(&self) -> bool {
-        !matches!(self, ChoiceError::Device(_) | ChoiceError::Engine(_))
+        match self {
+            ChoiceError::Engine(error) => matches!(error, EngineError::NotOnLanes { .. }),
+            error => !matches!(error, ChoiceError::Device(_)),
+        }
     }
 }
 

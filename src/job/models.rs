@@ -67,11 +67,11 @@ fn contact(name: &str, wall: &Wall, [z, w]: [&str; 2]) -> String {
     }
     match &wall.law {
         WallLaw::Elastic { pulls } => {
-            let _ =
-                writeln!(text, "There is no impact: the motion continues behind the wall until {z} returns.");
-            if !pulls {
-                text += "    The wall only pushes: behind it, contact is open while spring, damper and preload would pull.\n";
-            }
+            let end = match pulls {
+                true => format!(" until {z} returns."),
+                false => ".\n    The wall only pushes: contact is open while spring, damper and preload would pull.".to_owned(),
+            };
+            let _ = writeln!(text, "There is no impact: the motion continues behind the wall{end}");
         }
         WallLaw::Impact { restitution, mesh_speed } => {
             let lasts = match mesh_speed.as_number() {

@@ -16,7 +16,7 @@ fn backlash(values: &[(&str, f64)]) -> FileModel {
 /// Angle and speed at 1 s after a release at 90 degrees, by an integrator of order 8 that switches at the events.
 #[test]
 fn the_released_inertia_has_the_trace_of_the_example() {
-    let model = backlash(&[("T", 0.0)]);
+    let model = backlash(&[("T", 0.0), ("b", std::f64::consts::FRAC_PI_4)]);
     let flow = Flow::of(&model).unwrap();
     let start = [std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0];
     let halt = std::sync::atomic::AtomicBool::new(false);
@@ -28,9 +28,9 @@ fn the_released_inertia_has_the_trace_of_the_example() {
 /// the flank behind the wall. Both flights are linear.
 #[test]
 fn a_cycle_agrees_with_its_linear_flights() {
-    let (omega, torque) = (6.0, 200.0);
-    let model = backlash(&[("omega", omega), ("T", torque)]);
+    let (omega, torque) = (20.0, 2000.0);
     let (j, c, d, half) = (5.0, 20_000.0, 50.0, std::f64::consts::FRAC_PI_8);
+    let model = backlash(&[("omega", omega), ("T", torque), ("b", 2.0 * half)]);
     let flow = Flow::of(&model).unwrap();
     let orbit = analyse_flow(&flow, model.law(), [0.0, 1.0, 0.0, 0.0], &Settings::default(), 8);
     assert!(matches!(orbit.class, Class::Periodic { .. }) && orbit.status == Status::Ok, "{orbit:?}");
