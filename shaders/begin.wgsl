@@ -41,6 +41,11 @@ fn start_beyond(side: u32) {
             cell.flow_index = shapes[cell.flow_index].behind[side];
             tally.interval = max(tally.interval, side) + 2u;
         }
+        if watches_force() && force_inside(motion.q) < 0.0 {
+            cell.flow_index = shapes[cell.flow_index].behind[side];
+            tally.interval += OPEN - 2u;
+            tally.origin = side;
+        }
         if sign_of(side) * (motion.q[0] - flows[cell.flow_index].walls[side]) <= 0.0 {
             return;
         }

@@ -49,10 +49,16 @@ var<private> offsets: vec2<Real>;
 fn watch(tau: Real) -> Watch {
     let z = gap_jet(tau);
     if tally.mode == MODE_FREE {
-        return Watch(
+        var both = Watch(
             vec3<Real>(offsets.x - z.x, -z.y, -z.z),
             vec3<Real>(offsets.y + z.x, z.y, z.z),
         );
+        if is_bounded_by_force(SIDE_RIGHT) {
+            both.first = force_jet(offsets.x, z, tau);
+        } else if is_bounded_by_force(SIDE_LEFT) {
+            both.second = force_jet(offsets.y, z, tau);
+        }
+        return both;
     }
     let sign = sign_of(side_of(tally.mode));
     if tally.mode < MODE_ONSET || sticks() {
@@ -65,6 +71,12 @@ fn set_offsets() {
     let z = motion.q[0];
     if tally.mode == MODE_FREE {
         offsets = vec2<Real>(walls[0] - z, z - walls[1]);
+        if watches_force() {
+            // A flight that begins where the force is 0 has its root there.
+            let begins = tally.order > 0u && tally.origin == side_of_interval();
+            let start = select(force_inside(motion.q), Real(0.0), begins);
+            offsets = select(vec2<Real>(offsets.x, start), vec2<Real>(start, offsets.y), side_of_interval() == SIDE_RIGHT);
+        }
     } else if sticks() {
         offsets = vec2<Real>(sign_of(side_of(tally.mode)) * gap_terms[0], 0.0);
     } else {
@@ -157,8 +169,13 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
         let rest = cube * cube * (1.0 / 14400.0);
         // In the contact onset the second distance is an acceleration, so that its remainder holds two more
         // derivatives.
-        let eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest) * here.swell
+        var eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest) * here.swell
             + 8.0 * ULP * abs(offsets);
+        if watches_force() {
+            let of_force = force_bound(motion.bound + growth, rate_bound + growth) * rest * here.swell
+                + 8.0 * ULP * size_of_force(motion.q);
+            eps = select(vec2<Real>(eps.x, of_force), vec2<Real>(of_force, eps.y), side_of_interval() == SIDE_RIGHT);
+        }
         let first = judge(left.first, right.first, dt, orders.x, eps.x);
         let second = judge(left.second, right.second, dt, orders.y, eps.y);
         if first == CLEAR && second == CLEAR {
@@ -211,7 +228,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
         }
         // The shortest stretch is still unclear: a touch within rounding. At elastic walls it does not matter.
         let touched = select(side_of(tally.mode), select(SIDE_LEFT, SIDE_RIGHT, first != CLEAR), tally.mode == MODE_FREE);
-        if !is_elastic(touched) {
+        if !is_elastic(touched) || has_preload(touched) {
             tally.grazes += 1u;
         }
         if right.first.x <= 0.0 {
@@ -237,6 +254,9 @@ var<private> balanced: Real;
 
 // Bound on the eighth derivative of the gap, which the contact onset needs.
 var<private> pressing_bound: Real;
+
+// Bound on the seventh derivative of the gap, which the force of a wall that only pushes needs.
+var<private> rate_bound: Real;
 
 // Bisections of the time at which the contact onset is deepest.
 const DEEPEST_CAP: u32 = 30u;
@@ -287,6 +307,10 @@ fn careful() -> bool {
     motion.bound =
         derivative_bound(120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
     pressing_bound = motion.bound;
+    if watches_force() {
+        rate_bound =
+            derivative_bound(720.0 * gap_terms[6], 5040.0 * gap_terms[7], 720.0 * x_terms[6], 5040.0 * x_terms[7]);
+    }
     if sticks() {
         motion.bound = stuck_bound();
     }
@@ -361,17 +385,23 @@ fn act(second: bool, tau: Real) {
     let settling = tau == 0.0;
     let mode = tally.mode;
     var side = side_of(mode);
+    var is_force = false;
     var jump: Jump;
     if mode == MODE_FREE {
         side = select(SIDE_RIGHT, SIDE_LEFT, second);
-        motion.q[0] = walls[side];
+        is_force = is_bounded_by_force(side);
+        if !is_force {
+            motion.q[0] = walls[side];
+        }
     } else if !second {
         motion.q[0] = 0.0;
     }
     if EXPONENT {
         crossing.before = field();
     }
-    if mode == MODE_FREE {
+    if is_force {
+        jump = change_force();
+    } else if mode == MODE_FREE {
         jump = contact(side, settling);
     } else if sticks() {
         jump = let_go(side);
@@ -395,6 +425,12 @@ fn act(second: bool, tau: Real) {
     }
     if INTERVALS && jump.mode == MODE_PASSING {
         pass_wall(side);
+        if is_force {
+            tally.order = 1u;
+        } else if PUSHING && motion.q[1] == 0.0 && has_preload(1u - side) && !presses(present_pull(), side, motion.q) {
+            // Rest on the wall under a load below the preload is an infinite series of contacts.
+            tally.status = STATUS_CAP_EVENTS;
+        }
     } else if jump.mode != mode {
         tally.mode = jump.mode;
         enter(domain_of(jump.mode));

@@ -21,8 +21,8 @@ const SCAN_CAREFUL: u32 = 0u; // the next step needs a careful pass
 const SCAN_BUDGET: u32 = 1u; // the iterations of this dispatch are used up
 
 fn scan() -> u32 {
-    // From rest on a wall, in the contact onset, and where the motion is measured, every step is a careful one.
-    if MEASURE || tally.order > 1u || tally.mode >= MODE_ONSET {
+    // From rest on a wall, in the contact onset, behind a wall that only pushes, and where the motion is measured, every step is a careful one.
+    if MEASURE || tally.order > 1u || tally.mode >= MODE_ONSET || watches_force() {
         return SCAN_CAREFUL;
     }
     let d = domain_of(tally.mode);

@@ -67,6 +67,10 @@ struct Flow {
     // Contact force of the walls that the gap has passed, positive to the left: factors of gap, rate and 1, in the units of
     // measure.wgsl.
     held: array<Real, 3>,
+    // Force of a wall that only pushes, positive inside the interval that it bounds: factors of gap, rate and 1, in these units.
+    push: array<Real, 3>,
+    // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters it.
+    preload: array<array<Real, 2>, 2>,
 }
 
 // Whole numbers of a flow.

@@ -63,7 +63,7 @@ fn restart_schedule() {
 }
 
 // Enters a stage: state and tangent vectors are continuous. A contact that depends on a force is decided anew: a gap at rest on
-// a rigid wall, and a contact onset.
+// a rigid wall, a contact onset, and contact with a wall that only pushes.
 fn enter_stage() {
     let side = side_of(tally.mode);
     let spring = flows[cell.flow_index].springs[side][0];
@@ -81,6 +81,7 @@ fn enter_stage() {
         }
         leave_contact(side);
     }
+    settle_force();
     if sticks() {
         tally.order = stuck_order(side);
     } else if tally.order > 0u {

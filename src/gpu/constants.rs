@@ -6,6 +6,7 @@ use wide::f64x4;
 use super::coordinates::Coordinates;
 use super::features::Features;
 use super::layout::{Domain, Flow};
+use super::pushing::{closed_pages, open_page, push};
 use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::{self, Contact, Side};
 use rattlemap_dynamics::reference::CLOSING_ANGLE;
@@ -74,6 +75,7 @@ impl Constants {
     /// Returns the free steps per forcing period: `requested`, or as many as the motion needs. Returns `None` if
     /// there are too many for a lane.
     pub fn steps(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<u32> {
+        let oscillator = &*closed_pages(oscillator);
         let of_stages = oscillator.stages.iter().map(|stage| &stage.free);
         let passed = Side::BOTH.into_iter().flat_map(|side| {
             let inner = oscillator.outer_walls[side.index()].len();
@@ -89,20 +91,20 @@ impl Constants {
 
     /// Derives the constants for the number of steps that [`Constants::steps`] returns.
     pub fn new(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<Constants> {
-        let steps = Constants::steps(oscillator, requested)?;
+        let (steps, features) = (Constants::steps(oscillator, requested)?, Features::of(oscillator));
+        let whole = closed_pages(oscillator);
+        let (model, oscillator) = (oscillator, &*whole);
         let period = oscillator.period();
         let common = Common::new(oscillator, period / f64::from(steps));
         let coordinates = Coordinates::new(oscillator);
-        let mut pages = pages_of_stage(oscillator, &common, 0);
+        let mut pages = pages_of_stage(oscillator, model, &common, 0);
         let intervals = pages.len();
         let mut changes = Vec::new();
         if !oscillator.schedule.is_empty() {
             let further = 1..oscillator.stage_count();
-            pages.extend(
-                further.flat_map(|stage| {
-                    pages_of_stage(&oscillator.in_stage(stage), &common, stage * intervals)
-                }),
-            );
+            pages.extend(further.flat_map(|stage| {
+                pages_of_stage(&oscillator.in_stage(stage), model, &common, stage * intervals)
+            }));
             changes = changes_of(oscillator, steps, intervals);
         }
         let further = pages.split_off(1);
@@ -116,7 +118,7 @@ impl Constants {
             mirror_symmetric: oscillator.mirror_symmetric(),
             degrees: oscillator.degrees as u32,
             must_rest: false,
-            features: Features::of(oscillator),
+            features,
             bounds: Side::BOTH.map(|side| match oscillator.last_wall(side) {
                 (at, Contact::Rigid) => at,
                 _ => side.sign() * f64::INFINITY,
@@ -231,8 +233,14 @@ fn behind_nth_wall(
     first.filter(move |_| nth == 0).chain(outer.into_iter().flatten())
 }
 
-/// Derives the constants of an oscillator's first stage, in all intervals between walls. Pages are numbered from `first`.
-fn pages_of_stage(oscillator: &model::Oscillator, common: &Common, first: usize) -> Vec<(Flow, Page)> {
+/// Derives the constants of an oscillator's first stage, in all intervals between walls. Pages are numbered from `first`. `model` tells
+/// which walls only push.
+fn pages_of_stage(
+    oscillator: &model::Oscillator,
+    model: &model::Oscillator,
+    common: &Common,
+    first: usize,
+) -> Vec<(Flow, Page)> {
     let [right, left] = oscillator.outer_walls.each_ref().map(Vec::len);
     let page = |side: Side, nth: usize| first + nth + if side == Side::Left { right } else { 0 };
     let behind_first = Side::BOTH.map(|side| common.is_passed[side.index()].then(|| page(side, 1)));
@@ -244,11 +252,32 @@ fn pages_of_stage(oscillator: &model::Oscillator, common: &Common, first: usize)
             behind[side.index()] = (nth < count).then(|| page(side, nth + 1));
             behind[1 - side.index()] = Some(if nth == 1 { first } else { page(side, nth - 1) });
             let is_passed = behind.map(|page| page.is_some());
-            let common = Common { walls: interval.walls, is_passed, ..*common };
+            let common = Common { walls: walls(&interval), is_passed, ..*common };
             let (mut flow, page) = page_of(&interval, &common, behind);
             flow.held = held_force(oscillator, &interval, common.h);
             pages.push((flow, page));
         }
+    }
+    for (side, count) in Side::BOTH.into_iter().zip([right, left]) {
+        if model.last_wall(side).1 != Contact::Pushing {
+            continue;
+        }
+        // Contact with the last wall ends and begins where the wall's force changes its sign.
+        let (closed, before) = (page(side, count), if count == 1 { first } else { page(side, count - 1) });
+        let open = first + pages.len();
+        let (flow, shape) = &mut pages[closed - first];
+        flow.push = push(oscillator, side, common.h);
+        shape.behind[side.index()] = Some(open);
+        let interval = open_page(oscillator, side);
+        let mut behind = [None; 2];
+        (behind[side.index()], behind[1 - side.index()]) = (Some(closed), Some(before));
+        let common = Common { walls: walls(&interval), is_passed: [true; 2], ..*common };
+        let (mut flow, shape) = page_of(&interval, &common, behind);
+        flow.push = push(oscillator, side, common.h).map(|factor| -factor);
+        if count > 1 {
+            flow.held = held_force(oscillator, &interval, common.h);
+        }
+        pages.push((flow, shape));
     }
     pages
 }
@@ -295,6 +324,8 @@ fn page_of(
         springs: Side::BOTH.map(|side| springs(oscillator, side, h)),
         displacements: coordinates.displacements(),
         held: [0.0; 3],
+        push: [0.0; 3],
+        preload: Side::BOTH.map(|side| coordinates.preload(oscillator, side).map(|rate| -h * h * rate)),
     };
     (flow, Page { harmonics, contacts: oscillator.contacts, behind: pages_behind })
 }

@@ -1,6 +1,6 @@
 //! Oscillators in the coordinates of lanes: the gap `z` and one displacement `x`.
 
-use rattlemap_dynamics::model::{Domain, Oscillator, State};
+use rattlemap_dynamics::model::{Domain, Oscillator, Side, State};
 
 /// Choice of the displacement `x`, and the effect of a force along the gap.
 #[derive(Clone, Copy, Debug)]
@@ -153,6 +153,12 @@ impl Coordinates {
 
     /// Returns the change of the accelerations of the gap and of `x`, per unit of gap rate, by a damper along the gap
     /// behind a wall.
+    /// Returns the decrease of the accelerations of gap and `x` by the preload of a wall.
+    pub(super) fn preload(&self, oscillator: &Oscillator, side: Side) -> [f64; 2] {
+        let push = side.sign() * oscillator.preload(side);
+        [push * self.compliance(), push * self.accelerated(self.gap)[self.other]]
+    }
+
     pub(super) fn damper(&self, free: &Domain, behind: &Domain) -> [f64; 2] {
         let (g, p) = (self.gap, 1 - self.other);
         let c = (behind.damping[p][p] - free.damping[p][p]) / (g[p] * g[p]);

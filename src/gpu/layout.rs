@@ -82,6 +82,8 @@ structs! {
         springs: [[f64; 2]; 2],
         displacements: [[f64; 2]; 2],
         held: [f64; 3],
+        push: [f64; 3],
+        preload: [[f64; 2]; 2],
     }
 
     /// Whole numbers of a [`Flow`].
@@ -332,7 +334,7 @@ pub(super) fn contact_code(contact: Contact) -> u32 {
     match contact {
         Contact::Impact => impact,
         Contact::Rigid => rigid,
-        // Lanes that have walls that only push are refused, `Features::pushing`.
+        // A wall that only pushes has pages of its own (pushing.rs).
         Contact::Elastic | Contact::Pushing => elastic,
     }
 }

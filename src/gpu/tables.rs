@@ -11,7 +11,7 @@ use super::layout::{self, Flow, FlowShape, NO_FLOW, contact_code};
 use super::precision::Precision;
 use super::transfer::{buffer, reals, upload};
 use super::{Gpu, GpuError};
-use rattlemap_dynamics::model::{Law, Oscillator};
+use rattlemap_dynamics::model::{Law, Oscillator, Side};
 
 /// Flows and laws, uploaded once for any number of runs.
 pub struct Tables {
@@ -49,7 +49,8 @@ pub(crate) fn bytes(oscillator: &Oscillator, steps: Option<u32>) -> [u64; 2] {
     let page = size_of::<Constants>()
         + size_of::<FlowShape>()
         + PAIRS_PER_HARMONIC * pair * oscillator.harmonics.len();
-    let intervals = 1 + oscillator.outer_walls.iter().map(Vec::len).sum::<usize>();
+    let pushing = Side::BOTH.into_iter().filter(|&side| oscillator.is_pushing_or_preloaded(side)).count();
+    let intervals = 1 + oscillator.outer_walls.iter().map(Vec::len).sum::<usize>() + 2 * pushing;
     let flow = page * oscillator.stage_count() * intervals + 2 * pair * oscillator.schedule.len();
     [flow as u64, phasors * pair as u64].map(|bytes| COPIES * bytes)
 }

@@ -349,9 +349,10 @@ impl Plan {
     }
 
     /// Whether lanes have no code for a part of the model, which the reference has.
+    #[cfg(feature = "gpu")]
     pub fn needs_reference(&self) -> bool {
         let flows = 0..self.flow_count() as u32;
-        flows.into_par_iter().any(|flow| self.oscillator(flow).has_pushing_or_preloaded_walls())
+        flows.into_par_iter().any(|flow| crate::gpu::needs_reference(&self.oscillator(flow)))
     }
 
     /// Returns the number of distinct flows.

@@ -1,5 +1,5 @@
-//! Further harmonics of the force, domains that change in a forcing period, and several walls on a side, on lanes and on the
-//! reference.
+//! Further harmonics of the force, domains that change in a forcing period, several walls on a side, and walls that only push, on
+//! lanes and on the reference.
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
@@ -124,6 +124,40 @@ fn with_walls(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
     (oscillator, law, start)
 }
 
+/// Makes the last walls elastic, unless they are rigid. Most only push, and most have a preload.
+fn with_pushing(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
+    let mut draw = Numbers(seed ^ 0x9a55);
+    let gap = oscillator.gap;
+    for side in (0..2).filter(|&side| oscillator.walls[side].is_finite()) {
+        let sign = [1.0, -1.0][side];
+        let contact = draw.one_of(&[Contact::Pushing, Contact::Pushing, Contact::Elastic]);
+        let least = if contact == Contact::Pushing { 0.0 } else { -0.5 };
+        let size = draw.one_of(&[0.0, 1.0, 1.0]) * draw.between(least, 1.5);
+        let preload = |domain: &mut Domain| {
+            domain.preload = size;
+            (0..2).for_each(|i| domain.load[i] -= sign * size * gap[i]);
+        };
+        match oscillator.outer_walls[side].last_mut() {
+            Some(last) if last.contact != Contact::Rigid => {
+                last.contact = contact;
+                last.meshing.iter_mut().for_each(preload);
+            }
+            None if oscillator.contacts[side] != Contact::Rigid => {
+                oscillator.contacts[side] = contact;
+                let stages = oscillator.stages.iter_mut().map(|stage| &mut stage.meshing[side]);
+                stages.chain([&mut oscillator.meshing[side]]).for_each(preload);
+            }
+            _ => {}
+        }
+    }
+    oscillator.validate().unwrap();
+    (oscillator, law, start)
+}
+
+fn pushing_cells() -> Vec<Cell> {
+    (0..SEEDS).map(|seed| with_pushing(seed, random_cell(seed))).collect()
+}
+
 fn walled_cells() -> Vec<Cell> {
     (0..SEEDS).map(|seed| with_walls(seed, random_cell(seed))).chain(chattering_clutches()).collect()
 }
@@ -149,7 +183,9 @@ fn staged_cells() -> Vec<Cell> {
 
 fn cells_with_everything() -> Vec<Cell> {
     let staged = |seed| with_harmonics(seed, with_stages(seed, random_cell(seed)));
-    (0..SEEDS).map(|seed| with_walls(seed, staged(seed))).chain(chattering_clutches()).collect()
+    let walled = (0..SEEDS).map(|seed| with_walls(seed, staged(seed)));
+    let pushing = (0..SEEDS).map(|seed| with_pushing(seed, with_walls(seed, staged(seed))));
+    walled.chain(pushing).chain(chattering_clutches()).collect()
 }
 
 fn reference((oscillator, law, start): &Cell) -> Record {
@@ -222,6 +258,12 @@ fn everything_together_agrees_with_the_reference_in_f32() {
 #[ignore = "compiles large shaders; scripts/test.sh --all"]
 fn several_walls_agree_with_the_reference() {
     check("walls", &walled_cells(), &[IN_F64, IN_F32]);
+}
+
+#[test]
+#[ignore = "compiles large shaders; scripts/test.sh --all"]
+fn walls_that_only_push_agree_with_the_reference() {
+    check("pushing", &pushing_cells(), &[IN_F64, IN_F32]);
 }
 
 /// Where all stages are equal, only the changes' instants interrupt the motion.

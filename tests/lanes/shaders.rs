@@ -68,8 +68,11 @@ fn variants(precision: Precision) -> [Variant; 19] {
         measuring(true, false),
         Variant { features: Features { harmonics: 7, ..class.features }, keep: true, ..class },
         Variant { features: Features { harmonics: 1, stages: true, ..class.features }, ..everything },
-        Variant { features: Features { harmonics: 2, intervals: true, ..all }, ..measuring(true, true) },
-        Variant { features: Features { intervals: true, ..class.features }, ..everything },
+        Variant {
+            features: Features { harmonics: 2, intervals: true, pushing: true, ..all },
+            ..measuring(true, true)
+        },
+        Variant { features: Features { intervals: true, pushing: true, ..class.features }, ..everything },
     ]
 }
 

@@ -335,15 +335,19 @@ impl Oscillator {
         self.outer_walls.iter().any(|walls| !walls.is_empty())
     }
 
-    /// Whether a wall only pushes or has a preload, in any stage.
-    pub fn has_pushing_or_preloaded_walls(&self) -> bool {
-        let side_has = |side: Side| {
-            let outer = &self.outer_walls[side.index()];
-            let stages = (0..self.stage_count()).map(|stage| self.stage(stage).meshing[side.index()]);
-            let mut domains = stages.chain(outer.iter().flat_map(|wall| wall.meshing.iter().copied()));
-            self.last_wall(side).1 == Contact::Pushing || domains.any(|domain| domain.preload != 0.0)
-        };
-        Side::BOTH.into_iter().any(|side| self.wall(side).is_finite() && side_has(side))
+    /// Whether the last wall of a side only pushes, or any of its walls has a preload in any stage.
+    pub fn is_pushing_or_preloaded(&self, side: Side) -> bool {
+        self.last_wall(side).1 == Contact::Pushing && self.wall(side).is_finite()
+            || self.preloads(side).any(|preload| preload != 0.0)
+    }
+
+    /// Returns the preloads of the walls of a side, in all stages.
+    pub fn preloads(&self, side: Side) -> impl Iterator<Item = f64> + '_ {
+        let outer = self.outer_walls[side.index()].iter().flat_map(|wall| &wall.meshing);
+        let stages =
+            (0..self.stage_count()).map(move |stage| self.stage(stage).meshing[side.index()].preload);
+        let exists = self.wall(side).is_finite();
+        stages.chain(outer.map(|domain| domain.preload)).filter(move |_| exists)
     }
 
     /// Returns position and law of the last wall of a side, from the inside to the outside. A missing wall is infinitely far.

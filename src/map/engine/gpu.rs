@@ -105,8 +105,8 @@ impl<'p> Gpu<'p> {
     pub async fn prepared(prepared: Prepared<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let mut clock = Instant::now();
         let Prepared { plan, constants, survey, took } = prepared;
-        if survey.features.pushing {
-            return Err(EngineError::NotOnLanes { feature: "walls that only push or have a preload" });
+        if survey.features.negative_preload {
+            return Err(EngineError::NotOnLanes { feature: gpu::NEGATIVE_PRELOAD });
         }
         let settings = settings_after(&plan, &survey);
         let mut engine = Gpu {
