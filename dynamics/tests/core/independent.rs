@@ -282,9 +282,10 @@ fn five_thousand_models_of_each_shape_agree_with_matrix_exponentials() {
 /// Longest time for one model on an idle processor.
 const LONGEST_TIME: Duration = Duration::from_secs(2);
 
+const WIDE: Shape = Shape { harmonics: true, stages: true, wide: true, ..PLAIN };
+
 /// Measures models of wide ranges. Every motion must end in time, with finite numbers.
-fn check_ends(seeds: std::ops::Range<u64>) {
-    let shape = Shape { harmonics: true, stages: true, pushing: true, wide: true, ..PLAIN };
+fn check_ends(shape: Shape, seeds: std::ops::Range<u64>, longest: Duration) {
     let ends: Vec<_> = seeds
         .into_par_iter()
         .map(|seed| {
@@ -302,7 +303,7 @@ fn check_ends(seeds: std::ops::Range<u64>) {
     let of = |status| ends.iter().filter(|end| end.2 == status).count();
     let statuses = Status::ALL.map(|status| (status.name(), of(status)));
     println!("{statuses:?}; the slowest: {slowest:?}");
-    let slow: Vec<_> = ends.iter().filter(|end| end.0 >= LONGEST_TIME).collect();
+    let slow: Vec<_> = ends.iter().filter(|end| end.0 >= longest).collect();
     let wrong: Vec<_> = ends.iter().filter(|end| !end.3).collect();
     assert!(wrong.is_empty(), "not finite: {wrong:?}");
     assert!(slow.is_empty(), "{slow:?}");
@@ -311,11 +312,18 @@ fn check_ends(seeds: std::ops::Range<u64>) {
 
 #[test]
 fn two_hundred_wide_models_end_with_finite_numbers() {
-    check_ends(0..200);
+    check_ends(WIDE, 0..200, LONGEST_TIME);
 }
 
 #[test]
 #[ignore = "minutes"]
 fn ten_thousand_wide_models_end_with_finite_numbers() {
-    check_ends(0..10_000);
+    check_ends(WIDE, 0..10_000, LONGEST_TIME);
+}
+
+/// Slow forces drive some of these motions through thousands of contacts in each period.
+#[test]
+#[ignore = "minutes"]
+fn a_thousand_wide_models_with_pushing_walls_end_with_finite_numbers() {
+    check_ends(Shape { pushing: true, ..WIDE }, 0..1000, 10 * LONGEST_TIME);
 }
