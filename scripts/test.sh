@@ -223,8 +223,8 @@ phase "docs, warnings denied" docs
 phase "dependencies" dependencies
 phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
 phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu,figures --lib
-phase "each feature alone" each_feature
 if $all; then
+    phase "each feature alone" each_feature
     phase "types of the page's scripts" page_types
     phase "the program on Windows" cargo check --target "$windows" -p rattlemap
     phase "the program on macOS" cargo check --target "$macos" -p rattlemap
