@@ -212,9 +212,8 @@ fn check(what: &str, cells: &[Cell], precisions: &[(Precision, f64, usize)]) {
             }
             let Class::Periodic { period, .. } = classes[1] else { continue };
             cycles += 1;
-            // Longer cycles may end at another of their strobes, and motion without contact before it is steady.
-            let is_comparable = period == 1 && !theirs.is_contact_free();
-            let error = if is_comparable { apart(ours.strobe, theirs.strobe) } else { 0.0 };
+            // Longer cycles may end at another of their strobes.
+            let error = if period == 1 { apart(ours.strobe, theirs.strobe) } else { 0.0 };
             let contact = (ours.mesh_fraction - theirs.mesh_fraction).abs();
             let growth =
                 if ours.lyapunov == theirs.lyapunov { 0.0 } else { (ours.lyapunov - theirs.lyapunov).abs() };
