@@ -4,9 +4,9 @@
 #     scripts/test.sh [--all]
 #
 # Installs what is missing: a software Vulkan driver, so that shader tests run on any machine, and Rust's WebAssembly
-# target. With --all it also runs the tests that take minutes, checks each feature alone and the program for Windows and macOS, starts a Slurm
-# cluster of one node, opens pages in Chromium, and installs the Python package into an environment of its own. It prints the
-# time of each phase and the ten slowest tests at the end.
+# target. With --all it also runs the tests that take minutes, checks each feature alone, checks the program for Windows and
+# macOS, starts a Slurm cluster of one node, opens pages in Chromium, and installs the Python package into an environment of its
+# own. It prints the time of each phase and the ten slowest tests at the end.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
