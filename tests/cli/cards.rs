@@ -7,6 +7,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
@@ -22,10 +23,14 @@ const DRIVERS: [&str; 3] = ["/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/
 
 const GPU: [&str; 5] = ["map", "s.toml", "--quiet", "--engine", "gpu"];
 
+/// The processor, on which both cards compute. Tests with a limit of time fail if another test with cards runs beside them.
+static PROCESSOR: Mutex<()> = Mutex::new(());
+
 /// A machine with two cards.
 struct Machine {
     folder: TempDir,
     drivers: String,
+    _processor: MutexGuard<'static, ()>,
 }
 
 impl Machine {
@@ -46,7 +51,8 @@ impl Machine {
             copy.display().to_string()
         };
         let drivers = ["one.json", "two.json"].map(copy).join(":");
-        Some(Machine { folder, drivers })
+        let processor = PROCESSOR.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(Machine { folder, drivers, _processor: processor })
     }
 
     fn environment(&self) -> [(&'static str, &str); 2] {
