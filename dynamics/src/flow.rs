@@ -41,6 +41,7 @@ mod constrained;
 mod energy;
 mod expansion;
 mod few;
+mod friction;
 mod gap_polynomial;
 mod generator;
 mod linear;
@@ -49,9 +50,12 @@ mod row;
 mod short_flight;
 mod taylor;
 
+use friction::{FrictionFlows, Watches};
 use nalgebra::Matrix2;
 
 pub(crate) use expansion::{EXPANSION_REACH, Expansion, TERMS, turned};
+pub(crate) use friction::{Element, Watch};
+pub use friction::{Slip, Slips};
 pub use linear::LinearFlow;
 pub(crate) use linear::Step;
 pub(crate) use pushing::PushingForce;
@@ -124,6 +128,13 @@ pub struct Flow {
     held: Option<[f64; 3]>,
     /// Flows of the intervals behind the first right wall and the first left wall, from the inside to the outside.
     behind: [Vec<Flow>; 2],
+    /// Flows under dry friction, of this stage and interval.
+    friction: Option<Box<FrictionFlows>>,
+    /// For the flow of one combination of friction modes: the functions that end them, whether an element sticks, and whether the sticking
+    /// elements hold the gap still in front of a wall or behind it.
+    watches: Option<Box<Watches>>,
+    pub(crate) sticks: bool,
+    pub(crate) holds_gap: bool,
     /// Flows of the further stages, and the changes of the stage: time since phase 0, and the stage that begins there.
     stages: Vec<Flow>,
     schedule: Vec<(f64, usize)>,
@@ -151,6 +162,23 @@ impl Flow {
 
     /// Computes the flow of an oscillator that [`Oscillator::validate`] accepts.
     pub fn new(oscillator: &Oscillator) -> Flow {
+        let mut flow = Flow::in_stages(oscillator);
+        if !oscillator.friction.is_empty() {
+            flow.add_friction();
+        }
+        flow
+    }
+
+    /// Adds the flows under dry friction, in all stages and intervals.
+    fn add_friction(&mut self) {
+        self.friction = FrictionFlows::new(self).map(Box::new);
+        if self.friction.is_some() {
+            self.non_impacting = None;
+        }
+        self.behind.iter_mut().flatten().chain(&mut self.stages).for_each(Flow::add_friction);
+    }
+
+    fn in_stages(oscillator: &Oscillator) -> Flow {
         let mut flow = Flow::in_one_stage(oscillator);
         if oscillator.schedule.is_empty() {
             return flow;
@@ -257,10 +285,40 @@ impl Flow {
             free,
             meshing,
             held: None,
+            friction: None,
+            watches: None,
+            sticks: false,
+            holds_gap: false,
             behind: Default::default(),
             stages: Vec::new(),
             schedule: Vec::new(),
         }
+    }
+
+    /// Returns the elements with dry friction.
+    pub(crate) fn friction(&self) -> &[Element] {
+        self.friction.as_ref().map_or(&[], |friction| &friction.elements)
+    }
+
+    /// Returns the flow in which the elements with dry friction are in given modes.
+    #[inline]
+    pub(crate) fn in_modes(&self, slips: Slips) -> &Flow {
+        self.friction.as_ref().map_or(self, |friction| friction.flow(slips))
+    }
+
+    /// Whether this is the flow of one combination of friction modes.
+    #[inline(always)]
+    pub(crate) fn has_friction(&self) -> bool {
+        self.watches.is_some()
+    }
+
+    /// Returns the functions that end the friction modes in a domain.
+    pub(crate) fn watches(&self, kind: DomainKind) -> &[Option<Watch>] {
+        let place = match kind {
+            DomainKind::Free => 0,
+            DomainKind::Meshing(side) => 1 + side.index(),
+        };
+        self.watches.as_ref().map_or(&[], |watches| &watches[place])
     }
 
     /// Returns the flow of an interval between neighbouring walls: 0 between the first walls, `n` behind the nth right wall, `-n`
@@ -321,7 +379,11 @@ impl Flow {
         let domains = [&self.free, &self.meshing[0], &self.meshing[1]];
         let of_stages =
             self.stages.iter().chain(self.behind.iter().flatten()).map(Flow::bytes).sum::<usize>();
-        size_of::<Flow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>() + of_stages
+        let of_friction = self.friction.as_ref().map_or(0, |friction| friction.bytes());
+        size_of::<Flow>()
+            + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>()
+            + of_stages
+            + of_friction
     }
 
     /// Whether `(y, t) -> (-y, t + T/2)` maps solutions to solutions: both walls and their laws are alike.

@@ -16,8 +16,8 @@ pub use gear_pair::GearPair;
 pub use non_impacting::NonImpacting;
 pub(crate) use oscillator::is_semidefinite;
 pub use oscillator::{
-    Contact, Domain, HIGHEST_ORDER, Harmonic, Law, MOST_CHANGES, MOST_HARMONICS, MOST_STAGES, MOST_WALLS,
-    Oscillator, OscillatorError, OuterWall, Stage,
+    Contact, Domain, Friction, HIGHEST_ORDER, Harmonic, Law, MOST_CHANGES, MOST_FRICTION, MOST_HARMONICS,
+    MOST_STAGES, MOST_WALLS, Oscillator, OscillatorError, OuterWall, Stage,
 };
 pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};
 pub use stops::Stops;

@@ -44,6 +44,8 @@ pub struct Image {
     pub log_scale: f64,
     /// Whether an event was so near to grazing that the derivative is not reliable.
     pub near_grazing: bool,
+    /// Number of elements with dry friction that never slid.
+    pub(crate) never_slid: usize,
     /// [`Flow::rate`](crate::flow::Flow).
     rate: f64,
 }
@@ -78,8 +80,9 @@ impl StrobeMap {
         work: &mut Work,
     ) -> Result<Image, Stop> {
         let rate = seed.flow().rate;
-        let mut image =
-            Image { state: y, scaled: Matrix4::identity(), log_scale: 0.0, near_grazing: false, rate };
+        let never_slid = usize::MAX;
+        let scaled = Matrix4::identity();
+        let mut image = Image { state: y, scaled, log_scale: 0.0, near_grazing: false, never_slid, rate };
         match self {
             StrobeMap::Periods(p) => {
                 let mut trajectory = seed.at(y, UNIT);
@@ -106,6 +109,7 @@ impl StrobeMap {
                         scaled,
                         log_scale,
                         near_grazing: image.near_grazing || step.near_grazing,
+                        never_slid: image.never_slid.min(step.never_slid),
                         rate,
                     };
                 }
@@ -164,6 +168,7 @@ fn image_at(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
         scaled,
         log_scale,
         near_grazing: trajectory.near_grazing(),
+        never_slid: trajectory.never_slid(),
         rate: trajectory.flow().rate,
     }
 }
@@ -180,7 +185,8 @@ pub struct Cycle {
     /// The monodromy matrix, the derivative of the strobe map over one cycle. In one degree of freedom the rows and
     /// columns of the second displacement are 0.
     pub monodromy: Matrix4<f64>,
-    /// Floquet multipliers `[re, im]`, largest modulus first; two for each degree of freedom.
+    /// Floquet multipliers `[re, im]`, largest modulus first; two for each degree of freedom. Where dry friction sticks for ever, the
+    /// multiplier 1 along its row is left out.
     pub multipliers: Vec<[f64; 2]>,
     /// `ln |mu1|` of the largest multiplier, also if `mu1` is below the range of f64; minus infinity for a
     /// superstable orbit.

@@ -36,6 +36,7 @@ pub(super) fn quantities(constants: &Constants, measured: &Measured) -> Option<Q
             .then(|| [highs[3] * force_unit, (force / contact).max(0.0).sqrt() * force_unit]),
         displacements: [0, 1, 2].map(displacement),
         dissipated: dissipated * energy / (steps * h),
+        friction: None,
     })
 }
 

@@ -131,6 +131,7 @@ impl Walled {
             stages: Vec::new(),
             schedule: Vec::new(),
             outer_walls: Default::default(),
+            friction: Vec::new(),
             free: self.free.domain(),
             meshing: [self.behind(0).domain(), self.behind(1).domain()],
         };

@@ -50,6 +50,7 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
+        friction: Vec::new(),
         free: domain,
         meshing: [domain; 2],
     };
@@ -116,6 +117,7 @@ impl Damper {
             stages: Vec::new(),
             schedule: Vec::new(),
             outer_walls: Default::default(),
+            friction: Vec::new(),
             free: domain,
             meshing: [domain; 2],
         };

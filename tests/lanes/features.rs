@@ -15,7 +15,9 @@ use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Model, Oscillator, OuterWall, Side, Stage};
+use rattlemap_dynamics::model::{
+    Contact, Domain, Friction, Harmonic, Law, Model, Oscillator, OuterWall, Side, Stage,
+};
 use rattlemap_dynamics::orbit::{Budget, Class, measure};
 use rayon::prelude::*;
 
@@ -442,4 +444,8 @@ fn excluded_features_are_refused() {
     let cells = [(with_preload(pushing, Side::Right, -0.1), Law::both(0.5, 0.0), [0.0; 4])];
     let error = kinds::run(Precision::F32, &cells, &settings(&cells)).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "negative_preload", .. }), "{error}");
+    let friction = vec![Friction { row: [1.0, 0.0], force: 0.1, speed: 0.0 }];
+    let cells = [(Oscillator { friction, ..free.oscillator() }, Law::both(0.5, 0.0), [0.0; 4])];
+    let error = kinds::run(Precision::F32, &cells, &settings(&cells)).unwrap_err();
+    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "friction", .. }), "{error}");
 }

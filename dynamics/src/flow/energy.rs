@@ -10,7 +10,7 @@ use crate::model::{Domain, Oscillator};
 /// Energies below this may have lost digits by underflow of the squares.
 const LEAST_ENERGY: f64 = 1e-280;
 
-/// A bound on `|z^(n+1)|` over a step, from the energy of `y^(n)` at its left end. It is scaled to be the remainder
+/// A bound on `|row . y^(n+1)|` over a step, for a row of displacements such as that of the gap, from the energy of `y^(n)` at its left end. It is scaled to be the remainder
 /// of a two-point Hermite quintic in Bernstein form.
 ///
 /// The quintic through value, slope and curvature at both ends of a step `h` differs from the function by
@@ -38,11 +38,12 @@ impl EnergyBound {
     pub(super) fn new(
         oscillator: &Oscillator,
         domain: &Domain,
+        row: [f64; 2],
         term: &Columns,
         n: u32,
         unit: f64,
     ) -> EnergyBound {
-        let reach = oscillator.mobility(oscillator.gap).sqrt();
+        let reach = oscillator.mobility(row).sqrt();
         let scale = reach * unit.powi(6) / 14400.0;
         let [cos, sin] = [oscillator.force, oscillator.force_sin].map(|f| oscillator.mobility(f));
         let drive = (cos + sin).sqrt();

@@ -34,7 +34,8 @@ impl PushingForce {
         if !is_pushing || damping == 0.0 && preload == 0.0 {
             return None;
         }
-        let bound = |flow: &LinearFlow, domain: &Domain| flow.energy_bound(oscillator, domain, 6);
+        let bound =
+            |flow: &LinearFlow, domain: &Domain| flow.energy_bound(oscillator, domain, oscillator.gap, 6);
         let bounds = [bound(flows[0], &oscillator.free), bound(flows[1], &oscillator.meshing[side.index()])];
         Some(PushingForce { sign: side.sign(), wall, stiffness, damping, preload, bounds })
     }

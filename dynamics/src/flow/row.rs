@@ -47,6 +47,12 @@ impl Row {
         self.waves.iter().map(term).fold(first, |sum, term| sum + term)
     }
 
+    /// Returns the row multiplied by a factor.
+    pub(crate) fn scaled(&self, factor: f64) -> Row {
+        let scaled = |&(order, factors): &(u32, [f64; 2])| (order, factors.map(|x| factor * x));
+        Row { base: self.base.map(|x| factor * x), waves: self.waves.iter().map(scaled).collect() }
+    }
+
     /// Returns the sum of two rows, the second one multiplied by a factor.
     pub(crate) fn plus(&self, factor: f64, other: &Row) -> Row {
         let sum = |a: [f64; 2], b: [f64; 2]| std::array::from_fn(|i| a[i] + factor * b[i]);

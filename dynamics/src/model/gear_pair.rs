@@ -65,6 +65,7 @@ impl GearPair {
             stages: Vec::new(),
             schedule: Vec::new(),
             outer_walls: Default::default(),
+            friction: Vec::new(),
             free,
             meshing: [meshing(1.0), meshing(-1.0)],
         };

@@ -162,6 +162,23 @@ pub struct OuterWall {
     pub meshing: Vec<Domain>,
 }
 
+/// Dry friction along a row of velocities, Coulomb's law.
+///
+/// With the sliding rate `rate = row . v - speed`, the oscillator is subject to the generalised force `-row F`, where `F = force` for `rate > 0`,
+/// `F = -force` for `rate < 0`, and `|F| <= force` while the surfaces stick at `rate = 0`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Friction {
+    /// The row of the sliding rate; not zero.
+    pub row: [f64; 2],
+    /// The friction force, >= 0: when sliding, and the largest one that holds.
+    pub force: f64,
+    /// Speed of the other surface, as of a moving belt, along the row.
+    pub speed: f64,
+}
+
+/// Largest number of elements with dry friction.
+pub const MOST_FRICTION: usize = 2;
+
 /// Largest number of walls on a side.
 pub const MOST_WALLS: usize = 4;
 
@@ -205,6 +222,8 @@ pub struct Oscillator {
     pub schedule: Vec<(f64, usize)>,
     /// Further walls behind the right and the left one, from the inside to the outside.
     pub outer_walls: [Vec<OuterWall>; 2],
+    /// Dry friction, in all stages and behind all walls; at most [`MOST_FRICTION`] elements with independent rows.
+    pub friction: Vec<Friction>,
 }
 
 impl Oscillator {
@@ -519,6 +538,7 @@ impl Oscillator {
         }
         self.validate_outer_walls()?;
         self.validate_harmonics()?;
+        self.validate_friction()?;
         if self.degrees == 1 {
             self.validate_single()?;
         }
@@ -587,6 +607,35 @@ impl Oscillator {
                 let single = "0, since one degree of freedom has no second displacement";
                 require(self.degrees == 2 || factors[1] == 0.0, quantity, factors[1], single)?;
             }
+        }
+        Ok(())
+    }
+
+    fn validate_friction(&self) -> Result<(), OscillatorError> {
+        let count = self.friction.len();
+        let most = self.degrees.min(MOST_FRICTION);
+        let few = "at most 2, and at most 1 for one degree of freedom";
+        require(count <= most, || "elements with dry friction".to_owned(), count as f64, few)?;
+        for (i, Friction { row, force, speed }) in self.friction.iter().enumerate() {
+            let name = |what: &'static str| move || format!("{what} of friction {}", i + 1);
+            row.iter().try_for_each(|&entry| finite(name("an entry of the row"), entry))?;
+            let largest = row[0].abs().max(row[1].abs());
+            require(largest > 0.0, name("the largest entry of the row"), largest, "different from 0")?;
+            let single = "0, since one degree of freedom has no second displacement";
+            require(self.degrees == 2 || row[1] == 0.0, name("entry 2 of the row"), row[1], single)?;
+            let is_force = force.is_finite() && *force >= 0.0;
+            require(is_force, name("force"), *force, "finite and at least 0")?;
+            finite(name("speed"), *speed)?;
+        }
+        if let [Friction { row: [a, b], .. }, Friction { row: [c, d], .. }] = self.friction[..] {
+            let determinant = a * d - b * c;
+            let size = a.hypot(b) * c.hypot(d);
+            require(
+                determinant.abs() > MATRIX_TOLERANCE * size,
+                || "determinant of the two rows of friction".to_owned(),
+                determinant,
+                "different from 0; one element with the sum of both forces describes friction along equal rows",
+            )?;
         }
         Ok(())
     }
@@ -735,7 +784,7 @@ impl Oscillator {
     /// It is half the distance of the walls. If a wall is missing or both coincide, it is
     ///
     /// ```text
-    /// max(|wall|, |D force|, |D load|, |D preload g|),   D = (|K| + omega^2 M)^-1
+    /// max(|wall|, |D force|, |D load|, |D preload g|, |D friction row|),   D = (|K| + omega^2 M)^-1
     /// ```
     ///
     /// over the existing walls and both displacements, with [`|K|`](Self::energy_stiffness) and `load` of free motion. `|D force|` is the amplitude
@@ -771,7 +820,10 @@ impl Oscillator {
         let preloads = preloads.flat_map(|domain| {
             self.deflections(self.gap.map(|g| domain.preload * g), self.omega).map(f64::abs)
         });
-        walls.chain(deflections).chain(preloads).fold(LEAST_LENGTH, f64::max)
+        let friction = self.friction.iter().flat_map(|Friction { row, force, .. }| {
+            self.deflections(row.map(|r| force * r), self.omega).map(f64::abs)
+        });
+        walls.chain(deflections).chain(preloads).chain(friction).fold(LEAST_LENGTH, f64::max)
     }
 
     fn deflections(&self, force: [f64; 2], omega: f64) -> [f64; 2] {
@@ -811,6 +863,7 @@ impl Oscillator {
             && right.len() == left.len()
             && right.iter().zip(left).all(are_mirrored)
             && self.harmonics.iter().all(|harmonic| harmonic.order % 2 == 1)
+            && self.friction.iter().all(|friction| friction.speed == 0.0)
             && match self.schedule.len() {
                 0 => is_mirrored(self.stage(0), self.stage(0)),
                 changes => changes % 2 == 0 && self.schedule.iter().enumerate().take(half).all(recurs),

@@ -5,7 +5,7 @@
 
 use crate::flow::Flow;
 use crate::model::Side;
-use crate::reference::{GapEvent, Observer};
+use crate::reference::{FrictionEvent, GapEvent, Observer};
 
 /// Largest distance from phase 0, in turns, of an event that a slow approach may still move to the other side.
 pub const NEAR_STROBE_TURNS: f64 = 1e-3;
@@ -34,11 +34,12 @@ impl Recorder {
         }
     }
 
-    /// Returns the itineraries of `periods` consecutive periods, of which `start` is the first.
-    pub(super) fn list(flow: &Flow, events: &[GapEvent], start: u64, periods: u32) -> Vec<Itinerary> {
-        let mut list = vec![Recorder::new(flow); periods as usize];
-        events.iter().for_each(|event| list[(event.period - start) as usize].event(event));
-        list.into_iter().map(|recorder| recorder.itinerary).collect()
+    #[inline]
+    fn add(&mut self, code: u64, t: f64) {
+        let Itinerary(before) = self.itinerary;
+        // Multiplication by an odd number and rotation are invertible, and they make the order count.
+        self.is_near_strobe |= t.min(self.period - t) < NEAR_STROBE_TURNS * self.period;
+        self.itinerary = Itinerary((before ^ code).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(23));
     }
 }
 
@@ -50,9 +51,11 @@ impl Observer for Recorder {
         let is_on_wall = event.before[0] == wall;
         let code =
             1 + u64::from(event.side == Side::Right) + 2 * u64::from(is_on_wall) + 4 * event.kind as u64;
-        let Itinerary(before) = self.itinerary;
-        // Multiplication by an odd number and rotation are invertible, and they make the order count.
-        self.is_near_strobe |= event.t.min(self.period - event.t) < NEAR_STROBE_TURNS * self.period;
-        self.itinerary = Itinerary((before ^ code).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(23));
+        self.add(code, event.t);
+    }
+
+    fn friction(&mut self, event: &FrictionEvent) {
+        let modes = event.slips.iter().fold(1, |code, &slip| 3 * code + slip as u64);
+        self.add(16 * modes, event.t);
     }
 }

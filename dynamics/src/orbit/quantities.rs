@@ -4,8 +4,8 @@
 //! and the meter evaluates the exact flow there: integrals by Gauss-Legendre quadrature of order 16 over pieces of at
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
-use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule};
-use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory, side_of};
+use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule, Slips};
+use crate::reference::{EventKind, FrictionEvent, GapEvent, Observer, Stop, Trajectory, side_of};
 
 /// Nodes in `(0, 1)` and weights of the Gauss-Legendre quadrature on `[-1, 1]`; the other half is symmetric.
 const GAUSS: [(f64, f64); 4] = [
@@ -31,6 +31,17 @@ pub struct Quantities {
     /// Both displacements and the gap.
     pub displacements: [Displacement; 3],
     /// Energy that all dampers take per unit time.
+    pub dissipated: f64,
+    /// Dry friction; none without it.
+    pub friction: Option<FrictionQuantities>,
+}
+
+/// Quantities of dry friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrictionQuantities {
+    /// Share of the time during which an element sticks, 0 to 1.
+    pub sticking: f64,
+    /// Energy that friction turns into heat per unit time, `force |rate|` of all elements.
     pub dissipated: f64,
 }
 
@@ -128,6 +139,8 @@ pub(super) struct Meter<'f> {
     stage: &'f Flow,
     /// The present interval between walls.
     interval: i32,
+    /// Present modes of dry friction.
+    slips: Slips,
     schedule: Schedule<'f>,
     /// Domain, state and time since phase 0 at the beginning of the present flight.
     kind: DomainKind,
@@ -141,6 +154,9 @@ pub(super) struct Meter<'f> {
     displacements: [Moments; 3],
     force: Moments,
     contact_time: f64,
+    sticking_time: f64,
+    /// Energy that friction has turned into heat.
+    heat: f64,
 }
 
 impl<'f> Meter<'f> {
@@ -148,11 +164,13 @@ impl<'f> Meter<'f> {
     pub(super) fn new(flow: &'f Flow, trajectory: &Trajectory<'_>) -> Meter<'f> {
         let (schedule, stage) = Schedule::new(flow);
         let interval = trajectory.interval();
-        let flow = stage.interval(interval);
+        let slips = trajectory.slips();
+        let flow = stage.interval(interval).in_modes(slips);
         Meter {
             flow,
             stage,
             interval,
+            slips,
             schedule,
             kind: trajectory.domain(),
             q: flow.to_gap(trajectory.state()),
@@ -165,6 +183,8 @@ impl<'f> Meter<'f> {
             displacements: [Moments::NONE; 3],
             force: Moments::NONE,
             contact_time: 0.0,
+            sticking_time: 0.0,
+            heat: 0.0,
         }
     }
 
@@ -196,6 +216,10 @@ impl<'f> Meter<'f> {
                 .then(|| [self.force.high, (self.force.square / self.contact_time).sqrt()]),
             displacements: self.displacements.map(|moments| moments.over(time)),
             dissipated: self.dissipated / time,
+            friction: self.flow.has_friction().then(|| FrictionQuantities {
+                sticking: self.sticking_time / time,
+                dissipated: self.heat / time,
+            }),
         }
     }
 
@@ -227,7 +251,7 @@ impl<'f> Meter<'f> {
     }
 
     fn enter_stage(&mut self, stage: &'f Flow) {
-        (self.stage, self.flow) = (stage, stage.interval(self.interval));
+        (self.stage, self.flow) = (stage, stage.interval(self.interval).in_modes(self.slips));
     }
 
     /// Measures the present flight over a time within one stage, and returns its end.
@@ -272,6 +296,12 @@ impl<'f> Meter<'f> {
         if let Some(force) = self.compliant_force(q) {
             self.force.square += weight * force * force;
             self.contact_time += weight;
+        }
+        if self.flow.sticks {
+            self.sticking_time += weight;
+        }
+        for (element, slip) in self.stage.friction().iter().zip(self.slips) {
+            self.heat += weight * element.force * slip.sign() * element.rate(q);
         }
     }
 
@@ -379,11 +409,19 @@ impl Observer for Meter<'_> {
             EventKind::MeshStart if event.interval == self.interval => DomainKind::Meshing(event.side),
             _ => DomainKind::Free,
         };
-        self.interval = event.interval;
-        self.flow = self.stage.interval(self.interval);
+        (self.interval, self.slips) = (event.interval, event.slips);
+        self.flow = self.stage.interval(self.interval).in_modes(self.slips);
         self.q = event.after;
         self.t = event.t;
         self.include(&event.after);
+    }
+
+    fn friction(&mut self, event: &FrictionEvent) {
+        self.complete_periods(event.period);
+        self.fly_to(event.t);
+        self.slips = event.slips;
+        self.flow = self.stage.interval(self.interval).in_modes(self.slips);
+        (self.q, self.t) = (event.at, event.t);
     }
 }
 

@@ -5,7 +5,7 @@ use super::itinerary::{Itinerary, Recorder};
 use super::quantities::{Meter, Quantities};
 use crate::flow::{DomainKind, Flow};
 use crate::model::{Side, State};
-use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
+use crate::reference::{EventKind, FrictionEvent, GapEvent, Observer, Stop, Trajectory};
 use crate::word::Word;
 
 /// Largest distance from phase 0, in turns, of an event that lies on the strobe.
@@ -46,16 +46,18 @@ impl Reading {
         let start = trajectory.period();
         let (mesh_start, impacts_start) = (trajectory.meshing_time(), trajectory.work().impacts);
         trajectory.clear_near_grazing();
-        let mut events: Vec<GapEvent> = Vec::new();
+        let mut log = Log {
+            events: Vec::new(),
+            symbols: Vec::new(),
+            start,
+            recorders: vec![Recorder::new(flow); periods as usize],
+            meter: measures.then(|| Meter::new(flow, &first)),
+            times: Vec::new(),
+        };
         for _ in 0..periods {
-            trajectory.advance_period(&mut events)?;
+            trajectory.advance_period(&mut log)?;
         }
-        let quantities = measures.then(|| {
-            let mut meter = Meter::new(flow, &first);
-            events.iter().for_each(|event| meter.event(event));
-            meter.finish(trajectory.period())
-        });
-        let symbols: Vec<u8> = events.iter().filter_map(|event| event.symbol).collect();
+        let Log { events, symbols, recorders, meter, times, .. } = log;
         let span = f64::from(periods);
         Ok(Reading {
             strobe,
@@ -63,18 +65,48 @@ impl Reading {
             word: Word::cyclic(&symbols),
             impacts_per_period: (trajectory.work().impacts - impacts_start) as f64 / span,
             mesh_fraction: (trajectory.meshing_time() - mesh_start) / (span * flow.period),
-            quantities,
-            itineraries: Recorder::list(flow, &events, start, periods),
+            quantities: meter.map(|meter| meter.finish(trajectory.period())),
+            itineraries: recorders.into_iter().map(|recorder| recorder.itinerary).collect(),
             closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),
             // Rounding may put an event at phase 0 outside the cycle.
             on_strobe: [&first, &*trajectory].into_iter().any(|end| passes_wall(flow, end))
-                || events.iter().any(|event| {
-                    let turns = event.t / flow.period;
+                || times.iter().any(|t| {
+                    let turns = t / flow.period;
                     turns < ON_STROBE_TURNS || 1.0 - turns < ON_STROBE_TURNS
                 }),
             events: events.iter().map(|event| in_states(flow, event, start)).collect(),
         })
+    }
+}
+
+/// Collects the events of a reading.
+struct Log<'f> {
+    events: Vec<GapEvent>,
+    symbols: Vec<u8>,
+    /// Number of forcing periods before the reading.
+    start: u64,
+    /// One recorder for each period.
+    recorders: Vec<Recorder>,
+    meter: Option<Meter<'f>>,
+    /// Times of all events since the last phase 0.
+    times: Vec<f64>,
+}
+
+impl Observer for Log<'_> {
+    fn event(&mut self, event: &GapEvent) {
+        self.recorders[(event.period - self.start) as usize].event(event);
+        self.meter.iter_mut().for_each(|meter| meter.event(event));
+        self.symbols.extend(event.symbol);
+        self.times.push(event.t);
+        self.events.push(*event);
+    }
+
+    fn friction(&mut self, event: &FrictionEvent) {
+        self.recorders[(event.period - self.start) as usize].friction(event);
+        self.meter.iter_mut().for_each(|meter| meter.friction(event));
+        self.symbols.extend(event.symbol);
+        self.times.push(event.t);
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::clock::Clock;
 use super::{Allowance, Mode, Trajectory, Work};
-use crate::flow::{DomainKind, Flow, Schedule};
-use crate::model::{Contact, Law, Side, State};
+use crate::flow::{DomainKind, Flow, Schedule, Slip, Slips};
+use crate::model::{Contact, Law, MOST_FRICTION, Side, State};
 
 /// Distance of a gap that lies on a wall, relative to the wall's position or the scale of length.
 const ON_WALL: f64 = 1e-9;
@@ -40,6 +40,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let (schedule, stage) = Schedule::new(flow);
         let interval = stage.interval_of(stage.to_gap(y)[0]);
         let flow = stage.interval(interval);
+        let slips = Self::modes_of(flow, y);
+        let flow = flow.in_modes(slips);
         let mut trajectory = Trajectory {
             flow,
             stage,
@@ -50,6 +52,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             origin: None,
             from_wall: None,
             from_force: 0,
+            slips,
+            from_rate: [0; MOST_FRICTION],
+            has_slid: [false; MOST_FRICTION],
             short_flight: false,
             pending: None,
             q: flow.to_gap(y),
@@ -63,11 +68,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             events_in_period: 0,
             steps_in_period: 0,
             meshing_time: 0.0,
+            sticking_time: 0.0,
             near_grazing: false,
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
         };
         trajectory.enter();
+        trajectory.start_friction();
         trajectory
     }
 
@@ -83,6 +90,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             origin: self.origin,
             from_wall: self.from_wall,
             from_force: self.from_force,
+            slips: self.slips,
+            from_rate: self.from_rate,
+            has_slid: self.has_slid,
             short_flight: self.short_flight,
             pending: self.pending,
             q: self.q,
@@ -96,6 +106,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             events_in_period: self.events_in_period,
             steps_in_period: self.steps_in_period,
             meshing_time: self.meshing_time,
+            sticking_time: self.sticking_time,
             near_grazing: self.near_grazing,
             work: self.work,
             allowance: self.allowance,
@@ -106,7 +117,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     ///
     /// The state alone does not determine the domain: a gap just in front of a wall may be free or in contact onset.
     pub fn at<const M: usize>(&self, y: State, tangents: [State; M]) -> Trajectory<'f, M> {
-        self.start_in(self.interval, self.mode, self.origin, y, tangents)
+        self.start_in(self.interval, self.mode, self.slips, self.origin, y, tangents)
     }
 
     /// Starts a trajectory in a given mode of an interval. If the state lies in another interval, it determines the mode.
@@ -114,6 +125,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         &self,
         interval: i32,
         mode: Mode,
+        slips: Slips,
         origin: Option<Side>,
         y: State,
         tangents: [State; M],
@@ -129,6 +141,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if let Mode::Sustained(side) | Mode::Open(side) = started.mode
             && is_elastic(side)
         {
+            started.take_modes(slips);
             return started;
         }
         let mode = match mode {
@@ -141,13 +154,14 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             (started.mode, started.from_wall, started.pending) = (mode, None, None);
         }
         started.origin = origin;
+        started.take_modes(slips);
         started
     }
 
     /// Whether another trajectory has the same mode and comes from the same wall.
     pub(crate) fn has_mode_and_origin_of(&self, other: &Trajectory<'_, N>) -> bool {
-        (self.interval, self.mode, self.origin, self.from_wall)
-            == (other.interval, other.mode, other.origin, other.from_wall)
+        (self.interval, self.mode, self.slips, self.origin, self.from_wall)
+            == (other.interval, other.mode, other.slips, other.origin, other.from_wall)
     }
 
     /// Whether another trajectory is in the same domain. Contact onset and sustained contact count as different,
@@ -158,6 +172,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             (self.q[0] - wall).abs() <= ON_WALL * wall.abs().max(self.flow.length)
         };
         self.interval == other.interval
+            && self.slips == other.slips
             && (self.mode == other.mode
                 || self.meshing() == other.meshing() && self.meshing().is_some_and(is_between))
     }
@@ -165,6 +180,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Starts a trajectory at phase 0 from the mirror image of the present state, in the mirrored domain.
     pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         let y = self.state().map(|value| -value);
-        self.start_in(-self.interval, self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
+        let (mode, slips) = (self.mode.mirrored(), self.slips.map(Slip::mirrored));
+        self.start_in(-self.interval, mode, slips, self.origin.map(Side::mirrored), y, tangents)
     }
 }

@@ -5,8 +5,8 @@
 //! wall, the gap leaves it, from rest and with zero acceleration. State and vector field are continuous there, so
 //! tangents do not jump.
 
-use super::{EventKind, Mode, Observer, StepVerdict, Stop, Trajectory};
-use crate::flow::{DomainKind, Gap};
+use super::{EventKind, Mode, NO_SPEED, Observer, StepVerdict, Stop, Trajectory};
+use crate::flow::{DomainKind, Flow, Gap, Slips};
 use crate::model::Side;
 
 /// Order of the root of the distance when the gap leaves the wall: its acceleration is zero, the derivative of the
@@ -15,10 +15,21 @@ pub(super) const RELEASE_ORDER: usize = 3;
 
 impl<const N: usize> Trajectory<'_, N> {
     /// Whether a contact with a rigid wall lasts: its leaving speed is low enough, and at rest it is pressed.
-    pub(super) fn sticks(&self, side: Side) -> bool {
+    /// Elements with dry friction then have their modes of rest.
+    pub(super) fn sticks(&mut self, side: Side) -> bool {
         let leaving = self.law.restitution[side.index()] * self.q[1].abs();
-        leaving <= self.law.mesh_speed[side.index()]
-            && self.presses(DomainKind::Meshing(side), side, &self.at_rest_on(side))
+        if leaving > self.lasting_speed(side) {
+            return false;
+        }
+        let (at_rest, before) = (self.at_rest_on(side), (self.flow, self.slips, self.from_rate, self.level));
+        if self.flow.has_friction() {
+            self.slide_after_jump(DomainKind::Meshing(side), &at_rest);
+        }
+        let is_pressed = self.presses(DomainKind::Meshing(side), side, &at_rest);
+        if !is_pressed {
+            (self.flow, self.slips, self.from_rate, self.level) = before;
+        }
+        is_pressed
     }
 
     /// Returns the state after an impact that stops the gap.
@@ -33,19 +44,36 @@ impl<const N: usize> Trajectory<'_, N> {
     /// `S = R + (f+ - R f-) n^T / (n f-)`, where `R` is the impact that stops the gap. What remains is the
     /// displacement of the other coordinate, and its damping by the gap's velocity.
     #[inline(never)]
-    pub(super) fn stick(&mut self, side: Side, observer: &mut impl Observer) {
+    /// `flow_before` and `slips_before` are those of the motion up to the wall.
+    pub(super) fn stick(
+        &mut self,
+        side: Side,
+        (flow_before, slips_before): (&Flow, Slips),
+        observer: &mut impl Observer,
+    ) {
         self.q[0] = self.flow.wall(side);
         let before = self.q;
         self.q = self.at_rest_on(side);
         if N > 0 {
-            let kick = self.flow.kick;
-            let row = self.flow.domain(DomainKind::Meshing(side)).second_acceleration_row().base;
+            let (kick, gaps) = (self.flow.kick, self.tangents.map(|u| u[0]));
+            let meshing = flow_before.domain(DomainKind::Meshing(side));
+            let row = meshing.second_acceleration_row().base;
             let drag = row[1] - kick * row[3];
             self.tangents =
                 self.tangents.map(|[z, w, x, v]| [0.0, 0.0, x + kick * z, v + kick * w - drag * z]);
+            if slips_before != self.slips && before[1].abs() >= NO_SPEED * self.flow.speed {
+                // The friction that acts along the wall has changed.
+                let rate =
+                    |flow: &Flow| flow.domain(DomainKind::Meshing(side)).field(&self.q, &self.phasor)[3];
+                let jump = (rate(self.flow) - rate(flow_before)) / before[1];
+                for (tangent, of_gap) in self.tangents.iter_mut().zip(gaps) {
+                    tangent[3] += jump * of_gap;
+                }
+            }
         }
         self.record(EventKind::MeshStart, side, before, observer);
         self.rest_on(side);
+        self.record_slips(slips_before, observer);
     }
 
     /// Sets the mode of rest on a rigid wall.
@@ -73,7 +101,7 @@ impl<const N: usize> Trajectory<'_, N> {
                     &computed
                 }
             };
-            match self.pressing_ahead(linear, step, side) {
+            match self.earlier_of_friction(self.pressing_ahead(linear, step, side), step) {
                 StepVerdict::Clear { roomy } => {
                     self.level[1] = level.saturating_sub(usize::from(roomy));
                     self.clear_step(linear, step, until);

@@ -214,6 +214,13 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
     let matrix = balanced(&scaled, image.rate);
     let mut scaled_multipliers = multipliers(&matrix)?;
     scaled_multipliers.truncate(2 * seed.flow().degrees);
+    // Friction that never slides leaves a family of cycles along its row.
+    for _ in 0..image.never_slid {
+        let off = |[re, im]: &[f64; 2]| (re * log_scale.exp() - 1.0).hypot(im * log_scale.exp());
+        let (along, _) =
+            scaled_multipliers.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
+        scaled_multipliers.remove(along);
+    }
     let [re, im] = scaled_multipliers[0];
     let (radius, scale) = (re.hypot(im), log_scale.exp());
     // A radius below the rounding errors of the matrix may as well be zero.

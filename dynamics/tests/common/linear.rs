@@ -70,6 +70,7 @@ impl Linear {
             stages: Vec::new(),
             schedule: Vec::new(),
             outer_walls: Default::default(),
+            friction: Vec::new(),
             free,
             meshing: [free; 2],
         }

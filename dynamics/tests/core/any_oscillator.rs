@@ -135,6 +135,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 stages: Vec::new(),
                 schedule: Vec::new(),
                 outer_walls: Default::default(),
+                friction: Vec::new(),
             };
             let mut start = [y[0], 3.0 * y[1], y[2], 3.0 * y[3]];
             if is_single {
@@ -612,6 +613,7 @@ fn forces_with_different_phases_have_the_closed_form_response() {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
+        friction: Vec::new(),
     };
     oscillator.validate().unwrap();
     let entry = |i: usize, j: usize| {

@@ -8,6 +8,7 @@ mod bits;
 mod cells;
 mod elastic;
 mod flow;
+mod friction;
 mod independent;
 mod instants;
 mod one_wall;

@@ -27,6 +27,7 @@ fn mass(load: f64, walls: [f64; 2], contact: Contact) -> Oscillator {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
+        friction: Vec::new(),
     }
 }
 
