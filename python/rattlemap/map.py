@@ -56,7 +56,8 @@ def map(  # noqa: A001
         ``"all"``: all adapters equal to the best one share the cells. The records are the same to the bit.
     quantities
         Some of ``class lyapunov impacts mesh symmetric word pattern impact_speed impact_speed_max impact_energy impact_rate
-        contact_force_max contact_force_rms amplitude rms harmonic dissipated multiplier state``; by default class and lyapunov.
+        contact_force_max contact_force_rms amplitude rms harmonic dissipated multiplier
+        stick_fraction friction_energy state``; by default class and lyapunov.
         Others are not computed. ``docs/scenes.md`` explains them.
     start
         The start of cells at phase 0: ``"rest"``, ``"up"``, ``"down"``, a state ``[x1, v1, x2, v2]``, or some of its

@@ -10,7 +10,7 @@ pub const MEASURES: usize = places_before(GROUPS.len());
 
 /// Quantities that a scene requests by one name, in the order of their places in a record.
 #[rustfmt::skip]
-pub const GROUPS: [Group; 10] = [
+pub const GROUPS: [Group; 12] = [
     group("impact_speed", 9, false, &[number("impact_speed", "mean approach speed of impacts", Dimension::Speed,
         |of, _| of.impacts()?.approaches.get(2).map(|both| both.mean))]),
     group("impact_speed_max", 10, false, &[number("impact_speed_max", "largest approach speed of impacts", Dimension::Speed,
@@ -35,6 +35,10 @@ pub const GROUPS: [Group; 10] = [
     group("multiplier", 18, false, &[
         number("multiplier", "modulus of the largest multiplier", Dimension::None, |of, _| Some(of.multiplier?[0])),
         number("multiplier_argument", "argument of the largest multiplier", Dimension::Angle, |of, _| Some(of.multiplier?[1].abs()))]),
+    group("stick_fraction", 19, false, &[number("stick_fraction", "share of the time in which dry friction sticks", Dimension::None,
+        |of, _| Some(of.quantities?.friction?.sticking))]),
+    group("friction_energy", 20, false, &[number("friction_energy", "energy that dry friction takes per unit time", Dimension::Power,
+        |of, _| Some(of.quantities?.friction?.dissipated))]),
 ];
 
 /// Physical dimension of a number, from which its unit follows.

@@ -51,7 +51,7 @@ pub mod valid {
 
 /// Results of one cell, in one fixed layout for all engines, precisions and variants.
 ///
-/// 360 bytes, no padding, little-endian in files.
+/// 376 bytes, no padding, little-endian in files.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Record {
@@ -65,7 +65,7 @@ pub struct Record {
     pub mesh_fraction: f64,
     /// Last strobe state `(x1, v1, x2, v2)`.
     pub strobe: [f64; 4],
-    /// First 64 symbols, 3 bits each (values 1 to 6), 21 to a `u64`, the first symbol lowest; zero if the word is
+    /// First 64 symbols, 3 bits each (values 0 to 7), 21 to a `u64`, the first symbol lowest; zero if the word is
     /// longer.
     pub word: [u64; 4],
     /// Rotation-invariant hash of the whole word.

@@ -61,7 +61,7 @@ impl<R: AsRef<[Record]> + AsMut<[Record]> + Debug + Sync + ?Sized> RecordsMut fo
 /// A fixed number of records, stored by column.
 ///
 /// A column that is zero in all records takes no memory, and equal words are stored once. A map of classes and
-/// exponents takes 24 bytes per run; a [`Record`] takes 360. Records come back to the bit, but for strobe states,
+/// exponents takes 24 bytes per run; a [`Record`] takes 376. Records come back to the bit, but for strobe states,
 /// which are stored on request only.
 #[derive(Clone, Debug, Default)]
 pub struct RecordStore {
@@ -238,7 +238,7 @@ mod tests {
     fn records() -> impl Strategy<Value = Vec<Record>> {
         let bits = prop::collection::vec(any::<u64>(), size_of::<Record>() / 8);
         let any_bits = bits.prop_map(|bits| bytemuck::pod_read_unaligned(bytemuck::cast_slice(&bits)));
-        let with_words = ("[1-6]{0,70}", "[1-6]{0,2}").prop_map(|(word, pattern)| {
+        let with_words = ("[0-7]{0,70}", "[0-7]{0,2}").prop_map(|(word, pattern)| {
             let mut record = Record::default();
             record.set_word(&Word::cyclic(word.as_bytes()));
             record.set_pattern(&Word::cyclic(pattern.as_bytes()));

@@ -381,3 +381,75 @@ impl Watch {
 /// The functions that end the modes of all elements, in free motion and in contact with the right and the left wall. Friction along the gap
 /// row is idle while the gap rests on a rigid wall, and has none.
 pub(crate) type Watches = [Vec<Option<Watch>>; 3];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::tests::two_harmonics;
+    use crate::model::GearPair;
+
+    /// Returns the sixth derivative of a watched function after a time.
+    fn sixth(watch: &Watch, linear: &LinearFlow, omega: f64, q: &Gap, phase: f64, tau: f64) -> f64 {
+        let row = (0..6).fold(watch.rows[0].clone(), |row, _| linear.derivatives(&row)[0].clone());
+        let (sin, cos) = phase.sin_cos();
+        let later = linear.propagate(*q, [cos, sin], tau);
+        let (sin, cos) = (phase + omega * tau).sin_cos();
+        row.dot(&later, &[cos, sin])
+    }
+
+    #[test]
+    fn sixth_derivatives_stay_within_their_bounds() {
+        let good = GearPair::paper(0.5).oscillator().unwrap();
+        let with = |damping, row: [f64; 2]| {
+            let stiffness = [[30.0, 4.0], [4.0, 11.0]];
+            let free = Domain { damping, stiffness, load: [1.0, -2.0], preload: 0.0 };
+            let friction = vec![Friction { row, force: 3.0, speed: 0.4 }];
+            Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, friction, ..good.clone() }
+        };
+        let passive = [[2.0, -0.7], [-0.7, 0.9]];
+        let rigid = Oscillator { contacts: [Contact::Rigid; 2], ..with(passive, [0.3, 0.8]) };
+        let harmonics = Oscillator { harmonics: two_harmonics(), ..with(passive, [0.0, 1.0]) };
+        let growing = with([[-1.0, 0.3], [0.3, 0.4]], [1.0, 0.5]);
+        let mut largest = [0.0f64; 2];
+        for oscillator in [with(passive, [1.0, 0.0]), rigid, harmonics, growing] {
+            let flow = Flow::new(&oscillator);
+            let element = &flow.friction()[0];
+            for (slip, kind) in Slip::ALL.into_iter().flat_map(|slip| {
+                [DomainKind::Free, DomainKind::Meshing(Side::Left)].map(|kind| (slip, kind))
+            }) {
+                let modes = flow.in_modes([slip, Slip::Stick]);
+                let linear = modes.domain(kind);
+                let watch = modes.watches(kind)[0].as_ref().unwrap();
+                for n in 0..500u32 {
+                    let t = f64::from(n);
+                    let size = 10f64.powf(-4.0 + 6.0 * (0.618 * t).fract());
+                    let q: Gap = [2.0, 5.0, 2.0, 5.0].map(|x| x * size);
+                    let mut q = std::array::from_fn(|i| q[i] * (t * (0.7 + 0.31 * i as f64)).sin());
+                    let is_at_rest = kind != DomainKind::Free && oscillator.contacts[1] == Contact::Rigid;
+                    if is_at_rest {
+                        (q[0], q[1]) = (flow.wall(Side::Left), 0.0);
+                    }
+                    if slip == Slip::Stick {
+                        element.put_at_rest(&mut q, is_at_rest);
+                    }
+                    let (sin, cos) = (0.9 * t).sin_cos();
+                    for level in [linear.taylor_level, linear.taylor_level + 2] {
+                        let step = linear.step(level).unwrap();
+                        let bound = watch.ahead(step, &q, &[cos, sin]).1 * 14400.0;
+                        for part in 0..=16 {
+                            let tau = step.h * f64::from(part) / 16.0;
+                            let derivative = sixth(watch, linear, oscillator.omega, &q, 0.9 * t, tau);
+                            let value = derivative.abs() * step.h.powi(6);
+                            // On a wall under friction nothing moves but the force.
+                            let share = if value == 0.0 { 0.0 } else { value / bound };
+                            assert!(share <= 1.0 + 1e-9, "{share} of the bound: {slip:?}, {kind:?}, {q:?}");
+                            let is_rate = usize::from(slip != Slip::Stick);
+                            largest[is_rate] = largest[is_rate].max(share);
+                        }
+                    }
+                }
+            }
+        }
+        assert!(largest.into_iter().all(|share| share > 0.2), "the bounds are not tight: {largest:?}");
+    }
+}

@@ -222,7 +222,8 @@ pub struct Oscillator {
     pub schedule: Vec<(f64, usize)>,
     /// Further walls behind the right and the left one, from the inside to the outside.
     pub outer_walls: [Vec<OuterWall>; 2],
-    /// Dry friction, in all stages and behind all walls; at most [`MOST_FRICTION`] elements with independent rows.
+    /// Dry friction, in all stages and behind all walls: at most [`MOST_FRICTION`] elements with independent rows, and one where a wall is
+    /// rigid.
     pub friction: Vec<Friction>,
 }
 
@@ -628,6 +629,14 @@ impl Oscillator {
             finite(name("speed"), *speed)?;
         }
         if let [Friction { row: [a, b], .. }, Friction { row: [c, d], .. }] = self.friction[..] {
+            let is_rigid = |side: Side| {
+                let (at, contact) = self.last_wall(side);
+                at.is_finite() && contact == Contact::Rigid
+            };
+            let rigid = Side::BOTH.into_iter().filter(|&side| is_rigid(side)).count();
+            let undetermined =
+                "0 with two elements of dry friction, because the forces of both and of the wall are not determined at rest";
+            require(rigid == 0, || "rigid walls".to_owned(), rigid as f64, undetermined)?;
             let determinant = a * d - b * c;
             let size = a.hypot(b) * c.hypot(d);
             require(

@@ -348,13 +348,6 @@ impl<'f> Meter<'f> {
         self.flow.contact_force(self.kind).map(|force| side.sign() * force.at(q))
     }
 
-    /// Whether an event ends an infinite series of impacts that the trajectory replaced by its limit.
-    fn ends_series(&self, event: &GapEvent) -> bool {
-        event.kind == EventKind::MeshStart
-            && event.before == event.after
-            && !self.flow.contacts[event.side.index()].is_elastic()
-    }
-
     /// Returns the energy of a wall's spring and preload at an event.
     fn stored(&self, event: &GapEvent) -> f64 {
         let (side, flow) = (event.side, self.flow);
@@ -375,7 +368,7 @@ impl<'f> Meter<'f> {
         } else if flow.contacts[side.index()].is_elastic() {
             self.lost -= self.stored(event);
         } else {
-            if self.ends_series(event) {
+            if event.ends_series {
                 // The series has taken the energy with which the gap left the wall.
                 self.lost += kinetic(self.q[1]);
                 return;
@@ -392,7 +385,7 @@ impl Observer for Meter<'_> {
     fn event(&mut self, event: &GapEvent) {
         self.complete_periods(event.period);
         let duration = event.t - self.t;
-        if self.ends_series(event) {
+        if event.ends_series {
             // The gap stays closed during the series. The error of the midpoint rule is of third order in its short
             // duration.
             let (begin, end) = (self.q, event.after);

@@ -112,7 +112,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.phasor = [cos, sin];
         let before = self.q;
         self.short_flight = false;
-        self.record(EventKind::MeshStart, side, before, observer);
+        self.record_in(self.interval, EventKind::MeshStart, side, before, true, observer);
         if is_rigid {
             self.rest_on(side);
         } else {

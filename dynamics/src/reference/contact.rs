@@ -235,7 +235,7 @@ impl<const N: usize> Trajectory<'_, N> {
 
     /// Counts and reports an event. The first flight comes from no wall, so it has no symbol.
     pub(super) fn record(&mut self, kind: EventKind, side: Side, before: Gap, observer: &mut impl Observer) {
-        self.record_in(self.interval, kind, side, before, observer);
+        self.record_in(self.interval, kind, side, before, false, observer);
     }
 
     /// Counts and reports an event after which the gap is in a given interval.
@@ -245,6 +245,7 @@ impl<const N: usize> Trajectory<'_, N> {
         kind: EventKind,
         side: Side,
         before: Gap,
+        ends_series: bool,
         observer: &mut impl Observer,
     ) {
         let contact = |side: Side| Some(if side == Side::Right { b'1' } else { b'4' });
@@ -272,6 +273,7 @@ impl<const N: usize> Trajectory<'_, N> {
             t: self.clock.time(),
             before,
             after: self.q,
+            ends_series,
         });
     }
 

@@ -73,7 +73,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let outwards = next.abs() > self.interval.abs();
         let kind = if outwards { EventKind::MeshStart } else { EventKind::MeshEnd };
         let of = side_of(if outwards { next } else { self.interval });
-        self.record_in(next, kind, of, self.q, observer);
+        self.record_in(next, kind, of, self.q, false, observer);
         self.interval = next;
         self.flow = self.stage.interval(next).in_modes(self.slips);
         self.level[0] = self.level[0].min(self.flow.domain(DomainKind::Free).levels - 1);

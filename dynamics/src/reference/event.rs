@@ -67,6 +67,8 @@ pub struct GapEvent {
     pub before: Gap,
     /// Gap coordinates just after the event.
     pub after: Gap,
+    /// Whether the event ends an infinite series of impacts, which the trajectory replaced by its limit.
+    pub(crate) ends_series: bool,
 }
 
 impl GapEvent {

@@ -1,5 +1,8 @@
 //! Dry friction: closed forms, limits and balances.
 
+use std::f64::consts::PI;
+
+use crate::common::{REST, near, paper};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Domain, Friction, Law, Oscillator};
 use rattlemap_dynamics::orbit::{Class, Settings, analyse_flow};
@@ -53,7 +56,7 @@ fn half_swings_become_shorter_until_the_block_stops() {
     let mut motion = Trajectory::new(&flow, LAW, [1.0, 0.0, 0.0, 0.0]);
     motion.advance_period(&mut slides).unwrap();
     // Turns at -0.7, 0.4 and -0.1, where the spring's force is below 0.15.
-    let turns: Vec<f64> = slides.0.iter().map(|&(_, t)| t / std::f64::consts::PI).collect();
+    let turns: Vec<f64> = slides.0.iter().map(|&(_, t)| t / PI).collect();
     assert_eq!(
         slides.0.iter().map(|&(symbol, _)| symbol).collect::<Vec<_>>(),
         [Some(b'0'), Some(b'0'), None]
@@ -80,7 +83,7 @@ fn the_amplitude_of_forced_sliding_is_that_of_den_hartog() {
     for (omega, friction) in [(0.8, 0.1), (0.8, 0.4), (1.3, 0.3), (1.7, 0.2), (2.3, 0.1)] {
         let flow = Flow::new(&block(omega, 1.0, friction));
         let orbit = analyse_flow(&flow, LAW, [0.3, 0.0, 0.0, 0.0], &Settings::default(), 8);
-        let angle = std::f64::consts::PI / omega;
+        let angle = PI / omega;
         let (v, u) = (1.0 / (1.0 - omega * omega), angle.sin() / (omega * (1.0 + angle.cos())));
         let expected = (v * v - u * u * friction * friction).sqrt();
         assert_eq!(
@@ -92,5 +95,107 @@ fn the_amplitude_of_forced_sliding_is_that_of_den_hartog() {
         let amplitude = orbit.quantities.unwrap().displacements[0].amplitude;
         assert!((amplitude - expected).abs() < 1e-12, "omega = {omega}: {amplitude} and {expected}");
         assert_eq!(orbit.word.time_order(), "00", "omega = {omega}");
+    }
+}
+
+/// A force below friction never moves the block: each displacement in the dead zone is a cycle, and its multiplier 1 is left out.
+#[test]
+fn a_block_that_sticks_for_ever_is_periodic() {
+    let flow = Flow::new(&block(0.7, 0.1, 0.3));
+    let orbit = analyse_flow(&flow, LAW, [0.15, 0.0, 0.0, 0.0], &Settings::default(), 8);
+    assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{:?}", orbit.status);
+    assert_eq!(orbit.strobe, [0.15, 0.0, 0.0, 0.0]);
+    assert_eq!(orbit.floquet, Some(vec![[0.0, 0.0]]));
+    let of = orbit.quantities.unwrap().friction.unwrap();
+    assert!(near(of.sticking, 1.0, 1e-14) && of.dissipated == 0.0, "{of:?}");
+}
+
+/// On a belt of speed `s` the block sticks until the spring pulls with `f`. It then swings about `f`, meets the speed of the belt
+/// again at the mirrored time, and sticks. With equal friction in sticking and sliding, it stays at `x = f` after that.
+#[test]
+fn a_block_on_a_belt_comes_to_slide_at_the_limit_of_friction() {
+    let (friction, speed) = (0.4, 0.3);
+    let mut belt = block(0.05, 0.0, friction);
+    belt.friction[0].speed = speed;
+    let flow = Flow::new(&belt);
+    let mut slides = Slides::default();
+    // At the start the block moves with the belt.
+    let mut motion = Trajectory::new(&flow, LAW, [0.0, speed, 0.0, 0.0]);
+    motion.advance_to(friction / speed, &mut slides).unwrap();
+    let [x, v, ..] = motion.state();
+    assert!(near(x, friction, 1e-14) && v == speed, "{x}, {v}");
+    motion.advance_period(&mut slides).unwrap();
+    // Sliding slower than the belt, it swings about x = f with the amplitude s: the belt's speed is the largest.
+    let expected = (motion.time_in_period(), 0.0);
+    assert_eq!(expected.0, 0.0);
+    let since = flow.period - friction / speed;
+    let [x, v, ..] = motion.state();
+    assert!(near(x, friction + speed * since.sin(), 1e-12), "{x}");
+    assert!(near(v, speed * since.cos(), 1e-12), "{v}");
+}
+
+/// Rows of friction on a gear pair: on one gear, between the gears, and on both.
+fn rows() -> [Vec<Friction>; 4] {
+    let on = |row: [f64; 2], force: f64| Friction { row, force, speed: 0.0 };
+    [
+        vec![on([1.0, 0.0], 4.0)],
+        vec![on([1.0, -1.0], 2.0)],
+        vec![on([0.0, 1.0], 6.0), on([1.0, 0.0], 3.0)],
+        vec![on([0.6, 0.8], 5.0)],
+    ]
+}
+
+#[test]
+fn friction_takes_its_share_of_the_work_of_the_force() {
+    let (mut cycles, mut sticking) = (0, 0);
+    for friction in rows() {
+        for (e, omega) in [(0.06, 5.6), (0.605, 5.6), (0.72, 1.5), (0.3, 3.0), (0.8, 4.4), (0.5, 11.5), (0.3, 7.5)] {
+            for contact in [Contact::Impact, Contact::Rigid, Contact::Elastic] {
+                let pair = paper(e, omega);
+                let oscillator = pair.oscillator().unwrap();
+                let oscillator = Oscillator { friction: friction.clone(), contacts: [contact; 2], ..oscillator };
+                if oscillator.validate().is_err() {
+                    // Two elements and rigid walls.
+                    continue;
+                }
+                let flow = Flow::new(&oscillator);
+                let orbit = analyse_flow(&flow, pair.law(), REST, &Settings::default(), 8);
+                let case = format!("{e} {omega} {contact:?} {friction:?}: {:?} {:?}", orbit.class, orbit.status);
+                assert_ne!(orbit.class, Class::Failed, "{case}");
+                if !matches!(orbit.class, Class::Periodic { .. }) {
+                    continue;
+                }
+                let of = orbit.quantities.unwrap();
+                let of_friction = of.friction.unwrap();
+                let [size, phase] = of.displacements[0].harmonic;
+                let work = -0.5 * pair.force * omega * size * phase.sin();
+                let taken = of.dissipated + of.impact_energy + of_friction.dissipated;
+                assert!(near(work, taken, 1e-10 * work.abs()), "{work} and {taken}: {case}");
+                cycles += 1;
+                sticking += usize::from(of_friction.sticking > 0.0);
+            }
+        }
+    }
+    assert!(cycles > 50 && sticking > 15, "{cycles} cycles, {sticking} with sticking");
+}
+
+#[test]
+fn without_force_friction_changes_nothing() {
+    for (e, omega) in [(0.06, 5.6), (0.72, 1.5), (0.3, 3.0), (0.5, 11.5)] {
+        let pair = paper(e, omega);
+        let plain = pair.oscillator().unwrap();
+        let orbit = |force: f64| {
+            let friction = vec![Friction { row: [1.0, -1.0], force, speed: 0.0 }];
+            let flow = Flow::new(&Oscillator { friction, ..plain.clone() });
+            analyse_flow(&flow, pair.law(), REST, &Settings::default(), 8)
+        };
+        let [none, zero, small] =
+            [analyse_flow(&Flow::new(&plain), pair.law(), REST, &Settings::default(), 8), orbit(0.0), orbit(1e-9)];
+        assert_eq!((none.class, none.strobe, &none.word), (zero.class, zero.strobe, &zero.word));
+        assert_eq!(none.class, small.class, "{e}, {omega}");
+        if matches!(none.class, Class::Periodic { .. }) {
+            let off = none.strobe.iter().zip(small.strobe).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+            assert!(off < 1e-7, "{e}, {omega}: {off}");
+        }
     }
 }

@@ -160,6 +160,10 @@ pub enum Quantity {
     Dissipated,
     /// Modulus and argument of the largest Floquet multiplier.
     Multiplier,
+    /// Share of the time in which dry friction sticks.
+    StickFraction,
+    /// Energy that dry friction takes per unit time.
+    FrictionEnergy,
     /// Last state at phase 0.
     State,
 }
@@ -190,7 +194,7 @@ pub struct Outputs {
     pub files: Vec<Format>,
 }
 
-const QUANTITIES: [(&str, Quantity); 19] = [
+const QUANTITIES: [(&str, Quantity); 21] = [
     ("class", Quantity::Class),
     ("lyapunov", Quantity::Lyapunov),
     ("impacts", Quantity::Impacts),
@@ -209,6 +213,8 @@ const QUANTITIES: [(&str, Quantity); 19] = [
     ("harmonic", Quantity::Harmonic),
     ("dissipated", Quantity::Dissipated),
     ("multiplier", Quantity::Multiplier),
+    ("stick_fraction", Quantity::StickFraction),
+    ("friction_energy", Quantity::FrictionEnergy),
     ("state", Quantity::State),
 ];
 const FORMATS: [(&str, Format); 6] = [
