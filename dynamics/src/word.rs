@@ -1,8 +1,8 @@
 //! Mapping words: the cyclic sequence of flights, equations (18) to (23) of the paper.
 //!
-//! Each flight has one symbol:
+//! Each flight has one symbol. With dry friction there are two symbols of sliding, in order of time with the flights:
 //!
-//! | flight | symbol |
+//! | flight or event | symbol |
 //! | --- | --- |
 //! | free, right to right | `2` |
 //! | free, right to left | `3` |
@@ -10,6 +10,8 @@
 //! | free, left to right | `6` |
 //! | meshing on the right | `1` |
 //! | meshing on the left | `4` |
+//! | sticking ends | `7` |
+//! | sliding reverses without sticking | `0` |
 
 use std::fmt;
 
@@ -18,7 +20,7 @@ use std::fmt;
 pub struct Word(Vec<u8>);
 
 impl Word {
-    /// Builds the cyclic word of a sequence of symbols `b'1'..=b'6'` in time order.
+    /// Builds the cyclic word of a sequence of symbols `b'0'..=b'7'` in time order.
     pub fn cyclic(symbols: &[u8]) -> Word {
         let mut canonical = symbols.to_vec();
         canonical.rotate_left(smallest_rotation(symbols));
@@ -30,19 +32,24 @@ impl Word {
         &self.0
     }
 
-    /// Returns the number of flights in the cycle.
+    /// Returns the number of symbols in the cycle.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether the cycle has no event.
+    /// Whether the cycle has no symbol.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// Returns the word of the mirror image `(y, t) -> (-y, t + T/2)`, which swaps 1-4, 2-5 and 3-6.
+    /// It leaves 0 and 7 as they are.
     pub fn mirrored(&self) -> Word {
-        Word::cyclic(&self.0.iter().map(|s| (s - b'1' + 3) % 6 + b'1').collect::<Vec<_>>())
+        let image = |&symbol: &u8| match symbol {
+            b'1'..=b'6' => (symbol - b'1' + 3) % 6 + b'1',
+            _ => symbol,
+        };
+        Word::cyclic(&self.0.iter().map(image).collect::<Vec<_>>())
     }
 
     /// Returns the word with each run of one symbol reduced to one: `13554622` gives `135462`.
@@ -141,8 +148,16 @@ mod tests {
 
     #[test]
     fn a_pattern_does_not_depend_on_where_the_cycle_starts() {
-        let cases =
-            [("13554622", "135462"), ("11312", "1213"), ("12", "12"), ("222222", "2"), ("5", "5"), ("", "")];
+        let cases = [
+            ("13554622", "135462"),
+            ("11312", "1213"),
+            ("12", "12"),
+            ("222222", "2"),
+            ("5", "5"),
+            ("", ""),
+            ("00", "0"),
+            ("0770", "07"),
+        ];
         for (symbols, pattern) in cases {
             for start in 0..symbols.len().max(1) {
                 let mut rotated = symbols.as_bytes().to_vec();
@@ -156,5 +171,6 @@ mod tests {
     fn the_mirror_image_swaps_walls() {
         assert_eq!(Word::cyclic(b"12345").mirrored(), Word::cyclic(b"45612"));
         assert_eq!(Word::cyclic(b"36").mirrored(), Word::cyclic(b"36"));
+        assert_eq!(Word::cyclic(b"07127").mirrored(), Word::cyclic(b"07457"));
     }
 }

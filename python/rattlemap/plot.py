@@ -194,7 +194,7 @@ def _label(name: str) -> str:
     """Return a name for the legend: words without the letter `w` that makes them text in tables."""
     if name == "w":
         return "no events"
-    return name[1:] if name.startswith("w") and name[1:2] in tuple("#123456") else name
+    return name[1:] if name.startswith("w") and name[1:2] in tuple("#01234567") else name
 
 
 def _percent(share: float) -> str:

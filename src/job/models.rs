@@ -38,6 +38,13 @@ pub fn page(model: &FileModel) -> String {
             text += &contact(&wall_name(side, nth, walls.len()), wall, gap_names(model));
         }
     }
+    if definition.walls.iter().all(Vec::is_empty) {
+        text += "    The model has no walls.\n";
+    }
+    let has_friction = !definition.friction.is_empty();
+    if has_friction {
+        let _ = writeln!(text, "\n{FRICTION}");
+    }
     let _ = writeln!(text, "\nParameters\n");
     let units = model.parameters().iter().filter_map(|parameter| parameter.unit.as_ref());
     // Without units there is no such column.
@@ -49,7 +56,7 @@ pub fn page(model: &FileModel) -> String {
     }
     text += &format!(
         "\n{}\n{CLASSES}\n\nStatus: how the integration of a cell ended\n\n",
-        words(definition.walls.each_ref().map(|walls| !walls.is_empty()))
+        words(definition.walls.each_ref().map(|walls| !walls.is_empty()), has_friction)
     );
     for status in Status::ALL {
         let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));
@@ -101,8 +108,12 @@ fn contact(name: &str, wall: &Wall, [z, w]: [&str; 2]) -> String {
 }
 
 /// Explains the symbols of words that a model can have. `right` and `left` say whether it has these walls.
-fn words([right, left]: [bool; 2]) -> String {
-    let mut text = "Words\n\n    One symbol per flight, between two events:\n".to_owned();
+fn words([right, left]: [bool; 2], has_friction: bool) -> String {
+    let mut text = "Words\n\n".to_owned();
+    let has_walls = right || left;
+    if has_walls {
+        text += "    One symbol per flight, between two events:\n";
+    }
     let symbols = [
         (right, "1  sustained contact on the right"),
         (right, "2  free, from the right to the right"),
@@ -115,6 +126,17 @@ fn words([right, left]: [bool; 2]) -> String {
         .into_iter()
         .filter(|(is_there, _)| *is_there)
         .for_each(|(_, line)| text += &format!("        {line}\n"));
+    if has_friction {
+        let others = if has_walls { ", in order of time with the others" } else { "" };
+        text += &format!(
+            "    One symbol per event of sliding{others}:\n        7  sticking ends\n        0  sliding reverses without sticking\n"
+        );
+    }
+    if !has_walls {
+        return text
+            + "    A word is the cyclic sequence of a cycle's symbols in order of time, rotated to the smallest number: 0077.\n    \
+               Its pattern, 07, writes repeated symbols once.\n";
+    }
     let example = Word::cyclic(match (left, right) {
         (true, true) => b"13554622",
         (false, _) => b"1222",
@@ -122,11 +144,15 @@ fn words([right, left]: [bool; 2]) -> String {
     });
     let (word, literature) = (example.time_order(), example.paper_notation());
     let pattern = example.pattern().time_order();
+    let bounces = match has_friction {
+        // At the turning point of a bounce the sliding reverses.
+        true => ".",
+        false => ": it leaves out the number of bounces before a sustained contact.",
+    };
     text += &format!(
-        "    A word is the cyclic sequence of a cycle's flights in order of time, rotated to the smallest number: {word}.\n    \
+        "    A word is the cyclic sequence of a cycle's symbols in order of time, rotated to the smallest number: {word}.\n    \
          The literature composes maps from right to left, with powers: {literature} is the same cycle.\n    \
-         Its pattern, {pattern}, writes repeated symbols once: it leaves out the number of bounces before a sustained \
-         contact.\n"
+         Its pattern, {pattern}, writes repeated symbols once{bounces}\n"
     );
     text
 }
@@ -164,6 +190,12 @@ fn meaning(status: Status) -> &'static str {
         Status::Escape => "failed: the motion grows without bound",
     }
 }
+
+const FRICTION: &str = "\
+Friction
+
+    Where the argument of sgn is not 0, the surfaces slide, and friction opposes the sliding. Where it is 0, they stick as
+    long as no larger force than that of sliding is needed. Friction has no part in impacts.";
 
 const CLASSES: &str = "\
 Class

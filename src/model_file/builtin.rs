@@ -30,6 +30,9 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("meissner", include_str!("../../models/meissner.toml")),
     ("clutch", include_str!("../../models/clutch.toml")),
     ("backlash", include_str!("../../models/backlash.toml")),
+    ("friction-oscillator", include_str!("../../models/friction_oscillator.toml")),
+    ("drag-gear", include_str!("../../models/drag_gear.toml")),
+    ("relief-valve", include_str!("../../models/relief_valve.toml")),
 ];
 
 /// The built-in models, read once. A test shows that each can be read.

@@ -84,9 +84,18 @@ impl Wall {
     }
 }
 
-/// Reads the walls of the right and of the left side, from the inside to the outside.
-pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Vec<Wall>; 2], SceneError> {
-    let field = root.require("contact", "write [[contact]] with side, at and law")?;
+/// Reads the walls of the right and of the left side, from the inside to the outside. A model may have none if it has friction.
+pub(super) fn read(
+    root: &Section<'_>,
+    names: Names<'_>,
+    has_friction: bool,
+) -> Result<[Vec<Wall>; 2], SceneError> {
+    let remedy = "write [[contact]] with side, at and law; only a model with [[friction]] may have no wall";
+    let field = match root.get("contact") {
+        None if has_friction => return Ok(Default::default()),
+        None => return Err(root.missing("contact", remedy)),
+        Some(field) => field,
+    };
     let some = "1 to 8 tables, [[contact]]: a model has up to 4 walls on each side";
     let items = field.list(some)?;
     if !(1..=2 * MOST_WALLS).contains(&items.len()) {

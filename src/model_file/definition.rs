@@ -1,12 +1,13 @@
 //! The contents of a model file, and the oscillator and contact law that it defines.
 
 use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, ModelError, Oscillator, OscillatorError, OuterWall, Parameter, Shapes,
-    Side, Stage,
+    Contact, Domain, Harmonic, Law, MOST_FRICTION, ModelError, Oscillator, OscillatorError, OuterWall,
+    Parameter, Shapes, Side, Stage,
 };
 
 use super::contact::{self, Wall, WallLaw};
 use super::entry::{Names, Staged};
+use super::friction::{self, DryFriction};
 use super::harmonic::HarmonicForce;
 use super::motion::{self, Motion};
 use super::{FileModel, parameters};
@@ -16,8 +17,10 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Keys outside of any table, and the names of the tables.
-const MODEL_KEYS: [&str; 9] =
-    ["name", "title", "summary", "source", "notes", "parameters", "motion", "harmonic", "contact"];
+#[rustfmt::skip]
+const MODEL_KEYS: [&str; 10] = [
+    "name", "title", "summary", "source", "notes", "parameters", "motion", "harmonic", "contact", "friction",
+];
 
 /// Largest number of characters of a model's name, which occurs in scenes and file names.
 const LONGEST_MODEL_NAME: usize = 40;
@@ -51,6 +54,8 @@ pub struct Definition {
     pub motion: Motion,
     /// Right and left wall.
     pub walls: [Vec<Wall>; 2],
+    /// Dry friction.
+    pub friction: Vec<DryFriction>,
 }
 
 /// Definitions are equal if their texts are.
@@ -74,12 +79,16 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let names = Names { parameters: &names, states: &[], stages: 0 };
     let motion = motion::read(&root, names)?;
     let states: Vec<&str> = motion.state_names().collect();
-    let walls = contact::read(&root, Names { states: &states, stages: motion.stages.len(), ..names })?;
+    let names = Names { states: &states, stages: motion.stages.len(), ..names };
+    let friction = friction::read(&root, names, motion.degrees())?;
+    let walls = contact::read(&root, names, !friction.is_empty())?;
     let shapes = |index: usize| {
         let uses = |entry: &Expression| entry.uses().contains(&index);
         let at_walls = walls.iter().flatten();
         Shapes::new(
-            motion.entries().any(uses) || at_walls.clone().flat_map(Wall::shaping_oscillator).any(uses),
+            motion.entries().any(uses)
+                || at_walls.clone().flat_map(Wall::shaping_oscillator).any(uses)
+                || friction.iter().flat_map(DryFriction::entries).any(uses),
             at_walls.flat_map(Wall::shaping_law).any(uses),
         )
     };
@@ -99,6 +108,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
             .collect(),
         motion,
         walls,
+        friction,
     });
     match rattlemap_dynamics::flow::Flow::validate(&model) {
         Ok(_) => Ok(model),
@@ -143,11 +153,19 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
                 is_on_side && before == nth
             }
             (Table::Harmonic(order), Some(Value::Integer(own))) => *own == order,
+            (Table::Friction(nth), _) => {
+                before += 1;
+                before == nth
+            }
             _ => false,
         };
         is && fields.contains_key(key)
     };
-    let list = if let Table::Harmonic(_) = table { "harmonic" } else { "contact" };
+    let list = match table {
+        Table::Harmonic(_) => "harmonic",
+        Table::Friction(_) => "friction",
+        Table::Motion | Table::Wall(_) => "contact",
+    };
     let items = root.get(list).and_then(|field| field.list("").ok()).unwrap_or_default();
     let opened = match items.iter().find(|item| is_meant(item)) {
         Some(item) => Section::open_any(item.node, &item.path),
@@ -166,6 +184,8 @@ enum Table {
     Wall(Option<(Side, usize)>),
     /// The harmonic of an order.
     Harmonic(i64),
+    /// An element with dry friction, counted from 1.
+    Friction(usize),
 }
 
 /// Returns the table and the key of the quantity that an error names.
@@ -178,6 +198,14 @@ fn blame(error: &ModelError) -> (Table, &str) {
         OscillatorError::NotDefinite { .. } => "mass",
         OscillatorError::Walls { .. } => "position",
     };
+    if let Some((what, nth)) = quantity.rsplit_once("of friction") {
+        let key = ["force", "speed"].into_iter().find(|key| what.starts_with(key));
+        // The determinant is that of both rows.
+        return (Table::Friction(nth.trim().parse().unwrap_or(MOST_FRICTION)), key.unwrap_or("row"));
+    }
+    if quantity == "rigid walls" {
+        return (Table::Friction(MOST_FRICTION), "force");
+    }
     let side = match (quantity.contains("right wall"), quantity.contains("left wall")) {
         (true, _) => Some(Side::Right),
         (_, true) => Some(Side::Left),
@@ -298,6 +326,7 @@ impl Definition {
             stages,
             schedule: Oscillator::repeated(&phases, motion.repeat)?,
             outer_walls,
+            friction: self.friction.iter().map(|friction| friction.evaluated(of)).collect(),
         })
     }
 

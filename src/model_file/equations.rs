@@ -4,6 +4,7 @@ use rattlemap_dynamics::model::{Contact, Side};
 
 use super::definition::Definition;
 use super::entry::Entry;
+use super::friction::DryFriction;
 use super::motion::Motion;
 use crate::text::expression::Expression;
 
@@ -15,6 +16,10 @@ pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
         format!("rate  {}", row(&motion.gap, &motion.velocities, w)),
     ];
     lines.extend(stages(motion));
+    lines.extend(acting(definition).map(|friction| {
+        let rate = sliding_rate(friction, motion);
+        format!("friction  sticks at {rate} = 0 while |friction force| <= {}", text(&friction.force))
+    }));
     lines.push(format!("free, {}", between(definition, z)));
     lines.extend(equations(definition, None).map(|line| format!("    {line}")));
     for side in Side::BOTH {
@@ -100,6 +105,32 @@ fn between(definition: &Definition, z: &str) -> String {
     }
 }
 
+/// Returns the friction whose force is not the number 0.
+fn acting(definition: &Definition) -> impl Iterator<Item = &DryFriction> {
+    definition.friction.iter().filter(|friction| friction.force.as_number() != Some(0.0))
+}
+
+/// Returns the sliding rate, such as `x1' - x2' - speed`.
+fn sliding_rate(friction: &DryFriction, motion: &Motion) -> String {
+    let rates = friction.row.iter().zip(&motion.coordinates);
+    minus(&sum(rates.map(|(entry, name)| product(entry, &format!("{name}'")))), &friction.speed)
+}
+
+/// Returns the friction force on the `i`-th coordinate; none if there is none.
+fn friction_force(friction: &DryFriction, motion: &Motion, i: usize) -> Option<String> {
+    let sign = format!("sgn({})", sliding_rate(friction, motion));
+    let (row, force) = (&friction.row[i], &friction.force);
+    match row.as_number() {
+        Some(0.0) => None,
+        Some(1.0) => product(force, &sign),
+        Some(-1.0) => {
+            let term = product(force, &sign)?;
+            Some(term.strip_prefix('-').map_or_else(|| format!("-{term}"), str::to_owned))
+        }
+        _ => Some(format!("{}*{} {sign}", factor(row), factor(force))),
+    }
+}
+
 /// Returns one equation per coordinate, with an optional force along the gap row.
 fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Iterator<Item = String> + 'd {
     let motion = &definition.motion;
@@ -113,6 +144,7 @@ fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Ite
             terms(&motion.mass[i], &accelerations),
             terms(&motion.damping[i], &rates),
             terms(&motion.stiffness[i], &displacements),
+            acting(definition).map(|friction| friction_force(friction, motion, i)).collect(),
             vec![along],
         ];
         let waves = |order: u32, cos: &Expression, sin: &Expression| {

@@ -2,7 +2,7 @@
 //!
 //! A file defines `M x'' + C x' + K x = force cos(frequency t) + force_sin sin(frequency t) + load` in one or two
 //! coordinates, a gap `z = g . x`, and up to four walls on each side. The force may have further harmonics. `C`, `K` and `load` may change
-//! at given phases of the period. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
+//! at given phases of the period, and dry friction may act. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
 //! f64. `docs/models.md` describes each key.
 
 mod builtin;
@@ -10,6 +10,7 @@ mod contact;
 mod definition;
 mod entry;
 mod equations;
+mod friction;
 mod harmonic;
 mod motion;
 mod parameters;
@@ -26,6 +27,7 @@ pub use definition::Definition;
 pub use entry::Staged;
 #[cfg(feature = "job")]
 pub(crate) use equations::{factor, wall_name};
+pub use friction::DryFriction;
 pub use harmonic::HarmonicForce;
 
 use crate::text::error::SceneError;

@@ -1,6 +1,6 @@
 //! Reading of model files: the values of valid files, and every kind of error.
 
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Model, Range, Shapes, Side};
+use rattlemap_dynamics::model::{Contact, Domain, Friction, Harmonic, Model, Range, Shapes, Side};
 
 use super::*;
 use crate::text::test_cases;
@@ -634,4 +634,143 @@ fn phases_out_of_order_are_found_for_later_values() {
         error.starts_with("phase at which stage 2 begins = 1: it must be at least 0, less than 1"),
         "{error}"
     );
+}
+
+/// Friction for a model of two degrees of freedom.
+const FRICTION: &str = r#"
+[[friction]]
+row = ["c/d", -1]
+force = "mu*k"
+speed = "u"
+
+[[friction]]
+row = [1, 0]
+force = 0.5
+"#;
+
+fn with_friction() -> String {
+    TWO_DEGREES.replace("d = 0.25\n", "d = 0.25\nmu = 0.2\nu = -0.75\n") + FRICTION
+}
+
+#[test]
+fn friction_is_read_in_the_order_of_the_file() {
+    let model = read(&with_friction());
+    let bare = read(TWO_DEGREES).oscillator().unwrap();
+    let friction = vec![
+        Friction { row: [2.0, -1.0], force: 0.2 * 3.0, speed: -0.75 },
+        Friction { row: [1.0, 0.0], force: 0.5, speed: 0.0 },
+    ];
+    assert_eq!(model.oscillator().unwrap(), Oscillator { friction, ..bare });
+    for name in ["mu", "u"] {
+        assert_eq!(model.parameters()[model.index(name).unwrap()].shapes, Shapes::Oscillator, "{name}");
+    }
+    let mut later = model.clone();
+    assert!(later.set_start_phase(1.0));
+    assert_eq!(later.oscillator().unwrap().friction, model.oscillator().unwrap().friction);
+    let stages = STAGES.to_owned() + "[[friction]]\nrow = [1, -1]\nforce = \"c\"\n";
+    let friction = [Friction { row: [1.0, -1.0], force: 0.5, speed: 0.0 }];
+    assert_eq!(read(&stages).oscillator().unwrap().friction, friction);
+}
+
+#[test]
+fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
+    let (motion, _) = ONE_DEGREE.split_once("[[contact]]").unwrap();
+    let model = read(&format!("{motion}[[friction]]\nforce = \"F\"\n"));
+    let free = Domain {
+        damping: [[0.5, 0.0], [0.0; 2]],
+        stiffness: [[1.0, 0.0], [0.0; 2]],
+        load: [-0.5, 0.0],
+        preload: 0.0,
+    };
+    let by_hand = Oscillator {
+        degrees: 1,
+        mass: [[1.0, 0.0], [0.0, 1.0]],
+        gap: [1.0, 0.0],
+        walls: [f64::INFINITY, f64::NEG_INFINITY],
+        contacts: [Contact::Rigid; 2],
+        omega: 2.0,
+        force: [6.0, 0.0],
+        force_sin: [0.0; 2],
+        free,
+        meshing: [free; 2],
+        harmonics: Vec::new(),
+        stages: Vec::new(),
+        schedule: Vec::new(),
+        outer_walls: Default::default(),
+        friction: vec![Friction { row: [1.0, 0.0], force: 1.5, speed: 0.0 }],
+    };
+    assert_eq!(model.oscillator().unwrap(), by_hand);
+    assert_eq!(
+        model.equations(),
+        [
+            "gap   z = x",
+            "rate  w = v",
+            "friction  sticks at x' = 0 while |friction force| <= F",
+            "free, everywhere",
+            "    x'' + 2*zeta x' + x + F sgn(x') = F*omega^2 cos(omega t) - 0.5",
+        ]
+    );
+}
+
+#[test]
+fn friction_is_written_in_usual_notation() {
+    assert_eq!(
+        read(&with_friction()).equations()[2..7],
+        [
+            "friction  sticks at c/d a' - b' - u = 0 while |friction force| <= mu*k",
+            "friction  sticks at a' = 0 while |friction force| <= 0.5",
+            "free, -d < z < d",
+            "    m a'' + 0.5 b'' + c a' - c b' + k a - k b + c/d*mu*k sgn(c/d a' - b' - u) + 0.5 sgn(a') = 0",
+            "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - mu*k sgn(c/d a' - b' - u) = 0",
+        ]
+    );
+    let written = |row: &str, force: &str, speed: &str| {
+        let table = format!("[[friction]]\nrow = [{row}, 0]\nforce = {force}\nspeed = {speed}\n");
+        let line = read(&format!("{TWO_DEGREES}{table}")).equations()[4].clone();
+        line.split_once("- k b ").map_or(line.clone(), |(_, rest)| rest.to_owned())
+    };
+    assert_eq!(written("1", "\"k + c\"", "1.5"), "+ (k + c) sgn(a' - 1.5) = 0");
+    assert_eq!(written("-2", "2", "\"-c\""), "- 2*2 sgn(-2 a' + c) = 0");
+    assert_eq!(written("-1", "\"-(-c)\"", "\"c - k\""), "+ (-c) sgn(-a' - (c - k)) = 0");
+    // A force that is the number 0 is left out.
+    let none = read(&format!("{TWO_DEGREES}[[friction]]\nrow = [1, 0]\nforce = 0\n"));
+    assert_eq!(none.equations(), read(TWO_DEGREES).equations());
+}
+
+#[test]
+fn errors_in_friction_name_the_field() {
+    check_refusals(
+        &with_friction(),
+        r#"
+speed = "u" | slip = "u" | m.toml:39:1: unknown field `friction.0.slip = "u"`; valid names: row, force, speed
+row = [1, 0] | row = [1] | m.toml:42:7: `friction.1.row = [1]` is out of range: it must be the row of the sliding rate, row . v - speed: a list of two entries, one for each coordinate
+row = [1, 0] | row = { a = 1, q = -1 } | m.toml:42:7: `friction.1.row = { ... }` has the wrong type: it must be the row of the sliding rate, row . v - speed: a list of two entries, one for each coordinate
+row = [1, 0] | row = ["va", 0] | m.toml:42:8: `friction.1.row.0 = "va"` does not fit: `va` is a velocity, and entries are constants of a cell
+row = [1, 0] | row = ["q", 0] | m.toml:42:8: `friction.1.row.0 = "q"` has an unknown name, `q`
+row = [1, 0] | | m.toml:41:1: `friction.1.row` is missing; write the factors of the velocities in the sliding rate, such as row = [1, -1]
+row = [1, 0] | row = ["k-3", 0] | m.toml:42:7: `friction.1.row = ["k-3", 0]` does not fit: at the defaults of two, the largest entry of the row of friction 2 = 0: it must be different from 0
+row = [1, 0] | row = ["1/0", 0] | m.toml:42:7: `friction.1.row = ["1/0", 0]` does not fit: at the defaults of two, an entry of the row of friction 2 = inf: it must be a finite number
+row = [1, 0] | row = [-4, 2] | m.toml:42:7: `friction.1.row = [-4, 2]` does not fit: at the defaults of two, determinant of the two rows of friction = 0: it must be different from 0; one element with the sum of both forces describes friction along equal rows
+force = "mu*k" | | m.toml:36:1: `friction.0.force` is missing; write the friction force of sliding, such as force = "f"
+force = "mu*k" | force = "-mu" | m.toml:38:9: `friction.0.force = "-mu"` does not fit: at the defaults of two, force of friction 1 = -0.2: it must be finite and at least 0
+force = "mu*k" | force = "mu*a" | m.toml:38:9: `friction.0.force = "mu*a"` does not fit: `a` is a coordinate
+force = "mu*k" | force = ["mu", "k"] | m.toml:38:9: `friction.0.force = ["mu", "k"]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping, load and preload
+force = 0.5 | force = "1/0" | m.toml:43:9: `friction.1.force = "1/0"` does not fit: at the defaults of two, force of friction 2 = inf: it must be finite and at least 0
+speed = "u" | speed = "log(-1)" | m.toml:39:9: `friction.0.speed = "log(-1)"` does not fit: at the defaults of two, speed of friction 1 = NaN: it must be a finite number
+stiffness = "100" | | m.toml:43:9: `friction.1.force = 0.5` does not fit: at the defaults of two, rigid walls = 1: it must be 0 with two elements of dry friction, because the forces of both and of the wall are not determined at rest
+[motion] | [[friction]]\nrow = [0, 1]\nforce = 1\n[motion] | `friction = 3 tables` is out of range: it must be at most 2 tables, [[friction]], each with row and force
+"#,
+    );
+    check_refusals(
+        ONE_DEGREE,
+        r#"
+[motion] | [[friction]]\nforce = 1\n[[friction]]\nforce = 2\n[motion] | `friction = 2 tables` is out of range: it must be at most 1 table, [[friction]], for one coordinate: friction forces on it add to one
+[motion] | [friction]\nforce = 1\n[motion] | `friction = { ... }` has the wrong type: it must be at most 1 table, [[friction]]
+gap = [1] | gap = [1]\nfriction = 1 | unknown field `motion.friction = 1`
+"#,
+    );
+    let (motion, _) = ONE_DEGREE.split_once("[[contact]]").unwrap();
+    let message = FileModel::parse(motion, "m.toml").unwrap_err().to_string();
+    let end = "`contact` is missing; write [[contact]] with side, at and law; only a model with [[friction]] may have no wall";
+    assert!(message.contains(end), "{message}");
 }

@@ -144,8 +144,22 @@ mod tests {
 
     #[test]
     fn words_are_unchanged_by_packing() {
-        let long: Vec<u8> = (0..64u32).map(|i| b'1' + (i * 5 % 6) as u8).collect();
-        for symbols in [&b""[..], b"36", b"2356", &long[..21], &long[..22], &long] {
+        let long: Vec<u8> = (0..64u32).map(|i| b'0' + (i * 5 % 8) as u8).collect();
+        let zeros = [b'0'; 64];
+        for symbols in [
+            &b""[..],
+            b"36",
+            b"2356",
+            &long[..21],
+            &long[..22],
+            &long,
+            b"0",
+            &zeros[..21],
+            &zeros[..22],
+            &zeros,
+            b"07",
+            b"7070",
+        ] {
             let word = Word::cyclic(symbols);
             let mut record = Record::default();
             record.set_word(&word);
@@ -155,6 +169,19 @@ mod tests {
             assert_eq!(record.spelling(), Some(Spelling::Whole(word)));
         }
         assert_eq!(Record::default().spelling(), None);
+    }
+
+    #[test]
+    fn words_of_zeros_differ_by_their_length() {
+        let stored = |length: usize| {
+            let mut record = Record::default();
+            record.set_word(&Word::cyclic(&vec![b'0'; length]));
+            (record.word_hash, record.spelling().unwrap().text())
+        };
+        assert_eq!([stored(0).1, stored(1).1, stored(3).1], ["", "0", "000"]);
+        let hashes: std::collections::HashSet<u64> = (0..100).map(|length| stored(length).0).collect();
+        assert_eq!(hashes.len(), 100);
+        assert!(stored(65).1.ends_with("/65"), "{:?}", stored(65));
     }
 
     #[test]

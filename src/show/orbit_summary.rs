@@ -99,7 +99,7 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
         return facts;
     }
     match (orbit.class, orbit.strobe_meshing) {
-        (Class::Periodic { .. }, _) if !orbit.events.is_empty() => {
+        (Class::Periodic { .. }, _) if !orbit.word.is_empty() => {
             add("word, in time", orbit.word.time_order());
             add("word, as printed", orbit.word.paper_notation());
             let pattern = orbit.word.pattern();

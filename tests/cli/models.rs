@@ -281,6 +281,31 @@ fn harmonics_and_stages_are_printed_and_computed() {
     assert_eq!(orbit["class"], "periodic", "{orbit}");
 }
 
+#[test]
+fn dry_friction_is_printed() {
+    let folder = empty();
+    let motion = "name = 'belt'\nparameters = { u = 0.1, mu = 0.2, m1 = 1, g = 9.81, f = 0.3 }\n[motion]\n\
+                  coordinates = ['x', 'y']\nmass = [['m1', 0], [0, 2]]\nstiffness = [[1, 0], [0, 1]]\nfrequency = 1\n\
+                  gap = [1, -1]\n";
+    let wall = "[[contact]]\nside = 'left'\nat = -1\nlaw = 'elastic'\nstiffness = 9\n";
+    fs::write(folder.path().join("belt.toml"), format!("{motion}{}{wall}", toml(8))).unwrap();
+    let page = stdout(&folder, "models belt.toml");
+    for part in [
+        "friction  sticks at x' - u = 0 while |friction force| <= mu*m1*g\n",
+        "friction  sticks at x' - y' = 0 while |friction force| <= f\n",
+        "m1 x'' + x + mu*m1*g sgn(x' - u) + f sgn(x' - y') = 0\n",
+        "2 y'' + y - f sgn(x' - y') = 0\n",
+        "Where the argument of sgn is not 0, the surfaces slide",
+        "4  sustained contact on the left",
+        "7  sticking ends\n        0  sliding reverses without sticking\n",
+    ] {
+        assert!(page.contains(part), "{part} is not in\n{page}");
+    }
+    let page = stdout(&folder, "models friction-oscillator");
+    assert!(page.contains("The model has no walls.") && page.contains("smallest number: 0077."), "{page}");
+    assert!(!page.contains("flight") && !stdout(&folder, "models backlash").contains("sgn"), "{page}");
+}
+
 /// Lanes of a map with stages and harmonics are computed again for its validation.
 #[test]
 #[ignore = "compiles large shaders; scripts/test.sh --all"]

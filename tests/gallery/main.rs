@@ -14,6 +14,7 @@ mod clutch;
 mod elastic;
 mod engines;
 mod files;
+mod friction;
 mod loose_gear;
 mod meissner;
 mod random;

@@ -30,6 +30,9 @@ use crate::model::{Contact, Domain, Friction, MOST_FRICTION, Oscillator, Side};
 /// A mobility below this share of the unconstrained one is rounding: other constraints already hold the row.
 const NO_MOBILITY: f64 = 1e-12;
 
+/// Rounding error of a rate or of a force, relative to the size of its terms.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
 /// The mode of an element with dry friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Slip {
@@ -364,6 +367,17 @@ impl Watch {
         }
     }
 
+    /// Returns a bound on the rounding error of the function.
+    pub(crate) fn rounding(&self, q: &Gap) -> f64 {
+        ROUNDING * self.rows[0].size(q)
+    }
+
+    /// Returns the derivatives of the function with respect to the gap coordinates.
+    pub(crate) fn gradient(&self) -> Gap {
+        let [z, w, x, v, ..] = self.rows[0].base;
+        [z, w, x, v]
+    }
+
     /// Returns the function and its first two derivatives.
     pub(crate) fn rates(&self, q: &Gap, phasor: &Phasor) -> [f64; 3] {
         self.rows.each_ref().map(|row| row.dot(q, phasor))
@@ -414,9 +428,10 @@ mod tests {
         for oscillator in [with(passive, [1.0, 0.0]), rigid, harmonics, growing] {
             let flow = Flow::new(&oscillator);
             let element = &flow.friction()[0];
-            for (slip, kind) in Slip::ALL.into_iter().flat_map(|slip| {
-                [DomainKind::Free, DomainKind::Meshing(Side::Left)].map(|kind| (slip, kind))
-            }) {
+            for (slip, kind) in Slip::ALL
+                .into_iter()
+                .flat_map(|slip| [DomainKind::Free, DomainKind::Meshing(Side::Left)].map(|kind| (slip, kind)))
+            {
                 let modes = flow.in_modes([slip, Slip::Stick]);
                 let linear = modes.domain(kind);
                 let watch = modes.watches(kind)[0].as_ref().unwrap();

@@ -634,8 +634,7 @@ impl Oscillator {
                 at.is_finite() && contact == Contact::Rigid
             };
             let rigid = Side::BOTH.into_iter().filter(|&side| is_rigid(side)).count();
-            let undetermined =
-                "0 with two elements of dry friction, because the forces of both and of the wall are not determined at rest";
+            let undetermined = "0 with two elements of dry friction, because the forces of both and of the wall are not determined at rest";
             require(rigid == 0, || "rigid walls".to_owned(), rigid as f64, undetermined)?;
             let determinant = a * d - b * c;
             let size = a.hypot(b) * c.hypot(d);

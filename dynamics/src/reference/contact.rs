@@ -150,7 +150,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let free = self.flow.domain(DomainKind::Free);
         let pressing = side.sign() * free.acceleration(&after, &self.phasor);
         let pressed = pressing > 0.0 || pressing == 0.0 && self.presses(DomainKind::Free, side, &after);
-        let meshes = leaving <= self.lasting_speed(side)
+        let meshes = leaving <= self.lasting_speed(side, pressing)
             && pressed
             && self.flow.contacts[side.index()] == Contact::Impact
             && self.presses(DomainKind::Meshing(side), side, &after);

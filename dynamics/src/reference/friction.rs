@@ -13,6 +13,9 @@ use crate::certificate::{Verdict, judge};
 use crate::flow::{DomainKind, Element, Flow, Gap, LinearFlow, Phasor, Slip, Slips, Step, Watch};
 use crate::model::{Contact, MOST_FRICTION, Side, State};
 
+/// Height of a flight, relative to the scale of length, that is not followed in a series of impacts.
+const LOWEST_FLIGHT: f64 = 1e-13;
+
 impl<'f, const N: usize> Trajectory<'f, N> {
     fn elements(&self) -> &'f [Element] {
         self.stage.interval(self.interval).friction()
@@ -67,8 +70,12 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             };
             let of_element = match self.slips[i] {
                 Slip::Stick => {
+                    let [force, rate, _] = watch.rates(&self.q, &self.phasor);
                     let limit = |next: Slip| {
-                        verdict(next.sign() * element.force, -next.sign(), 0, Crossing::Slips(i, next))
+                        let (level, sign) = (next.sign() * element.force, -next.sign());
+                        // A force that has just touched its limit is leaving it.
+                        let touches = (force - level).abs() <= watch.rounding(&self.q) && sign * rate > 0.0;
+                        verdict(level, sign, usize::from(touches), Crossing::Slips(i, next))
                     };
                     first_of(limit(Slip::Forward), limit(Slip::Backward))
                 }
@@ -96,22 +103,26 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Enters the first consistent combination of modes in a domain at a point: each element `at_rest` sticks or begins to slide, and the
-    /// others keep their modes.
-    fn enter_from_rest(&mut self, at_rest: [bool; MOST_FRICTION], slips: Slips, kind: DomainKind, q: &Gap) {
+    /// Enters the first consistent combination of modes in a domain at a point: each element that sticks, or has come to rest, sticks or
+    /// begins to slide, and the others keep their modes.
+    fn enter_from_rest(&mut self, stops: [bool; MOST_FRICTION], slips: Slips, kind: DomainKind, q: &Gap) {
         let whole = self.stage.interval(self.interval);
+        let mut at_rest = stops;
+        for (at_rest, slip) in at_rest.iter_mut().zip(slips).take(whole.friction().len()) {
+            *at_rest |= slip == Slip::Stick;
+        }
         let options = |i: usize| if at_rest[i] { &Slip::ALL[..] } else { std::slice::from_ref(&slips[i]) };
         let all = options(0).iter().flat_map(|&a| options(1).iter().map(move |&b| [a, b]));
         let is_consistent = |slips: &Slips| {
             let flow = whole.in_modes(*slips);
             let mut places = flow.watches(kind).iter().zip(whole.friction()).zip(*slips).zip(at_rest);
             places.all(|(((watch, element), slip), at_rest)| {
-                let rates = watch.as_ref().map(|watch| watch.rates(q, &self.phasor));
-                match (at_rest, slip, rates) {
-                    (false, ..) | (_, Slip::Stick, None) => true,
-                    (_, Slip::Stick, Some([force, ..])) => force.abs() <= element.force,
-                    (_, _, None) => false,
-                    (_, slip, Some([_, rates @ ..])) => rates
+                let Some(watch) = watch else { return !at_rest || slip == Slip::Stick };
+                let [value, rates @ ..] = watch.rates(q, &self.phasor);
+                match slip {
+                    _ if !at_rest => true,
+                    Slip::Stick => value.abs() <= element.force + watch.rounding(q),
+                    _ => rates
                         .into_iter()
                         .find(|&rate| rate != 0.0)
                         .is_some_and(|rate| slip.sign() * rate > 0.0),
@@ -169,6 +180,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.has_slid = slips.map(|slip| slip != Slip::Stick);
         self.from_rate = [0; MOST_FRICTION];
         self.hold_rates();
+        self.hold_tangents();
+    }
+
+    /// Projects the tangents to rest of the sticking elements.
+    fn hold_tangents(&mut self) {
         let keeps_w = matches!(self.mode, Mode::Stuck(_));
         for (element, _) in self.sticking() {
             self.tangents.iter_mut().for_each(|u| element.project(u, keeps_w));
@@ -191,36 +207,53 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     #[cold]
     #[inline(never)]
     pub(super) fn end_sliding(&mut self, i: usize, observer: &mut impl Observer) {
-        let (kind, before, slips) = (self.mode.domain(), self.flow, self.slips);
+        let (kind, slips) = (self.mode.domain(), self.slips);
+        let field = self.present_field();
         let rate = self.friction_rates(i, None, &self.q, &self.phasor)[1] * slips[i].sign();
-        let at_rest = std::array::from_fn(|j| j == i);
-        self.enter_from_rest(at_rest, slips, kind, &self.q.clone());
+        let stops = std::array::from_fn(|j| j == i);
+        self.enter_from_rest(stops, slips, kind, &self.q.clone());
+        let let_go = match self.mode {
+            Mode::Stuck(side) if !self.presses(kind, side, &self.q) => Some(side),
+            _ => None,
+        };
+        if let_go.is_some() {
+            self.enter_from_rest(stops, slips, DomainKind::Free, &self.q.clone());
+        }
         if self.slips[i] == slips[i] {
+            // The rate only touches 0, or begins on the wrong side of it.
+            let keeps_w = matches!(self.mode, Mode::Stuck(_));
+            self.elements()[i].put_at_rest(&mut self.q, keeps_w);
             self.near_grazing = true;
+            self.work.events += 1;
+            self.events_in_period += 1;
             return;
         }
-        if N > 0 {
-            let [a, b] = self.elements()[i].row;
-            let [field, next] =
-                [before, self.flow].map(|flow| flow.domain(kind).field(&self.q, &self.phasor));
-            self.saltate(|u| *u, &[0.0, a, 0.0, b], rate, &field, &next);
-        }
-        if self.slips[i] == Slip::Stick {
-            self.hold_rates();
-            let keeps_w = matches!(self.mode, Mode::Stuck(_));
-            let element = &self.elements()[i];
-            self.tangents.iter_mut().for_each(|u| element.project(u, keeps_w));
-            self.record_friction(None, observer);
-        } else {
-            self.record_friction(Some(b'0'), observer);
+        self.hold_rates();
+        self.record_changes(slips, Some(i), observer);
+        if let Some(side) = let_go {
+            self.record(EventKind::MeshEnd, side, self.q, observer);
+            self.leave(side);
         }
         self.recheck_contact(observer);
+        if N > 0 {
+            let [a, b] = self.elements()[i].row;
+            let next = self.present_field();
+            self.saltate(|u| *u, &[0.0, a, 0.0, b], rate, &field, &next);
+            self.hold_tangents();
+        }
+    }
+
+    fn present_field(&self) -> Gap {
+        self.flow.domain(self.mode.domain()).field(&self.q, &self.phasor)
     }
 
     /// Processes an element that breaks away in a direction.
     #[cold]
     #[inline(never)]
     pub(super) fn begin_sliding(&mut self, i: usize, next: Slip, observer: &mut impl Observer) {
+        let (kind, field) = (self.mode.domain(), self.present_field());
+        let force =
+            self.watches()[i].as_ref().map(|watch| (watch.gradient(), watch.rates(&self.q, &self.phasor)[1]));
         let mut slips = self.slips;
         slips[i] = next;
         let sliding = self.stage.interval(self.interval).in_modes(slips);
@@ -254,6 +287,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             self.from_wall = Some((side, RELEASE_ORDER));
         }
         self.recheck_contact(observer);
+        // The field is continuous, except where a contact onset ends at once.
+        if let (true, Some((gradient, rate))) = (N > 0 && self.mode.domain() != kind, force) {
+            let next = self.present_field();
+            self.saltate(|u| *u, &gradient, rate, &field, &next);
+        }
     }
 
     /// Decides contacts that depend on forces anew, after a jump of a friction force.
@@ -269,6 +307,14 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 if side.sign() * meshing.acceleration(&self.q, &self.phasor) <= 0.0 {
                     self.record(EventKind::MeshEnd, side, self.q, observer);
                     self.mode = Mode::Free;
+                    // The force of the spring is gone: elements without a rate begin anew.
+                    let stops = self.from_rate.map(|order| order > 0);
+                    let slips = self.slips;
+                    self.enter_from_rest(stops, slips, DomainKind::Free, &self.q.clone());
+                    if self.slips != slips {
+                        self.hold_rates();
+                        self.record_friction(None, observer);
+                    }
                 }
             }
             _ => {}
@@ -317,9 +363,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     pub(super) fn settle_friction(&mut self, observer: &mut impl Observer) -> bool {
         for (i, watch) in self.watches().iter().enumerate() {
             let Some(watch) = watch else { continue };
-            let [value, ..] = watch.rates(&self.q, &self.phasor);
+            let [value, rate, _] = watch.rates(&self.q, &self.phasor);
             match self.slips[i] {
-                Slip::Stick if value.abs() > self.elements()[i].force => {
+                Slip::Stick if value.abs() > self.elements()[i].force && value * rate > 0.0 => {
                     self.begin_sliding(i, Slip::of(value), observer);
                     return true;
                 }
@@ -333,19 +379,29 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         false
     }
 
-    /// Returns the leaving speed up to which a pressed contact lasts. A series of impacts under friction has no closed form; it ends when
-    /// it is shorter than rounding errors.
-    pub(super) fn lasting_speed(&self, side: Side) -> f64 {
+    /// Returns the leaving speed up to which a contact lasts, given the acceleration that presses it. A series of impacts under friction has
+    /// no closed form; it ends when its flights are hardly higher than rounding errors.
+    pub(super) fn lasting_speed(&self, side: Side, pressing: f64) -> f64 {
         let speed = self.law.mesh_speed[side.index()];
-        if self.flow.has_friction() { speed.max(super::NO_THRESHOLD * self.flow.speed) } else { speed }
+        if !self.flow.has_friction() {
+            return speed;
+        }
+        speed.max((2.0 * LOWEST_FLIGHT * self.flow.length * pressing.abs()).sqrt())
     }
 
     /// Reports elements that have begun or ended to stick at an event at a wall, given the modes before.
     pub(super) fn record_slips(&mut self, before: Slips, observer: &mut impl Observer) {
-        for (before, after) in before.into_iter().zip(self.slips) {
+        self.record_changes(before, None, observer);
+    }
+
+    /// Reports changes of modes, in the order of the elements. The rate of the element `stopped` vanished.
+    fn record_changes(&mut self, before: Slips, stopped: Option<usize>, observer: &mut impl Observer) {
+        for (i, (before, after)) in before.into_iter().zip(self.slips).enumerate() {
             match (before, after) {
-                (Slip::Stick, after) if after != Slip::Stick => self.record_friction(Some(b'7'), observer),
-                (before, Slip::Stick) if before != Slip::Stick => self.record_friction(None, observer),
+                (Slip::Stick, Slip::Stick) => {}
+                (Slip::Stick, _) => self.record_friction(Some(b'7'), observer),
+                (_, Slip::Stick) => self.record_friction(None, observer),
+                _ if stopped == Some(i) => self.record_friction(Some(b'0'), observer),
                 _ => {}
             }
         }

@@ -18,18 +18,17 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Elements with dry friction then have their modes of rest.
     pub(super) fn sticks(&mut self, side: Side) -> bool {
         let leaving = self.law.restitution[side.index()] * self.q[1].abs();
-        if leaving > self.lasting_speed(side) {
-            return false;
-        }
         let (at_rest, before) = (self.at_rest_on(side), (self.flow, self.slips, self.from_rate, self.level));
+        let kind = DomainKind::Meshing(side);
         if self.flow.has_friction() {
-            self.slide_after_jump(DomainKind::Meshing(side), &at_rest);
+            self.slide_after_jump(kind, &at_rest);
         }
-        let is_pressed = self.presses(DomainKind::Meshing(side), side, &at_rest);
-        if !is_pressed {
+        let pressing = self.flow.domain(kind).acceleration(&at_rest, &self.phasor);
+        let lasts = leaving <= self.lasting_speed(side, pressing) && self.presses(kind, side, &at_rest);
+        if !lasts {
             (self.flow, self.slips, self.from_rate, self.level) = before;
         }
-        is_pressed
+        lasts
     }
 
     /// Returns the state after an impact that stops the gap.
@@ -43,8 +42,8 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Neighbouring motions reach the wall earlier or later and come to rest, too. The approach speed cancels in
     /// `S = R + (f+ - R f-) n^T / (n f-)`, where `R` is the impact that stops the gap. What remains is the
     /// displacement of the other coordinate, and its damping by the gap's velocity.
-    #[inline(never)]
     /// `flow_before` and `slips_before` are those of the motion up to the wall.
+    #[inline(never)]
     pub(super) fn stick(
         &mut self,
         side: Side,
@@ -54,7 +53,14 @@ impl<const N: usize> Trajectory<'_, N> {
         self.q[0] = self.flow.wall(side);
         let before = self.q;
         self.q = self.at_rest_on(side);
-        if N > 0 {
+        let breaks_away = slips_before != self.slips && flow_before.sticks;
+        if N > 0 && breaks_away {
+            let kick = self.flow.kick;
+            let field = flow_before.domain(DomainKind::Free).field(&before, &self.phasor);
+            let next = self.flow.domain(DomainKind::Meshing(side)).field(&self.q, &self.phasor);
+            let stop = |u: &Gap| [u[0], 0.0, u[2], u[3] + kick * u[1]];
+            self.saltate(stop, &[1.0, 0.0, 0.0, 0.0], before[1], &field, &next);
+        } else if N > 0 {
             let (kick, gaps) = (self.flow.kick, self.tangents.map(|u| u[0]));
             let meshing = flow_before.domain(DomainKind::Meshing(side));
             let row = meshing.second_acceleration_row().base;

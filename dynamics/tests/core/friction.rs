@@ -149,18 +149,22 @@ fn rows() -> [Vec<Friction>; 4] {
 fn friction_takes_its_share_of_the_work_of_the_force() {
     let (mut cycles, mut sticking) = (0, 0);
     for friction in rows() {
-        for (e, omega) in [(0.06, 5.6), (0.605, 5.6), (0.72, 1.5), (0.3, 3.0), (0.8, 4.4), (0.5, 11.5), (0.3, 7.5)] {
+        for (e, omega) in
+            [(0.06, 5.6), (0.605, 5.6), (0.72, 1.5), (0.3, 3.0), (0.8, 4.4), (0.5, 11.5), (0.3, 7.5)]
+        {
             for contact in [Contact::Impact, Contact::Rigid, Contact::Elastic] {
                 let pair = paper(e, omega);
                 let oscillator = pair.oscillator().unwrap();
-                let oscillator = Oscillator { friction: friction.clone(), contacts: [contact; 2], ..oscillator };
+                let oscillator =
+                    Oscillator { friction: friction.clone(), contacts: [contact; 2], ..oscillator };
                 if oscillator.validate().is_err() {
                     // Two elements and rigid walls.
                     continue;
                 }
                 let flow = Flow::new(&oscillator);
                 let orbit = analyse_flow(&flow, pair.law(), REST, &Settings::default(), 8);
-                let case = format!("{e} {omega} {contact:?} {friction:?}: {:?} {:?}", orbit.class, orbit.status);
+                let case =
+                    format!("{e} {omega} {contact:?} {friction:?}: {:?} {:?}", orbit.class, orbit.status);
                 assert_ne!(orbit.class, Class::Failed, "{case}");
                 if !matches!(orbit.class, Class::Periodic { .. }) {
                     continue;
@@ -189,13 +193,38 @@ fn without_force_friction_changes_nothing() {
             let flow = Flow::new(&Oscillator { friction, ..plain.clone() });
             analyse_flow(&flow, pair.law(), REST, &Settings::default(), 8)
         };
-        let [none, zero, small] =
-            [analyse_flow(&Flow::new(&plain), pair.law(), REST, &Settings::default(), 8), orbit(0.0), orbit(1e-9)];
+        let [none, zero, small] = [
+            analyse_flow(&Flow::new(&plain), pair.law(), REST, &Settings::default(), 8),
+            orbit(0.0),
+            orbit(1e-9),
+        ];
         assert_eq!((none.class, none.strobe, &none.word), (zero.class, zero.strobe, &zero.word));
         assert_eq!(none.class, small.class, "{e}, {omega}");
         if matches!(none.class, Class::Periodic { .. }) {
-            let off = none.strobe.iter().zip(small.strobe).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+            let off =
+                none.strobe.iter().zip(small.strobe).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
             assert!(off < 1e-7, "{e}, {omega}: {off}");
         }
     }
+}
+
+/// A valve between rigid stops, whose friction makes each series of impacts end at rest.
+#[test]
+fn series_of_impacts_under_friction_end_at_rest() {
+    let mut valve = block(0.4545, 0.8, 0.15);
+    valve.walls = [0.5, 0.0];
+    valve.contacts = [Contact::Rigid; 2];
+    valve.free.damping[0][0] = 0.1;
+    valve.meshing = [valve.free; 2];
+    let law = Law { restitution: [0.6, 0.4], mesh_speed: [0.0; 2] };
+    let flow = Flow::new(&valve);
+    let mut motion = Trajectory::new(&flow, law, REST);
+    for _ in 0..20 {
+        let before = motion.work().events;
+        motion.advance_period(&mut ()).unwrap();
+        let events = motion.work().events - before;
+        assert!((10..200).contains(&events), "{events} events in a period");
+    }
+    let orbit = analyse_flow(&flow, law, REST, &Settings::default(), 8);
+    assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{:?}", orbit.status);
 }

@@ -4,7 +4,7 @@ use nalgebra::{Matrix4, Vector4};
 use rattlemap_dynamics::model::{Law, State};
 use rattlemap_dynamics::word::Word;
 
-use super::motion::{Mode, Motion, System, What, distance};
+use super::motion::{Grip, Mode, Motion, System, What, distance};
 
 /// Longest cycle that is searched, in forcing periods.
 pub(crate) const LONGEST: usize = 12;
@@ -18,9 +18,9 @@ const CLOSES: f64 = 1e-12;
 /// What is known of a cycle.
 #[derive(Clone, Debug)]
 pub(crate) struct Cycle {
-    /// State and mode at each phase 0.
-    pub(crate) strobes: Vec<(State, Mode)>,
-    /// Largest modulus of a multiplier.
+    /// State and modes at each phase 0.
+    pub(crate) strobes: Vec<(State, Mode, [Grip; 2])>,
+    /// Largest modulus of a multiplier, without those of elements that stick for ever.
     pub(crate) radius: f64,
     pub(crate) word: Word,
     pub(crate) impacts: usize,
@@ -53,18 +53,20 @@ fn derivative(motion: &Motion) -> Option<Matrix4<f64>> {
 pub(crate) fn follow(start: &Motion, period: usize) -> Option<Cycle> {
     let (system, rate) = (start.system, start.rate());
     let mut motion = start.clone();
+    motion.clear();
     // The first flight has a symbol only if the last event is known.
     for _ in 0..period {
         motion.advance_period()?;
     }
     motion.set_state(start.state());
+    motion.for_good = motion.slid.map(|slid| slid == 0.0);
     motion.clear();
     let mut shaken = motion.shaken();
     let mut strobes = Vec::new();
     motion.carry_tangents();
     let mut noise = 0.0f64;
     for _ in 0..period {
-        strobes.push((motion.state(), motion.mode));
+        strobes.push((motion.state(), motion.mode, motion.grips));
         motion.advance_period()?;
         noise = noise.max(motion.noise(&mut shaken)?);
     }
@@ -83,6 +85,10 @@ pub(crate) fn follow(start: &Motion, period: usize) -> Option<Cycle> {
 fn newton(near: &Motion, period: usize) -> Option<Cycle> {
     let rate = near.rate();
     let mut at = near.clone();
+    at.clear();
+    let mut moved = at.clone();
+    image(&mut moved, period)?;
+    at.for_good = moved.slid.map(|slid| slid == 0.0);
     for _ in 0..12 {
         let from = Vector4::from(at.state());
         let mut moved = at.clone();
@@ -108,18 +114,18 @@ fn newton(near: &Motion, period: usize) -> Option<Cycle> {
 pub(crate) fn settle(system: &System, law: Law, start: State, most_periods: usize) -> Option<Cycle> {
     let mut motion = Motion::new(system, law, start, Mode::Free);
     let rate = motion.rate();
-    let mut strobes = vec![(start, Mode::Free)];
+    let mut strobes = vec![(start, motion.mode, motion.grips)];
     for n in 1..=most_periods {
         motion.advance_period()?;
         motion.clear();
-        strobes.push((motion.state(), motion.mode));
+        strobes.push((motion.state(), motion.mode, motion.grips));
         if n < 30 || n % 10 > 0 {
             continue;
         }
         let recurs = |lag: usize| {
             (n + 1 - 2 * lag..=n).all(|i| {
-                let ((a, mode), (b, before)) = (strobes[i], strobes[i - lag]);
-                mode == before && distance(a, b, rate) < RECURS
+                let ((a, mode, grips), (b, before, grips_before)) = (strobes[i], strobes[i - lag]);
+                (mode, grips) == (before, grips_before) && distance(a, b, rate) < RECURS
             })
         };
         let found = (1..=LONGEST.min(n / 3)).find(|&lag| recurs(lag));

@@ -4,7 +4,7 @@
 //! product with a stored exponential. Near a wall, Taylor series of the step are searched for roots between the extrema.
 
 use nalgebra::{Matrix2, Matrix4, RowSVector, RowVector4, SMatrix, SVector, Vector2, Vector4};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, Stage, State};
+use rattlemap_dynamics::model::{Contact, Domain, Friction, Law, Oscillator, Side, Stage, State};
 
 /// Largest number of harmonics, the first one included.
 pub(crate) const HARMONICS: usize = 5;
@@ -20,6 +20,9 @@ const TERMS: usize = 15;
 
 /// Relative errors of velocities that stand for those of rounding, which are smaller.
 const SHAKEN: f64 = 1e-12;
+
+/// Relative size of numbers that are zero but for rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// Largest number of events in a part of a period.
 const MOST_EVENTS: u32 = 20_000;
@@ -56,9 +59,29 @@ pub(crate) enum What {
     Ends,
 }
 
+/// What an element with dry friction does: it sticks, or slides with a positive or a negative rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Grip {
+    Stick,
+    Plus,
+    Minus,
+}
+
+impl Grip {
+    const ALL: [Grip; 3] = [Grip::Stick, Grip::Plus, Grip::Minus];
+
+    fn sign(self) -> f64 {
+        [0.0, 1.0, -1.0][self as usize]
+    }
+}
+
 /// What ends a flight.
 #[derive(Clone, Copy, Debug)]
 enum End {
+    /// Sliding of an element.
+    Rests(usize),
+    /// Sticking of an element.
+    Slips(usize, Grip),
     Reaches(Side),
     OnsetEnds(Side),
     FallsBack(Side),
@@ -87,13 +110,17 @@ struct Linear {
     a: Generator,
     /// Length of a step and its exponential.
     step: (f64, Generator),
+    /// Row of the gap's acceleration. On a rigid wall it is that without the wall.
+    pressing: Row,
+    /// Rows of the forces that make elements stick while all else holds.
+    hold: [Row; 2],
 }
 
 impl Linear {
-    fn new(a: Generator, fastest: f64, angle: f64) -> Linear {
+    fn new((a, pressing, hold): (Generator, Row, [Row; 2]), fastest: f64, angle: f64) -> Linear {
         // With few digits, sums of steps have hardly any rounding error.
         let h = f64::from((angle / fastest) as f32);
-        Linear { a, step: (h, exponential(a * h)) }
+        Linear { a, step: (h, exponential(a * h)), pressing, hold }
     }
 
     /// Returns the coefficients of the state as a polynomial of the share of a step.
@@ -106,11 +133,9 @@ impl Linear {
     }
 }
 
-/// The domains of a stage: free, and in contact with the right and the left wall.
+/// The domains of a stage: free, and in contact with the right and the left wall, for each combination of grips.
 struct Stages {
-    domains: [Linear; 3],
-    /// Rows of the gap's acceleration in each domain. On a rigid wall it is that of free motion.
-    pressing: [Row; 3],
+    domains: Vec<Linear>,
     /// Rows of the forces of spring, damper and preload behind the right and the left wall, if these only push.
     pushing: [Option<Row>; 2],
 }
@@ -124,12 +149,17 @@ pub(crate) struct System {
     pub(crate) period: f64,
     pub(crate) degrees: usize,
     orders: Vec<u32>,
-    gap: [f64; 2],
+    per_mass: Matrix2<f64>,
+    gap: Vector2<f64>,
     /// Change of both velocities by an impulse that changes the gap's rate by 1.
     kick: Vector2<f64>,
     /// Rows of the gap and of its rate.
     z: Row,
     w: Row,
+    /// Elements with a force, their rows, and rows of their sliding rates.
+    friction: Vec<Friction>,
+    along: Vec<Vector2<f64>>,
+    slides: Vec<Row>,
     /// Systems between further walls on the right and on the left, from the inside to the outside.
     behind: [Vec<System>; 2],
 }
@@ -161,20 +191,50 @@ fn matrix(m: [[f64; 2]; 2]) -> Matrix2<f64> {
     Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1])
 }
 
+/// Returns the row of a combination of displacements (`at` 0) or velocities (1).
+fn row_of(along: Vector2<f64>, at: usize) -> Row {
+    let mut row = Row::zeros();
+    (row[at], row[at + 2]) = (along[0], along[1]);
+    row
+}
+
+/// Returns for each of the combinations of velocities the change of velocities by an impulse that changes it by 1 while those before it
+/// are held, and that impulse. Both are 0 for a combination that those before it hold.
+fn bonds(per_mass: Matrix2<f64>, rows: &[Vector2<f64>]) -> Vec<(Vector2<f64>, f64)> {
+    let mut mobility = per_mass;
+    let bond = |row: &Vector2<f64>| {
+        let change = mobility * row;
+        let along = row.dot(&change);
+        if along <= ROUNDING * row.dot(&(per_mass * row)) {
+            return (Vector2::zeros(), 0.0);
+        }
+        mobility -= change * change.transpose() / along;
+        (change / along, 1.0 / along)
+    };
+    rows.iter().map(bond).collect()
+}
+
+/// Returns the generator of motion in which combinations of velocities are constant.
+fn bound(mut a: Generator, per_mass: Matrix2<f64>, rows: &[Vector2<f64>]) -> Generator {
+    for (row, (change, _)) in rows.iter().zip(bonds(per_mass, rows)) {
+        let rate = row_of(*row, 1) * a;
+        a.set_row(1, &(a.row(1) - rate * change[0]));
+        a.set_row(3, &(a.row(3) - rate * change[1]));
+    }
+    a
+}
+
 impl System {
     /// Builds the system with steps of `angle` radians of the fastest rate.
     pub(crate) fn new(o: &Oscillator, angle: f64) -> System {
         let mut harmonics = vec![(1, o.force, o.force_sin)];
         harmonics.extend(o.harmonics.iter().map(|h| (h.order, h.cos, h.sin)));
         let per_mass = matrix(o.mass).try_inverse().expect("a mass matrix");
-        let along = per_mass * Vector2::from(o.gap);
-        let kick = along / Vector2::from(o.gap).dot(&along);
-        let rows = |at: usize| {
-            let mut row = Row::zeros();
-            (row[at], row[at + 2]) = (o.gap[0], o.gap[1]);
-            row
-        };
-        let (z, w) = (rows(0), rows(1));
+        let gap = Vector2::from(o.gap);
+        let kick = bonds(per_mass, &[gap])[0].0;
+        let (z, w) = (row_of(gap, 0), row_of(gap, 1));
+        let friction: Vec<_> = o.friction.iter().copied().filter(|friction| friction.force > 0.0).collect();
+        let along: Vec<_> = friction.iter().map(|friction| Vector2::from(friction.row)).collect();
         let generator = |domain: &Domain| {
             let mut a = Generator::zeros();
             (a[(0, 1)], a[(2, 3)]) = (1.0, 1.0);
@@ -207,21 +267,46 @@ impl System {
         let stage = |Stage { free, meshing }: Stage| {
             let freely = generator(&free);
             let behind = |side: Side| match o.contacts[side.index()] {
-                _ if o.walls[side.index()].is_infinite() => (freely, &free),
-                Contact::Rigid => {
-                    // The wall cancels the acceleration of the gap by an impulse per time.
-                    let (mut held, force) = (freely, w * freely);
-                    held.set_row(1, &(freely.row(1) - force * kick[0]));
-                    held.set_row(3, &(freely.row(3) - force * kick[1]));
-                    (held, &free)
-                }
-                _ => (generator(&meshing[side.index()]), &meshing[side.index()]),
+                _ if o.walls[side.index()].is_infinite() => (freely, &free, false),
+                Contact::Rigid => (freely, &free, true),
+                _ => (generator(&meshing[side.index()]), &meshing[side.index()], false),
             };
             let [right, left] = Side::BOTH.map(behind);
-            let pressing = [(freely, Contact::Elastic), (right.0, o.contacts[0]), (left.0, o.contacts[1])]
-                .map(|(a, contact)| w * if contact == Contact::Rigid { freely } else { a });
-            let domains =
-                [(freely, &free), right, left].map(|(a, domain)| Linear::new(a, rate(domain), angle));
+            // A rigid wall cancels the acceleration of the gap by an impulse per time.
+            let linear = |slot: usize, (mut a, domain, is_held): (Generator, &Domain, bool)| {
+                let grips: Vec<_> =
+                    (0..along.len()).map(|i| Grip::ALL[slot / 3usize.pow(i as u32) % 3]).collect();
+                for ((row, friction), grip) in along.iter().zip(&friction).zip(&grips) {
+                    let change = per_mass * row * (friction.force * grip.sign());
+                    a[(1, 4)] -= change[0];
+                    a[(3, 4)] -= change[1];
+                }
+                let stick: Vec<usize> = (0..along.len()).filter(|&i| grips[i] == Grip::Stick).collect();
+                let with = |of: &[usize]| -> Vec<Vector2<f64>> {
+                    is_held.then_some(gap).into_iter().chain(of.iter().map(|&i| along[i])).collect()
+                };
+                let all = with(&stick);
+                let moves = bound(a, per_mass, &all);
+                let mut pressing = w * moves;
+                if is_held {
+                    // Elements that the wall holds are idle.
+                    let held = bonds(per_mass, &all);
+                    let busy: Vec<_> = (1..all.len()).filter(|&i| held[i].1 > 0.0).map(|i| all[i]).collect();
+                    pressing = w * bound(a, per_mass, &busy);
+                }
+                let mut hold = [Row::zeros(); 2];
+                for &i in &stick {
+                    let others: Vec<usize> = stick.iter().copied().filter(|&other| other != i).collect();
+                    let (others, last) = (with(&others), with(&[&others[..], &[i]].concat()));
+                    let impulse = bonds(per_mass, &last)[others.len()].1;
+                    hold[i] = row_of(along[i], 1) * bound(a, per_mass, &others) * impulse;
+                }
+                Linear::new((moves, pressing, hold), rate(domain), angle)
+            };
+            let slots = 0..3usize.pow(along.len() as u32);
+            let domains = slots
+                .flat_map(|slot| [(freely, &free, false), right, left].map(|base| linear(slot, base)))
+                .collect();
             let pushing = Side::BOTH.map(|side| {
                 let (i, g) = (side.index(), Vector2::from(o.gap));
                 let along = |m: Matrix2<f64>| g.dot(&(m * g)) / g.norm_squared().powi(2);
@@ -235,7 +320,7 @@ impl System {
                 let may_pull = c == 0.0 && behind.preload == 0.0;
                 (o.contacts[i] == Contact::Pushing && row[4].is_finite() && !may_pull).then_some(row)
             });
-            Stages { domains, pressing, pushing }
+            Stages { domains, pushing }
         };
         let first = Stage { free: o.free, meshing: o.meshing };
         System {
@@ -246,10 +331,20 @@ impl System {
             period: std::f64::consts::TAU / o.omega,
             degrees: o.degrees,
             orders: harmonics.iter().map(|harmonic| harmonic.0).collect(),
-            gap: o.gap,
+            per_mass,
+            gap,
             kick,
             z,
             w,
+            slides: (friction.iter().zip(&along))
+                .map(|(friction, along)| {
+                    let mut row = row_of(*along, 1);
+                    row[4] = -friction.speed;
+                    row
+                })
+                .collect(),
+            friction,
+            along,
             behind: Side::BOTH.map(|side| {
                 let count = o.outer_walls[side.index()].len();
                 (1..=count).map(|nth| System::new(&between_walls(o, side, nth), angle)).collect()
@@ -277,12 +372,22 @@ pub(crate) struct Motion<'a> {
     law: Law,
     stage: usize,
     pub(crate) mode: Mode,
+    /// Of a missing element: [`Grip::Stick`].
+    pub(crate) grips: [Grip; 2],
     y: Vector,
-    t: f64,
-    /// The wall that the gap is just leaving, and the order of that root.
+    pub(crate) t: f64,
+    /// The wall that the gap is just leaving, and the order of that root. Friction may hold the gap there.
     leaves: Option<(Side, usize)>,
     /// Whether the force of a wall that only pushes is zero now.
     is_unloaded: bool,
+    /// Whether a contact onset has no acceleration now.
+    is_unpressed: bool,
+    /// Orders of roots of the sliding rates now.
+    orders: [usize; 2],
+    /// Distances that the elements have slid, which the caller may clear.
+    pub(crate) slid: [f64; 2],
+    /// Elements that never slide, so that their place does not matter.
+    pub(crate) for_good: [bool; 2],
     /// The wall of the last event.
     origin: Option<Side>,
     pub(crate) tangents: Option<Matrix4<f64>>,
@@ -318,10 +423,15 @@ impl<'a> Motion<'a> {
             law,
             stage: holds_at_0.map_or(0, |&(_, stage)| stage),
             mode,
+            grips: [Grip::Stick; 2],
             y,
             t: 0.0,
             leaves: None,
             is_unloaded: false,
+            is_unpressed: false,
+            orders: [0; 2],
+            slid: [0.0; 2],
+            for_good: [false; 2],
             origin: None,
             tangents: None,
             events: Vec::new(),
@@ -337,7 +447,34 @@ impl<'a> Motion<'a> {
         {
             motion.mode = Mode::Open(side);
         }
+        motion.begin_grips();
         motion
+    }
+
+    /// Elements without a sliding rate are at rest.
+    fn begin_grips(&mut self) {
+        let [x, v] = [0, 1].map(|at| Vector2::new(self.y[at], self.y[at + 2]));
+        for (i, friction) in self.system.friction.iter().enumerate() {
+            let along = self.system.along[i].abs();
+            let size = along.sum() * self.rate() * x.amax() + along.dot(&v.abs()) + friction.speed.abs();
+            self.grips[i] = self.grip(i, ROUNDING * size);
+        }
+        self.decide();
+        self.project();
+        let z = (self.system.z * self.y)[0];
+        let is_on = |side: &Side| (z - self.system.walls[side.index()]).abs() < ROUNDING;
+        if self.is_gap_held() {
+            self.leaves = Side::BOTH.into_iter().find(is_on).map(|side| (side, 3));
+        }
+    }
+
+    /// Returns the direction of an element's sliding rate.
+    fn grip(&self, i: usize, zero: f64) -> Grip {
+        match (self.system.slides[i] * self.y)[0] {
+            rate if rate.abs() <= zero => Grip::Stick,
+            rate if rate > 0.0 => Grip::Plus,
+            _ => Grip::Minus,
+        }
     }
 
     /// Enters the interval of the gap.
@@ -384,12 +521,41 @@ impl<'a> Motion<'a> {
 
     pub(crate) fn set_state(&mut self, state: State) {
         self.y.fixed_rows_mut::<4>(0).copy_from(&Vector4::from(state));
+        self.project();
     }
 
-    /// Begins to carry tangents. A gap at rest on a wall has no neighbours off the wall.
+    /// Begins to carry tangents. A gap at rest on a wall has no neighbours off the wall, and elements that stick have none with a rate.
     pub(crate) fn carry_tangents(&mut self) {
-        let is_stuck = matches!(self.mode, Mode::Stuck(_));
-        self.tangents = Some(if is_stuck { self.at_rest(true) } else { Matrix4::identity() });
+        let projection = |(i, change, _): &(Option<usize>, Vector2<f64>, Row)| {
+            let (along, with_place) =
+                i.map_or((self.system.gap, true), |i| (self.system.along[i], self.for_good[i]));
+            at_rest(*change, along, with_place)
+        };
+        self.tangents = Some(self.held().iter().fold(Matrix4::identity(), |all, one| projection(one) * all));
+    }
+
+    /// Returns what is at rest: none for the gap or the number of an element, the change of velocities that stops it while those before
+    /// it hold, and the row of its rate.
+    fn held(&self) -> Vec<(Option<usize>, Vector2<f64>, Row)> {
+        let System { per_mass, gap, along, slides, w, .. } = self.system;
+        let on_wall = matches!(self.mode, Mode::Stuck(_)).then_some((None, *gap, *w));
+        let sticking = (0..along.len()).filter(|&i| self.grips[i] == Grip::Stick);
+        let all: Vec<_> =
+            on_wall.into_iter().chain(sticking.map(|i| (Some(i), along[i], slides[i]))).collect();
+        let rows: Vec<_> = all.iter().map(|one| one.1).collect();
+        all.into_iter().zip(bonds(*per_mass, &rows)).map(|((i, _, row), bond)| (i, bond.0, row)).collect()
+    }
+
+    /// Removes rates of what is at rest.
+    fn project(&mut self) {
+        if self.system.friction.is_empty() {
+            return;
+        }
+        for (_, change, row) in self.held() {
+            let rate = (row * self.y)[0];
+            self.y[1] -= change[0] * rate;
+            self.y[3] -= change[1] * rate;
+        }
     }
 
     /// Clears what the caller reads about a cycle.
@@ -397,6 +563,7 @@ impl<'a> Motion<'a> {
         self.events.clear();
         self.symbols.clear();
         self.meshing_time = 0.0;
+        self.slid = [0.0; 2];
     }
 
     fn begin_period(&mut self) {
@@ -431,16 +598,8 @@ impl<'a> Motion<'a> {
     /// The state and the tangents are continuous at a change of the stage.
     fn change(&mut self, stage: usize) {
         self.stage = stage;
-        match self.mode {
-            Mode::Stuck(side) if !self.presses(0, side, &self.y) => {
-                self.ends(side);
-                self.leave(side, true);
-                self.by_stage[0] += 1;
-            }
-            Mode::Onset(side) if self.pressing(index(side), side, &self.y) <= 0.0 => {
-                self.ends(side);
-                self.by_stage[1] += 1;
-            }
+        let (grips, mode) = (self.grips, self.mode);
+        match mode {
             Mode::Sustained(side) if !self.closes(side) => {
                 self.ends(side);
                 self.mode = Mode::Open(side);
@@ -450,6 +609,99 @@ impl<'a> Motion<'a> {
                 self.mode = Mode::Sustained(side);
             }
             _ => {}
+        }
+        self.settle(grips, None);
+        self.by_stage[0] += usize::from(matches!(mode, Mode::Stuck(_)) && mode != self.mode);
+        self.by_stage[1] += usize::from(matches!(mode, Mode::Onset(_)) && mode != self.mode);
+    }
+
+    /// Decides about all that is at rest, ends contacts that are not pressed, and records what the elements do then. They did `before`,
+    /// and the sliding rate of `stops` has become 0.
+    fn settle(&mut self, mut before: [Grip; 2], stops: Option<usize>) {
+        let (mode, undecided) = (self.mode, self.grips);
+        self.decide();
+        let ended = match mode {
+            Mode::Stuck(side) if !self.presses(side) => Some(side),
+            Mode::Onset(side) if !self.is_unpressed && !self.is_gap_held() && !self.presses(side) => {
+                Some(side)
+            }
+            _ => None,
+        };
+        if let Some(side) = ended {
+            (self.mode, self.grips) = (Mode::Free, undecided);
+            self.decide();
+            // The cause comes first.
+            if let Some(i) = stops {
+                let mut first = self.grips;
+                first[i] = before[i];
+                self.mark(first, stops);
+                before[i] = self.grips[i];
+            }
+            self.mode = mode;
+            self.ends(side);
+            if let Mode::Stuck(_) = mode {
+                self.leave(side, true);
+            }
+        }
+        self.mark(before, stops);
+        self.project();
+    }
+
+    /// Chooses the first consistent grips of elements at rest, in the order of sticking, positive and negative rate.
+    fn decide(&mut self) {
+        let before = self.grips;
+        let rests = |i: usize| i < self.system.friction.len() && before[i] == Grip::Stick;
+        let [first, second] = [0, 1].map(|i| if rests(i) { Grip::ALL.to_vec() } else { vec![before[i]] });
+        let mut grips = first.iter().flat_map(|&a| second.iter().map(move |&b| [a, b]));
+        let is_consistent = |&grips: &[Grip; 2]| {
+            self.grips = grips;
+            (0..2).filter(|&i| rests(i)).all(|i| self.is_consistent(i))
+        };
+        self.grips = grips.find(is_consistent).unwrap_or(before);
+        for i in (0..2).filter(|&i| self.grips[i] != before[i]) {
+            self.orders[i] = 1;
+        }
+    }
+
+    /// Whether an element at rest keeps its grip.
+    fn is_consistent(&self, i: usize) -> bool {
+        let linear = self.linear(self.domain_index());
+        let tends = |row: Row| first_not_zero(&row, &linear.a, &self.y);
+        match self.grips[i] {
+            Grip::Stick => self.limits(i).into_iter().all(|(room, _)| tends(room) >= 0.0),
+            grip => grip.sign() * tends(self.system.slides[i] * linear.a) > 0.0,
+        }
+    }
+
+    /// Returns rows of the rooms that the force which makes an element stick has, and what follows without room.
+    fn limits(&self, i: usize) -> [(Row, Grip); 2] {
+        [Grip::Plus, Grip::Minus].map(|grip| {
+            let mut room = self.linear(self.domain_index()).hold[i] * -grip.sign();
+            room[4] += self.system.friction[i].force;
+            (room, grip)
+        })
+    }
+
+    /// Whether friction holds the gap.
+    fn is_gap_held(&self) -> bool {
+        let System { friction, along, gap, .. } = self.system;
+        let still = |i: &usize| self.grips[*i] == Grip::Stick && friction[*i].speed == 0.0;
+        let still: Vec<_> = (0..friction.len()).filter(still).collect();
+        let is_parallel = |&i: &usize| along[i].perp(gap).abs() <= ROUNDING * along[i].norm() * gap.norm();
+        !matches!(self.mode, Mode::Stuck(_)) && (still.len() == 2 || still.iter().any(is_parallel))
+    }
+
+    /// Records the ends of sticking, and the reversal of one element.
+    fn mark(&mut self, before: [Grip; 2], stops: Option<usize>) {
+        for (i, (before, after)) in before.into_iter().zip(self.grips).enumerate() {
+            if after == Grip::Stick || after == before {
+                continue;
+            }
+            if before == Grip::Stick {
+                self.symbols.push(b'7');
+            } else if stops == Some(i) {
+                self.symbols.push(b'0');
+            }
         }
     }
 
@@ -461,7 +713,8 @@ impl<'a> Motion<'a> {
     }
 
     fn linear(&self, domain: usize) -> &'a Linear {
-        &self.system.stages[self.stage].domains[domain]
+        let slot = self.grips[0] as usize + 3 * self.grips[1] as usize;
+        &self.system.stages[self.stage].domains[domain + 3 * slot]
     }
 
     fn contact(&self, side: Side) -> Contact {
@@ -474,52 +727,17 @@ impl<'a> Motion<'a> {
 
     /// Whether a gap behind a wall is in contact.
     fn closes(&self, side: Side) -> bool {
-        let Some(row) = self.pushing(side) else { return true };
-        let mut y = self.y;
-        for _ in 0..4 {
-            let force = (row * y)[0];
-            if force != 0.0 {
-                return force > 0.0;
-            }
-            y = self.linear(0).a * y;
-        }
-        false
+        self.pushing(side).is_none_or(|row| first_not_zero(&row, &self.linear(0).a, &self.y) > 0.0)
     }
 
-    /// Returns the acceleration of the gap into a wall.
-    fn pressing(&self, domain: usize, side: Side, y: &Vector) -> f64 {
-        sign(side) * (self.system.stages[self.stage].pressing[domain] * y)[0]
-    }
-
-    /// Whether a gap at rest is pressed into a wall: the first derivative of the acceleration that is not zero decides.
-    fn presses(&self, domain: usize, side: Side, y: &Vector) -> bool {
-        let a = &self.linear(domain).a;
-        let mut rates = *y;
-        for _ in 0..4 {
-            let pressing = self.pressing(domain, side, &rates);
-            if pressing != 0.0 {
-                return pressing > 0.0;
-            }
-            rates = a * rates;
-        }
-        false
-    }
-
-    /// Returns the projection of states, or of their changes, to rest on a wall or to a rate of 0.
-    fn at_rest(&self, with_gap: bool) -> Matrix4<f64> {
-        let (mut m, System { gap, kick, .. }) = (Matrix4::identity(), self.system);
-        for i in 0..2 {
-            for j in 0..2 {
-                let share = kick[i] * gap[j];
-                m[(2 * i + 1, 2 * j + 1)] -= share;
-                m[(2 * i, 2 * j)] -= if with_gap { share } else { 0.0 };
-            }
-        }
-        m
+    /// Whether a gap at rest is pressed into a wall.
+    fn presses(&self, side: Side) -> bool {
+        let linear = self.linear(self.domain_index());
+        !self.is_gap_held() && sign(side) * first_not_zero(&linear.pressing, &linear.a, &self.y) > 0.0
     }
 
     /// Integrates to a time within the present stage.
-    fn run(&mut self, until: f64) -> Option<()> {
+    pub(crate) fn run(&mut self, until: f64) -> Option<()> {
         let mut events = 0u32;
         while self.t < until {
             let linear = self.linear(self.domain_index());
@@ -554,17 +772,27 @@ impl<'a> Motion<'a> {
             if !matches!(self.mode, Mode::Free | Mode::Open(_)) || self.interval != 0 {
                 self.meshing_time += share * h;
             }
-            match found {
-                None => {
-                    (self.y, self.leaves, self.is_unloaded) = (next, None, false);
-                    self.t = if is_whole { self.t + h } else { until };
+            let to = found.map_or(next, |(_, _, at)| at);
+            for (i, friction) in self.system.friction.iter().enumerate() {
+                let moved = (row_of(self.system.along[i], 0) * (to - self.y))[0];
+                self.slid[i] += self.grips[i].sign() * (moved - friction.speed * share * h);
+            }
+            if share > 0.0 {
+                (self.is_unloaded, self.orders) = (false, [0; 2]);
+                if !self.is_gap_held() {
+                    (self.leaves, self.is_unpressed) = (None, false);
                 }
-                Some((_, end, at)) => {
-                    (self.y, self.t, self.is_unloaded) = (at, self.t + share * h, false);
+            }
+            self.y = to;
+            match found {
+                None => self.t = if is_whole { self.t + h } else { until },
+                Some((_, end, _)) => {
+                    self.t += share * h;
                     self.act(end, share == 0.0);
                     let error = self.shaken[events as usize % 4];
                     self.y[1] *= 1.0 + error;
                     self.y[3] *= 1.0 + error;
+                    self.project();
                     events += 1;
                     if events > MOST_EVENTS {
                         return None;
@@ -577,8 +805,9 @@ impl<'a> Motion<'a> {
 
     /// Returns the walls that the gap may meet.
     fn watched(&self) -> impl Iterator<Item = Side> + use<'a> {
-        let (mode, walls) = (self.mode, self.system.walls);
+        let (mode, walls, is_held) = (self.mode, self.system.walls, self.is_gap_held());
         [Side::Right, Side::Left].into_iter().filter(move |&side| match mode {
+            _ if is_held => false,
             Mode::Free | Mode::Onset(_) => walls[side.index()].is_finite(),
             Mode::Sustained(own) | Mode::Open(own) => side == own,
             Mode::Stuck(_) => false,
@@ -598,7 +827,10 @@ impl<'a> Motion<'a> {
 
     /// Whether a step is certainly too far from every wall: the cubic through its ends stays away, with room for its error.
     fn is_clear(&self, next: &Vector, h: f64) -> bool {
-        if self.leaves.is_some() || matches!(self.mode, Mode::Onset(_) | Mode::Stuck(_) | Mode::Open(_)) {
+        if !self.system.friction.is_empty()
+            || self.leaves.is_some()
+            || matches!(self.mode, Mode::Onset(_) | Mode::Stuck(_) | Mode::Open(_))
+        {
             return false;
         }
         if matches!(self.mode, Mode::Sustained(side) if self.pushing(side).is_some()) {
@@ -630,16 +862,31 @@ impl<'a> Motion<'a> {
             };
             ends.extend(first_fall(&c[order..], order > 0).map(|share| (share, end)));
         }
-        if let Mode::Onset(side) | Mode::Stuck(side) = self.mode {
-            let c: Vec<f64> = series.iter().map(|term| self.pressing(index(side), side, term)).collect();
+        let is_held = self.is_gap_held();
+        if let Mode::Onset(side) | Mode::Stuck(side) = self.mode
+            && !is_held
+        {
+            let row = self.linear(index(side)).pressing;
+            let c: Vec<f64> = series.iter().map(|term| sign(side) * (row * term)[0]).collect();
             let is_onset = matches!(self.mode, Mode::Onset(_));
             let end = if is_onset { End::PressingEnds(side) } else { End::PulledOff(side) };
             // Pressing may begin at zero.
-            let order = c.iter().take_while(|c| **c == 0.0).count();
+            let zeros = c.iter().take_while(|c| **c == 0.0).count();
+            let order = zeros.max(usize::from(self.is_unpressed));
             ends.extend(first_fall(&c[order..], order > 0).map(|share| (share, end)));
         }
+        for i in 0..self.system.friction.len() {
+            let watched = match self.grips[i] {
+                Grip::Stick => self.limits(i).map(|(room, grip)| (room, 0, End::Slips(i, grip))).to_vec(),
+                grip => vec![(self.system.slides[i] * grip.sign(), self.orders[i], End::Rests(i))],
+            };
+            for (row, order, end) in watched {
+                let c: Vec<f64> = series[order..].iter().map(|term| (row * term)[0]).collect();
+                ends.extend(first_fall(&c, order > 0).map(|share| (share, end)));
+            }
+        }
         if let Mode::Sustained(side) | Mode::Open(side) = self.mode
-            && let Some(row) = self.pushing(side)
+            && let Some(row) = self.pushing(side).filter(|_| !is_held)
         {
             let is_open = matches!(self.mode, Mode::Open(_));
             let (sign, end) = if is_open { (-1.0, End::Closes(side)) } else { (1.0, End::Opens(side)) };
@@ -651,70 +898,120 @@ impl<'a> Motion<'a> {
     }
 
     fn act(&mut self, end: End, at_start: bool) {
-        match end {
+        let (mut grips, mut before) = (self.grips, self.field(self.domain_index()));
+        let (z, one) = (self.system.z, Matrix4::identity());
+        let of_pushing = |side| self.pushing(side).expect("the wall only pushes");
+        let mut stops = None;
+        let saltation = match end {
+            End::Rests(i) => {
+                (self.grips[i], stops) = (Grip::Stick, Some(i));
+                Some((one, self.system.slides[i]))
+            }
+            End::Slips(i, grip) => {
+                let (row, is_held) = (self.linear(self.domain_index()).hold[i], self.is_gap_held());
+                (self.grips[i], self.orders[i]) = (grip, 2);
+                if is_held && !self.is_gap_held() && !self.is_caught(i) {
+                    self.mark(std::mem::replace(&mut grips, self.grips), None);
+                    self.loosen();
+                }
+                Some((one, row))
+            }
             End::Reaches(side) => {
                 if let Mode::Onset(own) = self.mode {
-                    self.jump(&Matrix4::identity(), &self.system.z, &self.field(index(own)), 0);
                     self.ends(own);
+                    self.jump(&one, &z, &before);
+                    before = self.field(0);
                 }
-                self.reach(side, at_start);
+                self.reach(side, at_start).map(|reset| (reset, z))
             }
-            End::OnsetEnds(side) => (self.mode, self.leaves) = (Mode::Sustained(side), Some((side, 1))),
+            End::OnsetEnds(side) => {
+                (self.mode, self.leaves) = (Mode::Sustained(side), Some((side, 1)));
+                None
+            }
             End::FallsBack(side) => {
                 if at_start && sign(side) * (self.system.w * self.y)[0] > 0.0 {
                     self.leaves = Some((side, 1));
                     return;
                 }
-                let before = self.field(index(side));
-                self.jump(&Matrix4::identity(), &self.system.z, &before, 0);
                 self.ends(side);
                 self.leave(side, false);
+                Some((one, z))
             }
             End::PressingEnds(side) => {
-                let row = self.system.stages[self.stage].pressing[index(side)];
-                let before = self.field(index(side));
-                self.jump(&Matrix4::identity(), &row, &before, 0);
+                let row = self.linear(index(side)).pressing;
                 self.ends(side);
+                Some((one, row))
             }
             End::Opens(side) => {
-                let row = self.pushing(side).expect("the wall only pushes");
-                self.jump(&Matrix4::identity(), &row, &self.field(index(side)), 0);
+                let row = of_pushing(side);
                 self.ends(side);
                 (self.mode, self.is_unloaded) = (Mode::Open(side), true);
+                Some((one, row))
             }
             End::Closes(side) => {
-                let row = self.pushing(side).expect("the wall only pushes");
-                self.jump(&Matrix4::identity(), &row, &self.field(0), index(side));
+                let row = of_pushing(side);
                 self.record(What::Begins, side);
                 (self.mode, self.leaves, self.is_unloaded) = (Mode::Sustained(side), None, true);
+                Some((one, row))
             }
-            End::Returns(side) if sign(side) * (self.system.w * self.y)[0] < 0.0 => self.leave(side, false),
-            End::Returns(side) => self.reach(side, false),
+            End::Returns(side) if sign(side) * (self.system.w * self.y)[0] < 0.0 => {
+                self.leave(side, false);
+                None
+            }
+            End::Returns(side) => self.reach(side, false).map(|reset| (reset, z)),
             End::PulledOff(side) => {
                 // The acceleration is continuous, so tangents do not jump.
                 self.ends(side);
                 self.leaves = Some((side, 3));
+                None
             }
+        };
+        self.settle(grips, stops);
+        if let Some((reset, row)) = saltation {
+            self.jump(&reset, &row, &before);
         }
     }
 
-    /// Free motion reaches a wall.
-    fn reach(&mut self, side: Side, at_start: bool) {
+    /// Returns the sign of the acceleration that a gap begins to have when friction lets it go.
+    fn growth(&self) -> f64 {
+        let a = &self.linear(self.domain_index()).a;
+        (self.system.w * (a * (a * self.y)))[0].signum()
+    }
+
+    /// An element slips that has held the gap. On a rigid wall it may be pressed into the wall, and rests on.
+    fn is_caught(&mut self, i: usize) -> bool {
+        let pressed = |&(side, _): &(Side, usize)| {
+            self.mode == Mode::Free && self.contact(side) == Contact::Rigid && sign(side) == self.growth()
+        };
+        let Some((side, _)) = self.leaves.filter(pressed) else { return false };
+        self.record(What::Begins, side);
+        (self.mode, self.grips[i], self.leaves) = (Mode::Stuck(side), Grip::Stick, None);
+        true
+    }
+
+    /// A gap moves that friction has held, without an acceleration at first.
+    fn loosen(&mut self) {
+        let growth = self.growth();
+        match (self.mode, self.leaves) {
+            (Mode::Onset(side), _) if sign(side) == growth => self.is_unpressed = true,
+            (Mode::Onset(side), _) => self.ends(side),
+            (Mode::Free, Some((side, _))) if sign(side) == growth => {
+                self.record(What::Begins, side);
+                (self.mode, self.leaves) = (Mode::Sustained(side), Some((side, 3)));
+            }
+            (_, leaves) => self.leaves = leaves.map(|(side, _)| (side, 3)),
+        }
+    }
+
+    /// Free motion reaches a wall. Returns the change of tangents at a fixed time, if the field jumps.
+    fn reach(&mut self, side: Side, at_start: bool) -> Option<Matrix4<f64>> {
         let closing = sign(side) * (self.system.w * self.y)[0];
         if closing <= 0.0 && (at_start || closing < 0.0) {
             self.leave(side, false);
-            return;
+            return None;
         }
-        let before = self.field(0);
         let i = side.index();
         let (mut e, limit) = (self.law.restitution[i], self.law.mesh_speed[i]);
-        let after = |e: f64| {
-            let mut y = self.y;
-            let change = self.system.kick * (-(1.0 + e) * sign(side) * closing);
-            y[1] += change[0];
-            y[3] += change[1];
-            y
-        };
         let step = if side == Side::Right { 1 } else { -1 };
         if let (Contact::Elastic, Some(next)) = (self.contact(side), self.whole.between(self.interval + step))
         {
@@ -722,46 +1019,73 @@ impl<'a> Motion<'a> {
             let of = if outwards == (side == Side::Right) { Side::Right } else { Side::Left };
             self.record(if outwards { What::Begins } else { What::Ends }, of);
             (self.system, self.interval) = (next, self.interval + step);
-            self.jump(&Matrix4::identity(), &self.system.z, &before, 0);
             let back = if side == Side::Right { Side::Left } else { Side::Right };
             self.leave(back, closing == 0.0);
-            return;
+            return Some(Matrix4::identity());
         }
-        if self.contact(side) == Contact::Pushing && !self.closes(side) {
-            (self.mode, self.leaves) = (Mode::Open(side), Some((side, 1)));
-            return;
-        }
-        let is_slow = e * closing <= limit;
-        let (lasts, next) = match self.contact(side) {
-            Contact::Elastic | Contact::Pushing => (true, Mode::Sustained(side)),
-            Contact::Rigid => (is_slow && self.presses(0, side, &after(0.0)), Mode::Stuck(side)),
-            Contact::Impact => {
-                let y = after(e);
-                let lasts = is_slow && self.presses(0, side, &y) && self.presses(index(side), side, &y);
-                (lasts, if e > 0.0 { Mode::Onset(side) } else { Mode::Sustained(side) })
+        if self.contact(side).is_elastic() {
+            if !self.closes(side) {
+                (self.mode, self.leaves) = (Mode::Open(side), Some((side, 1)));
+                return None;
             }
+            self.record(What::Begins, side);
+            (self.mode, self.leaves) = (Mode::Sustained(side), Some((side, 1)));
+            return Some(Matrix4::identity());
+        }
+        let (y, grips, mode) = (self.y, self.grips, self.mode);
+        let after = |motion: &mut Self, e: f64, mode: Mode| {
+            let change = (1.0 + e) * closing;
+            (motion.y, motion.grips, motion.mode) = (y, grips, mode);
+            let kick = motion.system.kick * (-sign(side) * change);
+            motion.y[1] += kick[0];
+            motion.y[3] += kick[1];
+            motion.begin_slides(change);
         };
-        let is_elastic = self.contact(side).is_elastic();
-        if lasts && matches!(next, Mode::Stuck(_)) {
-            e = 0.0;
+        after(self, e, Mode::Free);
+        let mut lasts = false;
+        if e * closing <= limit {
+            let is_rigid = self.contact(side) == Contact::Rigid;
+            if is_rigid || self.presses(side) {
+                let (e, next) = match (is_rigid, e > 0.0) {
+                    (true, _) => (0.0, Mode::Stuck(side)),
+                    (false, true) => (e, Mode::Onset(side)),
+                    (false, false) => (e, Mode::Sustained(side)),
+                };
+                after(self, e, next);
+                lasts = self.presses(side);
+            }
+            if !lasts {
+                after(self, e, Mode::Free);
+            } else if is_rigid {
+                e = 0.0;
+            }
         }
-        let mut reset = Matrix4::identity();
-        if !is_elastic {
-            reset += (self.at_rest(false) - reset) * (1.0 + e);
-            self.y = after(e);
-        }
-        self.jump(&reset, &self.system.z, &before, if lasts { index(side) } else { 0 });
+        let next = std::mem::replace(&mut self.mode, mode);
         self.record(if lasts { What::Begins } else { What::Impact }, side);
-        if !lasts {
+        if lasts {
+            self.mode = next;
+            self.leaves = match next {
+                Mode::Stuck(_) => None,
+                Mode::Sustained(_) => Some((side, 2)),
+                _ => Some((side, 1)),
+            };
+        } else {
             self.leave(side, e == 0.0);
-            return;
         }
-        self.mode = next;
-        self.leaves = match next {
-            Mode::Stuck(_) | Mode::Free => None,
-            Mode::Sustained(_) if !is_elastic => Some((side, 2)),
-            _ => Some((side, 1)),
-        };
+        let one = Matrix4::identity();
+        Some(one + (at_rest(self.system.kick, self.system.gap, false) - one) * (1.0 + e))
+    }
+
+    /// Begins to slide after an impact, which has changed the rate of the gap.
+    fn begin_slides(&mut self, change: f64) {
+        for i in 0..self.system.friction.len() {
+            let (along, kick) = (self.system.along[i], self.system.kick);
+            if along.dot(&kick).abs() > ROUNDING * along.norm() * kick.norm() {
+                self.grips[i] = self.grip(i, ROUNDING * (along.dot(&kick) * change).abs());
+                self.orders[i] = 0;
+            }
+        }
+        self.decide();
     }
 
     fn field(&self, domain: usize) -> Vector {
@@ -769,12 +1093,12 @@ impl<'a> Motion<'a> {
     }
 
     /// Applies the derivative of an event to the tangents. The event lies where `row y` is constant; `before` is the field before it,
-    /// and the state is the one after it.
-    fn jump(&mut self, reset: &Matrix4<f64>, row: &Row, before: &Vector, next: usize) {
+    /// and state and mode are those after it.
+    fn jump(&mut self, reset: &Matrix4<f64>, row: &Row, before: &Vector) {
         let Some(tangents) = self.tangents else { return };
         let of = |y: &Vector| y.fixed_rows::<4>(0).into_owned();
         let normal: RowVector4<f64> = row.fixed_columns::<4>(0).into_owned();
-        let change = of(&self.field(next)) - reset * of(before);
+        let change = of(&self.field(self.domain_index())) - reset * of(before);
         let rate = (row * before)[0];
         self.tangents = Some((reset + change * normal / rate) * tangents);
     }
@@ -788,7 +1112,7 @@ impl<'a> Motion<'a> {
     fn leave(&mut self, side: Side, is_at_rest: bool) {
         let order = match is_at_rest {
             false => 1,
-            true if self.pressing(0, side, &self.y) != 0.0 => 2,
+            true if (self.linear(0).pressing * self.y)[0] != 0.0 => 2,
             true => 3,
         };
         (self.mode, self.leaves) = (Mode::Free, Some((side, order)));
@@ -814,6 +1138,25 @@ impl<'a> Motion<'a> {
         self.origin = Some(side);
         self.events.push((what, side));
     }
+}
+
+/// Returns the first derivative of `row y` that is not zero, the value itself included.
+fn first_not_zero(row: &Row, a: &Generator, y: &Vector) -> f64 {
+    let rates = std::iter::successors(Some(*y), |y| Some(a * y));
+    rates.take(4).map(|y| (row * y)[0]).find(|value| *value != 0.0).unwrap_or(0.0)
+}
+
+/// Returns the projection of changes of states to a combination of velocities of 0, and of displacements.
+fn at_rest(change: Vector2<f64>, along: Vector2<f64>, with_place: bool) -> Matrix4<f64> {
+    let mut m = Matrix4::identity();
+    for i in 0..2 {
+        for j in 0..2 {
+            let share = change[i] * along[j];
+            m[(2 * i + 1, 2 * j + 1)] -= share;
+            m[(2 * i, 2 * j)] -= if with_place { share } else { 0.0 };
+        }
+    }
+    m
 }
 
 fn value(c: &[f64], u: f64) -> f64 {

@@ -1,6 +1,8 @@
 //! Random models with harmonics and stages.
 
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, OuterWall, Side, Stage, State};
+use rattlemap_dynamics::model::{
+    Contact, Domain, Friction, Harmonic, Law, Oscillator, OuterWall, Side, Stage, State,
+};
 
 use crate::common::linear::with_wall;
 
@@ -45,6 +47,8 @@ pub(crate) struct Shape {
     pub(crate) walls: bool,
     /// Elastic walls with a preload, of which most only push.
     pub(crate) pushing: bool,
+    /// Dry friction, and sometimes no walls.
+    pub(crate) friction: bool,
     /// Wide ranges: any signs of damping and stiffness, skew damping, very large and very small rates.
     pub(crate) wide: bool,
 }
@@ -130,6 +134,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
+        friction: Vec::new(),
     };
     if shape.harmonics {
         let count = 1 + random.below(4);
@@ -181,6 +186,9 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     }
     if shape.pushing {
         preload_walls(random, &mut oscillator);
+    }
+    if shape.friction {
+        add_friction(random, &mut oscillator);
     }
     oscillator.validate().unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
     let restitution = [0; 2].map(|_| if random.chance(0.25) { 0.0 } else { random.between(0.0, 0.9) });
@@ -251,6 +259,37 @@ fn preload_walls(random: &mut Random, o: &mut Oscillator) {
                 .zip([1, 0, 1])
                 .for_each(|(stage, j)| preload(&mut stage.meshing[i], sizes[j]));
         }
+    }
+}
+
+/// Adds one element with dry friction, or two, and sometimes removes the walls.
+fn add_friction(random: &mut Random, o: &mut Oscillator) {
+    if random.chance(0.15) {
+        o.walls = [f64::INFINITY, f64::NEG_INFINITY];
+        o.outer_walls = Default::default();
+    }
+    let amplitude =
+        o.all_harmonics().flat_map(|h| [h.cos, h.sin].concat()).fold(0.0, |a: f64, f| a.max(f.abs()));
+    let is_rigid = |side| o.last_wall(side).1 == Contact::Rigid && o.walls[side.index()].is_finite();
+    let is_double = o.degrees == 2 && !Side::BOTH.into_iter().any(is_rigid) && random.chance(0.5);
+    for _ in 0..1 + usize::from(is_double) {
+        let mut row = match random.below(3) {
+            0 => {
+                let factor = [0.5, 1.0, -1.0][random.below(3)];
+                o.gap.map(|g| factor * g)
+            }
+            1 => [[1.0, 0.0], [0.0, 1.0]][random.below(o.degrees)],
+            _ => [random.between(0.5, 2.0), if o.degrees == 2 { random.even(2.0) } else { 0.0 }],
+        };
+        if let Some(Friction { row: [a, b], .. }) = o.friction.first()
+            && (a * row[1] - b * row[0]).abs() < 0.2 * a.hypot(*b) * row[0].hypot(row[1])
+        {
+            row = [-b, *a];
+        }
+        let size = row[0].hypot(row[1]);
+        let force = random.logarithmic(0.02, 0.8) * amplitude / size;
+        let speed = if random.chance(0.75) { 0.0 } else { random.even(1.0) * size };
+        o.friction.push(Friction { row, force, speed });
     }
 }
 

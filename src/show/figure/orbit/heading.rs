@@ -46,7 +46,7 @@ fn flights(orbit: &Orbit) -> String {
     match orbit.word.len() {
         0 if orbit.strobe_meshing.is_some() => "always in contact".to_owned(),
         0 => "no contact".to_owned(),
-        n if n > WORD_SYMBOLS => format!("word {word} ({n} flights)"),
+        n if n > WORD_SYMBOLS => format!("word {word} ({n} symbols)"),
         _ => format!("word {word}"),
     }
 }

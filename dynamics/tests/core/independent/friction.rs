@@ -1,0 +1,301 @@
+//! Dry friction in motions by matrix exponentials: closed forms, energy and limits.
+
+use nalgebra::{Matrix2, Vector2, Vector4};
+use rattlemap_dynamics::model::{Contact, Friction, Law, Oscillator, Side, State};
+use std::f64::consts::PI;
+
+use super::cycle::settle;
+use super::motion::{ANGLE, Grip, Mode, Motion, System, What, distance};
+use super::random::{Case, Shape, case};
+use crate::common::linear::Linear;
+
+const SHAPE: Shape =
+    Shape { harmonics: false, stages: false, walls: false, pushing: false, friction: true, wide: false };
+
+/// Returns a mass of 1 on a spring without a damper and on a floor with friction.
+fn block(square: f64, force: f64, omega: f64, friction: f64, speed: f64) -> Oscillator {
+    let friction = vec![Friction { row: [1.0, 0.0], force: friction, speed }];
+    Oscillator { friction, ..Linear { gamma: 0.0, square, force, load: 0.0, omega }.oscillator() }
+}
+
+fn start<'a>(system: &'a System, state: State) -> Motion<'a> {
+    Motion::new(system, Law::both(0.0, 0.0), state, Mode::Free)
+}
+
+/// Den Hartog 1931: with `r = omega / omega_n`, `a = P / k`, `f = F / k`, a turn at `x_m` and phase `phi` of the force,
+///
+/// ```text
+/// x = -f cos(omega_n t) - f U r sin(omega_n t) + V a cos(omega t + phi) + f,   0 < omega t < pi
+/// V = 1 / (1 - r^2),   U = sin(pi / r) / (r (1 + cos(pi / r))),   V a sin(phi) = -f U,   x_m = V a cos(phi)
+/// ```
+///
+/// and the other half of the period mirrors this one. A turn multiplies changes of the velocity by the ratio of the accelerations
+/// after and before it.
+#[test]
+fn motion_without_stops_is_that_of_den_hartog() {
+    let (square, force, friction) = (2.3f64, 1.7, 0.31);
+    let (own, a, f) = (square.sqrt(), force / square, friction / square);
+    for r in [0.6, 0.75, 0.9, 1.1, 1.4, 2.0, 3.1] {
+        let (omega, v) = (r * own, 1.0 / (1.0 - r * r));
+        let u = (PI / r).sin() / (r * (1.0 + (PI / r).cos()));
+        let turn = ((v * a).powi(2) - (f * u).powi(2)).sqrt();
+        let phase = (-f * u / (v * a)).atan2(turn / (v * a));
+        let x = |t: f64| {
+            let ((s, c), (sin, cos)) = ((own * t).sin_cos(), (omega * t + phase).sin_cos());
+            let x = -f * c - f * u * r * s + v * a * cos + f;
+            [x, own * f * s - own * f * u * r * c - omega * v * a * sin]
+        };
+        assert!((1..100).all(|i| x(PI / omega * f64::from(i) / 100.0)[1] < 0.0), "r = {r} has stops");
+        // The force has phase 0 at the time `-phase / omega`.
+        let halves = (-phase / PI).rem_euclid(2.0);
+        let sign = if halves < 1.0 { 1.0 } else { -1.0 };
+        let expected = x(halves.fract() * PI / omega).map(|x| sign * x);
+        let system = System::new(&block(square, force, omega, friction, 0.0), ANGLE);
+        let cycle = settle(&system, Law::both(0.0, 0.0), [0.5, 0.1, 0.0, 0.0], 1000).unwrap();
+        let off = distance(cycle.strobes[0].0, [expected[0], expected[1], 0.0, 0.0], omega);
+        let before = square * turn + friction - force * phase.cos();
+        let (sin, cos) = (PI / r).sin_cos();
+        let ratio = (before - 2.0 * friction) / before;
+        let half = Matrix2::new(cos, sin, -ratio * sin, ratio * cos);
+        let radius = half.complex_eigenvalues().map(|m| m.norm_sqr()).max();
+        assert!(off < 1e-13, "r = {r}: off by {off:e}");
+        assert!((cycle.radius - radius).abs() < 1e-12, "{} but {radius}", cycle.radius);
+        assert_eq!((cycle.word.time_order().as_str(), cycle.strobes.len()), ("00", 1));
+    }
+}
+
+/// Half swings are about `f` from the middle, and stop for ever where the spring is weaker than friction.
+#[test]
+fn swings_shorten_by_twice_the_friction_over_the_stiffness() {
+    let (square, friction) = (4.0, 0.52);
+    let f = friction / square;
+    let system = System::new(&block(square, 0.0, 1.0, friction, 0.0), ANGLE);
+    for (x, v) in [(1.0f64, 0.0f64), (-0.9, 0.0), (0.1, 0.0), (0.0, 3.0), (0.3, -2.0)] {
+        // The first turn is at the end of an arc about the first middle.
+        let middle = -f * if v == 0.0 { -x.signum() } else { v.signum() };
+        let mut turn = if v == 0.0 { x } else { middle + v.signum() * (x - middle).hypot(v / square.sqrt()) };
+        let (mut length, mut turns) = ((turn - x).abs(), 0u32);
+        while turn.abs() > f {
+            let next = 2.0 * f * turn.signum() - turn;
+            length += (next - turn).abs();
+            (turn, turns) = (next, turns + 1);
+        }
+        let reversals = (if v == 0.0 { turns.max(1) - 1 } else { turns }) as usize;
+        let mut motion = start(&system, [x, v, 0.0, 0.0]);
+        let swing = if v == 0.0 { f64::from(turns) * PI / square.sqrt() } else { 20.0 };
+        motion.run(swing + 1e-6).unwrap();
+        assert_eq!((motion.grips[0], motion.symbols.len()), (Grip::Stick, reversals));
+        assert!(motion.symbols.iter().all(|symbol| *symbol == b'0'));
+        let [at, rate, ..] = motion.state();
+        assert!((at - turn).abs() < 1e-14 && rate == 0.0, "{at} but {turn}; {rate}");
+        assert!((motion.slid[0] - length).abs() < 1e-13, "{} but {length}", motion.slid[0]);
+        motion.run(40.0).unwrap();
+        assert_eq!(motion.state()[0], at);
+    }
+}
+
+#[test]
+fn a_belt_carries_a_block_until_the_spring_is_stronger() {
+    let (square, friction, speed) = (4.0f64, 0.6, 0.25);
+    let (own, f) = (square.sqrt(), friction / square);
+    let system = System::new(&block(square, 0.0, 0.1, friction, speed), ANGLE);
+    let mut motion = start(&system, [0.0, speed, 0.0, 0.0]);
+    let slip = f / speed;
+    for i in 1..40 {
+        let t = 0.09 * f64::from(i);
+        motion.run(t).unwrap();
+        let (sin, cos) = (own * (t - slip)).sin_cos();
+        let (grip, x, v) = match t < slip {
+            true => (Grip::Stick, speed * t, speed),
+            false => (Grip::Minus, f + speed / own * sin, speed * cos),
+        };
+        let [at, rate, ..] = motion.state();
+        assert_eq!(
+            (motion.grips[0], motion.symbols.as_slice()),
+            (grip, if t < slip { &b""[..] } else { b"7" })
+        );
+        assert!((at - x).abs() < 1e-14 && (rate - v).abs() < 1e-14, "{t}: {at}, {rate} but {x}, {v}");
+    }
+}
+
+/// A rigid wall lets a gap go when the force vanishes, and friction when the force is as large.
+#[test]
+fn friction_holds_a_gap_on_a_rigid_wall() {
+    let omega = 1.3;
+    for (friction, slips) in [(0.4f64, true), (1.1, false)] {
+        let mut o = block(1e-9, 1.0, omega, friction, 0.0);
+        (o.walls[0], o.contacts[0]) = (0.0, Contact::Rigid);
+        let system = System::new(&o, ANGLE);
+        let mut motion = start(&system, [-1e-3, 0.2, 0.0, 0.0]);
+        motion.run(0.5 * PI / omega - 1e-6).unwrap();
+        assert_eq!((motion.mode, motion.grips[0]), (Mode::Stuck(Side::Right), Grip::Stick));
+        motion.run(0.5 * PI / omega + 1e-6).unwrap();
+        let rest = (Mode::Free, Grip::Stick, vec![(What::Begins, Side::Right), (What::Ends, Side::Right)]);
+        assert_eq!((motion.mode, motion.grips[0], motion.events.clone()), rest);
+        let slip = if slips { (-friction).acos() / omega } else { 1.5 * PI / omega };
+        motion.run(slip - 1e-9).unwrap();
+        assert_eq!((motion.grips[0], motion.symbols.as_slice()), (Grip::Stick, &b"1"[..]));
+        motion.run(slip + 1e-9).unwrap();
+        let slid = if slips { (Grip::Minus, &b"17"[..]) } else { (Grip::Stick, &b"1"[..]) };
+        assert_eq!((motion.grips[0], motion.symbols.as_slice()), slid);
+    }
+}
+
+/// A force of -0.16 does not press a gap that a wall has stopped, and friction holds it. When the force is 0.4, the wall takes over.
+#[test]
+fn a_wall_takes_over_from_friction() {
+    for contact in [Contact::Rigid, Contact::Impact] {
+        let mut o = block(1e-9, 1.0, 1.0, 0.4, 0.0);
+        (o.walls[0], o.contacts[0]) = (0.0, contact);
+        o.meshing[0].stiffness[0][0] = 100.0;
+        let system = System::new(&o.at_phase(1.45 * PI), ANGLE);
+        let mut motion = start(&system, [-1e-3, 0.2, 0.0, 0.0]);
+        let takeover = 0.55 * PI - 0.4f64.acos();
+        motion.run(takeover - 1e-9).unwrap();
+        assert_eq!((motion.mode, motion.grips[0]), (Mode::Free, Grip::Stick));
+        assert_eq!((motion.events.as_slice(), motion.symbols.len()), (&[(What::Impact, Side::Right)][..], 0));
+        motion.run(takeover + 1e-9).unwrap();
+        // A gap at rest on a rigid wall has not slid.
+        let expected = match contact {
+            Contact::Rigid => (Mode::Stuck(Side::Right), Grip::Stick, &b"2"[..]),
+            _ => (Mode::Sustained(Side::Right), Grip::Plus, &b"72"[..]),
+        };
+        assert_eq!((motion.mode, motion.grips[0], motion.symbols.as_slice()), expected);
+    }
+}
+
+/// Of free motion without dampers.
+fn energy(o: &Oscillator, y: State) -> f64 {
+    let form = |m: [[f64; 2]; 2], a: f64, b: f64| m[0][0] * a * a + 2.0 * m[0][1] * a * b + m[1][1] * b * b;
+    0.5 * (form(o.mass, y[1], y[3]) + form(o.free.stiffness, y[0], y[2]))
+}
+
+/// Checks directions, and that the forces which make elements stick are small enough.
+fn check_grips(o: &Oscillator, motion: &Motion) {
+    let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
+    let (per_mass, y) = (matrix(o.mass).try_inverse().unwrap(), motion.state());
+    let (x, v) = (Vector2::new(y[0], y[2]), Vector2::new(y[1], y[3]));
+    let mut forces = -matrix(o.free.stiffness) * x;
+    let rows: Vec<_> = o.friction.iter().map(|friction| Vector2::from(friction.row)).collect();
+    let mut stick = Vec::new();
+    for (i, row) in rows.iter().enumerate() {
+        match motion.grips[i] {
+            Grip::Stick => stick.push(i),
+            grip => {
+                let sign = if grip == Grip::Plus { 1.0 } else { -1.0 };
+                assert!(sign * row.dot(&v) > -1e-13, "{grip:?} {}", row.dot(&v));
+                forces -= row * (sign * o.friction[i].force);
+            }
+        }
+    }
+    let Some(&first) = stick.first() else { return };
+    let pulls = |i: usize| rows[i].dot(&(per_mass * forces));
+    let impulse = |i: usize, j: usize| rows[i].dot(&(per_mass * rows[j]));
+    let hold = match stick.get(1) {
+        None => vec![pulls(first) / impulse(first, first)],
+        Some(_) => {
+            let impulses = Matrix2::new(impulse(0, 0), impulse(0, 1), impulse(1, 0), impulse(1, 1));
+            let hold = impulses.try_inverse().unwrap() * Vector2::new(pulls(0), pulls(1));
+            vec![hold[0], hold[1]]
+        }
+    };
+    for (&i, hold) in stick.iter().zip(hold) {
+        assert!(rows[i].dot(&v).abs() < 1e-13 && hold.abs() < o.friction[i].force * (1.0 + 1e-9), "{hold}");
+    }
+}
+
+#[test]
+fn friction_does_the_work_that_is_lost() {
+    let (mut slips, mut rests) = (0, 0);
+    for seed in 0..400 {
+        let Case { mut oscillator, law, start } = case(seed, SHAPE);
+        let o = &mut oscillator;
+        (o.walls, o.force, o.force_sin) = ([f64::INFINITY, f64::NEG_INFINITY], [0.0; 2], [0.0; 2]);
+        (o.free.damping, o.free.load) = ([[0.0; 2]; 2], [0.0; 2]);
+        o.friction
+            .iter_mut()
+            .for_each(|friction| (friction.force, friction.speed) = (0.2 * friction.force, 0.0));
+        let system = System::new(o, ANGLE);
+        let mut motion = Motion::new(&system, law, start, Mode::Free);
+        for i in 1..100 {
+            motion.run(0.05 * f64::from(i)).unwrap();
+            check_grips(o, &motion);
+            let lost = energy(o, start) - energy(o, motion.state());
+            let work: f64 = o.friction.iter().zip(motion.slid).map(|(one, slid)| one.force * slid).sum();
+            assert!((lost - work).abs() < 1e-12 * energy(o, start), "{seed}: lost {lost}, work {work}");
+        }
+        if o.friction.len() == 2 {
+            slips += motion.symbols.iter().filter(|symbol| **symbol == b'7').count();
+            rests += usize::from(motion.grips == [Grip::Stick; 2]);
+        }
+    }
+    println!("{slips} slips and {rests} rests with two elements");
+    assert!(slips > 20 && rests > 5, "{slips}, {rests}");
+}
+
+#[test]
+fn small_friction_changes_little() {
+    let mut worst = 0.0f64;
+    for seed in 0..100 {
+        let Case { mut oscillator, law, start } = case(seed, SHAPE);
+        oscillator
+            .friction
+            .iter_mut()
+            .for_each(|friction| (friction.force, friction.speed) = (1e-11 * friction.force, 0.0));
+        let without = Oscillator { friction: Vec::new(), ..oscillator.clone() };
+        let ends = [&oscillator, &without].map(|o| {
+            let system = System::new(o, ANGLE);
+            let mut motion = Motion::new(&system, law, start, Mode::Free);
+            motion.advance_period().and_then(|()| motion.advance_period()).unwrap();
+            (motion.state(), motion.events.clone())
+        });
+        worst = worst.max(distance(ends[0].0, ends[1].0, oscillator.omega));
+        assert_eq!(ends[0].1, ends[1].1, "{seed}");
+    }
+    assert!(worst < 1e-9, "{worst:e}");
+}
+
+/// Differences of motions from neighbouring starts that slide.
+#[test]
+fn tangents_are_limits_of_differences() {
+    let mut found = [0; 3];
+    for seed in 0..300 {
+        let case = case(seed, Shape { stages: seed % 2 == 0, harmonics: seed % 3 == 0, ..SHAPE });
+        let system = System::new(&case.oscillator, ANGLE);
+        let mut motion = Motion::new(&system, case.law, case.start, Mode::Free);
+        (0..5).try_for_each(|_| motion.advance_period()).unwrap();
+        let count = case.oscillator.friction.len();
+        if motion.mode != Mode::Free || motion.grips[..count].contains(&Grip::Stick) {
+            continue;
+        }
+        motion.clear();
+        motion.carry_tangents();
+        let image = |mut motion: Motion, i: usize, h: f64| {
+            let mut y = motion.state();
+            y[i] += h;
+            motion.set_state(y);
+            motion.advance_period().unwrap();
+            (Vector4::from(motion.state()), motion.tangents.unwrap(), motion.symbols)
+        };
+        let (_, exact, symbols) = image(motion.clone(), 0, 0.0);
+        let size = exact.amax().max(1.0);
+        for i in 0..2 * case.oscillator.degrees {
+            // A motion with steep turns needs small differences, and one that rounding errors grow in needs large ones.
+            let off = |h: f64| {
+                let [above, below] = [h, -h].map(|h| image(motion.clone(), i, h / size));
+                let is_same = above.2 == symbols && below.2 == symbols;
+                let change = (above.0 - below.0) * (size / (2.0 * h));
+                is_same.then(|| (change - exact.column(i)).amax() / size)
+            };
+            let Some(off) = [1e-5, 1e-6, 1e-7].into_iter().filter_map(off).reduce(f64::min) else {
+                found[2] += 1;
+                continue;
+            };
+            assert!(off < 1e-5, "{seed}: {off:e}");
+            found[0] += 1;
+            found[1] += usize::from(count == 2 && symbols.contains(&b'7'));
+        }
+    }
+    println!("{found:?}");
+    assert!(found[0] > 500 && found[1] > 30 && found[2] < 10, "{found:?}");
+}
