@@ -1,10 +1,12 @@
 //! Features of oscillators for which shaders have code only if it is needed.
 
-use super::pushing::needs_reference;
+use super::pushing::has_negative_preload;
 use rattlemap_dynamics::model::{Contact, Oscillator, Side};
 
-/// What no shader has code for.
-pub const NEGATIVE_PRELOAD: &str = "a wall that only pushes and has a negative preload";
+/// Whether only the reference computes the oscillator.
+pub fn needs_reference(oscillator: &Oscillator) -> bool {
+    Features::of(oscillator).needing_reference().is_some()
+}
 
 /// The features that some oscillators have, or that a shader has code for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -23,6 +25,8 @@ pub struct Features {
     pub pushing: bool,
     /// Walls that only push and have a negative preload. No shader has code for these.
     pub negative_preload: bool,
+    /// Dry friction. No shader has code for it.
+    pub friction: bool,
 }
 
 impl Features {
@@ -37,7 +41,8 @@ impl Features {
             stages: !oscillator.schedule.is_empty(),
             intervals: oscillator.has_outer_walls() || pushing,
             pushing,
-            negative_preload: needs_reference(oscillator),
+            negative_preload: has_negative_preload(oscillator),
+            friction: oscillator.friction.iter().any(|friction| friction.force > 0.0),
         }
     }
 
@@ -51,7 +56,18 @@ impl Features {
             intervals: self.intervals || other.intervals,
             pushing: self.pushing || other.pushing,
             negative_preload: self.negative_preload || other.negative_preload,
+            friction: self.friction || other.friction,
         }
+    }
+
+    /// Returns a feature that no shader has code for, in words.
+    pub fn needing_reference(self) -> Option<&'static str> {
+        self.without_code().into_iter().find_map(|(is_there, feature, _)| is_there.then_some(feature))
+    }
+
+    fn without_code(self) -> [(bool, &'static str, &'static str); 2] {
+        let preload = "a wall that only pushes and has a negative preload";
+        [(self.negative_preload, preload, "negative_preload"), (self.friction, "dry friction", "friction")]
     }
 
     /// Returns a feature that `code` lacks, in words, and the name of its field.
@@ -63,9 +79,25 @@ impl Features {
             (self.stages && !code.stages, "stages", "stages"),
             (self.intervals && !code.intervals, "several walls on one side", "intervals"),
             (self.pushing && !code.pushing, "a wall that only pushes or has a preload", "pushing"),
-            (self.negative_preload, NEGATIVE_PRELOAD, "negative_preload"),
         ]
         .into_iter()
+        .chain(self.without_code())
         .find_map(|(lacks, feature, setting)| lacks.then_some((feature, setting)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model_file::FileModel;
+    use rattlemap_dynamics::model::Model;
+
+    #[test]
+    fn dry_friction_needs_the_reference() {
+        let mut model = FileModel::built_in("friction-oscillator").unwrap();
+        let features = Features::default().and(Features::of(&model.oscillator().unwrap()));
+        assert_eq!(features.needing_reference(), Some("dry friction"));
+        model.set("f", 0.0).unwrap();
+        assert!(!needs_reference(&model.oscillator().unwrap()));
     }
 }

@@ -48,10 +48,9 @@ pub use adapter::{
 };
 pub use constants::Constants;
 pub use error::GpuError;
-pub use features::{Features, NEGATIVE_PRELOAD};
+pub use features::{Features, needs_reference};
 pub use pool::Pool;
 pub use precision::Precision;
-pub use pushing::needs_reference;
 pub use reading::LaneResult;
 pub use shader::Variant;
 use shader::WORKGROUP;

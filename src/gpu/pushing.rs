@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use rattlemap_dynamics::model::{Contact, Domain, Oscillator, OuterWall, Side};
 
 /// Whether only the reference computes the oscillator: a wall that only pushes has a negative preload, so that contact begins behind it.
-pub fn needs_reference(oscillator: &Oscillator) -> bool {
+pub(super) fn has_negative_preload(oscillator: &Oscillator) -> bool {
     Side::BOTH.into_iter().any(|side| {
         oscillator.last_wall(side).1 == Contact::Pushing
             && oscillator.preloads(side).any(|preload| preload < 0.0)

@@ -234,7 +234,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             self.record(EventKind::MeshEnd, side, self.q, observer);
             self.leave(side);
         }
-        self.recheck_contact(observer);
+        self.recheck_contact(None, observer);
         if N > 0 {
             let [a, b] = self.elements()[i].row;
             let next = self.present_field();
@@ -286,7 +286,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             }
             self.from_wall = Some((side, RELEASE_ORDER));
         }
-        self.recheck_contact(observer);
+        self.recheck_contact(lets_go.then_some(jerk), observer);
         // The field is continuous, except where a contact onset ends at once.
         if let (true, Some((gradient, rate))) = (N > 0 && self.mode.domain() != kind, force) {
             let next = self.present_field();
@@ -294,8 +294,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Decides contacts that depend on forces anew, after a jump of a friction force.
-    fn recheck_contact(&mut self, observer: &mut impl Observer) {
+    /// Decides contacts that depend on forces anew, after a jump of a friction force. If friction has let go of the gap, its acceleration is 0
+    /// within rounding, and `jerk` decides.
+    fn recheck_contact(&mut self, jerk: Option<f64>, observer: &mut impl Observer) {
         match self.mode {
             Mode::Stuck(side) if !self.presses(DomainKind::Meshing(side), side, &self.q) => {
                 self.record(EventKind::MeshEnd, side, self.q, observer);
@@ -304,7 +305,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             }
             Mode::Onset(side) if !self.flow.holds_gap => {
                 let meshing = self.flow.domain(DomainKind::Meshing(side));
-                if side.sign() * meshing.acceleration(&self.q, &self.phasor) <= 0.0 {
+                let pressing = jerk.unwrap_or_else(|| meshing.acceleration(&self.q, &self.phasor));
+                if side.sign() * pressing <= 0.0 {
                     self.record(EventKind::MeshEnd, side, self.q, observer);
                     self.mode = Mode::Free;
                     // The force of the spring is gone: elements without a rate begin anew.

@@ -105,8 +105,8 @@ impl<'p> Gpu<'p> {
     pub async fn prepared(prepared: Prepared<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let mut clock = Instant::now();
         let Prepared { plan, constants, survey, took } = prepared;
-        if survey.features.negative_preload {
-            return Err(EngineError::NotOnLanes { feature: gpu::NEGATIVE_PRELOAD });
+        if let Some(feature) = survey.features.needing_reference() {
+            return Err(EngineError::NotOnLanes { feature });
         }
         let settings = settings_after(&plan, &survey);
         let mut engine = Gpu {
