@@ -318,7 +318,8 @@ impl<const N: usize> Trajectory<'_, N> {
             Mode::Onset(side) => {
                 let onset_over = side.sign() * (self.q[0] - self.flow.wall(side)) >= 0.0;
                 let linear = self.flow.domain(DomainKind::Meshing(side));
-                let pulls = side.sign() * linear.acceleration(&self.q, &self.phasor) <= 0.0;
+                let pulls = !self.begins_unpressed()
+                    && side.sign() * linear.acceleration(&self.q, &self.phasor) <= 0.0;
                 let through = side.sign() * (self.q[0] - self.flow.wall(side.mirrored())) <= 0.0;
                 if through && side.sign() * self.q[1] < 0.0 {
                     self.act(Crossing::Through(side), observer);

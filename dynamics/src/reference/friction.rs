@@ -294,6 +294,12 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
+    /// Whether friction has just let go of the gap in a contact onset, so that its acceleration is 0 within rounding.
+    #[inline(always)]
+    pub(super) fn begins_unpressed(&self) -> bool {
+        self.from_rate.contains(&2) && matches!(self.mode, Mode::Onset(_))
+    }
+
     /// Decides contacts that depend on forces anew, after a jump of a friction force. If friction has let go of the gap, its acceleration is 0
     /// within rounding, and `jerk` decides.
     fn recheck_contact(&mut self, jerk: Option<f64>, observer: &mut impl Observer) {

@@ -158,7 +158,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let (q, phasor) = step.end(&self.q, &self.phasor);
         let pressing = Bernstein::new(rates(&self.q, &self.phasor), rates(&q, &phasor), step.h);
         let remainder = step.u6 * linear.pressing_bound.remainder(&self.q, &self.phasor, step.u);
-        match judge(&pressing, 0.0, side.sign(), 0, remainder) {
+        match judge(&pressing, 0.0, side.sign(), usize::from(self.begins_unpressed()), remainder) {
             Verdict::Clear { roomy } => StepVerdict::Clear { roomy },
             Verdict::Crossing(bracket) => StepVerdict::Crossing(Crossing::PressingEnds(side), bracket),
             Verdict::Unclear => StepVerdict::Unclear,
