@@ -20,8 +20,8 @@ use crate::record::classify::CHAOS_ERRORS;
 use crate::record::distance::{self, farther};
 use crate::record::{Record, Records, valid};
 use dop853::Solver;
-use flight::{Ended, Flight};
-use rattlemap_dynamics::model::{Law, Oscillator, Side, State};
+use flight::{Ended, Flight, Slip};
+use rattlemap_dynamics::model::{Law, MOST_FRICTION, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Budget, Status};
 use rattlemap_dynamics::reference::EventKind;
 use rattlemap_dynamics::stability::{multipliers, standard_error};
@@ -71,6 +71,19 @@ struct Tally {
     symbols: Vec<u8>,
     /// Phases of events, in turns.
     phases: Vec<f64>,
+    /// Elements with dry friction that changed their mode.
+    slipped: [bool; MOST_FRICTION],
+}
+
+impl Tally {
+    /// Counts changes of friction.
+    fn count(&mut self, slips: impl Iterator<Item = Slip>, period: f64) {
+        for slip in slips {
+            self.symbols.extend(slip.symbol);
+            self.phases.push((slip.t / period).fract());
+            self.slipped[slip.element] = true;
+        }
+    }
 }
 
 impl Strobed<'_> {
@@ -95,7 +108,9 @@ impl Strobed<'_> {
         let until = self.from + self.period;
         self.solver.advance(&mut self.flight, self.from, until)?;
         let mut meshing_since = meshed.then_some(self.from);
-        for ended in std::mem::take(&mut self.flight.events) {
+        let mut slips = std::mem::take(&mut self.flight.slips).into_iter().peekable();
+        for (n, ended) in std::mem::take(&mut self.flight.events).into_iter().enumerate() {
+            self.tally.count(std::iter::from_fn(|| slips.next_if(|slip| slip.after <= n)), self.period);
             self.tally.series |= ended.after_series;
             self.tally.phases.push((ended.t / self.period).fract());
             if ended.kind == EventKind::Impact {
@@ -112,8 +127,15 @@ impl Strobed<'_> {
             self.tally.symbols.extend(self.before.map(|before| symbol(before, ended.side)));
             self.before = Some(ended);
         }
+        self.tally.count(slips, self.period);
         self.tally.meshing_time += meshing_since.map_or(0.0, |since| until - since);
         Some(())
+    }
+
+    /// Returns the elements with dry friction that stuck all the time. Neighbouring motions keep their distance along these rows.
+    fn stuck_for_good(&self) -> [bool; MOST_FRICTION] {
+        let sticks = self.flight.sticks();
+        std::array::from_fn(|i| sticks[i] && !self.tally.slipped[i])
     }
 
     /// Returns the state at the next phase 0, after an event there.
@@ -205,11 +227,16 @@ fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> 
 }
 
 /// Computes the derivative of the strobe map over one period by central differences.
-fn derivative(on: &Strobed, degrees: usize, units: [f64; 2]) -> Option<Matrix4<f64>> {
+fn derivative(
+    on: &Strobed,
+    degrees: usize,
+    units: [f64; 2],
+    for_good: [bool; MOST_FRICTION],
+) -> Option<Matrix4<f64>> {
     let image = |j: usize, by: f64| {
         let mut direction = [0.0; 4];
         direction[j] = by;
-        let mut other = Strobed { flight: on.flight.displaced(&direction), ..on.clone() };
+        let mut other = Strobed { flight: on.flight.displaced(&direction, for_good), ..on.clone() };
         other.advance()?;
         Some(other.flight.q)
     };
@@ -226,11 +253,12 @@ fn derivative(on: &Strobed, degrees: usize, units: [f64; 2]) -> Option<Matrix4<f
 /// Builds the record of a cycle; none if it is unstable.
 fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<Record> {
     let span = f64::from(period) * on.period;
+    let for_good = on.stuck_for_good();
     let mut motion = on.clone();
     motion.tally = Tally::default();
     let mut monodromy = Matrix4::identity();
     for _ in 0..period {
-        monodromy = derivative(&motion, degrees, units)? * monodromy;
+        monodromy = derivative(&motion, degrees, units, for_good)? * monodromy;
         motion.advance()?;
     }
     let [re, im] = *multipliers(&monodromy)?.first()?;
@@ -261,11 +289,12 @@ fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<R
 
 /// Builds the record of a chaotic motion; none unless a neighbouring motion separates from it on average.
 fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
+    let for_good = motion.stuck_for_good();
     motion.tally = Tally::default();
     let mut other = motion.clone();
     let mut aside = [0.0; 4];
     aside[if motion.flight.is_stuck() { 2 } else { 0 }] = DISPLACEMENT * units[0];
-    other.flight = motion.flight.displaced(&aside);
+    other.flight = motion.flight.displaced(&aside, for_good);
     let mut growth = Vec::new();
     for _ in 0..periods {
         motion.advance()?;
@@ -277,7 +306,7 @@ fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
         // The neighbour starts again in the same direction, at the initial distance.
         other = motion.clone();
         aside = std::array::from_fn(|i| DISPLACEMENT * units[i % 2] * difference[i] / length);
-        other.flight = motion.flight.displaced(&aside);
+        other.flight = motion.flight.displaced(&aside, for_good);
     }
     let mean = growth.iter().sum::<f64>() / growth.len().max(1) as f64;
     let error = standard_error(&growth);

@@ -25,7 +25,12 @@ fn stops_begin_at_the_border_of_den_hartog() {
         let border = v.abs() / u.hypot(1.0 / (omega * omega));
         for (f, word) in [(border * (1.0 - 1e-6), "00"), (border * (1.0 + 1e-6), "77")] {
             let orbit = motion("friction-oscillator", &[("omega", omega), ("f", f)], [0.0; 4]);
-            assert_eq!(orbit.class, Class::Periodic { period: 1 }, "omega = {omega}, f = {f}: {:?}", orbit.status);
+            assert_eq!(
+                orbit.class,
+                Class::Periodic { period: 1 },
+                "omega = {omega}, f = {f}: {:?}",
+                orbit.status
+            );
             assert_eq!(orbit.word.time_order(), word, "omega = {omega}, f = {f}");
         }
     }

@@ -1,5 +1,7 @@
 //! Harmonics and stages in the integrator, against closed forms.
 
+mod friction;
+
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::dop853::Solver;
