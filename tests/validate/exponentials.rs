@@ -38,7 +38,7 @@ fn the_judge_agrees_with_matrix_exponentials() {
     let plain = (0..500u64).map(|seed| (seed, shapes[seed as usize % shapes.len()]));
     let cases = plain
         .chain((500..700).map(|seed| (seed, pushing[seed as usize % pushing.len()])))
-        .chain((700..900).map(|seed| (seed, rough[seed as usize % rough.len()])));
+        .chain((700..1200).map(|seed| (seed, rough[seed as usize % rough.len()])));
     let off: Vec<(u64, f64, bool, [usize; 2])> = cases
         .collect::<Vec<_>>()
         .into_par_iter()
