@@ -6,6 +6,7 @@
 //! reference and stability use only the oscillator and the law; scenes, maps and files use only the trait.
 
 mod gear_pair;
+mod machine;
 mod non_impacting;
 mod oscillator;
 mod parameter;
@@ -13,6 +14,9 @@ mod stops;
 mod traits;
 
 pub use gear_pair::GearPair;
+pub use machine::{
+    Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_GAPS, Machine, Restitution, Spring, Wall,
+};
 pub use non_impacting::NonImpacting;
 pub(crate) use oscillator::is_semidefinite;
 pub use oscillator::{

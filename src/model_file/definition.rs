@@ -327,6 +327,7 @@ impl Definition {
             schedule: Oscillator::repeated(&phases, motion.repeat)?,
             outer_walls,
             friction: self.friction.iter().map(|friction| friction.evaluated(of)).collect(),
+            machine: None,
         })
     }
 

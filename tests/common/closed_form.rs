@@ -132,6 +132,7 @@ impl Walled {
             schedule: Vec::new(),
             outer_walls: Default::default(),
             friction: Vec::new(),
+            machine: None,
             free: self.free.domain(),
             meshing: [self.behind(0).domain(), self.behind(1).domain()],
         };

@@ -51,6 +51,7 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
         schedule: Vec::new(),
         outer_walls: Default::default(),
         friction: Vec::new(),
+        machine: None,
         free: domain,
         meshing: [domain; 2],
     };
@@ -118,6 +119,7 @@ impl Damper {
             schedule: Vec::new(),
             outer_walls: Default::default(),
             friction: Vec::new(),
+            machine: None,
             free: domain,
             meshing: [domain; 2],
         };

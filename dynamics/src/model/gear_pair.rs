@@ -66,6 +66,7 @@ impl GearPair {
             schedule: Vec::new(),
             outer_walls: Default::default(),
             friction: Vec::new(),
+            machine: None,
             free,
             meshing: [meshing(1.0), meshing(-1.0)],
         };

@@ -3,11 +3,11 @@
 use nalgebra::{Complex, Matrix2, Vector2};
 use thiserror::Error;
 
-use super::Side;
+use super::{Machine, Side};
 use crate::number::significant;
 
 /// Rounding error that checks of a matrix allow, relative to its entries.
-const MATRIX_TOLERANCE: f64 = 1e-12;
+pub(super) const MATRIX_TOLERANCE: f64 = 1e-12;
 
 /// An error in an oscillator or a contact law.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -225,9 +225,35 @@ pub struct Oscillator {
     /// Dry friction, in all stages and behind all walls: at most [`MOST_FRICTION`] elements with independent rows, and one where a wall is
     /// rigid.
     pub friction: Vec<Friction>,
+    /// The whole oscillator, if the fields above cannot describe it. It then has its own contact laws, and those fields have no meaning,
+    /// except `degrees` and `omega`. See [`Oscillator::of_machine`].
+    pub machine: Option<Box<Machine>>,
 }
 
 impl Oscillator {
+    /// Wraps a machine. Only the reference computes it.
+    pub fn of_machine(machine: Machine) -> Oscillator {
+        let none = Domain { damping: [[0.0; 2]; 2], stiffness: [[0.0; 2]; 2], load: [0.0; 2], preload: 0.0 };
+        Oscillator {
+            degrees: machine.degrees(),
+            mass: [[1.0, 0.0], [0.0, 1.0]],
+            gap: [1.0, 0.0],
+            walls: [f64::INFINITY, f64::NEG_INFINITY],
+            contacts: [Contact::Rigid; 2],
+            omega: machine.omega,
+            force: [0.0; 2],
+            force_sin: [0.0; 2],
+            free: none,
+            meshing: [none; 2],
+            harmonics: Vec::new(),
+            stages: Vec::new(),
+            schedule: Vec::new(),
+            outer_walls: Default::default(),
+            friction: Vec::new(),
+            machine: Some(Box::new(machine)),
+        }
+    }
+
     /// Returns the forcing period `2 pi / omega`.
     pub fn period(&self) -> f64 {
         std::f64::consts::TAU / self.omega
@@ -493,6 +519,9 @@ impl Oscillator {
     /// # Errors
     /// [`OscillatorError`] for the first check that fails.
     pub fn validate(&self) -> Result<(), OscillatorError> {
+        if let Some(machine) = &self.machine {
+            return machine.validate();
+        }
         let is_known = matches!(self.degrees, 1 | 2);
         require(is_known, || "degrees of freedom".to_owned(), self.degrees as f64, "1 or 2")?;
         let [[m1, m], [other, m2]] = self.mass;
@@ -880,7 +909,7 @@ impl Oscillator {
 }
 
 /// Checks that phases at which stages begin are in `[0, 1)` and increase.
-fn check_phases(schedule: &[(f64, usize)]) -> Result<(), OscillatorError> {
+pub(super) fn check_phases(schedule: &[(f64, usize)]) -> Result<(), OscillatorError> {
     let mut before = f64::NEG_INFINITY;
     schedule.iter().try_for_each(|&(begins, stage)| {
         let is_allowed = (0.0..1.0).contains(&begins) && begins > before;
@@ -933,15 +962,15 @@ fn along(row: [f64; 2], matrix: [[f64; 2]; 2], less: [[f64; 2]; 2]) -> f64 {
     (product(0, 0) + product(0, 1) + product(1, 0) + product(1, 1)) / (square * square)
 }
 
-fn finite(quantity: impl Fn() -> String, value: f64) -> Result<(), OscillatorError> {
+pub(super) fn finite(quantity: impl Fn() -> String, value: f64) -> Result<(), OscillatorError> {
     require(value.is_finite(), quantity, value, "a finite number")
 }
 
-fn positive(quantity: impl Fn() -> String, value: f64) -> Result<(), OscillatorError> {
+pub(super) fn positive(quantity: impl Fn() -> String, value: f64) -> Result<(), OscillatorError> {
     require(value.is_finite() && value > 0.0, quantity, value, "finite and greater than 0")
 }
 
-fn require(
+pub(super) fn require(
     is_allowed: bool,
     quantity: impl Fn() -> String,
     value: f64,

@@ -50,6 +50,7 @@ impl Stops {
             schedule: Vec::new(),
             outer_walls: Default::default(),
             friction: Vec::new(),
+            machine: None,
             free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0], preload: 0.0 },
             meshing: [stop(1.0), stop(-1.0)],
         };

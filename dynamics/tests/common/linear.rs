@@ -71,6 +71,7 @@ impl Linear {
             schedule: Vec::new(),
             outer_walls: Default::default(),
             friction: Vec::new(),
+            machine: None,
             free,
             meshing: [free; 2],
         }

@@ -136,6 +136,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 schedule: Vec::new(),
                 outer_walls: Default::default(),
                 friction: Vec::new(),
+                machine: None,
             };
             let mut start = [y[0], 3.0 * y[1], y[2], 3.0 * y[3]];
             if is_single {
@@ -614,6 +615,7 @@ fn forces_with_different_phases_have_the_closed_form_response() {
         schedule: Vec::new(),
         outer_walls: Default::default(),
         friction: Vec::new(),
+        machine: None,
     };
     oscillator.validate().unwrap();
     let entry = |i: usize, j: usize| {

@@ -28,6 +28,7 @@ fn block(omega: f64, drive: f64, friction: f64) -> Oscillator {
         schedule: Vec::new(),
         outer_walls: Default::default(),
         friction: vec![Friction { row: [1.0, 0.0], force: friction, speed: 0.0 }],
+        machine: None,
     };
     oscillator.validate().unwrap();
     oscillator

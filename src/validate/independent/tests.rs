@@ -30,6 +30,7 @@ fn mass(load: f64, walls: [f64; 2], contact: Contact) -> Oscillator {
         schedule: Vec::new(),
         outer_walls: Default::default(),
         friction: Vec::new(),
+        machine: None,
     }
 }
 

@@ -98,6 +98,7 @@ pub(crate) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
         schedule: Vec::new(),
         outer_walls: Default::default(),
         friction: Vec::new(),
+        machine: None,
     };
     oscillator.validate().expect("a valid oscillator");
     let mut start = [0; 4].map(|_| draw.between(-0.4, 0.4));

@@ -135,6 +135,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         schedule: Vec::new(),
         outer_walls: Default::default(),
         friction: Vec::new(),
+        machine: None,
     };
     if shape.harmonics {
         let count = 1 + random.below(4);

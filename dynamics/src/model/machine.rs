@@ -1,0 +1,365 @@
+//! Machines: piecewise-linear oscillators of up to eight coordinates, with several gaps and dry friction.
+//!
+//! ```text
+//! M x'' + C x' + K x = load + sum over harmonics (cos_k cos(k omega t) + sin_k sin(k omega t)) + contact forces + friction forces
+//! ```
+//!
+//! A gap is a row of displacements `z = row . x` with walls on one side or on both. The force of a contact acts along this row.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::oscillator::{MATRIX_TOLERANCE, check_phases, finite, positive, require};
+use super::{
+    Contact, HIGHEST_ORDER, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, OscillatorError, Side,
+};
+
+/// Largest number of coordinates.
+pub const MOST_COORDINATES: usize = 8;
+
+/// Largest number of gaps.
+pub const MOST_GAPS: usize = 3;
+
+/// Linear forces that act always, in one stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Forces {
+    /// Damping matrix. Its skew-symmetric part, as of gyroscopic forces, does no work.
+    pub damping: DMatrix<f64>,
+    /// Stiffness matrix, symmetric.
+    pub stiffness: DMatrix<f64>,
+    /// Constant load.
+    pub load: DVector<f64>,
+}
+
+/// One harmonic of the force: `cos cos(order omega t) + sin sin(order omega t)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    /// Order, 1 to [`HIGHEST_ORDER`].
+    pub order: u32,
+    /// Factor of the cosine.
+    pub cos: DVector<f64>,
+    /// Factor of the sine.
+    pub sin: DVector<f64>,
+}
+
+/// Spring, damper and preload behind a wall, in one stage.
+///
+/// Contact pushes the gap off its wall by `stiffness s (z - at) + damping s w + preload`, where `s` is +1 on the right and -1 on the left.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spring {
+    /// Stiffness, >= 0.
+    pub stiffness: f64,
+    /// Damping, >= 0.
+    pub damping: f64,
+    /// Force that begins at the wall. It is 0 where the law is [`Contact::Impact`].
+    pub preload: f64,
+}
+
+/// Coefficient of restitution as a function of the approach speed: `constant + factor speed^power`, limited to `[0, 1]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Restitution {
+    /// Value at zero speed, before it is limited.
+    pub constant: f64,
+    /// Factor of the power; 0 for a constant coefficient.
+    pub factor: f64,
+    /// Exponent of the speed, > 0.
+    pub power: f64,
+}
+
+impl Restitution {
+    /// Returns a coefficient that does not depend on the speed.
+    pub fn constant(constant: f64) -> Restitution {
+        Restitution { constant, factor: 0.0, power: 1.0 }
+    }
+
+    /// Returns the coefficient `e` and its derivative at an approach speed >= 0.
+    pub fn at(&self, speed: f64) -> [f64; 2] {
+        if self.factor == 0.0 {
+            return [self.constant.clamp(0.0, 1.0), 0.0];
+        }
+        let value = self.constant + self.factor * speed.powf(self.power);
+        let slope = self.factor * self.power * speed.powf(self.power - 1.0);
+        if (0.0..=1.0).contains(&value) && slope.is_finite() {
+            [value, slope]
+        } else {
+            [value.clamp(0.0, 1.0), 0.0]
+        }
+    }
+}
+
+/// A wall of a gap.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wall {
+    /// Position `z`.
+    pub at: f64,
+    /// Contact law. All walls on a side but the outermost one are [`Contact::Elastic`].
+    pub contact: Contact,
+    /// Coefficient of restitution; of no effect where the law is elastic.
+    pub restitution: Restitution,
+    /// Leaving speed, >= 0, up to which a pressed contact lasts.
+    pub mesh_speed: f64,
+    /// Spring, damper and preload in each stage; of no effect on a rigid wall.
+    pub springs: Vec<Spring>,
+}
+
+/// A gap and its walls.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GapRow {
+    /// Row of displacements; not zero, and independent of the rows of the other gaps.
+    pub row: DVector<f64>,
+    /// Walls on the right, at increasing positions, and on the left, at decreasing positions.
+    pub walls: [Vec<Wall>; 2],
+}
+
+/// An element with dry friction along a row of velocities, as [`super::Friction`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct DryFriction {
+    /// Row of the sliding rate; not zero.
+    pub row: DVector<f64>,
+    /// Friction force, >= 0.
+    pub force: f64,
+    /// Speed of the other surface along the row.
+    pub speed: f64,
+}
+
+/// A machine. All vectors have one entry per coordinate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    /// Excitation frequency, > 0.
+    pub omega: f64,
+    /// Mass matrix, symmetric and positive definite.
+    pub mass: DMatrix<f64>,
+    /// Linear forces of each stage, at least one.
+    pub stages: Vec<Forces>,
+    /// Changes of the stage in a forcing period, as [`Oscillator::schedule`](super::Oscillator::schedule). Empty if stage 0 holds always.
+    pub schedule: Vec<(f64, usize)>,
+    /// Harmonics of the force, in increasing order.
+    pub drives: Vec<Drive>,
+    /// Gaps, up to [`MOST_GAPS`].
+    pub gaps: Vec<GapRow>,
+    /// Elements with dry friction, up to [`MOST_FRICTION`].
+    pub friction: Vec<DryFriction>,
+}
+
+/// Lower bound of [`Machine::length_scale`], which must not be zero.
+const LEAST_LENGTH: f64 = 1e-150;
+
+/// Checks that all entries of a vector or matrix are finite.
+fn all_finite<'a>(
+    name: impl Fn() -> String,
+    values: impl IntoIterator<Item = &'a f64>,
+) -> Result<(), OscillatorError> {
+    values.into_iter().try_for_each(|&value| finite(&name, value))
+}
+
+impl Machine {
+    /// Returns the number of coordinates.
+    pub fn degrees(&self) -> usize {
+        self.mass.nrows()
+    }
+
+    /// Returns the forcing period `2 pi / omega`.
+    pub fn period(&self) -> f64 {
+        std::f64::consts::TAU / self.omega
+    }
+
+    /// Returns the orders of all harmonics; order 1 without a force.
+    pub fn highest_order(&self) -> u32 {
+        self.drives.iter().map(|drive| drive.order).max().unwrap_or(1)
+    }
+
+    /// Returns the stage that holds at phase 0.
+    pub fn first_stage(&self) -> usize {
+        match self.schedule.first() {
+            Some(&(0.0, stage)) => stage,
+            _ => self.schedule.last().map_or(0, |&(_, stage)| stage),
+        }
+    }
+
+    /// Checks all ranges.
+    ///
+    /// # Errors
+    /// [`OscillatorError`] for the first quantity that is not valid.
+    ///
+    /// # Panics
+    /// If the sizes of vectors and matrices differ.
+    pub fn validate(&self) -> Result<(), OscillatorError> {
+        let (n, stages) = (self.degrees(), self.stages.len());
+        let count = |what: &'static str, count: usize, most: usize, range: &'static str| {
+            require((1..=most).contains(&count), || what.to_owned(), count as f64, range)
+        };
+        count("coordinates", n, MOST_COORDINATES, "1 to 8")?;
+        count("gaps", self.gaps.len(), MOST_GAPS.min(n), "1 to 3, and not more than coordinates")?;
+        count("the number of stages", stages, MOST_STAGES, "1 to 8")?;
+        let elements = self.friction.len();
+        require(
+            elements <= MOST_FRICTION.min(n),
+            || "elements with dry friction".to_owned(),
+            elements as f64,
+            "at most 2, and not more than coordinates",
+        )?;
+        positive(|| "excitation frequency".to_owned(), self.omega)?;
+        all_finite(|| "mass".to_owned(), &self.mass)?;
+        symmetric("mass", &self.mass)?;
+        let definite = self.mass.clone().cholesky().is_some();
+        require(definite, || "determinant of the mass matrix".to_owned(), self.mass.determinant(), POSITIVE)?;
+        let changes = self.schedule.len();
+        let few = "at most 1024";
+        require(changes <= MOST_CHANGES, || "changes of the stage".to_owned(), changes as f64, few)?;
+        check_phases(&self.schedule)?;
+        for &(_, stage) in &self.schedule {
+            require(stage < stages, || "index of a stage".to_owned(), stage as f64, "that of a stage")?;
+        }
+        for (stage, forces) in (1..).zip(&self.stages) {
+            let name = |what: &'static str| move || format!("{what} in stage {stage}");
+            all_finite(name("damping"), &forces.damping)?;
+            all_finite(name("stiffness"), &forces.stiffness)?;
+            all_finite(name("load"), &forces.load)?;
+            symmetric("stiffness", &forces.stiffness)?;
+        }
+        for Drive { order, cos, sin } in &self.drives {
+            let is_known = (1..=HIGHEST_ORDER).contains(order);
+            require(is_known, || "order of a harmonic".to_owned(), f64::from(*order), "1 to 64")?;
+            all_finite(|| format!("cosine of harmonic {order}"), cos)?;
+            all_finite(|| format!("sine of harmonic {order}"), sin)?;
+        }
+        for (i, gap) in (1..).zip(&self.gaps) {
+            all_finite(|| format!("row of gap {i}"), &gap.row)?;
+            Side::BOTH.into_iter().try_for_each(|side| self.validate_walls(i, gap, side))?;
+            if let [Some(right), Some(left)] = gap.walls.each_ref().map(|walls| walls.first())
+                && right.at < left.at
+            {
+                return Err(OscillatorError::Walls { walls: [right.at, left.at] });
+            }
+        }
+        let rows = |rows: Vec<&DVector<f64>>, what: &'static str| {
+            let independent = self.independence(&rows);
+            require(independent > MATRIX_TOLERANCE, || what.to_owned(), independent, POSITIVE)
+        };
+        rows(self.gaps.iter().map(|gap| &gap.row).collect(), "independence of the rows of the gaps")?;
+        for (i, DryFriction { row, force, speed }) in (1..).zip(&self.friction) {
+            let name = |what: &'static str| move || format!("{what} of friction {i}");
+            all_finite(name("row"), row)?;
+            require(force.is_finite() && *force >= 0.0, name("force"), *force, "finite and at least 0")?;
+            finite(name("speed"), *speed)?;
+        }
+        if elements > 0 {
+            rows(
+                self.friction.iter().map(|friction| &friction.row).collect(),
+                "independence of the rows of friction",
+            )?;
+        }
+        Ok(())
+    }
+
+    fn validate_walls(
+        &self,
+        gap: usize,
+        GapRow { walls, .. }: &GapRow,
+        side: Side,
+    ) -> Result<(), OscillatorError> {
+        let (walls, word) = (&walls[side.index()], ["right", "left"][side.index()]);
+        let count = walls.len();
+        let name = |nth: usize| format!("{word} wall {nth} of gap {gap}");
+        require(
+            count <= MOST_WALLS,
+            || format!("walls on the {word} side of gap {gap}"),
+            count as f64,
+            "at most 4",
+        )?;
+        for (i, wall) in walls.iter().enumerate() {
+            let quantity =
+                |what: &'static str| move || format!("{what} of {word} wall {} of gap {gap}", i + 1);
+            finite(quantity("position"), wall.at)?;
+            if let Some(inner) = i.checked_sub(1).map(|i| &walls[i]) {
+                let beyond = side.sign() * (wall.at - inner.at) > 0.0;
+                require(beyond, quantity("position"), wall.at, "farther out than the wall before it")?;
+                let elastic = "elastic, with a force that may pull, because another wall lies behind it";
+                require(inner.contact == Contact::Elastic, || name(i), inner.at, elastic)?;
+            }
+            let Restitution { constant, factor, power } = wall.restitution;
+            let allowed = factor != 0.0 && constant.is_finite() || (0.0..=1.0).contains(&constant);
+            require(allowed, quantity("restitution"), constant, "between 0 and 1")?;
+            finite(quantity("slope of restitution"), factor)?;
+            require(power > 0.0, quantity("exponent of restitution"), power, POSITIVE)?;
+            let speed = wall.mesh_speed;
+            require(
+                speed.is_finite() && speed >= 0.0,
+                quantity("mesh_speed"),
+                speed,
+                "finite and at least 0",
+            )?;
+            for Spring { stiffness, damping, preload } in &wall.springs {
+                for (what, value) in [("stiffness", *stiffness), ("damping", *damping)] {
+                    require(
+                        value.is_finite() && value >= 0.0,
+                        quantity(what),
+                        value,
+                        "finite and at least 0",
+                    )?;
+                }
+                finite(quantity("preload"), *preload)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns a measure of the independence of rows: the least eigenvalue of the Gram matrix of the rows, each divided by its length.
+    fn independence(&self, rows: &[&DVector<f64>]) -> f64 {
+        let unit: Vec<DVector<f64>> = rows.iter().map(|row| (*row).clone().normalize()).collect();
+        let gram = DMatrix::from_fn(rows.len(), rows.len(), |i, j| unit[i].dot(&unit[j]));
+        if gram.iter().all(|x| x.is_finite()) { gram.symmetric_eigenvalues().min() } else { 0.0 }
+    }
+
+    /// Returns the length, > 0, that tolerances on distances are relative to: half the distance of the two walls of a gap, the smallest if
+    /// several gaps have two. Without such a gap it is the largest of the walls' positions and of the deflections `D f` under
+    /// forces, loads, preloads and friction, with `D = (|K| + omega^2 M)^-1`.
+    pub fn length_scale(&self) -> f64 {
+        let half = |gap: &GapRow| {
+            let [right, left] = gap.walls.each_ref().map(|walls| walls.first());
+            Some(0.5 * (right?.at - left?.at)).filter(|&half| half > 0.0)
+        };
+        if let Some(least) = self.gaps.iter().filter_map(half).min_by(f64::total_cmp) {
+            return least;
+        }
+        let walls = self.gaps.iter().flat_map(|gap| gap.walls.iter().flatten()).map(|wall| wall.at.abs());
+        self.deflections().into_iter().chain(walls).fold(LEAST_LENGTH, f64::max)
+    }
+
+    /// Returns the largest deflection by each force, in all stages.
+    fn deflections(&self) -> Vec<f64> {
+        let mut found = Vec::new();
+        for Forces { stiffness, load, .. } in &self.stages {
+            let eigen = stiffness.clone().symmetric_eigen();
+            let size = &eigen.eigenvectors
+                * DMatrix::from_diagonal(&eigen.eigenvalues.abs())
+                * eigen.eigenvectors.transpose();
+            let mut under = |force: DVector<f64>, order: u32| {
+                let rate = self.omega * f64::from(order);
+                let dynamic = &size + &self.mass * (rate * rate);
+                found.extend(dynamic.cholesky().map(|factors| factors.solve(&force).amax()));
+            };
+            under(load.clone(), 1);
+            self.drives.iter().for_each(|drive| {
+                under(drive.cos.clone(), drive.order);
+                under(drive.sin.clone(), drive.order);
+            });
+            self.friction.iter().for_each(|friction| under(&friction.row * friction.force, 1));
+            for gap in &self.gaps {
+                let springs = gap.walls.iter().flatten().flat_map(|wall| &wall.springs);
+                springs
+                    .filter(|spring| spring.preload != 0.0)
+                    .for_each(|spring| under(&gap.row * spring.preload, 1));
+            }
+        }
+        found
+    }
+}
+
+const POSITIVE: &str = "greater than 0";
+
+fn symmetric(name: &'static str, matrix: &DMatrix<f64>) -> Result<(), OscillatorError> {
+    let size = matrix.amax();
+    let difference = (matrix - matrix.transpose()).amax();
+    let quantity = || format!("difference of opposite entries of {name}");
+    require(difference <= MATRIX_TOLERANCE * size, quantity, difference, "0: the matrix must be symmetric")
+}
