@@ -32,7 +32,7 @@ mod tangent;
 
 pub use allowance::Allowance;
 pub use chatter::{CLOSING_ANGLE, NO_THRESHOLD};
-use clock::Clock;
+pub(crate) use clock::Clock;
 pub use contact::GRAZING_SPEED;
 pub use event::{
     EVENTS_PER_PERIOD_CAP, EventKind, FrictionEvent, GapEvent, Observer, STEPS_PER_PERIOD_CAP, Stop, Work,
