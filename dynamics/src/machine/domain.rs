@@ -50,6 +50,10 @@ impl Row {
     }
 }
 
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// The Taylor terms of a step, as multiples of powers of the share of the step.
 pub(super) type Series = [Point; ORDER + 1];
 
@@ -144,35 +148,46 @@ impl Domain {
 
     /// Returns the time derivative of a point.
     pub(super) fn derivative(&self, point: &Point) -> Point {
-        let n = self.n;
         let mut rate = [0.0; WIDTH];
-        rate[..n].copy_from_slice(&point[n..2 * n]);
-        for (i, row) in self.accelerations.iter().enumerate() {
-            rate[n + i] = (0..self.width).map(|j| row.0[j] * point[j]).sum();
-        }
-        for (k, omega) in self.rates.iter().enumerate() {
-            let at = 2 * (n + k);
-            (rate[at], rate[at + 1]) = (-omega * point[at + 1], omega * point[at]);
-        }
+        self.differentiate(point, 1.0, &mut rate);
         rate
     }
 
-    /// Returns the Taylor terms of a step of length `h`.
-    pub(super) fn series(&self, point: &Point, h: f64) -> Box<Series> {
-        let mut terms = Box::new([[0.0; WIDTH]; ORDER + 1]);
-        terms[0] = *point;
-        for k in 0..ORDER {
-            let factor = h / (k + 1) as f64;
-            let mut next = self.derivative(&terms[k]);
-            next[..self.width].iter_mut().for_each(|x| *x *= factor);
-            terms[k + 1] = next;
+    /// Writes `factor` times the time derivative of a point to `rate`.
+    fn differentiate(&self, point: &Point, factor: f64, rate: &mut Point) {
+        let n = self.n;
+        for i in 0..n {
+            rate[i] = factor * point[n + i];
         }
-        terms
+        for (rate, row) in rate[n..].iter_mut().zip(&self.accelerations) {
+            *rate = factor * dot(&row.0[..self.width], &point[..self.width]);
+        }
+        for (k, omega) in self.rates.iter().enumerate() {
+            let (at, turn) = (2 * (n + k), factor * omega);
+            (rate[at], rate[at + 1]) = (-turn * point[at + 1], turn * point[at]);
+        }
+        rate[self.width - 1] = 0.0;
+    }
+
+    /// Computes the Taylor terms of a step of length `h`.
+    pub(super) fn expand(&self, point: &Point, h: f64, series: &mut Series) {
+        series[0] = *point;
+        for k in 0..ORDER {
+            let (done, next) = series.split_at_mut(k + 1);
+            self.differentiate(&done[k], h / (k + 1) as f64, &mut next[0]);
+        }
     }
 
     /// Returns the state at a share of a step.
     pub(super) fn state(&self, series: &Series, share: f64) -> Numbers {
         let mut y = [0.0; SIZE];
+        if share == 1.0 {
+            // The small terms first.
+            for term in series.iter().rev() {
+                y.iter_mut().zip(&term[..2 * self.n]).for_each(|(y, term)| *y += term);
+            }
+            return y;
+        }
         for term in series.iter().rev() {
             for (y, term) in y.iter_mut().zip(&term[..2 * self.n]) {
                 *y = *y * share + term;
@@ -183,7 +198,8 @@ impl Domain {
 
     /// Returns a functional on a step.
     pub(super) fn along(&self, row: &Row, series: &Series) -> Polynomial {
-        std::array::from_fn(|k| (0..self.width).map(|j| row.0[j] * series[k][j]).sum())
+        let row = &row.0[..self.width];
+        std::array::from_fn(|k| dot(row, &series[k][..self.width]))
     }
 
     /// Returns a tangent vector after a time of at most one step.

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::domain::{Constraint, Constraints, Domain, Row, Series};
+use super::domain::{Constraint, Constraints, Domain, DomainKey, Row, Series};
 use super::events::{MachineEvent, MachineObserver, SlipEvent};
 use super::modes::{AtRest, GapMode, Modes, ROUNDING, first_derivative};
-use super::polynomial::{Fall, first_fall};
+use super::polynomial::{Fall, ORDER, first_fall};
 use super::system::System;
-use super::{Numbers, Point, SIZE};
+use super::{Numbers, Point, SIZE, WIDTH};
 use crate::flow::{Slip, Slips};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::reference::{
@@ -63,7 +63,10 @@ enum Watch {
 pub struct Motion<'s> {
     system: &'s System,
     modes: Modes,
+    key: DomainKey,
     domain: Arc<Domain>,
+    /// Memory for the Taylor terms of a step.
+    series: Option<Box<Series>>,
     y: Numbers,
     clock: Clock,
     goal: f64,
@@ -104,7 +107,9 @@ impl<'s> Motion<'s> {
         let mut motion = Motion {
             system,
             modes,
+            key: modes.key(system),
             domain: system.domain(modes.key(system)),
+            series: None,
             y: system.to_flow(state),
             clock: Clock::default(),
             goal: 0.0,
@@ -337,8 +342,12 @@ impl<'s> Motion<'s> {
         self.system.point(&self.y, self.clock.time())
     }
 
+    /// Enters the domain of the present modes.
     fn refresh(&mut self) {
-        self.domain = self.system.domain(self.modes.key(self.system));
+        let key = self.modes.key(self.system);
+        if key != self.key {
+            (self.key, self.domain) = (key, self.system.domain(key));
+        }
     }
 
     fn rate(&self, gap: usize) -> f64 {
@@ -485,13 +494,32 @@ impl<'s> Motion<'s> {
         let remaining = self.clock.remaining(self.goal);
         let h = self.domain.unit.min(remaining);
         let point = self.point();
-        let series = self.domain.series(&point, h);
+        let mut series = self.series.take().unwrap_or_else(|| Box::new([[0.0; WIDTH]; ORDER + 1]));
+        self.domain.expand(&point, h, &mut series);
+        let first = self.first_event(&point, &series);
+        let (share, time) = first.map_or((1.0, h), |(share, _)| (share, share * h));
+        if share > 0.0 {
+            self.advance(&series, share, time);
+        }
+        self.series = Some(series);
+        if let Some((_, watch)) = first {
+            self.cross(watch, observer);
+            return self.check_events();
+        }
+        if h == remaining {
+            self.clock.set(self.goal);
+        }
+        self.check_size()
+    }
+
+    /// Returns the share of the step at which the first watch ends the modes.
+    fn first_event(&mut self, point: &Point, series: &Series) -> Option<(f64, Watch)> {
         let mut first: Option<(f64, Watch)> = None;
         for watch in self.watches() {
             let (row, order) = self.function(watch);
-            let order = if self.touches_limit(watch, &row, &point) { 1 } else { order };
-            let function = self.domain.along(&row, &series);
-            match first_fall(&function, order, row.size(&point)) {
+            let order = if self.touches_limit(watch, &row, point) { 1 } else { order };
+            let function = self.domain.along(&row, series);
+            match first_fall(&function, order, row.size(point)) {
                 Fall::None => {}
                 Fall::Touches => self.note_touch(watch),
                 Fall::At(share) if first.is_none_or(|(earliest, _)| share < earliest) => {
@@ -500,18 +528,7 @@ impl<'s> Motion<'s> {
                 Fall::At(_) => {}
             }
         }
-        let Some((share, watch)) = first else {
-            self.advance(&series, 1.0, h);
-            if h == remaining {
-                self.clock.set(self.goal);
-            }
-            return self.check_size();
-        };
-        if share > 0.0 {
-            self.advance(&series, share, share * h);
-        }
-        self.cross(watch, observer);
-        self.check_events()
+        first
     }
 
     /// Large displacements make all steps short.

@@ -50,19 +50,29 @@ pub(super) fn first_fall(polynomial: &Polynomial, order: usize, size: f64) -> Fa
     }
 }
 
+/// `1 / n`; 0 for 0.
+const RECIPROCALS: [f64; ORDER + 1] = {
+    let mut all = [0.0; ORDER + 1];
+    let mut n = 1;
+    while n <= ORDER {
+        all[n] = 1.0 / n as f64;
+        n += 1;
+    }
+    all
+};
+
 /// Returns the Bernstein coefficients on `[0, 1]`.
 fn bernstein(c: &[f64]) -> Polynomial {
     let degree = c.len() - 1;
     let mut b = [0.0; ORDER + 1];
     // b_i = sum_j C(i, j) / C(degree, j) c_j
-    let mut scaled = [0.0; ORDER + 1];
-    let mut binomial = 1.0;
-    for (j, scaled) in scaled.iter_mut().enumerate().take(degree + 1) {
-        *scaled = c[j] / binomial;
-        binomial *= (degree - j) as f64 / (j + 1) as f64;
+    let mut row = [0.0; ORDER + 1];
+    let mut inverse = 1.0;
+    for (j, (row, c)) in row.iter_mut().zip(c).enumerate() {
+        *row = c * inverse;
+        inverse *= (j + 1) as f64 * RECIPROCALS[degree - j];
     }
     // Each pass adds the neighbours, as in Pascal's triangle.
-    let mut row = scaled;
     for i in 0..=degree {
         b[i] = row[0];
         for j in 0..degree - i {
