@@ -12,7 +12,7 @@
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
 
-use super::{Harmonic, Oscillator, State, is_semidefinite};
+use super::{Harmonic, Oscillator, State, is_semidefinite, state};
 
 /// Margin for rounding: of the distance to a wall, relative to twice the scale of length, and of the decay rate,
 /// relative to the excitation frequency.
@@ -84,7 +84,7 @@ impl NonImpacting {
             }
         }
         (0..2).for_each(|i| steady[2 * i] += middle[i]);
-        Some(NonImpacting { steady, mass, stiffness, reach, slowest, resting: None })
+        Some(NonImpacting { steady: state(&steady), mass, stiffness, reach, slowest, resting: None })
     }
 
     /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
@@ -123,7 +123,7 @@ impl NonImpacting {
         if self.resting.is_some_and(|i| [y[2 * i], y[2 * i + 1]] != [0.0; 2]) {
             return false;
         }
-        let q: State = std::array::from_fn(|i| y[i] - self.steady[i]);
+        let q: [f64; 4] = std::array::from_fn(|i| y[i] - self.steady[i]);
         let x = Vector2::new(q[0], q[2]);
         let [[m1, m], [_, m2]] = self.mass;
         let kinetic = m1 * q[1] * q[1] + m2 * q[3] * q[3] + 2.0 * m * q[1] * q[3];
@@ -230,7 +230,10 @@ mod tests {
             assert!(motion.is_neutral() && motion.exponent() == 0.0, "{}", motion.exponent());
             assert!(motion.is_certain(motion.steady()));
             let [x1, v1, ..] = motion.steady();
-            assert!(!motion.is_certain([x1, v1, 1e-12, 0.0]) && !motion.is_certain([x1, v1, 0.0, 1e-12]));
+            assert!(
+                !motion.is_certain(state(&[x1, v1, 1e-12]))
+                    && !motion.is_certain(state(&[x1, v1, 0.0, 1e-12]))
+            );
         }
     }
 
