@@ -6,7 +6,6 @@
 //! - [`flow`]: its motion in closed form;
 //! - [`certificate`]: proof that a step contains no event;
 //! - [`mod@reference`]: the trajectory from event to event;
-//! - [`machine`]: the same for any number of coordinates, gaps and elements with dry friction;
 //! - [`stability`]: cycles, Floquet multipliers and Lyapunov exponents;
 //! - [`orbit`]: the class of a motion;
 //! - [`word`]: the symbols of a cycle;
@@ -22,8 +21,6 @@ pub mod model;
 pub mod certificate;
 pub mod flow;
 pub mod reference;
-
-pub mod machine;
 
 pub mod stability;
 pub mod word;

@@ -46,22 +46,3 @@ pub struct SlipEvent {
     /// State, `(x1, v1, x2, v2, ...)`.
     pub at: Numbers,
 }
-
-/// Receives the events of a motion, in order of time.
-pub trait MachineObserver {
-    /// Receives an event at a wall.
-    fn event(&mut self, event: &MachineEvent);
-
-    /// Receives a change of a friction mode.
-    fn slip(&mut self, _: &SlipEvent) {}
-}
-
-impl MachineObserver for () {
-    fn event(&mut self, _: &MachineEvent) {}
-}
-
-impl MachineObserver for Vec<MachineEvent> {
-    fn event(&mut self, event: &MachineEvent) {
-        self.push(*event);
-    }
-}

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::domain::{Constraint, Constraints, Domain, DomainKey, Row, Series};
-use super::events::{MachineEvent, MachineObserver, SlipEvent};
+use super::events::{MachineEvent, SlipEvent};
 use super::modes::{AtRest, GapMode, Modes, ROUNDING, first_derivative};
 use super::polynomial::{Fall, ORDER, first_fall};
 use super::system::System;
@@ -13,7 +13,7 @@ use super::{Numbers, Point, SIZE, WIDTH};
 use crate::flow::{Slip, Slips};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::reference::{
-    Allowance, Clock, EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, NO_SPEED, STEPS_PER_PERIOD_CAP, Stop,
+    Allowance, Clock, EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, NO_SPEED, Observer, STEPS_PER_PERIOD_CAP, Stop,
     Work,
 };
 
@@ -284,11 +284,22 @@ impl<'s> Motion<'s> {
             })
     }
 
+    /// Whether another motion is in the same modes, with gaps on the same walls and from the same walls.
+    pub(crate) fn is_where(&self, other: &Motion<'_>) -> bool {
+        self.modes == other.modes && self.origin == other.origin && self.at_wall == other.at_wall
+    }
+
+    /// Multiplies the first entries of the state by `1 + shares`, to simulate rounding.
+    pub(crate) fn perturb(&mut self, shares: [f64; 4]) {
+        self.y.iter_mut().zip(shares).for_each(|(y, share)| *y += share * *y);
+        self.system.hold(&self.modes, &mut self.y, false);
+    }
+
     /// Integrates to the next phase 0.
     ///
     /// # Errors
     /// A [`Stop`] if the motion cannot be continued.
-    pub fn advance_period(&mut self, observer: &mut impl MachineObserver) -> Result<(), Stop> {
+    pub fn advance_period(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
         self.advance_to(self.system.period, observer)?;
         self.clock.set(0.0);
         self.change = 0;
@@ -307,7 +318,7 @@ impl<'s> Motion<'s> {
     ///
     /// # Errors
     /// A [`Stop`] if the motion cannot be continued.
-    pub fn advance_to(&mut self, until: f64, observer: &mut impl MachineObserver) -> Result<(), Stop> {
+    pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         if self.allowance.is_halted() {
             return Err(Stop::TooStiff);
         }
@@ -482,7 +493,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Takes one step: to the first event, or as far as the series or the goal allow.
-    fn step(&mut self, observer: &mut impl MachineObserver) -> Result<(), Stop> {
+    fn step(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
         self.work.steps += 1;
         self.steps_in_period += 1;
         if self.work.steps > self.allowance.steps {
@@ -588,7 +599,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes the root of a watch at the present state, and lets the tangents jump.
-    fn cross(&mut self, watch: Watch, observer: &mut impl MachineObserver) {
+    fn cross(&mut self, watch: Watch, observer: &mut impl Observer) {
         let (row, _) = self.function(watch);
         if let Watch::Wall(gap, _) | Watch::OnsetEnds(gap, _) | Watch::Leaves(gap, _) = watch {
             self.put_on_wall(gap, &row);
@@ -653,7 +664,7 @@ impl<'s> Motion<'s> {
         }
     }
 
-    fn act(&mut self, watch: Watch, observer: &mut impl MachineObserver) {
+    fn act(&mut self, watch: Watch, observer: &mut impl Observer) {
         let mut exempt = AtRest::default();
         match watch {
             Watch::Wall(gap, direction) => {
@@ -707,7 +718,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Begins contact with a wall that only pushes.
-    fn begin_force(&mut self, gap: usize, side: Side, observer: &mut impl MachineObserver) {
+    fn begin_force(&mut self, gap: usize, side: Side, observer: &mut impl Observer) {
         let count = self.system.walls(gap, side).len();
         self.record(gap, EventKind::MeshStart, side, count - 1, Some(side), observer);
         self.modes.gaps[gap] = GapMode::Beyond(signed(side, count));
@@ -715,7 +726,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Ends a lasting contact with the last wall of a side.
-    fn end_contact(&mut self, gap: usize, side: Side, observer: &mut impl MachineObserver) {
+    fn end_contact(&mut self, gap: usize, side: Side, observer: &mut impl Observer) {
         let next = self.before_last(gap, side);
         let last = self.system.walls(gap, side).len() - 1;
         self.record(gap, EventKind::MeshEnd, side, last, next.contact(), observer);
@@ -744,7 +755,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes a gap that reaches a wall in a direction.
-    fn reach(&mut self, gap: usize, direction: Side, observer: &mut impl MachineObserver) {
+    fn reach(&mut self, gap: usize, direction: Side, observer: &mut impl Observer) {
         let Some((side, number)) = self.wall_ahead(gap, direction) else { return };
         let wall = &self.system.walls(gap, side)[number];
         self.y[gap] = wall.at;
@@ -798,7 +809,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes an impact, after which the gap leaves the wall, or a lasting contact begins.
-    fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut impl MachineObserver) {
+    fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut impl Observer) {
         let (system, n) = (self.system, self.system.n);
         let (approach, number) = (side.sign() * self.rate(gap), system.walls(gap, side).len() - 1);
         let [e, slope] = wall.restitution.at(approach);
@@ -966,7 +977,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes a sliding rate that vanishes.
-    fn end_sliding(&mut self, i: usize, observer: &mut impl MachineObserver) {
+    fn end_sliding(&mut self, i: usize, observer: &mut impl Observer) {
         let mut at_rest = self.at_rest();
         at_rest.elements[i] = true;
         let before = self.modes.slips[i];
@@ -991,7 +1002,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes an element that breaks away.
-    fn begin_sliding(&mut self, i: usize, next: Slip, observer: &mut impl MachineObserver) {
+    fn begin_sliding(&mut self, i: usize, next: Slip, observer: &mut impl Observer) {
         let kept: Vec<usize> = (0..self.system.gaps()).filter(|&gap| self.is_kept(gap)).collect();
         let before = self.modes;
         self.modes.slips[i] = next;
@@ -1048,7 +1059,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Decides all modes anew that depend on forces, after a jump of forces or rates. `exempt` has just been decided.
-    fn settle(&mut self, exempt: &AtRest, observer: &mut impl MachineObserver) {
+    fn settle(&mut self, exempt: &AtRest, observer: &mut impl Observer) {
         for _ in 0..MOST_DECISIONS {
             self.refresh();
             let point = self.point();
@@ -1084,7 +1095,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Decides contact onsets and walls that only push anew. Returns whether a mode has changed.
-    fn settle_pushing(&mut self, point: &Point, observer: &mut impl MachineObserver) -> bool {
+    fn settle_pushing(&mut self, point: &Point, observer: &mut impl Observer) -> bool {
         for gap in 0..self.system.gaps() {
             if self.from_force[gap] > 0 || self.is_kept(gap) {
                 continue;
@@ -1125,7 +1136,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Enters other modes of elements at rest, and reports the changes. The rate of the element `stopped` vanished.
-    fn change_modes(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut impl MachineObserver) {
+    fn change_modes(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut impl Observer) {
         for gap in 0..self.system.gaps() {
             match (self.modes.gaps[gap], next.gaps[gap]) {
                 (GapMode::Stuck(side), GapMode::Beyond(_)) => {
@@ -1171,7 +1182,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Enters a stage: what depends on forces is decided anew.
-    fn enter_stage(&mut self, stage: usize, observer: &mut impl MachineObserver) {
+    fn enter_stage(&mut self, stage: usize, observer: &mut impl Observer) {
         self.modes.stage = stage;
         self.before = self.y;
         self.refresh();
@@ -1192,7 +1203,7 @@ impl<'s> Motion<'s> {
         side: Side,
         wall: usize,
         meshing: Option<Side>,
-        observer: &mut impl MachineObserver,
+        observer: &mut impl Observer,
     ) {
         let of_contact = |side: Side| if side == Side::Right { b'1' } else { b'4' };
         let mode = match self.modes.gaps[gap] {
@@ -1209,7 +1220,7 @@ impl<'s> Motion<'s> {
         self.work.events += 1;
         self.events_in_period += 1;
         let n = self.system.n;
-        observer.event(&MachineEvent {
+        observer.machine_event(&MachineEvent {
             gap,
             kind,
             side,
@@ -1224,10 +1235,10 @@ impl<'s> Motion<'s> {
         });
     }
 
-    fn record_slip(&mut self, symbol: Option<u8>, observer: &mut impl MachineObserver) {
+    fn record_slip(&mut self, symbol: Option<u8>, observer: &mut impl Observer) {
         self.work.events += 1;
         self.events_in_period += 1;
-        observer.slip(&SlipEvent {
+        observer.machine_slip(&SlipEvent {
             slips: self.modes.slips,
             symbol,
             period: self.period,

@@ -28,20 +28,20 @@ mod motion;
 mod polynomial;
 mod system;
 
-pub use events::{MachineEvent, MachineObserver, SlipEvent};
+pub use events::{MachineEvent, SlipEvent};
 pub use motion::Motion;
 pub use system::System;
 
-use crate::model::{MOST_COORDINATES, MOST_HARMONICS};
+use crate::model::{MOST_HARMONICS, STATE, State};
 
 /// Numbers of a state.
-pub(crate) const SIZE: usize = 2 * MOST_COORDINATES;
+pub(crate) const SIZE: usize = STATE;
 
 /// Entries of `a`: the state, a pair for each harmonic, and 1.
 pub(crate) const WIDTH: usize = SIZE + 2 * (MOST_HARMONICS + 1) + 1;
 
 /// A state in the coordinates of the model, `(x1, v1, x2, v2, ...)`, or in those of the flow, `(d1 .. dn, w1 .. wn)`; further numbers are 0.
-pub(crate) type Numbers = [f64; SIZE];
+pub(crate) type Numbers = State;
 
 /// The state, the phasors and 1, in the coordinates of the flow.
 pub(crate) type Point = [f64; WIDTH];

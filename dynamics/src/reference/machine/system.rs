@@ -147,6 +147,11 @@ impl System {
         self.period
     }
 
+    /// Returns the scales of length and speed, and the displacement beyond which the motion has escaped.
+    pub(crate) fn units(&self) -> (f64, f64, f64) {
+        (self.length, self.speed, self.escape)
+    }
+
     pub(super) fn gaps(&self) -> usize {
         self.machine.gaps.len()
     }
