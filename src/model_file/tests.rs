@@ -698,6 +698,7 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
         schedule: Vec::new(),
         outer_walls: Default::default(),
         friction: vec![Friction { row: [1.0, 0.0], force: 1.5, speed: 0.0 }],
+        machine: None,
     };
     assert_eq!(model.oscillator().unwrap(), by_hand);
     assert_eq!(
