@@ -64,7 +64,11 @@ pub fn page(model: &FileModel) -> String {
     }
     text += &format!(
         "\n{}\n{CLASSES}\n\nStatus: how the integration of a cell ended\n\n",
-        words([0, 1].map(|side| definition.walls.iter().any(|gap| !gap[side].is_empty())), has_friction, has_several)
+        words(
+            [0, 1].map(|side| definition.walls.iter().any(|gap| !gap[side].is_empty())),
+            has_friction,
+            has_several
+        )
     );
     for status in Status::ALL {
         let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));

@@ -135,9 +135,9 @@ pub(super) fn read(
             ));
         }
         if own.len() == MOST_WALLS {
-            return Err(
-                field.conflict(format!("there are already 4 walls on this side; {owner} has up to 4 on each side"))
-            );
+            return Err(field.conflict(format!(
+                "there are already 4 walls on this side; {owner} has up to 4 on each side"
+            )));
         }
         own.push(wall);
     }

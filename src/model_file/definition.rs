@@ -132,7 +132,8 @@ fn read_name(field: &Field<'_>) -> Result<String, SceneError> {
 /// Builds the error for a model without motion at its defaults, at the place of the field with the error.
 fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) -> SceneError {
     let (table, key) = blame(error, definition);
-    let refuse = |field: &Field<'_>| field.conflict(format!("at the defaults of {}, {error}", definition.name));
+    let refuse =
+        |field: &Field<'_>| field.conflict(format!("at the defaults of {}, {error}", definition.name));
     if let Table::Gap(nth) = table
         && let Some(field) = definition.motion.gaps.get(nth).and_then(|gap| motion::gap_field(root, gap))
     {

@@ -45,10 +45,12 @@ pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<Strin
     lines.extend(written(&forces));
     for (i, [z, w]) in names.iter().enumerate() {
         lines.push(format!("free, {}: N_{z} = 0", between(definition, i, z)));
-        lines.extend(contacts(definition, i, [z, w]).into_iter().map(|Contact { place, force }| match force {
-            Some(force) => format!("behind {place}: N_{z} = {force}"),
-            None => place,
-        }));
+        lines.extend(contacts(definition, i, [z, w]).into_iter().map(
+            |Contact { place, force }| match force {
+                Some(force) => format!("behind {place}: N_{z} = {force}"),
+                None => place,
+            },
+        ));
     }
     lines
 }
@@ -180,7 +182,10 @@ fn friction_force(friction: &DryFriction, motion: &Motion, i: usize) -> Option<S
 }
 
 /// Returns one equation per coordinate, with an optional force along the row of each gap.
-fn equations<'d>(definition: &'d Definition, forces: &'d [Option<String>]) -> impl Iterator<Item = String> + 'd {
+fn equations<'d>(
+    definition: &'d Definition,
+    forces: &'d [Option<String>],
+) -> impl Iterator<Item = String> + 'd {
     let motion = &definition.motion;
     let rate = |suffix: &str| -> Vec<String> {
         motion.coordinates.iter().map(|name| format!("{name}{suffix}")).collect()

@@ -23,11 +23,7 @@ impl Values<'_> {
         DVector::from_iterator(entries.len(), entries.map(|entry| self.of(entry)))
     }
 
-    fn matrix<'e, T: 'e>(
-        &self,
-        rows: &'e [Vec<T>],
-        entry: impl Fn(&'e T) -> &'e Expression,
-    ) -> DMatrix<f64> {
+    fn matrix<'e, T: 'e>(&self, rows: &'e [Vec<T>], entry: impl Fn(&'e T) -> &'e Expression) -> DMatrix<f64> {
         let entries = rows.iter().flatten().map(|value| self.of(entry(value)));
         DMatrix::from_row_iterator(rows.len(), rows.len(), entries)
     }

@@ -97,9 +97,8 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
     let section =
         root.section_among("motion", &MOTION_KEYS, &format!("{}; {LIMITS}", MOTION_KEYS.join(", ")))?;
     let field = section.require("coordinates", "name one to eight, such as coordinates = [\"x\"]")?;
-    let some = format!(
-        "1 to {MOST_COORDINATES} names: a model has at most {MOST_COORDINATES} degrees of freedom"
-    );
+    let some =
+        format!("1 to {MOST_COORDINATES} names: a model has at most {MOST_COORDINATES} degrees of freedom");
     let coordinates = read_names(&field, &some)?;
     if !(1..=MOST_COORDINATES).contains(&coordinates.len()) {
         return Err(field.out_of_range(&some));

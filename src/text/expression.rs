@@ -406,7 +406,8 @@ mod tests {
         ] {
             assert_eq!(law(text), Some(expected), "{text}");
         }
-        for text in ["exp(-x)", "x + x^2", "(1 + x)^2", "max(0, 1 - x)", "2^x", "x*(1 - x)", "1/(1 + x)", "abs(x)"]
+        for text in
+            ["exp(-x)", "x + x^2", "(1 + x)^2", "max(0, 1 - x)", "2^x", "x*(1 - x)", "1/(1 + x)", "abs(x)"]
         {
             assert_eq!(law(text), None, "{text}");
         }

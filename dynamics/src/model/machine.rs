@@ -175,11 +175,7 @@ impl Machine {
         let first = turn(phase);
         let drive = |Drive { order, cos, sin }: &Drive| {
             let turn = first.powu(*order);
-            Drive {
-                order: *order,
-                cos: cos * turn.re + sin * turn.im,
-                sin: sin * turn.re - cos * turn.im,
-            }
+            Drive { order: *order, cos: cos * turn.re + sin * turn.im, sin: sin * turn.re - cos * turn.im }
         };
         let drives = self.drives.iter().map(drive).collect();
         Machine { drives, schedule: schedule_at(&self.schedule, phase), ..self.clone() }
@@ -219,7 +215,9 @@ impl Machine {
         all_finite(|| "mass".to_owned(), &self.mass)?;
         symmetric("mass", &self.mass)?;
         if self.mass.clone().cholesky().is_none() {
-            let least = self.mass.symmetric_eigenvalues().min();
+            // The size is divided out, so that nothing overflows.
+            let size = self.mass.amax().max(f64::MIN_POSITIVE);
+            let least = size * (&self.mass / size).symmetric_eigenvalues().min();
             require(false, || "lowest eigenvalue of the mass matrix".to_owned(), least, POSITIVE)?;
         }
         let changes = self.schedule.len();
