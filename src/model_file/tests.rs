@@ -1135,3 +1135,18 @@ fn equations_of_several_gaps_have_one_contact_force_for_each() {
         ]
     );
 }
+
+#[test]
+fn a_machine_starts_at_the_same_phase_as_an_oscillator() {
+    let text = ONE_DEGREE.replace("gap = [1]", "gap = [1]\nforce_sin = [0.75]") + HARMONICS;
+    let mut plain = read(&text);
+    let mut by_speed = read(&text.replace("restitution = \"e\"", "restitution = \"e - 0.1*speed\""));
+    assert!(plain.set_start_phase(1.0) && by_speed.set_start_phase(1.0));
+    let (oscillator, machine) = (plain.oscillator().unwrap(), machine(&by_speed));
+    assert_eq!(machine.drives.len(), 3);
+    for (drive, harmonic) in machine.drives.iter().zip(oscillator.all_harmonics()) {
+        assert_eq!(drive.order, harmonic.order);
+        let off = (drive.cos[0] - harmonic.cos[0]).abs().max((drive.sin[0] - harmonic.sin[0]).abs());
+        assert!(off < 1e-14, "{drive:?} {harmonic:?}");
+    }
+}
