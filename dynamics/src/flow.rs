@@ -63,8 +63,8 @@ pub(crate) use row::Row;
 pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 
-use crate::reference::machine::System;
 use crate::model::{Contact, Law, Model, ModelError, NonImpacting, Oscillator, REST, Side, State, state};
+use crate::reference::machine::System;
 
 /// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Oscillator::other`].
 pub type Gap = [f64; 4];

@@ -43,7 +43,7 @@ use step_verdict::{Crossing, StepVerdict};
 pub use tangent::NO_SPEED;
 
 use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Schedule, Slips, Step};
-use crate::model::{Law, MOST_FRICTION, Side, State};
+use crate::model::{Law, MOST_FRICTION, REST, Side, State};
 
 /// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
 const RESCALE_STEPS: u64 = 16;
@@ -187,6 +187,15 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.tangents.map(|u| self.flow.to_state(u))
     }
 
+    /// Returns the images of the unit vectors of all entries of a state, [`Flow::state_len`], divided by the exponential of
+    /// [`log_scale`](Self::log_scale). The trajectory must carry four tangent vectors.
+    pub(crate) fn unit_images(&self) -> Vec<State> {
+        let Some(motion) = &self.machine else { return self.tangents().to_vec() };
+        let mut images = motion.tangents();
+        images.resize(self.flow.state_len(), REST);
+        images
+    }
+
     /// Returns the logarithm of the common factor of all tangent vectors, which keeps them in the range of f64.
     pub fn log_scale(&self) -> f64 {
         if let Some(motion) = &self.machine {
@@ -198,7 +207,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Replaces the tangent vectors.
     pub fn set_tangents(&mut self, tangents: [State; N]) {
         if let Some(motion) = &mut self.machine {
-            return motion.set_tangents(tangents.to_vec());
+            return motion.set_tangents(start::of_machine(motion.system(), tangents));
         }
         self.log_scale = 0.0;
         self.tangents = tangents.map(|u| self.flow.tangent_to_gap(u));
@@ -228,6 +237,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Returns the present domain of the interval.
     pub(crate) fn domain(&self) -> DomainKind {
         self.mode.domain()
+    }
+
+    /// For a machine: whether a gap in free motion passes a wall within a time of now.
+    pub(crate) fn machine_passes_wall(&self, time: f64) -> Option<bool> {
+        self.machine.as_ref().map(|motion| motion.passes_wall(time))
     }
 
     /// Returns the number of completed forcing periods.

@@ -214,6 +214,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 }
 
 /// Returns the tangents of a machine: four stand for the unit vectors of all coordinates.
-fn of_machine<const M: usize>(system: &System, tangents: [State; M]) -> Vec<State> {
+pub(super) fn of_machine<const M: usize>(system: &System, tangents: [State; M]) -> Vec<State> {
     if M == 4 { Motion::unit_tangents(system) } else { tangents.to_vec() }
 }

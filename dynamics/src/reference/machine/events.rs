@@ -16,7 +16,8 @@ pub struct MachineEvent {
     pub side: Side,
     /// Number of the wall on its side, from 0 on the inside.
     pub wall: usize,
-    /// Symbol `b'1'..=b'6'` of the flight of this gap that ends here; none for the first flight.
+    /// Symbol of the flight of this gap that ends here: `b'1'..=b'6'` if there is one gap, else [`of_gap`](crate::word::of_gap). None for
+    /// the first flight.
     pub symbol: Option<u8>,
     /// Number of completed forcing periods.
     pub period: u64,
@@ -26,6 +27,8 @@ pub struct MachineEvent {
     pub before: Numbers,
     /// State just after the event.
     pub after: Numbers,
+    /// Whether the gap was on the wall.
+    pub(crate) is_on_wall: bool,
     /// Rate of the gap just before and just after the event.
     pub rates: [f64; 2],
     /// The side of the contact of this gap that lasts after the event, if one does.

@@ -13,9 +13,10 @@ use super::{Numbers, Point, SIZE, WIDTH};
 use crate::flow::{Slip, Slips};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::reference::{
-    Allowance, Clock, EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, NO_SPEED, Observer, STEPS_PER_PERIOD_CAP, Stop,
-    Work,
+    Allowance, Clock, EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, NO_SPEED, Observer,
+    STEPS_PER_PERIOD_CAP, Stop, Work,
 };
+use crate::word;
 
 /// Height of a flight, relative to the scale of length, that is not followed in a series of impacts.
 const LOWEST_FLIGHT: f64 = 1e-13;
@@ -282,6 +283,16 @@ impl<'s> Motion<'s> {
                     || self.contact(gap) == other.contact(gap)
                         && self.contact(gap).is_some_and(|side| is_on_wall(gap, side))
             })
+    }
+
+    /// Whether a gap in free motion reaches the next wall within a time, or has passed it within that time.
+    pub(crate) fn passes_wall(&self, time: f64) -> bool {
+        (0..self.system.gaps()).any(|gap| {
+            let mut ahead = Side::BOTH.into_iter().filter_map(|side| self.wall_ahead(gap, side));
+            ahead.any(|(side, number)| {
+                (self.y[gap] - self.system.walls(gap, side)[number].at).abs() < time * self.rate(gap).abs()
+            })
+        })
     }
 
     /// Whether another motion is in the same modes, with gaps on the same walls and from the same walls.
@@ -947,6 +958,7 @@ impl<'s> Motion<'s> {
     ) -> (Modes, bool) {
         let (system, n) = (self.system, self.system.n);
         let mut modes = *modes;
+        let jumps = *y != self.y;
         let mut at_rest = AtRest::default();
         for gap in 0..system.gaps() {
             if let GapMode::Stuck(side) = modes.gaps[gap] {
@@ -959,7 +971,7 @@ impl<'s> Motion<'s> {
         for (i, element) in system.elements.iter().enumerate() {
             let moved: f64 = (0..n).map(|j| element.row[j] * kick[j]).sum();
             let size: f64 = (0..n).map(|j| (element.row[j] * kick[j]).abs()).sum();
-            if moved.abs() > 1e-12 * size {
+            if jumps && moved.abs() > 1e-12 * size {
                 let terms = (0..n).map(|j| element.row[j] * y[n + j]);
                 let (rate, size) = terms
                     .fold((-element.speed, element.speed.abs()), |(sum, size), x| (sum + x, size + x.abs()));
@@ -1135,8 +1147,11 @@ impl<'s> Motion<'s> {
         false
     }
 
-    /// Enters other modes of elements at rest, and reports the changes. The rate of the element `stopped` vanished.
+    /// Enters other modes of elements at rest, and reports the changes: of friction first, if the rate of the element `stopped` vanished.
     fn change_modes(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut impl Observer) {
+        if stopped.is_some() {
+            self.change_slips(next, stopped, observer);
+        }
         for gap in 0..self.system.gaps() {
             match (self.modes.gaps[gap], next.gaps[gap]) {
                 (GapMode::Stuck(side), GapMode::Beyond(_)) => {
@@ -1152,8 +1167,9 @@ impl<'s> Motion<'s> {
             }
             self.modes.gaps[gap] = next.gaps[gap];
         }
-        let before = self.modes.slips;
-        self.modes.slips = next.slips;
+        if stopped.is_none() {
+            self.change_slips(next, stopped, observer);
+        }
         self.refresh();
         self.system.hold(&self.modes, &mut self.y, false);
         for gap in 0..self.system.gaps() {
@@ -1162,22 +1178,33 @@ impl<'s> Motion<'s> {
             }
         }
         for i in 0..self.system.elements.len() {
-            let after = self.modes.slips[i];
-            self.has_slid[i] |= after != Slip::Stick;
-            if after == before[i] && stopped != Some(i) {
+            if self.from_rate[i] > 0 {
+                self.from_rate[i] = self.slide_order(i);
+            }
+        }
+    }
+
+    /// Enters other modes of friction, and reports the changes.
+    fn change_slips(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut impl Observer) {
+        let before = std::mem::replace(&mut self.modes.slips, next.slips);
+        for (i, (before, after)) in
+            before.into_iter().zip(next.slips).enumerate().take(self.system.elements.len())
+        {
+            if after == before {
                 continue;
             }
-            match (before[i], after) {
-                (Slip::Stick, Slip::Stick) => {}
-                (Slip::Stick, _) => self.record_slip(Some(b'7'), observer),
-                (_, Slip::Stick) => self.record_slip(None, observer),
+            self.has_slid[i] |= after != Slip::Stick;
+            let reverses = before != Slip::Stick && after != Slip::Stick;
+            let row = self.system.rate_row(i, &self.domain);
+            let point = self.point();
+            let is_at_rest = row.dot(&point).abs() <= ROUNDING * row.size(&point);
+            self.from_rate[i] = usize::from(after != Slip::Stick && is_at_rest);
+            match before {
+                Slip::Stick => self.record_slip(Some(b'7'), observer),
+                _ if !reverses => self.record_slip(None, observer),
                 _ if stopped == Some(i) => self.record_slip(Some(b'0'), observer),
                 _ => {}
             }
-            let point = self.point();
-            let row = self.system.rate_row(i, &self.domain);
-            let is_at_rest = row.dot(&point).abs() <= ROUNDING * row.size(&point);
-            self.from_rate[i] = if after != Slip::Stick && is_at_rest { self.slide_order(i) } else { 0 };
         }
     }
 
@@ -1216,6 +1243,9 @@ impl<'s> Motion<'s> {
             (None, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
             (None, Some(Side::Left)) => Some(if side == Side::Left { b'5' } else { b'6' }),
         };
+        // With several gaps, a symbol tells its gap.
+        let several = self.system.gaps() > 1;
+        let symbol = symbol.map(|symbol| if several { word::of_gap(symbol, gap) } else { symbol });
         self.origin[gap] = Some(side);
         self.work.events += 1;
         self.events_in_period += 1;
@@ -1230,6 +1260,7 @@ impl<'s> Motion<'s> {
             t: self.clock.time(),
             before: self.system.to_state(&self.before),
             after: self.state(),
+            is_on_wall: self.before[gap] == self.system.walls(gap, side)[wall].at,
             rates: [self.before[n + gap], self.y[n + gap]],
             meshing,
         });
