@@ -153,6 +153,24 @@ impl Domain {
         rate
     }
 
+    /// Returns the time derivative of a functional along the motion, as a functional.
+    pub(super) fn rate_of(&self, row: &Row) -> Row {
+        let n = self.n;
+        let mut rate = [0.0; WIDTH];
+        rate[n..2 * n].copy_from_slice(&row.0[..n]);
+        for (acceleration, &factor) in
+            self.accelerations.iter().zip(&row.0[n..]).filter(|(_, factor)| **factor != 0.0)
+        {
+            rate.iter_mut().zip(&acceleration.0).for_each(|(rate, x)| *rate += factor * x);
+        }
+        for (k, omega) in self.rates.iter().enumerate() {
+            let at = 2 * (n + k);
+            rate[at] += omega * row.0[at + 1];
+            rate[at + 1] -= omega * row.0[at];
+        }
+        Row(rate)
+    }
+
     /// Writes `factor` times the time derivative of a point to `rate`.
     fn differentiate(&self, point: &Point, factor: f64, rate: &mut Point) {
         let n = self.n;
