@@ -3,7 +3,7 @@
 
 mod cycle;
 mod friction;
-mod motion;
+pub(crate) mod motion;
 pub(crate) mod random;
 
 use std::time::{Duration, Instant};
