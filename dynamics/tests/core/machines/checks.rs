@@ -54,8 +54,8 @@ fn other_steps_give_the_same_motion() {
         let case = any_case(seed);
         let [system, other] = [ANGLE, 0.6 * ANGLE].map(|angle| System::new(&case.machine, angle));
         let mut motion = Motion::new(&system, &case.start);
-        motion.carry_tangents();
         let mut shaken = motion.shaken();
+        motion.carry_tangents();
         let mut same = Motion::new(&other, &case.start);
         same.carry_tangents();
         let rate = case.machine.omega;
@@ -84,7 +84,7 @@ fn other_steps_give_the_same_motion() {
         }
         Ok((worst, worst_tangents, periods, motion.events.len(), motion.slips.len()))
     };
-    let all: Vec<_> = (0..120u64).into_par_iter().map(run).collect();
+    let all: Vec<_> = (0..300u64).into_par_iter().map(run).collect();
     let failures: Vec<_> = all.iter().filter_map(|one| one.as_ref().err()).collect();
     let found: Vec<_> = all.iter().filter_map(|one| one.as_ref().ok()).collect();
     let worst = found.iter().map(|one| one.0).fold(0.0, f64::max);
@@ -112,16 +112,19 @@ fn derivatives_are_limits_of_differences() {
         }
         motion.events.clear();
         motion.slips.clear();
-        motion.carry_tangents();
         let image = |i: usize, h: f64| {
             let (mut moved, mut state) = (motion.clone(), motion.state());
+            if h == 0.0 {
+                moved.carry_tangents();
+            }
             state[i] += h;
             moved.set_state(&state);
             moved.advance_period()?;
             let what = (by_gap(&moved.events, case.machine.gaps.len()), moved.slips.iter().map(|slip| slip.0).collect::<Vec<_>>());
-            Some((DVector::from_vec(moved.state()), moved.derivative(), what))
+            let derivative = (h == 0.0).then(|| moved.derivative());
+            Some((DVector::from_vec(moved.state()), derivative, what))
         };
-        let Some((_, exact, what)) = image(0, 0.0) else { return Ok((found, 0.0)) };
+        let Some((_, Some(exact), what)) = image(0, 0.0) else { return Ok((found, 0.0)) };
         let (size, mut worst) = (exact.amax().max(1.0), 0.0f64);
         for i in 0..2 * n {
             // A motion with steep turns needs small differences, and one that rounding errors grow in needs large ones.
@@ -131,7 +134,14 @@ fn derivatives_are_limits_of_differences() {
                 let change = (above.0 - below.0) * (size / (2.0 * h));
                 is_same.then(|| (change - exact.column(i)).amax() / size)
             };
-            let Some(off) = [1e-5, 1e-6, 1e-7].into_iter().filter_map(off).reduce(f64::min) else {
+            let mut best = None;
+            for found in [1e-6, 1e-7, 3e-8, 1e-5].into_iter().filter_map(off) {
+                best = Some(best.map_or(found, |best: f64| best.min(found)));
+                if found < 1e-5 {
+                    break;
+                }
+            }
+            let Some(off) = best else {
                 found[2] += 1;
                 continue;
             };
@@ -144,7 +154,7 @@ fn derivatives_are_limits_of_differences() {
         }
         Ok((found, worst))
     };
-    let all: Vec<_> = (0..300u64).into_par_iter().map(run).collect();
+    let all: Vec<_> = (0..200u64).into_par_iter().map(run).collect();
     let failures: Vec<_> = all.iter().filter_map(|one| one.as_ref().err()).collect();
     let found: Vec<_> = all.iter().filter_map(|one| one.as_ref().ok()).collect();
     let sum = |i: usize| found.iter().map(|one| one.0[i]).sum::<usize>();
@@ -173,7 +183,7 @@ fn energy(machine: &Machine, motion: &Motion, state: &[f64]) -> f64 {
 #[test]
 fn energy_decreases_without_force() {
     let mut events = 0;
-    for seed in 0..100 {
+    for seed in 0..300 {
         let Case { mut machine, start } = any_case(seed);
         machine.drives.iter_mut().for_each(|drive| (drive.cos, drive.sin) = (&drive.cos * 0.0, &drive.sin * 0.0));
         machine.schedule.clear();
@@ -341,4 +351,58 @@ fn machines_of_two_oscillators_move_like_both() {
 #[test]
 fn machines_of_three_oscillators_move_like_all() {
     check_plain(3, 0..30, 4, 0.7);
+}
+
+/// The motion does not depend on the coordinates.
+#[test]
+fn other_coordinates_give_the_same_motion() {
+    let run = |seed: u64| {
+        let Case { machine, start } = any_case(seed);
+        let n = machine.degrees();
+        let random = &mut Random(seed);
+        let t = DMatrix::from_fn(n, n, |i, j| random.even(0.8 / n as f64) + if i == j { 1.0 } else { 0.0 });
+        let inverse = t.clone().try_inverse().expect("coordinates");
+        let moved = |m: &DMatrix<f64>, state: &[f64]| -> Vec<f64> {
+            let of = |at: usize| m * DVector::from_fn(n, |i, _| state[2 * i + at]);
+            let (x, v) = (of(0), of(1));
+            (0..2 * n).map(|i| if i % 2 == 0 { x[i / 2] } else { v[i / 2] }).collect()
+        };
+        let other = in_coordinates(&machine, &t);
+        // Without two walls of one gap, the scale of length depends on the coordinates.
+        if (machine.length_scale() - other.length_scale()).abs() > 1e-12 * machine.length_scale() {
+            return Ok(0);
+        }
+        let systems = [&machine, &other].map(|machine| System::new(machine, ANGLE));
+        let mut motion = Motion::new(&systems[0], &start);
+        let mut same = Motion::new(&systems[1], &moved(&inverse, &start));
+        let mut shaken = motion.shaken();
+        let mut compared = 0;
+        for period in 0..4 {
+            let ends = shaken.iter_mut().all(|one| one.advance_period().is_some());
+            if motion.advance_period().is_none() || !ends {
+                break;
+            }
+            let off_of = |state: &[f64]| apart(state, &motion.state(), machine.omega);
+            let noise = shaken.iter().map(|one| off_of(&one.state())).fold(0.0, f64::max);
+            if noise > MOST_NOISE {
+                break;
+            }
+            if same.advance_period().is_none() {
+                return Err(format!("{seed}: no end"));
+            }
+            let off = off_of(&moved(&t, &same.state()));
+            let gaps = machine.gaps.len();
+            if off.is_nan() || off > 1e-11 + 10.0 * noise || by_gap(&motion.events, gaps) != by_gap(&same.events, gaps) {
+                return Err(format!("{seed}: off by {off:e} with noise {noise:e} in period {period}: {:?} but {:?}", motion.events, same.events));
+            }
+            compared += 1;
+        }
+        Ok(compared)
+    };
+    let all: Vec<Result<i32, String>> = (0..200u64).into_par_iter().map(run).collect();
+    let failures: Vec<_> = all.iter().filter_map(|one| one.as_ref().err()).collect();
+    failures.iter().for_each(|failure| println!("{failure}"));
+    let compared: i32 = all.iter().filter_map(|one| one.as_ref().ok()).sum();
+    println!("{compared} periods");
+    assert!(failures.is_empty() && compared > 400, "{}", failures.len());
 }

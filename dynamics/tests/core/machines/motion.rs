@@ -7,7 +7,7 @@ use std::rc::Rc;
 use nalgebra::DVector;
 use rattlemap_dynamics::model::{Contact, Side};
 
-use super::system::{Grip, Key, Linear, Matrix, ROUNDING, Row, System, Vector, exponential, value};
+use super::system::{Grip, Key, Linear, Matrix, ROUNDING, Row, System, Vector, exponential, product, value};
 use crate::independent::motion::first_fall;
 
 /// Relative errors of velocities that stand for those of rounding, which are smaller.
@@ -227,6 +227,10 @@ impl<'a> Motion<'a> {
         self.gaps[gap].acting()
     }
 
+    pub(crate) fn modes(&self) -> Vec<Mode> {
+        self.gaps.iter().map(|gap| gap.mode).collect()
+    }
+
     pub(super) fn time(&self) -> f64 {
         f64::from(self.periods) * self.system.period + self.t
     }
@@ -393,7 +397,7 @@ impl<'a> Motion<'a> {
     pub(crate) fn run(&mut self, until: f64) -> Option<()> {
         let n = self.system.degrees;
         let mut events = 0u32;
-        let mut linear = self.linear();
+        let (mut linear, mut flown) = (self.linear(), 0.0);
         while self.t < until {
             let (h, is_whole) = match until - self.t {
                 rest if rest <= linear.step.0 => (rest, false),
@@ -405,14 +409,7 @@ impl<'a> Motion<'a> {
             let at = |share: f64| {
                 series.iter().rev().fold(Vector::zeros(self.y.len()), |sum, term| sum * share + term)
             };
-            if let Some(tangents) = &mut self.tangents {
-                let block = |m: &Matrix| m.view((0, 0), (2 * n, 2 * n)).into_owned();
-                let moved = match is_whole && found.is_none() {
-                    true => block(&linear.step.1),
-                    false => exponential(&(block(&linear.a) * (share * h))),
-                };
-                *tangents = moved * &*tangents;
-            }
+            flown += share * h;
             if share > 0.0 {
                 self.y = if is_whole && found.is_none() { &linear.step.1 * &self.y } else { at(share) };
                 self.orders.fill(0);
@@ -428,6 +425,7 @@ impl<'a> Motion<'a> {
                 continue;
             };
             self.t += share * h;
+            self.move_tangents(&linear, std::mem::take(&mut flown));
             self.act(end, share == 0.0);
             if self.shaken[0] != 0.0 {
                 let error = self.shaken[events as usize % 4];
@@ -441,7 +439,17 @@ impl<'a> Motion<'a> {
                 return None;
             }
         }
+        self.move_tangents(&linear, flown);
         Some(())
+    }
+
+    /// Advances the tangents by a time in a domain.
+    fn move_tangents(&mut self, linear: &Linear, time: f64) {
+        let size = 2 * self.system.degrees;
+        if let Some(tangents) = &mut self.tangents {
+            let moved = exponential(&(linear.a.view((0, 0), (size, size)) * time));
+            *tangents = product(&moved, tangents);
+        }
     }
 
     /// Returns the share of a step after which a flight ends, and what ends it.

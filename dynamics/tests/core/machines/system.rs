@@ -102,11 +102,22 @@ pub(crate) fn exponential(a: &Matrix) -> Matrix {
     let doublings = (2.0 * size).log2().ceil().max(0.0) as i32;
     let small = a * 2f64.powi(-doublings);
     let one = Matrix::identity(a.nrows(), a.nrows());
-    let mut sum = (1..=18).rev().fold(one.clone(), |sum, k| &one + &small * sum / f64::from(k));
+    let mut sum = (1..=18).rev().fold(one.clone(), |sum, k| &one + product(&small, &sum) / f64::from(k));
     for _ in 0..doublings {
-        sum = &sum * &sum;
+        sum = product(&sum, &sum);
     }
     sum
+}
+
+/// Returns the product of two matrices, column by column. In test builds, the product of nalgebra is not optimised.
+pub(crate) fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    let mut all = Matrix::zeros(a.nrows(), b.ncols());
+    for (mut column, b) in all.column_iter_mut().zip(b.column_iter()) {
+        for (a, &b) in a.column_iter().zip(b.iter()).filter(|(_, b)| **b != 0.0) {
+            column.axpy(b, &a, 1.0);
+        }
+    }
+    all
 }
 
 /// Returns the largest sum of the entries' sizes in a row.
