@@ -135,7 +135,8 @@ impl Motion<'_> {
     /// Opens or closes the contact with a wall that only pushes by the sign of its force.
     fn push(&mut self, i: usize) {
         let mode = self.gaps[i].mode;
-        if self.gaps[i].is_unloaded || !matches!(mode, Mode::Plain | Mode::Open) || self.pushing(i).is_none() {
+        if self.gaps[i].is_unloaded || !matches!(mode, Mode::Plain | Mode::Open) || self.pushing(i).is_none()
+        {
             if mode == Mode::Open && self.pushing(i).is_none() {
                 // Without preload and damper, the force behind the wall pushes.
                 self.record(i, What::Begins, side_of(self.gaps[i].level));
@@ -230,10 +231,11 @@ impl Motion<'_> {
                 continue;
             }
             let growth = self.of(&(&linear.acceleration[i] * &linear.a)).signum();
-            let wall = self.gaps[i].leaves.filter(|(side, _)| side.sign() == growth).and_then(|(direction, _)| {
-                let (side, nth) = self.next_wall(i, direction).filter(|wall| wall.0 == direction)?;
-                Some((side, self.system.machine.gaps[i].walls[side.index()][nth].contact))
-            });
+            let wall =
+                self.gaps[i].leaves.filter(|(side, _)| side.sign() == growth).and_then(|(direction, _)| {
+                    let (side, nth) = self.next_wall(i, direction).filter(|wall| wall.0 == direction)?;
+                    Some((side, self.system.machine.gaps[i].walls[side.index()][nth].contact))
+                });
             match (self.gaps[i].mode, wall) {
                 (Mode::Onset(side), _) if side.sign() == growth => self.gaps[i].is_unpressed = true,
                 (Mode::Onset(side), _) => self.ends(i, side),
@@ -294,8 +296,9 @@ impl Motion<'_> {
         }
     }
 
-    /// Returns the joint impact of a gap with a wall. Gaps at rest on rigid walls rest on if this needs a push of their walls.
-    fn joint(&self, i: usize, side: Side) -> Joint {
+    /// Returns the joint impact of a gap with a wall. Gaps at rest on rigid walls rest on if this needs a push of their walls, and the gaps of
+    /// `keep` in any case.
+    fn joint(&self, i: usize, side: Side, keep: &[usize]) -> Joint {
         let (machine, stuck) = (&self.system.machine, self.stuck());
         let walls: Vec<(usize, Side)> = (0..stuck.len()).filter_map(|j| Some((j, stuck[j]?))).collect();
         let hit = &machine.gaps[i].row;
@@ -313,12 +316,13 @@ impl Motion<'_> {
             let impulses = mobility.try_inverse().expect("independent rows") * rates;
             let size: f64 = impulses.iter().zip(&rows).map(|(p, row)| p.abs() * row.norm()).sum();
             let pushes = held.iter().enumerate().all(|(at, &j)| {
-                -walls[j].1.sign() * impulses[at] * rows[at].norm() >= -ROUNDING * size
+                let is_kept = keep.contains(&walls[j].0);
+                is_kept || -walls[j].1.sign() * impulses[at] * rows[at].norm() >= -ROUNDING * size
             });
             let leaves = released.iter().all(|&j| {
                 let (other, own) = walls[j];
                 let rate = machine.gaps[other].row.dot(&change) * -side.sign();
-                own.sign() * rate < 0.0
+                !keep.contains(&other) && own.sign() * rate < 0.0
             });
             if pushes && leaves {
                 return Joint { change, released: released.into_iter().map(|j| walls[j]).collect() };
@@ -332,10 +336,10 @@ impl Motion<'_> {
         let (n, system) = (self.system.degrees, self.system);
         let (gap, s) = (&system.machine.gaps[i], side.sign());
         let wall = &gap.walls[side.index()][nth];
-        let ([mut e, mut slope], joint) = (wall.restitution.at(closing), self.joint(i, side));
+        let [mut e, mut slope] = wall.restitution.at(closing);
         let start = self.clone();
         // The state after the impact, with this restitution and this mode of the gap.
-        let after = |motion: &mut Self, e: f64, mode: Mode| {
+        let after = |motion: &mut Self, joint: &Joint, e: f64, mode: Mode| {
             motion.y.clone_from(&start.y);
             motion.gaps.clone_from(&start.gaps);
             motion.grips.clone_from(&start.grips);
@@ -349,30 +353,45 @@ impl Motion<'_> {
             motion.begin_slides(&joint.change, (1.0 + e) * closing);
             motion.decide();
         };
-        after(self, e, Mode::Plain);
-        let linear = self.linear();
-        let acceleration = self.of(&linear.acceleration[i]).abs();
-        let limit = wall.mesh_speed.max((2.0 * LOWEST_FLIGHT * system.length * acceleration).sqrt());
-        let mut lasts = false;
-        if e * closing <= limit {
-            if wall.contact == Contact::Rigid {
-                after(self, 0.0, Mode::Stuck(side));
-                lasts = matches!(self.gaps[i].mode, Mode::Stuck(_));
-                if lasts {
-                    (e, slope) = (0.0, 0.0);
+        let limit = |motion: &Self, gap: usize| {
+            let acceleration = motion.of(&motion.linear().acceleration[gap]).abs();
+            (2.0 * LOWEST_FLIGHT * system.length * acceleration).sqrt()
+        };
+        let (mut keep, mut joint) = (Vec::new(), self.joint(i, side, &[]));
+        let mut lasts;
+        loop {
+            lasts = false;
+            after(self, &joint, e, Mode::Plain);
+            if e * closing <= wall.mesh_speed.max(limit(self, i)) {
+                if wall.contact == Contact::Rigid {
+                    after(self, &joint, 0.0, Mode::Stuck(side));
+                    lasts = matches!(self.gaps[i].mode, Mode::Stuck(_));
+                } else if self.presses(&self.linear(), i, side) {
+                    after(self, &joint, e, if e > 0.0 { Mode::Onset(side) } else { Mode::Plain });
+                    if e == 0.0 {
+                        self.enter(i, side);
+                        self.gaps[i].leaves = Some((side.mirrored(), 2));
+                        self.decide();
+                    }
+                    lasts = self.presses(&self.linear(), i, side);
                 }
-            } else if self.presses(&linear, i, side) {
-                after(self, e, if e > 0.0 { Mode::Onset(side) } else { Mode::Plain });
-                if e == 0.0 {
-                    self.enter(i, side);
-                    self.gaps[i].leaves = Some((side.mirrored(), 2));
-                    self.decide();
+                if !lasts {
+                    after(self, &joint, e, Mode::Plain);
                 }
-                lasts = self.presses(&self.linear(), i, side);
             }
-            if !lasts {
-                after(self, e, Mode::Plain);
-            }
+            // Gaps that begin a flight which is too low rest on, or impacts of two gaps in turn could be infinitely many.
+            let linear = self.linear();
+            let low = joint
+                .released
+                .iter()
+                .find(|&&(j, own)| self.presses(&linear, j, own) && -self.rate(j, own) <= limit(self, j));
+            let Some(&(j, _)) = low else { break };
+            self.corners += 1;
+            keep.push(j);
+            joint = start.joint(i, side, &keep);
+        }
+        if lasts && wall.contact == Contact::Rigid {
+            (e, slope) = (0.0, 0.0);
         }
         let what = if lasts { What::Begins } else { What::Impact };
         self.record_as(i, what, side, symbol(&start.gaps[i], side));

@@ -52,6 +52,11 @@ impl Follower for Motion<'_> {
     }
 }
 
+/// Returns the largest entry of the derivative. It is 0 but for rounding when everything rests.
+fn size(period: &Period) -> f64 {
+    period.derivative.amax().max(1e-6)
+}
+
 /// Largest differences and numbers of what is compared.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
@@ -75,13 +80,14 @@ impl Ours<'_> {
     /// Advances by a period. Returns it with the effects of errors on state and derivative and the events with other steps, or none if
     /// they are too large.
     fn advance(&mut self, omega: f64) -> Option<(Period, Period, [f64; 2])> {
-        let (ours, other) = (Follower::advance(&mut self.motion).ok()?, Follower::advance(&mut self.other).ok()?);
+        let (ours, other) =
+            (Follower::advance(&mut self.motion).ok()?, Follower::advance(&mut self.other).ok()?);
         let mut noise = apart(&ours.state, &other.state, omega);
         for shaken in &mut self.shaken {
             shaken.advance_period()?;
             noise = noise.max(apart(&ours.state, &shaken.state(), omega));
         }
-        let size = ours.derivative.amax();
+        let size = size(&ours);
         let of_derivative = (&ours.derivative - &other.derivative).amax() / size;
         (noise <= MOST_NOISE && size <= MOST_GROWTH).then_some((ours, other, [noise, of_derivative]))
     }
@@ -118,10 +124,12 @@ fn compare(machine: &Machine, mut ours: Ours, theirs: &mut dyn Follower) -> Resu
         if off.is_nan() || off > STATE_OFF + NOISES * noise {
             return Err(period_of(format!("state off by {off:e} with noise {noise:e}")));
         }
-        let size = own.derivative.amax();
+        let size = size(&own);
         let of = (&own.derivative - &their.derivative).amax() / size;
         if of.is_nan() || of > DERIVATIVE_OFF + NOISES * of_derivative {
-            return Err(period_of(format!("derivative off by {of:e} of {size:e} with noise {of_derivative:e}")));
+            return Err(period_of(format!(
+                "derivative off by {of:e} of {size:e} with noise {of_derivative:e}"
+            )));
         }
         found.state = found.state.max(off);
         found.derivative = found.derivative.max(of);

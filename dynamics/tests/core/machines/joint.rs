@@ -25,8 +25,7 @@ fn row_of_masses(loads: &[f64]) -> Machine {
         GapRow { row, walls: [vec![wall(0.0, if i == 0 { 0.5 } else { 0.0 })], vec![wall(-1.0, 0.5)]] }
     };
     let none = DMatrix::zeros(n, n);
-    let forces =
-        Forces { damping: none.clone(), stiffness: none, load: DVector::from_row_slice(loads) };
+    let forces = Forces { damping: none.clone(), stiffness: none, load: DVector::from_row_slice(loads) };
     Machine {
         omega: 1.0,
         mass: DMatrix::identity(n, n),
@@ -73,7 +72,8 @@ fn an_impact_that_pulls_releases_a_mass() {
     let system = System::new(&row_of_masses(&[0.0, 0.1]), ANGLE);
     let mut motion = Motion::new(&system, &[-0.5, -1.0, FALL[0], FALL[1]]);
     motion.run(0.75).unwrap();
-    let events: Vec<_> = motion.events.iter().map(|event| (event.gap, event.what, event.side, event.symbol)).collect();
+    let events: Vec<_> =
+        motion.events.iter().map(|event| (event.gap, event.what, event.side, event.symbol)).collect();
     let expected = [
         (1, What::Begins, Side::Right, None),
         (0, What::Impact, Side::Left, None),

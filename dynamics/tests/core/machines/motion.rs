@@ -99,6 +99,8 @@ pub(crate) struct Motion<'a> {
     pub(crate) events: Vec<Event>,
     /// Ends of sticking, `7`, and reversals, `0`, with their times, which the caller may clear.
     pub(crate) slips: Vec<(u8, f64)>,
+    /// Number of flights of gaps off walls which impacts of other gaps would have begun, and that are too low.
+    pub(crate) corners: usize,
     /// Relative errors of the velocities that are added in turn at events.
     shaken: [f64; 4],
 }
@@ -155,6 +157,7 @@ impl<'a> Motion<'a> {
             tangents: None,
             events: Vec::new(),
             slips: Vec::new(),
+            corners: 0,
             shaken: [0.0; 4],
         };
         motion.put(start);

@@ -1,7 +1,9 @@
 //! Random machines, with walls near the amplitudes of their gaps.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Contact, Drive, DryFriction, Forces, GapRow, Machine, Restitution, Side, Spring, Wall};
+use rattlemap_dynamics::model::{
+    Contact, Drive, DryFriction, Forces, GapRow, Machine, Restitution, Side, Spring, Wall,
+};
 
 use crate::independent::random::Random;
 
@@ -112,7 +114,8 @@ fn walls(random: &mut Random, machine: &Machine, count: usize, at: f64, s: f64, 
             damping: spring.damping * random.logarithmic(0.6, 1.6),
             preload: spring.preload * random.between(0.5, 1.5),
         };
-        let springs = (0..machine.stages.len()).map(|i| if i == 0 { spring } else { of_stage(random) }).collect();
+        let springs =
+            (0..machine.stages.len()).map(|i| if i == 0 { spring } else { of_stage(random) }).collect();
         let restitution = match random.below(8) {
             0 | 1 => Restitution::constant(0.0),
             2 => Restitution {
@@ -173,7 +176,8 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
             phases.iter().enumerate().map(|(i, &phase)| (phase, (i + 1) % count)).collect()
         }
     };
-    let mut orders: Vec<u32> = (1..1 + random.below(shape.harmonics)).map(|_| 2 + random.below(5) as u32).collect();
+    let mut orders: Vec<u32> =
+        (1..1 + random.below(shape.harmonics)).map(|_| 2 + random.below(5) as u32).collect();
     orders.push(1);
     orders.sort_unstable();
     orders.dedup();

@@ -261,7 +261,8 @@ impl System {
             let rate = f64::from(drive.order) * machine.omega;
             (a[(cos, sin)], a[(sin, cos)]) = (-rate, rate);
         }
-        let fastest = (norm(&of_x).sqrt() + norm(&of_v)).max(f64::from(machine.highest_order()) * machine.omega);
+        let fastest =
+            (norm(&of_x).sqrt() + norm(&of_v)).max(f64::from(machine.highest_order()) * machine.omega);
         (a, fastest)
     }
 
@@ -291,7 +292,8 @@ impl System {
         let rows = |walls: &[usize], sticking: &[usize]| -> Vec<&Vector> {
             walls.iter().map(|&i| gap(i)).chain(sticking.iter().map(|&i| along(i))).collect()
         };
-        let others = |of: &[usize], i: usize| -> Vec<usize> { of.iter().copied().filter(|&j| j != i).collect() };
+        let others =
+            |of: &[usize], i: usize| -> Vec<usize> { of.iter().copied().filter(|&j| j != i).collect() };
         let at_rest = rows(&held, &busy);
         let a = self.bound(&free, &at_rest);
         let mut is_still = vec![false; machine.gaps.len()];
