@@ -10,6 +10,7 @@ mod elastic;
 mod flow;
 mod friction;
 mod independent;
+mod machines;
 mod instants;
 mod machine;
 mod one_wall;
