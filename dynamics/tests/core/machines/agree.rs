@@ -202,9 +202,8 @@ fn the_comparison_finds_errors() {
     assert!(differ > 30, "{differ}");
 }
 
-#[cfg(any())]
 mod program {
-    use rattlemap_dynamics::machine::System as Program;
+    use rattlemap_dynamics::reference::machine::System as Program;
 
     use super::super::engine::program::Engine;
     use super::*;

@@ -23,11 +23,10 @@ pub(crate) trait Follower {
 }
 
 /// The program's motion of a machine. Names and signatures of the program occur only here.
-#[cfg(any())]
 pub(crate) mod program {
-    use rattlemap_dynamics::machine::{Motion, Observer, System};
     use rattlemap_dynamics::model::Machine;
-    use rattlemap_dynamics::reference::EventKind;
+    use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, SlipEvent, System};
+    use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer};
 
     use super::super::motion::{Event, What};
     use super::{Follower, Period};
@@ -36,6 +35,7 @@ pub(crate) mod program {
         motion: Motion<'a>,
         degrees: usize,
         period: f64,
+        several: bool,
     }
 
     #[derive(Default)]
@@ -43,43 +43,49 @@ pub(crate) mod program {
         events: Vec<Event>,
         slips: Vec<(u8, f64)>,
         period: f64,
+        several: bool,
     }
 
     impl Observer for Record {
-        fn event(&mut self, event: &rattlemap_dynamics::machine::Event) {
+        fn event(&mut self, _: &GapEvent) {}
+
+        fn machine_event(&mut self, event: &MachineEvent) {
             let what = match event.kind {
                 EventKind::Impact => What::Impact,
                 EventKind::MeshStart => What::Begins,
                 EventKind::MeshEnd => What::Ends,
             };
             let t = event.period as f64 * self.period + event.t;
-            self.events.push(Event { gap: event.gap, what, side: event.side, symbol: event.symbol, t });
+            let of_gap = if self.several { 8 * (event.gap as u8 + 1) } else { 0 };
+            let symbol = event.symbol.map(|symbol| symbol - of_gap);
+            self.events.push(Event { gap: event.gap, what, side: event.side, symbol, t });
         }
 
-        fn friction(&mut self, change: &rattlemap_dynamics::machine::FrictionChange) {
-            self.slips.push((change.symbol, change.period as f64 * self.period + change.t));
+        fn machine_slip(&mut self, change: &SlipEvent) {
+            let t = change.period as f64 * self.period + change.t;
+            self.slips.extend(change.symbol.map(|symbol| (symbol, t)));
         }
     }
 
     impl<'a> Engine<'a> {
         pub(crate) fn new(system: &'a System, machine: &Machine, start: &[f64]) -> Engine<'a> {
-            let mut state = [0.0; 16];
-            state[..start.len()].copy_from_slice(start);
-            let motion = Motion::with_unit_tangents(system, &state);
-            Engine { motion, degrees: machine.degrees(), period: machine.period() }
+            let mut motion = Motion::new(system, start);
+            motion.set_tangents(Motion::unit_tangents(system));
+            let several = machine.gaps.len() > 1;
+            Engine { motion, degrees: machine.degrees(), period: machine.period(), several }
         }
     }
 
     impl Follower for Engine<'_> {
         fn advance(&mut self) -> Result<Period, String> {
-            let mut record = Record { period: self.period, ..Record::default() };
+            let mut record = Record { period: self.period, several: self.several, ..Record::default() };
             self.motion.advance_period(&mut record).map_err(|stop| stop.to_string())?;
             let size = 2 * self.degrees;
             Ok(Period {
                 events: record.events,
                 slips: record.slips,
                 state: self.motion.state()[..size].to_vec(),
-                derivative: self.motion.derivative().view((0, 0), (size, size)).into_owned(),
+                derivative: self.motion.derivative(),
             })
         }
     }
