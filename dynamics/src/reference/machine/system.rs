@@ -6,6 +6,7 @@ use std::sync::{Arc, RwLock};
 use nalgebra::{DMatrix, DVector};
 
 use super::domain::{Domain, DomainKey};
+use super::modes::ROUNDING;
 use super::{Numbers, Point, SIZE};
 use crate::model::{Contact, Machine, Side, Wall};
 
@@ -81,10 +82,12 @@ impl System {
             .collect();
         let with_force = machine.friction.iter().filter(|friction| friction.force > 0.0);
         let elements = with_force
-            .map(|friction| Element {
-                row: &back * &friction.row,
-                force: friction.force,
-                speed: friction.speed,
+            .map(|friction| {
+                let row = &back * &friction.row;
+                // A row along a gap must not have rounding errors in other entries.
+                let least = ROUNDING * row.amax();
+                let row = row.map(|x| if x.abs() > least { x } else { 0.0 });
+                Element { row, force: friction.force, speed: friction.speed }
             })
             .collect();
         let period = machine.period();

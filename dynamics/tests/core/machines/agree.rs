@@ -126,7 +126,8 @@ fn compare(machine: &Machine, mut ours: Ours, theirs: &mut dyn Follower) -> Resu
         }
         let size = size(&own);
         let of = (&own.derivative - &their.derivative).amax() / size;
-        if of.is_nan() || of > DERIVATIVE_OFF + NOISES * of_derivative {
+        // At rest on a wall, the known derivative is not a number.
+        if !of_derivative.is_nan() && (of.is_nan() || of > DERIVATIVE_OFF + NOISES * of_derivative) {
             return Err(period_of(format!(
                 "derivative off by {of:e} of {size:e} with noise {of_derivative:e}"
             )));
