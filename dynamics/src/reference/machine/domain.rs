@@ -68,6 +68,8 @@ pub(super) struct Domain {
     pub(super) accelerations: Vec<Row>,
     /// Whether the acceleration of each coordinate is exactly 0, because constraints hold it.
     pub(super) is_still: [bool; SIZE],
+    /// Damping matrix, with the dampers of contacts.
+    pub(super) damping: DMatrix<f64>,
     /// Longest step.
     pub(super) unit: f64,
     /// Rows of the forces with which rigid walls push gaps that rest on them.
@@ -134,6 +136,7 @@ impl Domain {
             accelerations: (0..n).map(|i| row(&bound, i)).collect(),
             is_still,
             unit: RADIUS / system.rate(&stiffness, &damping),
+            damping,
             pushes,
             holds,
         }
@@ -194,6 +197,17 @@ impl Domain {
             let (done, next) = series.split_at_mut(k + 1);
             self.differentiate(&done[k], h / (k + 1) as f64, &mut next[0]);
         }
+    }
+
+    /// Returns the whole point at a share of a step.
+    pub(super) fn point(&self, series: &Series, share: f64) -> Point {
+        let mut point = [0.0; WIDTH];
+        for term in series.iter().rev() {
+            for (x, term) in point.iter_mut().zip(&term[..self.width]) {
+                *x = *x * share + term;
+            }
+        }
+        point
     }
 
     /// Returns the state at a share of a step.

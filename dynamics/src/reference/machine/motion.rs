@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 
 use super::domain::{Constraint, Constraints, Domain, DomainKey, Row, Series};
 use super::events::{MachineEvent, SlipEvent};
+use super::flight::Flight;
 use super::modes::{AtRest, GapMode, Modes, ROUNDING, first_derivative};
 use super::polynomial::{Fall, ORDER, first_fall};
 use super::system::System;
@@ -532,6 +533,19 @@ impl<'s> Motion<'s> {
         let first = self.first_event(&point, &series);
         let (share, time) = first.map_or((1.0, h), |(share, _)| (share, share * h));
         if share > 0.0 {
+            if observer.measures() {
+                let (system, start) = (self.system, self.clock.time());
+                let (domain, modes, series) = (&*self.domain, &self.modes, &*series);
+                observer.machine_flight(&Flight {
+                    system,
+                    domain,
+                    modes,
+                    series,
+                    share,
+                    duration: time,
+                    start,
+                });
+            }
             self.advance(&series, share, time);
         }
         self.series = Some(series);
@@ -628,7 +642,11 @@ impl<'s> Motion<'s> {
         }
         (self.before, self.reset) = (self.y, None);
         let field = self.domain.derivative(&self.point());
+        let energy = self.system.energy(&self.modes, &self.y);
         self.act(watch, observer);
+        if observer.measures() {
+            observer.machine_loss(energy - self.system.energy(&self.modes, &self.y));
+        }
         self.refresh();
         if !self.tangents.is_empty() {
             self.saltate(watch, &row, &field);

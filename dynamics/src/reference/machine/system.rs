@@ -44,7 +44,8 @@ pub struct System {
     pub(super) escape: f64,
     /// `d = to_flow x`, and its inverse.
     to_flow: DMatrix<f64>,
-    from_flow: DMatrix<f64>,
+    pub(super) from_flow: DMatrix<f64>,
+    pub(super) mass: DMatrix<f64>,
     /// Inverse of the mass matrix, and the inverse of its Cholesky factor.
     pub(super) mobility: DMatrix<f64>,
     pub(super) mass_scale: DMatrix<f64>,
@@ -69,7 +70,7 @@ impl System {
         let mobility = 0.5 * (&mobility + mobility.transpose());
         let mass = &back * &machine.mass * &from_flow;
         let mass = 0.5 * (&mass + mass.transpose());
-        let factor = mass.cholesky().expect("the mass matrix is positive definite").l();
+        let factor = mass.clone().cholesky().expect("the mass matrix is positive definite").l();
         let mass_scale = factor.try_inverse().expect("the factor is regular");
         let stages: Vec<StageForces> = machine
             .stages
@@ -103,6 +104,7 @@ impl System {
             schedule: machine.schedule.iter().map(|&(turns, stage)| (turns * period, stage)).collect(),
             to_flow,
             from_flow,
+            mass,
             mobility,
             mass_scale,
             stages,
