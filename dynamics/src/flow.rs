@@ -63,7 +63,7 @@ pub(crate) use row::Row;
 pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 
-use crate::model::{Contact, Law, Model, ModelError, NonImpacting, Oscillator, Side, State};
+use crate::model::{Contact, Law, Model, ModelError, NonImpacting, Oscillator, REST, Side, State, state};
 
 /// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Oscillator::other`].
 pub type Gap = [f64; 4];
@@ -439,19 +439,35 @@ impl Flow {
         self.compliance
     }
 
+    /// Returns the number of entries of a state that can differ from 0: two for each coordinate, and four at least.
+    pub fn state_len(&self) -> usize {
+        2 * self.degrees.max(2)
+    }
+
     /// Converts a state to gap coordinates.
+    #[inline]
     pub fn to_gap(&self, y: State) -> Gap {
         let ([g0, g1], o) = (self.gap, 2 * self.other);
         [g0 * y[0] + g1 * y[2], g0 * y[1] + g1 * y[3], y[o], y[o + 1]]
     }
 
     /// Converts a tangent vector to gap coordinates. In one degree of freedom the second displacement is set to 0.
-    pub(crate) fn tangent_to_gap(&self, [x1, v1, x2, v2]: State) -> Gap {
-        self.to_gap(if self.degrees == 1 { [x1, v1, 0.0, 0.0] } else { [x1, v1, x2, v2] })
+    pub(crate) fn tangent_to_gap(&self, u: State) -> Gap {
+        self.to_gap(if self.degrees == 1 { state(&u[..2]) } else { u })
     }
 
     /// Converts gap coordinates to a state.
+    #[inline]
     pub fn to_state(&self, q: Gap) -> State {
+        let [x1, v1, x2, v2] = self.displacements(q);
+        let mut y = REST;
+        (y[0], y[1], y[2], y[3]) = (x1, v1, x2, v2);
+        y
+    }
+
+    /// Returns both displacements and their velocities, `(x1, v1, x2, v2)`.
+    #[inline]
+    pub(crate) fn displacements(&self, q: Gap) -> [f64; 4] {
         let [g0, g1] = self.gap;
         if self.other == 1 {
             [(q[0] - g1 * q[2]) / g0, (q[1] - g1 * q[3]) / g0, q[2], q[3]]

@@ -10,6 +10,7 @@ mod machine;
 mod non_impacting;
 mod oscillator;
 mod parameter;
+mod state;
 mod stops;
 mod traits;
 
@@ -24,14 +25,10 @@ pub use oscillator::{
     MOST_STAGES, MOST_WALLS, Oscillator, OscillatorError, OuterWall, Stage,
 };
 pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};
+pub use state::{REST, STATE, State, state};
+pub(crate) use state::{difference, dot, sum};
 pub use stops::Stops;
 pub use traits::{CloneModel, Model, ModelError};
-
-/// State of an oscillator of two degrees of freedom: `(x1, v1, x2, v2)`, dimensionless.
-pub type State = [f64; 4];
-
-/// The state at rest.
-pub const REST: State = [0.0; 4];
 
 /// One of the two walls that bound the free gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -2,7 +2,7 @@
 //! Lyapunov exponents.
 //!
 //! The strobe map `P` maps the state at one phase 0 to the state at the next. Its derivative is the product of flow
-//! and saltation matrices, and is integrated as four tangent vectors. For orbits that may be their own mirror image
+//! and saltation matrices, and is integrated as one tangent vector for each entry of a state. For orbits that may be their own mirror image
 //! the half-period map `Q(y) = -P_{T/2}(y)` is used instead. Since `P = Q^2`, at a pitchfork, where a multiplier of
 //! `P` is `+1`, that of `Q` is `-1`, and `Q' - I` stays regular.
 
@@ -14,15 +14,15 @@ pub use exponent::{CORRELATION_MARGIN, Exponent, FRESH_TANGENT, LEAST_FOR_ERROR,
 pub use newton::refine;
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 
+use nalgebra::DMatrix;
 use nalgebra::linalg::Schur;
-use nalgebra::{Matrix4, Vector4};
 
-use crate::model::State;
+use crate::model::{REST, State, dot, state};
 use crate::reference::{Stop, Trajectory, Work};
 
-/// The unit vectors. As initial tangent vectors they become the columns of the derivative.
+/// The unit vectors of two coordinates. As initial tangent vectors they become the columns of the derivative.
 pub const UNIT: [State; 4] =
-    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    [state(&[1.0]), state(&[0.0, 1.0]), state(&[0.0, 0.0, 1.0]), state(&[0.0, 0.0, 0.0, 1.0])];
 
 /// A map on states at phase 0, whose fixed points are cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,13 +33,13 @@ pub enum StrobeMap {
     MirroredHalves(u32),
 }
 
-/// The image of a state and the derivative of the map there.
-#[derive(Clone, Copy, Debug)]
+/// The image of a state and the derivative of the map there. The derivative has [`Flow::state_len`](crate::flow::Flow::state_len) rows and columns.
+#[derive(Clone, Debug)]
 pub struct Image {
     /// The image.
     pub state: State,
     /// The derivative divided by `exp(log_scale)`.
-    pub scaled: Matrix4<f64>,
+    pub scaled: DMatrix<f64>,
     /// Logarithm of the factor: over a long cycle derivatives leave the range of f64.
     pub log_scale: f64,
     /// Whether an event was so near to grazing that the derivative is not reliable.
@@ -53,13 +53,13 @@ pub struct Image {
 impl Image {
     /// Returns the derivative on states whose velocities are divided by `rate`, so that its norm and pivots do not
     /// depend on the unit of time.
-    pub(crate) fn balanced(&self) -> Matrix4<f64> {
+    pub(crate) fn balanced(&self) -> DMatrix<f64> {
         balanced(&self.derivative(), self.rate)
     }
 
     /// Returns the derivative of the map; entries out of the range of f64 are zero or infinite.
-    pub fn derivative(&self) -> Matrix4<f64> {
-        self.scaled * self.log_scale.exp()
+    pub fn derivative(&self) -> DMatrix<f64> {
+        &self.scaled * self.log_scale.exp()
     }
 }
 
@@ -81,7 +81,8 @@ impl StrobeMap {
     ) -> Result<Image, Stop> {
         let rate = seed.flow().rate;
         let never_slid = usize::MAX;
-        let scaled = Matrix4::identity();
+        let size = seed.flow().state_len();
+        let scaled = DMatrix::identity(size, size);
         let mut image = Image { state: y, scaled, log_scale: 0.0, near_grazing: false, never_slid, rate };
         match self {
             StrobeMap::Periods(p) => {
@@ -103,7 +104,7 @@ impl StrobeMap {
                     ended?;
                     let step = image_at(&half, -1.0);
                     let (scaled, log_scale) =
-                        unit_size(step.scaled * image.scaled, step.log_scale + image.log_scale);
+                        unit_size(product(&step.scaled, &image.scaled), step.log_scale + image.log_scale);
                     image = Image {
                         state: step.state,
                         scaled,
@@ -120,10 +121,12 @@ impl StrobeMap {
 
     /// Returns the monodromy matrix of the whole cycle and the logarithm of its factor, from the derivative of this
     /// map.
-    fn monodromy(self, image: &Image) -> (Matrix4<f64>, f64) {
+    fn monodromy(self, image: &Image) -> (DMatrix<f64>, f64) {
         match self {
-            StrobeMap::Periods(_) => (image.scaled, image.log_scale),
-            StrobeMap::MirroredHalves(_) => unit_size(image.scaled * image.scaled, 2.0 * image.log_scale),
+            StrobeMap::Periods(_) => (image.scaled.clone(), image.log_scale),
+            StrobeMap::MirroredHalves(_) => {
+                unit_size(product(&image.scaled, &image.scaled), 2.0 * image.log_scale)
+            }
         }
     }
 
@@ -149,20 +152,51 @@ impl StrobeMap {
 }
 
 /// Divides a matrix by its largest entry, so that products and eigenvalues stay in the range of f64.
-fn unit_size(matrix: Matrix4<f64>, log_scale: f64) -> (Matrix4<f64>, f64) {
+fn unit_size(matrix: DMatrix<f64>, log_scale: f64) -> (DMatrix<f64>, f64) {
     let size = matrix.amax();
     if size > 0.0 && size.is_finite() { (matrix / size, log_scale + size.ln()) } else { (matrix, log_scale) }
 }
 
 /// Transforms a matrix on states to one on states whose velocities are divided by `rate`, a power of two.
-fn balanced(matrix: &Matrix4<f64>, rate: f64) -> Matrix4<f64> {
+fn balanced(matrix: &DMatrix<f64>, rate: f64) -> DMatrix<f64> {
     let unit = |i: usize| if i % 2 == 1 { rate } else { 1.0 };
-    Matrix4::from_fn(|i, j| matrix[(i, j)] * (unit(j) / unit(i)))
+    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * (unit(j) / unit(i)))
+}
+
+/// Returns the product of two matrices. That of nalgebra depends on the processor if matrices have more than five rows.
+pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut product = DMatrix::zeros(a.nrows(), b.ncols());
+    for (mut column, factors) in product.column_iter_mut().zip(b.column_iter()) {
+        for (of_a, &factor) in a.column_iter().zip(&factors) {
+            column.iter_mut().zip(&of_a).for_each(|(sum, x)| *sum += x * factor);
+        }
+    }
+    product
+}
+
+/// Returns the image of a vector, with zeros beyond the rows of the matrix.
+pub(crate) fn image_of(matrix: &DMatrix<f64>, vector: &State) -> State {
+    let mut image = REST;
+    for (column, factor) in matrix.column_iter().zip(vector) {
+        image.iter_mut().zip(&column).for_each(|(sum, x)| *sum += x * factor);
+    }
+    image
+}
+
+/// Returns the square root of the sum of the squares of all entries.
+pub(crate) fn norm(matrix: &DMatrix<f64>) -> f64 {
+    let size = matrix.nrows();
+    matrix.as_slice().chunks(size).map(|column| dot(column, column)).sum::<f64>().sqrt()
+}
+
+/// Returns the matrix with these columns, the tangent vectors of a trajectory.
+pub(crate) fn matrix_of(columns: &[State]) -> DMatrix<f64> {
+    DMatrix::from_fn(columns.len(), columns.len(), |i, j| columns[j][i])
 }
 
 fn image_at(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
-    let columns = trajectory.tangents().map(|u| sign * Vector4::from(u));
-    let (scaled, log_scale) = unit_size(Matrix4::from_columns(&columns), trajectory.log_scale());
+    let columns = trajectory.tangents().map(|u| u.map(|x| sign * x));
+    let (scaled, log_scale) = unit_size(matrix_of(&columns), trajectory.log_scale());
     Image {
         state: trajectory.state().map(|value| sign * value),
         scaled,
@@ -182,9 +216,9 @@ pub struct Cycle {
     pub period: u32,
     /// Whether the orbit is its own mirror image.
     pub symmetric: bool,
-    /// The monodromy matrix, the derivative of the strobe map over one cycle. In one degree of freedom the rows and
-    /// columns of the second displacement are 0.
-    pub monodromy: Matrix4<f64>,
+    /// The monodromy matrix, the derivative of the strobe map over one cycle. It has
+    /// [`Flow::state_len`](crate::flow::Flow::state_len) rows; in one degree of freedom those of the second displacement, and its columns, are 0.
+    pub monodromy: DMatrix<f64>,
     /// Floquet multipliers `[re, im]`, largest modulus first; two for each degree of freedom. Where dry friction sticks for ever, the
     /// multiplier 1 along its row is left out.
     pub multipliers: Vec<[f64; 2]>,
@@ -231,11 +265,11 @@ const EIGEN_CAP: usize = 1000;
 
 /// Returns the eigenvalues `[re, im]`, largest modulus first; of a conjugate pair, positive imaginary part first.
 /// Returns none if the matrix is not finite or the iteration does not converge.
-pub fn multipliers(monodromy: &Matrix4<f64>) -> Option<Vec<[f64; 2]>> {
+pub fn multipliers(monodromy: &DMatrix<f64>) -> Option<Vec<[f64; 2]>> {
     if !monodromy.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let schur = Schur::try_new(*monodromy, f64::EPSILON, EIGEN_CAP)?;
+    let schur = Schur::try_new(monodromy.clone(), f64::EPSILON, EIGEN_CAP)?;
     let mut list: Vec<[f64; 2]> = schur.complex_eigenvalues().iter().map(|m| [m.re, m.im]).collect();
     list.sort_by(|a, b| modulus(*b).total_cmp(&modulus(*a)).then(b[1].total_cmp(&a[1])));
     Some(list)

@@ -12,7 +12,7 @@
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
 
-use super::{Harmonic, Oscillator, State, is_semidefinite};
+use super::{Harmonic, Oscillator, State, is_semidefinite, state};
 
 /// Margin for rounding: of the distance to a wall, relative to twice the scale of length, and of the decay rate,
 /// relative to the excitation frequency.
@@ -84,7 +84,7 @@ impl NonImpacting {
             }
         }
         (0..2).for_each(|i| steady[2 * i] += middle[i]);
-        Some(NonImpacting { steady, mass, stiffness, reach, slowest, resting: None })
+        Some(NonImpacting { steady: state(&steady), mass, stiffness, reach, slowest, resting: None })
     }
 
     /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
@@ -123,7 +123,7 @@ impl NonImpacting {
         if self.resting.is_some_and(|i| [y[2 * i], y[2 * i + 1]] != [0.0; 2]) {
             return false;
         }
-        let q: State = std::array::from_fn(|i| y[i] - self.steady[i]);
+        let q: [f64; 4] = std::array::from_fn(|i| y[i] - self.steady[i]);
         let x = Vector2::new(q[0], q[2]);
         let [[m1, m], [_, m2]] = self.mass;
         let kinetic = m1 * q[1] * q[1] + m2 * q[3] * q[3] + 2.0 * m * q[1] * q[3];
@@ -185,7 +185,7 @@ fn slowest(stiffness: &Matrix2<f64>, damping: &Matrix2<f64>) -> Complex<f64> {
 mod tests {
     use super::*;
     use crate::flow::Flow;
-    use crate::model::GearPair;
+    use crate::model::{GearPair, sum};
     use crate::reference::Trajectory;
 
     fn pair(omega: f64) -> GearPair {
@@ -230,7 +230,10 @@ mod tests {
             assert!(motion.is_neutral() && motion.exponent() == 0.0, "{}", motion.exponent());
             assert!(motion.is_certain(motion.steady()));
             let [x1, v1, ..] = motion.steady();
-            assert!(!motion.is_certain([x1, v1, 1e-12, 0.0]) && !motion.is_certain([x1, v1, 0.0, 1e-12]));
+            assert!(
+                !motion.is_certain(state(&[x1, v1, 1e-12]))
+                    && !motion.is_certain(state(&[x1, v1, 0.0, 1e-12]))
+            );
         }
     }
 
@@ -245,7 +248,7 @@ mod tests {
             let angle = f64::from(step);
             let size = 0.03 * f64::from(step % 17);
             let offset = [size * angle.cos(), 3.0 * size * angle.sin(), size * (2.0 * angle).sin(), 0.0];
-            let start = std::array::from_fn(|i| motion.steady()[i] + offset[i]);
+            let start = sum(&motion.steady(), &state(&offset), 1.0);
             let mut trajectory = Trajectory::new(&flow, pair.law(), start);
             let was = motion.is_certain(start);
             for _ in 0..40 {

@@ -13,7 +13,7 @@ use super::{Class, Orbit, Section, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, Model, ModelError, NonImpacting, State};
 use crate::reference::{Allowance, Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap, norm};
 use crate::word::Word;
 
 /// Default number of last periods whose events are listed for aperiodic motion.
@@ -123,8 +123,9 @@ pub(super) fn is_growing(flow: &Flow, strobes: &[State], exponent: f64) -> bool 
     let expected = SHARED_GROWTH * exponent * second.len() as f64;
     // Between two walls only the rates can grow.
     let grows = [0, 1].into_iter().any(|i| {
-        let largest =
-            |part: &[State]| part.iter().fold(0.0, |most: f64, y| most.max(y[i].abs()).max(y[i + 2].abs()));
+        let entries =
+            |y: &State| y[i..flow.state_len()].iter().step_by(2).fold(0.0, |most: f64, x| most.max(x.abs()));
+        let largest = |part: &[State]| part.iter().map(entries).fold(0.0, f64::max);
         (largest(second) / largest(first)).ln() > expected
     });
     flow.escape.is_finite() && (grows || expected < PLAIN_GROWTH)
@@ -423,7 +424,7 @@ impl Analysis<'_> {
                 }
                 let image = newton.apply(map, seed, cycle.state)?;
                 // The map amplifies the rounding error of the fixed point.
-                let close = ON_CYCLE * image.balanced().norm().max(1.0);
+                let close = ON_CYCLE * norm(&image.balanced()).max(1.0);
                 if metric.distance(&image.state, &cycle.state) < close
                     && let Some(shorter) = newton.refine(&seed.at(cycle.state, []), map)
                 {

@@ -8,11 +8,9 @@
 //! lie in the hull, too, and the motion stays on its branch. That happens after a few cycles, or after one turn of a
 //! spiral.
 
-use nalgebra::Vector4;
-
 use super::recurrence::Metric;
-use crate::model::State;
-use crate::stability::Cycle;
+use crate::model::{REST, State, difference, dot, state, sum};
+use crate::stability::{Cycle, image_of};
 
 /// Largest error of the linear map, relative to the deviation. With 0.1, one cell of 40,000 over restitution and
 /// frequency was assigned to a cycle that the motion then leaves.
@@ -50,13 +48,13 @@ pub(super) fn stays(
     metric: &Metric,
     tolerance: f64,
 ) -> bool {
-    let centre = Vector4::from(cycle.state);
-    let deviation = |back: usize| strobe(back).map(|y| Vector4::from(y) - centre);
+    let deviation = |back: usize| strobe(back).map(|y| difference(&y, &cycle.state));
     let Some(present) = deviation(0) else { return false };
     let (mut after, mut earlier) = (present, Vec::new());
     for back in 1..=HULL_CYCLES {
         let Some(before) = deviation(back).filter(|_| is_on_branch(back)) else { break };
-        if metric.size(&(after - cycle.monodromy * before)) > tolerance * metric.size(&before) {
+        let predicted = image_of(&cycle.monodromy, &before);
+        if metric.size(&after, &predicted) > tolerance * metric.size(&before, &REST) {
             break;
         }
         earlier.push(before);
@@ -69,56 +67,60 @@ pub(super) fn stays(
 ///
 /// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step goes from the nearest point so far towards the corner that
 /// lies farthest beyond it, whose position also bounds the distance from below.
-fn is_in_hull(point: &Vector4<f64>, corners: &[Vector4<f64>], metric: &Metric) -> bool {
+fn is_in_hull(point: &State, corners: &[State], metric: &Metric) -> bool {
     let target = metric.scaled(point);
-    let allowed = (HULL_DISTANCE * target.norm()).max(LEAST_HULL_DISTANCE);
-    let corners: Vec<Vector4<f64>> = corners.iter().map(|corner| metric.scaled(corner) - target).collect();
+    let norm = |y: &State| dot(y, y).sqrt();
+    let allowed = (HULL_DISTANCE * norm(&target)).max(LEAST_HULL_DISTANCE);
+    let corners: Vec<State> =
+        corners.iter().map(|corner| difference(&metric.scaled(corner), &target)).collect();
     // In slow motion the last corner is close to the point, and the steps below would be short.
-    if corners.first().is_some_and(|last| last.norm() <= allowed) {
+    if corners.first().is_some_and(|last| norm(last) <= allowed) {
         return true;
     }
-    let mut nearest = -target;
+    let origin = target.map(|x| -x);
+    let mut nearest = origin;
     for _ in 0..HULL_STEPS {
-        let square = nearest.norm_squared();
+        let square = dot(&nearest, &nearest);
         if square <= allowed * allowed {
             return true;
         }
-        let along = |corner: &Vector4<f64>| corner.dot(&nearest);
+        let along = |corner: &State| dot(corner, &nearest);
         let farthest = corners
             .iter()
-            .fold(-target, |best, corner| if along(corner) < along(&best) { *corner } else { best });
-        let step = farthest - nearest;
-        let gain = -nearest.dot(&step);
+            .fold(origin, |best, corner| if along(corner) < along(&best) { *corner } else { best });
+        let step = difference(&farthest, &nearest);
+        let gain = -dot(&nearest, &step);
         if along(&farthest) > allowed * square.sqrt() || gain <= f64::EPSILON * square {
             return false;
         }
-        nearest += step * (gain / step.norm_squared()).min(1.0);
+        nearest = sum(&nearest, &step, (gain / dot(&step, &step)).min(1.0));
     }
     false
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Matrix4;
+    use nalgebra::{DMatrix, DVector};
 
     use super::*;
     use crate::flow::Flow;
     use crate::model::GearPair;
 
     fn metric() -> Metric {
-        Metric::of(&[[0.0; 4]], &Flow::new(&GearPair::paper(0.5).oscillator().unwrap()))
+        Metric::of(&[REST], &Flow::new(&GearPair::paper(0.5).oscillator().unwrap()))
     }
 
     /// Builds a cycle at the origin whose complex multipliers have the modulus `radius` and the argument `angle`, and
     /// whose other multipliers are `real`.
     fn spiral(angle: f64, radius: f64, real: [f64; 2]) -> Cycle {
         let (sin, cos) = angle.sin_cos();
-        let mut monodromy = Matrix4::from_diagonal(&Vector4::new(0.0, 0.0, real[0], real[1]));
+        let mut monodromy =
+            DMatrix::from_diagonal(&DVector::from_column_slice(&[0.0, 0.0, real[0], real[1]]));
         monodromy
             .fixed_view_mut::<2, 2>(0, 0)
             .copy_from(&(nalgebra::Matrix2::new(cos, -sin, sin, cos) * radius));
         Cycle {
-            state: [0.0; 4],
+            state: REST,
             period: 1,
             symmetric: false,
             monodromy,
@@ -131,12 +133,14 @@ mod tests {
     /// Returns the strobe states of a motion, the last one first. In every cycle `bend` times the square of the first
     /// entry is added to the linear map.
     fn states(cycle: &Cycle, start: State, cycles: usize, bend: f64) -> Vec<State> {
-        let mut list = vec![Vector4::from(start)];
+        let mut list = vec![start];
         for n in 0..cycles {
             let before = list[n];
-            list.push(cycle.monodromy * before + Vector4::new(bend * before[0] * before[0], 0.0, 0.0, 0.0));
+            let mut next = image_of(&cycle.monodromy, &before);
+            next[0] += bend * before[0] * before[0];
+            list.push(next);
         }
-        list.into_iter().rev().map(Into::into).collect()
+        list.into_iter().rev().collect()
     }
 
     fn stay(cycle: &Cycle, strobes: &[State]) -> bool {
@@ -148,7 +152,7 @@ mod tests {
         for (angle, expected) in [(0.0, 4), (0.7, 8), (1.5, 4), (3.1, 4)] {
             let cycle = spiral(angle, 0.9, [0.3, 0.1]);
             let first = (BRANCH_CYCLES..40)
-                .find(|&cycles| stay(&cycle, &states(&cycle, [0.02, 0.0, 1e-4, 0.0], cycles, 0.0)));
+                .find(|&cycles| stay(&cycle, &states(&cycle, state(&[0.02, 0.0, 1e-4]), cycles, 0.0)));
             assert!(first.is_some_and(|first| first.abs_diff(expected) <= 1), "{angle}: after {first:?}");
         }
     }
@@ -157,10 +161,10 @@ mod tests {
     fn nonlinear_motion_and_motion_on_another_branch_do_not_stay() {
         let cycle = spiral(1.5, 0.9, [0.3, 0.1]);
         for (bend, expected) in [(0.0, true), (1.0, true), (20.0, false)] {
-            let strobes = states(&cycle, [0.01, 0.0, 0.002, 0.0], 8, bend);
+            let strobes = states(&cycle, state(&[0.01, 0.0, 0.002]), 8, bend);
             assert_eq!(stay(&cycle, &strobes), expected, "bend {bend}");
         }
-        let strobes = states(&cycle, [0.01, 0.0, 0.002, 0.0], 8, 0.0);
+        let strobes = states(&cycle, state(&[0.01, 0.0, 0.002]), 8, 0.0);
         for (other, expected) in [(1, false), (4, false), (5, true)] {
             let strobe = |back: usize| strobes.get(back).copied();
             let stays = stays(&cycle, strobe, |back| back != other, &metric(), LINEAR_TOLERANCE);
@@ -171,11 +175,11 @@ mod tests {
     #[test]
     fn motion_that_has_not_filled_its_hull_does_not_stay() {
         let mut cycle = spiral(0.3, 0.95, [0.5, 0.1]);
-        let strobes = states(&cycle, [0.02, 0.0, 0.0, 0.0], 5, 0.0);
+        let strobes = states(&cycle, state(&[0.02]), 5, 0.0);
         assert!(!stay(&cycle, &strobes), "after a quarter of a turn");
         // One direction decays faster than the other, so the direction of the deviation changes.
         cycle = spiral(0.0, 0.95, [0.3, 0.0]);
-        assert!(!stay(&cycle, &states(&cycle, [1e-3, 0.0, 1.0, 0.0], 5, 0.0)));
-        assert!(stay(&cycle, &states(&cycle, [1e-2, 0.0, 1e-2, 0.0], 6, 0.0)));
+        assert!(!stay(&cycle, &states(&cycle, state(&[1e-3, 0.0, 1.0]), 5, 0.0)));
+        assert!(stay(&cycle, &states(&cycle, state(&[1e-2, 0.0, 1e-2]), 6, 0.0)));
     }
 }

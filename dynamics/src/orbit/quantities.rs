@@ -287,7 +287,7 @@ impl<'f> Meter<'f> {
     }
 
     fn integrate(&mut self, weight: f64, q: &Gap, phasor: Phasor) {
-        let [x1, v1, x2, v2] = self.flow.to_state(*q);
+        let [x1, v1, x2, v2] = self.flow.displacements(*q);
         for (moments, value) in self.displacements.iter_mut().zip([x1, x2, q[0]]) {
             moments.integrate(weight, value, phasor);
         }
@@ -307,7 +307,7 @@ impl<'f> Meter<'f> {
 
     /// Includes a state in the extremes.
     fn include(&mut self, q: &Gap) {
-        let [x1, _, x2, _] = self.flow.to_state(*q);
+        let [x1, _, x2, _] = self.flow.displacements(*q);
         for (moments, value) in self.displacements.iter_mut().zip([x1, x2, q[0]]) {
             moments.include(value);
         }
@@ -330,7 +330,7 @@ impl<'f> Meter<'f> {
     /// Returns the rate of a displacement, of the gap, or of the contact force.
     fn rate(&self, which: usize, linear: &LinearFlow, q: &Gap, phasor: &Phasor) -> f64 {
         match which {
-            0 | 1 => self.flow.to_state(*q)[2 * which + 1],
+            0 | 1 => self.flow.displacements(*q)[2 * which + 1],
             2 => q[1],
             _ => self
                 .flow

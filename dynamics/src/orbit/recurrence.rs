@@ -1,9 +1,7 @@
 //! Recurrence of strobe states: candidates for the period of a motion.
 
-use nalgebra::Vector4;
-
 use crate::flow::Flow;
-use crate::model::State;
+use crate::model::{State, difference};
 
 /// Largest distance of a recurrence, relative to the size of the motion.
 pub(super) const RECURRENCE_DISTANCE: f64 = 3e-2;
@@ -13,34 +11,45 @@ pub(super) const RECURRENCE_DISTANCE: f64 = 3e-2;
 pub(super) struct Metric {
     position: f64,
     velocity: f64,
+    /// Number of entries of a state.
+    len: usize,
 }
 
 impl Metric {
     /// Builds the metric of a set of strobe states from the largest position and the largest velocity. The flow's
     /// scale of length, and that as a velocity, are lower bounds: at a turning point, velocities are rounding errors.
     pub(super) fn of(strobes: &[State], flow: &Flow) -> Metric {
-        let largest =
-            |a: usize, b: usize| strobes.iter().flat_map(|y| [y[a].abs(), y[b].abs()]).fold(0.0, f64::max);
-        let position = largest(0, 2).max(flow.length);
-        Metric { position, velocity: largest(1, 3).max(flow.omega * position) }
+        let len = flow.state_len();
+        let largest = |from: usize| {
+            let entries = strobes.iter().flat_map(|y| y[from..len].iter().step_by(2));
+            entries.fold(0.0, |most: f64, value| most.max(value.abs()))
+        };
+        let position = largest(0).max(flow.length);
+        Metric { position, velocity: largest(1).max(flow.omega * position), len }
     }
 
     /// Returns the distance of two states.
     pub(super) fn distance(&self, a: &State, b: &State) -> f64 {
         let difference = |i: usize| (a[i] - b[i]).abs();
-        (difference(0).max(difference(2)) / self.position)
-            .max(difference(1).max(difference(3)) / self.velocity)
+        let largest =
+            |from: usize| (from + 2..self.len).step_by(2).fold(difference(from), |d, i| d.max(difference(i)));
+        (largest(0) / self.position).max(largest(1) / self.velocity)
     }
 
-    /// Returns the size of a difference of states.
-    pub(super) fn size(&self, difference: &Vector4<f64>) -> f64 {
-        self.scaled(difference).amax()
+    /// Returns the size of `a - b`.
+    pub(super) fn size(&self, a: &State, b: &State) -> f64 {
+        let scaled = self.scaled(&difference(a, b));
+        scaled[1..self.len].iter().fold(scaled[0].abs(), |most, value| most.max(value.abs()))
     }
 
     /// Returns a difference of states in the units of the metric.
-    pub(super) fn scaled(&self, difference: &Vector4<f64>) -> Vector4<f64> {
-        let units = [self.position, self.velocity, self.position, self.velocity];
-        difference.component_div(&Vector4::from(units))
+    pub(super) fn scaled(&self, difference: &State) -> State {
+        std::array::from_fn(|i| difference[i] / self.unit(i))
+    }
+
+    /// Returns the unit of an entry of a state.
+    pub(super) fn unit(&self, i: usize) -> f64 {
+        if i.is_multiple_of(2) { self.position } else { self.velocity }
     }
 }
 
@@ -102,6 +111,7 @@ pub(super) fn candidates(strobes: &[State], metric: &Metric, max_period: u32) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::state;
 
     #[test]
     fn a_decaying_spiral_has_its_fixed_point_among_the_candidates() {
@@ -109,18 +119,18 @@ mod tests {
         let strobes: Vec<State> = (0..100)
             .map(|n| {
                 let (r, phi) = (0.9f64.powi(n), f64::from(n) * std::f64::consts::TAU / 3.02);
-                [1.0 + r * phi.cos(), r * phi.sin(), 0.5, 0.5]
+                state(&[1.0 + r * phi.cos(), r * phi.sin(), 0.5, 0.5])
             })
             .collect();
-        let metric = Metric { position: 1.0, velocity: 1.0 };
+        let metric = Metric { position: 1.0, velocity: 1.0, len: 4 };
         let found = candidates(&strobes, &metric, 8);
         assert!(found.iter().any(|c| c.period == 1), "{found:?}");
     }
 
     #[test]
     fn a_three_cycle_has_lag_three_as_its_only_candidate() {
-        let strobes: Vec<State> = (0..60).map(|n| [f64::from(n % 3), 0.0, 0.0, 1.0]).collect();
-        let found = candidates(&strobes, &Metric { position: 2.0, velocity: 1.0 }, 16);
+        let strobes: Vec<State> = (0..60).map(|n| state(&[f64::from(n % 3), 0.0, 0.0, 1.0])).collect();
+        let found = candidates(&strobes, &Metric { position: 2.0, velocity: 1.0, len: 4 }, 16);
         assert_eq!(found, [Candidate { period: 3, distance: 0.0 }]);
     }
 }

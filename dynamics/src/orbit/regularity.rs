@@ -6,10 +6,8 @@
 //! Physica D 411 (2020) 132569): of each displacement from the first strobe, and of the sum of their squares, which shows
 //! whether a spiral shrinks. Velocities jump where an impact passes phase 0, and their averages converge slowly.
 
-use nalgebra::Vector4;
-
 use super::recurrence::Metric;
-use crate::model::State;
+use crate::model::{MOST_COORDINATES, State, difference, state};
 
 /// Least number of strobe states in a window.
 pub const LEAST_WINDOW: usize = 64;
@@ -37,7 +35,8 @@ pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) ->
     }
     let centre = strobes[0];
     let [first, second] = [0, length].map(|from| averages(&strobes[from..][..length], &centre, metric));
-    let [x, y, squares] = [0, 1, 2].map(|i: usize| (first[i] - second[i]).abs());
+    let largest = first.0.iter().zip(second.0).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let squares = (first.1 - second.1).abs();
     let distance = |lag: usize| {
         let squares = strobes.iter().zip(&strobes[lag..]).map(|(a, b)| metric.distance(a, b).powi(2));
         (squares.sum::<f64>() / (strobes.len() - lag) as f64).sqrt()
@@ -46,22 +45,23 @@ pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) ->
     let size = strobes.iter().map(|y| metric.distance(y, &centre)).fold(0.0, f64::max);
     let allowed = LARGEST_DIFFERENCE * nearest;
     let is_wide = nearest > LEAST_RECURRENCE * size && allowed > ROUNDING_OF_AVERAGES * f64::EPSILON;
-    is_wide && x.max(y) < allowed && squares < allowed * size
+    is_wide && largest < allowed && squares < allowed * size
 }
 
-/// Returns the weighted averages of both displacements from `centre`, in units of the metric, and of the sum of their
+/// Returns the weighted averages of all displacements from `centre`, in units of the metric, and of the sum of their
 /// squares.
-fn averages(strobes: &[State], centre: &State, metric: &Metric) -> [f64; 3] {
-    let (mut sums, mut total) = ([0.0; 3], 0.0);
+fn averages(strobes: &[State], centre: &State, metric: &Metric) -> ([f64; MOST_COORDINATES], f64) {
+    let (mut sums, mut squares, mut total) = ([0.0; MOST_COORDINATES], 0.0, 0.0);
     for (n, y) in strobes.iter().enumerate() {
         let t = (n as f64 + 0.5) / strobes.len() as f64;
         let weight = (t * (1.0 - t)).powi(POWER);
-        let y = metric.scaled(&(Vector4::from(*y) - Vector4::from(*centre)));
-        let values = [y[0], y[2], y[0] * y[0] + y[2] * y[2]];
-        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
+        let y = metric.scaled(&difference(y, centre));
+        let displacements = || y.iter().step_by(2);
+        sums.iter_mut().zip(displacements()).for_each(|(sum, x)| *sum += weight * x);
+        squares += weight * displacements().map(|x| x * x).sum::<f64>();
         total += weight;
     }
-    sums.map(|sum| sum / total)
+    (sums.map(|sum| sum / total), squares / total)
 }
 
 #[cfg(test)]
@@ -84,7 +84,7 @@ mod tests {
                 move |n: usize| {
                     let (sin, cos) = (golden * n as f64).sin_cos();
                     let r = size * decay.powi(n as i32);
-                    [0.2 + cos * r, 5.6 * sin * r, 0.1 * sin * cos * r, 0.0]
+                    state(&[0.2 + cos * r, 5.6 * sin * r, 0.1 * sin * cos * r])
                 }
             };
             assert!(regular(turning(1.0), 400), "size {size}");
@@ -97,15 +97,15 @@ mod tests {
     #[test]
     fn cycles_drift_and_chaotic_sequences_are_not_regular() {
         for period in [1, 3, 40] {
-            assert!(!regular(|n| [1.0 + (n % period) as f64, 0.0, 0.0, 0.0], 400), "period {period}");
+            assert!(!regular(|n| state(&[1.0 + (n % period) as f64]), 400), "period {period}");
         }
-        assert!(!regular(|n| [n as f64, 1.0, 0.0, 0.0], 400));
+        assert!(!regular(|n| state(&[n as f64, 1.0]), 400));
         // Narrow bands of chaos, which alternate.
         for (seed, width) in (0..500).flat_map(|seed| [1.0, 0.05].map(|width| (seed, width))) {
             let mut x = 0.1 + 0.001 * f64::from(seed);
             let state = |n: usize| {
                 x = 3.9 * x * (1.0 - x);
-                [(n % 2) as f64 + width * x, 0.0, 0.0, 0.0]
+                state(&[(n % 2) as f64 + width * x])
             };
             assert!(!regular(state, 400), "seed {seed}, width {width}");
         }

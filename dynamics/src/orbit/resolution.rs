@@ -1,6 +1,6 @@
 //! Whether rounding decides the period of a cycle.
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{DMatrix, DVector};
 
 use super::analysis::Analysis;
 use super::recurrence::Metric;
@@ -8,7 +8,7 @@ use super::{Event, Settings};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Allowance, Stop, Trajectory};
-use crate::stability::{Cycle, StrobeMap, UNIT, refine};
+use crate::stability::{Cycle, StrobeMap, UNIT, matrix_of, product, refine};
 
 /// Rounding error of the motion between two events, in units of the machine epsilon times the size of the motion.
 const ROUNDING: f64 = 4.0;
@@ -59,8 +59,7 @@ pub(super) fn is_below_resolution(
     let mut trajectory = seed.at(cycle.state, UNIT);
     let (mut strobes, mut parts) = (vec![cycle.state], Vec::new());
     let mut part = |trajectory: &mut Trajectory<'_, 4>| {
-        let columns = trajectory.tangents().map(Vector4::from);
-        parts.push(Matrix4::from_columns(&columns) * trajectory.log_scale().exp());
+        parts.push(matrix_of(&trajectory.tangents()) * trajectory.log_scale().exp());
         trajectory.set_tangents(UNIT);
     };
     let mut times = events.windows(2).map(|pair| 0.5 * (pair[0].t + pair[1].t)).peekable();
@@ -76,13 +75,16 @@ pub(super) fn is_below_resolution(
     }
     strobes.pop();
     let metric = Metric::of(&strobes, flow);
-    let units = metric.scaled(&Vector4::repeat(1.0));
-    let (to, from) = (Matrix4::from_diagonal(&units), Matrix4::from_diagonal(&units.map(f64::recip)));
+    let size = flow.state_len();
+    let units = DVector::from_fn(size, |i, _| 1.0 / metric.unit(i));
+    let (to, from) = (DMatrix::from_diagonal(&units), DMatrix::from_diagonal(&units.map(f64::recip)));
     // Covariance of the errors. The second turn includes growth across the end of the cycle.
-    let (mut errors, mut largest) = (Matrix4::zeros(), 0.0f64);
+    let (mut errors, mut largest) = (DMatrix::zeros(size, size), 0.0f64);
+    let rounding = (ROUNDING * epsilon).powi(2);
     for part in parts.iter().chain(&parts) {
-        let part = to * part * from;
-        errors = part * errors * part.transpose() + Matrix4::identity() * (ROUNDING * epsilon).powi(2);
+        let part = product(&product(&to, part), &from);
+        errors = product(&product(&part, &errors), &part.transpose());
+        (0..size).for_each(|i| errors[(i, i)] += rounding);
         largest = largest.max(errors.diagonal().max());
     }
     let pairs = strobes.iter().enumerate().flat_map(|(i, a)| strobes[..i].iter().map(move |b| (a, b)));

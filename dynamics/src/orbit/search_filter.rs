@@ -10,7 +10,7 @@
 //! other cycles and from the starts of earlier searches do not.
 
 use super::recurrence::Metric;
-use crate::model::State;
+use crate::model::{State, state};
 use crate::stability::{Cycle, Exponent, LARGEST_MULTIPLIER, StrobeMap};
 
 /// Distances of recurrences below this are near rounding and need not shrink.
@@ -88,15 +88,15 @@ impl SearchHistory {
 mod tests {
     use super::*;
     use crate::flow::Flow;
-    use crate::model::GearPair;
+    use crate::model::{GearPair, REST};
 
     /// Returns the strobe states of a motion with one multiplier, near a cycle at the origin.
     fn powers(multiplier: f64, start: f64) -> Vec<State> {
-        (0..20).map(|n| [start * multiplier.powi(n), 0.0, 0.0, 0.0]).collect()
+        (0..20).map(|n| state(&[start * multiplier.powi(n)])).collect()
     }
 
     fn metric() -> Metric {
-        Metric::of(&[[0.0; 4]], &Flow::new(&GearPair::paper(0.5).oscillator().unwrap()))
+        Metric::of(&[REST], &Flow::new(&GearPair::paper(0.5).oscillator().unwrap()))
     }
 
     #[test]
@@ -112,7 +112,7 @@ mod tests {
         assert!(contraction(&powers(1.001, 1e-9), 1, &metric()).is_some(), "rounding");
         assert!(contraction(&powers(0.5, 1e-3), 10, &metric()).is_none(), "fewer than two lags");
         // The distances are 1, 4 and 2: closer than before, but only once.
-        let at = |x: f64| [1e-3 * x, 0.0, 0.0, 0.0];
+        let at = |x: f64| state(&[1e-3 * x]);
         let recent = [0.0, 1.0, 5.0, 7.0].map(at);
         assert!(contraction(&recent, 1, &metric()).is_some());
         let slower = [0.0, 0.0, 1.0, 1.0, 5.0, 5.0, 7.0, 7.0].map(at);
@@ -125,9 +125,9 @@ mod tests {
         let (map, mut history) = (StrobeMap::Periods(1), SearchHistory::default());
         let pair = GearPair::paper(0.5);
         let flow = Flow::new(&pair.oscillator().unwrap());
-        let seed = crate::reference::Trajectory::new(&flow, pair.law(), [0.0; 4]);
+        let seed = crate::reference::Trajectory::new(&flow, pair.law(), REST);
         let mut cycle = crate::stability::refine(&seed, map).unwrap();
-        cycle.state = [0.0; 4];
+        cycle.state = REST;
         history.add_unstable(map, &cycle);
         let passage = |multiplier: f64| {
             let strobes = powers(multiplier, 1e-3);
@@ -137,16 +137,16 @@ mod tests {
         assert!(passage(1.5) && passage(-1.3) && passage(0.7));
         assert!(!passage(1.1), "it hardly moves: there may be another cycle");
         let convergence = |n: i32| {
-            let at = |n: i32| [0.01 * (1.0 + 0.6f64.powi(n)), 0.0, 0.0, 0.0];
+            let at = |n: i32| state(&[0.01 * (1.0 + 0.6f64.powi(n))]);
             history.explains(map, &at(n), metric().distance(&at(n), &at(n - 1)), &metric())
         };
         assert!(!convergence(8) && !convergence(20));
-        let explains = |history: &SearchHistory, map| history.explains(map, &[0.0; 4], 1.0, &metric());
+        let explains = |history: &SearchHistory, map| history.explains(map, &REST, 1.0, &metric());
         assert!(explains(&history, StrobeMap::Periods(2)), "twice the period");
         assert!(!explains(&history, StrobeMap::MirroredHalves(3)), "it need not be symmetric");
         // A failed search does not explain longer cycles.
         let mut history = SearchHistory::default();
-        history.add_failure(map, [0.0; 4]);
+        history.add_failure(map, REST);
         assert!(explains(&history, map) && !explains(&history, StrobeMap::Periods(2)));
     }
 
@@ -157,7 +157,7 @@ mod tests {
             let pair = GearPair::paper(0.5);
             let flow = Flow::new(&pair.oscillator().unwrap());
             let mut carrier =
-                crate::reference::Trajectory::new(&flow, pair.law(), [0.0; 4]).carrying([[0.5; 4]]);
+                crate::reference::Trajectory::new(&flow, pair.law(), REST).carrying([state(&[0.5; 4])]);
             for _ in 0..6 {
                 let [u] = carrier.tangents();
                 carrier.set_tangents([u.map(|x| factor * x)]);
@@ -178,16 +178,16 @@ mod tests {
     fn a_turning_tangent_does_not_escape() {
         let pair = GearPair::paper(0.5);
         let flow = Flow::new(&pair.oscillator().unwrap());
-        let fresh = crate::reference::Trajectory::new(&flow, pair.law(), [0.0; 4]);
+        let fresh = crate::reference::Trajectory::new(&flow, pair.law(), REST);
         let (radius, ratio) = (0.9, 100.0);
         let (mut apparent, mut count) = (0, 0);
         for angle in [0.3, 0.7, 1.1, 1.5] {
             let (sin, cos) = f64::sin_cos(angle);
-            let mut carrier = fresh.carrying([[0.6, 0.8, 0.0, 0.0]]);
+            let mut carrier = fresh.carrying([state(&[0.6, 0.8])]);
             let mut exponent = Exponent::default();
             for n in 0..60 {
                 let [[x, v, ..]] = carrier.tangents();
-                let turned = [cos * x + sin * v / ratio, cos * v - sin * x * ratio, 0.0, 0.0];
+                let turned = state(&[cos * x + sin * v / ratio, cos * v - sin * x * ratio]);
                 carrier.set_tangents([turned.map(|y| radius * y)]);
                 exponent.renormalise(&mut carrier);
                 assert!(n < 8 || !escapes(&exponent, 1, true), "after {n} turns by {angle}");

@@ -2,7 +2,7 @@
 
 use super::{Budget, Class, Measurement, Settings, Status, analyse, measure};
 use crate::flow::Flow;
-use crate::model::GearPair;
+use crate::model::{GearPair, REST, state};
 
 fn budget(early_stop: bool, transient_periods: u32) -> Budget {
     Budget {
@@ -17,7 +17,7 @@ fn budget(early_stop: bool, transient_periods: u32) -> Budget {
 }
 
 fn cell(pair: &GearPair, budget: &Budget) -> Measurement {
-    measure(&Flow::new(&pair.oscillator().unwrap()), pair.law(), [0.0; 4], budget)
+    measure(&Flow::new(&pair.oscillator().unwrap()), pair.law(), REST, budget)
 }
 
 fn paper(e: f64, omega: f64) -> GearPair {
@@ -96,7 +96,7 @@ fn contact_free_motion_with_one_undamped_gear_at_rest_is_periodic_and_neutral() 
     for (r2, k2) in [(0.0, 20.0), (0.6, 0.0), (0.0, 0.0)] {
         let pair = GearPair { r2, k2, ..paper(0.5, 11.0) };
         let pair = GearPair { force: 5.0, ..pair };
-        let orbit = analyse(&pair, [0.0; 4], &Settings::default()).unwrap();
+        let orbit = analyse(&pair, REST, &Settings::default()).unwrap();
         assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Neutral), "{pair:?}");
         assert!(orbit.lyapunov.abs() < 1e-12, "{}", orbit.lyapunov);
         assert_eq!(orbit.floquet.map(|list| list.len()), Some(4));

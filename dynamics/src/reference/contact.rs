@@ -3,7 +3,7 @@
 use super::sticking::RELEASE_ORDER;
 use super::{Crossing, EventKind, GapEvent, Mode, Observer, Trajectory, side_of};
 use crate::flow::{DomainKind, Gap, LinearFlow};
-use crate::model::{Contact, Side};
+use crate::model::{Contact, Side, state};
 
 /// Approach speeds below this, relative to the scale of length and the rate of free motion, count as near grazing if
 /// the load pulls away from the wall. The saltation matrix is proportional to the inverse of the approach speed.
@@ -399,7 +399,7 @@ impl<const N: usize> Trajectory<'_, N> {
 #[cfg(test)]
 mod tests {
     use crate::flow::Flow;
-    use crate::model::{GearPair, Side};
+    use crate::model::{GearPair, REST, Side};
     use crate::reference::{EventKind, GapEvent, Trajectory};
 
     /// With a very small backlash, a contact onset may reach the opposite wall. A contact there must follow.
@@ -410,7 +410,7 @@ mod tests {
             for (e, omega) in [(0.3, 5.6), (0.6, 3.2), (0.8, 2.0)] {
                 let pair = GearPair { b, mesh_speed, omega, ..GearPair::paper(e) };
                 let flow = Flow::new(&pair.oscillator().unwrap());
-                let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0; 4]);
+                let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
                 let mut events: Vec<GapEvent> = Vec::new();
                 for _ in 0..20 {
                     trajectory.advance_period(&mut events).unwrap();

@@ -1,10 +1,13 @@
 //! Newton's method on the strobe map.
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::allocator::Allocator;
+use nalgebra::{
+    DMatrix, DVector, DefaultAllocator, DimDiff, DimMin, DimSub, Matrix4, OMatrix, OVector, U1, Vector4,
+};
 
 use super::unit_circle::lies_within_unit_circle;
 use super::{Cycle, Image, StrobeMap, balanced, multipliers};
-use crate::model::State;
+use crate::model::{State, difference, state, sum};
 use crate::reference::{Trajectory, Work};
 
 /// Limits of one Newton search.
@@ -106,9 +109,9 @@ impl Newton {
         limits: SearchLimits,
         is_near: impl Fn(&State) -> bool,
     ) -> Option<Cycle> {
-        let mut y = Vector4::from(seed.state());
+        let mut y = seed.state();
         let rate = seed.flow().rate;
-        let mut residual = Vector4::from(image.state) - y;
+        let mut residual = difference(&image.state, &y);
         for nth in 0..limits.steps {
             let now = size(&residual, rate) / size_of(seed, &y);
             if now <= CONVERGED {
@@ -116,14 +119,14 @@ impl Newton {
             }
             let step = newton_step(&image, &residual)?;
             if limits.stops_at_unstable && nth > 0 && now < MULTIPLIER_RESIDUAL && is_unstable(&image) {
-                return cycle(seed, map, (y + step).into(), &image);
+                return cycle(seed, map, sum(&y, &step, 1.0), &image);
             }
-            if !is_near(&(y + step).into()) {
+            if !is_near(&sum(&y, &step, 1.0)) {
                 return None;
             }
             match self.damped(seed, map, &y, &residual, &step, limits.trials) {
                 Some((next, next_image)) => {
-                    residual = Vector4::from(next_image.state) - next;
+                    residual = difference(&next_image.state, &next);
                     (y, image) = (next, next_image);
                 }
                 // No step reduces the residual: it is rounding error, or the search has failed.
@@ -131,7 +134,7 @@ impl Newton {
             }
         }
         if size(&residual, rate) <= 1e3 * CONVERGED * size_of(seed, &y) {
-            cycle(seed, map, y.into(), &image)
+            cycle(seed, map, y, &image)
         } else {
             None
         }
@@ -142,16 +145,16 @@ impl Newton {
         &mut self,
         seed: &Trajectory<'_>,
         map: StrobeMap,
-        y: &Vector4<f64>,
-        residual: &Vector4<f64>,
-        step: &Vector4<f64>,
+        y: &State,
+        residual: &State,
+        step: &State,
         trials: u32,
-    ) -> Option<(Vector4<f64>, Image)> {
+    ) -> Option<(State, Image)> {
         let (rate, mut share) = (seed.flow().rate, 1.0);
         for _ in 0..trials {
-            let next = y + step * share;
-            if let Some(image) = self.apply(map, seed, next.into())
-                && size(&(Vector4::from(image.state) - next), rate) < size(residual, rate)
+            let next = sum(y, step, share);
+            if let Some(image) = self.apply(map, seed, next)
+                && size(&difference(&image.state, &next), rate) < size(residual, rate)
             {
                 return Some((next, image));
             }
@@ -172,34 +175,48 @@ fn expands(image: &Image) -> Option<bool> {
 }
 
 /// Returns the size that residuals are relative to: that of the state, or the scale of length if that is larger.
-fn size_of(seed: &Trajectory<'_>, y: &Vector4<f64>) -> f64 {
+fn size_of(seed: &Trajectory<'_>, y: &State) -> f64 {
     let flow = seed.flow();
     size(y, flow.rate).max(flow.length * flow.omega / flow.rate)
 }
 
 /// Returns the largest of displacements and of velocities divided by `rate`.
-fn size(y: &Vector4<f64>, rate: f64) -> f64 {
-    in_displacements(y, rate).amax()
+fn size(y: &State, rate: f64) -> f64 {
+    let [first, others @ ..] = in_displacements(y, rate);
+    others.iter().fold(first.abs(), |most, x| most.max(x.abs()))
 }
 
 /// Divides the velocities of a state by `rate`.
-fn in_displacements(y: &Vector4<f64>, rate: f64) -> Vector4<f64> {
-    Vector4::new(y[0], y[1] / rate, y[2], y[3] / rate)
+fn in_displacements(y: &State, rate: f64) -> State {
+    std::array::from_fn(|i| if i % 2 == 1 { y[i] / rate } else { y[i] })
 }
 
 /// Solves `(P' - I) step = -residual` by least squares, with velocities divided by `rate`, so that the result does
 /// not depend on the unit of time.
-fn newton_step(image: &Image, residual: &Vector4<f64>) -> Option<Vector4<f64>> {
-    let step = balanced_step(&image.balanced(), &in_displacements(residual, image.rate))?;
+fn newton_step(image: &Image, residual: &State) -> Option<State> {
+    let (derivative, residual) = (image.balanced(), in_displacements(residual, image.rate));
+    let size = derivative.nrows();
+    // Fixed sizes of today's oscillators keep the order of operations, and need no memory.
+    let step = if size == 4 {
+        let matrix = Matrix4::from_column_slice(derivative.as_slice()) - Matrix4::identity();
+        state(balanced_step(matrix, &Vector4::from_column_slice(&residual[..4]))?.as_slice())
+    } else {
+        let matrix = derivative - DMatrix::identity(size, size);
+        state(balanced_step(matrix, &DVector::from_column_slice(&residual[..size]))?.as_slice())
+    };
     Some(in_displacements(&step, image.rate.recip()))
 }
 
-fn balanced_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<Vector4<f64>> {
-    let matrix = derivative - Matrix4::identity();
+/// Solves `matrix step = -residual` by least squares.
+fn balanced_step<D>(matrix: OMatrix<f64, D, D>, residual: &OVector<f64, D>) -> Option<OVector<f64, D>>
+where
+    D: DimMin<D, Output = D> + DimSub<U1>,
+    DefaultAllocator: Allocator<D, D> + Allocator<D> + Allocator<DimDiff<D, U1>> + Allocator<U1, D>,
+{
     if !matrix.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let lu = matrix.full_piv_lu();
+    let lu = matrix.clone().full_piv_lu();
     let pivots = lu.u().diagonal().abs();
     if pivots.min() > WELL_CONDITIONED * pivots.max() {
         return lu.solve(&-residual);
@@ -240,10 +257,10 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
 mod tests {
     use super::*;
     use crate::flow::Flow;
-    use crate::model::GearPair;
+    use crate::model::{GearPair, REST};
 
     fn seed_of<'f>(flow: &'f Flow, pair: &GearPair, periods: u32) -> Trajectory<'f> {
-        let mut seed = Trajectory::new(flow, pair.law(), [0.0; 4]);
+        let mut seed = Trajectory::new(flow, pair.law(), REST);
         (0..periods).for_each(|_| seed.advance_period(&mut ()).unwrap());
         seed
     }

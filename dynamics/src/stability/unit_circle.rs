@@ -1,21 +1,24 @@
 //! A test whether all eigenvalues lie within the unit circle, without computing them.
 //!
 //! It uses the characteristic polynomial (Faddeev and LeVerrier) and the criterion of Schur and Cohn, about a hundred
-//! multiplications.
+//! multiplications for a matrix of four rows.
 
-use nalgebra::Matrix4;
+use nalgebra::DMatrix;
+
+use super::product;
+use crate::model::STATE;
 
 /// Whether the modulus of every eigenvalue is below 1; none if the matrix is not finite.
 ///
 /// If an eigenvalue lies within rounding of the circle, either answer is possible.
-pub(super) fn lies_within_unit_circle(matrix: &Matrix4<f64>) -> Option<bool> {
+pub(super) fn lies_within_unit_circle(matrix: &DMatrix<f64>) -> Option<bool> {
     let mut polynomial = characteristic(matrix);
     if !polynomial.iter().all(|c| c.is_finite()) {
         return None;
     }
     // All roots of a polynomial of degree n lie inside if its last coefficient is smaller than its first, and if the
     // same holds for the polynomial of degree n - 1 that remains after elimination with the reversed one.
-    for degree in (1..=4).rev() {
+    for degree in (1..=matrix.nrows()).rev() {
         let (first, last) = (polynomial[0], polynomial[degree]);
         // NaN is a sign of overflow.
         if last.abs() >= first.abs() || last.is_nan() || first.is_nan() {
@@ -29,20 +32,24 @@ pub(super) fn lies_within_unit_circle(matrix: &Matrix4<f64>) -> Option<bool> {
     Some(true)
 }
 
-/// Returns the coefficients of `det(z - A)`, that of `z^4` first.
-fn characteristic(a: &Matrix4<f64>) -> [f64; 5] {
-    let mut coefficients = [1.0; 5];
-    let mut product = *a;
-    for (n, coefficient) in coefficients.iter_mut().enumerate().skip(1) {
-        *coefficient = -product.trace() / n as f64;
-        product = a * (product + Matrix4::identity() * *coefficient);
+/// Returns the coefficients of `det(z - A)`, that of the highest power first, and zeros behind them.
+fn characteristic(a: &DMatrix<f64>) -> [f64; STATE + 1] {
+    let size = a.nrows();
+    let mut coefficients = [0.0; STATE + 1];
+    coefficients[0] = 1.0;
+    let mut power = a.clone();
+    for n in 1..=size {
+        let coefficient = -power.trace() / n as f64;
+        coefficients[n] = coefficient;
+        (0..size).for_each(|i| power[(i, i)] += coefficient);
+        power = product(a, &power);
     }
     coefficients
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector4;
+    use nalgebra::DVector;
     use proptest::prelude::*;
 
     use super::*;
@@ -51,21 +58,23 @@ mod tests {
     #[test]
     fn the_characteristic_polynomial_has_the_eigenvalues_as_roots() {
         // (z - 1)(z - 2)(z + 3)(z - 4)
-        let diagonal = Matrix4::from_diagonal(&Vector4::new(1.0, 2.0, -3.0, 4.0));
-        assert_eq!(characteristic(&diagonal), [1.0, -4.0, -7.0, 34.0, -24.0]);
+        let diagonal = DMatrix::from_diagonal(&DVector::from_column_slice(&[1.0, 2.0, -3.0, 4.0]));
+        assert_eq!(characteristic(&diagonal)[..5], [1.0, -4.0, -7.0, 34.0, -24.0]);
     }
 
     #[test]
     fn nan_zero_and_identity_matrices() {
-        assert_eq!(lies_within_unit_circle(&Matrix4::from_element(f64::NAN)), None);
-        assert_eq!(lies_within_unit_circle(&Matrix4::zeros()), Some(true));
-        assert_eq!(lies_within_unit_circle(&Matrix4::identity()), Some(false));
+        assert_eq!(lies_within_unit_circle(&DMatrix::from_element(4, 4, f64::NAN)), None);
+        assert_eq!(lies_within_unit_circle(&DMatrix::zeros(4, 4)), Some(true));
+        assert_eq!(lies_within_unit_circle(&DMatrix::identity(4, 4)), Some(false));
     }
 
     proptest! {
         #[test]
-        fn the_criterion_agrees_with_the_eigenvalues(entries in prop::array::uniform16(-1.0..1.0f64), scale in 0.1..3.0f64) {
-            let matrix = Matrix4::from_column_slice(&entries) * scale;
+        fn the_criterion_agrees_with_the_eigenvalues(
+            entries in prop::collection::vec(-1.0..1.0f64, STATE * STATE), size in 1..=STATE, scale in 0.1..3.0f64,
+        ) {
+            let matrix = DMatrix::from_column_slice(size, size, &entries[..size * size]) * scale;
             let [re, im] = multipliers(&matrix).unwrap()[0];
             let radius = re.hypot(im);
             prop_assume!((radius - 1.0).abs() > 1e-6);

@@ -2,15 +2,13 @@
 #![allow(dead_code, reason = "every test binary compiles this module and uses a part of it")]
 
 use rattlemap_dynamics::flow::{DomainKind, Flow};
+pub(crate) use rattlemap_dynamics::model::REST;
 use rattlemap_dynamics::model::{GearPair, Law, Side, State};
 use rattlemap_dynamics::orbit::{Budget, Settings};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory, Work};
 
 pub(crate) mod linear;
 pub(crate) mod table;
-
-/// At rest in the middle of the gap.
-pub(crate) const REST: State = [0.0; 4];
 
 /// The default budget of a map, with early stops and exponents.
 pub(crate) const BUDGET: Budget = Budget {
@@ -134,17 +132,17 @@ pub(crate) fn max_or_nan(m: f64, d: f64) -> f64 {
 }
 
 /// Returns the largest difference of two states.
-pub(crate) fn apart(a: State, b: State) -> f64 {
+pub(crate) fn apart<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
     a.iter().zip(&b).map(|(x, y)| (x - y).abs()).fold(0.0, max_or_nan)
 }
 
 /// Returns the largest entry of a state, or 1 if that is larger.
-pub(crate) fn size(y: State) -> f64 {
+pub(crate) fn size<const N: usize>(y: [f64; N]) -> f64 {
     y.iter().fold(1.0, |m, x| m.max(x.abs()))
 }
 
 /// Returns the largest difference of two states, relative to their size.
-pub(crate) fn departure(a: State, b: State) -> f64 {
+pub(crate) fn departure<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
     apart(a, b) / size(a).max(size(b))
 }
 
@@ -162,7 +160,7 @@ pub(crate) fn mirrored_symbol(symbol: u8) -> u8 {
 }
 
 /// Returns a state with all signs reversed.
-pub(crate) fn negated(y: State) -> State {
+pub(crate) fn negated<const N: usize>(y: [f64; N]) -> [f64; N] {
     y.map(|x| -x)
 }
 

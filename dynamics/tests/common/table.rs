@@ -1,6 +1,6 @@
 //! Reference results of an independent program, `data/cells.csv`.
 
-use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::model::{GearPair, State, state};
 use rattlemap_dynamics::orbit::Class;
 use rattlemap_dynamics::word::Word;
 use serde::Deserialize;
@@ -53,7 +53,7 @@ impl Row {
 
     /// Returns a state of the cycle, or of its symmetry-conjugate orbit, at phase 0.
     pub(crate) fn strobe(&self) -> Option<State> {
-        Some([self.x1?, self.v1?, self.x2?, self.v2?])
+        Some(state(&[self.x1?, self.v1?, self.x2?, self.v2?]))
     }
 
     /// Returns the word of the cycle; none if it was too long for the table.

@@ -8,7 +8,7 @@ use nalgebra::Complex;
 use proptest::prelude::*;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, NonImpacting, Oscillator, Side, Stage, State,
+    Contact, Domain, Harmonic, Law, NonImpacting, Oscillator, REST, Side, Stage, State, state,
 };
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
@@ -138,7 +138,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 friction: Vec::new(),
                 machine: None,
             };
-            let mut start = [y[0], 3.0 * y[1], y[2], 3.0 * y[3]];
+            let mut start = state(&[y[0], 3.0 * y[1], y[2], 3.0 * y[3]]);
             if is_single {
                 let first = |m: Matrix| [[m[0][0], 0.0], [0.0, 0.0]];
                 let free = Domain {
@@ -153,7 +153,7 @@ fn cases() -> impl Strategy<Value = Case> {
                     gap: [if gap[0] == 0.0 { -1.0 } else { gap[0] }, 0.0],
                     ..transformed(&oscillator, |_| free, |force| [force[0], 0.0])
                 };
-                start = [y[0], 3.0 * y[1], 0.0, 0.0];
+                start = state(&[y[0], 3.0 * y[1]]);
             }
             let changed = |&(k, c, by): &(f64, f64, [f64; 2])| {
                 let Domain { damping, stiffness, load, .. } = oscillator.free;
@@ -363,7 +363,7 @@ proptest! {
         let tangents = carrier.tangents().map(|u| u.map(|x| x * carrier.log_scale().exp()));
         let degrees = case.oscillator.degrees;
         for (j, tangent) in tangents.into_iter().enumerate().take(2 * degrees) {
-            let mut ends = [[0.0; 4]; 4];
+            let mut ends = [REST; 4];
             for (end, h) in ends.iter_mut().zip([H, -H, 2.0 * H, -2.0 * H]) {
                 let moved = std::array::from_fn(|i| y[i] + if i == j { h } else { 0.0 });
                 let mut neighbour = settled.at::<0>(moved, []);
@@ -441,8 +441,8 @@ proptest! {
         let (length, rate) = (2f64.powi(length), 2f64.powi(time));
         let o = &case.oscillator;
         let (scaled, law, start) = in_units(o, case.law, case.start, length, rate);
-        let unit = [length, length * rate, length, length * rate];
-        let times = |y: State, unit: State| std::array::from_fn::<f64, 4, _>(|i| y[i] * unit[i]);
+        let unit = state(&[length, length * rate, length, length * rate]);
+        let times = |y: State, unit: State| -> State { std::array::from_fn(|i| y[i] * unit[i]) };
         let run = |oscillator: &Oscillator, law: Law, start: State| {
             let flow = Flow::new(oscillator);
             let mut trajectory = Trajectory::new(&flow, law, start);
@@ -458,7 +458,8 @@ proptest! {
         prop_assert_eq!(theirs, times(ours, unit));
         prop_assert_eq!(kinds(&images), kinds(&events));
         for (image, event) in images.iter().zip(&events) {
-            prop_assert_eq!(image.before, times(event.before, unit));
+            let before: [f64; 4] = std::array::from_fn(|i| event.before[i] * unit[i]);
+            prop_assert_eq!(image.before, before);
             prop_assert_eq!(image.t * rate, event.t);
         }
     }
@@ -504,7 +505,7 @@ proptest! {
         let forth = |u: [f64; 2]| [a[0][0] * u[0] + a[0][1] * u[1], a[1][0] * u[0] + a[1][1] * u[1]];
         let each = |map: &dyn Fn([f64; 2]) -> [f64; 2], y: State| {
             let (x, v) = (map([y[0], y[2]]), map([y[1], y[3]]));
-            [x[0], v[0], x[1], v[1]]
+            state(&[x[0], v[0], x[1], v[1]])
         };
         let (flow, other_flow) = (Flow::new(o), Flow::new(&other));
         let mut ours = Trajectory::with_tangents(&flow, case.law, case.start, UNIT);
@@ -631,12 +632,12 @@ fn forces_with_different_phases_have_the_closed_form_response() {
         let turn = Complex::new(0.0, phase).exp();
         let of = |i: usize| [middle[i] + (amplitudes[i] * turn).re, -omega * (amplitudes[i] * turn).im];
         let ([x1, v1], [x2, v2]) = (of(0), of(1));
-        [x1, v1, x2, v2]
+        state(&[x1, v1, x2, v2])
     };
     let contact_free = NonImpacting::new(&oscillator).unwrap();
     assert!(departure(contact_free.steady(), steady(0.0)) < 1e-14);
     let flow = Flow::new(&oscillator);
-    let mut trajectory = Trajectory::<0>::new(&flow, Law::both(0.5, 0.0), [0.0; 4]);
+    let mut trajectory = Trajectory::<0>::new(&flow, Law::both(0.5, 0.0), REST);
     for _ in 0..80 {
         trajectory.advance_period(&mut ()).unwrap();
     }

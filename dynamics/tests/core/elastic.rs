@@ -3,7 +3,7 @@
 use crate::common::linear::{Linear, invariants, invariants_of, product, with_wall};
 use crate::common::{BUDGET, REST, near};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State, state};
 use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow, measure};
 use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
@@ -11,7 +11,7 @@ use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 const LAW: Law = Law { restitution: [0.5; 2], mesh_speed: [0.01; 2] };
 
 /// The unit tangents of one degree of freedom.
-const UNITS: [State; 2] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
+const UNITS: [State; 2] = [state(&[1.0]), state(&[0.0, 1.0])];
 
 /// A bilinear oscillator: free motion, and motion behind an elastic wall on the right.
 struct Bilinear {
@@ -80,7 +80,7 @@ fn a_bilinear_oscillator_agrees_with_two_linear_flights() {
 
 /// Returns the tangents, the state and the events of one period.
 fn strobe(flow: &Flow, start: [f64; 2]) -> ([[f64; 2]; 2], [f64; 2], Vec<GapEvent>) {
-    let mut trajectory = Trajectory::with_tangents(flow, LAW, [start[0], start[1], 0.0, 0.0], UNITS);
+    let mut trajectory = Trajectory::with_tangents(flow, LAW, state(&[start[0], start[1], 0.0, 0.0]), UNITS);
     let mut events = Vec::new();
     trajectory.advance_period(&mut events).expect("an ordinary cell");
     assert!(!trajectory.near_grazing(), "a crossing of an elastic wall is near grazing: {start:?}");
@@ -160,7 +160,7 @@ fn growth_that_contacts_do_not_share_is_not_chaos() {
     // Impacts between two walls without loss, while negative damping supplies energy.
     let mut driven = linear(-0.001, 1.0).oscillator();
     driven.walls = [1.0, -1.0];
-    let bouncing = (driven, Law::both(1.0, 0.0), [0.3, 2.0, 0.0, 0.0]);
+    let bouncing = (driven, Law::both(1.0, 0.0), state(&[0.3, 2.0]));
     // A bouncing mass beside an uncoupled one that rests on the top of a hill.
     let mut pair = linear(0.05, 1.0).oscillator();
     (pair.degrees, pair.walls, pair.force) = (2, [0.5, -0.5], [2.0, 0.0]);
@@ -170,7 +170,7 @@ fn growth_that_contacts_do_not_share_is_not_chaos() {
     // Rest behind a wall, where the hill is steeper than the contact's spring.
     let hill = Linear { load: -1.0, ..linear(0.0, -2.0) };
     let behind = with_wall(hill.oscillator(), Side::Right, 0.0, Contact::Elastic, [1.0, 0.0]);
-    let at_rest = (behind, Law::both(0.0, 0.0), [1.0, 0.0, 0.0, 0.0]);
+    let at_rest = (behind, Law::both(0.0, 0.0), state(&[1.0]));
     for (oscillator, law, start) in [bouncing, beside_a_hill, at_rest] {
         let flow = Flow::new(&oscillator);
         let found = measure(&flow, law, start, &BUDGET);

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::common::{REST, near, paper};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Friction, Law, Oscillator};
+use rattlemap_dynamics::model::{Contact, Domain, Friction, Law, Oscillator, state};
 use rattlemap_dynamics::orbit::{Class, Settings, analyse_flow};
 use rattlemap_dynamics::reference::{FrictionEvent, GapEvent, Observer, Trajectory};
 
@@ -54,7 +54,7 @@ fn half_swings_become_shorter_until_the_block_stops() {
     // The period is ten half swings long.
     let flow = Flow::new(&block(0.1, 0.0, 0.15));
     let mut slides = Slides::default();
-    let mut motion = Trajectory::new(&flow, LAW, [1.0, 0.0, 0.0, 0.0]);
+    let mut motion = Trajectory::new(&flow, LAW, state(&[1.0]));
     motion.advance_period(&mut slides).unwrap();
     // Turns at -0.7, 0.4 and -0.1, where the spring's force is below 0.15.
     let turns: Vec<f64> = slides.0.iter().map(|&(_, t)| t / PI).collect();
@@ -70,7 +70,7 @@ fn half_swings_become_shorter_until_the_block_stops() {
     for _ in 0..100 {
         motion.advance_period(&mut slides).unwrap();
     }
-    assert_eq!((slides.0.len(), motion.state()), (3, [x, 0.0, 0.0, 0.0]));
+    assert_eq!((slides.0.len(), motion.state()), (3, state(&[x])));
 }
 
 /// J. P. den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931) 107: motion without stops. With
@@ -83,7 +83,7 @@ fn half_swings_become_shorter_until_the_block_stops() {
 fn the_amplitude_of_forced_sliding_is_that_of_den_hartog() {
     for (omega, friction) in [(0.8, 0.1), (0.8, 0.4), (1.3, 0.3), (1.7, 0.2), (2.3, 0.1)] {
         let flow = Flow::new(&block(omega, 1.0, friction));
-        let orbit = analyse_flow(&flow, LAW, [0.3, 0.0, 0.0, 0.0], &Settings::default(), 8);
+        let orbit = analyse_flow(&flow, LAW, state(&[0.3]), &Settings::default(), 8);
         let angle = PI / omega;
         let (v, u) = (1.0 / (1.0 - omega * omega), angle.sin() / (omega * (1.0 + angle.cos())));
         let expected = (v * v - u * u * friction * friction).sqrt();
@@ -103,9 +103,9 @@ fn the_amplitude_of_forced_sliding_is_that_of_den_hartog() {
 #[test]
 fn a_block_that_sticks_for_ever_is_periodic() {
     let flow = Flow::new(&block(0.7, 0.1, 0.3));
-    let orbit = analyse_flow(&flow, LAW, [0.15, 0.0, 0.0, 0.0], &Settings::default(), 8);
+    let orbit = analyse_flow(&flow, LAW, state(&[0.15]), &Settings::default(), 8);
     assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{:?}", orbit.status);
-    assert_eq!(orbit.strobe, [0.15, 0.0, 0.0, 0.0]);
+    assert_eq!(orbit.strobe, state(&[0.15]));
     assert_eq!(orbit.floquet, Some(vec![[0.0, 0.0]]));
     let of = orbit.quantities.unwrap().friction.unwrap();
     assert!(near(of.sticking, 1.0, 1e-14) && of.dissipated == 0.0, "{of:?}");
@@ -121,7 +121,7 @@ fn a_block_on_a_belt_comes_to_slide_at_the_limit_of_friction() {
     let flow = Flow::new(&belt);
     let mut slides = Slides::default();
     // At the start the block moves with the belt.
-    let mut motion = Trajectory::new(&flow, LAW, [0.0, speed, 0.0, 0.0]);
+    let mut motion = Trajectory::new(&flow, LAW, state(&[0.0, speed]));
     motion.advance_to(friction / speed, &mut slides).unwrap();
     let [x, v, ..] = motion.state();
     assert!(near(x, friction, 1e-14) && v == speed, "{x}, {v}");

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::linear::{Linear, with_wall};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Side, State};
+use rattlemap_dynamics::model::{Contact, Law, Side, State, state};
 use rattlemap_dynamics::orbit::{history, state_at};
 
 /// Returns the flow of a ball with the acceleration 2 towards a wall at 0. The forcing has no amplitude.
@@ -20,7 +20,7 @@ fn at(flow: &Flow, law: Law, start: State, time: f64) -> State {
 /// From the height 9 the ball falls for 3 and then bounces every 6, with the speed 6.
 #[test]
 fn the_state_at_the_exact_time_of_an_impact_is_the_one_after_it() {
-    let start = [-9.0, 0.0, 0.0, 0.0];
+    let start = state(&[-9.0]);
     for omega in [1.0, 0.7, std::f64::consts::TAU, std::f64::consts::TAU / 3.0] {
         let (flow, law) = (falling(Contact::Impact, omega), Law::both(1.0, 0.0));
         for n in 0..200 {
@@ -39,7 +39,7 @@ fn samples_of_a_history_at_impacts_have_the_states_after_them() {
     let (flow, law) = (falling(Contact::Impact, std::f64::consts::TAU / 3.0), Law::both(1.0, 0.0));
     let history = |skipped, periods, samples| {
         let window = (skipped, periods);
-        history(&flow, law, [-9.0, 0.0, 0.0, 0.0], window, samples, &AtomicBool::new(false)).unwrap().unwrap()
+        history(&flow, law, state(&[-9.0]), window, samples, &AtomicBool::new(false)).unwrap().unwrap()
     };
     let first = history(0, 8, 4);
     assert_eq!(first.samples.len(), 33);

@@ -4,7 +4,7 @@ use crate::common::linear::{Linear, transformed, with_wall};
 use crate::common::{BUDGET, near};
 use crate::single_stop::{Family, Impacting};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, REST, Side, State};
+use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, REST, Side, State, state};
 use rattlemap_dynamics::orbit::{
     Budget, Class, EventKind, Measurement, Orbit, Settings, Status, analyse_flow, measure,
 };
@@ -66,7 +66,7 @@ fn an_orbit_at_one_wall_is_classified_and_agrees_with_the_closed_form() {
         let (exact, [x, v]) = case.orbit();
         assert!(exact.speed > 0.3, "{case:?}");
         let flow = Flow::new(&case.oscillator());
-        let start = [x - 0.01, v + 0.02, 0.3, -0.2];
+        let start = state(&[x - 0.01, v + 0.02, 0.3, -0.2]);
 
         let orbit = analyse_flow(&flow, case.law(), start, &Settings::default(), 8);
         assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Ok), "{case:?}");
@@ -108,7 +108,7 @@ fn an_oscillator_with_a_left_wall_is_the_mirror_image_of_one_with_a_right_wall()
         };
         assert_eq!(left.length_scale(), right.length_scale());
         let (_, [x, v]) = case.orbit();
-        let start = [x - 0.01, v + 0.02, 0.3, -0.2];
+        let start = state(&[x - 0.01, v + 0.02, 0.3, -0.2]);
         let run = |oscillator: &Oscillator, start: State| {
             let flow = Flow::new(oscillator);
             analyse_flow(&flow, case.law(), start, &Settings::default(), 8)
@@ -161,7 +161,7 @@ fn a_ball_comes_to_rest_on_a_floor_at_any_position() {
         assert!(oscillator.length_scale() >= g);
         let flow = Flow::new(&oscillator);
         let law = Law::both(e, 0.0);
-        let mut trajectory = Trajectory::new(&flow, law, [floor, -v, 0.0, 0.0]);
+        let mut trajectory = Trajectory::new(&flow, law, state(&[floor, -v]));
         let mut events: Vec<GapEvent> = Vec::new();
         (0..3).for_each(|_| trajectory.advance_period(&mut events).unwrap());
         let end = events.pop().unwrap();
@@ -182,7 +182,7 @@ fn a_ball_comes_to_rest_on_a_floor_at_any_position() {
         assert_eq!(trajectory.meshing(), Some(Side::Right));
         assert!(near(trajectory.state()[0] - floor, g / 1e4, 1e-12), "{:?}", trajectory.state());
 
-        let orbit = analyse_flow(&flow, law, [floor, -v, 0.0, 0.0], &Settings::default(), 8);
+        let orbit = analyse_flow(&flow, law, state(&[floor, -v]), &Settings::default(), 8);
         assert_eq!(orbit.class, Class::Periodic { period: 1 }, "floor {floor}");
         assert!(near(orbit.mesh_fraction, 1.0, 1e-12), "floor {floor}: {}", orbit.mesh_fraction);
     }
@@ -209,8 +209,8 @@ pub(crate) fn in_units(
         ..transformed(oscillator, domain, |f| f.map(|f| force * f))
     };
     assert_eq!(scaled.length_scale(), length * oscillator.length_scale());
-    let [x1, v1, x2, v2] = start;
-    let start = [length * x1, length * rate * v1, length * x2, length * rate * v2];
+    let [x1, v1, x2, v2, ..] = start;
+    let start = state(&[length * x1, length * rate * v1, length * x2, length * rate * v2]);
     (scaled, Law { mesh_speed: law.mesh_speed.map(|speed| length * rate * speed), ..law }, start)
 }
 
@@ -227,7 +227,7 @@ fn gear_pairs_and_impact_oscillators() -> Vec<(Oscillator, Law, State)> {
     for i in 0..24 {
         let (gamma, sigma) = (if i % 2 == 0 { 0.0 } else { 0.05 }, 0.3 * f64::from(i % 3 - 1));
         let case = ImpactOscillator { gamma, omega: 1.3 + 0.07 * f64::from(i), sigma, e: 0.7 };
-        list.push((case.oscillator(), case.law(), [sigma - 0.5, 0.0, 0.1, 0.0]));
+        list.push((case.oscillator(), case.law(), state(&[sigma - 0.5, 0.0, 0.1])));
     }
     list
 }

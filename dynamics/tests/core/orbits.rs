@@ -1,7 +1,7 @@
 //! Classification of motions that are difficult to classify.
 
 use crate::common::{BUDGET, REST, flow_of, paper as cell};
-use rattlemap_dynamics::model::{GearPair, Model, State, Stops};
+use rattlemap_dynamics::model::{GearPair, Model, State, Stops, state};
 use rattlemap_dynamics::orbit::{
     Class, EVENT_PERIODS, LONGEST_WINDOW, Orbit, Settings, Status, analyse, analyse_until, measure,
 };
@@ -142,7 +142,7 @@ fn the_end_of_a_period_doubling_cascade_is_not_quasi_periodic() {
 #[test]
 fn the_steady_motion_of_an_undamped_oscillator_is_neutral() {
     let omega = 7f64.sqrt();
-    let steady = [0.1 / (1.0 - omega * omega), 0.0, 0.0, 0.0];
+    let steady = state(&[0.1 / (1.0 - omega * omega)]);
     let orbit = analyse(&undamped(omega), steady, &Settings::default()).unwrap();
     assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Neutral));
     let (sin, cos) = (std::f64::consts::TAU / omega).sin_cos();
@@ -155,7 +155,8 @@ fn the_steady_motion_of_an_undamped_oscillator_is_neutral() {
     let repeating = analyse(&undamped(5.0 / 3.0), REST, &Settings::default()).unwrap();
     assert_eq!((repeating.class, repeating.status), (Class::Periodic { period: 5 }, Status::Neutral));
     // A motion nearby stays nearby.
-    let nearby = analyse(&undamped(omega), [1.01 * steady[0], 0.0, 0.0, 0.0], &Settings::default()).unwrap();
+    let nearby =
+        analyse(&undamped(omega), state(&[1.01 * steady[0], 0.0, 0.0, 0.0]), &Settings::default()).unwrap();
     assert!(nearby.class == Class::QuasiPeriodic || nearby.status == Status::Neutral, "{nearby:?}");
 }
 
@@ -251,9 +252,9 @@ fn chaos_of_a_pair_without_supports_is_recognised() {
         // The gaps of two nearby motions separate.
         let flow = flow_of(&pair);
         let gap = |speed: f64| {
-            let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, speed, 0.0, 0.0]);
+            let mut trajectory = Trajectory::new(&flow, pair.law(), state(&[0.0, speed]));
             (0..200).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
-            let [x1, _, x2, _] = trajectory.state();
+            let [x1, _, x2, _, ..] = trajectory.state();
             x1 - x2
         };
         assert!((gap(1e-10) - gap(0.0)).abs() > 1e-3 * pair.b, "{pair:?}");
@@ -288,7 +289,7 @@ fn a_symmetric_cycle_with_strobes_in_different_domains_is_found() {
         e: 0.9422111622332906,
         mesh_speed: 60.746353712543986,
     };
-    let orbit = analyse(&pair, [0.0; 4], &Settings::default()).unwrap();
+    let orbit = analyse(&pair, REST, &Settings::default()).unwrap();
     assert_eq!((orbit.class, orbit.symmetric), (Class::Periodic { period: 5 }, Some(true)));
     assert_eq!(orbit.word, orbit.word.mirrored());
 }

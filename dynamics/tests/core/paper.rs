@@ -94,7 +94,7 @@ fn the_pitchfork_lies_at_05419() {
         let seed = Trajectory::new(&flow, pair.law(), guess);
         let symmetric = refine(&seed, map).unwrap().state;
         let derivative = map.apply(&seed, symmetric).unwrap().derivative();
-        ((derivative + nalgebra::Matrix4::identity()).determinant(), symmetric)
+        ((derivative + nalgebra::DMatrix::identity(4, 4)).determinant(), symmetric)
     };
     let (mut low, mut high) = (0.54, 0.544);
     let (at_low, mut state) = determinant(low, orbit(low).strobe);

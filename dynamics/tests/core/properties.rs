@@ -3,7 +3,7 @@
 use crate::common::{departure, domain_after, mirrored_symbol, negated, paper, sign, size};
 use proptest::prelude::*;
 use rattlemap_dynamics::flow::{DomainKind, Flow};
-use rattlemap_dynamics::model::{GearPair, Side, State};
+use rattlemap_dynamics::model::{GearPair, REST, Side, State, state};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 use rayon::prelude::*;
@@ -59,7 +59,8 @@ fn pairs() -> impl Strategy<Value = GearPair> {
 }
 
 fn starts() -> impl Strategy<Value = State> {
-    prop::array::uniform4(-2.0..2.0).prop_map(|[z, v1, x2, v2]: [f64; 4]| [x2 + z, 5.0 * v1, x2, 5.0 * v2])
+    prop::array::uniform4(-2.0..2.0)
+        .prop_map(|[z, v1, x2, v2]: [f64; 4]| state(&[x2 + z, 5.0 * v1, x2, 5.0 * v2]))
 }
 
 fn flow_of(pair: &GearPair) -> Flow {
@@ -265,7 +266,7 @@ fn a_stiff_flight_late_in_a_period_ends_in_the_state_of_its_event() {
         mesh_speed: 0.0,
     };
     let start = -1.642_490_278_186_327;
-    check_free_flights(&pair, [start, 0.0, start, 0.0]).expect("an agreement");
+    check_free_flights(&pair, state(&[start, 0.0, start])).expect("an agreement");
 }
 
 /// Meshing starts with almost no pressing acceleration, so its end depends on rounding.
@@ -286,8 +287,12 @@ fn meshing_with_hardly_any_pressing_ends() {
         e: 0.285_430_285_787_210_1,
         mesh_speed: 0.043_454_217_307_052_935,
     };
-    let start =
-        [0.385_414_006_558_098_93, 3.661_243_976_023_188_7, 0.328_508_820_108_546_65, 3.661_243_974_235_642];
+    let start = state(&[
+        0.385_414_006_558_098_93,
+        3.661_243_976_023_188_7,
+        0.328_508_820_108_546_65,
+        3.661_243_974_235_642,
+    ]);
     let mut ends_in_onset = 0;
     // The pressing acceleration is 0, or 1e-13 to 1e-3 of the total.
     for k in 0..=400 {
@@ -316,7 +321,7 @@ fn the_number_of_threads_changes_no_bit() {
         pool.install(|| {
             let cell = |pair: &GearPair| {
                 let flow = flow_of(pair);
-                let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0; 4]);
+                let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
                 for _ in 0..60 {
                     trajectory.advance_period(&mut ()).expect("an ordinary cell");
                 }

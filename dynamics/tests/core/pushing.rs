@@ -3,7 +3,7 @@
 use crate::common::linear::{Linear, with_preload, with_wall};
 use crate::common::near;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, REST, Side, state};
 use rattlemap_dynamics::orbit::{Class, Settings, analyse_flow};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
 
@@ -26,7 +26,7 @@ fn backlash_that_does_not_pull_has_the_published_trace() {
         let oscillator =
             both_walls(still, std::f64::consts::FRAC_PI_8, contact, [20_000.0 / 5.0, 50.0 / 5.0]);
         let flow = Flow::new(&oscillator);
-        let mut trajectory = Trajectory::<0>::new(&flow, LAW, [std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0]);
+        let mut trajectory = Trajectory::<0>::new(&flow, LAW, state(&[std::f64::consts::FRAC_PI_2]));
         trajectory.advance_period(&mut ()).unwrap();
         let [x, v, ..] = trajectory.state();
         assert!(near(x, expected[0], 1e-5) && near(v, expected[1], 1e-5), "{contact:?}: {x} {v}");
@@ -44,8 +44,8 @@ fn a_constant_force_returns_the_mass_with_its_speed() {
         oscillator.validate().unwrap();
         let flow = Flow::new(&oscillator);
         let mut events: Vec<GapEvent> = Vec::new();
-        let units = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
-        let mut trajectory = Trajectory::with_tangents(&flow, LAW, [0.0, 3.0, 0.0, 0.0], units);
+        let units = [state(&[1.0]), state(&[0.0, 1.0])];
+        let mut trajectory = Trajectory::with_tangents(&flow, LAW, state(&[0.0, 3.0]), units);
         trajectory.advance_to(3.0, &mut events).unwrap();
         // From 0 to the right wall, behind it, to the left wall, and so on.
         let (crosses, turns) = (1.0 / 3.0, 2.0 * 3.0 / 4.0);
@@ -84,7 +84,7 @@ fn rest_under_a_load_below_the_preload_ends() {
         let walled = with_wall(pressed.oscillator(), Side::Right, 0.5, contact, [10.0, 1.0]);
         let end = |preload: f64, start: f64| {
             let flow = Flow::new(&with_preload(walled.clone(), Side::Right, preload));
-            let mut trajectory = Trajectory::<0>::new(&flow, LAW, [start, 0.0, 0.0, 0.0]);
+            let mut trajectory = Trajectory::<0>::new(&flow, LAW, state(&[start]));
             (0..20).try_for_each(|_| trajectory.advance_period(&mut ())).map(|()| trajectory.state()[0])
         };
         assert_eq!(end(2.0, 0.5), Err(Stop::CapEvents));
@@ -102,7 +102,7 @@ fn a_spring_alone_never_pulls() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
     let orbit = |contact| {
         let oscillator = with_wall(free.oscillator(), Side::Right, 0.2, contact, [8.0, 0.0]);
-        analyse_flow(&Flow::new(&oscillator), LAW, [0.0; 4], &Settings::default(), 8)
+        analyse_flow(&Flow::new(&oscillator), LAW, REST, &Settings::default(), 8)
     };
     let [elastic, pushing] = [orbit(Contact::Elastic), orbit(Contact::Pushing)];
     assert_eq!(elastic.class, Class::Periodic { period: 1 });

@@ -3,7 +3,7 @@
 use crate::common::linear::{Linear, with_preload, with_wall};
 use crate::common::{BUDGET, REST, near, paper};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, Side};
+use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, Side, State, state};
 use rattlemap_dynamics::orbit::{
     Budget, Class, EventKind, Orbit, Quantities, Settings, analyse, analyse_flow, measure, trace,
 };
@@ -62,7 +62,7 @@ fn quantities_are_those_of_dense_samples() {
     let count = (samples.len() - 1) as f64;
     let of = quantities(&orbit);
     for (i, displacement) in of.displacements.iter().enumerate() {
-        let value = |y: &[f64; 4]| [y[0], y[2], y[0] - y[2]][i];
+        let value = |y: &State| [y[0], y[2], y[0] - y[2]][i];
         let values = || samples[1..].iter().map(|sample| value(&sample.state));
         let mean = values().sum::<f64>() / count;
         let rms = (values().map(|x| x * x).sum::<f64>() / count).sqrt();
@@ -122,7 +122,7 @@ fn a_bouncing_ball_has_the_impulses_of_its_cycle() {
     let (time, leaving) = (std::f64::consts::TAU - phase, -e * std::f64::consts::TAU / (1.0 + e));
     let v = leaving + time - gamma * phase.sin();
     let x = leaving * time + 0.5 * time * time + gamma * (phase.cos() - 1.0 - time * phase.sin());
-    let orbit = analyse_flow(&flow, Law::both(e, 0.0), [x, v, 0.0, 0.0], &Settings::default(), 8);
+    let orbit = analyse_flow(&flow, Law::both(e, 0.0), state(&[x, v]), &Settings::default(), 8);
     assert_eq!(orbit.word.time_order(), "2", "{orbit:?}");
     let speed = std::f64::consts::TAU / (1.0 + e);
     let of = quantities(&orbit);

@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 use crate::common::linear::{Linear, with_wall};
 use crate::common::{BUDGET, near};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, REST, Side};
+use rattlemap_dynamics::model::{Contact, Law, REST, Side, state};
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse_flow, measure, state_at};
 
 fn flow(sigma: f64) -> Flow {
@@ -37,7 +37,7 @@ fn an_impact_at_phase_0_does_not_change_the_orbit() {
     for (sigma, e) in cases() {
         let (flow, law, speed) = (flow(sigma), Law::both(e, 0.0), PI / (1.0 + e));
         let size = 1e-12 * sigma.max(1.0);
-        for start in [REST, [sigma - 0.02, -e * speed + 0.01, 0.0, 0.0]] {
+        for start in [REST, state(&[sigma - 0.02, -e * speed + 0.01])] {
             let orbit = analyse_flow(&flow, law, start, &Settings::default(), 8);
             let found = (orbit.class, orbit.status, orbit.word.to_string());
             if found.2 != "2" {

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 use crate::common::linear::{Linear, invariants, invariants_of, product, with_wall};
 use crate::common::near;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Side};
+use rattlemap_dynamics::model::{Contact, Law, Side, state};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
@@ -124,7 +124,7 @@ impl Family {
     /// Returns events and end of `n` periods of the reference from the orbit's state at phase 0.
     fn integrate(&self, flow: &Flow, orbit: &Impacting) -> (Vec<GapEvent>, [f64; 2]) {
         let [x, v] = self.strobe(orbit);
-        let mut trajectory = Trajectory::new(flow, self.law(), [x, v, 0.0, 0.0]);
+        let mut trajectory = Trajectory::new(flow, self.law(), state(&[x, v]));
         let mut events = Vec::new();
         (0..self.n).for_each(|_| trajectory.advance_period(&mut events).expect("an ordinary cell"));
         let [x, v, ..] = trajectory.state();
@@ -174,7 +174,7 @@ fn orbits_with_one_impact_in_n_periods_agree_with_the_closed_form() {
             assert!(near(impact.before[1], orbit.speed, 1e-12), "{case}: {impact:?}");
             assert!(near(x, x_start, 1e-12 * growth) && near(v, v_start, 1e-12 * growth), "{case}: {x} {v}");
 
-            let seed = Trajectory::new(&flow, family.law(), [x_start, v_start, 0.0, 0.0]);
+            let seed = Trajectory::new(&flow, family.law(), state(&[x_start, v_start]));
             let map = StrobeMap::Periods(family.n);
             let derivative = map.apply(&seed, seed.state()).expect("an ordinary cell").derivative();
             let ours =
@@ -220,7 +220,7 @@ fn the_ends_of_the_ellipse_are_folds() {
             count += 1;
             let flow = family.flow(orbit.sigma);
             let [x, v] = family.strobe(&orbit);
-            let seed = Trajectory::new(&flow, family.law(), [x, v, 0.0, 0.0]);
+            let seed = Trajectory::new(&flow, family.law(), state(&[x, v]));
             let image = StrobeMap::Periods(family.n).apply(&seed, seed.state()).expect("an ordinary cell");
             let derivative = image.derivative().fixed_view::<2, 2>(0, 0).into_owned();
             let ours = 1.0 - derivative.trace() + derivative.determinant();
@@ -252,7 +252,7 @@ fn contact_free_motion_grazes_at_its_amplitude() {
         for beyond in [1e-3, 1e-6, 1e-9, 1e-12] {
             for (share, hits) in [(1.0 + beyond, false), (1.0 - beyond, true)] {
                 let flow = family.flow(amplitude.abs() * share);
-                let mut trajectory = Trajectory::new(&flow, family.law(), [x, v, 0.0, 0.0]);
+                let mut trajectory = Trajectory::new(&flow, family.law(), state(&[x, v]));
                 let mut events: Vec<GapEvent> = Vec::new();
                 trajectory.advance_period(&mut events).expect("an ordinary cell");
                 assert_eq!(!events.is_empty(), hits, "gamma {gamma}, omega {omega}, {share}: {events:?}");

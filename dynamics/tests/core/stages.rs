@@ -6,7 +6,7 @@ use crate::common::linear::{Linear, invariants, product, with_wall};
 use crate::common::{BUDGET, REST, near, paper};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, NonImpacting, Oscillator, Side, Stage, State,
+    Contact, Domain, Harmonic, Law, NonImpacting, Oscillator, Side, Stage, State, state,
 };
 use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow, measure};
 use rattlemap_dynamics::reference::{GapEvent, Trajectory};
@@ -50,8 +50,8 @@ fn meissners_equation_is_stable_within_its_borders() {
             let [early, late] = [first.fundamental(share * TAU), second.fundamental((1.0 - share) * TAU)];
             let exact = product(late, early);
             let flow = Flow::new(&oscillator);
-            let columns = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
-            let mut trajectory = Trajectory::with_tangents(&flow, LAW, [0.1, 0.0, 0.0, 0.0], columns);
+            let columns = [state(&[1.0]), state(&[0.0, 1.0])];
+            let mut trajectory = Trajectory::with_tangents(&flow, LAW, state(&[0.1]), columns);
             trajectory.advance_period(&mut ()).unwrap();
             let case = format!("delta = {delta}, epsilon = {epsilon}");
             for (j, column) in trajectory.tangents().iter().enumerate() {
@@ -60,7 +60,7 @@ fn meissners_equation_is_stable_within_its_borders() {
                 }
             }
             let [trace, determinant] = invariants(exact);
-            let found = measure(&flow, LAW, [0.1, 0.0, 0.0, 0.0], &BUDGET);
+            let found = measure(&flow, LAW, state(&[0.1]), &BUDGET);
             if trace.abs() < 1.0 + determinant {
                 assert_eq!((found.period, found.status), (Some(1), Status::Ok), "{case}: {found:?}");
                 stable += 1;
@@ -124,7 +124,7 @@ fn a_contact_lasts_when_its_stiffness_changes() {
     for (k, share) in [(4.0, 0.25), (3.0, 0.5), (4.0, 0.25)] {
         exact = behind(k).flow(exact, 0.0, share * TAU);
     }
-    let found = after(&oscillator, LAW, [0.75, 0.0, 0.0, 0.0], 1);
+    let found = after(&oscillator, LAW, state(&[0.75]), 1);
     assert!(near(found[0] - 0.5, exact[0], 1e-13) && near(found[1], exact[1], 1e-13), "{found:?} {exact:?}");
 }
 
@@ -250,6 +250,6 @@ fn the_steady_motion_is_the_sum_of_the_responses_to_all_harmonics() {
     }
     let steady = NonImpacting::new(&oscillator).unwrap().steady();
     assert!(near(steady[0], exact[0], 1e-14) && near(steady[1], exact[1], 1e-14), "{steady:?} {exact:?}");
-    let moved = after(&oscillator, LAW, [exact[0], exact[1], 0.0, 0.0], 1);
+    let moved = after(&oscillator, LAW, state(&[exact[0], exact[1], 0.0, 0.0]), 1);
     assert!(near(moved[0], exact[0], 1e-13) && near(moved[1], exact[1], 1e-13), "{moved:?} {exact:?}");
 }

@@ -3,7 +3,7 @@
 use crate::common::linear::{Linear, with_wall};
 use crate::common::{BUDGET, apart, differences, events, near};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, REST, Side, State, state};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse_flow, measure};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
@@ -41,7 +41,7 @@ fn landing_phase(gamma: f64, omega: f64, from: f64) -> f64 {
 fn a_ball_without_restitution_leaves_a_vibrating_table_and_sticks_after_landing() {
     for (gamma, omega) in [(1.05, 1.0), (1.2, 1.0), (1.2, 3.0), (2.0, 0.5), (2.8, 1.0)] {
         let flow = Flow::new(&ball(gamma, omega));
-        let events = events(&flow, Law::both(0.0, 0.0), [0.0; 4], 4);
+        let events = events(&flow, Law::both(0.0, 0.0), REST, 4);
         let leaves = (-1.0f64 / gamma).acos();
         let lands = landing_phase(gamma, omega, leaves);
         let speed = thrown(gamma, omega, leaves, lands)[1];
@@ -59,12 +59,12 @@ fn a_ball_without_restitution_leaves_a_vibrating_table_and_sticks_after_landing(
             assert_eq!((end.after, start.after), ([0.0; 4], [0.0; 4]), "{case}");
         }
         assert!(events.len() >= 8, "{events:?}");
-        let orbit = analyse_flow(&flow, Law::both(0.0, 0.0), [-0.3, 0.0, 0.0, 0.0], &Settings::default(), 8);
+        let orbit = analyse_flow(&flow, Law::both(0.0, 0.0), state(&[-0.3]), &Settings::default(), 8);
         assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Ok), "{orbit:?}");
         assert_eq!((orbit.word.time_order().as_str(), orbit.impacts_per_period), ("12", 0.0), "{orbit:?}");
         let flies = (lands - leaves) / std::f64::consts::TAU;
         assert!(near(orbit.mesh_fraction, 1.0 - flies, 1e-12), "{orbit:?}");
-        let cell = measure(&flow, Law::both(0.0, 0.0), [-0.3, 0.0, 0.0, 0.0], &BUDGET);
+        let cell = measure(&flow, Law::both(0.0, 0.0), state(&[-0.3]), &BUDGET);
         assert_eq!((cell.period, cell.status, cell.word), (Some(1), Status::Ok, Some(orbit.word)));
         // Neighbouring motions leave the table at the same phase and in the same state.
         assert_eq!(orbit.floquet, Some(vec![[0.0; 2]; 2]));
@@ -77,7 +77,7 @@ fn a_ball_without_restitution_leaves_a_vibrating_table_and_sticks_after_landing(
 fn a_bouncing_ball_leaves_the_vibrating_table_at_the_same_phase() {
     for (gamma, e) in [(1.05, 0.3), (1.2, 0.5), (1.1, 0.8)] {
         let flow = Flow::new(&ball(gamma, 1.0));
-        let events = events(&flow, Law::both(e, 0.0), [-0.05, 0.0, 0.0, 0.0], 6);
+        let events = events(&flow, Law::both(e, 0.0), state(&[-0.05]), 6);
         let leaves = (-1.0f64 / gamma).acos();
         let ends: Vec<&GapEvent> = events.iter().filter(|event| event.kind == EventKind::MeshEnd).collect();
         assert!(ends.len() >= 4, "gamma = {gamma}: {}", ends.len());
@@ -99,9 +99,9 @@ fn a_ball_stays_on_a_table_with_less_acceleration_than_gravity() {
     for gamma in [0.0, 0.5, 0.999] {
         let flow = Flow::new(&ball(gamma, 2.0));
         for (start, law) in [
-            ([0.0; 4], Law::both(0.5, 0.0)),
-            ([-0.1, 0.0, 0.0, 0.0], Law::both(0.6, 1e-3)),
-            ([0.2, 0.3, 0.0, 0.0], Law::both(0.0, 0.0)),
+            (REST, Law::both(0.5, 0.0)),
+            (state(&[-0.1]), Law::both(0.6, 1e-3)),
+            (state(&[0.2, 0.3]), Law::both(0.0, 0.0)),
         ] {
             let mut trajectory = Trajectory::new(&flow, law, start);
             let mut events: Vec<GapEvent> = Vec::new();
@@ -113,7 +113,7 @@ fn a_ball_stays_on_a_table_with_less_acceleration_than_gravity() {
                 "gamma = {gamma}: {last:?}"
             );
             assert!(last.period < 20, "gamma = {gamma}: {last:?}");
-            assert_eq!((trajectory.state(), trajectory.meshing()), ([0.0; 4], Some(Side::Right)));
+            assert_eq!((trajectory.state(), trajectory.meshing()), (REST, Some(Side::Right)));
             assert!(!trajectory.near_grazing());
         }
     }
@@ -124,7 +124,7 @@ fn a_ball_stays_on_a_table_with_less_acceleration_than_gravity() {
 fn an_impact_at_the_mesh_speed_sticks() {
     let flow = Flow::new(&ball(0.0, 1.0));
     let (e, threshold, drop) = (0.6, 1e-2, 0.5);
-    let events = events(&flow, Law::both(e, threshold), [-drop, 0.0, 0.0, 0.0], 2);
+    let events = events(&flow, Law::both(e, threshold), state(&[-drop]), 2);
     let speed = (2.0 * drop).sqrt();
     let count = (1..).find(|&n| speed * e.powi(n) <= threshold).unwrap() as usize;
     assert_eq!(events.len(), count, "{events:?}");
@@ -148,7 +148,7 @@ fn gears_that_stick_move_as_one_body() {
         let pair = GearPair { omega, mesh_speed: 0.0, ..GearPair::paper(e) };
         let flow = Flow::new(&rigid(&pair));
         let mass = pair.m1 + pair.m2;
-        let events = events(&flow, pair.law(), [0.1, 0.0, 0.0, 0.0], 12);
+        let events = events(&flow, pair.law(), state(&[0.1]), 12);
         for two in events.windows(2).filter(|two| two[0].kind == EventKind::MeshStart) {
             let (start, end) = (&two[0], &two[1]);
             let case = format!("e = {e}, omega = {omega}: {two:?}");
@@ -169,7 +169,7 @@ fn gears_that_stick_move_as_one_body() {
                 (end.before[..2].to_vec(), start.after[..2].to_vec()),
                 (vec![wall, 0.0], vec![wall, 0.0])
             );
-            let pull = |[x1, v1, x2, v2]: State| {
+            let pull = |[x1, v1, x2, v2, ..]: State| {
                 (pair.force * (omega * end.t).cos() - pair.r1 * v1 - pair.k1 * x1) / pair.m1
                     + (pair.r2 * v2 + pair.k2 * x2) / pair.m2
             };
@@ -187,7 +187,7 @@ fn tangents_are_derivatives_through_sticking() {
     {
         let pair = GearPair { omega, mesh_speed, ..GearPair::paper(e) };
         let flow = Flow::new(&rigid(&pair));
-        let mut settled = Trajectory::new(&flow, pair.law(), [0.1, 0.0, 0.0, 0.0]);
+        let mut settled = Trajectory::new(&flow, pair.law(), state(&[0.1]));
         (0..20).for_each(|_| settled.advance_period(&mut ()).expect("an ordinary cell"));
         let y = settled.state();
         let strobe = |y: State| {
@@ -214,7 +214,7 @@ fn cycles_that_stick_at_the_strobe_are_found() {
         let (e, omega) = (0.05 * f64::from(n % 6), 1.1 + 0.35 * f64::from(n / 6));
         let pair = GearPair { omega, mesh_speed: 0.0, ..GearPair::paper(e) };
         let flow = Flow::new(&rigid(&pair));
-        let orbit = analyse_flow(&flow, pair.law(), [0.1, 0.0, 0.0, 0.0], &Settings::default(), 8);
+        let orbit = analyse_flow(&flow, pair.law(), state(&[0.1]), &Settings::default(), 8);
         if let (Some(side), Class::Periodic { period }) = (orbit.strobe_meshing, orbit.class) {
             let mut around = Trajectory::meshing_from(&flow, pair.law(), orbit.strobe, Some(side));
             (0..period).for_each(|_| around.advance_period(&mut ()).expect("an ordinary cell"));
@@ -235,8 +235,8 @@ fn a_start_behind_a_rigid_wall_is_moved_onto_the_wall() {
     let flow = Flow::new(&pair);
     let law = Law::both(0.5, 0.0);
     for (w, kind) in [(2.0, Some(EventKind::Impact)), (0.0, Some(EventKind::MeshStart)), (-2.0, None)] {
-        let mut trajectory = Trajectory::new(&flow, law, [1.1, w, 0.2, 0.0]);
-        assert_eq!(trajectory.state(), [0.7, w, 0.2, 0.0]);
+        let mut trajectory = Trajectory::new(&flow, law, state(&[1.1, w, 0.2]));
+        assert_eq!(trajectory.state(), state(&[0.7, w, 0.2]));
         let mut events: Vec<GapEvent> = Vec::new();
         trajectory.advance_to(1e-3, &mut events).expect("an ordinary cell");
         assert_eq!(

@@ -3,7 +3,7 @@
 use crate::common::events;
 use crate::common::linear::{Linear, with_wall};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, Stops};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, Stops, state};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 
 fn stops(e: f64) -> Stops {
@@ -24,7 +24,7 @@ fn an_elastic_free_particle_bounces_with_an_exact_period() {
     let stops = stops(1.0);
     let flow = Flow::new(&stops.oscillator().expect("valid"));
     let speed = 0.7;
-    let events = events(&flow, stops.law(), [0.0, speed, 0.0, 0.0], 200);
+    let events = events(&flow, stops.law(), state(&[0.0, speed]), 200);
     assert_eq!(events.len(), ((200.0 * flow.period * speed / stops.b - 1.0) / 2.0) as usize + 1);
     for (n, event) in events.iter().enumerate() {
         let want = (2 * n + 1) as f64 * stops.b / speed;
@@ -41,7 +41,7 @@ fn an_inelastic_free_particle_slows_down_geometrically() {
     for e in [0.2, 0.5, 0.9, 0.999] {
         let stops = stops(e);
         let flow = Flow::new(&stops.oscillator().expect("valid"));
-        let events = events(&flow, stops.law(), [0.0, 40.0, 0.0, 0.0], 100);
+        let events = events(&flow, stops.law(), state(&[0.0, 40.0]), 100);
         assert!(events.len() >= 5, "e = {e}: {} impacts", events.len());
         let (mut t, mut speed) = (stops.b / 40.0, 40.0);
         for event in &events {
@@ -63,7 +63,7 @@ fn a_harmonic_oscillator_between_stops_agrees_with_the_closed_form() {
         let w = (stops.k / stops.m).sqrt();
         let flow = Flow::new(&stops.oscillator().expect("valid"));
         let start = 30.0;
-        let events = events(&flow, stops.law(), [0.0, start, 0.0, 0.0], 30);
+        let events = events(&flow, stops.law(), state(&[0.0, start]), 30);
         let mut t = (w * stops.b / start).asin() / w;
         let mut speed = (start * start - (w * stops.b).powi(2)).sqrt();
         // The rounding error of a speed is that of the energy divided by the speed.
@@ -88,9 +88,9 @@ fn a_harmonic_oscillator_reaches_the_wall_at_the_right_speed() {
     let (w, b) = ((stops.k / stops.m).sqrt(), stops.b);
     let flow = Flow::new(&stops.oscillator().expect("valid"));
     for beyond in [1e-3, 1e-6, 1e-9, 1e-12] {
-        let miss = events(&flow, stops.law(), [0.0, w * b * (1.0 - beyond), 0.0, 0.0], 3);
+        let miss = events(&flow, stops.law(), state(&[0.0, w * b * (1.0 - beyond)]), 3);
         assert!(miss.is_empty(), "an impact at {beyond:e} below the speed: {miss:?}");
-        let hit = events(&flow, stops.law(), [0.0, w * b * (1.0 + beyond), 0.0, 0.0], 1);
+        let hit = events(&flow, stops.law(), state(&[0.0, w * b * (1.0 + beyond)]), 1);
         assert!(!hit.is_empty(), "no impact at {beyond:e} above the speed");
         // Near grazing the rounding error of the time is large.
         let want = (1.0 / (1.0 + beyond)).asin() / w;
@@ -119,7 +119,7 @@ fn a_bouncing_ball_comes_to_rest_at_the_end_of_the_series() {
         assert!(top < 1.0, "the ball reaches the other wall");
         // With a lower speed the series ends within the period.
         let v = if e > 0.9 { v * scale } else { v };
-        let events = events(&flow, law, [0.5, -v, 0.0, 0.0], 4);
+        let events = events(&flow, law, state(&[0.5, -v]), 4);
         let (mut t, mut speed) = (0.0, v);
         let impacts = events.iter().filter(|event| event.kind == EventKind::Impact).count();
         for event in &events[..impacts] {
@@ -143,7 +143,7 @@ fn a_bouncing_ball_meshes_at_the_mesh_speed() {
     let (g, v, e, threshold) = (2.0, 1.0, 0.6, 1e-3);
     let flow = Flow::new(&ball(g, 0.0));
     let law = Law::both(e, threshold);
-    let events = events(&flow, law, [0.5, -v, 0.0, 0.0], 3);
+    let events = events(&flow, law, state(&[0.5, -v]), 3);
     let count = (1..).find(|&n| v * e.powi(n) <= threshold).unwrap() as usize;
     assert!(events[..count - 1].iter().all(|event| event.kind == EventKind::Impact), "{events:?}");
     assert_eq!(events[count - 1].kind, EventKind::MeshStart, "{events:?}");
@@ -160,7 +160,7 @@ fn a_ball_reaches_the_other_wall_at_the_right_speed() {
     let law = Law::both(0.5, 0.0);
     let grazing = (2.0 * g).sqrt();
     for beyond in [1e-4, 1e-8, 1e-11, 1e-13] {
-        let first = |v: f64| events(&flow, law, [0.5, -v, 0.0, 0.0], 1)[0];
+        let first = |v: f64| events(&flow, law, state(&[0.5, -v]), 1)[0];
         let hit = first(grazing * (1.0 + beyond));
         assert_eq!(hit.side, Side::Left, "{beyond:e} above the speed: {hit:?}");
         let miss = first(grazing * (1.0 - beyond));
@@ -168,7 +168,7 @@ fn a_ball_reaches_the_other_wall_at_the_right_speed() {
     }
     // At exactly that speed, `v^2 / (2 g) = 1`, rounding decides between no event and a very slow impact. The flag of
     // near grazing must be set.
-    let mut trajectory = Trajectory::new(&flow, law, [0.5, -2.0, 0.0, 0.0]);
+    let mut trajectory = Trajectory::new(&flow, law, state(&[0.5, -2.0]));
     let mut events: Vec<GapEvent> = Vec::new();
     trajectory.advance_to(1.5, &mut events).expect("an ordinary cell");
     assert!(trajectory.near_grazing());
@@ -184,7 +184,7 @@ fn infinite_chatter_stops_at_the_requested_time() {
     let law = Law::both(0.5, 0.0);
     // The series ends at 2.
     for short in [1e-3, 1e-4, 1e-5, 1e-6] {
-        let mut trajectory = Trajectory::new(&flow, law, [0.5, -1.0, 0.0, 0.0]);
+        let mut trajectory = Trajectory::new(&flow, law, state(&[0.5, -1.0]));
         trajectory.advance_to(2.0 - short, &mut ()).expect("an ordinary cell");
         assert_eq!(trajectory.time_in_period(), 2.0 - short, "{short:e} before the end of the series");
     }
@@ -196,7 +196,7 @@ fn a_step_may_end_at_the_requested_time() {
     let stops = Stops { m: 1.0, k: 1.0, omega: 0.05, ..stops(0.5) };
     let flow = Flow::new(&stops.oscillator().expect("valid"));
     for goal in [1.25, 2.5, 3.75, 5.0, 8.75, 10.0, 18.75, 28.75, 38.75, 48.75] {
-        let mut trajectory = Trajectory::new(&flow, stops.law(), [0.1, 0.0, 0.0, 0.0]);
+        let mut trajectory = Trajectory::new(&flow, stops.law(), state(&[0.1]));
         trajectory.advance_to(goal, &mut ()).expect("an ordinary cell");
         let off = (trajectory.state()[0] - 0.1 * goal.cos()).abs();
         assert!(off < 1e-14, "off by {off:.1e} at {goal}");

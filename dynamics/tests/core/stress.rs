@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::{BUDGET, REST, apart, flow_of, negated, paper, sign, strobe, work_since};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, Side, State, state};
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse, measure, measure_until};
 use rattlemap_dynamics::reference::{EVENTS_PER_PERIOD_CAP, GapEvent, Stop, Trajectory, Work};
 use rayon::prelude::*;
@@ -115,7 +115,7 @@ fn an_escape_within_a_long_period_takes_bounded_work() {
         ..paper(0.5, 1.0).oscillator().unwrap()
     };
     let flow = Flow::new(&oscillator);
-    let mut trajectory = Trajectory::new(&flow, Law::both(0.5, 0.0), [0.0, 0.0, 0.1, 0.0]);
+    let mut trajectory = Trajectory::new(&flow, Law::both(0.5, 0.0), state(&[0.0, 0.0, 0.1]));
     assert_eq!(trajectory.advance_period(&mut ()), Err(Stop::Escape));
     assert!(trajectory.work().steps < 10_000, "{:?}", trajectory.work());
 }
@@ -130,20 +130,20 @@ fn extreme_parameters_take_bounded_work() {
 /// Returns starts on, near and behind the right wall.
 fn starts(b: f64) -> Vec<(&'static str, State)> {
     vec![
-        ("on the wall, at rest", [b, 0.0, 0.0, 0.0]),
-        ("on the wall, closing", [b, 1.0, 0.0, 0.0]),
-        ("on the wall, closing very slowly", [b, 1e-300, 0.0, 0.0]),
-        ("on the wall, opening", [b, -1.0, 0.0, 0.0]),
-        ("on the wall, opening very slowly", [b, -1e-300, 0.0, 0.0]),
-        ("behind the wall, at rest", [1.5 * b, 0.0, 0.0, 0.0]),
-        ("behind the wall, closing", [1.5 * b, 3.0, 0.0, 0.0]),
-        ("behind the wall, opening", [1.5 * b, -3.0, 0.0, 0.0]),
-        ("behind the wall by rounding", [b * (1.0 + f64::EPSILON), 0.0, 0.0, 0.0]),
-        ("behind the wall by rounding, opening", [b * (1.0 + f64::EPSILON), -1.0, 0.0, 0.0]),
-        ("in front of the wall by rounding", [b * (1.0 - f64::EPSILON), 0.0, 0.0, 0.0]),
-        ("in front of the wall by rounding, closing", [b * (1.0 - f64::EPSILON), 1.0, 0.0, 0.0]),
-        ("far behind the wall", [50.0 * b, 0.0, -50.0 * b, 0.0]),
-        ("very fast", [0.0, 1e4, 0.0, -1e4]),
+        ("on the wall, at rest", state(&[b])),
+        ("on the wall, closing", state(&[b, 1.0])),
+        ("on the wall, closing very slowly", state(&[b, 1e-300])),
+        ("on the wall, opening", state(&[b, -1.0])),
+        ("on the wall, opening very slowly", state(&[b, -1e-300])),
+        ("behind the wall, at rest", state(&[1.5 * b])),
+        ("behind the wall, closing", state(&[1.5 * b, 3.0])),
+        ("behind the wall, opening", state(&[1.5 * b, -3.0])),
+        ("behind the wall by rounding", state(&[b * (1.0 + f64::EPSILON)])),
+        ("behind the wall by rounding, opening", state(&[b * (1.0 + f64::EPSILON), -1.0])),
+        ("in front of the wall by rounding", state(&[b * (1.0 - f64::EPSILON)])),
+        ("in front of the wall by rounding, closing", state(&[b * (1.0 - f64::EPSILON), 1.0])),
+        ("far behind the wall", state(&[50.0 * b, 0.0, -50.0 * b])),
+        ("very fast", state(&[0.0, 1e4, 0.0, -1e4])),
     ]
 }
 
@@ -183,15 +183,15 @@ fn the_start_and_the_load_determine_the_first_event() {
         let b = s * pair.b;
         // F > 0 accelerates gear 1 to the right at phase 0.
         let (pressing, pulling) = (s * 50.0, s * -50.0);
-        assert_eq!(first(pressing, [b, 0.0, 0.0, 0.0]), (Some(side), Some(0.0)), "pressed on the wall");
-        assert_eq!(first(pulling, [b, 0.0, 0.0, 0.0]), (None, None), "pulled off the wall");
-        assert_eq!(first(pressing, [b, s * 3.0, 0.0, 0.0]), (None, Some(s * -1.5)), "closing");
-        assert_eq!(first(pulling, [b, s * 3.0, 0.0, 0.0]), (None, Some(s * -1.5)), "closing");
-        assert_eq!(first(pressing, [b, s * -3.0, 0.0, 0.0]), (None, None), "opening");
-        assert_eq!(first(pulling, [1.2 * b, 0.0, 0.0, 0.0]), (Some(side), None), "behind the wall");
-        let (meshing, event) = first(pressing, [b, s * 0.01, 0.0, 0.0]);
+        assert_eq!(first(pressing, state(&[b])), (Some(side), Some(0.0)), "pressed on the wall");
+        assert_eq!(first(pulling, state(&[b])), (None, None), "pulled off the wall");
+        assert_eq!(first(pressing, state(&[b, s * 3.0])), (None, Some(s * -1.5)), "closing");
+        assert_eq!(first(pulling, state(&[b, s * 3.0])), (None, Some(s * -1.5)), "closing");
+        assert_eq!(first(pressing, state(&[b, s * -3.0])), (None, None), "opening");
+        assert_eq!(first(pulling, state(&[1.2 * b])), (Some(side), None), "behind the wall");
+        let (meshing, event) = first(pressing, state(&[b, s * 0.01]));
         assert_eq!((meshing, event), (Some(side), Some(s * -0.005)), "slowly closing, pressed");
-        let (meshing, event) = first(pulling, [b, s * 0.01, 0.0, 0.0]);
+        let (meshing, event) = first(pulling, state(&[b, s * 0.01]));
         assert_eq!((meshing, event), (None, Some(s * -0.005)), "slowly closing, pulled");
     }
 }
@@ -202,7 +202,7 @@ fn grazing_motion_gains_no_energy() {
     let pair = GearPair { force: 0.0, r1: 0.0, k2: 0.0, r2: 0.0, ..paper(0.5, 5.6) };
     let speed = (pair.k1 / pair.m1).sqrt() * pair.b;
     for steps in -64..=64 {
-        let start = [0.0, speed * (1.0 + f64::from(steps) * f64::EPSILON), 0.0, 0.0];
+        let start = state(&[0.0, speed * (1.0 + f64::from(steps) * f64::EPSILON)]);
         let end = run(&pair, start, 20).expect("a trajectory without a stop");
         let energy = 0.5 * pair.m1 * end[1].powi(2) + 0.5 * pair.k1 * end[0].powi(2);
         assert!(energy < 0.5 * pair.m1 * speed * speed * (1.0 + 1e-12), "the energy has grown: {end:?}");
@@ -213,7 +213,7 @@ fn grazing_motion_gains_no_energy() {
 fn states_that_are_not_finite_stop_the_trajectory() {
     let pair = paper(0.5, 5.6);
     let flow = flow_of(&pair);
-    for start in [[f64::NAN, 0.0, 0.0, 0.0], [0.0, f64::INFINITY, 0.0, 0.0], [0.0, 0.0, 0.0, f64::NAN]] {
+    for start in [state(&[f64::NAN]), state(&[0.0, f64::INFINITY]), state(&[0.0, 0.0, 0.0, f64::NAN])] {
         let mut trajectory = Trajectory::new(&flow, pair.law(), start);
         let ended = trajectory.advance_period(&mut ());
         assert!(matches!(ended, Err(Stop::NonFinite | Stop::CapRoot)), "{start:?}: {ended:?}");
@@ -231,7 +231,7 @@ fn rates_out_of_range_stop_the_trajectory_at_once() {
         ("stiffness", GearPair { k1: 1e140, ..paper(0.5, 1e60) }),
     ] {
         let flow = flow_of(&pair);
-        let mut trajectory = Trajectory::new(&flow, pair.law(), [0.1, 1.0, 0.0, 0.0]);
+        let mut trajectory = Trajectory::new(&flow, pair.law(), state(&[0.1, 1.0]));
         let ended = trajectory.advance_period(&mut ());
         assert_eq!(ended, Err(Stop::NonFinite), "{what}");
         assert!(trajectory.work().steps < 1000, "{what}: {:?}", trajectory.work());
@@ -279,7 +279,7 @@ fn resting_on_a_wall_takes_few_steps() {
         ..paper(0.0, 0.3)
     };
     let flow = flow_of(&pair);
-    let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, -9.7, 0.0, 0.0]);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), state(&[0.0, -9.7]));
     for piece in 1..=50 {
         let before = trajectory.work().steps;
         trajectory
@@ -295,7 +295,7 @@ fn resting_on_a_wall_takes_few_steps() {
 fn elastic_chatter_without_a_threshold_stops_at_the_cap() {
     let pair = GearPair { e: 1.0, mesh_speed: 0.0, omega: 0.01, ..paper(1.0, 0.01) };
     let flow = flow_of(&pair);
-    let mut trajectory = Trajectory::new(&flow, pair.law(), [pair.b, -1e-7, 0.0, 0.0]);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), state(&[pair.b, -1e-7]));
     let ended = trajectory.advance_period(&mut ());
     assert_eq!(ended, Err(Stop::CapEvents));
     assert!(trajectory.work().events <= EVENTS_PER_PERIOD_CAP + 1);
@@ -367,7 +367,7 @@ fn a_cell_stops_when_its_allowance_is_spent() {
     let allowance = budget.allowance();
     let undamped = GearPair { r1: 0.0, r2: 0.0, r: 0.0, ..paper(0.9999, 5.6) };
     let flow = flow_of(&undamped);
-    let fast = [0.0, 2.8e5, 0.0, 0.0];
+    let fast = state(&[0.0, 2.8e5]);
     let measured = measure(&flow, undamped.law(), fast, &budget);
     assert_eq!(measured.status, Status::CapEvents, "{measured:?}");
     assert!(measured.periods_run < budget.periods(), "{measured:?}");

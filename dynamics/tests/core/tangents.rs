@@ -11,7 +11,7 @@ use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
 fn matrix(columns: [State; 4]) -> Matrix4<f64> {
-    Matrix4::from_columns(&columns.map(nalgebra::Vector4::from))
+    Matrix4::from_fn(|i, j| columns[j][i])
 }
 
 /// Returns the derivative of the strobe map over some periods by tangent vectors, and the events.

@@ -4,7 +4,7 @@ use crate::common::linear::{Linear, with_wall};
 use crate::common::near;
 use crate::independent::random::{Shape, case};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, OscillatorError, OuterWall, Side};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, OscillatorError, OuterWall, Side, state};
 use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Settings, Status, analyse_flow};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 
@@ -38,7 +38,7 @@ fn free_vibration_of_a_two_stage_spring_has_its_closed_form() {
     let o = two_stages(std::f64::consts::TAU / (4.0 * quarter));
     o.validate().unwrap();
     let (flow, law) = (Flow::new(&o), Law::both(1.0, 0.0));
-    let start = [0.0, v, 0.0, 0.0];
+    let start = state(&[0.0, v]);
     let mut trajectory = Trajectory::<0>::new(&flow, law, start);
     let mut events: Vec<GapEvent> = Vec::new();
     for _ in 0..10 {
@@ -107,7 +107,7 @@ fn a_wall_without_a_spring_changes_no_motion() {
         let plain = Flow::new(&o);
         add(&mut o, Side::Right, at, Contact::Elastic, 0.0);
         let more = Flow::new(&o);
-        let start = [0.2, 0.0, 0.0, 0.0];
+        let start = state(&[0.2]);
         let [mut a, mut b] =
             [&plain, &more].map(|flow| Trajectory::<0>::new(flow, Law::both(0.0, 0.0), start));
         let mut events = [Vec::<GapEvent>::new(), Vec::new()];

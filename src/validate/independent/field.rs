@@ -4,7 +4,7 @@
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use rattlemap_dynamics::flow::{Gap, Phasor};
-use rattlemap_dynamics::model::{Domain, Harmonic, Oscillator, State};
+use rattlemap_dynamics::model::{Domain, Harmonic, Oscillator, State, state};
 
 /// Relative difference of parallel rows.
 const PARALLEL: f64 = 1e-12;
@@ -62,7 +62,7 @@ impl Coordinates {
     pub fn state(&self, [z, w, x, v]: &Gap) -> State {
         let (own, rest) = (self.gap[self.other], self.gap[1 - self.other]);
         let (y, rate) = ((z - own * x) / rest, (w - own * v) / rest);
-        if self.other == 1 { [y, rate, *x, *v] } else { [*x, *v, y, rate] }
+        state(&if self.other == 1 { [y, rate, *x, *v] } else { [*x, *v, y, rate] })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Stable cycles of a motion by matrix exponentials: recurrence of strobe states, then Newton's method.
 
 use nalgebra::{Matrix4, Vector4};
-use rattlemap_dynamics::model::{Law, State};
+use rattlemap_dynamics::model::{Law, State, state};
 use rattlemap_dynamics::word::Word;
 
 use super::motion::{Grip, Mode, Motion, System, What, distance};
@@ -37,7 +37,7 @@ fn image(motion: &mut Motion, periods: usize) -> Option<(Vector4<f64>, Matrix4<f
     for _ in 0..periods {
         motion.advance_period()?;
     }
-    Some((motion.state().into(), derivative(motion)?))
+    Some((motion.vector(), derivative(motion)?))
 }
 
 /// Returns the derivative of a state. The second displacement of a single oscillator counts as constant.
@@ -90,11 +90,11 @@ fn newton(near: &Motion, period: usize) -> Option<Cycle> {
     image(&mut moved, period)?;
     at.for_good = moved.slid.map(|slid| slid == 0.0);
     for _ in 0..12 {
-        let from = Vector4::from(at.state());
+        let from = at.vector();
         let mut moved = at.clone();
         let (to, derivative) = image(&mut moved, period)?;
         let step = (Matrix4::identity() - derivative).lu().solve(&(to - from))?;
-        let next: State = (from + step).into();
+        let next = state((from + step).as_slice());
         let length = distance(next, at.state(), rate);
         at.set_state(next);
         if length < 1e-14 {

@@ -1,7 +1,7 @@
 //! Dry friction in motions by matrix exponentials: closed forms, energy and limits.
 
 use nalgebra::{Matrix2, Vector2, Vector4};
-use rattlemap_dynamics::model::{Contact, Friction, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Friction, Law, Oscillator, Side, State, state};
 use std::f64::consts::PI;
 
 use super::cycle::settle;
@@ -51,8 +51,8 @@ fn motion_without_stops_is_that_of_den_hartog() {
         let sign = if halves < 1.0 { 1.0 } else { -1.0 };
         let expected = x(halves.fract() * PI / omega).map(|x| sign * x);
         let system = System::new(&block(square, force, omega, friction, 0.0), ANGLE);
-        let cycle = settle(&system, Law::both(0.0, 0.0), [0.5, 0.1, 0.0, 0.0], 1000).unwrap();
-        let off = distance(cycle.strobes[0].0, [expected[0], expected[1], 0.0, 0.0], omega);
+        let cycle = settle(&system, Law::both(0.0, 0.0), state(&[0.5, 0.1]), 1000).unwrap();
+        let off = distance(cycle.strobes[0].0, state(&[expected[0], expected[1], 0.0, 0.0]), omega);
         let before = square * turn + friction - force * phase.cos();
         let (sin, cos) = (PI / r).sin_cos();
         let ratio = (before - 2.0 * friction) / before;
@@ -81,7 +81,7 @@ fn swings_shorten_by_twice_the_friction_over_the_stiffness() {
             (turn, turns) = (next, turns + 1);
         }
         let reversals = (if v == 0.0 { turns.max(1) - 1 } else { turns }) as usize;
-        let mut motion = start(&system, [x, v, 0.0, 0.0]);
+        let mut motion = start(&system, state(&[x, v]));
         let swing = if v == 0.0 { f64::from(turns) * PI / square.sqrt() } else { 20.0 };
         motion.run(swing + 1e-6).unwrap();
         assert_eq!((motion.grips[0], motion.symbols.len()), (Grip::Stick, reversals));
@@ -99,7 +99,7 @@ fn a_belt_carries_a_block_until_the_spring_is_stronger() {
     let (square, friction, speed) = (4.0f64, 0.6, 0.25);
     let (own, f) = (square.sqrt(), friction / square);
     let system = System::new(&block(square, 0.0, 0.1, friction, speed), ANGLE);
-    let mut motion = start(&system, [0.0, speed, 0.0, 0.0]);
+    let mut motion = start(&system, state(&[0.0, speed]));
     let slip = f / speed;
     for i in 1..40 {
         let t = 0.09 * f64::from(i);
@@ -126,7 +126,7 @@ fn friction_holds_a_gap_on_a_rigid_wall() {
         let mut o = block(1e-9, 1.0, omega, friction, 0.0);
         (o.walls[0], o.contacts[0]) = (0.0, Contact::Rigid);
         let system = System::new(&o, ANGLE);
-        let mut motion = start(&system, [-1e-3, 0.2, 0.0, 0.0]);
+        let mut motion = start(&system, state(&[-1e-3, 0.2]));
         motion.run(0.5 * PI / omega - 1e-6).unwrap();
         assert_eq!((motion.mode, motion.grips[0]), (Mode::Stuck(Side::Right), Grip::Stick));
         motion.run(0.5 * PI / omega + 1e-6).unwrap();
@@ -149,7 +149,7 @@ fn a_wall_takes_over_from_friction() {
         (o.walls[0], o.contacts[0]) = (0.0, contact);
         o.meshing[0].stiffness[0][0] = 100.0;
         let system = System::new(&o.at_phase(1.45 * PI), ANGLE);
-        let mut motion = start(&system, [-1e-3, 0.2, 0.0, 0.0]);
+        let mut motion = start(&system, state(&[-1e-3, 0.2]));
         let takeover = 0.55 * PI - 0.4f64.acos();
         motion.run(takeover - 1e-9).unwrap();
         assert_eq!((motion.mode, motion.grips[0]), (Mode::Free, Grip::Stick));
@@ -275,7 +275,7 @@ fn tangents_are_limits_of_differences() {
             y[i] += h;
             motion.set_state(y);
             motion.advance_period().unwrap();
-            (Vector4::from(motion.state()), motion.tangents.unwrap(), motion.symbols)
+            (motion.vector(), motion.tangents.unwrap(), motion.symbols)
         };
         let (_, exact, symbols) = image(motion.clone(), 0, 0.0);
         let size = exact.amax().max(1.0);

@@ -4,7 +4,7 @@
 //! product with a stored exponential. Near a wall, Taylor series of the step are searched for roots between the extrema.
 
 use nalgebra::{Matrix2, Matrix4, RowSVector, RowVector4, SMatrix, SVector, Vector2, Vector4};
-use rattlemap_dynamics::model::{Contact, Domain, Friction, Law, Oscillator, Side, Stage, State};
+use rattlemap_dynamics::model::{Contact, Domain, Friction, Law, Oscillator, Side, Stage, State, state};
 
 /// Largest number of harmonics, the first one included.
 pub(crate) const HARMONICS: usize = 5;
@@ -413,7 +413,7 @@ impl<'a> Motion<'a> {
     /// Starts at phase 0 in a mode.
     pub(crate) fn new(system: &'a System, law: Law, start: State, mode: Mode) -> Motion<'a> {
         let mut y = Vector::zeros();
-        y.fixed_rows_mut::<4>(0).copy_from(&Vector4::from(start));
+        y.fixed_rows_mut::<4>(0).copy_from_slice(&start[..4]);
         let holds_at_0 =
             system.schedule.first().filter(|(phase, _)| *phase == 0.0).or(system.schedule.last());
         let mut motion = Motion {
@@ -516,11 +516,16 @@ impl<'a> Motion<'a> {
     }
 
     pub(crate) fn state(&self) -> State {
-        [self.y[0], self.y[1], self.y[2], self.y[3]]
+        state(self.vector().as_slice())
+    }
+
+    /// Returns both displacements and their velocities, `(x1, v1, x2, v2)`.
+    pub(crate) fn vector(&self) -> Vector4<f64> {
+        self.y.fixed_rows::<4>(0).into()
     }
 
     pub(crate) fn set_state(&mut self, state: State) {
-        self.y.fixed_rows_mut::<4>(0).copy_from(&Vector4::from(state));
+        self.y.fixed_rows_mut::<4>(0).copy_from_slice(&state[..4]);
         self.project();
     }
 

@@ -1,7 +1,7 @@
 //! Random models with harmonics and stages.
 
 use rattlemap_dynamics::model::{
-    Contact, Domain, Friction, Harmonic, Law, Oscillator, OuterWall, Side, Stage, State,
+    Contact, Domain, Friction, Harmonic, Law, Oscillator, OuterWall, Side, Stage, State, state,
 };
 
 use crate::common::linear::with_wall;
@@ -198,7 +198,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         restitution.map(|e| if e == 0.0 && random.chance(0.3) { 0.0 } else { random.logarithmic(0.01, 2.0) });
     // The gap is half of the nearer wall.
     let inside = 0.5 * if walls[0].is_finite() { walls[0] } else { walls[1] };
-    let mut start = [0.0, random.even(1.0), 0.0, random.even(1.0)];
+    let mut start = state(&[0.0, random.even(1.0), 0.0, random.even(1.0)]);
     let other = oscillator.other();
     start[2 * (1 - other)] = inside / oscillator.gap[1 - other];
     if is_single {
