@@ -391,6 +391,7 @@ mod tests {
     use crate::record::measures::MEASURES;
     use crate::record::{RecordStore, RecordsMut};
     use rattlemap_dynamics::flow::Flow;
+    use rattlemap_dynamics::model::state;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2], sets: &[&str]) -> Scene {
         let [columns, rows] = counts;

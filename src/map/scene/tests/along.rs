@@ -1,6 +1,7 @@
 //! `--along`: a diagram along one of two axes.
 
 use super::*;
+use rattlemap_dynamics::model::state;
 use crate::map::scene::Along;
 
 const PLANE: &str = "parameters = { F = 40.0 }
@@ -92,7 +93,7 @@ fn settings_of_maps_are_ignored_in_the_text_and_refused_in_arguments() {
     assert_eq!(scene.outputs().files, [Format::Png]);
     assert_eq!(
         (scene.start(), scene.draw(), scene.refine()),
-        (Start::State([0.1, 0.0, 0.0, 0.0]), None, None)
+        (Start::State(state(&[0.1])), None, None)
     );
     assert_eq!(scene.integration().transient_periods, 77);
     let none = of_a_map.replace("'npy', 'png', 'html'", "'html'");

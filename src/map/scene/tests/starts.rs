@@ -1,6 +1,7 @@
 //! Components of the start as axes and as columns.
 
 use super::*;
+use rattlemap_dynamics::model::state;
 use crate::map::plan::Plan;
 use crate::map::scene::{CompanionFile, FileText};
 use rattlemap_dynamics::model::Stops;
@@ -29,7 +30,7 @@ fn cells_have_different_starts_and_share_one_flow() {
         assert_eq!((plan.flow_count(), plan.law_count(), plan.is_basin()), (1, 1, true));
         for id in 0..10 {
             let [v1, x2] = [-2.0 + f64::from(id % 5), [-0.5, 0.25][id as usize / 5]];
-            let start = [others[0], v1, x2, others[3]];
+            let start = state(&[others[0], v1, x2, others[3]]);
             assert_eq!((plan.cell(id).start, plan.start(id, &[])), (start, start));
             assert_eq!(plan.points().values(id as usize), [v1, x2]);
         }
@@ -41,7 +42,7 @@ fn one_axis_may_be_a_parameter() {
     let scene = map(START_PLANE, &["axis.1.parameter=omega", "axis.1.values=[2,4]"]).unwrap();
     let plan = Plan::new(&scene);
     assert_eq!((plan.flow_count(), plan.law_count()), (2, 1));
-    assert_eq!(plan.cell(9).start, [0.0, 2.0, 0.0, 0.0]);
+    assert_eq!(plan.cell(9).start, state(&[0.0, 2.0]));
     assert_eq!(plan.model(9).get("omega"), Ok(4.0));
     assert!(scene.is_basin());
     assert!(scene.fixed().all(|(parameter, _)| parameter.name != "omega"));
