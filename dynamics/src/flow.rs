@@ -64,6 +64,7 @@ pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 
 use crate::model::{Contact, Law, Model, ModelError, NonImpacting, Oscillator, REST, Side, State, state};
+use crate::reference::machine::System;
 
 /// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Oscillator::other`].
 pub type Gap = [f64; 4];
@@ -97,6 +98,8 @@ pub struct Flow {
     pub escape: f64,
     /// The oscillator.
     pub oscillator: Oscillator,
+    /// The whole system, if the oscillator is a machine. The flows of this structure then have no meaning.
+    pub machine: Option<System>,
     /// Scale of speed: the scale of length times the rate of free motion.
     pub(crate) speed: f64,
     /// The largest power of two up to `omega`. Velocities divided by it are comparable with displacements, and the
@@ -163,6 +166,12 @@ impl Flow {
     /// Computes the flow of an oscillator that [`Oscillator::validate`] accepts.
     pub fn new(oscillator: &Oscillator) -> Flow {
         let mut flow = Flow::in_stages(oscillator);
+        if let Some(machine) = &oscillator.machine {
+            let system = System::new(machine);
+            (flow.length, flow.speed, flow.escape) = system.units();
+            (flow.symmetric, flow.non_impacting, flow.machine) = (false, None, Some(system));
+            return flow;
+        }
         if !oscillator.friction.is_empty() {
             flow.add_friction();
         }
@@ -265,6 +274,7 @@ impl Flow {
             length,
             escape: oscillator.escape(),
             oscillator: oscillator.clone(),
+            machine: None,
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
             contacts,

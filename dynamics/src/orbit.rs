@@ -50,6 +50,8 @@ pub use crate::reference::EventKind;
 pub struct Event {
     /// What happened.
     pub kind: EventKind,
+    /// Index of the gap, 0 if there is one.
+    pub gap: usize,
     /// The wall at which it happened.
     pub side: Side,
     /// Time since phase 0 of the first period of the cycle or window; in a [`History`] since the start.

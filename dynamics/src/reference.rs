@@ -22,6 +22,7 @@ mod elastic;
 mod event;
 mod friction;
 mod localisation;
+pub mod machine;
 mod pushing;
 mod short_flight;
 mod stages;
@@ -32,16 +33,17 @@ mod tangent;
 
 pub use allowance::Allowance;
 pub use chatter::{CLOSING_ANGLE, NO_THRESHOLD};
-use clock::Clock;
+pub(crate) use clock::Clock;
 pub use contact::GRAZING_SPEED;
 pub use event::{
     EVENTS_PER_PERIOD_CAP, EventKind, FrictionEvent, GapEvent, Observer, STEPS_PER_PERIOD_CAP, Stop, Work,
 };
+use machine::Motion;
 use step_verdict::{Crossing, StepVerdict};
 pub use tangent::NO_SPEED;
 
 use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Schedule, Slips, Step};
-use crate::model::{Law, MOST_FRICTION, Side, State};
+use crate::model::{Law, MOST_FRICTION, REST, Side, State};
 
 /// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
 const RESCALE_STEPS: u64 = 16;
@@ -91,9 +93,12 @@ pub(crate) fn side_of(interval: i32) -> Side {
     if interval > 0 { Side::Right } else { Side::Left }
 }
 
-/// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix.
+/// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix, which stands for
+/// two for each coordinate of a machine.
 #[derive(Clone, Debug)]
 pub struct Trajectory<'f, const N: usize = 0> {
+    /// The motion, if the oscillator is a machine. The other fields then have no meaning.
+    machine: Option<Box<Motion<'f>>>,
     /// The flow of the present stage, interval and modes of friction.
     flow: &'f Flow,
     /// The flow of the present stage, in all intervals.
@@ -143,6 +148,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Multiplies the gap coordinates by `1 + shares`, to simulate the rounding of a less precise engine. While
     /// meshing, the first one is the distance from the wall. A gap that is just leaving a wall is not changed.
     pub fn perturb(&mut self, shares: [f64; 4]) {
+        if let Some(motion) = &mut self.machine {
+            return motion.perturb(shares);
+        }
         let wall = match self.mode {
             Mode::Free if self.interval == 0 => 0.0,
             Mode::Free => self.flow.wall(side_of(self.interval).mirrored()),
@@ -164,28 +172,52 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     /// Returns the present state.
     pub fn state(&self) -> State {
+        if let Some(motion) = &self.machine {
+            return motion.state();
+        }
         self.flow.to_state(self.q)
     }
 
     /// Returns the tangent vectors in the coordinates of [`State`], divided by the exponential of
     /// [`log_scale`](Self::log_scale).
     pub fn tangents(&self) -> [State; N] {
+        if let Some(motion) = &self.machine {
+            return motion.tangents().try_into().expect("there are N tangents");
+        }
         self.tangents.map(|u| self.flow.to_state(u))
+    }
+
+    /// Returns the images of the unit vectors of all entries of a state, [`Flow::state_len`], divided by the exponential of
+    /// [`log_scale`](Self::log_scale). The trajectory must carry four tangent vectors.
+    pub(crate) fn unit_images(&self) -> Vec<State> {
+        let Some(motion) = &self.machine else { return self.tangents().to_vec() };
+        let mut images = motion.tangents();
+        images.resize(self.flow.state_len(), REST);
+        images
     }
 
     /// Returns the logarithm of the common factor of all tangent vectors, which keeps them in the range of f64.
     pub fn log_scale(&self) -> f64 {
+        if let Some(motion) = &self.machine {
+            return motion.log_scale();
+        }
         self.log_scale
     }
 
     /// Replaces the tangent vectors.
     pub fn set_tangents(&mut self, tangents: [State; N]) {
+        if let Some(motion) = &mut self.machine {
+            return motion.set_tangents(start::of_machine(motion.system(), tangents));
+        }
         self.log_scale = 0.0;
         self.tangents = tangents.map(|u| self.flow.tangent_to_gap(u));
     }
 
     /// Returns the wall of the contact that lasts, if one does.
     pub fn meshing(&self) -> Option<Side> {
+        if let Some(motion) = &self.machine {
+            return motion.contact(0);
+        }
         match self.mode {
             Mode::Free | Mode::Open(_) => (self.interval != 0).then(|| side_of(self.interval)),
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => Some(side),
@@ -207,53 +239,88 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.mode.domain()
     }
 
+    /// For a machine: whether a gap in free motion passes a wall within a time of now.
+    pub(crate) fn machine_passes_wall(&self, time: f64) -> Option<bool> {
+        self.machine.as_ref().map(|motion| motion.passes_wall(time))
+    }
+
     /// Returns the number of completed forcing periods.
     pub fn period(&self) -> u64 {
+        if let Some(motion) = &self.machine {
+            return motion.period();
+        }
         self.period
     }
 
     /// Returns the time since the last phase 0.
     pub fn time_in_period(&self) -> f64 {
+        if let Some(motion) = &self.machine {
+            return motion.time_in_period();
+        }
         self.clock.time()
     }
 
     /// Returns the total time spent meshing.
     pub fn meshing_time(&self) -> f64 {
+        if let Some(motion) = &self.machine {
+            return motion.contact_time();
+        }
         self.meshing_time
     }
 
     /// Returns the total time during which an element with dry friction stuck.
     pub fn sticking_time(&self) -> f64 {
+        if let Some(motion) = &self.machine {
+            return motion.sticking_time();
+        }
         self.sticking_time
     }
 
     /// Returns the number of elements with dry friction that have not slid since the start.
     pub(crate) fn never_slid(&self) -> usize {
+        if let Some(motion) = &self.machine {
+            return motion.never_slid();
+        }
         self.schedule.whole.friction().iter().zip(self.has_slid).filter(|(_, has_slid)| !has_slid).count()
     }
 
     /// Returns the modes of dry friction.
     pub(crate) fn slips(&self) -> Slips {
+        if let Some(motion) = &self.machine {
+            return motion.slips();
+        }
         self.slips
     }
 
     /// Whether any event was so near to grazing that the linearisation is not reliable.
     pub fn near_grazing(&self) -> bool {
+        if let Some(motion) = &self.machine {
+            return motion.near_grazing();
+        }
         self.near_grazing
     }
 
     /// Clears the flag of earlier near-grazing events.
     pub fn clear_near_grazing(&mut self) {
+        if let Some(motion) = &mut self.machine {
+            return motion.clear_near_grazing();
+        }
         self.near_grazing = false;
     }
 
     /// Returns the counters of work.
     pub fn work(&self) -> Work {
+        if let Some(motion) = &self.machine {
+            return motion.work();
+        }
         self.work
     }
 
     /// Sets the work that the trajectory may take from here on.
     pub fn allowing(mut self, allowance: Allowance<'f>) -> Self {
+        if let Some(motion) = self.machine.take() {
+            return Trajectory { machine: Some(Box::new(motion.allowing(allowance))), ..self };
+        }
         self.allowance = Allowance {
             steps: allowance.steps.saturating_add(self.work.steps),
             events: allowance.events.saturating_add(self.work.events),
@@ -263,6 +330,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     }
 
     pub(crate) fn allowance(&self) -> Allowance<'f> {
+        if let Some(motion) = &self.machine {
+            return motion.allowance();
+        }
         self.allowance.after(self.work)
     }
 
@@ -271,6 +341,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub fn advance_period(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
+        if let Some(motion) = &mut self.machine {
+            return motion.advance_period(observer);
+        }
         let period = self.flow.period;
         self.advance_to(period, observer)?;
         self.phasor = [1.0, 0.0];
@@ -291,6 +364,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        if let Some(motion) = &mut self.machine {
+            return motion.advance_to(until, observer);
+        }
         if self.allowance.is_halted() {
             return Err(Stop::TooStiff);
         }

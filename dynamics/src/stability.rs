@@ -195,7 +195,7 @@ pub(crate) fn matrix_of(columns: &[State]) -> DMatrix<f64> {
 }
 
 fn image_at(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
-    let columns = trajectory.tangents().map(|u| u.map(|x| sign * x));
+    let columns: Vec<State> = trajectory.unit_images().iter().map(|u| u.map(|x| sign * x)).collect();
     let (scaled, log_scale) = unit_size(matrix_of(&columns), trajectory.log_scale());
     Image {
         state: trajectory.state().map(|value| sign * value),

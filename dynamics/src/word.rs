@@ -15,12 +15,25 @@
 
 use std::fmt;
 
+/// Returns the symbol of a flight of one of several gaps, given its symbol `b'0'..=b'7'`. It is written with the letter of the gap, as `b3`.
+pub fn of_gap(symbol: u8, gap: usize) -> u8 {
+    symbol + 8 * (gap as u8 + 1)
+}
+
+/// Writes a symbol, with the letter of its gap if it has one.
+fn written(symbol: u8) -> String {
+    match (symbol - b'0') / 8 {
+        0 => char::from(symbol).to_string(),
+        gap => format!("{}{}", char::from(b'a' + gap - 1), (symbol - b'0') % 8),
+    }
+}
+
 /// A cyclic word, stored in its lexicographically smallest rotation.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Default)]
 pub struct Word(Vec<u8>);
 
 impl Word {
-    /// Builds the cyclic word of a sequence of symbols `b'0'..=b'7'` in time order.
+    /// Builds the cyclic word of a sequence of symbols, `b'0'..=b'7'` or [`of_gap`], in time order.
     pub fn cyclic(symbols: &[u8]) -> Word {
         let mut canonical = symbols.to_vec();
         canonical.rotate_left(smallest_rotation(symbols));
@@ -64,7 +77,7 @@ impl Word {
 
     /// Returns the symbols in time order, such as `2356`.
     pub fn time_order(&self) -> String {
-        self.0.iter().map(|&s| char::from(s)).collect()
+        self.0.iter().map(|&symbol| written(symbol)).collect()
     }
 
     /// Returns the composition of maps as the paper prints it: last flight first, repeated ones as powers. `2356` is
@@ -77,12 +90,12 @@ impl Word {
             order.rotate_left(1);
         }
         order.reverse();
-        let runs: Vec<(char, usize)> =
-            order.chunk_by(|a, b| a == b).map(|run| (char::from(run[0]), run.len())).collect();
+        let runs: Vec<(String, usize)> =
+            order.chunk_by(|a, b| a == b).map(|run| (written(run[0]), run.len())).collect();
         let powers = runs.iter().any(|&(_, count)| count > 1);
         let parts: Vec<String> = runs
-            .iter()
-            .map(|&(symbol, count)| if count > 1 { format!("{symbol}^{count}") } else { symbol.to_string() })
+            .into_iter()
+            .map(|(symbol, count)| if count > 1 { format!("{symbol}^{count}") } else { symbol })
             .collect();
         format!("P_{{{}}}", parts.join(if powers { " " } else { "" }))
     }

@@ -27,6 +27,8 @@ pub struct Features {
     pub negative_preload: bool,
     /// Dry friction. No shader has code for it.
     pub friction: bool,
+    /// A [machine](rattlemap_dynamics::model::Machine). No shader has code for it.
+    pub machine: bool,
 }
 
 impl Features {
@@ -43,6 +45,7 @@ impl Features {
             pushing,
             negative_preload: has_negative_preload(oscillator),
             friction: oscillator.friction.iter().any(|friction| friction.force > 0.0),
+            machine: oscillator.machine.is_some(),
         }
     }
 
@@ -57,6 +60,7 @@ impl Features {
             pushing: self.pushing || other.pushing,
             negative_preload: self.negative_preload || other.negative_preload,
             friction: self.friction || other.friction,
+            machine: self.machine || other.machine,
         }
     }
 
@@ -65,9 +69,14 @@ impl Features {
         self.without_code().into_iter().find_map(|(is_there, feature, _)| is_there.then_some(feature))
     }
 
-    fn without_code(self) -> [(bool, &'static str, &'static str); 2] {
+    fn without_code(self) -> [(bool, &'static str, &'static str); 3] {
+        let machine = "models of more than two coordinates, of several gaps, or with a restitution that depends on the speed";
         let preload = "a wall that only pushes and has a negative preload";
-        [(self.negative_preload, preload, "negative_preload"), (self.friction, "dry friction", "friction")]
+        [
+            (self.machine, machine, "machine"),
+            (self.negative_preload, preload, "negative_preload"),
+            (self.friction, "dry friction", "friction"),
+        ]
     }
 
     /// Returns a feature that `code` lacks, in words, and the name of its field.
@@ -91,6 +100,15 @@ mod tests {
     use super::*;
     use crate::model_file::FileModel;
     use rattlemap_dynamics::model::Model;
+
+    #[test]
+    fn machines_need_the_reference() {
+        let text = FileModel::built_in("impact-oscillator").unwrap().definition().text.clone();
+        let text = text.replace("restitution = \"e\"", "restitution = \"e - 0.1*speed\"");
+        let oscillator = FileModel::parse(&text, "m.toml").unwrap().oscillator().unwrap();
+        let features = Features::default().and(Features::of(&oscillator));
+        assert!(features.needing_reference().unwrap().starts_with("models of more than two coordinates"));
+    }
 
     #[test]
     fn dry_friction_needs_the_reference() {

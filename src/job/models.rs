@@ -6,7 +6,7 @@ use rattlemap_dynamics::model::{Contact, Model, Parameter, Side};
 use rattlemap_dynamics::orbit::Status;
 use rattlemap_dynamics::word::Word;
 
-use crate::model_file::{FileModel, Wall, WallLaw, factor, gap_names, wall_name};
+use crate::model_file::{FileModel, Wall, WallLaw, factor, wall_name};
 use crate::show::symbols::with_unit;
 
 /// Returns the name and a summary of every built-in model.
@@ -32,13 +32,21 @@ pub fn page(model: &FileModel) -> String {
         definition.motion.frequency.text()
     );
     let _ = writeln!(text, "\nContact\n");
-    for side in Side::BOTH {
-        let walls = &definition.walls[side.index()];
-        for (nth, wall) in (1..).zip(walls) {
-            text += &contact(&wall_name(side, nth, walls.len()), wall, gap_names(model));
+    let has_several = definition.walls.len() > 1;
+    for (gap, [z, w]) in definition.walls.iter().zip(model.gap_symbols()) {
+        let of_gap = if has_several { format!(" of gap {z}") } else { String::new() };
+        for (side, walls) in Side::BOTH.into_iter().zip(gap) {
+            for (nth, wall) in (1..).zip(walls) {
+                let name = wall_name(side, nth, walls.len()) + &of_gap;
+                text += &contact(&name, wall, [&z, &w]);
+            }
         }
     }
-    if definition.walls.iter().all(Vec::is_empty) {
+    let walls = || definition.walls.iter().flatten().flatten();
+    if walls().any(Wall::is_by_speed) {
+        text += SPEED;
+    }
+    if walls().next().is_none() {
         text += "    The model has no walls.\n";
     }
     let has_friction = !definition.friction.is_empty();
@@ -56,7 +64,11 @@ pub fn page(model: &FileModel) -> String {
     }
     text += &format!(
         "\n{}\n{CLASSES}\n\nStatus: how the integration of a cell ended\n\n",
-        words(definition.walls.each_ref().map(|walls| !walls.is_empty()), has_friction)
+        words(
+            [0, 1].map(|side| definition.walls.iter().any(|gap| !gap[side].is_empty())),
+            has_friction,
+            has_several
+        )
     );
     for status in Status::ALL {
         let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));
@@ -80,7 +92,7 @@ fn contact(name: &str, wall: &Wall, [z, w]: [&str; 2]) -> String {
             };
             let _ = writeln!(text, "There is no impact: the motion continues behind the wall{end}");
         }
-        WallLaw::Impact { restitution, mesh_speed } => {
+        WallLaw::Impact { restitution, mesh_speed, .. } => {
             let lasts = match mesh_speed.as_number() {
                 Some(0.0) => "its rate is zero".to_owned(),
                 _ => format!("it separates at a rate of at most {}", mesh_speed.text()),
@@ -107,11 +119,13 @@ fn contact(name: &str, wall: &Wall, [z, w]: [&str; 2]) -> String {
     text
 }
 
-/// Explains the symbols of words that a model can have. `right` and `left` say whether it has these walls.
-fn words([right, left]: [bool; 2], has_friction: bool) -> String {
+/// Explains the symbols of words that a model can have. `right` and `left` say whether any gap has these walls.
+fn words([right, left]: [bool; 2], has_friction: bool, has_several_gaps: bool) -> String {
     let mut text = "Words\n\n".to_owned();
     let has_walls = right || left;
-    if has_walls {
+    if has_several_gaps {
+        text += "    One symbol per flight of each gap, between two of its events:\n";
+    } else if has_walls {
         text += "    One symbol per flight, between two events:\n";
     }
     let symbols = [
@@ -131,6 +145,11 @@ fn words([right, left]: [bool; 2], has_friction: bool) -> String {
         text += &format!(
             "    One symbol per event of sliding{others}:\n        7  sticking ends\n        0  sliding reverses without sticking\n"
         );
+    }
+    if has_several_gaps {
+        return text
+            + "    A word is the cyclic sequence of a cycle's symbols in order of time, with those of all gaps.\n    \
+               Its pattern writes repeated symbols once.\n";
     }
     if !has_walls {
         return text
@@ -190,6 +209,10 @@ fn meaning(status: Status) -> &'static str {
         Status::Escape => "failed: the motion grows without bound",
     }
 }
+
+const SPEED: &str = "    In the coefficient of restitution, speed is the size of the rate before the impact. The coefficient is limited to the
+    range from 0 to 1.
+";
 
 const FRICTION: &str = "\
 Friction

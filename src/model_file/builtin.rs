@@ -33,6 +33,9 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("friction-oscillator", include_str!("../../models/friction_oscillator.toml")),
     ("drag-gear", include_str!("../../models/drag_gear.toml")),
     ("relief-valve", include_str!("../../models/relief_valve.toml")),
+    ("turbine-gears", include_str!("../../models/turbine_gears.toml")),
+    ("two-loose-gears", include_str!("../../models/two_loose_gears.toml")),
+    ("absorber-chain", include_str!("../../models/absorber_chain.toml")),
 ];
 
 /// The built-in models, read once. A test shows that each can be read.

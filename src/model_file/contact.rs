@@ -3,13 +3,17 @@
 use rattlemap_dynamics::model::{Contact, MOST_WALLS, Side};
 
 use super::entry::{Entry, Names, Staged};
+use super::motion::{self, Gap};
 use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Keys of `[[contact]]`.
-const CONTACT_KEYS: [&str; 9] =
-    ["side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping", "preload", "pull"];
+const CONTACT_KEYS: [&str; 10] =
+    ["gap", "side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping", "preload", "pull"];
+
+/// Name of the approach speed in restitution.
+const SPEED: &str = "speed";
 
 /// A wall.
 #[derive(Clone, Debug)]
@@ -27,8 +31,10 @@ pub struct Wall {
 pub enum WallLaw {
     /// An impact.
     Impact {
-        /// Coefficient of restitution.
+        /// Coefficient of restitution. With `by_speed` it contains the approach speed, a name with the index after those of all parameters.
         restitution: Expression,
+        /// Whether restitution depends on the approach speed.
+        by_speed: bool,
         /// Largest leaving speed at which contact is sustained.
         mesh_speed: Expression,
     },
@@ -67,6 +73,11 @@ impl Wall {
         }
     }
 
+    /// Whether restitution depends on the approach speed.
+    pub fn is_by_speed(&self) -> bool {
+        matches!(self.law, WallLaw::Impact { by_speed: true, .. })
+    }
+
     /// Returns the entries on which the oscillator depends.
     pub(super) fn shaping_oscillator(&self) -> impl Iterator<Item = &Expression> {
         let spring =
@@ -77,34 +88,41 @@ impl Wall {
     /// Returns the entries on which the contact law depends.
     pub(super) fn shaping_law(&self) -> impl Iterator<Item = &Expression> {
         let both = match &self.law {
-            WallLaw::Impact { restitution, mesh_speed } => Some([restitution, mesh_speed]),
+            WallLaw::Impact { restitution, mesh_speed, .. } => Some([restitution, mesh_speed]),
             WallLaw::Elastic { .. } => None,
         };
         both.into_iter().flatten()
     }
 }
 
-/// Reads the walls of the right and of the left side, from the inside to the outside. A model may have none if it has friction.
+/// Reads the walls of each gap on the right and on the left, from the inside to the outside. A model with one gap may have none if it
+/// has friction. `defaults` are those of the parameters.
 pub(super) fn read(
     root: &Section<'_>,
     names: Names<'_>,
+    gaps: &[Gap],
+    defaults: &[f64],
     has_friction: bool,
-) -> Result<[Vec<Wall>; 2], SceneError> {
+) -> Result<Vec<[Vec<Wall>; 2]>, SceneError> {
+    let mut walls: Vec<[Vec<Wall>; 2]> = gaps.iter().map(|_| Default::default()).collect();
     let remedy = "write [[contact]] with side, at and law; only a model with [[friction]] may have no wall";
-    let field = match root.get("contact") {
-        None if has_friction => return Ok(Default::default()),
-        None => return Err(root.missing("contact", remedy)),
-        Some(field) => field,
+    let field = match (root.get("contact"), gaps) {
+        (None, [_]) if has_friction => return Ok(walls),
+        (None, _) => return Err(root.missing("contact", remedy)),
+        (Some(field), _) => field,
     };
-    let some = "1 to 8 tables, [[contact]]: a model has up to 4 walls on each side";
-    let items = field.list(some)?;
-    if !(1..=2 * MOST_WALLS).contains(&items.len()) {
-        return Err(field.wrong_count(items.len(), "tables", some));
+    let most = 2 * MOST_WALLS * gaps.len();
+    let owner = if gaps.len() == 1 { "a model" } else { "a gap" };
+    let some = format!("1 to {most} tables, [[contact]]: {owner} has up to 4 walls on each side");
+    let items = field.list(&some)?;
+    if !(1..=most).contains(&items.len()) {
+        return Err(field.wrong_count(items.len(), "tables", &some));
     }
-    let mut walls = [Vec::new(), Vec::new()];
     for item in &items {
-        let (side, field, wall) = read_one(item, names)?;
-        let own: &mut Vec<Wall> = &mut walls[side.index()];
+        let section = Section::open(item.node, &item.path, &CONTACT_KEYS)?;
+        let gap = read_gap(&section, gaps)?;
+        let (side, field, wall) = read_one(&section, names, defaults)?;
+        let own: &mut Vec<Wall> = &mut walls[gap][side.index()];
         if own.last().is_some_and(|inner| matches!(inner.law, WallLaw::Impact { .. })) {
             return Err(field.conflict(
                 "the wall before it on this side has impacts, so that no motion reaches this one; write the walls of a side from \
@@ -117,17 +135,72 @@ pub(super) fn read(
             ));
         }
         if own.len() == MOST_WALLS {
-            return Err(
-                field.conflict("there are already 4 walls on this side; a model has up to 4 on each side")
-            );
+            return Err(field.conflict(format!(
+                "there are already 4 walls on this side; {owner} has up to 4 on each side"
+            )));
         }
         own.push(wall);
+    }
+    let is_bare = |(_, walls): &(&Gap, &[Vec<Wall>; 2])| walls.iter().all(Vec::is_empty);
+    if let Some((gap, _)) = gaps.iter().zip(&walls).find(is_bare)
+        && let (Some(name), Some(field)) = (&gap.name, motion::gap_field(root, gap))
+    {
+        return Err(field.conflict(format!(
+            "no wall limits this gap; write a [[contact]] with gap = \"{name}\", or remove the row"
+        )));
     }
     Ok(walls)
 }
 
-fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, Wall), SceneError> {
-    let section = Section::open(item.node, &item.path, &CONTACT_KEYS)?;
+/// Returns the index of a contact's gap.
+fn read_gap(section: &Section<'_>, gaps: &[Gap]) -> Result<usize, SceneError> {
+    let names: Vec<(&str, usize)> =
+        gaps.iter().zip(0..).filter_map(|(gap, i)| Some((gap.name.as_deref()?, i))).collect();
+    match (section.get("gap"), names.first()) {
+        (Some(field), Some(_)) => field.choice(&names),
+        (None, None) => Ok(0),
+        (None, Some(_)) => {
+            let list: Vec<String> = names.iter().map(|(name, _)| format!("gap = \"{name}\"")).collect();
+            let remedy = format!("the gaps in [motion] have names: write {}", list.join(" or "));
+            Err(section.missing("gap", &remedy))
+        }
+        (Some(field), None) => Err(field.conflict(
+            "the gap row in [motion] has no name; remove it, or name the rows, such as gap = { a = [1, -1] }",
+        )),
+    }
+}
+
+/// Reads restitution, and whether it depends on the approach speed.
+fn read_restitution(
+    field: &Field<'_>,
+    names: Names<'_>,
+    defaults: &[f64],
+) -> Result<(Expression, bool), SceneError> {
+    let speed = names.parameters.len();
+    let known: Vec<&str> = names.parameters.iter().copied().chain([SPEED]).collect();
+    let restitution = Names { parameters: &known, ..names }.entry(field)?;
+    let is_used = |index: usize| restitution.uses().contains(&index);
+    let of_model = names.parameters.iter().position(|name| *name == SPEED);
+    if of_model.is_some_and(is_used) || is_used(speed) && names.states.contains(&SPEED) {
+        return Err(field.conflict(format!(
+            "in a restitution `{SPEED}` is the approach speed, and the model has a parameter, a coordinate or a velocity of this name; rename it"
+        )));
+    }
+    if is_used(speed) && restitution.power_law(speed, &|index| defaults[index]).is_none() {
+        return Err(field.conflict(format!(
+            "a restitution that depends on the approach speed has the form c + f*{SPEED}^p, where c, f and p do not contain `{SPEED}`, such as \
+             \"0.9 - 0.1*{SPEED}^0.2\"; values below 0 and above 1 count as 0 and 1"
+        )));
+    }
+    let by_speed = is_used(speed);
+    Ok((restitution, by_speed))
+}
+
+fn read_one<'a>(
+    section: &Section<'a>,
+    names: Names<'_>,
+    defaults: &[f64],
+) -> Result<(Side, Field<'a>, Wall), SceneError> {
     let side = section.require("side", "write side = \"right\" (z <= at) or side = \"left\" (z >= at)")?;
     let which = side.choice(&[("right", Side::Right), ("left", Side::Left)])?;
     let at = section.require("at", "write where the wall is, such as at = \"b\"")?;
@@ -144,8 +217,9 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
                 }
             }
             let restitution = section.require("restitution", "an impact needs one: w+ = -restitution w-")?;
-            let restitution = names.entry(&restitution)?;
-            WallLaw::Impact { restitution, mesh_speed: entry("mesh_speed")?.unwrap_or_else(Entry::zero) }
+            let (restitution, by_speed) = read_restitution(&restitution, names, defaults)?;
+            let mesh_speed = entry("mesh_speed")?.unwrap_or_else(Entry::zero);
+            WallLaw::Impact { restitution, by_speed, mesh_speed }
         }
         LawKind::Elastic => {
             for name in ["restitution", "mesh_speed"] {

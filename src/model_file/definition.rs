@@ -52,8 +52,8 @@ pub struct Definition {
     pub defaults: Vec<f64>,
     /// Free motion.
     pub motion: Motion,
-    /// Right and left wall.
-    pub walls: [Vec<Wall>; 2],
+    /// Right and left walls of each gap, from the inside to the outside.
+    pub walls: Vec<[Vec<Wall>; 2]>,
     /// Dry friction.
     pub friction: Vec<DryFriction>,
 }
@@ -81,35 +81,25 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let states: Vec<&str> = motion.state_names().collect();
     let names = Names { states: &states, stages: motion.stages.len(), ..names };
     let friction = friction::read(&root, names, motion.degrees())?;
-    let walls = contact::read(&root, names, !friction.is_empty())?;
-    let shapes = |index: usize| {
-        let uses = |entry: &Expression| entry.uses().contains(&index);
-        let at_walls = walls.iter().flatten();
-        Shapes::new(
-            motion.entries().any(uses)
-                || at_walls.clone().flat_map(Wall::shaping_oscillator).any(uses)
-                || friction.iter().flat_map(DryFriction::entries).any(uses),
-            at_walls.flat_map(Wall::shaping_law).any(uses),
-        )
-    };
-    let shapes: Vec<Shapes> = (0..written.len()).map(shapes).collect();
-    let model = FileModel::new(Definition {
+    let defaults: Vec<f64> = written.iter().map(|parameter| parameter.default).collect();
+    let walls = contact::read(&root, names, &motion.gaps, &defaults, !friction.is_empty())?;
+    let mut definition = Definition {
         text: text.to_owned(),
         title: line("title")?.unwrap_or_else(|| name.clone()),
         name,
         summary: line("summary")?,
         source: line("source")?,
         notes,
-        defaults: written.iter().map(|parameter| parameter.default).collect(),
-        parameters: written
-            .into_iter()
-            .zip(shapes)
-            .map(|(written, shapes)| written.into_parameter(shapes))
-            .collect(),
+        defaults,
+        parameters: Vec::new(),
         motion,
         walls,
         friction,
-    });
+    };
+    let shapes: Vec<Shapes> = (0..written.len()).map(|index| definition.shaped_by(index)).collect();
+    definition.parameters =
+        written.into_iter().zip(shapes).map(|(written, shapes)| written.into_parameter(shapes)).collect();
+    let model = FileModel::new(definition);
     match rattlemap_dynamics::flow::Flow::validate(&model) {
         Ok(_) => Ok(model),
         Err(error) => Err(no_motion(&root, &model.definition, &error)),
@@ -141,14 +131,27 @@ fn read_name(field: &Field<'_>) -> Result<String, SceneError> {
 
 /// Builds the error for a model without motion at its defaults, at the place of the field with the error.
 fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) -> SceneError {
-    let (table, key) = blame(error);
+    let (table, key) = blame(error, definition);
+    let refuse =
+        |field: &Field<'_>| field.conflict(format!("at the defaults of {}, {error}", definition.name));
+    if let Table::Gap(nth) = table
+        && let Some(field) = definition.motion.gaps.get(nth).and_then(|gap| motion::gap_field(root, gap))
+    {
+        return refuse(&field);
+    }
     let mut before = 0;
     let mut is_meant = |of: &Field<'_>| {
         let Value::Table(fields) = &of.node.value else { return false };
+        let is_of = |gap: usize| {
+            let written = fields.get("gap").map(|node| &node.value);
+            let name = definition.motion.gaps[gap].name.as_deref();
+            matches!((written, name), (Some(Value::Text(written)), Some(name)) if written == name)
+                || name.is_none()
+        };
         let is = match (table, fields.get("side").or(fields.get("order")).map(|node| &node.value)) {
-            (Table::Wall(None), _) => true,
-            (Table::Wall(Some((side, nth))), Some(Value::Text(name))) => {
-                let is_on_side = (name == "right") == (side == Side::Right);
+            (Table::Wall(gap, None), _) => is_of(gap),
+            (Table::Wall(gap, Some((side, nth))), Some(Value::Text(name))) => {
+                let is_on_side = (name == "right") == (side == Side::Right) && is_of(gap);
                 before += usize::from(is_on_side);
                 is_on_side && before == nth
             }
@@ -164,7 +167,7 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
     let list = match table {
         Table::Harmonic(_) => "harmonic",
         Table::Friction(_) => "friction",
-        Table::Motion | Table::Wall(_) => "contact",
+        Table::Motion | Table::Gap(_) | Table::Wall(..) => "contact",
     };
     let items = root.get(list).and_then(|field| field.list("").ok()).unwrap_or_default();
     let opened = match items.iter().find(|item| is_meant(item)) {
@@ -172,7 +175,7 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
         None => root.get("motion").and_then(|motion| Section::open_any(motion.node, &motion.path)),
     };
     match opened.and_then(|section| section.get(key)) {
-        Some(field) => field.conflict(format!("at the defaults of {}, {error}", definition.name)),
+        Some(field) => refuse(&field),
         None => root.no_motion("the defaults", error),
     }
 }
@@ -180,8 +183,10 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
 #[derive(Clone, Copy)]
 enum Table {
     Motion,
-    /// A wall of a side, counted from 1.
-    Wall(Option<(Side, usize)>),
+    /// The row of a gap, counted from 0.
+    Gap(usize),
+    /// A wall: the gap, counted from 0, and the side and the wall on it, counted from 1.
+    Wall(usize, Option<(Side, usize)>),
     /// The harmonic of an order.
     Harmonic(i64),
     /// An element with dry friction, counted from 1.
@@ -189,19 +194,20 @@ enum Table {
 }
 
 /// Returns the table and the key of the quantity that an error names.
-fn blame(error: &ModelError) -> (Table, &str) {
+fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str) {
     let ModelError::Oscillator(error) = error else { return (Table::Motion, "") };
     let quantity = match error {
         OscillatorError::OutOfRange { quantity, .. }
         | OscillatorError::NotSymmetric { quantity, .. }
         | OscillatorError::NotAlongGap { quantity, .. } => quantity.as_str(),
         OscillatorError::NotDefinite { .. } => "mass",
-        OscillatorError::Walls { .. } => "position",
+        OscillatorError::Walls { walls } => return (Table::Wall(definition.gap_between(*walls), None), "at"),
     };
     if let Some((what, nth)) = quantity.rsplit_once("of friction") {
         let key = ["force", "speed"].into_iter().find(|key| what.starts_with(key));
         // The determinant is that of both rows.
-        return (Table::Friction(nth.trim().parse().unwrap_or(MOST_FRICTION)), key.unwrap_or("row"));
+        let last = definition.friction.len();
+        return (Table::Friction(nth.trim().parse().unwrap_or(last)), key.unwrap_or("row"));
     }
     if quantity == "rigid walls" {
         return (Table::Friction(MOST_FRICTION), "force");
@@ -213,34 +219,65 @@ fn blame(error: &ModelError) -> (Table, &str) {
     };
     let nth = quantity.split_once(" wall ").and_then(|(_, nth)| nth.split(' ').next()?.parse().ok());
     let side = side.map(|side| (side, nth.unwrap_or(1)));
+    let of_gap = quantity.rsplit_once(" gap ").and_then(|(_, nth)| nth.parse().ok());
+    let gap = of_gap.map_or(0, |nth: usize| nth - 1);
     match quantity.split(' ').next().unwrap_or_default() {
         "entry" | "the" => (Table::Motion, "gap"),
+        "row" => (Table::Gap(gap), "gap"),
+        "independence" => (Table::Motion, "gap"),
+        "lowest" => (Table::Motion, "mass"),
+        "difference" => (Table::Motion, if quantity.contains("mass") { "mass" } else { "stiffness" }),
         "excitation" => (Table::Motion, "frequency"),
         "phase" => (Table::Motion, "stages"),
         name @ ("cosine" | "sine") => {
             let order = quantity.rsplit(' ').next().and_then(|order| order.parse().ok());
+            if order == Some(1) {
+                return (Table::Motion, if name == "sine" { "force_sin" } else { "force" });
+            }
             (Table::Harmonic(order.unwrap_or_default()), if name == "sine" { "sin" } else { "cos" })
         }
-        "position" => (Table::Wall(side), "at"),
-        "load" if side.is_some() => (Table::Wall(side), "at"),
-        "mesh" => (Table::Wall(side), "mesh_speed"),
-        "restitution" => (Table::Wall(side), "restitution"),
-        key @ ("damping" | "stiffness" | "preload") if side.is_some() => (Table::Wall(side), key),
+        "position" => (Table::Wall(gap, side), "at"),
+        "load" if side.is_some() => (Table::Wall(gap, side), "at"),
+        "mesh" | "mesh_speed" => (Table::Wall(gap, side), "mesh_speed"),
+        "restitution" | "slope" | "exponent" => (Table::Wall(gap, side), "restitution"),
+        key @ ("damping" | "stiffness" | "preload") if side.is_some() => (Table::Wall(gap, side), key),
         key => (Table::Motion, key),
     }
 }
 
 impl Definition {
-    /// Returns the first wall on a side.
+    /// Returns the first wall on a side of the first gap.
     pub fn wall(&self, side: Side) -> Option<&Wall> {
-        self.walls[side.index()].first()
+        self.walls[0][side.index()].first()
+    }
+
+    /// Returns what depends on the parameter with this index.
+    fn shaped_by(&self, index: usize) -> Shapes {
+        let uses = |entry: &Expression| entry.uses().contains(&index);
+        let walls = || self.walls.iter().flatten().flatten();
+        let oscillator = self.motion.entries().any(uses)
+            || walls().flat_map(Wall::shaping_oscillator).any(uses)
+            || self.friction.iter().flat_map(DryFriction::entries).any(uses);
+        let law = walls().flat_map(Wall::shaping_law).any(uses);
+        // A machine has its own contact laws.
+        if self.is_machine() { Shapes::new(oscillator || law, false) } else { Shapes::new(oscillator, law) }
+    }
+
+    /// Returns the index of the gap whose first walls have these positions at the defaults; 0 if there is none.
+    fn gap_between(&self, walls: [f64; 2]) -> usize {
+        let at = |wall: &Wall| wall.at.evaluate(&|index| self.defaults[index]);
+        let found = |own: &[Vec<Wall>; 2]| own.each_ref().map(|side| side.first().map(at)) == walls.map(Some);
+        self.walls.iter().position(found).unwrap_or(0)
     }
 
     /// Builds the oscillator for values of the parameters. The caller validates it.
     pub(super) fn oscillator(&self, values: &[f64]) -> Result<Oscillator, OscillatorError> {
+        if self.is_machine() {
+            return self.machine(values).map(Oscillator::of_machine);
+        }
         let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
         let motion = &self.motion;
-        let gap = vector(&motion.gap, of);
+        let gap = vector(&motion.gaps[0].row, of);
         let mut mass = matrix(&motion.mass, of);
         if motion.degrees() == 1 {
             // The second displacement does not exist; its mass must not be 0.
@@ -264,7 +301,7 @@ impl Definition {
             contacts[side.index()] = wall.contact();
         }
         let outer = |side: Side| {
-            let further = self.walls[side.index()].iter().skip(1);
+            let further = self.walls[0][side.index()].iter().skip(1);
             further
                 .map(|wall| OuterWall { at: of(&wall.at), contact: wall.contact(), meshing: Vec::new() })
                 .collect()
@@ -290,7 +327,7 @@ impl Definition {
             };
             let meshing = Side::BOTH.map(|side| {
                 let mut domain = free;
-                let own = &self.walls[side.index()];
+                let own = &self.walls[0][side.index()];
                 if let Some(wall) = own.first() {
                     domain = behind(free, wall, side, walls[side.index()]);
                 }
@@ -331,13 +368,16 @@ impl Definition {
         })
     }
 
-    /// Builds the contact law for values of the parameters.
+    /// Builds the contact law for values of the parameters. A machine has laws of its own.
     pub(super) fn law(&self, values: &[f64]) -> Law {
         let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
         let mut law = Law::both(0.0, 0.0);
-        for (i, wall) in self.walls.iter().enumerate() {
+        if self.is_machine() {
+            return law;
+        }
+        for (i, wall) in self.walls[0].iter().enumerate() {
             // Only the last wall of a side may have impacts.
-            if let Some(Wall { law: WallLaw::Impact { restitution, mesh_speed }, .. }) = wall.last() {
+            if let Some(Wall { law: WallLaw::Impact { restitution, mesh_speed, .. }, .. }) = wall.last() {
                 law.restitution[i] = of(restitution);
                 law.mesh_speed[i] = of(mesh_speed);
             }

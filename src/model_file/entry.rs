@@ -1,5 +1,7 @@
 //! Entries of vectors and matrices: numbers or expressions in parameters, or one of these for each stage.
 
+use rattlemap_dynamics::model::MOST_COORDINATES;
+
 use crate::text::document::Value;
 use crate::text::error::SceneError;
 use crate::text::expression::{Expression, ExpressionError};
@@ -150,12 +152,13 @@ impl Names<'_> {
     /// Reads a square matrix, row by row.
     pub(super) fn matrix<T: Entry>(self, field: &Field<'_>, count: usize) -> Result<Vec<Vec<T>>, SceneError> {
         let requirement = match count {
-            1 => "a matrix of one row, such as [[\"1\"]]",
-            _ => "a matrix of two rows, such as [[\"m1\", \"0\"], [\"0\", \"m2\"]]",
+            1 => "a matrix of one row, such as [[\"1\"]]".to_owned(),
+            2 => "a matrix of two rows, such as [[\"m1\", \"0\"], [\"0\", \"m2\"]]".to_owned(),
+            _ => format!("a matrix of {} rows with {} each", NUMBERS[count - 1], entries(count)),
         };
-        let rows = field.list(requirement)?;
+        let rows = field.list(&requirement)?;
         if rows.len() != count {
-            return Err(field.out_of_range(requirement));
+            return Err(field.out_of_range(&requirement));
         }
         rows.iter().map(|row| self.vector(row, count, "a row")).collect()
     }
@@ -187,6 +190,9 @@ impl Names<'_> {
     }
 }
 
-fn entries(count: usize) -> &'static str {
-    if count == 1 { "one entry" } else { "two entries" }
+/// Numbers of coordinates in words, from 1.
+const NUMBERS: [&str; MOST_COORDINATES] = ["one", "two", "three", "four", "five", "six", "seven", "eight"];
+
+pub(super) fn entries(count: usize) -> String {
+    format!("{} {}", NUMBERS[count - 1], if count == 1 { "entry" } else { "entries" })
 }

@@ -1,6 +1,6 @@
 //! Writes the equations of motion of a model.
 
-use rattlemap_dynamics::model::{Contact, Side};
+use rattlemap_dynamics::model::{self, Side};
 
 use super::definition::Definition;
 use super::entry::Entry;
@@ -8,27 +8,75 @@ use super::friction::DryFriction;
 use super::motion::Motion;
 use crate::text::expression::Expression;
 
-/// Returns the equations as lines: free motion, then contact with each wall. `z` and `w` name the gap and its velocity.
-pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
+/// Returns the equations as lines: free motion, then contact with each wall. `names` are those of each gap and its velocity.
+///
+/// With several gaps, which may be in contact at the same time, the equations come once, with a contact force for each gap.
+pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<String> {
     let motion = &definition.motion;
-    let mut lines = vec![
-        format!("gap   {}", row(&motion.gap, &motion.coordinates, z)),
-        format!("rate  {}", row(&motion.gap, &motion.velocities, w)),
-    ];
+    let mut lines = Vec::new();
+    for (gap, [z, w]) in motion.gaps.iter().zip(names) {
+        lines.push(format!("gap   {}", row(&gap.row, &motion.coordinates, z)));
+        lines.push(format!("rate  {}", row(&gap.row, &motion.velocities, w)));
+    }
     lines.extend(stages(motion));
     lines.extend(acting(definition).map(|friction| {
         let rate = sliding_rate(friction, motion);
         format!("friction  sticks at {rate} = 0 while |friction force| <= {}", text(&friction.force))
     }));
-    lines.push(format!("free, {}", between(definition, z)));
-    lines.extend(equations(definition, None).map(|line| format!("    {line}")));
+    let written = |forces: &[Option<String>]| -> Vec<String> {
+        equations(definition, forces).map(|line| format!("    {line}")).collect()
+    };
+    if let [[z, w]] = names {
+        lines.push(format!("free, {}", between(definition, 0, z)));
+        lines.extend(written(&[None]));
+        for Contact { place, force } in contacts(definition, 0, [z, w]) {
+            match force {
+                Some(force) => {
+                    lines.push(format!("behind {place}, with N = {force}"));
+                    lines.extend(written(&[Some("N".to_owned())]));
+                }
+                None => lines.push(place),
+            }
+        }
+        return lines;
+    }
+    let forces: Vec<_> = names.iter().map(|[z, _]| Some(format!("N_{z}"))).collect();
+    lines.push("with a contact force on each gap".to_owned());
+    lines.extend(written(&forces));
+    for (i, [z, w]) in names.iter().enumerate() {
+        lines.push(format!("free, {}: N_{z} = 0", between(definition, i, z)));
+        lines.extend(contacts(definition, i, [z, w]).into_iter().map(
+            |Contact { place, force }| match force {
+                Some(force) => format!("behind {place}: N_{z} = {force}"),
+                None => place,
+            },
+        ));
+    }
+    lines
+}
+
+/// Motion in contact with a wall, in words.
+struct Contact {
+    /// The wall; if the gap stays on it, the whole line.
+    place: String,
+    /// The contact force; none if the gap stays on the wall.
+    force: Option<String>,
+}
+
+/// Returns the contacts of a gap with each wall.
+fn contacts(definition: &Definition, gap: usize, [z, w]: [&str; 2]) -> Vec<Contact> {
+    let mut contacts = Vec::new();
+    let of_gap = match definition.motion.gaps.len() {
+        1 => String::new(),
+        _ => format!(" of gap {z}"),
+    };
     for side in Side::BOTH {
-        let walls = &definition.walls[side.index()];
+        let walls = &definition.walls[gap][side.index()];
         let mut forces = Vec::new();
         for (nth, wall) in (1..).zip(walls) {
-            let name = wall_name(side, nth, walls.len());
+            let name = wall_name(side, nth, walls.len()) + &of_gap;
             match (wall.contact(), &wall.spring) {
-                (contact @ (Contact::Impact | Contact::Elastic | Contact::Pushing), Some(spring)) => {
+                (contact, Some(spring)) => {
                     let preload = match side {
                         Side::Right => constant(&spring.preload),
                         Side::Left => negated(&spring.preload),
@@ -39,20 +87,22 @@ pub(super) fn lines(definition: &Definition, [z, w]: [&str; 2]) -> Vec<String> {
                         preload,
                     ];
                     match contact {
-                        Contact::Pushing => {
+                        model::Contact::Pushing => {
                             let larger = if side == Side::Right { "max" } else { "min" };
                             forces.push(Some(format!("{larger}(0, {})", sum(own))));
                         }
                         _ => forces.extend(own),
                     }
-                    lines.push(format!("behind {name}, with N = {}", sum(forces.clone())));
-                    lines.extend(equations(definition, Some("N")).map(|line| format!("    {line}")));
+                    contacts.push(Contact { place: name, force: Some(sum(forces.clone())) });
                 }
-                _ => lines.push(format!("on {name}: {z} stays {}, as long as it is pressed", text(&wall.at))),
+                (_, None) => {
+                    let place = format!("on {name}: {z} stays {}, as long as it is pressed", text(&wall.at));
+                    contacts.push(Contact { place, force: None });
+                }
             }
         }
     }
-    lines
+    contacts
 }
 
 /// Returns the name of a side.
@@ -94,9 +144,9 @@ fn stages(motion: &Motion) -> Vec<String> {
     ]
 }
 
-/// Returns the range of the gap in free motion.
-fn between(definition: &Definition, z: &str) -> String {
-    let at = |side| definition.wall(side).map(|wall| text(&wall.at));
+/// Returns the range of a gap in free motion.
+fn between(definition: &Definition, gap: usize, z: &str) -> String {
+    let at = |side: Side| definition.walls[gap][side.index()].first().map(|wall| text(&wall.at));
     match (at(Side::Left), at(Side::Right)) {
         (Some(left), Some(right)) => format!("{left} < {z} < {right}"),
         (None, Some(right)) => format!("{z} < {right}"),
@@ -131,21 +181,25 @@ fn friction_force(friction: &DryFriction, motion: &Motion, i: usize) -> Option<S
     }
 }
 
-/// Returns one equation per coordinate, with an optional force along the gap row.
-fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Iterator<Item = String> + 'd {
+/// Returns one equation per coordinate, with an optional force along the row of each gap.
+fn equations<'d>(
+    definition: &'d Definition,
+    forces: &'d [Option<String>],
+) -> impl Iterator<Item = String> + 'd {
     let motion = &definition.motion;
     let rate = |suffix: &str| -> Vec<String> {
         motion.coordinates.iter().map(|name| format!("{name}{suffix}")).collect()
     };
     let [accelerations, rates, displacements] = ["''", "'", ""].map(rate);
     (0..motion.degrees()).map(move |i| {
-        let along = force.and_then(|force| product(&motion.gap[i], force));
+        let along = motion.gaps.iter().zip(forces);
+        let along = along.map(|(gap, force)| product(&gap.row[i], force.as_deref()?)).collect();
         let left = [
             terms(&motion.mass[i], &accelerations),
             terms(&motion.damping[i], &rates),
             terms(&motion.stiffness[i], &displacements),
             acting(definition).map(|friction| friction_force(friction, motion, i)).collect(),
-            vec![along],
+            along,
         ];
         let waves = |order: u32, cos: &Expression, sin: &Expression| {
             let phase = phase(&motion.frequency, order);

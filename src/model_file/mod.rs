@@ -1,8 +1,8 @@
 //! Model files: names, parameters and matrices in TOML, read into a [`Model`]. Pure.
 //!
-//! A file defines `M x'' + C x' + K x = force cos(frequency t) + force_sin sin(frequency t) + load` in one or two
-//! coordinates, a gap `z = g . x`, and up to four walls on each side. The force may have further harmonics. `C`, `K` and `load` may change
-//! at given phases of the period, and dry friction may act. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
+//! A file defines `M x'' + C x' + K x = force cos(frequency t) + force_sin sin(frequency t) + load` in one to eight
+//! coordinates, up to three gaps `z = g . x`, and up to four walls on each side of a gap. The force may have further harmonics. `C`, `K`
+//! and `load` may change at given phases of the period, and dry friction may act. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
 //! f64. `docs/models.md` describes each key.
 
 mod builtin;
@@ -12,6 +12,7 @@ mod entry;
 mod equations;
 mod friction;
 mod harmonic;
+mod machine;
 mod motion;
 mod parameters;
 #[cfg(test)]
@@ -71,7 +72,19 @@ impl FileModel {
 
     /// Writes the equations of motion as lines: free motion, then contact with each wall.
     pub fn equations(&self) -> Vec<String> {
-        equations::lines(&self.definition, gap_names(self))
+        equations::lines(&self.definition, &self.gap_symbols())
+    }
+
+    /// Returns the symbols of each gap and its velocity in equations: those of [`gap_names`] for one gap, else its name, and its name with
+    /// a prime.
+    pub fn gap_symbols(&self) -> Vec<[String; 2]> {
+        match &self.definition.motion.gaps[..] {
+            [_] => vec![gap_names(self).map(str::to_owned)],
+            gaps => {
+                let names = gaps.iter().filter_map(|gap| gap.name.as_ref());
+                names.map(|name| [name.clone(), format!("{name}'")]).collect()
+            }
+        }
     }
 
     fn new(definition: Definition) -> FileModel {

@@ -1,13 +1,13 @@
-//! `[motion]`: coordinates, matrices, forcing and the gap.
+//! `[motion]`: coordinates, matrices, forcing and the gaps.
 
-use super::entry::{Entry, Names, Staged};
+use super::entry::{Entry, Names, Staged, entries};
 use super::harmonic::{self, HarmonicForce};
 use super::parameters::{check_name, read_unit};
 use crate::text::document::Value;
 use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
-use rattlemap_dynamics::model::{MOST_CHANGES, MOST_STAGES, Units};
+use rattlemap_dynamics::model::{MOST_CHANGES, MOST_COORDINATES, MOST_GAPS, MOST_STAGES, Units};
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
@@ -17,15 +17,27 @@ const MOTION_KEYS: [&str; 17] = [
 ];
 
 /// Limits of all models, for messages.
-const LIMITS: &str = "a model has one or two coordinates and one gap row; further harmonics of the force are tables, [[harmonic]]";
+const LIMITS: &str = "a model has one to eight coordinates and up to three gap rows; further harmonics of the force are tables, [[harmonic]]";
+
+/// Names of several rows, for messages.
+const NAMED_ROWS: &str = "gap = { a = [1, -1, 0], b = [0, 1, -1] }";
 
 /// Largest number of characters of a body's name.
 const LONGEST_BODY: usize = 40;
 
-/// Free motion and its gap.
+/// A row of displacements that walls limit.
+#[derive(Clone, Debug)]
+pub struct Gap {
+    /// Name in contacts; none if the model has one row without a name.
+    pub name: Option<String>,
+    /// Factors of the displacements.
+    pub row: Vec<Expression>,
+}
+
+/// Free motion and its gaps.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Names of the displacements, one or two.
+    /// Names of the displacements, one to eight.
     pub coordinates: Vec<String>,
     /// Names of their rates.
     pub velocities: Vec<String>,
@@ -51,8 +63,8 @@ pub struct Motion {
     pub stages: Vec<Expression>,
     /// How often the stages recur in a forcing period.
     pub repeat: u32,
-    /// Gap row: the gap is `gap . x`.
-    pub gap: Vec<Expression>,
+    /// Gaps in the order of the file, one to three.
+    pub gaps: Vec<Gap>,
     /// Units of coordinates, gap, time and contact forces.
     pub units: Units,
 }
@@ -72,8 +84,9 @@ impl Motion {
     pub(super) fn entries(&self) -> impl Iterator<Item = &Expression> {
         let staged = [&self.damping, &self.stiffness].into_iter().flatten().flatten().chain(&self.load);
         let harmonics = self.harmonics.iter().flat_map(|harmonic| [&harmonic.cos, &harmonic.sin]);
-        let vectors = [&self.force, &self.force_sin, &self.stages, &self.gap].into_iter();
-        let constant = vectors.chain(&self.mass).chain(harmonics).flatten();
+        let vectors = [&self.force, &self.force_sin, &self.stages].into_iter();
+        let rows = self.gaps.iter().map(|gap| &gap.row);
+        let constant = vectors.chain(rows).chain(&self.mass).chain(harmonics).flatten();
         staged.flat_map(Entry::values).chain(constant).chain([&self.frequency])
     }
 }
@@ -83,11 +96,12 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
     root.require("motion", "write [motion] with coordinates, mass, frequency and gap")?;
     let section =
         root.section_among("motion", &MOTION_KEYS, &format!("{}; {LIMITS}", MOTION_KEYS.join(", ")))?;
-    let field = section.require("coordinates", "name one or two, such as coordinates = [\"x\"]")?;
-    let two = "one or two names: a model has at most two degrees of freedom";
-    let coordinates = read_names(&field, two)?;
-    if !(1..=2).contains(&coordinates.len()) {
-        return Err(field.out_of_range(two));
+    let field = section.require("coordinates", "name one to eight, such as coordinates = [\"x\"]")?;
+    let some =
+        format!("1 to {MOST_COORDINATES} names: a model has at most {MOST_COORDINATES} degrees of freedom");
+    let coordinates = read_names(&field, &some)?;
+    if !(1..=MOST_COORDINATES).contains(&coordinates.len()) {
+        return Err(field.out_of_range(&some));
     }
     let count = coordinates.len();
     let each = "a list of names, one for each coordinate";
@@ -100,7 +114,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
             velocities
         }
         None if count == 1 => vec!["v".to_owned()],
-        None => vec!["v1".to_owned(), "v2".to_owned()],
+        None => (1..=count).map(|i| format!("v{i}")).collect(),
     };
     let pairs = coordinates.iter().zip(&velocities);
     let states: Vec<&str> = pairs.flat_map(|(x, v)| [x.as_str(), v.as_str()]).collect();
@@ -126,10 +140,9 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
     let (stages, repeat) = read_stages(&section, names)?;
     let names = Names { stages: stages.len(), ..names };
     let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
-    let gap = section.require("gap", "write the gap row, such as gap = [\"1\"]: z = gap . x")?;
-    let gap = names.vector(&gap, count, "one gap row")?;
+    let gaps = read_gaps(&section, names, count)?;
     Ok(Motion {
-        units: read_units(&section, &gap)?,
+        units: read_units(&section, count, &gaps)?,
         mass: names.matrix(&mass, count)?,
         damping: names.matrix_or_zeros(&section, "damping", count)?,
         stiffness: names.matrix_or_zeros(&section, "stiffness", count)?,
@@ -140,30 +153,76 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         frequency: read_frequency(&section, names)?,
         stages,
         repeat,
-        gap,
+        gaps,
         coordinates,
         velocities,
         bodies,
     })
 }
 
-/// Reads the units. The gap has the unit of the coordinates in its row, if they have the same one and plain numbers as
-/// factors, unless the file gives another.
-fn read_units(section: &Section<'_>, gap: &[Expression]) -> Result<Units, SceneError> {
+/// Reads the gap row, or the table of named rows.
+fn read_gaps(section: &Section<'_>, names: Names<'_>, count: usize) -> Result<Vec<Gap>, SceneError> {
+    let field = section.require("gap", "write the gap row, such as gap = [\"1\"]: z = gap . x")?;
+    let what = "one gap row";
+    let Some(table) = Section::open_any(field.node, &field.path) else {
+        if let Value::List(items) = &field.node.value
+            && items.iter().any(|item| matches!(item.value, Value::List(_)))
+        {
+            return Err(field.out_of_range(&format!(
+                "{what}: a list of {}; several rows have names, such as {NAMED_ROWS}",
+                entries(count)
+            )));
+        }
+        return Ok(vec![Gap { name: None, row: names.vector(&field, count, what)? }]);
+    };
+    let rows = table.fields_as_written();
+    let most = MOST_GAPS.min(count);
+    if !(1..=most).contains(&rows.len()) {
+        let remedy = format!(
+            "1 to {most} rows with names, such as {NAMED_ROWS}: a model has at most {MOST_GAPS}, and not more than coordinates"
+        );
+        return Err(field.wrong_count(rows.len(), "rows", &remedy));
+    }
+    let read_one = |(name, field): (&str, Field<'_>)| {
+        check_name(name, &field)?;
+        if names.parameters.contains(&name) || names.states.contains(&name) {
+            return Err(field.conflict(format!(
+                "`{name}` is already the name of a parameter, a coordinate or a velocity; rename the gap or the other"
+            )));
+        }
+        Ok(Gap { name: Some(name.to_owned()), row: names.vector(&field, count, what)? })
+    };
+    rows.into_iter().map(read_one).collect()
+}
+
+/// Returns the field of a gap's row.
+pub(super) fn gap_field<'a>(root: &Section<'a>, gap: &Gap) -> Option<Field<'a>> {
+    let motion = root.get("motion")?;
+    let field = Section::open_any(motion.node, &motion.path)?.get("gap")?;
+    match &gap.name {
+        Some(name) => Section::open_any(field.node, &field.path)?.get(name),
+        None => Some(field),
+    }
+}
+
+/// Reads the units. A gap has the unit of the coordinates in its row, if they have the same one and plain numbers as
+/// factors. The unit of all gaps is theirs if it is the same, unless the file gives another.
+fn read_units(section: &Section<'_>, count: usize, gaps: &[Gap]) -> Result<Units, SceneError> {
     let each = "a list of units, one for each coordinate, such as [\"mm\"]";
     let coordinates = match section.get("units") {
         Some(field) => {
             let items = field.list(each)?;
-            if items.len() != gap.len() {
+            if items.len() != count {
                 return Err(field.out_of_range(each));
             }
             items.iter().map(|item| read_unit(item).map(Some)).collect::<Result<_, _>>()?
         }
-        None => vec![None; gap.len()],
+        None => vec![None; count],
     };
     let unit = |key| section.get(key).map(|field| read_unit(&field)).transpose();
     let (given, time, force) = (unit("gap_unit")?, unit("time_unit")?, unit("force_unit")?);
-    let used = gap.iter().zip(&coordinates).filter(|(entry, _)| entry.as_number() != Some(0.0));
+    let entries = gaps.iter().flat_map(|gap| gap.row.iter().zip(&coordinates));
+    let used = entries.filter(|(entry, _)| entry.as_number() != Some(0.0));
     let mut used = used.map(|(entry, unit)| entry.as_number().and(unit.clone()));
     let common = used.next().flatten().filter(|first| used.all(|unit| unit.as_ref() == Some(first)));
     Ok(Units { coordinates, gap: given.or(common), time, force })

@@ -1,6 +1,10 @@
 //! Reading of model files: the values of valid files, and every kind of error.
 
-use rattlemap_dynamics::model::{Contact, Domain, Friction, Harmonic, Model, Range, Shapes, Side};
+use nalgebra::{DMatrix, DVector};
+use rattlemap_dynamics::model::{
+    self, Contact, Domain, Drive, Forces, Friction, GapRow, Harmonic, Machine, Model, Range, Restitution,
+    Shapes, Side, Spring,
+};
 
 use super::*;
 use crate::text::test_cases;
@@ -146,12 +150,12 @@ fn errors_name_the_field_and_the_limit() {
     check_refusals(
         ONE_DEGREE,
         r#"
-["x"] | ["x", "y", "q"] | m.toml:14:15: `motion.coordinates = ["x", "y", "q"]` is out of range: it must be one or two names: a model has at most two degrees of freedom
-["x"] | [] | at most two degrees of freedom
+["x"] | ["a", "b", "c", "d", "f", "g", "h", "q", "l"] | is out of range: it must be 1 to 8 names: a model has at most 8 degrees of freedom
+["x"] | [] | m.toml:14:15: `motion.coordinates = []` is out of range: it must be 1 to 8 names: a model has at most 8 degrees of freedom
 gap = [1] | gap = [1]\nforce2 = ["F"] | m.toml:22:1: unknown field `motion.force2 = ["F"]`; did you mean `force`?
-gap = [1] | gap = [1]\nharmonics = 2 | one gap row; further harmonics of the force are tables, [[harmonic]]
+gap = [1] | gap = [1]\nharmonics = 2 | a model has one to eight coordinates and up to three gap rows; further harmonics of the force are tables, [[harmonic]]
 "omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry, the frequency of the first harmonic, force cos(frequency t) + force_sin sin(frequency t); write multiples of it as [[harmonic]]
-gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry
+gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry; several rows have names, such as gap = { a = [1, -1, 0], b = [0, 1, -1] }
 [[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact.1.side = "left"` does not fit: the wall before it on this side has impacts
 [[contact]] | [[contact]]\nside = "right"\nat = 1\nlaw = "impact"\nrestitution = 1\n[[contact]] | m.toml:29:8: `contact.1.side = "right"` does not fit: the wall before it on this side has impacts, so that no motion reaches this one; write the walls of a side from the inside to the outside
 "impact" | "elastic" | m.toml:27:15: `contact.0.restitution = "e"` does not fit: it needs law = "impact"
@@ -698,6 +702,7 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
         schedule: Vec::new(),
         outer_walls: Default::default(),
         friction: vec![Friction { row: [1.0, 0.0], force: 1.5, speed: 0.0 }],
+        machine: None,
     };
     assert_eq!(model.oscillator().unwrap(), by_hand);
     assert_eq!(
@@ -773,4 +778,375 @@ gap = [1] | gap = [1]\nfriction = 1 | unknown field `motion.friction = 1`
     let message = FileModel::parse(motion, "m.toml").unwrap_err().to_string();
     let end = "`contact` is missing; write [[contact]] with side, at and law; only a model with [[friction]] may have no wall";
     assert!(message.contains(end), "{message}");
+}
+
+/// Three discs on a shaft, with stops between them and a mesh stiffness that changes.
+const THREE: &str = r#"name = "three"
+
+[parameters]
+m = 2.0
+k = 3.0
+c = 0.5
+d = 0.25
+F = 1.5
+e = { default = 0.8, min = 0.0, max = 1.0 }
+mu = 0.2
+
+[motion]
+coordinates = ["x", "y", "q"]
+mass = [["m", 0, 0], [0, 1, 0.25], [0, 0.25, 1]]
+damping = [["c", "-c", 0], ["-c", "c", "0"], [0, 0, ["c", 1]]]
+stiffness = [[["k", "2*k"], 0, 0], [0, 5, -1], [0, -1, 4]]
+load = [0, ["F", "-F"], 0]
+force = [0, 0, "F"]
+frequency = 1.5
+gap = { left = [1, -1, 0], right = [0, 1, "-c"] }
+stages = [0.25, 0.5]
+
+[[harmonic]]
+order = 3
+sin = [0, 1, 0]
+
+[[contact]]
+gap = "right"
+side = "right"
+at = "d"
+law = "elastic"
+stiffness = ["k", "k/2"]
+preload = 0.125
+
+[[contact]]
+gap = "left"
+side = "left"
+at = "-d"
+law = "impact"
+restitution = "e - c*speed^0.2"
+mesh_speed = "mu"
+
+[[contact]]
+gap = "right"
+side = "right"
+at = "2*d"
+law = "impact"
+restitution = 0.5
+damping = "c"
+
+[[friction]]
+row = [0, 0, "m"]
+force = "mu*k"
+speed = "e"
+"#;
+
+fn machine(model: &FileModel) -> Machine {
+    *model.oscillator().unwrap().machine.expect("a machine")
+}
+
+#[test]
+fn a_model_of_three_coordinates_and_two_gaps_is_a_machine() {
+    let model = read(THREE);
+    let forces = |c: f64, k: f64, load: f64| Forces {
+        damping: DMatrix::from_row_slice(3, 3, &[0.5, -0.5, 0.0, -0.5, 0.5, 0.0, 0.0, 0.0, c]),
+        stiffness: DMatrix::from_row_slice(3, 3, &[k, 0.0, 0.0, 0.0, 5.0, -1.0, 0.0, -1.0, 4.0]),
+        load: DVector::from_row_slice(&[0.0, load, 0.0]),
+    };
+    let row = |entries: [f64; 3]| DVector::from_row_slice(&entries);
+    let left = model::Wall {
+        at: -0.25,
+        contact: Contact::Rigid,
+        restitution: Restitution { constant: 0.8, factor: -0.5, power: 0.2 },
+        mesh_speed: 0.2,
+        springs: vec![Spring::default(); 2],
+    };
+    let elastic = model::Wall {
+        at: 0.25,
+        contact: Contact::Elastic,
+        restitution: Restitution::constant(0.0),
+        mesh_speed: 0.0,
+        springs: [3.0, 1.5].map(|stiffness| Spring { stiffness, damping: 0.0, preload: 0.125 }).into(),
+    };
+    let impact = model::Wall {
+        at: 0.5,
+        contact: Contact::Impact,
+        restitution: Restitution::constant(0.5),
+        mesh_speed: 0.0,
+        springs: vec![Spring { stiffness: 0.0, damping: 0.5, preload: 0.0 }; 2],
+    };
+    let by_hand = Machine {
+        omega: 1.5,
+        mass: DMatrix::from_row_slice(3, 3, &[2.0, 0.0, 0.0, 0.0, 1.0, 0.25, 0.0, 0.25, 1.0]),
+        stages: vec![forces(0.5, 3.0, 1.5), forces(1.0, 6.0, -1.5)],
+        schedule: vec![(0.25, 0), (0.5, 1)],
+        drives: vec![
+            Drive { order: 1, cos: row([0.0, 0.0, 1.5]), sin: row([0.0; 3]) },
+            Drive { order: 3, cos: row([0.0; 3]), sin: row([0.0, 1.0, 0.0]) },
+        ],
+        gaps: vec![
+            GapRow { row: row([1.0, -1.0, 0.0]), walls: [vec![], vec![left]] },
+            GapRow { row: row([0.0, 1.0, -0.5]), walls: [vec![elastic, impact], vec![]] },
+        ],
+        friction: vec![model::DryFriction { row: row([0.0, 0.0, 2.0]), force: 0.2 * 3.0, speed: 0.8 }],
+    };
+    assert_eq!(machine(&model), by_hand);
+    let oscillator = model.oscillator().unwrap();
+    assert_eq!((oscillator.degrees, oscillator.omega), (3, 1.5));
+    assert_eq!(model.state_names(), ["x", "v1", "y", "v2", "q", "v3"]);
+    // A machine has its own laws: everything shapes the oscillator.
+    assert_eq!(model.law(), Law::both(0.0, 0.0));
+    assert!(model.parameters().iter().all(|parameter| parameter.shapes == Shapes::Oscillator));
+    // Half a turn later odd harmonics have the other sign, and stages begin elsewhere.
+    let mut later = model.clone();
+    assert!(later.set_start_phase(std::f64::consts::PI));
+    let turned = Machine {
+        schedule: vec![(0.0, 1), (0.75, 0)],
+        drives: vec![
+            Drive { order: 1, cos: row([0.0, 0.0, -1.5]), sin: row([0.0; 3]) },
+            Drive { order: 3, cos: row([0.0; 3]), sin: row([0.0, -1.0, 0.0]) },
+        ],
+        ..by_hand.clone()
+    };
+    assert_eq!(machine(&later), turned);
+    // Without a force there is no first harmonic.
+    let mut unforced = model.clone();
+    unforced.set("F", 0.0).unwrap();
+    assert_eq!(machine(&unforced).highest_order(), 3);
+    assert_eq!(machine(&unforced).drives.len(), 1);
+}
+
+#[test]
+fn eight_coordinates_are_read() {
+    let rows = |diagonal: &str| {
+        let row = |i: usize| {
+            let entries = (0..8).map(|j| if i == j { diagonal } else { "0" });
+            format!("[{}]", entries.collect::<Vec<_>>().join(", "))
+        };
+        format!("[{}]", (0..8).map(row).collect::<Vec<_>>().join(", "))
+    };
+    let names: Vec<String> = (1..9).map(|i| format!("'x{i}'")).collect();
+    let text = format!(
+        "name = 'eight'\n[motion]\ncoordinates = [{}]\nmass = {}\nstiffness = {}\nfrequency = 1\ngap = [0, 0, 0, 0, 0, 0, 1, -1]\n\
+         [[contact]]\nside = 'left'\nat = -1\nlaw = 'impact'\nrestitution = 0.5\n",
+        names.join(", "),
+        rows("2"),
+        rows("3"),
+    );
+    let model = read(&text);
+    let found = machine(&model);
+    assert_eq!((found.degrees(), found.gaps.len(), found.stages.len()), (8, 1, 1));
+    assert_eq!((found.mass.trace(), found.stages[0].stiffness.sum()), (16.0, 24.0));
+    assert!(found.drives.is_empty() && found.schedule.is_empty());
+    assert_eq!(model.state_names()[14..], ["x8", "v8"]);
+    assert_eq!(
+        model.equations()[..4],
+        ["gap   z = x7 - x8", "rate  w = v7 - v8", "free, z > -1", "    2 x1'' + 3 x1 = 0"]
+    );
+    let short = text.replace("[0, 0, 0, 0, 0, 0, 1, -1]", "[1, -1]");
+    let message = FileModel::parse(&short, "m.toml").unwrap_err().to_string();
+    assert!(message.contains("one gap row: a list of eight entries, one for each coordinate"), "{message}");
+    let message =
+        FileModel::parse(&text.replace("stiffness = [", "stiffness = [[1], "), "m.toml").unwrap_err();
+    assert!(message.to_string().contains("a matrix of eight rows with eight entries each"), "{message}");
+}
+
+#[test]
+fn one_row_with_a_name_is_the_row_without_one() {
+    let named = TWO_DEGREES.replace(r#"gap = ["1", "-2"]"#, r#"gap = { teeth = ["1", "-2"] }"#);
+    let named = read(&named.replace("[[contact]]", "[[contact]]\ngap = \"teeth\""));
+    let plain = read(TWO_DEGREES);
+    let written = |model: &FileModel| format!("{:?} {:?}", model.oscillator().unwrap(), model.law());
+    assert_eq!(written(&named), written(&plain), "to the bit");
+    assert!(plain.oscillator().unwrap().machine.is_none());
+    assert_eq!((named.equations(), named.parameters()), (plain.equations(), plain.parameters()));
+    assert_eq!(named.units(), plain.units());
+    // With friction a named gap needs no wall, either.
+    let (motion, _) = TWO_DEGREES.split_once("[[contact]]").unwrap();
+    let motion = motion.replace(r#"gap = ["1", "-2"]"#, r#"gap = { teeth = ["1", "-2"] }"#);
+    let free = read(&format!("{motion}[[friction]]\nrow = [1, 0]\nforce = 1\n"));
+    assert_eq!(free.oscillator().unwrap().wall_count(Side::Right), 0);
+}
+
+#[test]
+fn gaps_have_the_unit_that_all_of_them_share() {
+    let gap = |units: &str| {
+        let with = THREE.replace("[motion]", &format!("[motion]\ntime_unit = 's'\nunits = {units}"));
+        read(&with.replace("\"-c\"]", "-0.5]")).units().gap
+    };
+    assert_eq!(gap("['mm', 'mm', 'mm']").as_deref(), Some("mm"));
+    assert_eq!(gap("['rad', 'rad', 'mm']"), None);
+}
+
+#[test]
+fn restitution_may_depend_on_the_approach_speed() {
+    let with = |restitution: &str| {
+        let text = ONE_DEGREE.replace("restitution = \"e\"", &format!("restitution = {restitution}"));
+        FileModel::parse(&text, "m.toml")
+    };
+    let at = |text: &str| {
+        let found = machine(&with(text).unwrap());
+        let Restitution { constant, factor, power } = found.gaps[0].walls[0][0].restitution;
+        [constant, factor, power]
+    };
+    assert_eq!(at("\"e - 0.05*speed\""), [0.8, -0.05, 1.0]);
+    assert_eq!(at("\"0.9 - 0.1*speed^0.2\""), [0.9, -0.1, 0.2]);
+    assert_eq!(at("\"e*(1 - s*(speed/2)^s)\""), [0.8, 0.8 * (-0.2 * libm::pow(0.5, 0.2)), 0.2]);
+    let model = with("\"e - 0.05*speed^s\"").unwrap();
+    let shapes = |name: &str| model.parameters()[model.index(name).unwrap()].shapes;
+    assert_eq!(
+        [shapes("e"), shapes("s"), shapes("k")],
+        [Shapes::Oscillator, Shapes::Oscillator, Shapes::Neither]
+    );
+    assert_eq!(model.law(), Law::both(0.0, 0.0));
+    let found = machine(&model);
+    assert_eq!((found.degrees(), &found.gaps[0].row), (1, &DVector::from_row_slice(&[1.0])));
+    assert_eq!(model.equations(), read(ONE_DEGREE).equations());
+    // The form may be lost for other values.
+    let mut lost = with("\"e - 0.1*speed - 0.1*speed^(5*s)\"").unwrap();
+    lost.set("s", 0.5).unwrap();
+    let error = lost.oscillator().unwrap_err().to_string();
+    assert!(
+        error.starts_with("restitution of right wall 1 of gap 1 = NaN: it must be c + f*speed^p, where"),
+        "{error}"
+    );
+    check_refusals(
+        ONE_DEGREE,
+        r#"
+"e"\n | "exp(-speed)"\n | m.toml:27:15: `contact.0.restitution = "exp(-speed)"` does not fit: a restitution that depends on the approach speed has the form c + f*speed^p, where c, f and p do not contain `speed`, such as "0.9 - 0.1*speed^0.2"; values below 0 and above 1 count as 0 and 1
+"e"\n | "e - speed - speed^2"\n | has the form c + f*speed^p
+"e"\n | "e - speed^(-s)"\n | m.toml:27:15: `contact.0.restitution = "e - speed^(-s)"` does not fit: at the defaults of stop, exponent of restitution of right wall 1 of gap 1 = -0.2: it must be greater than 0
+"e"\n | "e - 2*speed/0"\n | restitution of right wall 1 of gap 1 = NaN: it must be between 0 and 1
+"e"\n | "e - 0.1*sped"\n | has an unknown name, `sped`: did you mean `speed`?
+at = "s" | at = "speed" | `contact.0.at = "speed"` has an unknown name, `speed`
+"#,
+    );
+    check_refusals(
+        &ONE_DEGREE.replace("k = 1000", "speed = 1000"),
+        r#"
+"e"\n | "e - 1e-4*speed"\n | `contact.0.restitution = "e - 1e-4*speed"` does not fit: in a restitution `speed` is the approach speed, and the model has a parameter, a coordinate or a velocity of this name; rename it
+"#,
+    );
+    check_refusals(
+        &ONE_DEGREE.replace("gap = [1]", "gap = [1]\nvelocities = [\"speed\"]"),
+        r#"
+"e"\n | "e - 0.1*speed"\n | in a restitution `speed` is the approach speed
+"#,
+    );
+    // A parameter of this name is an ordinary one elsewhere.
+    let other = ONE_DEGREE.replace("k = 1000", "speed = 1000").replace("[[1]]", "[[\"speed\"]]");
+    assert!(read(&other).oscillator().unwrap().machine.is_none());
+}
+
+#[test]
+fn errors_in_gaps_name_the_field() {
+    check_refusals(
+        THREE,
+        r#"
+gap = { left = [1, -1, 0], right = [0, 1, "-c"] } | gap = [1, -1, 0] | m.toml:28:7: `contact.0.gap = "right"` does not fit: the gap row in [motion] has no name; remove it, or name the rows, such as gap = { a = [1, -1] }
+gap = { left = [1, -1, 0], right = [0, 1, "-c"] } | gap = {} | `motion.gap = 0 rows` is out of range: it must be 1 to 3 rows with names, such as gap = { a = [1, -1, 0], b = [0, 1, -1] }: a model has at most 3, and not more than coordinates
+left = [1, -1, 0], | left = [1, -1, 0], c1 = [1, 0, 0], c2 = [0, 0, 1], | `motion.gap = 4 rows` is out of range: it must be 1 to 3 rows
+left = [1, -1, 0], | left = [1, -1, 0], low = [1, 0, 0], | m.toml:20:34: `motion.gap.low = [1, 0, 0]` does not fit: no wall limits this gap; write a [[contact]] with gap = "low", or remove the row
+left = [1, -1, 0], | left = [1, -1], | m.toml:20:16: `motion.gap.left = [1, -1]` is out of range: it must be one gap row: a list of three entries, one for each coordinate
+left = [1, -1, 0], | k = [1, -1, 0], | m.toml:20:13: `motion.gap.k = [1, -1, 0]` does not fit: `k` is already the name of a parameter, a coordinate or a velocity; rename the gap or the other
+left = [1, -1, 0], | v2 = [1, -1, 0], | `v2` is already the name of a parameter
+left = [1, -1, 0], | side = [1, -1, 0], | `side` is a column of tables
+left = [1, -1, 0], | left = ["1/0", -1, 0], | m.toml:20:16: `motion.gap.left = ["1/0", -1, 0]` does not fit: at the defaults of three, row of gap 1 = inf: it must be a finite number
+left = [1, -1, 0], | left = [0, -2, 1], | m.toml:20:7: `motion.gap = { ... }` does not fit: at the defaults of three, independence of the rows of the gaps = 0: it must be above 1e-12: no row may be 0 or a sum of multiples of the others, and all walls along one row belong to one gap
+left = [1, -1, 0], | left = [0, 0, 0], | independence of the rows of the gaps = 0: it must be above 1e-12
+gap = "right"\n | gap = "middle"\n | m.toml:28:7: `contact.0.gap = "middle"` is not known; valid names: left, right
+gap = "right"\n | | m.toml:27:1: `contact.0.gap` is missing; the gaps in [motion] have names: write gap = "left" or gap = "right"
+gap = "right"\n | gap = 1\n | `contact.0.gap = 1` has the wrong type: it must be one of left, right
+at = "-d" | at = "1/0" | m.toml:38:6: `contact.1.at = "1/0"` does not fit: at the defaults of three, position of left wall 1 of gap 1 = inf: it must be a finite number
+at = "2*d" | at = "d/2" | m.toml:46:6: `contact.2.at = "d/2"` does not fit: at the defaults of three, position of right wall 2 of gap 2 = 0.125: it must be farther out than the wall before it
+["k", "k/2"] | ["k", "-k"] | m.toml:32:13: `contact.0.stiffness = ["k", "-k"]` does not fit: at the defaults of three, stiffness of right wall 1 of gap 2 = -3: it must be finite and at least 0
+preload = 0.125 | preload = "1/0" | m.toml:33:11: `contact.0.preload = "1/0"` does not fit: at the defaults of three, preload of right wall 1 of gap 2 = inf
+mesh_speed = "mu" | mesh_speed = "-mu" | m.toml:41:14: `contact.1.mesh_speed = "-mu"` does not fit: at the defaults of three, mesh_speed of left wall 1 of gap 1 = -0.2: it must be finite and at least 0
+restitution = 0.5 | restitution = 1.5 | m.toml:48:15: `contact.2.restitution = 1.5` does not fit: at the defaults of three, restitution of right wall 2 of gap 2 = 1.5: it must be between 0 and 1
+damping = "c" | damping = "-c" | m.toml:49:11: `contact.2.damping = "-c"` does not fit: at the defaults of three, damping of right wall 2 of gap 2 = -0.5
+[[contact]]\ngap = "left" | [[contact]]\ngap = "left"\nside = "right"\nat = -1\nlaw = "elastic"\nstiffness = 1\n[[contact]]\ngap = "left" | m.toml:38:6: `contact.1.at = -1` does not fit: at the defaults of three, walls at -1 and -0.25: the right one must lie above the left one
+"left"\nside = "left" | "right"\nside = "right" | m.toml:45:8: `contact.2.side = "right"` does not fit: the wall before it on this side has impacts
+[0, 0, "m"] | [0, "m"] | `friction.0.row = [0, "m"]` is out of range: it must be the row of the sliding rate, row . v - speed: a list of three entries, one for each coordinate
+[0, 0, "m"] | ["1/0", 0, 0] | m.toml:52:7: `friction.0.row = ["1/0", 0, 0]` does not fit: at the defaults of three, row of friction 1 = inf: it must be a finite number
+[0, 0, "m"] | [0, 0, 0] | m.toml:52:7: `friction.0.row = [0, 0, 0]` does not fit: at the defaults of three, independence of the rows of friction = 0: it must be above 1e-12
+force = "mu*k" | force = "-mu" | m.toml:53:9: `friction.0.force = "-mu"` does not fit: at the defaults of three, force of friction 1 = -0.2: it must be finite and at least 0
+["m", 0, 0] | ["-m", 0, 0] | m.toml:14:8: `motion.mass = [["-m", 0, 0], [0, 1, 0.25], [0, 0.25, 1]]` does not fit: at the defaults of three, lowest eigenvalue of the mass matrix = -2: it must be greater than 0
+["m", 0, 0] | ["m", 1, 0] | `motion.mass = [["m", 1, 0], [0, 1, 0.25], [0, 0.25, 1]]` does not fit: at the defaults of three, difference of opposite entries of mass = 1: it must be 0: the matrix must be symmetric
+[0, 5, -1] | [0, 5, 1] | difference of opposite entries of stiffness = 2: it must be 0: the matrix must be symmetric
+["c", 1] | ["c", "1/0"] | `motion.damping = [["c", "-c", 0], ["-c", "c", "0"], [0, 0, ["c", "1/0"]]]` does not fit: at the defaults of three, damping in stage 2 = inf: it must be a finite number
+force = [0, 0, "F"] | force = [0, 0, "F/0"] | m.toml:18:9: `motion.force = [0, 0, "F/0"]` does not fit: at the defaults of three, cosine of harmonic 1 = inf
+frequency = 1.5 | frequency = 0 | m.toml:19:13: `motion.frequency = 0` does not fit: at the defaults of three, excitation frequency = 0
+"#,
+    );
+    let (motion, _) = THREE.split_once("[[contact]]").unwrap();
+    let message = FileModel::parse(motion, "m.toml").unwrap_err().to_string();
+    assert!(message.contains("`contact` is missing; write [[contact]]"), "{message}");
+    // Each of several gaps needs a wall, with friction, too.
+    let friction = format!("{motion}[[friction]]\nrow = [1, 0, 0]\nforce = 1\n");
+    assert!(FileModel::parse(&friction, "m.toml").unwrap_err().to_string().contains("`contact` is missing"));
+}
+
+#[test]
+fn each_side_of_each_gap_may_have_four_walls() {
+    let (motion, _) = THREE.split_once("[[contact]]").unwrap();
+    let wall = |gap: &str, side: &str, nth: usize| {
+        let sign = if side == "left" { "-" } else { "" };
+        format!(
+            "[[contact]]\ngap = '{gap}'\nside = '{side}'\nat = '{sign}{nth}*d'\nlaw = 'elastic'\nstiffness = 'k'\n"
+        )
+    };
+    let walls = |count: usize| {
+        let all = ["left", "right"].into_iter().flat_map(|gap| ["left", "right"].map(|side| (gap, side)));
+        all.flat_map(|(gap, side)| (1..=count).map(move |nth| wall(gap, side, nth))).collect::<String>()
+    };
+    let model = read(&format!("{motion}{}", walls(4)));
+    assert!(machine(&model).gaps.iter().flat_map(|gap| &gap.walls).all(|side| side.len() == 4));
+    let message = |text: String| FileModel::parse(&text, "m.toml").unwrap_err().to_string();
+    let many = message(format!("{motion}{}", walls(5)));
+    assert!(
+        many.contains("it must be 1 to 16 tables, [[contact]]: a gap has up to 4 walls on each side"),
+        "{many}"
+    );
+    let five: String = (1..6).map(|nth| wall("left", "right", nth)).collect();
+    let five = message(format!("{motion}{five}"));
+    assert!(
+        five.contains("there are already 4 walls on this side; a gap has up to 4 on each side"),
+        "{five}"
+    );
+}
+
+#[test]
+fn equations_of_several_gaps_have_one_contact_force_for_each() {
+    assert_eq!(
+        read(THREE).equations(),
+        [
+            "gap   left = x - y",
+            "rate  left' = v1 - v2",
+            "gap   right = y - c q",
+            "rate  right' = v2 - c v3",
+            "stages  1 from phase 0.25, 2 from phase 0.5 of each forcing period",
+            "        [stage 1 | stage 2] lists the values of an entry that changes",
+            "friction  sticks at m q' - e = 0 while |friction force| <= mu*k",
+            "with a contact force on each gap",
+            "    m x'' + c x' - c y' + [k | 2*k] x + N_left = 0",
+            "    y'' + 0.25 q'' - c x' + c y' + 5 y - q - N_left + N_right = sin(4.5 t) + [F | -F]",
+            "    0.25 y'' + q'' + [c | 1] q' - y + 4 q + m*mu*k sgn(m q' - e) - c N_right = F cos(1.5 t)",
+            "free, left > -d: N_left = 0",
+            "on the left wall of gap left: left stays -d, as long as it is pressed",
+            "free, right < d: N_right = 0",
+            "behind right wall 1 of gap right: N_right = [k | k/2] (right - d) + 0.125",
+            "behind right wall 2 of gap right: N_right = [k | k/2] (right - d) + 0.125 + c right'",
+        ]
+    );
+}
+
+#[test]
+fn a_machine_starts_at_the_same_phase_as_an_oscillator() {
+    let text = ONE_DEGREE.replace("gap = [1]", "gap = [1]\nforce_sin = [0.75]") + HARMONICS;
+    let mut plain = read(&text);
+    let mut by_speed = read(&text.replace("restitution = \"e\"", "restitution = \"e - 0.1*speed\""));
+    assert!(plain.set_start_phase(1.0) && by_speed.set_start_phase(1.0));
+    let (oscillator, machine) = (plain.oscillator().unwrap(), machine(&by_speed));
+    assert_eq!(machine.drives.len(), 3);
+    for (drive, harmonic) in machine.drives.iter().zip(oscillator.all_harmonics()) {
+        assert_eq!(drive.order, harmonic.order);
+        let off = (drive.cos[0] - harmonic.cos[0]).abs().max((drive.sin[0] - harmonic.sin[0]).abs());
+        assert!(off < 1e-14, "{drive:?} {harmonic:?}");
+    }
 }

@@ -1,4 +1,4 @@
-//! Labels of a model's gap and walls in figures.
+//! Labels of a model's gap and walls in figures. Of several gaps it is the first one.
 
 use rattlemap_dynamics::model::{Model, Side};
 
@@ -34,12 +34,15 @@ impl WallLabels {
     fn of_file(definition: &Definition, gap: &str) -> WallLabels {
         let motion = &definition.motion;
         let is = |entry: &Expression, value: f64| entry.as_number() == Some(value);
+        let first = &motion.gaps[0];
         let alone = (0..motion.degrees()).find(|&i| {
-            is(&motion.gap[i], 1.0) && (0..motion.degrees()).all(|j| j == i || is(&motion.gap[j], 0.0))
+            is(&first.row[i], 1.0) && (0..motion.degrees()).all(|j| j == i || is(&first.row[j], 0.0))
         });
         let at = |side| definition.wall(side).map(|wall| position(&wall.at));
         let alone = alone.map(|i| symbol(&motion.coordinates[i]));
-        WallLabels::new(alone.unwrap_or_else(|| gap.to_owned()), Side::BOTH.map(at))
+        // Several gaps have names of their own.
+        let own = first.name.as_ref().filter(|_| motion.gaps.len() > 1).map(|name| symbol(name));
+        WallLabels::new(alone.or(own).unwrap_or_else(|| gap.to_owned()), Side::BOTH.map(at))
     }
 
     fn of_values(model: &dyn Model, gap: &str) -> WallLabels {

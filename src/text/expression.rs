@@ -85,8 +85,72 @@ enum Term {
     /// A name, by its index.
     Name(usize),
     Negative(Box<Term>),
-    Unary(Unary, Box<Term>),
+    /// A function, with its name.
+    Unary((&'static str, Unary), Box<Term>),
     Binary(Binary, Box<[Term; 2]>),
+    /// One of the operators `+ - * / ^`.
+    Operator(char, Box<[Term; 2]>),
+}
+
+/// The function `constant + factor x^power` of one variable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PowerLaw {
+    /// Value at 0, if the power is positive.
+    pub(crate) constant: f64,
+    /// Factor of the power.
+    pub(crate) factor: f64,
+    /// Exponent; without effect if the factor is 0.
+    pub(crate) power: f64,
+}
+
+impl PowerLaw {
+    fn constant(constant: f64) -> PowerLaw {
+        PowerLaw { constant, factor: 0.0, power: 1.0 }
+    }
+
+    /// Returns the value if it does not depend on the variable.
+    fn as_constant(self) -> Option<f64> {
+        (self.factor == 0.0).then_some(self.constant)
+    }
+
+    fn times(self, number: f64) -> PowerLaw {
+        PowerLaw { constant: self.constant * number, factor: self.factor * number, ..self }
+    }
+
+    /// Returns `a + sign b`; none if the powers differ.
+    fn sum(a: PowerLaw, b: PowerLaw, sign: f64) -> Option<PowerLaw> {
+        let power = match (a.as_constant(), b.as_constant()) {
+            (_, Some(_)) => a.power,
+            (Some(_), None) => b.power,
+            (None, None) => (a.power == b.power).then_some(a.power)?,
+        };
+        Some(PowerLaw { constant: a.constant + sign * b.constant, factor: a.factor + sign * b.factor, power })
+    }
+
+    /// Returns `self^power`; none if it has another form.
+    fn to_the(self, power: f64) -> Option<PowerLaw> {
+        match self.as_constant() {
+            Some(constant) => Some(PowerLaw::constant(libm::pow(constant, power))),
+            None if power == 1.0 => Some(self),
+            None if power == 0.0 => Some(PowerLaw::constant(1.0)),
+            None => (self.constant == 0.0).then(|| PowerLaw {
+                constant: 0.0,
+                factor: libm::pow(self.factor, power),
+                power: self.power * power,
+            }),
+        }
+    }
+
+    /// Returns `a b`; none if it has another form.
+    fn product(a: PowerLaw, b: PowerLaw) -> Option<PowerLaw> {
+        match (a.as_constant(), b.as_constant()) {
+            (Some(a), _) => Some(b.times(a)),
+            (_, Some(b)) => Some(a.times(b)),
+            _ if a.constant != 0.0 || b.constant != 0.0 => None,
+            _ if a.power + b.power == 0.0 => Some(PowerLaw::constant(a.factor * b.factor)),
+            _ => Some(PowerLaw { constant: 0.0, factor: a.factor * b.factor, power: a.power + b.power }),
+        }
+    }
 }
 
 impl Expression {
@@ -138,6 +202,12 @@ impl Expression {
     pub fn evaluate(&self, value: &dyn Fn(usize) -> f64) -> f64 {
         self.term.evaluate(value)
     }
+
+    /// Returns the expression as a function of the name with the index `variable`; none if it is no [`PowerLaw`]. `value(index)` returns
+    /// the value of any other name.
+    pub(crate) fn power_law(&self, variable: usize, value: &dyn Fn(usize) -> f64) -> Option<PowerLaw> {
+        self.term.power_law(variable, value)
+    }
 }
 
 impl Term {
@@ -146,8 +216,49 @@ impl Term {
             Term::Number(number) => *number,
             Term::Name(place) => value(*place),
             Term::Negative(of) => -of.evaluate(value),
-            Term::Unary(function, of) => function(of.evaluate(value)),
+            Term::Unary((_, function), of) => function(of.evaluate(value)),
             Term::Binary(function, of) => function(of[0].evaluate(value), of[1].evaluate(value)),
+            Term::Operator(sign, of) => operator(*sign)(of[0].evaluate(value), of[1].evaluate(value)),
+        }
+    }
+
+    fn power_law(&self, variable: usize, value: &dyn Fn(usize) -> f64) -> Option<PowerLaw> {
+        let of = |term: &Term| term.power_law(variable, value);
+        match self {
+            Term::Name(place) if *place == variable => {
+                Some(PowerLaw { constant: 0.0, factor: 1.0, power: 1.0 })
+            }
+            Term::Number(_) | Term::Name(_) => Some(PowerLaw::constant(self.evaluate(value))),
+            Term::Negative(term) => Some(of(term)?.times(-1.0)),
+            Term::Unary((name, function), term) => {
+                let argument = of(term)?;
+                match argument.as_constant() {
+                    Some(constant) => Some(PowerLaw::constant(function(constant))),
+                    None if *name == "sqrt" => argument.to_the(0.5),
+                    None => None,
+                }
+            }
+            Term::Binary(function, terms) => {
+                let [a, b] = terms.each_ref().map(|term| of(term).and_then(PowerLaw::as_constant));
+                Some(PowerLaw::constant(function(a?, b?)))
+            }
+            Term::Operator(sign, terms) => {
+                let [a, b] = terms.each_ref().map(of);
+                let (a, b) = (a?, b?);
+                if let (Some(a), Some(b)) = (a.as_constant(), b.as_constant()) {
+                    return Some(PowerLaw::constant(operator(*sign)(a, b)));
+                }
+                match sign {
+                    '+' => PowerLaw::sum(a, b, 1.0),
+                    '-' => PowerLaw::sum(a, b, -1.0),
+                    '*' => PowerLaw::product(a, b),
+                    '/' => match b.as_constant() {
+                        Some(b) => Some(PowerLaw { constant: a.constant / b, factor: a.factor / b, ..a }),
+                        None => PowerLaw::product(a, b.to_the(-1.0)?),
+                    },
+                    _ => a.to_the(b.as_constant()?),
+                }
+            }
         }
     }
 }
@@ -169,7 +280,7 @@ fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Ter
         Tree::Binary(sign, of) => {
             let [a, b] = *of;
             let of = [resolved(a, names, uses)?, resolved(b, names, uses)?];
-            Term::Binary(operator(sign), Box::new(of))
+            Term::Operator(sign, Box::new(of))
         }
         Tree::Call(name, arguments) => {
             let given = arguments.len();
@@ -177,7 +288,7 @@ fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Ter
             for argument in arguments {
                 terms.push(resolved(argument, names, uses)?);
             }
-            let one = UNARY.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
+            let one = UNARY.iter().find(|(known, _)| *known == name).copied();
             let two = BINARY.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
             match (one, two, <[Term; 2]>::try_from(terms)) {
                 (_, Some(function), Ok(both)) => Term::Binary(function, Box::new(both)),
@@ -271,6 +382,35 @@ mod tests {
         assert_eq!(value("sin(pi/6)"), libm::sin(std::f64::consts::PI / 6.0));
         assert_eq!(value("omega^1.7"), libm::pow(5.6, 1.7));
         assert!(value("min(0/0, 1)").is_nan() && value("max(1, 0/0)").is_nan() && value("log(-1)").is_nan());
+    }
+
+    #[test]
+    fn power_laws_of_one_name_are_recognised() {
+        let law = |text: &str| {
+            let expression = Expression::parse(text, &NAMES).unwrap();
+            let law = expression.power_law(2, &|place| [30.0, 0.5, f64::NAN][place]);
+            law.map(|law| [law.constant, law.factor, law.power])
+        };
+        for (text, expected) in [
+            ("0.8", [0.8, 0.0, 1.0]),
+            ("0.8 - 0.05*x", [0.8, -0.05, 1.0]),
+            ("0.9 - 0.1*x^0.2", [0.9, -0.1, 0.2]),
+            ("k1 + x^omega/3", [30.0, 1.0 / 3.0, 0.5]),
+            ("2*(1 - k1*sqrt(x))", [2.0, -60.0, 0.5]),
+            ("(2*x)^omega", [0.0, libm::pow(2.0, 0.5), 0.5]),
+            ("x*x - 3*x^2 + min(k1, 2)", [2.0, -2.0, 2.0]),
+            ("1/x", [0.0, 1.0, -1.0]),
+            ("x/x + cos(0)", [2.0, 0.0, 1.0]),
+            ("1 + 0*x", [1.0, 0.0, 1.0]),
+            ("-x + 1 + x", [1.0, 0.0, 1.0]),
+        ] {
+            assert_eq!(law(text), Some(expected), "{text}");
+        }
+        for text in
+            ["exp(-x)", "x + x^2", "(1 + x)^2", "max(0, 1 - x)", "2^x", "x*(1 - x)", "1/(1 + x)", "abs(x)"]
+        {
+            assert_eq!(law(text), None, "{text}");
+        }
     }
 
     #[test]

@@ -306,6 +306,26 @@ fn dry_friction_is_printed() {
     assert!(!page.contains("flight") && !stdout(&folder, "models backlash").contains("sgn"), "{page}");
 }
 
+#[test]
+fn several_gaps_and_restitution_by_speed_are_printed() {
+    let folder = empty();
+    fs::write(folder.path().join("my-driveline.toml"), toml(9)).unwrap();
+    let page = stdout(&folder, "models my-driveline.toml");
+    for part in [
+        "gap   mesh = x1 - x2\n    rate  mesh' = v1 - v2\n    gap   shaft = x2 - x3\n",
+        "with a contact force on each gap\n        x1'' + c x1' - c x2' + N_mesh = F cos(omega t) + T\n",
+        "0.3 x2 - 0.3 x3 - N_mesh + N_shaft = 0\n",
+        "free, -b < mesh < b: N_mesh = 0\n    behind the right wall of gap mesh: N_mesh = [k2 | k1] (mesh - b)\n",
+        "free, shaft < d: N_shaft = 0\n    on the right wall of gap shaft: shaft stays d, as long as it is pressed\n",
+        "The right wall of gap shaft is at shaft = d. An impact multiplies the rate shaft' by -(e - 0.1*speed^0.5)",
+        "speed is the size of the rate before the impact",
+        "One symbol per flight of each gap",
+        "The state is x1, v1, x2, v2, x3, v3;",
+    ] {
+        assert!(page.contains(part), "{part} is not in\n{page}");
+    }
+}
+
 /// Lanes of a map with stages and harmonics are computed again for its validation.
 #[test]
 #[ignore = "compiles large shaders; scripts/test.sh --all"]

@@ -34,7 +34,7 @@ const NO_MOBILITY: f64 = 1e-12;
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// The mode of an element with dry friction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Slip {
     /// The sliding rate stays 0.
     #[default]

@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::oscillator::{MATRIX_TOLERANCE, check_phases, finite, positive, require};
+use super::oscillator::{MATRIX_TOLERANCE, check_phases, finite, positive, require, schedule_at, turn};
 use super::{
     Contact, HIGHEST_ORDER, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, OscillatorError, Side,
 };
@@ -167,6 +167,20 @@ impl Machine {
         self.drives.iter().map(|drive| drive.order).max().unwrap_or(1)
     }
 
+    /// Returns the machine whose phase 0 is this phase of the forcing, in radians.
+    pub fn at_phase(&self, phase: f64) -> Machine {
+        if phase == 0.0 {
+            return self.clone();
+        }
+        let first = turn(phase);
+        let drive = |Drive { order, cos, sin }: &Drive| {
+            let turn = first.powu(*order);
+            Drive { order: *order, cos: cos * turn.re + sin * turn.im, sin: sin * turn.re - cos * turn.im }
+        };
+        let drives = self.drives.iter().map(drive).collect();
+        Machine { drives, schedule: schedule_at(&self.schedule, phase), ..self.clone() }
+    }
+
     /// Returns the stage that holds at phase 0.
     pub fn first_stage(&self) -> usize {
         match self.schedule.first() {
@@ -200,8 +214,12 @@ impl Machine {
         positive(|| "excitation frequency".to_owned(), self.omega)?;
         all_finite(|| "mass".to_owned(), &self.mass)?;
         symmetric("mass", &self.mass)?;
-        let definite = self.mass.clone().cholesky().is_some();
-        require(definite, || "determinant of the mass matrix".to_owned(), self.mass.determinant(), POSITIVE)?;
+        if self.mass.clone().cholesky().is_none() {
+            // The size is divided out, so that nothing overflows.
+            let size = self.mass.amax().max(f64::MIN_POSITIVE);
+            let least = size * (&self.mass / size).symmetric_eigenvalues().min();
+            require(false, || "lowest eigenvalue of the mass matrix".to_owned(), least, POSITIVE)?;
+        }
         let changes = self.schedule.len();
         let few = "at most 1024";
         require(changes <= MOST_CHANGES, || "changes of the stage".to_owned(), changes as f64, few)?;
@@ -210,7 +228,9 @@ impl Machine {
             require(stage < stages, || "index of a stage".to_owned(), stage as f64, "that of a stage")?;
         }
         for (stage, forces) in (1..).zip(&self.stages) {
-            let name = |what: &'static str| move || format!("{what} in stage {stage}");
+            let name = |what: &'static str| {
+                move || if stages == 1 { what.to_owned() } else { format!("{what} in stage {stage}") }
+            };
             all_finite(name("damping"), &forces.damping)?;
             all_finite(name("stiffness"), &forces.stiffness)?;
             all_finite(name("load"), &forces.load)?;
@@ -231,11 +251,15 @@ impl Machine {
                 return Err(OscillatorError::Walls { walls: [right.at, left.at] });
             }
         }
-        let rows = |rows: Vec<&DVector<f64>>, what: &'static str| {
+        let rows = |rows: Vec<&DVector<f64>>, what: &'static str, range: &'static str| {
             let independent = self.independence(&rows);
-            require(independent > MATRIX_TOLERANCE, || what.to_owned(), independent, POSITIVE)
+            require(independent > MATRIX_TOLERANCE, || what.to_owned(), independent, range)
         };
-        rows(self.gaps.iter().map(|gap| &gap.row).collect(), "independence of the rows of the gaps")?;
+        rows(
+            self.gaps.iter().map(|gap| &gap.row).collect(),
+            "independence of the rows of the gaps",
+            "above 1e-12: no row may be 0 or a sum of multiples of the others, and all walls along one row belong to one gap",
+        )?;
         for (i, DryFriction { row, force, speed }) in (1..).zip(&self.friction) {
             let name = |what: &'static str| move || format!("{what} of friction {i}");
             all_finite(name("row"), row)?;
@@ -246,6 +270,8 @@ impl Machine {
             rows(
                 self.friction.iter().map(|friction| &friction.row).collect(),
                 "independence of the rows of friction",
+                "above 1e-12: no row may be 0 or a multiple of the other; one element with the sum of both forces describes \
+                 friction along equal rows",
             )?;
         }
         Ok(())

@@ -264,8 +264,7 @@ impl Oscillator {
         if phase == 0.0 {
             return self.clone();
         }
-        // Half a turn changes the sign only: no rounding error adds a sine to the force.
-        let (sin, cos) = if phase == std::f64::consts::PI { (0.0, -1.0) } else { phase.sin_cos() };
+        let Complex { re: cos, im: sin } = turn(phase);
         let turned = |force: [f64; 2], force_sin: [f64; 2], [cos, sin]: [f64; 2]| {
             let pairs = [0, 1].map(|i| {
                 let (f, g) = (force[i], force_sin[i]);
@@ -279,15 +278,10 @@ impl Oscillator {
             let [cos, sin] = turned(harmonic.cos, harmonic.sin, [power.re, power.im]);
             Harmonic { cos, sin, ..*harmonic }
         };
-        let turns = phase / std::f64::consts::TAU;
-        // Rounding may give a whole turn.
-        let later =
-            |begins: f64| Some((begins - turns).rem_euclid(1.0)).filter(|&phase| phase < 1.0).unwrap_or(0.0);
-        let mut schedule: Vec<_> =
-            self.schedule.iter().map(|&(begins, stage)| (later(begins), stage)).collect();
-        schedule.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let schedule = schedule_at(&self.schedule, phase);
         let harmonics = self.harmonics.iter().map(harmonic).collect();
-        Oscillator { force, force_sin, harmonics, schedule, ..self.clone() }
+        let machine = self.machine.as_ref().map(|machine| Box::new(machine.at_phase(phase)));
+        Oscillator { force, force_sin, harmonics, schedule, machine, ..self.clone() }
     }
 
     /// Returns the [`schedule`](Self::schedule) of stages that begin at these phases, in order, and recur `repeat` times in a forcing
@@ -906,6 +900,24 @@ impl Oscillator {
                 changes => changes % 2 == 0 && self.schedule.iter().enumerate().take(half).all(recurs),
             }
     }
+}
+
+/// Returns `exp(i phase)`.
+pub(super) fn turn(phase: f64) -> Complex<f64> {
+    // Half a turn changes the sign only: no rounding error adds a sine to the force.
+    let (sin, cos) = if phase == std::f64::consts::PI { (0.0, -1.0) } else { phase.sin_cos() };
+    Complex::new(cos, sin)
+}
+
+/// Returns a schedule of stages whose phase 0 is `phase`, in radians.
+pub(super) fn schedule_at(schedule: &[(f64, usize)], phase: f64) -> Vec<(f64, usize)> {
+    let turns = phase / std::f64::consts::TAU;
+    // Rounding may give a whole turn.
+    let later =
+        |begins: f64| Some((begins - turns).rem_euclid(1.0)).filter(|&phase| phase < 1.0).unwrap_or(0.0);
+    let mut schedule: Vec<_> = schedule.iter().map(|&(begins, stage)| (later(begins), stage)).collect();
+    schedule.sort_by(|a, b| a.0.total_cmp(&b.0));
+    schedule
 }
 
 /// Checks that phases at which stages begin are in `[0, 1)` and increase.

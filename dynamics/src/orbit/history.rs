@@ -3,12 +3,12 @@
 use std::sync::atomic::AtomicBool;
 
 use super::analysis::ALLOWANCE;
-use super::reading::in_states;
+use super::reading::EventLog;
 use super::trace::{sample, sample_period};
 use super::{Event, Sample, status_of};
 use crate::flow::Flow;
 use crate::model::{Law, Side, State};
-use crate::reference::{Allowance, GapEvent, Stop, Trajectory};
+use crate::reference::{Allowance, Stop, Trajectory};
 
 /// Largest number of events in a window. They take about 200 MB.
 const MOST_EVENTS: u64 = 1_000_000;
@@ -67,14 +67,19 @@ pub fn history(
     let mut trajectory = trajectory.allowing(Allowance { events: MOST_EVENTS, ..allowance });
     let start = skipped as f64 * flow.period;
     let (meshing, mut samples) = (trajectory.meshing(), vec![sample(&trajectory, start)]);
-    let mut events: Vec<GapEvent> = Vec::new();
+    let mut log = EventLog::new(flow, 0);
     for period in skipped..skipped + u64::from(periods) {
         // A step ends at each sample, which changes the last digits of the motion. So a copy is sampled.
         let sampled = sample_period(&mut trajectory.clone(), samples_per_period, &mut samples);
-        if let Err(stop) = sampled.and(trajectory.advance_period(&mut events)) {
+        if let Err(stop) = sampled.and(trajectory.advance_period(&mut log)) {
             return stopped(stop, period);
         }
     }
-    let events = events.iter().map(|event| in_states(flow, event, 0)).collect();
-    Ok(Some(History { meshing, samples, events, samples_per_period, forcing_period: flow.period }))
+    Ok(Some(History {
+        meshing,
+        samples,
+        events: log.events,
+        samples_per_period,
+        forcing_period: flow.period,
+    }))
 }

@@ -3,9 +3,10 @@
 use std::sync::atomic::AtomicBool;
 
 use super::analysis::ALLOWANCE;
+use super::reading::EventLog;
 use crate::flow::Flow;
 use crate::model::{Law, Side, State};
-use crate::reference::{GapEvent, Stop, Trajectory};
+use crate::reference::{Stop, Trajectory};
 
 /// Forcing periods that take about a minute if the motion is not stiff.
 pub const LONGEST_TIME: f64 = 3e7;
@@ -59,16 +60,17 @@ pub(super) fn at_present(trajectory: &Trajectory<'_, 0>, time: f64) -> (State, O
 /// Returns the state of a trajectory at the present time, and the wall of the contact that lasts. If an event follows
 /// within the time `tolerance`, it is the state after the event.
 pub(super) fn after_events(trajectory: &Trajectory<'_, 0>, tolerance: f64) -> (State, Option<Side>) {
-    let (flow, mut ahead, mut events) = (trajectory.flow(), trajectory.clone(), Vec::<GapEvent>::new());
+    let (flow, mut ahead) = (trajectory.flow(), trajectory.clone());
+    let mut log = EventLog::new(flow, 0);
     let until = trajectory.time_in_period() + tolerance;
     let advanced = if until <= flow.period {
-        ahead.advance_to(until, &mut events)
+        ahead.advance_to(until, &mut log)
     } else {
-        let next = ahead.advance_period(&mut events);
-        next.and_then(|()| ahead.advance_to(until - flow.period, &mut events))
+        let next = ahead.advance_period(&mut log);
+        next.and_then(|()| ahead.advance_to(until - flow.period, &mut log))
     };
-    match (advanced, events.last()) {
-        (Ok(()), Some(event)) => (flow.to_state(event.after), ahead.meshing()),
+    match (advanced, log.events.last()) {
+        (Ok(()), Some(event)) => (event.after, ahead.meshing()),
         _ => (trajectory.state(), trajectory.meshing()),
     }
 }

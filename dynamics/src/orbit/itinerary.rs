@@ -5,6 +5,7 @@
 
 use crate::flow::Flow;
 use crate::model::Side;
+use crate::reference::machine::{MachineEvent, SlipEvent};
 use crate::reference::{FrictionEvent, GapEvent, Observer};
 
 /// Largest distance from phase 0, in turns, of an event that a slow approach may still move to the other side.
@@ -55,6 +56,17 @@ impl Observer for Recorder {
     }
 
     fn friction(&mut self, event: &FrictionEvent) {
+        let modes = event.slips.iter().fold(1, |code, &slip| 3 * code + slip as u64);
+        self.add(16 * modes, event.t);
+    }
+
+    fn machine_event(&mut self, event: &MachineEvent) {
+        let of_wall = 1 + u64::from(event.side == Side::Right) + 2 * u64::from(event.is_on_wall);
+        let code = of_wall + 4 * event.kind as u64 + 256 * (event.gap + 4 * event.wall) as u64;
+        self.add(code, event.t);
+    }
+
+    fn machine_slip(&mut self, event: &SlipEvent) {
         let modes = event.slips.iter().fold(1, |code, &slip| 3 * code + slip as u64);
         self.add(16 * modes, event.t);
     }

@@ -5,6 +5,7 @@ use super::itinerary::{Itinerary, Recorder};
 use super::quantities::{Meter, Quantities};
 use crate::flow::{DomainKind, Flow};
 use crate::model::{Side, State};
+use crate::reference::machine::{MachineEvent, SlipEvent};
 use crate::reference::{EventKind, FrictionEvent, GapEvent, Observer, Stop, Trajectory};
 use crate::word::Word;
 
@@ -47,7 +48,7 @@ impl Reading {
         let (mesh_start, impacts_start) = (trajectory.meshing_time(), trajectory.work().impacts);
         trajectory.clear_near_grazing();
         let mut log = Log {
-            events: Vec::new(),
+            events: EventLog::new(flow, start),
             symbols: Vec::new(),
             start,
             recorders: vec![Recorder::new(flow); periods as usize],
@@ -75,14 +76,14 @@ impl Reading {
                     let turns = t / flow.period;
                     turns < ON_STROBE_TURNS || 1.0 - turns < ON_STROBE_TURNS
                 }),
-            events: events.iter().map(|event| in_states(flow, event, start)).collect(),
+            events: events.events,
         })
     }
 }
 
 /// Collects the events of a reading.
 struct Log<'f> {
-    events: Vec<GapEvent>,
+    events: EventLog<'f>,
     symbols: Vec<u8>,
     /// Number of forcing periods before the reading.
     start: u64,
@@ -99,7 +100,7 @@ impl Observer for Log<'_> {
         self.meter.iter_mut().for_each(|meter| meter.event(event));
         self.symbols.extend(event.symbol);
         self.times.push(event.t);
-        self.events.push(*event);
+        self.events.event(event);
     }
 
     fn friction(&mut self, event: &FrictionEvent) {
@@ -108,29 +109,72 @@ impl Observer for Log<'_> {
         self.symbols.extend(event.symbol);
         self.times.push(event.t);
     }
+
+    fn machine_event(&mut self, event: &MachineEvent) {
+        self.recorders[(event.period - self.start) as usize].machine_event(event);
+        self.symbols.extend(event.symbol);
+        self.times.push(event.t);
+        self.events.machine_event(event);
+    }
+
+    fn machine_slip(&mut self, event: &SlipEvent) {
+        self.recorders[(event.period - self.start) as usize].machine_slip(event);
+        self.symbols.extend(event.symbol);
+        self.times.push(event.t);
+    }
+}
+
+/// Collects the events at walls, with the states of the model.
+pub(super) struct EventLog<'f> {
+    flow: &'f Flow,
+    /// The first period.
+    start: u64,
+    pub(super) events: Vec<Event>,
+}
+
+impl<'f> EventLog<'f> {
+    /// Starts a log of the periods from `start` on.
+    pub(super) fn new(flow: &'f Flow, start: u64) -> EventLog<'f> {
+        EventLog { flow, start, events: Vec::new() }
+    }
+
+    fn push(
+        &mut self,
+        kind: EventKind,
+        side: Side,
+        (period, t): (u64, f64),
+        states: [State; 2],
+        meshing: Option<Side>,
+    ) {
+        // An event at the end of a period, by rounding, is at phase 0 of the next one.
+        let within = if t < self.flow.period { t } else { 0.0 };
+        let [before, after] = if kind == EventKind::MeshEnd { [states[0]; 2] } else { states };
+        let t = (period - self.start) as f64 * self.flow.period + t;
+        self.events.push(Event { kind, gap: 0, side, t, t_mod_period: within, before, after, meshing });
+    }
+}
+
+impl Observer for EventLog<'_> {
+    fn event(&mut self, event: &GapEvent) {
+        let states = [event.before, event.after].map(|q| self.flow.to_state(q));
+        self.push(event.kind, event.side, (event.period, event.t), states, event.meshing_after());
+    }
+
+    fn machine_event(&mut self, event: &MachineEvent) {
+        let states = [event.before, event.after];
+        self.push(event.kind, event.side, (event.period, event.t), states, event.meshing);
+        self.events.iter_mut().last().expect("it was just added").gap = event.gap;
+    }
 }
 
 /// Whether free motion is at a wall within `ON_STROBE_TURNS` of the present time.
 fn passes_wall(flow: &Flow, trajectory: &Trajectory<'_, 0>) -> bool {
+    if let Some(passes) = trajectory.machine_passes_wall(ON_STROBE_TURNS * flow.period) {
+        return passes;
+    }
     let q = flow.to_gap(trajectory.state());
     let reach = ON_STROBE_TURNS * flow.period * q[1].abs();
     let between = trajectory.walls();
     let is_near = |side: Side| (q[0] - between[side.index()]).abs() < reach;
     trajectory.domain() == DomainKind::Free && Side::BOTH.into_iter().any(is_near)
-}
-
-/// Converts an event to states; `start` is the first period.
-pub(super) fn in_states(flow: &Flow, event: &GapEvent, start: u64) -> Event {
-    // An event at the end of a period, by rounding, is at phase 0 of the next one.
-    let within = if event.t < flow.period { event.t } else { 0.0 };
-    let after = if event.kind == EventKind::MeshEnd { event.before } else { event.after };
-    Event {
-        kind: event.kind,
-        side: event.side,
-        t: (event.period - start) as f64 * flow.period + event.t,
-        t_mod_period: within,
-        before: flow.to_state(event.before),
-        after: flow.to_state(after),
-        meshing: event.meshing_after(),
-    }
 }

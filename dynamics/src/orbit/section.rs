@@ -7,10 +7,10 @@
 use super::Event;
 use super::instant::after_events;
 use super::quantities::Quantities;
-use super::reading::ON_STROBE_TURNS;
+use super::reading::{EventLog, ON_STROBE_TURNS};
 use crate::flow::Flow;
 use crate::model::{Law, Side, State};
-use crate::reference::{Allowance, GapEvent, Trajectory};
+use crate::reference::{Allowance, Trajectory};
 
 /// Least distance of half a turn from events, in turns, at which states are compared there. Half a turn adds no sine to
 /// the force.
@@ -44,11 +44,11 @@ impl Section {
         allowance: Allowance<'_>,
     ) -> Option<Section> {
         let mut trajectory = Trajectory::<0>::new(flow, law, in_front(flow, strobe)).allowing(allowance);
-        let mut events: Vec<GapEvent> = Vec::new();
+        let mut log = EventLog::new(flow, 0);
         for _ in 0..periods {
-            trajectory.advance_period(&mut events).ok()?;
+            trajectory.advance_period(&mut log).ok()?;
         }
-        let mut phases: Vec<f64> = events.iter().map(|event| event.t / flow.period).collect();
+        let mut phases: Vec<f64> = log.events.iter().map(|event| event.t_mod_period / flow.period).collect();
         phases.extend([0.0, 1.0]);
         phases.sort_by(f64::total_cmp);
         let is_half_clear = phases.iter().all(|phase| (phase - 0.5).abs() >= CLEARANCE);
@@ -107,6 +107,9 @@ impl Section {
 
 /// Moves a gap that lies behind a wall by rounding to its front: behind it would be a lasting contact.
 fn in_front(flow: &Flow, y: State) -> State {
+    if flow.machine.is_some() {
+        return y;
+    }
     let mut q = flow.to_gap(y);
     for side in Side::BOTH {
         let (wall, sign) = (flow.wall(side), side.sign());

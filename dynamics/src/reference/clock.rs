@@ -7,7 +7,7 @@
 ///
 /// W. Kahan, Further remarks on reducing truncation errors, Commun. ACM 8 (1965) 40.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Clock {
+pub(crate) struct Clock {
     time: f64,
     /// Rounding error of `time`, at most half a unit in its last place.
     error: f64,
@@ -16,17 +16,17 @@ pub(super) struct Clock {
 impl Clock {
     /// Returns the time, rounded.
     #[inline(always)]
-    pub(super) fn time(&self) -> f64 {
+    pub(crate) fn time(&self) -> f64 {
         self.time
     }
 
     #[inline(always)]
-    pub(super) fn set(&mut self, time: f64) {
+    pub(crate) fn set(&mut self, time: f64) {
         *self = Self { time, error: 0.0 };
     }
 
     #[inline(always)]
-    pub(super) fn advance(&mut self, step: f64) {
+    pub(crate) fn advance(&mut self, step: f64) {
         let step = step + self.error;
         let later = self.time + step;
         self.error = step - (later - self.time);
@@ -35,7 +35,7 @@ impl Clock {
 
     /// Returns the time from now to `until`.
     #[inline(always)]
-    pub(super) fn remaining(&self, until: f64) -> f64 {
+    pub(crate) fn remaining(&self, until: f64) -> f64 {
         (until - self.time) - self.error
     }
 }

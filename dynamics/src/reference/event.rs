@@ -2,6 +2,7 @@
 
 use std::ops::AddAssign;
 
+use super::machine::{MachineEvent, SlipEvent};
 use super::side_of;
 use crate::flow::{Gap, Slips};
 use crate::model::Side;
@@ -96,13 +97,19 @@ pub struct FrictionEvent {
     pub(crate) at: Gap,
 }
 
-/// Receives the events of a trajectory. `()` ignores them, a vector stores those at walls.
+/// Receives the events of a trajectory. `()` ignores them, a vector stores those at walls. Machines have events of their own.
 pub trait Observer {
     /// Receives one event at a wall. Events come in order of time.
     fn event(&mut self, event: &GapEvent);
 
     /// Receives one change of a friction mode, in order of time with the events at walls.
     fn friction(&mut self, _: &FrictionEvent) {}
+
+    /// Receives one event of a machine at a wall.
+    fn machine_event(&mut self, _: &MachineEvent) {}
+
+    /// Receives one change of a friction mode of a machine, in order of time with the events at walls.
+    fn machine_slip(&mut self, _: &SlipEvent) {}
 }
 
 impl Observer for () {

@@ -1,6 +1,7 @@
 //! Starts of trajectories: free, in contact or meshing.
 
 use super::clock::Clock;
+use super::machine::{Motion, System};
 use super::{Allowance, Mode, Trajectory, Work};
 use crate::flow::{DomainKind, Flow, Schedule, Slip, Slips};
 use crate::model::{Contact, Law, MOST_FRICTION, Side, State};
@@ -21,6 +22,9 @@ impl<'f> Trajectory<'f, 0> {
     /// determine this: a gap just in front of a wall may be free or in contact onset.
     pub fn meshing_from(flow: &'f Flow, law: Law, y: State, meshing: Option<Side>) -> Self {
         let mut trajectory = Self::new(flow, law, y);
+        if trajectory.machine.is_some() {
+            return trajectory;
+        }
         let contact = meshing.map(|side| flow.contacts[side.index()]);
         if let (Some(side), Some(Contact::Rigid)) = (meshing, contact) {
             trajectory.stand_on(side);
@@ -38,11 +42,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Starts a trajectory with tangent vectors in the coordinates of [`State`].
     pub fn with_tangents(flow: &'f Flow, law: Law, y: State, tangents: [State; N]) -> Self {
         let (schedule, stage) = Schedule::new(flow);
+        let machine = flow.machine.as_ref();
         let interval = stage.interval_of(stage.to_gap(y)[0]);
         let flow = stage.interval(interval);
         let slips = Self::modes_of(flow, y);
         let flow = flow.in_modes(slips);
         let mut trajectory = Trajectory {
+            machine: None,
             flow,
             stage,
             interval,
@@ -73,6 +79,12 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
         };
+        if let Some(system) = machine {
+            let mut motion = Motion::new(system, &y);
+            motion.set_tangents(of_machine(system, tangents));
+            trajectory.machine = Some(Box::new(motion));
+            return trajectory;
+        }
         trajectory.enter();
         trajectory.start_friction();
         trajectory
@@ -80,7 +92,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     /// Copies the trajectory and replaces its tangent vectors, whose number may change.
     pub fn carrying<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
+        let with_tangents = |motion: &Motion<'f>| {
+            let mut motion = motion.clone();
+            motion.set_tangents(of_machine(motion.system(), tangents));
+            Box::new(motion)
+        };
         Trajectory {
+            machine: self.machine.as_deref().map(with_tangents),
             flow: self.flow,
             stage: self.stage,
             interval: self.interval,
@@ -117,6 +135,10 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     ///
     /// The state alone does not determine the domain: a gap just in front of a wall may be free or in contact onset.
     pub fn at<const M: usize>(&self, y: State, tangents: [State; M]) -> Trajectory<'f, M> {
+        if let Some(motion) = &self.machine {
+            let motion = motion.at(&y, of_machine(motion.system(), tangents));
+            return Trajectory { machine: Some(Box::new(motion)), ..self.carrying(tangents) };
+        }
         self.start_in(self.interval, self.mode, self.slips, self.origin, y, tangents)
     }
 
@@ -160,6 +182,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     /// Whether another trajectory has the same mode and comes from the same wall.
     pub(crate) fn has_mode_and_origin_of(&self, other: &Trajectory<'_, N>) -> bool {
+        if let (Some(motion), Some(other)) = (&self.machine, &other.machine) {
+            return motion.is_where(other);
+        }
         (self.interval, self.mode, self.slips, self.origin, self.from_wall)
             == (other.interval, other.mode, other.slips, other.origin, other.from_wall)
     }
@@ -167,6 +192,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Whether another trajectory is in the same domain. Contact onset and sustained contact count as different,
     /// unless the gap lies on the wall.
     pub(crate) fn is_in_domain_of(&self, other: &Trajectory<'_, N>) -> bool {
+        if let (Some(motion), Some(other)) = (&self.machine, &other.machine) {
+            return motion.is_in_modes_of(other);
+        }
         let is_between = |side: Side| {
             let wall = self.flow.wall(side);
             (self.q[0] - wall).abs() <= ON_WALL * wall.abs().max(self.flow.length)
@@ -183,4 +211,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let (mode, slips) = (self.mode.mirrored(), self.slips.map(Slip::mirrored));
         self.start_in(-self.interval, mode, slips, self.origin.map(Side::mirrored), y, tangents)
     }
+}
+
+/// Returns the tangents of a machine: four stand for the unit vectors of all coordinates.
+pub(super) fn of_machine<const M: usize>(system: &System, tangents: [State; M]) -> Vec<State> {
+    if M == 4 { Motion::unit_tangents(system) } else { tangents.to_vec() }
 }

@@ -3,7 +3,7 @@
 
 mod cycle;
 mod friction;
-mod motion;
+pub(crate) mod motion;
 pub(crate) mod random;
 
 use std::time::{Duration, Instant};
@@ -34,10 +34,10 @@ const FIRST_OFF: f64 = 1e-10;
 const MANY_EVENTS: usize = 10_000;
 
 /// Rounding errors may have this multiple of the effect of known errors, [`Motion::shaken`].
-const NOISES: f64 = 20.0;
+pub(crate) const NOISES: f64 = 20.0;
 
 /// Motions in which this effect is larger are not compared further.
-const MOST_NOISE: f64 = 1e-6;
+pub(crate) const MOST_NOISE: f64 = 1e-6;
 
 /// Largest difference of the strobe states of a cycle, relative to the size of the motion.
 const STROBE_OFF: f64 = 1e-10;

@@ -11,6 +11,7 @@ mod flow;
 mod friction;
 mod independent;
 mod instants;
+mod machine;
 mod one_wall;
 mod orbits;
 mod paper;

@@ -118,7 +118,7 @@ mod tests {
     fn event(kind: EventKind, t: f64) -> Event {
         let (before, after) = (state(&[0.5, 1.0]), state(&[0.5, 0.2, 0.0, 0.8]));
         let meshing = (kind == EventKind::MeshStart).then_some(Side::Right);
-        Event { kind, side: Side::Right, t, t_mod_period: t % 2.0, before, after, meshing }
+        Event { kind, gap: 0, side: Side::Right, t, t_mod_period: t % 2.0, before, after, meshing }
     }
 
     fn sample(t: f64, meshing: Option<Side>) -> Sample {

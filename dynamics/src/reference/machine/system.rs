@@ -1,0 +1,263 @@
+//! A machine in the coordinates of its flow, with the domains that motions have met.
+
+use std::collections::HashMap;
+use std::sync::{Arc, RwLock};
+
+use nalgebra::{DMatrix, DVector};
+
+use super::domain::{Domain, DomainKey};
+use super::{Numbers, Point, SIZE};
+use crate::model::{Contact, Machine, Side, Wall};
+
+/// Displacement, in scales of length, from which no motion is expected to return if energy can grow.
+const ESCAPE: f64 = 1e9;
+
+/// Linear forces in the coordinates of the flow.
+#[derive(Clone, Debug)]
+pub(super) struct StageForces {
+    pub(super) stiffness: DMatrix<f64>,
+    pub(super) damping: DMatrix<f64>,
+    pub(super) load: DVector<f64>,
+}
+
+/// An element with dry friction: factors of `w` in the sliding rate, force and speed.
+#[derive(Clone, Debug)]
+pub(super) struct Element {
+    pub(super) row: DVector<f64>,
+    pub(super) force: f64,
+    pub(super) speed: f64,
+}
+
+/// A machine, prepared for its motions. Domains are shared by all motions.
+#[derive(Clone, Debug)]
+pub struct System {
+    pub(super) machine: Machine,
+    /// Number of coordinates.
+    pub(super) n: usize,
+    /// Forcing period.
+    pub(super) period: f64,
+    /// Scales of length and speed.
+    pub(super) length: f64,
+    pub(super) speed: f64,
+    /// Displacement beyond which the motion has escaped.
+    pub(super) escape: f64,
+    /// `d = to_flow x`, and its inverse.
+    to_flow: DMatrix<f64>,
+    from_flow: DMatrix<f64>,
+    /// Inverse of the mass matrix, and the inverse of its Cholesky factor.
+    pub(super) mobility: DMatrix<f64>,
+    pub(super) mass_scale: DMatrix<f64>,
+    pub(super) stages: Vec<StageForces>,
+    /// Orders of the harmonics, and their cosines and sines as columns.
+    pub(super) orders: Vec<f64>,
+    pub(super) drives: Vec<[DVector<f64>; 2]>,
+    pub(super) elements: Vec<Element>,
+    /// Changes of the stage: time since phase 0, and stage.
+    pub(super) schedule: Vec<(f64, usize)>,
+    domains: Arc<RwLock<HashMap<DomainKey, Arc<Domain>>>>,
+}
+
+impl System {
+    /// Prepares a machine that [`Machine::validate`] accepts.
+    pub fn new(machine: &Machine) -> System {
+        let (machine, n) = (machine.clone(), machine.degrees());
+        let to_flow = coordinates(&machine);
+        let from_flow = to_flow.clone().try_inverse().expect("the rows are independent");
+        let back = from_flow.transpose();
+        let mobility = &to_flow * inverse(&machine.mass) * to_flow.transpose();
+        let mobility = 0.5 * (&mobility + mobility.transpose());
+        let mass = &back * &machine.mass * &from_flow;
+        let mass = 0.5 * (&mass + mass.transpose());
+        let factor = mass.cholesky().expect("the mass matrix is positive definite").l();
+        let mass_scale = factor.try_inverse().expect("the factor is regular");
+        let stages: Vec<StageForces> = machine
+            .stages
+            .iter()
+            .map(|forces| StageForces {
+                stiffness: &back * &forces.stiffness * &from_flow,
+                damping: &back * &forces.damping * &from_flow,
+                load: &back * &forces.load,
+            })
+            .collect();
+        let with_force = machine.friction.iter().filter(|friction| friction.force > 0.0);
+        let elements = with_force
+            .map(|friction| Element {
+                row: &back * &friction.row,
+                force: friction.force,
+                speed: friction.speed,
+            })
+            .collect();
+        let period = machine.period();
+        let length = machine.length_scale();
+        let mut system = System {
+            n,
+            period,
+            length,
+            speed: 0.0,
+            escape: f64::INFINITY,
+            orders: machine.drives.iter().map(|drive| f64::from(drive.order)).collect(),
+            drives: machine.drives.iter().map(|drive| [&back * &drive.cos, &back * &drive.sin]).collect(),
+            schedule: machine.schedule.iter().map(|&(turns, stage)| (turns * period, stage)).collect(),
+            to_flow,
+            from_flow,
+            mobility,
+            mass_scale,
+            stages,
+            elements,
+            domains: Arc::default(),
+            machine,
+        };
+        let rates = system.stages.iter().map(|forces| system.rate(&forces.stiffness, &forces.damping));
+        system.speed = length * rates.fold(0.0, f64::max);
+        if system.can_grow() {
+            system.escape = ESCAPE * length;
+        }
+        system
+    }
+
+    /// Whether energy can grow without the force.
+    fn can_grow(&self) -> bool {
+        let is_negative = |matrix: &DMatrix<f64>| {
+            let scaled = self.mass_scaled(&(0.5 * (matrix + matrix.transpose()))).symmetric_eigenvalues();
+            scaled.min() < -1e-12 * scaled.amax()
+        };
+        self.stages.len() > 1
+            || self.stages.iter().any(|forces| is_negative(&forces.stiffness) || is_negative(&forces.damping))
+    }
+
+    /// Transforms a matrix to coordinates with mass 1.
+    fn mass_scaled(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.mass_scale * matrix * self.mass_scale.transpose()
+    }
+
+    /// Returns a bound on all rates under given stiffness and damping: of the forcing, and of the mass-scaled system by its norm.
+    pub(super) fn rate(&self, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> f64 {
+        let norm = |matrix: DMatrix<f64>| matrix.singular_values().max();
+        let own = norm(self.mass_scaled(damping)) + norm(self.mass_scaled(stiffness)).sqrt();
+        own.max(self.machine.omega * f64::from(self.machine.highest_order()))
+    }
+
+    /// Returns the machine.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Returns the forcing period.
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// Returns the scales of length and speed, and the displacement beyond which the motion has escaped.
+    pub(crate) fn units(&self) -> (f64, f64, f64) {
+        (self.length, self.speed, self.escape)
+    }
+
+    pub(super) fn gaps(&self) -> usize {
+        self.machine.gaps.len()
+    }
+
+    pub(super) fn walls(&self, gap: usize, side: Side) -> &[Wall] {
+        &self.machine.gaps[gap].walls[side.index()]
+    }
+
+    /// Returns the number of walls of a side behind which motion continues.
+    pub(super) fn passable(&self, gap: usize, side: Side) -> usize {
+        let walls = self.walls(gap, side);
+        walls.iter().filter(|wall| wall.contact.is_elastic()).count()
+    }
+
+    /// Returns the last wall of a side if it only pushes, and its force differs from that of a wall that may pull.
+    pub(super) fn pushing(&self, gap: usize, side: Side) -> Option<&Wall> {
+        let last = self.walls(gap, side).last()?;
+        let differs = last.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
+        (last.contact == Contact::Pushing && differs).then_some(last)
+    }
+
+    /// Returns the domain of a combination of modes, and builds it if it is the first time.
+    pub(super) fn domain(&self, key: DomainKey) -> Arc<Domain> {
+        if let Some(domain) = self.domains.read().expect("no builder panics").get(&key) {
+            return Arc::clone(domain);
+        }
+        let domain = Arc::new(Domain::new(self, key));
+        self.domains.write().expect("no builder panics").entry(key).or_insert(domain).clone()
+    }
+
+    /// Converts a state `(x1, v1, ...)` to `(d1 .. dn, w1 .. wn)`.
+    pub(super) fn to_flow(&self, state: &[f64]) -> Numbers {
+        let n = self.n;
+        let mut y = [0.0; SIZE];
+        for i in 0..n {
+            for j in 0..n {
+                y[i] += self.to_flow[(i, j)] * state[2 * j];
+                y[n + i] += self.to_flow[(i, j)] * state[2 * j + 1];
+            }
+        }
+        y
+    }
+
+    /// Converts `(d1 .. dn, w1 .. wn)` to a state `(x1, v1, ...)`.
+    pub(super) fn to_state(&self, y: &[f64]) -> Numbers {
+        let n = self.n;
+        let mut state = [0.0; SIZE];
+        for i in 0..n {
+            for j in 0..n {
+                state[2 * i] += self.from_flow[(i, j)] * y[j];
+                state[2 * i + 1] += self.from_flow[(i, j)] * y[n + j];
+            }
+        }
+        state
+    }
+
+    /// Returns the number of entries of [`Point`] that are in use.
+    pub(super) fn width(&self) -> usize {
+        2 * self.n + 2 * self.orders.len() + 1
+    }
+
+    /// Completes a state to a point at a time since phase 0.
+    pub(super) fn point(&self, y: &[f64], t: f64) -> Point {
+        let mut point = [0.0; super::WIDTH];
+        let states = 2 * self.n;
+        point[..states].copy_from_slice(&y[..states]);
+        for (k, order) in self.orders.iter().enumerate() {
+            let (sin, cos) = (order * self.machine.omega * t).sin_cos();
+            (point[states + 2 * k], point[states + 2 * k + 1]) = (cos, sin);
+        }
+        point[self.width() - 1] = 1.0;
+        point
+    }
+}
+
+/// Returns the inverse of a symmetric positive definite matrix.
+fn inverse(mass: &DMatrix<f64>) -> DMatrix<f64> {
+    let is_diagonal = mass.iter().enumerate().all(|(k, x)| *x == 0.0 || k % (mass.nrows() + 1) == 0);
+    if is_diagonal {
+        return DMatrix::from_diagonal(&mass.diagonal().map(f64::recip));
+    }
+    mass.clone().cholesky().expect("the mass matrix is positive definite").inverse()
+}
+
+/// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. The displacement that is left out for a gap is
+/// the one with the largest entry in what is left of its row.
+fn coordinates(machine: &Machine) -> DMatrix<f64> {
+    let n = machine.degrees();
+    let mut rows: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
+    let (mut reduced, mut replaced) = (rows.clone(), Vec::new());
+    for i in 0..reduced.len() {
+        let row = reduced[i].clone();
+        let free = (0..n).filter(|j| !replaced.contains(j));
+        let pivot = free
+            .max_by(|&a, &b| row[a].abs().total_cmp(&row[b].abs()).then(b.cmp(&a)))
+            .expect("there are not more gaps than coordinates");
+        for other in reduced.iter_mut().skip(i + 1) {
+            let share = other[pivot] / row[pivot];
+            *other -= &row * share;
+        }
+        replaced.push(pivot);
+    }
+    rows.extend(
+        (0..n)
+            .filter(|j| !replaced.contains(j))
+            .map(|j| DVector::from_fn(n, |i, _| f64::from(u8::from(i == j)))),
+    );
+    DMatrix::from_fn(n, n, |i, j| rows[i][j])
+}
