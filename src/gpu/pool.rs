@@ -18,6 +18,7 @@ use super::stage::Stage;
 use super::tables::Tables;
 use super::transfer::reals;
 use super::{Gpu, GpuError, Lane, LaneSettings};
+use rattlemap_dynamics::model::REST;
 use rattlemap_dynamics::orbit::Status;
 
 /// Most unchanged slots that are uploaded again to avoid one more transfer.

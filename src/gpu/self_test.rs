@@ -2,7 +2,7 @@
 
 use super::{Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
 use crate::record::distance::{apart, farther, is_within};
-use rattlemap_dynamics::model::{GearPair, State, state};
+use rattlemap_dynamics::model::{GearPair, REST, State, state};
 
 /// Forcing periods from rest to the answers.
 const PERIODS: u32 = 20;

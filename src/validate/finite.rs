@@ -6,9 +6,8 @@ use rattlemap_dynamics::orbit::Budget;
 use rattlemap_dynamics::stability::LEAST_FOR_ERROR;
 
 /// Names of the entries of a state in messages.
-const STATE_NAMES: [&str; STATE] = [
-    "x1", "v1", "x2", "v2", "x3", "v3", "x4", "v4", "x5", "v5", "x6", "v6", "x7", "v7", "x8", "v8",
-];
+const STATE_NAMES: [&str; STATE] =
+    ["x1", "v1", "x2", "v2", "x3", "v3", "x4", "v4", "x5", "v5", "x6", "v6", "x7", "v7", "x8", "v8"];
 
 /// Returns the name and value of the first field that is not finite.
 ///
@@ -24,7 +23,8 @@ pub(super) fn not_finite(record: &Record, budget: &Budget) -> Option<(&'static s
         (valid::IMPACTS, "impacts_per_period", record.impacts_per_period, None),
         (valid::MESH, "mesh_fraction", record.mesh_fraction, None),
     ];
-    let strobe = STATE_NAMES.into_iter().zip(record.strobe).map(|(name, value)| (valid::STROBE, name, value, None));
+    let strobe =
+        STATE_NAMES.into_iter().zip(record.strobe).map(|(name, value)| (valid::STROBE, name, value, None));
     let measured = measures::all()
         .map(|measure| (measure.group.bit, measure.group.name, record.measures[measure.place], None));
     let is_wrong = |&(bit, _, value, answer): &(u32, &str, f64, Option<f64>)| {

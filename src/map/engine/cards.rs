@@ -438,6 +438,7 @@ mod tests {
 
     use super::super::Fake;
     use super::*;
+    use rattlemap_dynamics::model::state;
 
     fn adapter(number: usize) -> AdapterId {
         AdapterId { number, name: "fake".to_owned(), pci: None }

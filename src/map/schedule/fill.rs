@@ -57,8 +57,7 @@ impl Filling {
             let weighted = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
             weighted.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
         };
-        let mut filled =
-            Record { periods_run: 0, strobe: REST, valid: self.valid, ..self.corners[nearest] };
+        let mut filled = Record { periods_run: 0, strobe: REST, valid: self.valid, ..self.corners[nearest] };
         filled.valid |= torus(&self.corners[nearest]);
         filled.clear_measures(|group| self.valid & group.bit == 0);
         if !self.averages[nearest] {

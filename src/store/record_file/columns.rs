@@ -160,3 +160,24 @@ fn batch(rows: &[Row]) -> Vec<(u32, Record)> {
     };
     rows.iter().map(cell).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::model::state;
+
+    #[test]
+    fn files_contain_the_strobe_entries_that_the_model_has() {
+        for (coordinates, bytes) in [(2, 376), (3, 392), (8, 472)] {
+            let strobes = 2 * coordinates;
+            let whole: usize = (1..COUNT).map(|column| bytes_of(column, strobes).count()).sum();
+            assert_eq!(whole, bytes, "{coordinates} coordinates");
+            let entries: Vec<f64> = (1..=strobes).map(|n| n as f64 / 3.0).collect();
+            let record = Record { strobe: state(&entries), period: 3, ..Record::default() };
+            let batch: Vec<(u32, Record)> = (0..5).map(|id| (7 * id, record)).collect();
+            let (mask, body) = encode(&batch, strobes).unwrap();
+            assert_eq!(decode(mask, 5, strobes, &body), Some(batch));
+            assert_eq!(decode(mask, 5, strobes + 2, &body), None);
+        }
+    }
+}

@@ -213,7 +213,7 @@ mod tests {
             for domain in [oscillator.free, oscillator.meshing[0]] {
                 let [cos, sin] = [0.6, 0.8];
                 let [a, b] = Equations::new(&oscillator, &domain).accelerations(&q, [cos, sin]);
-                let x = coordinates.state(&[a, 0.0, b]);
+                let x = coordinates.state(&[a, 0.0, b, 0.0]);
                 let (acceleration, k, c) = ([x[0], x[2]], domain.stiffness, domain.damping);
                 for i in 0..2 {
                     let inertia =

@@ -6,7 +6,9 @@ use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::dop853::Solver;
 use super::flight::{Ended, Flight};
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, Side, REST, Stage, State, state};
+use rattlemap_dynamics::model::{
+    Contact, Domain, Harmonic, Law, Oscillator, REST, Side, Stage, State, state,
+};
 use rattlemap_dynamics::reference::EventKind;
 
 const NO_WALLS: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];

@@ -96,7 +96,10 @@ fn errors_of_built_scenes_name_the_field() {
     }
     let stops =
         Scene::builder(Stops::with_restitution(0.5)).axis("F", 1.0..=2.0, 2).axis("omega", 1.0..=2.0, 2);
-    assert_says(&refusal(stops.start(Start::State(state(&[0.0, 0.0, 1.0])))), &["two finite numbers, [x, v]"]);
+    assert_says(
+        &refusal(stops.start(Start::State(state(&[0.0, 0.0, 1.0])))),
+        &["two finite numbers, [x, v]"],
+    );
 }
 
 /// Cells without motion are found before the computation: at corners by the scene, elsewhere by the plan.

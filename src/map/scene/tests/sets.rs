@@ -1,8 +1,8 @@
 //! `--set`: changes of the scene, and messages that name the argument.
 
 use super::*;
-use rattlemap_dynamics::model::state;
 use crate::model_file::FileModel;
+use rattlemap_dynamics::model::state;
 
 #[test]
 fn arguments_override_the_text() {

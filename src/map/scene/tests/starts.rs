@@ -1,10 +1,10 @@
 //! Components of the start as axes and as columns.
 
 use super::*;
-use rattlemap_dynamics::model::state;
 use crate::map::plan::Plan;
 use crate::map::scene::{CompanionFile, FileText};
 use rattlemap_dynamics::model::Stops;
+use rattlemap_dynamics::model::state;
 
 const START_PLANE: &str = "[parameters]\ne = 0.5\n\n[[axis]]\nstart = 'v1'\nmin = -2\nmax = 2\ncount = 5\n\n\
                      [[axis]]\nstart = 'x2'\nvalues = [-0.5, 0.25]\n";
@@ -118,7 +118,7 @@ fn a_built_scene_has_axes_of_the_start() {
         .start_axis("v", 0.0..=2.0, 5)
         .build();
     let scene = scene.unwrap();
-    assert_eq!(Plan::new(&scene).cell(14).start, [0.5, 2.0, 0.0, 0.0]);
+    assert_eq!(Plan::new(&scene).cell(14).start, state(&[0.5, 2.0]));
     assert_eq!(scene.title().matches("at the start").count(), 2, "{}", scene.title());
     let identity = scene.identity();
     assert!(identity.contains(&("axis.0.start".to_owned(), "x".to_owned())), "{identity:?}");

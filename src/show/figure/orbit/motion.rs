@@ -143,7 +143,7 @@ mod tests {
         let motion = Motion::new(&events, &trace, 2.0);
         let modes: Vec<_> = motion.pieces.iter().map(|p| p.meshing).collect();
         assert_eq!(modes, [None, None, meshing, None]);
-        assert_eq!(motion.pieces[0].points.last().unwrap().1, [0.5, 1.0, 0.0, 0.0]);
+        assert_eq!(motion.pieces[0].points.last().unwrap().1, state(&[0.5, 1.0]));
         assert_eq!(motion.pieces[1].points[0], (0.25, state(&[0.5, 0.2, 0.0, 0.8])));
         // The sample at the start of meshing is skipped.
         assert_eq!(motion.pieces[2].points.len(), 3);

@@ -7,7 +7,7 @@ use super::super::{Strobed, follow};
 use super::*;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Friction, state};
+use rattlemap_dynamics::model::{Friction, REST, state};
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, analyse_flow};
 
 const SETTINGS: Settings = Settings { transient_periods: 150, observed_periods: 20, max_period: 4 };
@@ -170,7 +170,7 @@ fn a_rigid_wall_lets_go_before_friction() {
     assert_eq!(kinds[1..], [(EventKind::MeshEnd, Side::Left), (EventKind::MeshStart, Side::Left)]);
     assert!((flight.events[2].t - (PI - (0.5 / 1.2f64).asin())).abs() < 1e-11, "{:?}", flight.events);
     assert!(flight.slips.iter().all(|slip| slip.symbol.is_none()), "{:?}", flight.slips);
-    assert_eq!(flight.state(), [0.0; 4]);
+    assert_eq!(flight.state(), REST);
 }
 
 /// A mass lies on another one that lies on the ground. Both begin to slide together, and then separately.
