@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use rattlemap::gpu::{AdapterChoice, Features, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::record::Record;
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator};
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST, state};
 
 use rattlemap::cli::bench::spread::Spread;
 use rattlemap_bench::shapes::{SHAPES, Shape};
@@ -89,7 +89,7 @@ impl Plane {
         // Blocks of 8 x 8 cells, so that neighbours on the device are neighbours in the plane.
         let mut places: Vec<_> = (0..side * side).map(|i| (i / side, i % side)).collect();
         places.sort_by_key(|&(flow, law)| (flow / 8, law / 8, flow, law));
-        let lanes = places.into_iter().map(|(flow, law)| Lane { flow, law, start: [0.0; 4] }).collect();
+        let lanes = places.into_iter().map(|(flow, law)| Lane { flow, law, start: REST }).collect();
         Plane { flows: flows.collect(), laws: laws.collect(), lanes }
     }
 

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use rattlemap_bench::shapes::SHAPES;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::model::{GearPair, REST, State, state};
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
 use rattlemap_dynamics::reference::Trajectory;
 
@@ -54,7 +54,7 @@ fn trajectories_of<const N: usize>(
     tangents: [State; N],
 ) -> Vec<Trajectory<'_, N>> {
     let settle = |cell: &'_ Cell| -> State {
-        let mut trajectory = Trajectory::new(&cell.flow, cell.pair.law(), [0.0; 4]);
+        let mut trajectory = Trajectory::new(&cell.flow, cell.pair.law(), REST);
         advance(&mut trajectory, transient);
         trajectory.state()
     };
@@ -106,7 +106,7 @@ fn per_period(c: &mut Criterion) {
 }
 
 fn per_period_with_tangent(c: &mut Criterion) {
-    run(c, "per period, one tangent vector", [4.5, 12.0], [[1.0, 0.0, 0.0, 0.0]], false);
+    run(c, "per period, one tangent vector", [4.5, 12.0], [state(&[1.0])], false);
 }
 
 fn per_event(c: &mut Criterion) {
@@ -126,7 +126,7 @@ fn per_period_of_a_map(c: &mut Criterion) {
         quantities: false,
     };
     let work = || -> u64 {
-        let periods = |cell: &Cell| measure(&cell.flow, cell.pair.law(), [0.0; 4], &budget).periods_run;
+        let periods = |cell: &Cell| measure(&cell.flow, cell.pair.law(), REST, &budget).periods_run;
         cells.iter().map(|cell| u64::from(periods(cell))).sum()
     };
     let periods = work();

@@ -20,7 +20,7 @@ use anyhow::anyhow;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use rattlemap_dynamics::model::{REST, State};
+use rattlemap_dynamics::model::{self, REST, STATE, State};
 use rattlemap_dynamics::orbit::{LONGEST_WINDOW, Settings};
 
 /// Version and commit, as `--version` prints them.
@@ -552,7 +552,7 @@ pub(crate) struct Orbit {
     pub(crate) force: bool,
 }
 
-/// A state of two or four numbers.
+/// A state of two numbers for each coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StartState {
     state: State,
@@ -563,8 +563,9 @@ fn state(text: &str) -> Result<StartState, String> {
     let numbers: Option<Vec<f64>> =
         text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
     match numbers.as_deref() {
-        Some(&[x, v]) => Ok(StartState { state: [x, v, 0.0, 0.0], count: 2 }),
-        Some(&[x1, v1, x2, v2]) => Ok(StartState { state: [x1, v1, x2, v2], count: 4 }),
+        Some(numbers) if numbers.len().is_multiple_of(2) && (2..=STATE).contains(&numbers.len()) => {
+            Ok(StartState { state: model::state(numbers), count: numbers.len() })
+        }
         _ => Err(
             "it must be finite numbers: two, such as 0.1,0, for a model of one coordinate; four, such as \
              0.1,0,-0.2,1.5, for a model of two"

@@ -1,6 +1,6 @@
 //! Oscillators in the coordinates of lanes: the gap `z` and one displacement `x`.
 
-use rattlemap_dynamics::model::{Domain, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Domain, Oscillator, REST, Side, State};
 
 /// Choice of the displacement `x`, and the effect of a force along the gap.
 #[derive(Clone, Copy, Debug)]
@@ -70,7 +70,7 @@ impl Coordinates {
     pub(super) fn to_state(self, q: [f64; 4], h: f64) -> State {
         let (o, p) = (self.other, 1 - self.other);
         let (w, v) = (q[1] / h, q[3] / h);
-        let mut y = [0.0; 4];
+        let mut y = REST;
         [y[2 * p], y[2 * p + 1]] =
             [(q[0] - self.gap[o] * q[2]) / self.gap[p], (w - self.gap[o] * v) / self.gap[p]];
         [y[2 * o], y[2 * o + 1]] = [q[2], v];

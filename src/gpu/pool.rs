@@ -18,6 +18,7 @@ use super::stage::Stage;
 use super::tables::Tables;
 use super::transfer::reals;
 use super::{Gpu, GpuError, Lane, LaneSettings};
+use rattlemap_dynamics::model::REST;
 use rattlemap_dynamics::orbit::Status;
 
 /// Most unchanged slots that are uploaded again to avoid one more transfer.
@@ -221,7 +222,7 @@ impl Pool {
         }
         self.buffers = Some(buffers);
         self.free.extend(had as u32..slots as u32);
-        self.lanes.resize(slots, (0, Lane { flow: 0, law: 0, start: [0.0; 4] }));
+        self.lanes.resize(slots, (0, Lane { flow: 0, law: 0, start: REST }));
         self.cells.resize(slots, Cell::zeroed());
         self.starts.resize(slots, [0.0; 4]);
         Ok(())
@@ -259,7 +260,7 @@ mod tests {
     use super::*;
     use crate::gpu::dispatch_policy::{DEDICATED, DispatchPolicy};
     use crate::gpu::{AdapterChoice, Precision};
-    use rattlemap_dynamics::model::GearPair;
+    use rattlemap_dynamics::model::{GearPair, state};
     use std::time::Duration;
 
     #[test]
@@ -285,7 +286,7 @@ mod tests {
         let pairs: Vec<_> = pairs.map(|(e, omega)| GearPair { omega, ..GearPair::paper(e) }).collect();
         let flows: Vec<_> = pairs.iter().map(|pair| pair.oscillator().unwrap()).collect();
         let laws: Vec<_> = pairs.iter().map(GearPair::law).collect();
-        let lane = |i| (i, Lane { flow: i, law: i, start: [0.0; 4] });
+        let lane = |i| (i, Lane { flow: i, law: i, start: REST });
         let lanes: Vec<_> = (0..flows.len() as u32).map(lane).collect();
         let settings = LaneSettings::default();
         let tables = pollster::block_on(gpu.load(&flows, &laws, None)).unwrap();
@@ -309,7 +310,7 @@ mod tests {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
         change(&mut gpu);
         let pair = GearPair::paper(0.5);
-        let lanes = [Lane { flow: 0, law: 0, start: [0.0; 4] }; 1 << 14];
+        let lanes = [Lane { flow: 0, law: 0, start: REST }; 1 << 14];
         let flows = [pair.oscillator().unwrap()];
         let settings = LaneSettings::default();
         let error = pollster::block_on(gpu.run(&flows, &[pair.law()], &lanes, &settings)).unwrap_err();

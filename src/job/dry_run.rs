@@ -75,6 +75,7 @@ impl DryRun {
         let stored = if job.resume {
             let identity =
                 Identity::new(engine.name(), engine.precision(), &engine.device(), job.scene.identity())
+                    .of_coordinates(job.scene.coordinates())
                     .of_shard(job.shard);
             let path = out.join(RECORDS);
             if path.is_file() { Work::new(plan, job.shard, false).read(&path, &identity)?.count } else { 0 }

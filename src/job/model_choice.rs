@@ -39,7 +39,11 @@ pub fn find(name: &str) -> Result<FileModel, JobError> {
 /// [`JobError::Usage`] if the numbers differ.
 pub fn check_components(model: &dyn Model, count: usize) -> Result<(), JobError> {
     let names = model.state_names();
-    let number = if names.len() == 2 { "two" } else { "four" };
+    let number = match names.len() {
+        2 => "two".to_owned(),
+        4 => "four".to_owned(),
+        more => more.to_string(),
+    };
     match count == names.len() {
         true => Ok(()),
         false => Err(JobError::Usage(format!(

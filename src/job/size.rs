@@ -25,7 +25,7 @@ const REFINED: u64 = 40;
 /// Memory per cell of a list, in bytes: values, their text, flow and law.
 const LIST_ROW: u64 = 200;
 /// Memory per forcing period of a cell that is being computed, in bytes: strobe state, growth of a tangent vector.
-const PERIOD: u64 = 40;
+const PERIOD: u64 = 136;
 /// Memory per flow that the CPU engine keeps, in bytes: an upper bound for built-in models.
 const FLOW: u64 = 100_000;
 /// Address space that a graphics driver needs, in bytes: the software driver's, which fails without a message if it has less.
@@ -254,13 +254,13 @@ fn disk(scene: &Scene) -> [u64; 2] {
             Quantity::Impacts | Quantity::Mesh | Quantity::ImpactRate => 8,
             Quantity::Class => class,
             Quantity::Symmetric => 1,
-            Quantity::State => 32,
+            Quantity::State => state_bytes(scene),
             measured => numbers(*measured),
         };
         quantities.iter().map(column).sum()
     };
     let figures = |quantity: &Quantity| match quantity {
-        Quantity::State => 4,
+        Quantity::State => state_bytes(scene) / 8,
         other => (numbers(*other) / 8).max(1),
     };
     let figures: u64 = quantities.iter().map(figures).sum();
@@ -321,8 +321,13 @@ fn stored_run(scene: &Scene, with_strobes: bool) -> u64 {
     let exponent = if quantities.iter().any(is_exponent) || scene.is_basin() { 16 } else { 0 };
     let has_starts = scene.run_count() > scene.cell_count();
     let needs_state = quantities.contains(&Quantity::State) || scene.is_basin() || scene.start().follows();
-    let state = if with_strobes || has_starts || needs_state { 32 } else { 0 };
+    let state = if with_strobes || has_starts || needs_state { state_bytes(scene) } else { 0 };
     8 + exponent + state + quantities.iter().map(column).sum::<u64>()
+}
+
+/// Bytes of a strobe state.
+fn state_bytes(scene: &Scene) -> u64 {
+    16 * scene.coordinates().max(2) as u64
 }
 
 /// Bytes of the numbers of a measured quantity.
@@ -386,6 +391,7 @@ mod tests {
     use crate::record::measures::MEASURES;
     use crate::record::{RecordStore, RecordsMut};
     use rattlemap_dynamics::flow::Flow;
+    use rattlemap_dynamics::model::state;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2], sets: &[&str]) -> Scene {
         let [columns, rows] = counts;
@@ -471,7 +477,7 @@ mod tests {
                 impacts_per_period: number(needs.impacts),
                 mesh_fraction: number(needs.mesh),
                 measures: [0.5; MEASURES],
-                strobe: [1.0; 4],
+                strobe: state(&[1.0; 4]),
                 period: 1,
                 periods_run: 100,
                 ..Record::default()

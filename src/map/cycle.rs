@@ -2,7 +2,7 @@
 
 use crate::record::distance::{apart, farther};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, State};
+use rattlemap_dynamics::model::{Law, STATE, State};
 use rattlemap_dynamics::reference::{Stop, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
@@ -102,9 +102,12 @@ impl StrobeCycle {
     /// and the corresponding velocity.
     pub(crate) fn units(&self, flow: &Flow) -> [f64; 2] {
         let all = || self.points.iter().copied().chain(self.mirrored());
-        let largest = |i: usize, j: usize| all().flat_map(|y| [y[i].abs(), y[j].abs()]).fold(0.0, f64::max);
-        let position = largest(0, 2).max(flow.length);
-        [position, largest(1, 3).max(flow.omega * position)]
+        let largest = |from: usize| {
+            let entries = all().flat_map(|y| (from..STATE).step_by(2).map(move |i| y[i].abs()));
+            entries.fold(0.0, f64::max)
+        };
+        let position = largest(0).max(flow.length);
+        [position, largest(1).max(flow.omega * position)]
     }
 
     /// Returns the distance of two states in the units of the cycle.
@@ -115,19 +118,19 @@ impl StrobeCycle {
 
 /// Returns the largest difference of the components of two states, in units of displacement and velocity.
 pub(crate) fn distance(units: [f64; 2], a: &State, b: &State) -> f64 {
-    (0..4).map(|i| apart(a[i], b[i]) / units[i % 2]).fold(0.0, farther)
+    (0..STATE).map(|i| apart(a[i], b[i]) / units[i % 2]).fold(0.0, farther)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::model::GearPair;
+    use rattlemap_dynamics::model::{GearPair, state};
 
     #[test]
     fn a_state_with_nan_or_infinity_is_on_no_cycle() {
         let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
         let through = |point: State| StrobeCycle::at(point, 1);
-        let state = [0.1, 0.2, -0.1, 0.3];
+        let state = state(&[0.1, 0.2, -0.1, 0.3]);
         assert!(through(state).passes(&flow, &state, 1));
         for i in 0..4 {
             for value in [f64::NAN, f64::INFINITY] {

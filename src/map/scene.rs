@@ -289,6 +289,11 @@ impl Scene {
         &self.points
     }
 
+    /// Returns the number of the model's coordinates.
+    pub fn coordinates(&self) -> usize {
+        self.base().state_names().len() / 2
+    }
+
     /// Returns the model in the first cell.
     pub fn base(&self) -> &dyn Model {
         self.points.base()

@@ -15,6 +15,7 @@ pub use store::{RecordStore, Records, RecordsMut};
 use bytemuck::{Pod, Zeroable};
 
 use measures::MEASURES;
+use rattlemap_dynamics::model::State;
 
 /// Layout version of [`Record`], stored in files that hold records.
 pub const RECORD_VERSION: u32 = 3;
@@ -51,7 +52,8 @@ pub mod valid {
 
 /// Results of one cell, in one fixed layout for all engines, precisions and variants.
 ///
-/// 376 bytes, no padding, little-endian in files.
+/// 472 bytes, no padding, little-endian. Files contain the entries of the strobe state that the model has, but four at least: 376
+/// bytes for one or two coordinates, and 16 more for each further one.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Record {
@@ -63,8 +65,8 @@ pub struct Record {
     pub impacts_per_period: f64,
     /// Fraction of time spent meshing.
     pub mesh_fraction: f64,
-    /// Last strobe state `(x1, v1, x2, v2)`.
-    pub strobe: [f64; 4],
+    /// Last strobe state `(x1, v1, x2, v2, ...)`.
+    pub strobe: State,
     /// First 64 symbols, 3 bits each (values 0 to 7), 21 to a `u64`, the first symbol lowest; zero if the word is
     /// longer.
     pub word: [u64; 4],

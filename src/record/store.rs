@@ -8,6 +8,7 @@ use bytemuck::Pod;
 
 use super::Record;
 use super::measures::MEASURES;
+use rattlemap_dynamics::model::MOST_COORDINATES;
 
 /// Records by number, in any container.
 pub trait Records: Debug + Sync {
@@ -61,7 +62,7 @@ impl<R: AsRef<[Record]> + AsMut<[Record]> + Debug + Sync + ?Sized> RecordsMut fo
 /// A fixed number of records, stored by column.
 ///
 /// A column that is zero in all records takes no memory, and equal words are stored once. A map of classes and
-/// exponents takes 24 bytes per run; a [`Record`] takes 376. Records come back to the bit, but for strobe states,
+/// exponents takes 24 bytes per run; a [`Record`] takes 472. Records come back to the bit, but for strobe states,
 /// which are stored on request only.
 #[derive(Clone, Debug, Default)]
 pub struct RecordStore {
@@ -69,7 +70,8 @@ pub struct RecordStore {
     with_strobes: bool,
     numbers: [Column<f64>; 4],
     measures: [Column<f64>; MEASURES],
-    strobe: Column<[f64; 4]>,
+    /// Displacement and velocity of each coordinate.
+    strobe: [Column<[f64; 2]>; MOST_COORDINATES],
     periods_run: Column<u32>,
     /// Period, status, symmetry, validity and the reserved field: few combinations occur.
     flags: Distinct<[u32; 5]>,
@@ -85,7 +87,7 @@ impl RecordStore {
             with_strobes,
             numbers: Default::default(),
             measures: Default::default(),
-            strobe: Column::default(),
+            strobe: Default::default(),
             periods_run: Column::default(),
             flags: Distinct::default(),
             word: Distinct::default(),
@@ -106,7 +108,7 @@ impl RecordStore {
         let small = [&self.periods_run, &self.flags.places, &self.word.places, &self.pattern.places];
         self.numbers.iter().chain(&self.measures).map(Column::bytes).sum::<usize>()
             + small.iter().map(|column| column.bytes()).sum::<usize>()
-            + self.strobe.bytes()
+            + self.strobe.iter().map(Column::bytes).sum::<usize>()
     }
 }
 
@@ -127,7 +129,7 @@ impl Records for RecordStore {
             lyapunov_error,
             impacts_per_period,
             mesh_fraction,
-            strobe: self.strobe.get(id),
+            strobe: std::array::from_fn(|i| self.strobe[i / 2].get(id)[i % 2]),
             word,
             word_hash,
             word_length,
@@ -158,7 +160,10 @@ impl RecordsMut for RecordStore {
             .zip(record.measures)
             .for_each(|(column, number)| column.put(count, id, number));
         if self.with_strobes {
-            self.strobe.put(count, id, record.strobe);
+            self.strobe
+                .iter_mut()
+                .zip(record.strobe.chunks_exact(2))
+                .for_each(|(column, pair)| column.put(count, id, [pair[0], pair[1]]));
         }
         self.periods_run.put(count, id, record.periods_run);
         let &Record { period, status, symmetric, valid, reserved, .. } = record;
@@ -232,6 +237,7 @@ mod tests {
     use crate::record::valid;
     use bytemuck::Zeroable;
     use proptest::prelude::*;
+    use rattlemap_dynamics::model::{REST, state};
     use rattlemap_dynamics::word::Word;
 
     /// Records of any bits; some are empty, some share their words.
@@ -257,7 +263,7 @@ mod tests {
             }
             prop_assert_eq!(store.count(), list.len());
             for (id, &record) in list.iter().enumerate() {
-                let strobe = if with_strobes { record.strobe } else { [0.0; 4] };
+                let strobe = if with_strobes { record.strobe } else { REST };
                 let (stored, expected) = (store.record(id), Record { strobe, ..record });
                 prop_assert_eq!(bytemuck::bytes_of(&stored), bytemuck::bytes_of(&expected));
             }
@@ -276,7 +282,7 @@ mod tests {
         let by_default = Record {
             lyapunov: 0.1,
             lyapunov_error: 0.01,
-            strobe: [1.0; 4],
+            strobe: state(&[1.0; 4]),
             period: 3,
             periods_run: 500,
             valid: valid::PERIOD | valid::LYAPUNOV | valid::STROBE,

@@ -3,7 +3,7 @@
 use crate::map::scene::{Scene, Start};
 use crate::model_file::FileModel;
 use crate::show::symbols::{equation, number, symbol};
-use rattlemap_dynamics::model::{Model, Parameter};
+use rattlemap_dynamics::model::{Model, Parameter, State};
 
 /// Describes an oscillator: values of parameters without a default, the frequency, values that differ from the defaults, and
 /// whether all others have their defaults; then the start phase if it is not 0. For a user's model it lists all values, because
@@ -63,7 +63,7 @@ fn derived(scene: &Scene) -> impl Iterator<Item = String> {
 pub(crate) fn integration(scene: &Scene) -> String {
     let last = scene.axes().last().map_or(String::new(), |axis| symbol(&axis.parameter().name));
     let components = scene.base().state_names().len();
-    let listed = |state: [f64; 4]| state.map(number)[..components].join(", ");
+    let listed = |state: State| state.map(number)[..components].join(", ");
     let start = match scene.start() {
         Start::Rest if scene.sweeps_start() => "from its own state, the other components 0".to_owned(),
         Start::State(state) if scene.sweeps_start() => {

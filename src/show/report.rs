@@ -116,9 +116,10 @@ pub fn data(
         "refinement": cells.refinement().map(|refined| audits(cells, refined)),
         "validation": validation,
     });
-    // Start states of cells that follow their neighbours, four numbers per cell.
+    // Start states of cells that follow their neighbours, four numbers per cell or more if states have more.
     if scene.start().follows() {
-        let starts: Vec<[f64; 4]> = (0..cells.count()).map(|id| cells.start(id)).collect();
+        let count = components.max(4);
+        let starts: Vec<f64> = (0..cells.count()).flat_map(|id| cells.start(id)[..count].to_vec()).collect();
         data["starts"] = packed("f64", &starts);
     }
     data

@@ -347,7 +347,9 @@ impl FinishedMap {
             return Err(FinishedMapError::NoRecords { folder: self.folder.clone() });
         }
         let StoredManifest { engine, precision, device, sources, target, .. } = &self.manifest;
-        let identity = Identity::new(engine, precision, device, scene.identity()).built_from(sources, target);
+        let identity = Identity::new(engine, precision, device, scene.identity())
+            .of_coordinates(scene.coordinates())
+            .built_from(sources, target);
         let mut work = Work::new(plan, None, true);
         let Extent { count, damage, .. } = work.read(&path, &identity).map_err(|error| match error {
             RecordFileError::OtherRun { path, differences } => {

@@ -46,6 +46,8 @@ pub struct RecordFile {
     count: usize,
     next_number: u32,
     damage: Option<Damage>,
+    /// Number of entries of strobe states.
+    strobes: usize,
 }
 
 impl RecordFile {
@@ -55,7 +57,8 @@ impl RecordFile {
     /// [`RecordFileError::Io`] if it cannot be written.
     pub fn create(path: &Path, identity: &Identity) -> Result<RecordFile, RecordFileError> {
         let file = begin(path, identity, None).map_err(|reason| io_error(path, reason))?;
-        Ok(RecordFile { file, path: path.to_owned(), count: 0, next_number: 0, damage: None })
+        let strobes = identity.strobes();
+        Ok(RecordFile { file, path: path.to_owned(), count: 0, next_number: 0, damage: None, strobes })
     }
 
     /// Creates a file under a temporary name. [`RecordFile::put_in_place`] gives it its name; until then an existing
@@ -117,7 +120,8 @@ impl RecordFile {
         };
         let mut file = mended.map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
-        Ok(RecordFile { file, path: path.to_owned(), count, next_number, damage })
+        let strobes = identity.strobes();
+        Ok(RecordFile { file, path: path.to_owned(), count, next_number, damage, strobes })
     }
 
     /// Reads a file without changing it; `take` is described at [`RecordFile::resume`].
@@ -152,7 +156,7 @@ impl RecordFile {
         let batches: Vec<&[(u32, Record)]> = records.chunks(batch::MOST_CELLS).collect();
         let numbered = (self.next_number..).zip(&batches).collect::<Vec<_>>().into_par_iter();
         let encoded: io::Result<Vec<Vec<u8>>> =
-            numbered.map(|(number, cells)| batch::encode(number, cells)).collect();
+            numbered.map(|(number, cells)| batch::encode(number, cells, self.strobes)).collect();
         encoded
             .and_then(|encoded| encoded.iter().try_for_each(|batch| self.file.write_all(batch)))
             .map_err(|reason| io_error(&self.path, reason))?;

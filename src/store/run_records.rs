@@ -136,6 +136,7 @@ impl<'f> RunRecords<'f> {
     ) -> Result<RunRecords<'f>, RunRecordsError> {
         let path = folder.path().join(RECORDS);
         let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
+            .of_coordinates(scene.coordinates())
             .of_shard(work.shard);
         let (file, elapsed_before) = if resume && path.is_file() {
             let order = work.order();

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::DMatrix;
 
 use super::Subject;
 use super::compare::{Answer, Bars, Labels};
@@ -244,8 +244,8 @@ impl<'a> Cell<'a> {
     /// Returns logarithms of the largest multiplier over `period` periods, for motions perturbed after each period.
     pub(super) fn multipliers_from(&self, state: State, period: u32) -> Vec<f64> {
         let log_radius = |end: Trajectory<'_, 4>| {
-            let columns = end.tangents().map(Vector4::from);
-            let [re, im] = *multipliers(&Matrix4::from_columns(&columns))?.first()?;
+            let columns = end.tangents();
+            let [re, im] = *multipliers(&DMatrix::from_fn(4, 4, |i, j| columns[j][i]))?.first()?;
             Some(re.hypot(im).ln() + end.log_scale())
         };
         self.perturbed_motions(state, period, UNIT).filter_map(log_radius).collect()
@@ -275,12 +275,13 @@ impl<'a> Cell<'a> {
     pub(super) fn apart(&self, a: &State, b: &State) -> f64 {
         let [position, velocity] = self.units(a);
         let by = |i: usize| distance::apart(a[i], b[i]) / [position, velocity][i % 2];
-        (0..4).map(by).fold(0.0, farther)
+        (0..self.flow.state_len()).map(by).fold(0.0, farther)
     }
 
     fn units(&self, y: &State) -> [f64; 2] {
-        let position = y[0].abs().max(y[2].abs()).max(self.flow.length);
-        [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
+        let largest = |from: usize| y[from..].iter().step_by(2).fold(0.0, |most: f64, x| most.max(x.abs()));
+        let position = largest(0).max(self.flow.length);
+        [position, largest(1).max(self.flow.omega * position)]
     }
 
     /// Builds the `k`th perturbed cell: every parameter and the start move at random within the resolution.

@@ -1,8 +1,13 @@
 //! Check that the numbers of a record are finite.
 
 use crate::record::{Record, measures, valid};
+use rattlemap_dynamics::model::STATE;
 use rattlemap_dynamics::orbit::Budget;
 use rattlemap_dynamics::stability::LEAST_FOR_ERROR;
+
+/// Names of the entries of a state in messages.
+const STATE_NAMES: [&str; STATE] =
+    ["x1", "v1", "x2", "v2", "x3", "v3", "x4", "v4", "x5", "v5", "x6", "v6", "x7", "v7", "x8", "v8"];
 
 /// Returns the name and value of the first field that is not finite.
 ///
@@ -12,22 +17,20 @@ pub(super) fn not_finite(record: &Record, budget: &Budget) -> Option<(&'static s
     let is_cycle = record.period > 0;
     let averaged = record.periods_run.saturating_sub(budget.exponent_from());
     let has_no_error = !is_cycle && averaged < LEAST_FOR_ERROR;
-    let fields: [(u32, &'static str, f64, Option<f64>); 8] = [
+    let fields: [(u32, &'static str, f64, Option<f64>); 4] = [
         (valid::LYAPUNOV, "lyapunov", record.lyapunov, is_cycle.then_some(f64::NEG_INFINITY)),
         (valid::LYAPUNOV, "lyapunov_error", record.lyapunov_error, has_no_error.then_some(f64::INFINITY)),
         (valid::IMPACTS, "impacts_per_period", record.impacts_per_period, None),
         (valid::MESH, "mesh_fraction", record.mesh_fraction, None),
-        (valid::STROBE, "x1", record.strobe[0], None),
-        (valid::STROBE, "v1", record.strobe[1], None),
-        (valid::STROBE, "x2", record.strobe[2], None),
-        (valid::STROBE, "v2", record.strobe[3], None),
     ];
+    let strobe =
+        STATE_NAMES.into_iter().zip(record.strobe).map(|(name, value)| (valid::STROBE, name, value, None));
     let measured = measures::all()
         .map(|measure| (measure.group.bit, measure.group.name, record.measures[measure.place], None));
     let is_wrong = |&(bit, _, value, answer): &(u32, &str, f64, Option<f64>)| {
         record.valid & bit != 0 && !value.is_finite() && answer != Some(value)
     };
-    fields.into_iter().chain(measured).find(is_wrong).map(|(_, name, value, _)| (name, value))
+    fields.into_iter().chain(strobe).chain(measured).find(is_wrong).map(|(_, name, value, _)| (name, value))
 }
 
 #[cfg(test)]
@@ -64,7 +67,7 @@ mod tests {
         ] {
             assert_eq!(named(wrong), Some("lyapunov_error"));
         }
-        let unclaimed = Record { strobe: [f64::NAN; 4], ..right };
+        let unclaimed = Record { strobe: [f64::NAN; STATE], ..right };
         assert_eq!(
             (named(unclaimed), named(Record { valid: valid::PERIOD, ..unclaimed })),
             (Some("x1"), None)

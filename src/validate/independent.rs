@@ -13,7 +13,7 @@ mod tests;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nalgebra::Matrix4;
+use nalgebra::{DMatrix, Matrix4};
 
 use crate::map::plan::Plan;
 use crate::record::classify::CHAOS_ERRORS;
@@ -261,7 +261,7 @@ fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<R
         monodromy = derivative(&motion, degrees, units, for_good)? * monodromy;
         motion.advance()?;
     }
-    let [re, im] = *multipliers(&monodromy)?.first()?;
+    let [re, im] = *multipliers(&DMatrix::from_column_slice(4, 4, monodromy.as_slice()))?.first()?;
     let (radius, tally) = (re.hypot(im), &motion.tally);
     let mut record = Record {
         period,

@@ -277,7 +277,7 @@ fn requested_periods_are_a_limit() {
 #[test]
 fn orbit_prints_the_state_at_a_time() {
     use rattlemap::flow::Flow;
-    use rattlemap::model::GearPair;
+    use rattlemap::model::{GearPair, state};
     use rattlemap::reference::Trajectory;
     let at = |arguments: &[&str]| {
         let fixed = ["orbit", "--start", "0.125,0,-0.25,1.5", "--time"];
@@ -285,7 +285,7 @@ fn orbit_prints_the_state_at_a_time() {
     };
     let pair = GearPair::paper(0.605);
     let flow = Flow::new(&pair.oscillator().unwrap());
-    let mut trajectory = Trajectory::new(&flow, pair.law(), [0.125, 0.0, -0.25, 1.5]);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), state(&[0.125, 0.0, -0.25, 1.5]));
     (0..3).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
     trajectory.advance_to(0.5, &mut ()).unwrap();
     let time = format!("{:?}", 3.0 * flow.period + 0.5);

@@ -1,5 +1,6 @@
 //! Tables of `orbit --out`: the trajectory and the spectrum.
 
+use rattlemap_dynamics::model::state;
 use std::fs;
 
 use rattlemap::flow::Flow;
@@ -47,7 +48,7 @@ fn a_trajectory_contains_events_and_samples() {
     }
     let pair = GearPair::paper(0.06);
     let flow = Flow::new(&pair.oscillator().unwrap());
-    let strobe: [f64; 4] = list(&orbit["strobe"]).try_into().unwrap();
+    let strobe = state(&list(&orbit["strobe"]));
     let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), strobe);
     for row in samples.iter().skip(1).step_by(77) {
         let [t, _, z, w, state @ ..] = numbers(row);

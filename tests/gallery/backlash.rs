@@ -4,7 +4,7 @@ use crate::common::apart;
 use crate::common::closed_form::Linear;
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::model::{Model, State, state};
 use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow, state_at};
 
 fn backlash(values: &[(&str, f64)]) -> FileModel {
@@ -18,7 +18,7 @@ fn backlash(values: &[(&str, f64)]) -> FileModel {
 fn the_released_inertia_has_the_trace_of_the_example() {
     let model = backlash(&[("T", 0.0), ("b", std::f64::consts::FRAC_PI_4)]);
     let flow = Flow::of(&model).unwrap();
-    let start = [std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0];
+    let start = state(&[std::f64::consts::FRAC_PI_2]);
     let halt = std::sync::atomic::AtomicBool::new(false);
     let [phi, speed, ..] = state_at(&flow, model.law(), start, 1.0, &halt).unwrap().unwrap();
     assert!((phi - 0.10348).abs() < 1e-5 && (speed + 6.21340).abs() < 1e-5, "{phi} {speed}");
@@ -32,7 +32,7 @@ fn a_cycle_agrees_with_its_linear_flights() {
     let (j, c, d, half) = (5.0, 20_000.0, 50.0, std::f64::consts::FRAC_PI_8);
     let model = backlash(&[("omega", omega), ("T", torque), ("b", 2.0 * half)]);
     let flow = Flow::of(&model).unwrap();
-    let orbit = analyse_flow(&flow, model.law(), [0.0, 1.0, 0.0, 0.0], &Settings::default(), 8);
+    let orbit = analyse_flow(&flow, model.law(), state(&[0.0, 1.0]), &Settings::default(), 8);
     assert!(matches!(orbit.class, Class::Periodic { .. }) && orbit.status == Status::Ok, "{orbit:?}");
     let free = Linear { m: j, c: 0.0, k: 0.0, force: torque, omega, load: 0.0 };
     let mut opened_behind = 0;
@@ -43,7 +43,7 @@ fn a_cycle_agrees_with_its_linear_flights() {
             EventKind::MeshStart => Linear { c: d, k: c, load: side * c * half, ..free },
             _ => free,
         };
-        let at = |state: [f64; 4]| [state[0], state[1]];
+        let at = |y: State| [y[0], y[1]];
         let end = field.after(from.t, at(from.after), to.t - from.t);
         let off = apart([end[0], end[1], 0.0, 0.0], [to.before[0], to.before[1], 0.0, 0.0]);
         assert!(off < 1e-11, "{off:e}: {from:?} {to:?}");

@@ -10,7 +10,7 @@
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
 use crate::cycle::{first_block, followed, multipliers_apart, off_the_integrator};
-use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::model::{REST, State, state};
 use rattlemap_dynamics::reference::EventKind;
 
 const T: f64 = std::f64::consts::TAU;
@@ -33,7 +33,7 @@ pub(crate) fn bounce(shaking: f64, e: f64) -> (State, [[f64; 2]; 2]) {
     let leaving = T * e / (1.0 + e);
     let [z, w] = ball(shaking, e).free.after(phase, [0.0, leaving], T - phase);
     let shear = -(1.0 + e).powi(2) * (shaking * phase.cos() - 1.0) / T;
-    ([z, w, 0.0, 0.0], [[-e, -e * T], [shear, shear * T - e]])
+    (state(&[z, w]), [[-e, -e * T], [shear, shear * T - e]])
 }
 
 #[test]
@@ -73,14 +73,14 @@ fn sticking_ends_at_the_acceleration_of_gravity() {
     for shaking in [1.2, 1.5, 1.9] {
         let (oscillator, law) = ball(shaking, 0.0).oscillator();
         // The ball starts at rest on the table.
-        let found = followed(&oscillator, law, [0.0; 4], 3);
+        let found = followed(&oscillator, law, REST, 3);
         let ends: Vec<_> = found.events.iter().filter(|event| event.kind == EventKind::MeshEnd).collect();
         assert!(ends.len() >= 2, "{:?}", found.events);
         for end in ends {
             let off = (shaking * end.t.cos() - 1.0).abs();
             assert!(off < 1e-12 && end.after[..2] == [0.0; 2], "G = {shaking}: {end:?}");
         }
-        assert!(off_the_integrator(&oscillator, law, [0.0; 4], 3) < 1e-10);
+        assert!(off_the_integrator(&oscillator, law, REST, 3) < 1e-10);
         // Sticking removes all perturbations.
         assert!(found.monodromy.iter().all(|&x| x == 0.0));
     }
@@ -91,11 +91,11 @@ fn sticking_ends_at_the_acceleration_of_gravity() {
 fn infinitely_many_bounces_end_at_the_computed_time() {
     for (e, w) in [(0.3, 1.4), (0.6, 0.9), (0.9, 0.2)] {
         let (oscillator, law) = ball(0.0, e).oscillator();
-        let found = followed(&oscillator, law, [0.0, w, 0.0, 0.0], 1);
+        let found = followed(&oscillator, law, state(&[0.0, w]), 1);
         let last = found.events.last().unwrap();
         let off = (last.t - 2.0 * w / (1.0 - e)).abs();
         println!("e = {e}: at rest after {}, off by {off:.1e}", last.t);
         assert!(last.kind == EventKind::MeshStart && off < 1e-12, "{last:?}");
-        assert_eq!(found.end, [0.0; 4]);
+        assert_eq!(found.end, REST);
     }
 }

@@ -17,10 +17,9 @@ use nalgebra::{Complex, Matrix2, Matrix4, Vector2, Vector4};
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{followed, off_the_integrator};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State};
+use crate::cycle::{followed, multipliers, off_the_integrator};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State, state};
 use rattlemap_dynamics::reference::EventKind;
-use rattlemap_dynamics::stability::multipliers;
 
 const MU: f64 = 0.05;
 const ZETA: f64 = 0.02;
@@ -229,7 +228,7 @@ pub(crate) fn symmetric((oscillator, law): &(Oscillator, Law)) -> Vec<Symmetric>
             // The second coordinate does not exist.
             half.view_mut((2, 2), (2, 2)).fill(0.0);
         }
-        Symmetric { phase, before, strobe: strobe.into(), half, is_free_between }
+        Symmetric { phase, before, strobe: state(strobe.as_slice()), half, is_free_between }
     };
     let turn = (delta / size).acos();
     [lag + turn, lag - turn]

@@ -6,7 +6,7 @@ use crate::common::apart;
 use crate::common::closed_form::Linear;
 use crate::cycle::followed;
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::model::{Law, Model, Oscillator};
+use rattlemap_dynamics::model::{Law, Model, Oscillator, REST, state};
 
 /// `x'' + 2 zeta x' + f(x) = F_m + F cos(omega t)`: f has the slope 0 up to |x| = 1, `SLOPES[1]` up to 2 and `SLOPES[2]` up to the
 /// stops at 4.
@@ -119,7 +119,7 @@ pub(crate) fn cycles() -> Vec<Cycle> {
                 .into_iter()
                 .for_each(|(name, value)| model.set(name, value).expect("a parameter"));
             let (oscillator, law) = (model.oscillator().expect("valid parameters"), model.law());
-            let [x, v, ..] = followed(&oscillator, law, [0.0; 4], 1200).end;
+            let [x, v, ..] = followed(&oscillator, law, REST, 1200).end;
             let closes = |&period: &u32| {
                 let [a, b] = run(omega, force, [x, v], period).y;
                 (x - a).hypot(v - b) < 1e-12
@@ -137,9 +137,9 @@ pub(crate) fn cycles() -> Vec<Cycle> {
 fn motion_from_rest_agrees_with_closed_forms() {
     for cycle in cycles() {
         let omega = cycle.oscillator.omega;
-        let found = followed(&cycle.oscillator, cycle.law, [0.0; 4], 3);
+        let found = followed(&cycle.oscillator, cycle.law, REST, 3);
         let [x, v] = run(omega, cycle.oscillator.force[0], [0.0; 2], 3).y;
-        let off = apart(found.end, [x, v, 0.0, 0.0]);
+        let off = apart(found.end, state(&[x, v]));
         assert!(off < 1e-12, "omega = {omega}: {off:e}");
     }
 }

@@ -1,6 +1,6 @@
 //! Motions computed by the reference and by the independent integrator.
 
-use nalgebra::{Complex, Matrix4, Vector4};
+use nalgebra::{Complex, DMatrix, Matrix4};
 
 use rattlemap::validate::independent::dop853::Solver;
 use rattlemap::validate::independent::flight::Flight;
@@ -29,11 +29,11 @@ pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods:
     for _ in 0..periods {
         trajectory.advance_period(&mut events).expect("an ordinary motion");
     }
-    let columns = trajectory.tangents().map(Vector4::from);
+    let columns = trajectory.tangents();
     Followed {
         end: trajectory.state(),
         events,
-        monodromy: Matrix4::from_columns(&columns) * trajectory.log_scale().exp(),
+        monodromy: Matrix4::from_fn(|i, j| columns[j][i]) * trajectory.log_scale().exp(),
         meshing_time: trajectory.meshing_time(),
     }
 }
@@ -57,6 +57,11 @@ pub(crate) fn eigenvalues([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] 
     let root = Complex::new(0.25 * trace * trace - det, 0.0).sqrt();
     let [first, second] = [0.5 * trace + root, 0.5 * trace - root];
     if first.norm() >= second.norm() { [first, second] } else { [second, first] }
+}
+
+/// Returns the multipliers of a monodromy matrix.
+pub(crate) fn multipliers(m: &Matrix4<f64>) -> Option<Vec<[f64; 2]>> {
+    rattlemap_dynamics::stability::multipliers(&DMatrix::from_column_slice(4, 4, m.as_slice()))
 }
 
 /// Returns the block of the first displacement and its velocity.

@@ -4,7 +4,7 @@
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
 use crate::cycle::{first_block, followed, off_the_integrator};
-use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::model::{State, state};
 use rattlemap_dynamics::reference::EventKind;
 
 /// Builds the bilinear oscillator with stiffness 1 for negative and 4 for positive displacements.
@@ -35,10 +35,10 @@ pub(crate) const BACKLASH: (f64, f64, f64) = (0.05, 0.1, 0.05);
 
 fn agrees(walled: &Walled, start: [f64; 2], periods: u32, what: &str) {
     let (oscillator, law) = walled.oscillator();
-    let start: State = [start[0], start[1], 0.0, 0.0];
+    let start: State = state(&[start[0], start[1], 0.0, 0.0]);
     let (end, events) = walled.run([start[0], start[1]], periods);
     let found = followed(&oscillator, law, start, periods);
-    let off = apart(found.end, [end[0], end[1], 0.0, 0.0]);
+    let off = apart(found.end, state(&[end[0], end[1], 0.0, 0.0]));
     let kinds: Vec<_> = found.events.iter().map(|event| (event.kind, event.side.index())).collect();
     assert_eq!(kinds, events.iter().map(|&(_, kind, side)| (kind, side)).collect::<Vec<_>>(), "{what}");
     assert!(kinds.iter().all(|&(kind, _)| kind != EventKind::Impact), "{what}");
@@ -91,7 +91,7 @@ fn a_free_bilinear_oscillator_has_the_bilinear_frequency() {
     let mut walled = bilinear(natural, 0.0);
     walled.free.c = 0.0;
     let (oscillator, law) = walled.oscillator();
-    for start in [[-0.7, 0.2, 0.0, 0.0], [0.3, -1.1, 0.0, 0.0]] {
+    for start in [state(&[-0.7, 0.2]), state(&[0.3, -1.1])] {
         let found = followed(&oscillator, law, start, 1);
         assert!(apart(found.end, start) < 1e-12, "{:?}", found.end);
         let mesh = found.meshing_time / walled.free.period();
@@ -114,7 +114,7 @@ fn teeth_separate_when_the_amplitude_reaches_the_mean_load() {
             let meshing = Linear { k: 1.0, load: mean + 1.0, ..walled.free };
             let [x, v] = meshing.steady(0.0);
             let (oscillator, law) = walled.oscillator();
-            !followed(&oscillator, law, [x, v, 0.0, 0.0], 1).events.is_empty()
+            !followed(&oscillator, law, state(&[x, v]), 1).events.is_empty()
         };
         let (mut outside, mut inside) = (parting * (2.0 - inside), parting * inside);
         assert!(!parts(outside) && parts(inside));
@@ -138,7 +138,7 @@ fn grazing_of_the_soft_stop_agrees_with_the_response() {
         let walled = soft(omega, a);
         let [x, v] = walled.free.steady(0.0);
         let (oscillator, law) = walled.oscillator();
-        !followed(&oscillator, law, [x, v, 0.0, 0.0], 1).events.is_empty()
+        !followed(&oscillator, law, state(&[x, v]), 1).events.is_empty()
     };
     let (mut low, mut high) = (0.99 * grazing, 1.01 * grazing);
     assert!(!meets(low) && meets(high));
@@ -175,18 +175,18 @@ fn response_points() -> Vec<ResponsePoint> {
 }
 
 /// Returns the cycle near a state, found by Newton's method on the reference's strobe map, and its monodromy matrix.
-fn cycle_near(omega: f64, mut state: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+fn cycle_near(omega: f64, mut y: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
     let (oscillator, law) = backlash(omega).oscillator();
     for _ in 0..30 {
-        let found = followed(&oscillator, law, [state[0], state[1], 0.0, 0.0], 1);
+        let found = followed(&oscillator, law, state(&y), 1);
         let [[a, b], [c, d]] = first_block(&found.monodromy);
-        let off = [found.end[0] - state[0], found.end[1] - state[1]];
+        let off = [found.end[0] - y[0], found.end[1] - y[1]];
         if off[0].hypot(off[1]) < 1e-13 {
-            return (state, [[a, b], [c, d]]);
+            return (y, [[a, b], [c, d]]);
         }
         let det = (1.0 - a) * (1.0 - d) - b * c;
-        state[0] += ((1.0 - d) * off[0] + b * off[1]) / det;
-        state[1] += (c * off[0] + (1.0 - a) * off[1]) / det;
+        y[0] += ((1.0 - d) * off[0] + b * off[1]) / det;
+        y[1] += (c * off[0] + (1.0 - a) * off[1]) / det;
     }
     panic!("no cycle at omega = {omega}");
 }

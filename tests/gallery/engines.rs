@@ -8,7 +8,7 @@ use crate::clutch;
 use crate::common::apart;
 use crate::common::closed_form::Walled;
 use crate::common::gpu::open;
-use crate::cycle::{eigenvalues, followed};
+use crate::cycle::{eigenvalues, followed, multipliers};
 use crate::elastic::{backlash, bilinear, soft};
 use crate::loose_gear::gear;
 use crate::single_impact::stable;
@@ -17,9 +17,8 @@ use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, State};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, State, state};
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
-use rattlemap_dynamics::stability::multipliers;
 
 /// A stable cycle with a closed form.
 struct Known {
@@ -85,7 +84,7 @@ fn known_cycles() -> Vec<Known> {
     for cycle in clutch::cycles() {
         let clutch::Cycle { oscillator, law, period, strobe: [x, v], radius, impacts, stays } = cycle;
         let what = format!("clutch, omega = {}, F = {}", oscillator.omega, oscillator.force[0]);
-        let (strobe, impacts) = ([x, v, 0.0, 0.0], f64::from(impacts));
+        let (strobe, impacts) = (state(&[x, v]), f64::from(impacts));
         list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays });
     }
     let settling = [
@@ -108,7 +107,7 @@ fn known_cycles() -> Vec<Known> {
         // phase volume, which the damper and the impacts determine.
         let damped = (-0.5 * walled.free.c / walled.free.m * f64::from(period) * walled.free.period()).exp();
         let radius = if is_stuck { 0.0 } else { damped * law.restitution[0].powi(impacts) };
-        let (what, strobe, impacts) = (what.to_owned(), [x, v, 0.0, 0.0], f64::from(impacts));
+        let (what, strobe, impacts) = (what.to_owned(), state(&[x, v]), f64::from(impacts));
         list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays });
     }
     list
@@ -117,7 +116,7 @@ fn known_cycles() -> Vec<Known> {
 /// Returns a state and a period of a cycle of the closed forms, near the last state of the reference.
 fn settled(walled: &Walled, [x, v]: [f64; 2]) -> ([f64; 2], u32) {
     let (oscillator, law) = walled.oscillator();
-    let [x, v, ..] = followed(&oscillator, law, [x, v, 0.0, 0.0], 1200).end;
+    let [x, v, ..] = followed(&oscillator, law, state(&[x, v]), 1200).end;
     let back = |period: u32| walled.run([x, v], period).0;
     let closes = |period: &u32| (x - back(*period)[0]).hypot(v - back(*period)[1]) < 1e-13;
     let period = (1..=8).find(closes).expect("a cycle");

@@ -2,7 +2,7 @@
 
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::model::{Model, REST, State, state};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse_flow};
 
 fn motion(name: &str, values: &[(&str, f64)], start: State) -> Orbit {
@@ -24,7 +24,7 @@ fn stops_begin_at_the_border_of_den_hartog() {
         let (v, u) = (1.0 / (1.0 - omega * omega), angle.sin() / (omega * (1.0 + angle.cos())));
         let border = v.abs() / u.hypot(1.0 / (omega * omega));
         for (f, word) in [(border * (1.0 - 1e-6), "00"), (border * (1.0 + 1e-6), "77")] {
-            let orbit = motion("friction-oscillator", &[("omega", omega), ("f", f)], [0.0; 4]);
+            let orbit = motion("friction-oscillator", &[("omega", omega), ("f", f)], REST);
             assert_eq!(
                 orbit.class,
                 Class::Periodic { period: 1 },
@@ -40,7 +40,7 @@ fn stops_begin_at_the_border_of_den_hartog() {
 #[test]
 fn a_gear_sticks_to_its_shaft_up_to_the_limit_of_friction() {
     for (a, never_slides) in [(1.0 - 1e-9, true), (1.0 + 1e-9, false)] {
-        let orbit = motion("drag-gear", &[("a", a), ("f", 1.0)], [0.0; 4]);
+        let orbit = motion("drag-gear", &[("a", a), ("f", 1.0)], REST);
         assert_eq!(orbit.word.is_empty(), never_slides, "a = {a}: {}", orbit.word);
         let of = orbit.quantities.and_then(|of| of.friction).unwrap();
         assert_eq!(of.sticking > 1.0 - 1e-12, never_slides, "a = {a}: {of:?}");
@@ -52,7 +52,7 @@ fn a_gear_sticks_to_its_shaft_up_to_the_limit_of_friction() {
 fn a_valve_opens_against_spring_and_friction() {
     for (p, opens) in [(0.4 - 1e-9, false), (0.4 + 1e-9, true)] {
         let values = [("p", p), ("p_m", 0.8), ("f", 0.2)];
-        let orbit = motion("relief-valve", &values, [0.0; 4]);
+        let orbit = motion("relief-valve", &values, REST);
         let lift = orbit.quantities.unwrap().displacements[0].amplitude;
         assert_eq!(lift > 0.0, opens, "p = {p}: {lift}");
     }

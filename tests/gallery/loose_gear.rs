@@ -4,6 +4,7 @@
 //! The driving flanks stay in contact while the drag exceeds the inertia, `M a <= D`. Above that, contact ends at the phase with
 //! `-M a cos(phase) = D`.
 
+use rattlemap_dynamics::model::{REST, state};
 use std::f64::consts::{PI, TAU};
 
 use crate::common::apart;
@@ -31,7 +32,7 @@ pub(crate) fn swing(multiple: f64) -> f64 {
 fn the_gear_begins_to_rattle_where_inertia_exceeds_drag() {
     let leaves = |multiple: f64| {
         let (oscillator, law) = gear(multiple, 1e-4, 0.6).oscillator();
-        let found = followed(&oscillator, law, [0.0; 4], 2);
+        let found = followed(&oscillator, law, REST, 2);
         let is_in_contact = (found.meshing_time - 2.0 * oscillator.period()).abs() < 1e-12;
         // The first event is the start of contact at rest.
         assert_eq!(found.events.len() > 1, !is_in_contact, "{:?}", found.events);
@@ -46,7 +47,7 @@ fn states_and_events_agree_with_the_closed_form() {
     for (multiple, backlash, e) in [(1.5, 1e-4, 0.0), (6.0, 1e-4, 0.0), (6.0, 5e-4, 0.0), (9.0, 1e-3, 0.5)] {
         let walled = gear(multiple, backlash, e);
         let (oscillator, law) = walled.oscillator();
-        let found = followed(&oscillator, law, [0.0; 4], 3);
+        let found = followed(&oscillator, law, REST, 3);
         let (end, events) = walled.run([0.0; 2], 3);
         let ours: Vec<EventKind> = found.events.iter().map(|event| event.kind).collect();
         println!("{multiple} {backlash} {e}: {ours:?} {events:?}");
@@ -54,8 +55,8 @@ fn states_and_events_agree_with_the_closed_form() {
             ours.ends_with(&events.iter().map(|event| event.1).collect::<Vec<_>>()),
             "{ours:?} {events:?}"
         );
-        let off = apart(found.end, [end[0], end[1], 0.0, 0.0]);
-        assert!(off < 1e-12 && off_the_integrator(&oscillator, law, [0.0; 4], 3) < 1e-10, "{off:e}");
+        let off = apart(found.end, state(&[end[0], end[1], 0.0, 0.0]));
+        assert!(off < 1e-12 && off_the_integrator(&oscillator, law, REST, 3) < 1e-10, "{off:e}");
         let released = found.events.iter().find(|event| event.kind == EventKind::MeshEnd).unwrap();
         let phase = (OMEGA * released.t).rem_euclid(TAU);
         assert!((multiple * phase.cos() + 1.0).abs() < 1e-11, "{phase}");

@@ -6,7 +6,7 @@
 use nalgebra::{Complex, Matrix2};
 
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::model::{Model, state};
 use rattlemap_dynamics::orbit::{Class, Settings, analyse};
 
 const ZETA: f64 = 0.01;
@@ -36,7 +36,7 @@ fn small_motion_meets_the_stops_where_rest_is_unstable() {
             [("delta", delta), ("epsilon", epsilon), ("zeta", ZETA)]
                 .into_iter()
                 .for_each(|(name, value)| model.set(name, value).unwrap());
-            let orbit = analyse(&model, [0.01, 0.0, 0.0, 0.0], &Settings::default()).unwrap();
+            let orbit = analyse(&model, state(&[0.01]), &Settings::default()).unwrap();
             let stays = orbit.class == Class::Periodic { period: 1 }
                 && orbit.events.is_empty()
                 && orbit.mesh_fraction == 0.0;

@@ -20,7 +20,7 @@ use rattlemap::validate::{
     Draw, Kind, Lanes, Rate, Sample, Stratum, Subject, TOLERATED, differences, replay,
 };
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Model, Oscillator, State};
+use rattlemap_dynamics::model::{Law, Model, Oscillator, REST, State, state};
 use rattlemap_dynamics::orbit::{Budget, Class, Measurement, Settings, Status, measure};
 use rattlemap_dynamics::reference::Trajectory;
 
@@ -128,7 +128,7 @@ pub(crate) fn random_cell(seed: u64) -> RandomCell {
          load = {load}\nfrequency = \"omega\"\ngap = {gap}\n{walls}"
     );
     let model = FileModel::parse(&text, "random.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let mut start = [0.0; 4];
+    let mut start = REST;
     if random.unit() < 0.5 {
         (0..2 * degrees).for_each(|i| start[i] = even(random, 2.0));
     }

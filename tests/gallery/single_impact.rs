@@ -17,7 +17,7 @@ use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
 use crate::cycle::{eigenvalues, first_block, followed, multipliers_apart, off_the_integrator};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{NonImpacting, State};
+use rattlemap_dynamics::model::{NonImpacting, State, state};
 use rattlemap_dynamics::reference::{EventKind, Trajectory};
 
 /// A forced oscillator with one stop.
@@ -95,7 +95,7 @@ impl Stop {
         let [[e11, e12], [e21, e22]] = linear.propagator(span);
         let monodromy =
             [[-self.e * e11, -self.e * e12], [shear * e11 - self.e * e21, shear * e12 - self.e * e22]];
-        Orbit { leaving, phase, strobe: [x, v, 0.0, 0.0], monodromy }
+        Orbit { leaving, phase, strobe: state(&[x, v]), monodromy }
     }
 
     /// Returns the position of the stop at which both orbits of one impact coincide.
@@ -171,7 +171,7 @@ fn grazing_agrees_with_the_response() {
             let stop = Stop { omega, ..stop };
             let (oscillator, law) = stop.walled().oscillator();
             let [x, v] = stop.linear().steady(0.0);
-            !followed(&oscillator, law, [x, v, 0.0, 0.0], 1).events.is_empty()
+            !followed(&oscillator, law, state(&[x, v]), 1).events.is_empty()
         };
         let (mut low, mut high) = (grazing * 0.99, grazing * 1.01);
         assert!(meets(low) && !meets(high));

@@ -8,6 +8,7 @@ use crate::kinds;
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
+use rattlemap_dynamics::model::state;
 use rattlemap_dynamics::orbit::{Class, Status};
 
 /// The points lie within a thousandth of the motion, so that shorter lags recur, and Newton's method leaves the
@@ -57,7 +58,7 @@ fn a_cycle_that_is_approached_from_both_sides_is_not_doubled() {
     ];
     let settings = LaneSettings { periods: 1456, transient_periods: 1200, ..LaneSettings::default() };
     for precision in Precision::ALL {
-        for record in run(&mut open(precision), &starts.map(|start| (cell, start)), &settings) {
+        for record in run(&mut open(precision), &starts.map(|start| (cell, state(&start))), &settings) {
             let class = classify(&record);
             // Chaos amplifies rounding: not every lane reaches the cycle in time.
             let is_known = matches!(class, Class::Periodic { period: 3 } | Class::Chaotic | Class::Undecided);
@@ -93,8 +94,9 @@ fn classes_do_not_depend_on_the_units_of_length_and_time() {
             let cells: Vec<_> = plane.iter().map(|cell| kinds::in_units(cell, length, time)).collect();
             let records = kinds::run(precision, &cells, &settings).unwrap();
             let differ = expected.iter().zip(records).filter(|&(&expected, mut record)| {
-                record.strobe =
-                    [0, 1, 2, 3].map(|i| record.strobe[i] / if i % 2 == 0 { far } else { far / long });
+                record.strobe = state(
+                    &[0, 1, 2, 3].map(|i| record.strobe[i] / if i % 2 == 0 { far } else { far / long }),
+                );
                 (record.lyapunov, record.lyapunov_error) =
                     (record.lyapunov * long, record.lyapunov_error * long);
                 let says = |record: &Record| (classify(record), record.period, record.status);

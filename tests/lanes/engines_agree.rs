@@ -8,7 +8,7 @@ use crate::common::{REST, apart, flow_of, paper as pair};
 use rattlemap::gpu::{Lane, LaneSettings, Precision};
 use rattlemap::record::distance::{farther, is_within};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State, state};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Trajectory};
 use rayon::prelude::*;
@@ -127,21 +127,21 @@ fn stable_cells_of_the_plane_agree() {
 /// Every kind of motion, over a horizon short enough for chaos.
 #[test]
 fn every_kind_of_motion_agrees() {
-    let on_wall = |w: f64| [0.25, 0.5 + w, -0.25, 0.5];
+    let on_wall = |w: f64| state(&[0.25, 0.5 + w, -0.25, 0.5]);
     let cells = [
-        (pair(0.5, 11.5), REST),                 // no contact
-        (pair(0.605, 5.6), REST),                // impacts on both walls
-        (pair(0.06, 5.6), REST),                 // meshing on both sides
-        (pair(0.0, 2.0), REST),                  // meshing without restitution
-        (pair(0.56, 1.5), REST),                 // chatter into meshing
-        (pair(0.72, 1.5), REST),                 // long chatter
-        (pair(0.7, 5.4), REST),                  // chaos
-        (pair(0.606, 5.6), REST),                // grazing chaos
-        (pair(0.5, 5.6), on_wall(1.0)),          // starts on the wall, closing
-        (pair(0.5, 5.6), on_wall(-1.0)),         // starts on the wall, leaving
-        (pair(0.5, 5.6), on_wall(0.0)),          // starts at rest on the wall
-        (pair(0.3, 4.0), [0.4, 0.0, -0.2, 0.0]), // starts meshing on the right
-        (pair(0.3, 4.0), [-0.4, 0.0, 0.2, 0.0]), // starts meshing on the left
+        (pair(0.5, 11.5), REST),                    // no contact
+        (pair(0.605, 5.6), REST),                   // impacts on both walls
+        (pair(0.06, 5.6), REST),                    // meshing on both sides
+        (pair(0.0, 2.0), REST),                     // meshing without restitution
+        (pair(0.56, 1.5), REST),                    // chatter into meshing
+        (pair(0.72, 1.5), REST),                    // long chatter
+        (pair(0.7, 5.4), REST),                     // chaos
+        (pair(0.606, 5.6), REST),                   // grazing chaos
+        (pair(0.5, 5.6), on_wall(1.0)),             // starts on the wall, closing
+        (pair(0.5, 5.6), on_wall(-1.0)),            // starts on the wall, leaving
+        (pair(0.5, 5.6), on_wall(0.0)),             // starts at rest on the wall
+        (pair(0.3, 4.0), state(&[0.4, 0.0, -0.2])), // starts meshing on the right
+        (pair(0.3, 4.0), state(&[-0.4, 0.0, 0.2])), // starts meshing on the left
     ];
     check(&cells, 6, [5.0e-6, 1.3e-14]);
     // No loss at the walls: errors grow by a factor of twenty in a period.
@@ -222,9 +222,9 @@ fn grazing_contacts_are_found_exactly() {
             let unit = 1.0 / (stiff.k1 - stiff.m1 * omega * omega);
             let amplitude = -(stiff.b + sign * hair);
             let grazing = GearPair { force: amplitude / unit, ..stiff };
-            let start = [amplitude, 0.0, 0.0, 0.0];
+            let start = state(&[amplitude]);
             // Where the amplitude exceeds the wall, the motion starts at rest.
-            let start = if sign > 0.0 { [0.0; 4] } else { start };
+            let start = if sign > 0.0 { REST } else { start };
             let expected = reference(&grazing, start, 2)[0];
             for precision in Precision::ALL {
                 let record = run(&mut open(precision), &[(grazing, start)], &LaneSettings::only(2))[0];
@@ -276,7 +276,7 @@ fn impossible_parameters_end_in_a_status() {
         (GearPair { omega: 1e-6, ..pair(0.2, 1.0) }, REST, Status::TooStiff),
         (GearPair { mesh_speed: 0.0, ..pair(0.9999, 0.1) }, REST, Status::CapEvents),
         (GearPair { force: 1e300, ..pair(0.5, 5.6) }, REST, Status::NonFinite),
-        (pair(0.5, 5.6), [f64::NAN, 0.0, 0.0, 0.0], Status::NonFinite),
+        (pair(0.5, 5.6), state(&[f64::NAN]), Status::NonFinite),
     ];
     let mut mixed = Vec::new();
     for (i, cell) in ordinary.iter().enumerate() {

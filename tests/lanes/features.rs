@@ -16,7 +16,7 @@ use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{
-    Contact, Domain, Friction, Harmonic, Law, Model, Oscillator, OuterWall, Side, Stage,
+    Contact, Domain, Friction, Harmonic, Law, Model, Oscillator, OuterWall, REST, Side, Stage, state,
 };
 use rattlemap_dynamics::orbit::{Budget, Class, measure};
 use rayon::prelude::*;
@@ -172,7 +172,7 @@ fn chattering_clutches() -> impl Iterator<Item = Cell> {
         [("omega", omega), ("F", force)]
             .into_iter()
             .for_each(|(name, value)| model.set(name, value).unwrap());
-        (model.oscillator().unwrap(), model.law(), [0.0; 4])
+        (model.oscillator().unwrap(), model.law(), REST)
     })
 }
 
@@ -356,7 +356,7 @@ fn pressed_and_released() -> Vec<Cell> {
             ..oscillator.clone()
         };
         oscillator.validate().unwrap();
-        (oscillator, Law::both(0.2, 0.0), [0.0; 4])
+        (oscillator, Law::both(0.2, 0.0), REST)
     };
     (0..12).map(of).collect()
 }
@@ -390,7 +390,7 @@ fn decaying_motion_with_stages_is_decided() {
             [("delta", delta), ("epsilon", epsilon)]
                 .into_iter()
                 .for_each(|(name, value)| model.set(name, value).unwrap());
-            (model.oscillator().unwrap(), model.law(), [0.01, 0.0, 0.0, 0.0])
+            (model.oscillator().unwrap(), model.law(), state(&[0.01]))
         })
         .collect();
     let expected: Vec<Record> = cells.par_iter().map(reference).collect();
@@ -441,11 +441,11 @@ fn excluded_features_are_refused() {
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "intervals", .. }), "{error}");
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 2.1 };
     let pushing = with_wall(free.oscillator(), Side::Right, 0.1, Contact::Pushing, [24.0, 1.5]);
-    let cells = [(with_preload(pushing, Side::Right, -0.1), Law::both(0.5, 0.0), [0.0; 4])];
+    let cells = [(with_preload(pushing, Side::Right, -0.1), Law::both(0.5, 0.0), REST)];
     let error = kinds::run(Precision::F32, &cells, &settings(&cells)).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "negative_preload", .. }), "{error}");
     let friction = vec![Friction { row: [1.0, 0.0], force: 0.1, speed: 0.0 }];
-    let cells = [(Oscillator { friction, ..free.oscillator() }, Law::both(0.5, 0.0), [0.0; 4])];
+    let cells = [(Oscillator { friction, ..free.oscillator() }, Law::both(0.5, 0.0), REST)];
     let error = kinds::run(Precision::F32, &cells, &settings(&cells)).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "friction", .. }), "{error}");
 }

@@ -8,13 +8,14 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use rattlemap::gpu::{Gpu, Lane, LaneResult, LaneSettings, Precision};
 use rattlemap::record::Record;
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State, state};
 
 /// Draws a cell of the plane, stiff or soft. Its start may lie beyond a wall.
 fn cell() -> impl Strategy<Value = (GearPair, State)> {
     let pair = (0.0..=1.0, 1.0..12.0, 100.0..3000.0, prop_oneof![Just(0.0), 1e-4..0.1])
         .prop_map(|(e, omega, k, mesh_speed)| GearPair { k, mesh_speed, ..paper(e, omega) });
-    let start = prop_oneof![Just(REST), prop::array::uniform4(-0.6..0.6)];
+    let start =
+        prop_oneof![Just(REST), prop::array::uniform4(-0.6..0.6).prop_map(|start: [f64; 4]| state(&start))];
     (pair, start)
 }
 

@@ -10,7 +10,7 @@ use rattlemap::map::plan::Needs;
 use rattlemap::model_file::FileModel;
 use rattlemap::record::classify::{classify, status};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, Model, State, Stops};
+use rattlemap_dynamics::model::{GearPair, Model, State, Stops, state};
 use rattlemap_dynamics::orbit::{Class, Status, measure};
 
 /// Returns a cell of the oscillator `x'' + x = 0.1 cos(omega t)`, which does not reach its walls.
@@ -33,10 +33,10 @@ fn every_engine_names_neutral_and_quasi_periodic_motion() {
     let cases = [
         ("a free body at rest", (free.oscillator().unwrap(), free.law(), REST), one, Status::Neutral),
         ("a ball at rest", gallery("energy-sink", [("omega", 0.99), ("d", 0.5)]), one, Status::Neutral),
-        ("steady motion", undamped(7f64.sqrt(), [-0.1 / 6.0, 0.0, 0.0, 0.0]), one, Status::Neutral),
+        ("steady motion", undamped(7f64.sqrt(), state(&[-0.1 / 6.0])), one, Status::Neutral),
         ("repeats", undamped(5.0 / 3.0, REST), Class::Periodic { period: 5 }, Status::Neutral),
         ("undamped", undamped(7f64.sqrt(), REST), Class::QuasiPeriodic, Status::Ok),
-        ("undamped", undamped(3f64.sqrt(), [0.1, 0.2, 0.0, 0.0]), Class::QuasiPeriodic, Status::Ok),
+        ("undamped", undamped(3f64.sqrt(), state(&[0.1, 0.2])), Class::QuasiPeriodic, Status::Ok),
         ("a torus", gallery("two-masses", [("omega", 0.625), ("e", 1.0)]), Class::QuasiPeriodic, Status::Ok),
     ];
     let cells = cases.clone().map(|case| case.1);

@@ -16,7 +16,7 @@ use rattlemap::map::random::Random;
 use rattlemap::map::scene::{Quantity, Refine, Scene, SceneBuilder, Start};
 use rattlemap::map::schedule::{Refined, Schedule};
 use rattlemap::record::{Record, valid};
-use rattlemap_dynamics::model::{GearPair, State, Stops};
+use rattlemap_dynamics::model::{GearPair, State, Stops, state};
 use rattlemap_dynamics::orbit::Class;
 
 fn basins(scene: &Scene) -> Basins {
@@ -73,7 +73,7 @@ fn impacting(stops: &Stops) -> State {
     let transient = (-alpha * u).exp() * a;
     let x = p * (omega * u + phi).cos() + transient * (t + c * s);
     let v = -p * omega * (omega * u + phi).sin() + transient * (nu * (c * t - s) - alpha * (t + c * s));
-    [sign * x, sign * v, 0.0, 0.0]
+    state(&[sign * x, sign * v])
 }
 
 fn rattling() -> Stops {
@@ -99,7 +99,7 @@ fn attractors_agree_with_closed_forms() {
     let (re, im) = (stops.k - stops.omega * stops.omega, stops.r * stops.omega);
     let size = stops.force / re.hypot(im);
     let phase = -im.atan2(re);
-    let steady = [size * phase.cos(), -size * stops.omega * phase.sin(), 0.0, 0.0];
+    let steady = state(&[size * phase.cos(), -size * stops.omega * phase.sin()]);
     assert!(off(free.strobe.unwrap(), steady) < 1e-12, "{free:?} {steady:?}");
     let period = std::f64::consts::TAU / stops.omega;
     assert!((free.exponent.unwrap() + 0.5 * stops.r).abs() < 1e-9, "{free:?}");
@@ -271,7 +271,7 @@ fn attractors_keep_their_labels_along_a_parameter() {
     let scene = Scene::builder(rattling())
         .axis("F", 0.8..=1.05, 6)
         .start_axis("v", -3.0..=3.0, 40)
-        .start(Start::State([-0.3, 9.0, 0.0, 0.0]))
+        .start(Start::State(state(&[-0.3, 9.0])))
         .quantities(&[Quantity::Class])
         .build()
         .unwrap();

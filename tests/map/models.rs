@@ -4,7 +4,7 @@ use rattlemap::job;
 use rattlemap::job::Processor;
 use rattlemap::map::scene::{Quantity, Scene, Start};
 use rattlemap::record::valid;
-use rattlemap_dynamics::model::Stops;
+use rattlemap_dynamics::model::{Stops, state};
 use rattlemap_dynamics::orbit::Class;
 
 fn stops(e: f64) -> Stops {
@@ -30,7 +30,7 @@ fn impacts_between_stops_agree_with_the_closed_form() {
     let scene = Scene::builder(stops(1.0))
         .axis("b", 0.25..=1.0, 4)
         .axis("omega", 0.05..=0.2, 4)
-        .start(Start::State([0.0, speed, 0.0, 0.0]))
+        .start(Start::State(state(&[0.0, speed])))
         .quantities(&[Quantity::Impacts])
         .build()
         .unwrap();

@@ -13,7 +13,7 @@ use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Model as _, State};
+use rattlemap_dynamics::model::{Model as _, State, state};
 use rattlemap_dynamics::orbit::{self, Class, Settings};
 
 /// Rattling wheel of de Souza and Caldas (2001). The published force is `-0.048 cos t + 0.48 sin t`.
@@ -84,12 +84,12 @@ fn plane(model: FileModel, side: u32) -> SceneBuilder {
 /// time between both sections.
 #[test]
 fn cycles_of_the_cosine_are_carried_to_the_published_section() {
-    let souza: &[State] = &[[-0.457665, 0.550574, 0.0, 0.0], [-0.260199, -0.148216, 0.0, 0.0]];
+    let souza: &[State] = &[state(&[-0.457665, 0.550574]), state(&[-0.260199, -0.148216])];
     let mason: &[State] = &[
-        [-0.070067, 0.857929, 0.0, 0.0],
-        [0.662391, 0.003644, 0.0, 0.0],
-        [0.710003, -0.503838, 0.0, 0.0],
-        [0.343343, 5.109192, 0.0, 0.0],
+        state(&[-0.070067, 0.857929]),
+        state(&[0.662391, 0.003644]),
+        state(&[0.710003, -0.503838]),
+        state(&[0.343343, 5.109192]),
     ];
     for (text, cycles) in [(SOUZA, souza), (MASON, mason)] {
         let (published, (cosine, phase)) = (model(text), under_cosine(text));

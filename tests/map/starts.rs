@@ -2,6 +2,7 @@
 //!
 //! The lanes need an adapter; without one the tests fail: see `scripts/test.sh`.
 
+use rattlemap_dynamics::model::{State, state};
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -71,8 +72,8 @@ fn period(record: &Record) -> u32 {
 
 /// Computes a record whose strobe state shows the start of the cell.
 fn record_of_start(cell: &Cell) -> Record {
-    let [x1, _, x2, _] = cell.start;
-    let strobe = [x1 + 1.0, 0.0, x2 + f64::from(cell.id), 0.5];
+    let [x1, _, x2, _, ..] = cell.start;
+    let strobe = state(&[x1 + 1.0, 0.0, x2 + f64::from(cell.id), 0.5]);
     Record { strobe, periods_run: 1, valid: valid::STROBE | valid::PERIOD, ..Record::default() }
 }
 
@@ -209,12 +210,12 @@ fn counted(omega: f64, e: f64, runs: &[Record]) -> u8 {
     found[0]
 }
 
-fn cycle(period: u32, strobe: [f64; 4]) -> Record {
+fn cycle(period: u32, strobe: State) -> Record {
     Record { period, strobe, valid: valid::PERIOD | valid::STROBE, ..Record::default() }
 }
 
 /// Returns the state of a motion after `periods` periods and `turns` of the next.
-fn later(omega: f64, e: f64, from: [f64; 4], periods: u32, turns: f64) -> [f64; 4] {
+fn later(omega: f64, e: f64, from: State, periods: u32, turns: f64) -> State {
     let pair = rattlemap_dynamics::model::GearPair { omega, ..rattlemap_dynamics::model::GearPair::paper(e) };
     let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::new(&flow, pair.law(), from);
@@ -274,7 +275,11 @@ fn attractors_are_distinguished_by_their_states() {
     };
     let failed = Record { status: Status::CapEvents.code(), ..chaos };
     let mirrored = |from| later(omega, e, from, 1, 0.5).map(|x| -x);
-    let perturbed = |state: [f64; 4]| state.map(|x| 1.001 * x + 1e-3);
+    let perturbed = |y: State| {
+        let mut moved = y;
+        moved[..4].iter_mut().for_each(|x| *x = 1.001 * *x + 1e-3);
+        moved
+    };
     for (expected, runs) in [
         (2, vec![cycle(2, two), cycle(3, three)]),
         // Other states of the same cycles.

@@ -10,7 +10,7 @@ use rattlemap::model_file::FileModel;
 use rattlemap::show::drawing::axis::Scale;
 use rattlemap::show::figure::bifurcation::{self, Panels};
 use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
-use rattlemap_dynamics::model::{GearPair, Model, REST, Side, State};
+use rattlemap_dynamics::model::{self, GearPair, Model, REST, Side, State};
 use rattlemap_dynamics::orbit::{self, Class, Event, EventKind, Orbit, Sample, Settings, Status};
 
 /// Label and scale of an axis.
@@ -56,7 +56,7 @@ fn state(turns: f64) -> State {
     let phase = TAU * turns;
     let (z, w) = (0.5 * (1.025 * phase.sin() - 0.025), 0.5 * 5.6 * 1.025 * phase.cos());
     let (x, v) = (common(phase), common_speed(phase));
-    [x + z / 2.0, v + w / 2.0, x - z / 2.0, v - w / 2.0]
+    model::state(&[x + z / 2.0, v + w / 2.0, x - z / 2.0, v - w / 2.0])
 }
 
 /// Phases at which that gap passes the left wall, in turns.
@@ -79,9 +79,9 @@ fn orbit(events: Vec<Event>) -> Orbit {
 fn meshing_orbit() -> (Orbit, Vec<Sample>) {
     let event = |kind, side, turns: f64, kick: f64| {
         let before = state(turns);
-        let after = [before[0], before[1] - kick, before[2], before[3] + 2.0 * kick];
+        let after = model::state(&[before[0], before[1] - kick, before[2], before[3] + 2.0 * kick]);
         let meshing = (kind == EventKind::MeshStart).then_some(side);
-        Event { kind, side, t: turns * PERIOD, t_mod_period: turns * PERIOD, before, after, meshing }
+        Event { kind, side, t: turns * PERIOD, t_mod_period: turns * PERIOD, before, after, meshing, gap: 0 }
     };
     let [start, end] = meshing();
     let events = vec![
@@ -140,14 +140,14 @@ fn orbit_figures_show_motion_meshing_and_events() {
 fn orbits_without_contact_without_samples_or_with_infinite_numbers_are_drawn() {
     let rest = |t: f64| Sample {
         t,
-        state: [0.3 * (5.6 * t).cos(), -1.68 * (5.6 * t).sin(), 0.0, 0.0],
+        state: model::state(&[0.3 * (5.6 * t).cos(), -1.68 * (5.6 * t).sin()]),
         meshing: None,
     };
     let free: Vec<Sample> = (0..=300).map(|i| rest(f64::from(i) / 300.0 * PERIOD)).collect();
     let blown_up = [
         rest(0.0),
-        Sample { state: [f64::NAN, f64::INFINITY, 0.0, 1e308], ..rest(0.1) },
-        Sample { state: [-1e308, 1e308, 0.0, 0.0], ..rest(0.2) },
+        Sample { state: model::state(&[f64::NAN, f64::INFINITY, 0.0, 1e308]), ..rest(0.1) },
+        Sample { state: model::state(&[-1e308, 1e308]), ..rest(0.2) },
     ];
     for (trace, class) in [
         (&free[..], Class::Periodic { period: 1 }),
@@ -281,7 +281,11 @@ fn columns(count: u32, points: u32) -> Vec<Column> {
             let side = Side::BOTH[(j % 2) as usize];
             // Golden-section points fill a band that widens with the axis.
             let spread = (f64::from(j) * 0.618_034).fract() * value;
-            let at = [-side.sign() * (1.0 - 0.4 * spread), 0.0, -side.sign() * (1.4 - 0.4 * spread), 0.0];
+            let at = model::state(&[
+                -side.sign() * (1.0 - 0.4 * spread),
+                0.0,
+                -side.sign() * (1.4 - 0.4 * spread),
+            ]);
             SectionPoint { side, kind: EventKind::Impact, t_mod_period: 0.0, before: at, after: at }
         };
         let points = if class == Class::Chaotic { (0..points).map(point).collect() } else { vec![] };
@@ -388,7 +392,7 @@ fn a_logarithmic_axis_has_its_decades() {
 fn the_axis_of_a_constant_has_short_labels_and_its_name_is_not_cut() {
     let still = |value: f64| {
         let point = |column: &mut Column, x: f64| {
-            column.points.iter_mut().for_each(|point| point.before = [x, 0.0, x, 0.0]);
+            column.points.iter_mut().for_each(|point| point.before = model::state(&[x, 0.0, x]));
         };
         let mut columns = columns(9, 2);
         columns.iter_mut().for_each(|column| point(column, value));
@@ -407,7 +411,7 @@ fn the_axis_of_a_constant_has_short_labels_and_its_name_is_not_cut() {
 fn diagrams_without_columns_without_points_or_with_infinite_numbers_are_drawn() {
     let mut wild = columns(3, 4);
     wild[0].value = f64::NAN;
-    wild[1].points[0].before = [f64::INFINITY, 0.0, f64::NAN, 0.0];
+    wild[1].points[0].before = model::state(&[f64::INFINITY, 0.0, f64::NAN]);
     (wild[0].lyapunov, wild[1].lyapunov, wild[2].lyapunov_error) =
         (f64::NAN, f64::NEG_INFINITY, Some(f64::INFINITY));
     let long = "a title that no figure has room for, ".repeat(12);

@@ -61,7 +61,7 @@ struct Motion {
 
 impl Motion {
     /// Returns the accelerations of both gears, (11) or (12) and (13).
-    fn accelerations(&self, t: f64, [x1, v1, x2, v2]: State) -> [f64; 2] {
+    fn accelerations(&self, t: f64, [x1, v1, x2, v2]: [f64; 4]) -> [f64; 2] {
         let p = &self.pair;
         let contact = self.wall.map_or(0.0, |s| p.r * (v1 - v2) + p.k * (x1 - x2 - s * p.b));
         let drive = p.force * (p.omega * t + self.phase).cos();
@@ -76,7 +76,7 @@ impl Motion {
         (supports + mesh).sqrt().max(p.omega)
     }
 
-    fn relative_acceleration(&self, t: f64, y: State) -> f64 {
+    fn relative_acceleration(&self, t: f64, y: [f64; 4]) -> f64 {
         let [a1, a2] = self.accelerations(t, y);
         a1 - a2
     }
@@ -90,19 +90,24 @@ fn motion(pair: &GearPair, leg: &Leg) -> Motion {
     Motion { pair: *pair, wall, phase: pair.omega * leg.t }
 }
 
+/// Returns both displacements and their velocities.
+fn first(y: State) -> [f64; 4] {
+    std::array::from_fn(|i| y[i])
+}
+
 /// Returns the solution on a leg, at samples or at both ends.
-fn integrate(motion: Motion, leg: &Leg, is_sampled: bool) -> Vec<(f64, State)> {
+fn integrate(motion: Motion, leg: &Leg, is_sampled: bool) -> Vec<(f64, [f64; 4])> {
     // There is no sample near the end, because the solver would extrapolate to it from an earlier step.
     let samples = is_sampled.then_some(leg.duration / (SAMPLES as f64 - 0.5));
     let integration =
         Integration { tolerance: TOLERANCE, longest: LONGEST_STEP / motion.fastest_rate(), samples };
-    let accelerations = |t: f64, y: &State| motion.accelerations(t, *y);
-    let solution = integration.run(&leg.start, 0.0, leg.duration, accelerations, |_, _| false);
+    let accelerations = |t: f64, y: &[f64; 4]| motion.accelerations(t, *y);
+    let solution = integration.run(&first(leg.start), 0.0, leg.duration, accelerations, |_, _| false);
     solution.expect("an ordinary leg")
 }
 
 /// Returns the end of a leg by DOP853.
-fn end_of(motion: Motion, leg: &Leg) -> State {
+fn end_of(motion: Motion, leg: &Leg) -> [f64; 4] {
     integrate(motion, leg, false).last().expect("at least the start").1
 }
 
@@ -141,7 +146,7 @@ fn every_leg(mut check: impl FnMut(&GearPair, &Leg, &str)) {
 fn every_leg_ends_where_dop853_does() {
     let (mut worst, mut count) = (0.0f64, 0);
     every_leg(|pair, leg, what| {
-        let off = departure(end_of(motion(pair, leg), leg), leg.end);
+        let off = departure(end_of(motion(pair, leg), leg), first(leg.end));
         worst = worst.max(off);
         count += 1;
         assert!(off < AGREEMENT, "{what}: off by {off:.2e} in {leg:#?}");
@@ -204,7 +209,7 @@ fn contact_onsets_are_as_short_as_the_leaving_speed_allows() {
 }
 
 /// Applies the impact law (5), (6), (22) as the paper prints it.
-fn impact_law(pair: &GearPair, [x1, v1, x2, v2]: State) -> State {
+fn impact_law(pair: &GearPair, [x1, v1, x2, v2]: [f64; 4]) -> [f64; 4] {
     let GearPair { m1, m2, e, .. } = *pair;
     let total = m1 + m2;
     [
@@ -222,7 +227,7 @@ fn events_obey_the_laws_of_contact() {
         let Some(event) = leg.ends else { return };
         let s = sign(event.side);
         let flow = flow_of(pair);
-        let (before, after) = (flow.to_state(event.before), flow.to_state(event.after));
+        let (before, after) = (first(flow.to_state(event.before)), first(flow.to_state(event.after)));
         let phase = pair.omega * event.t;
         let free = Motion { pair: *pair, wall: None, phase };
         let meshing = Motion { pair: *pair, wall: Some(s), phase };

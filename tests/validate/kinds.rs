@@ -5,7 +5,7 @@ use crate::common::closed_form::{Linear, Wall, Walled};
 use crate::common::{REST, apart, paper};
 use rattlemap::validate::independent::dop853::Solver;
 use rattlemap::validate::independent::flight::{Ended, Flight};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State, state};
 use rattlemap_dynamics::reference::EventKind;
 
 /// Time since phase 0 of the first period, kind and wall of each event.
@@ -37,8 +37,8 @@ fn time_error(ours: &Events, theirs: &Events) -> f64 {
 fn check(walled: &Walled, start: [f64; 2], periods: u32, what: &str) -> Events {
     let (oscillator, law) = walled.oscillator();
     let (exact, exact_events) = walled.run(start, periods);
-    let (state, events) = run(&oscillator, law, [start[0], start[1], 0.0, 0.0], periods);
-    let error = apart(state, [exact[0], exact[1], 0.0, 0.0]).max(time_error(&events, &exact_events));
+    let (end, events) = run(&oscillator, law, state(&start), periods);
+    let error = apart(end, state(&exact)).max(time_error(&events, &exact_events));
     assert!(error < 1e-10, "{what}: {error:e}");
     events
 }
@@ -83,7 +83,7 @@ fn a_ball_bounces_infinitely_often_in_finite_time() {
     let ball = Linear { m: 1.0, c: 0.0, k: 0.0, force: 0.0, omega: 1.0, load: -1.0 };
     let table = Walled { free: ball, walls: [None, Some(Wall::Rigid { at: 0.0, e: 0.6 })] };
     let (oscillator, law) = table.oscillator();
-    let (state, events) = run(&oscillator, law, [0.0, 0.9, 0.0, 0.0], 2);
+    let (state, events) = run(&oscillator, law, state(&[0.0, 0.9]), 2);
     let (t, kind, _) = *events.last().unwrap();
     let rest = 2.0 * 0.9 / (1.0 - 0.6);
     assert!(kind == EventKind::MeshStart && (t - rest).abs() < 1e-6 * rest, "{t} {rest}");
@@ -132,12 +132,12 @@ fn motions_do_not_depend_on_the_coordinates() {
     ] {
         let pair = paper(e, 5.6);
         let oscillator = Oscillator { contacts, ..pair.oscillator().unwrap() };
-        let (state, events) = run(&oscillator, pair.law(), REST, 3);
+        let (end, events) = run(&oscillator, pair.law(), REST, 3);
         assert!(events.len() > 5, "{what}: {events:?}");
         for t in matrices {
             let (other, other_events) = run(&in_coordinates(&oscillator, t), pair.law(), REST, 3);
             let back = [0, 1].map(|i| [0, 1].map(|rate| t[i][0] * other[rate] + t[i][1] * other[2 + rate]));
-            let error = apart(state, [back[0][0], back[0][1], back[1][0], back[1][1]]);
+            let error = apart(end, state(&[back[0][0], back[0][1], back[1][0], back[1][1]]));
             let error = error.max(time_error(&events, &other_events));
             assert!(error < 1e-9, "{what}, {t:?}: {error:e}");
         }
@@ -147,9 +147,9 @@ fn motions_do_not_depend_on_the_coordinates() {
 #[test]
 fn a_start_behind_a_rigid_wall_begins_on_the_wall() {
     let oscillator = Oscillator { contacts: [Contact::Rigid; 2], ..paper(0.0, 5.6).oscillator().unwrap() };
-    let flight = Flight::new(&oscillator, Law::both(0.0, 0.0), [0.9, 0.0, 0.1, 0.0]);
+    let flight = Flight::new(&oscillator, Law::both(0.0, 0.0), state(&[0.9, 0.0, 0.1]));
     assert_eq!((flight.q, flight.meshing()), ([0.5, 0.0, 0.1, 0.0], None));
     let soft = Oscillator { contacts: [Contact::Elastic; 2], ..oscillator.clone() };
-    let flight = Flight::new(&soft, Law::both(0.0, 0.0), [0.9, 0.0, 0.1, 0.0]);
+    let flight = Flight::new(&soft, Law::both(0.0, 0.0), state(&[0.9, 0.0, 0.1]));
     assert_eq!(flight.meshing(), Some(Side::Right));
 }

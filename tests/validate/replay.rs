@@ -23,7 +23,7 @@ use rattlemap::validate::{
     Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, independent, replay, sample,
 };
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::model::{GearPair, REST, state};
 use rattlemap_dynamics::orbit::{Class, Status};
 use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::{StrobeMap, multipliers};
@@ -98,7 +98,7 @@ const PLANTED: [Planted; 20] = [
     ("class", chaotic, |record| (record.status, record.periods_run) = (Status::Slow.code(), 528)),
     ("class", settled, |record| {
         (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01);
-        (record.periods_run, record.strobe) = (400, [0.0; 4]);
+        (record.periods_run, record.strobe) = (400, REST);
     }),
 ];
 
@@ -265,7 +265,7 @@ fn a_multiplier_is_compared_at_the_state_where_it_was_computed() {
     let plan = plan_at(e, omega, &[]);
     let pair = GearPair { omega, ..GearPair::paper(e) };
     let flow = Flow::new(&pair.oscillator().unwrap());
-    let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), [0.0; 4]);
+    let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), REST);
     (0..run - period).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
     let derivative = StrobeMap::Periods(period).apply(&trajectory, trajectory.state()).unwrap().derivative();
     (0..period).for_each(|_| trajectory.advance_period(&mut ()).unwrap());

@@ -11,7 +11,7 @@ use rattlemap::record::classify::{classify, status};
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::Kind;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::model::{GearPair, REST, state};
 use rattlemap_dynamics::orbit::{Class, Measurement, Status, measure};
 
 /// Measures the first cell of a plan on the reference.
@@ -75,7 +75,7 @@ fn a_motion_that_creeps_off_its_wall_is_not_at_rest() {
 #[test]
 fn symmetry_is_claimed_only_near_the_cycle() {
     for (e, symmetric) in [(0.5, 1), (0.58, 0)] {
-        let record = lane(&plan(GearPair { omega: 5.6, ..GearPair::paper(e) }, [0.0; 4]), Precision::F64);
+        let record = lane(&plan(GearPair { omega: 5.6, ..GearPair::paper(e) }, REST), Precision::F64);
         assert_eq!(classify(&record), Class::Periodic { period: 1 }, "{e}: {record:?}");
         assert_ne!(record.valid & valid::SYMMETRIC, 0, "{e}: {record:?}");
         assert_eq!(record.symmetric, symmetric, "{e}: {record:?}");

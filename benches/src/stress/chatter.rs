@@ -16,7 +16,7 @@ use super::lanes::{Lanes, Start};
 use super::{Size, Verdict};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::record::classify::status;
-use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::model::{GearPair, State, state};
 use rattlemap_dynamics::orbit::{Status, status_of};
 use rattlemap_dynamics::reference::Stop;
 
@@ -55,7 +55,7 @@ pub struct Row {
 struct Case {
     start: Start,
     /// Final state of the correct answer, or why the reference stopped.
-    expected: Result<[f64; 4], Stop>,
+    expected: Result<State, Stop>,
     impacts: u64,
 }
 
@@ -95,7 +95,7 @@ fn cell(less: f64, mesh_speed: f64) -> Start {
     // An elastic series never slows down, so any speed will do.
     let share = if less > 0.0 { less } else { 1e-2 };
     let leaving = 0.5 * DURATION * (pair.force / pair.m1) * share;
-    (pair, [pair.b, -leaving, 0.0, 0.0])
+    (pair, state(&[pair.b, -leaving]))
 }
 
 fn case((pair, start): Start) -> Case {
@@ -112,7 +112,7 @@ fn on_reference(case: &Case) -> Row {
     }
 }
 
-fn row(case: &Case, engine: EngineName, status: Status, state: Option<[f64; 4]>) -> Row {
+fn row(case: &Case, engine: EngineName, status: Status, state: Option<State>) -> Row {
     let (pair, start) = case.start;
     let error = state.zip(case.expected.ok()).map(|(state, expected)| state_distance(&state, &expected));
     let bar = || {

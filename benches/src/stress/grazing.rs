@@ -21,7 +21,7 @@ use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::map::random::Random;
 use rattlemap::record::Record;
 use rattlemap::record::distance::farther;
-use rattlemap_dynamics::model::{GearPair, Side};
+use rattlemap_dynamics::model::{GearPair, Side, state};
 use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
 /// Allowed error of the gap in unit roundoffs: about a dozen steps precede the contact, and each rounds eight times.
@@ -53,7 +53,7 @@ pub(super) fn swing(distance: f64, random: &mut Random) -> Start {
     let [re, im] = [k1 - m1 * omega * omega, r1 * omega];
     let [size, amplitude] = [re.hypot(im), b * (1.0 + distance)];
     let pair = GearPair { force: amplitude * size, ..base };
-    (pair, [amplitude * re / size, amplitude * omega * im / size, 0.0, 0.0])
+    (pair, state(&[amplitude * re / size, amplitude * omega * im / size]))
 }
 
 /// Returns the contact speed in units of `omega b`.

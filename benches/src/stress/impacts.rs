@@ -18,7 +18,7 @@ use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::map::random::Random;
 use rattlemap::record::distance::farther;
 use rattlemap_dynamics::flow::Gap;
-use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::model::{GearPair, State, state};
 use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
 
 /// Restitutions and masses of the two gears.
@@ -126,7 +126,7 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Vec<Row>, Gpu
 fn on_reference(pair: &GearPair, horizon: u32) -> Row {
     let flow = flow_of(pair);
     let mut worst = Worst::new(pair, EngineName::Reference);
-    let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, 1.0, 0.0, -1.0]);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), state(&[0.0, 1.0, 0.0, -1.0]));
     for _ in 0..horizon {
         if trajectory.advance_period(&mut worst).is_err() {
             // Zero contacts make the verdict fail.
@@ -143,7 +143,7 @@ fn closing(pair: &GearPair, random: &mut Random) -> State {
     let (gap, speed) = (number(-0.9, 0.9) * pair.b, number(1.0, 6.0));
     let (x2, v2) = (number(-1.0, 1.0), number(-3.0, 3.0));
     let w = if number(0.0, 1.0) < 0.5 { speed } else { -speed };
-    [gap + x2, w + v2, x2, v2]
+    state(&[gap + x2, w + v2, x2, v2])
 }
 
 /// Requires that there are contacts and that both laws hold to rounding.

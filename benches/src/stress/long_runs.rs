@@ -14,7 +14,7 @@ use super::{Size, Verdict, Watch};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::record::classify::status;
 use rattlemap::record::distance::{farther, is_within};
-use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::model::{GearPair, REST, State, state};
 use rattlemap_dynamics::orbit::Status;
 use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::{Cycle, StrobeMap, refine};
@@ -111,7 +111,7 @@ fn row(cell: &Settled, engine: EngineName, periods: u32, error: f64) -> Row {
 /// Returns a cell with its cycle and starts near it.
 fn settled(pair: GearPair) -> Settled {
     let flow = flow_of(&pair);
-    let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0; 4]);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
     for _ in 0..SETTLING {
         trajectory.advance_period(&mut ()).expect("a stable cell");
     }

@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::cells::flow_of;
 use super::{Size, Verdict, Watch};
 use rattlemap::map::random::Random;
-use rattlemap_dynamics::model::{GearPair, Model, REST};
+use rattlemap_dynamics::model::{GearPair, Model, REST, State, state};
 use rattlemap_dynamics::orbit::{Budget, Settings, Status, measure};
 
 /// Longest allowed time of a cell, in times of a typical cell: one to three seconds of a core. The slowest of the first
@@ -109,7 +109,7 @@ fn time(seed: u64, n: u64) -> Times {
 }
 
 /// Draws a random cell.
-fn cell(random: &mut Random) -> (GearPair, [f64; 4]) {
+fn cell(random: &mut Random) -> (GearPair, State) {
     let mut pair = GearPair::paper(random.unit());
     for (index, parameter) in GearPair::PARAMETERS.iter().enumerate().filter(|(_, it)| it.name != "e") {
         let value = parameter.default.expect("only the restitution has no default");
@@ -120,8 +120,9 @@ fn cell(random: &mut Random) -> (GearPair, [f64; 4]) {
     let pair = if random.unit() < 0.1 { undamped } else { pair };
     let size = 10f64.powf(4.0 * random.unit());
     let rest = random.unit() < 0.5;
-    let start = std::array::from_fn(|_| if rest { 0.0 } else { size * (2.0 * random.unit() - 1.0) });
-    (pair, start)
+    let start: [f64; 4] =
+        std::array::from_fn(|_| if rest { 0.0 } else { size * (2.0 * random.unit() - 1.0) });
+    (pair, state(&start))
 }
 
 /// Requires that no cell takes longer than `LONGEST` typical cells.

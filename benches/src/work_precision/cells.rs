@@ -6,7 +6,7 @@ use super::outcome::Outcome;
 use super::{EVENTS, PERIODS};
 use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST, State, state};
 use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
 
 /// Number of variants of a cell, next to each other as in a map. Their restitution grows by [`RESTITUTION_STEP`], or their
@@ -133,7 +133,7 @@ fn subject(cell: u32, kind: Kind, beyond: Option<f64>, pair: GearPair) -> Subjec
     let start = match kind {
         Kind::Grazing => steady(&pair),
         _ => {
-            let mut trajectory = Trajectory::new(&flow, law, [0.0; 4]);
+            let mut trajectory = Trajectory::new(&flow, law, REST);
             for _ in 0..SETTLING_PERIODS {
                 trajectory.advance_period(&mut ()).expect("an ordinary cell");
             }
@@ -149,7 +149,7 @@ fn subject(cell: u32, kind: Kind, beyond: Option<f64>, pair: GearPair) -> Subjec
 fn steady(pair: &GearPair) -> State {
     let amplitude = pair.force * compliance(pair);
     let lag = (pair.r1 * pair.omega).atan2(pair.k1 - pair.m1 * pair.omega * pair.omega);
-    [amplitude * lag.cos(), amplitude * pair.omega * lag.sin(), 0.0, 0.0]
+    state(&[amplitude * lag.cos(), amplitude * pair.omega * lag.sin()])
 }
 
 /// Times of the latest events, the last one first; NaN if there is none.

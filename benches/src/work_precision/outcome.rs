@@ -2,7 +2,7 @@
 
 use super::EVENTS;
 use rattlemap::record::distance::{apart, farther};
-use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::model::{State, state};
 
 /// The result of a lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Error {
 impl Outcome {
     /// Returns the result of a lane that failed.
     pub fn lost() -> Outcome {
-        Outcome { state: [f64::NAN; 4], events: [f64::NAN; EVENTS] }
+        Outcome { state: state(&[f64::NAN; 4]), events: [f64::NAN; EVENTS] }
     }
 
     /// Returns the difference from the `exact` result, with forcing period `period`.
@@ -55,8 +55,8 @@ mod tests {
 
     #[test]
     fn errors_are_the_largest_difference() {
-        let exact = Outcome { state: [1.0, 2.0, 3.0, 4.0], events: [0.1, f64::NAN] };
-        let near = Outcome { state: [1.0, 2.5, 3.0, 4.25], events: [0.9, 0.3] };
+        let exact = Outcome { state: state(&[1.0, 2.0, 3.0, 4.0]), events: [0.1, f64::NAN] };
+        let near = Outcome { state: state(&[1.0, 2.5, 3.0, 4.25]), events: [0.9, 0.3] };
         assert_eq!(near.error(&exact, 1.0).state, 0.5);
         assert!((near.error(&exact, 1.0).event.unwrap() - 0.2).abs() < 1e-15, "across phase 0");
         let lost = Outcome::lost().error(&exact, 1.0);

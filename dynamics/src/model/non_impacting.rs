@@ -185,7 +185,7 @@ fn slowest(stiffness: &Matrix2<f64>, damping: &Matrix2<f64>) -> Complex<f64> {
 mod tests {
     use super::*;
     use crate::flow::Flow;
-    use crate::model::GearPair;
+    use crate::model::{GearPair, sum};
     use crate::reference::Trajectory;
 
     fn pair(omega: f64) -> GearPair {
@@ -248,7 +248,7 @@ mod tests {
             let angle = f64::from(step);
             let size = 0.03 * f64::from(step % 17);
             let offset = [size * angle.cos(), 3.0 * size * angle.sin(), size * (2.0 * angle).sin(), 0.0];
-            let start = std::array::from_fn(|i| motion.steady()[i] + offset[i]);
+            let start = sum(&motion.steady(), &state(&offset), 1.0);
             let mut trajectory = Trajectory::new(&flow, pair.law(), start);
             let was = motion.is_certain(start);
             for _ in 0..40 {

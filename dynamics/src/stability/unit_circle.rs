@@ -38,9 +38,9 @@ fn characteristic(a: &DMatrix<f64>) -> [f64; STATE + 1] {
     let mut coefficients = [0.0; STATE + 1];
     coefficients[0] = 1.0;
     let mut power = a.clone();
-    for n in 1..=size {
+    for (n, place) in coefficients.iter_mut().enumerate().take(size + 1).skip(1) {
         let coefficient = -power.trace() / n as f64;
-        coefficients[n] = coefficient;
+        *place = coefficient;
         (0..size).for_each(|i| power[(i, i)] += coefficient);
         power = product(a, &power);
     }

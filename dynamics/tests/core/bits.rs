@@ -32,7 +32,10 @@ fn measured(pair: &GearPair) -> Measurement {
 /// Returns a line of the table: period (0 for none), word, and the bits of exponent and strobe state.
 fn row(measured: &Measurement) -> String {
     let [lyapunov, _] = measured.lyapunov.unwrap_or([f64::NAN; 2]);
-    let bits = [lyapunov].into_iter().chain(measured.strobe).map(|x| format!("{:016x}", x.to_bits()));
+    let bits = [lyapunov]
+        .into_iter()
+        .chain(measured.strobe[..4].iter().copied())
+        .map(|x| format!("{:016x}", x.to_bits()));
     let word = measured.word.as_ref().map(ToString::to_string).unwrap_or_default();
     let first = [measured.period.unwrap_or(0).to_string(), word];
     first.into_iter().chain(bits).collect::<Vec<_>>().join(",")

@@ -438,6 +438,7 @@ mod tests {
 
     use super::super::Fake;
     use super::*;
+    use rattlemap_dynamics::model::state;
 
     fn adapter(number: usize) -> AdapterId {
         AdapterId { number, name: "fake".to_owned(), pci: None }
@@ -449,7 +450,7 @@ mod tests {
     }
 
     fn cells(count: u32) -> Vec<Cell> {
-        (0..count).map(|id| Cell { id, flow: 0, law: 0, start: [f64::from(id); 4] }).collect()
+        (0..count).map(|id| Cell { id, flow: 0, law: 0, start: state(&[f64::from(id); 4]) }).collect()
     }
 
     /// Computes a record from the start, which a cell must keep when it changes cards.

@@ -4,7 +4,7 @@ use crate::map::random::Random;
 use crate::map::scene::{Draw, Start};
 use crate::record::classify::status;
 use crate::record::{Record, valid};
-use rattlemap_dynamics::model::{Oscillator, REST, State};
+use rattlemap_dynamics::model::{Oscillator, REST, State, state};
 
 /// Range of random starts: displacements are within this many scales of length of the middle, velocities within this
 /// many times the corresponding velocity. The attractors of the paper's plane are inside.
@@ -58,7 +58,7 @@ impl Starts {
         let (z, x2) = (middle + half * gap, START_RANGE * length * x2);
         let speed = START_RANGE * length * oscillator.omega;
         let [g1, g2] = oscillator.gap;
-        [(z - g2 * x2) / g1, speed * v1, x2, speed * v2]
+        state(&[(z - g2 * x2) / g1, speed * v1, x2, speed * v2])
     }
 }
 
@@ -124,11 +124,11 @@ mod tests {
 
     #[test]
     fn runs_start_at_rest_if_the_neighbour_has_no_last_state() {
-        let end = [1.0, 2.0, 3.0, 4.0];
+        let end = state(&[1.0, 2.0, 3.0, 4.0]);
         let record = Record { strobe: end, valid: valid::STROBE, ..Record::default() };
         assert_eq!(followed(Some(&record)), end);
         let failed = Record { status: Status::CapEvents.code(), ..record };
-        let infinite = Record { strobe: [f64::NAN; 4], ..record };
+        let infinite = Record { strobe: state(&[f64::NAN; 4]), ..record };
         for record in [None, Some(&failed), Some(&infinite), Some(&Record::default())] {
             assert_eq!(followed(record), REST, "{record:?}");
         }

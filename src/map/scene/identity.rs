@@ -63,7 +63,7 @@ impl Scene {
         add("integration.confirm_chaos".into(), integration.confirm_chaos.to_string());
         add("integration.max_period".into(), integration.max_period.to_string());
         let start = match self.start() {
-            Start::State(state) => format!("state {state:?}"),
+            Start::State(state) => format!("state {:?}", &state[..2 * self.coordinates().max(2)]),
             start => start.policy().to_owned(),
         };
         add("start".into(), start);

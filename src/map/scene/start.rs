@@ -109,7 +109,11 @@ pub(super) fn read_phase(section: &Section<'_>, model: &mut dyn Model) -> Result
 
 fn read_state(field: &Field<'_>, model: &dyn Model) -> Result<State, SceneError> {
     let names = model.state_names();
-    let count = if names.len() == 4 { "four" } else { "two" };
+    let count = match names.len() {
+        2 => "two".to_owned(),
+        4 => "four".to_owned(),
+        more => more.to_string(),
+    };
     let expected = &format!("{count} finite numbers, [{}]", names.join(", "));
     let mut numbers = Vec::new();
     for item in field.list(expected)? {

@@ -15,7 +15,7 @@ mod texts;
 use super::*;
 use crate::model_file::FileModel;
 use crate::text::test_cases;
-use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::model::{GearPair, state};
 
 const GOOD: &str = r#"title = "A scene"
 model = "gear-pair"
@@ -258,7 +258,7 @@ d = 4 | d = 11 | s.toml:18:14: `integration.max_period = 11` does not fit: a cyc
 fn starts_from_a_state() {
     let with =
         |state: &str| parse(&GOOD.replacen("\"rest\"", &format!("\"state\"\nstate = {state}"), 1), &[]);
-    assert_eq!(with("[1, -0.5, 0, 2e-3]").unwrap().start(), Start::State([1.0, -0.5, 0.0, 2e-3]));
+    assert_eq!(with("[1, -0.5, 0, 2e-3]").unwrap().start(), Start::State(state(&[1.0, -0.5, 0.0, 2e-3])));
     for (state, expected) in [
         (
             "[1, 2, 3]",

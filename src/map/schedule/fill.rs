@@ -6,6 +6,7 @@ use super::label::{pattern_of, word_of};
 use crate::record::classify::classify;
 use crate::record::measures::{self, GROUPS, MEASURES};
 use crate::record::{Record, valid};
+use rattlemap_dynamics::model::REST;
 use rattlemap_dynamics::orbit::Class;
 
 /// Returns the bit by which a record is quasi-periodic. Like the class of other motion, it is that of the nearest corner.
@@ -56,8 +57,7 @@ impl Filling {
             let weighted = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
             weighted.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
         };
-        let mut filled =
-            Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..self.corners[nearest] };
+        let mut filled = Record { periods_run: 0, strobe: REST, valid: self.valid, ..self.corners[nearest] };
         filled.valid |= torus(&self.corners[nearest]);
         filled.clear_measures(|group| self.valid & group.bit == 0);
         if !self.averages[nearest] {

@@ -12,7 +12,7 @@ use crate::show::error::WriteError;
 use crate::show::figure::map_layout::{MapFigure, Row};
 use crate::show::figure::map_lines;
 use crate::show::layers::{Layer, NamedColor, share};
-use rattlemap_dynamics::model::Side;
+use rattlemap_dynamics::model::{Side, State};
 
 /// Width of the legend, and least height of map and legend.
 const LEGEND: (f64, f64) = (460.0, 700.0);
@@ -88,7 +88,7 @@ pub(crate) fn attractors(cells: &Cells<'_>) -> Vec<Point> {
         return Vec::new();
     };
     let plane = cells.start(0);
-    let lies_in_plane = |state: &&[f64; 4]| {
+    let lies_in_plane = |state: &&State| {
         let size = state.iter().map(|component| component.abs()).fold(0.0, f64::max);
         let is_near = |i: usize| (state[i] - plane[i]).abs() <= IN_PLANE * size;
         (0..state.len()).filter(|i| ![x, y].contains(i)).all(is_near)

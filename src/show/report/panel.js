@@ -60,8 +60,8 @@ function choose(cell) {
   if (cell) {
     const { sheet: { data, starts, columns: across }, i, j } = selectedCell;
     const [a, b] = [axisValue(data.axes[0], i), axisValue(data.axes[1], j)];
-    const place = 4 * (j * across + i);
-    const own = (data.start ?? starts?.subarray(place, place + 4))?.slice(0, data.components);
+    const width = Math.max(data.components, 4), place = width * (j * across + i);
+    const own = (data.start ?? starts?.subarray(place, place + width))?.slice(0, data.components);
     const start = own ? ` --start ${[...own].map((x, k) => [a, b][data.axes.findIndex((axis) => axis.start === k)] ?? x).join(",")}` : "";
     const sets = data.axes.map((axis, k) => (axis.start === undefined ? ` --set ${axis.parameter}=${[a, b][k]}` : "")).join("");
     const derived = derivedValues(selectedCell).map(([name, value]) => ` --set ${name}=${value}`).join("");

@@ -7,7 +7,7 @@ use crate::record::Spelling;
 use crate::show::error::WriteError;
 use crate::show::names::{self, float, optional};
 use crate::show::numbers::Number;
-use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::model::{State, state};
 use rattlemap_dynamics::word::Word;
 
 /// Columns of a point before its states.
@@ -165,8 +165,8 @@ mod tests {
             side: Side::Left,
             kind: EventKind::MeshStart,
             t_mod_period: 0.1,
-            before: [1.0, -2.0, 1.5, 1e-7],
-            after: [1.0, 0.1 + 0.2, 1.5, f64::NAN],
+            before: state(&[1.0, -2.0, 1.5, 1e-7]),
+            after: state(&[1.0, 0.1 + 0.2, 1.5, f64::NAN]),
         };
         let periodic = Column::plain(0.25, Class::Periodic { period: 2 });
         let columns = [Column { points: vec![point, point], ..periodic }, Column::plain(1.0, Class::Chaotic)];
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_period_has_a_row_and_a_column_without_states_has_one_row() {
-        let strobes = vec![[0.5, -1.0, 0.0, 0.0], [0.1 + 0.2, 2.0, 0.0, 0.0]];
+        let strobes = vec![state(&[0.5, -1.0]), state(&[0.1 + 0.2, 2.0])];
         let columns = [
             Column { strobes, ..Column::plain(0.25, Class::Periodic { period: 2 }) },
             Column::plain(1.0, Class::Failed),

@@ -27,9 +27,9 @@ pub(crate) struct BatchHead {
     sum: u32,
 }
 
-/// Returns the bytes of a batch.
-pub(crate) fn encode(number: u32, batch: &[(u32, Record)]) -> std::io::Result<Vec<u8>> {
-    let (columns, body) = columns::encode(batch)?;
+/// Returns the bytes of a batch. `strobes` is the number of entries of strobe states.
+pub(crate) fn encode(number: u32, batch: &[(u32, Record)], strobes: usize) -> std::io::Result<Vec<u8>> {
+    let (columns, body) = columns::encode(batch, strobes)?;
     let (cells, bytes) = (batch.len() as u32, body.len() as u32);
     let head = BatchHead { number, cells, columns, bytes, sum: crc32fast::hash(&body) };
     Ok([&head.bytes()[..], &body].concat())
@@ -58,9 +58,9 @@ impl BatchHead {
     }
 
     /// Returns the records that these bytes encode, or none if they are damaged.
-    pub(crate) fn decode(&self, body: &[u8]) -> Option<Vec<(u32, Record)>> {
+    pub(crate) fn decode(&self, strobes: usize, body: &[u8]) -> Option<Vec<(u32, Record)>> {
         let is_good = crc32fast::hash(body) == self.sum;
-        is_good.then(|| columns::decode(self.columns, self.cells as usize, body)).flatten()
+        is_good.then(|| columns::decode(self.columns, self.cells as usize, strobes, body)).flatten()
     }
 }
 

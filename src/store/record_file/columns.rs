@@ -1,6 +1,7 @@
 //! Records as compressed columns: the first bytes of all numbers of a column, then the second bytes, and so on.
 //!
-//! A column that is zero in every cell is left out. Decoding returns the encoded records bit for bit.
+//! A column that is zero in every cell is left out. Of strobe states a file contains as many entries as the model has, but four at
+//! least. Decoding returns the encoded records bit for bit.
 
 use std::io::{self, Read, Write};
 use std::mem::offset_of;
@@ -13,7 +14,7 @@ use flate2::write::DeflateEncoder;
 use crate::record::Record;
 use crate::record::measures::{GROUPS, places_before};
 
-/// Number of bytes of an id and its record.
+/// Number of bytes of an id and its record in memory.
 pub(crate) const ROW: usize = ID + size_of::<Record>();
 const ID: usize = size_of::<u32>();
 
@@ -79,30 +80,38 @@ const PLACES: [(usize, usize); BEFORE] = [
     (ID + offset_of!(Record, pattern_length), 4),
 ];
 
-/// Returns the range of a column's bytes in a row.
-fn range_of(column: usize) -> Range<usize> {
-    place(column).0..if column + 1 < COUNT { place(column + 1).0 } else { ROW }
+/// Place of the strobe state in the lists.
+const STROBE: usize = 5;
+
+/// Returns the range of a column's bytes in a row, if files contain this number of entries of strobe states.
+fn range_of(column: usize, strobes: usize) -> Range<usize> {
+    let begin = place(column).0;
+    match column {
+        STROBE => begin..begin + 8 * strobes,
+        _ if column + 1 < COUNT => begin..place(column + 1).0,
+        _ => begin..ROW,
+    }
 }
 
 /// Returns the places of a column's bytes in a row, the most significant byte of each number first.
-fn bytes_of(column: usize) -> impl Iterator<Item = usize> {
+fn bytes_of(column: usize, strobes: usize) -> impl Iterator<Item = usize> {
     let width = place(column).1;
-    range_of(column).step_by(width).flat_map(move |number| (number..number + width).rev())
+    range_of(column, strobes).step_by(width).flat_map(move |number| (number..number + width).rev())
 }
 
 type Row = [u8; ROW];
 
-/// Returns a bit for each column that is stored, and the compressed columns.
-pub(crate) fn encode(batch: &[(u32, Record)]) -> io::Result<(u32, Vec<u8>)> {
+/// Returns a bit for each column that is stored, and the compressed columns. `strobes` is the number of entries of strobe states.
+pub(crate) fn encode(batch: &[(u32, Record)], strobes: usize) -> io::Result<(u32, Vec<u8>)> {
     let rows = rows(batch);
     let mut mask = 0;
     let mut output = DeflateEncoder::new(Vec::new(), Compression::fast());
     for column in 0..COUNT {
-        if rows.iter().all(|row| row[range_of(column)].iter().all(|byte| *byte == 0)) {
+        if rows.iter().all(|row| row[range_of(column, strobes)].iter().all(|byte| *byte == 0)) {
             continue;
         }
         mask |= 1 << column;
-        for at in bytes_of(column) {
+        for at in bytes_of(column, strobes) {
             output.write_all(&rows.iter().map(|row| row[at]).collect::<Vec<_>>())?;
         }
     }
@@ -110,11 +119,12 @@ pub(crate) fn encode(batch: &[(u32, Record)]) -> io::Result<(u32, Vec<u8>)> {
 }
 
 /// Returns the records of a batch of `cells` cells, or none if the bytes do not encode so many.
-pub(crate) fn decode(mask: u32, cells: usize, bytes: &[u8]) -> Option<Vec<(u32, Record)>> {
+pub(crate) fn decode(mask: u32, cells: usize, strobes: usize, bytes: &[u8]) -> Option<Vec<(u32, Record)>> {
     if mask >> COUNT != 0 {
         return None;
     }
-    let places: Vec<usize> = (0..COUNT).filter(|column| mask >> column & 1 == 1).flat_map(bytes_of).collect();
+    let stored = (0..COUNT).filter(|column| mask >> column & 1 == 1);
+    let places: Vec<usize> = stored.flat_map(|column| bytes_of(column, strobes)).collect();
     let whole = places.len() * cells;
     let mut planes = Vec::with_capacity(whole);
     // One byte more than expected, so that data that is too long is noticed.
@@ -149,4 +159,25 @@ fn batch(rows: &[Row]) -> Vec<(u32, Record)> {
         (before, bytemuck::pod_read_unaligned(&row[ID..]))
     };
     rows.iter().map(cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::model::state;
+
+    #[test]
+    fn files_contain_the_strobe_entries_that_the_model_has() {
+        for (coordinates, bytes) in [(2, 376), (3, 392), (8, 472)] {
+            let strobes = 2 * coordinates;
+            let whole: usize = (1..COUNT).map(|column| bytes_of(column, strobes).count()).sum();
+            assert_eq!(whole, bytes, "{coordinates} coordinates");
+            let entries: Vec<f64> = (1..=strobes).map(|n| n as f64 / 3.0).collect();
+            let record = Record { strobe: state(&entries), period: 3, ..Record::default() };
+            let batch: Vec<(u32, Record)> = (0..5).map(|id| (7 * id, record)).collect();
+            let (mask, body) = encode(&batch, strobes).unwrap();
+            assert_eq!(decode(mask, 5, strobes, &body), Some(batch));
+            assert_eq!(decode(mask, 5, strobes + 2, &body), None);
+        }
+    }
 }

@@ -114,4 +114,15 @@ mod tests {
         assert!(matches!(find(&older, true), Found::OtherVersion));
         assert!(matches!(find(b"another file of that length", true), Found::Damaged(_)));
     }
+    #[test]
+    fn more_than_two_coordinates_stand_in_the_header() {
+        let identity = |coordinates| Identity::new("cpu", "f64", "d", Vec::new()).of_coordinates(coordinates);
+        let header = |coordinates| bytes(&identity(coordinates)).unwrap();
+        assert_eq!(header(1), header(2));
+        assert!(!String::from_utf8_lossy(&header(2)).contains("coordinates"));
+        for (coordinates, strobes) in [(1, 4), (2, 4), (3, 6), (8, 16)] {
+            let Found::Header { identity: found, .. } = find(&header(coordinates), true) else { panic!() };
+            assert_eq!((found.strobes(), found == identity(coordinates)), (strobes, true));
+        }
+    }
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::record::RECORD_VERSION;
+use rattlemap_dynamics::model::MOST_COORDINATES;
 
 /// Everything that decides the records of a run. A run resumes only from records of the same identity.
 ///
@@ -22,9 +23,21 @@ pub struct Identity {
     precision: String,
     device: String,
     scene: Vec<(String, String)>,
+    /// Number of the model's coordinates; absent for one or two. It is not compared; the scene contains the model.
+    #[serde(default = "two", skip_serializing_if = "is_two")]
+    coordinates: usize,
     /// The part of the map that the run computes; absent if it computes the whole map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     shard: Option<Shard>,
+}
+
+/// Files of models with one or two coordinates have the same layout.
+fn two() -> usize {
+    2
+}
+
+fn is_two(coordinates: &usize) -> bool {
+    *coordinates == two()
 }
 
 impl Identity {
@@ -39,8 +52,20 @@ impl Identity {
             precision: precision.to_owned(),
             device: device.to_owned(),
             scene,
+            coordinates: two(),
             shard: None,
         }
+    }
+
+    /// Returns this identity for a model with this number of coordinates.
+    #[must_use]
+    pub fn of_coordinates(self, coordinates: usize) -> Identity {
+        Identity { coordinates: coordinates.max(two()), ..self }
+    }
+
+    /// Returns the number of entries of strobe states in the file.
+    pub(crate) fn strobes(&self) -> usize {
+        2 * self.coordinates.clamp(two(), MOST_COORDINATES)
     }
 
     /// Returns this identity for a shard, or for the whole map if there is none.

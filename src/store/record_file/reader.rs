@@ -209,7 +209,7 @@ impl<'a> Reader<'a> {
         }
         let mut body = vec![0; head.bytes as usize];
         input.read_exact(&mut body)?;
-        let batch = head.decode(&body).map(|batch| (head, batch));
+        let batch = head.decode(self.identity.strobes(), &body).map(|batch| (head, batch));
         Ok(batch.ok_or(Bad { what: "a batch does not match its checksum", body: body.len() as u64 }))
     }
 

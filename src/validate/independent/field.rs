@@ -4,7 +4,7 @@
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use rattlemap_dynamics::flow::{Gap, Phasor};
-use rattlemap_dynamics::model::{Domain, Harmonic, Oscillator, State};
+use rattlemap_dynamics::model::{Domain, Harmonic, Oscillator, State, state};
 
 /// Relative difference of parallel rows.
 const PARALLEL: f64 = 1e-12;
@@ -62,7 +62,7 @@ impl Coordinates {
     pub fn state(&self, [z, w, x, v]: &Gap) -> State {
         let (own, rest) = (self.gap[self.other], self.gap[1 - self.other]);
         let (y, rate) = ((z - own * x) / rest, (w - own * v) / rest);
-        if self.other == 1 { [y, rate, *x, *v] } else { [*x, *v, y, rate] }
+        state(&if self.other == 1 { [y, rate, *x, *v] } else { [*x, *v, y, rate] })
     }
 }
 
@@ -205,7 +205,7 @@ mod tests {
             let oscillator =
                 Oscillator { mass: [[2.0, 0.7], [0.7, 1.0]], gap, force_sin: [-20.0, 30.0], ..pair.clone() };
             let coordinates = Coordinates::new(&oscillator);
-            let y = [0.3, -1.2, 0.9, 2.1];
+            let y = state(&[0.3, -1.2, 0.9, 2.1]);
             let q = coordinates.gap(&y);
             let back = coordinates.state(&q);
             let off = (0..4).map(|i| (back[i] - y[i]).abs()).fold(0.0, f64::max);

@@ -6,7 +6,9 @@ use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::dop853::Solver;
 use super::flight::{Ended, Flight};
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Oscillator, Side, Stage, State};
+use rattlemap_dynamics::model::{
+    Contact, Domain, Harmonic, Law, Oscillator, REST, Side, Stage, State, state,
+};
 use rattlemap_dynamics::reference::EventKind;
 
 const NO_WALLS: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
@@ -90,7 +92,7 @@ fn the_response_to_three_harmonics_is_that_of_the_closed_form() {
         ..mass(0.0, NO_WALLS, Contact::Rigid)
     };
     let steady = |t: f64| {
-        let mut y = [0.0; 4];
+        let mut y = REST;
         for Harmonic { order, cos, sin } in oscillator.all_harmonics() {
             let w = f64::from(order) * oscillator.omega;
             let impedance = Matrix2::from_fn(|i, j| {
@@ -140,7 +142,7 @@ fn a_stiffness_that_alternates_is_integrated_piece_by_piece() {
         let pass = |y: [f64; 2], &(k, turns): &(f64, f64)| oscillated(y, k, turns * oscillator.period());
         let exact = (0..repeat).fold([0.2, 0.7], |y, _| pieces.iter().fold(y, pass));
         let turns = f64::from(repeat) * pieces.iter().map(|(_, turns)| turns).sum::<f64>();
-        let (y, _) = run(&oscillator, Law::both(0.5, 0.0), [0.2, 0.7, 0.0, 0.0], turns);
+        let (y, _) = run(&oscillator, Law::both(0.5, 0.0), state(&[0.2, 0.7]), turns);
         assert_near(&y[..2], &exact, 1e-10, &format!("{schedule:?}"));
     }
 }
@@ -166,7 +168,7 @@ fn a_stage_releases_a_mass_at_rest() {
     ] {
         let schedule = vec![(lifts, 1), (lifts + 0.3, 0)];
         let oscillator = Oscillator { stages: vec![stage(0.0, 2.0)], schedule, ..floor.clone() };
-        let (y, events) = run(&oscillator, Law::both(0.0, 0.0), [0.0; 4], 3.0);
+        let (y, events) = run(&oscillator, Law::both(0.0, 0.0), REST, 3.0);
         check_events(&events, &expected, oscillator.period());
         assert_eq!(y[..2], [0.0; 2]);
     }
@@ -182,7 +184,7 @@ fn derivatives_of_the_force_decide_about_rest() {
             schedule: vec![(0.0, 1), (0.4, 0)],
             ..mass(-20.0, [f64::INFINITY, 0.0], Contact::Rigid)
         };
-        let (_, events) = run(&oscillator, Law::both(0.0, 0.0), [0.0; 4], 2.0);
+        let (_, events) = run(&oscillator, Law::both(0.0, 0.0), REST, 2.0);
         let expected: &[_] = if stays { &[] } else { &[(EventKind::MeshEnd, 1.0)] };
         let at_end: Vec<_> =
             events.into_iter().filter(|ended| ended.t > 0.99 * oscillator.period()).collect();
@@ -200,13 +202,13 @@ fn a_stage_ends_a_contact_onset() {
     let period = oscillator.period();
     let (fall, onset, rise, last) = (0.2 * period, 0.05 * period, 0.65 * period, 0.1 * period);
     let (v, h) = (fall, 0.5 * fall * fall);
-    let (y, events) = run(&oscillator, Law::both(0.5, 10.0), [h, 0.0, 0.0, 0.0], 1.0);
+    let (y, events) = run(&oscillator, Law::both(0.5, 10.0), state(&[h]), 1.0);
     check_events(&events, &[(EventKind::MeshStart, 0.2), (EventKind::MeshEnd, 0.25)], period);
     let moved = |[x, v]: [f64; 2], load: f64, t: f64| [x + v * t + 0.5 * load * t * t, v + load * t];
     let exact = moved(moved(moved([0.0, 0.5 * v], -1.0, onset), 3.0, rise), -1.0, last);
     assert_near(&y[..2], &exact, 1e-11, "after the onset");
     // In a stage that presses the mass, the onset goes on.
     let pressed = Oscillator { stages: vec![stage(0.0, -3.0)], ..oscillator };
-    let (_, events) = run(&pressed, Law::both(0.5, 10.0), [h, 0.0, 0.0, 0.0], 0.3);
+    let (_, events) = run(&pressed, Law::both(0.5, 10.0), state(&[h]), 0.3);
     check_events(&events, &[(EventKind::MeshStart, 0.2)], period);
 }

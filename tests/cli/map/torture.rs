@@ -8,6 +8,7 @@ use std::time::Duration;
 use rattlemap::map::random::Random;
 use rattlemap::record::{Record, valid};
 use rattlemap::store::record_file::{Damage, Identity, Order, RecordFile};
+use rattlemap_dynamics::model::MOST_COORDINATES;
 
 use super::*;
 
@@ -41,7 +42,8 @@ const BATCH: usize = 40;
 impl Victim {
     fn new(folder: &TempDir) -> Victim {
         let path = folder.path().join("records.bin");
-        let identity = Identity::new("cpu", "f64", "any", vec![("axis.0.count".into(), "many".into())]);
+        let identity = Identity::new("cpu", "f64", "any", vec![("axis.0.count".into(), "many".into())])
+            .of_coordinates(MOST_COORDINATES);
         let mut random = Random::new(3);
         let mut cell = |id: u32| {
             let mut record: Record =

@@ -1,6 +1,6 @@
 //! Random oscillators of every kind, by seed.
 
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State, state};
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
 pub(crate) struct Numbers(pub(crate) u64);
@@ -105,5 +105,5 @@ pub(crate) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
     if degrees == 1 {
         start[2..].fill(0.0);
     }
-    (oscillator, law, start)
+    (oscillator, law, state(&start))
 }

@@ -2,7 +2,7 @@
 //! independent of lanes.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State, state};
 
 /// Steps per period. A crossing of a wall and back within one step is missed.
 const STEPS: u32 = 1000;
@@ -42,7 +42,7 @@ const SIGN: [f64; 2] = [1.0, -1.0];
 impl March {
     pub(super) fn new(oscillator: &Oscillator, law: Law, start: State) -> March {
         let [[a, b], [c, d]] = oscillator.mass;
-        let [x1, v1, x2, v2] = start;
+        let [x1, v1, x2, v2, ..] = start;
         let mut march = March {
             oscillator: oscillator.clone(),
             law,
@@ -172,7 +172,7 @@ impl March {
         let mut y = self.y;
         (y[4], y[5]) = (1.0, 0.0);
         self.y = y;
-        [y[0], y[2], y[1], y[3]]
+        state(&[y[0], y[2], y[1], y[3]])
     }
 
     /// Returns the time at which the distance falls through zero. A gap that leaves a wall is off it at once.

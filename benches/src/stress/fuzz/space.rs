@@ -6,7 +6,7 @@ use super::each;
 use crate::stress::Watch;
 use rattlemap::gpu::Constants;
 use rattlemap::map::random::Random;
-use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::model::{GearPair, State, state};
 use rattlemap_dynamics::reference::Trajectory;
 
 /// Limit of bounded cells: steps per forcing period on the finest grid they need, and steps and root iterations of the
@@ -118,7 +118,7 @@ fn is_bounded((pair, start): &Start) -> bool {
 }
 
 /// Draws a start: at rest, between the walls, on a wall or behind it.
-fn start(pair: &GearPair, random: &mut Random) -> [f64; 4] {
+fn start(pair: &GearPair, random: &mut Random) -> State {
     let kind = random.unit();
     if kind < 0.5 {
         return REST;
@@ -131,7 +131,7 @@ fn start(pair: &GearPair, random: &mut Random) -> [f64; 4] {
     };
     let speed = pair.omega * pair.b;
     let (x2, w, v2) = (uniform(pair.b), uniform(4.0 * speed), uniform(4.0 * speed));
-    [gap + x2, w + v2, x2, v2]
+    state(&[gap + x2, w + v2, x2, v2])
 }
 
 /// Draws a cell of any magnitude.

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::map::scene::Along;
+use rattlemap_dynamics::model::state;
 
 const PLANE: &str = "parameters = { F = 40.0 }
 [[axis]]
@@ -90,10 +91,7 @@ fn settings_of_maps_are_ignored_in_the_text_and_refused_in_arguments() {
     );
     let scene = along(&of_a_map, &[], "e", &["omega=5"]).unwrap();
     assert_eq!(scene.outputs().files, [Format::Png]);
-    assert_eq!(
-        (scene.start(), scene.draw(), scene.refine()),
-        (Start::State([0.1, 0.0, 0.0, 0.0]), None, None)
-    );
+    assert_eq!((scene.start(), scene.draw(), scene.refine()), (Start::State(state(&[0.1])), None, None));
     assert_eq!(scene.integration().transient_periods, 77);
     let none = of_a_map.replace("'npy', 'png', 'html'", "'html'");
     assert_eq!(along(&none, &[], "e", &["omega=5"]).unwrap().outputs().files, [Format::Csv, Format::Png]);

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::model_file::FileModel;
+use rattlemap_dynamics::model::state;
 
 #[test]
 fn arguments_override_the_text() {
@@ -12,7 +13,7 @@ fn arguments_override_the_text() {
     assert_eq!((scene.axes()[0].count(), scene.title()), (8, "Set"));
     assert_eq!(scene.integration().max_period, 2);
     let scene = parse(GOOD, &["start.policy=state", "start.state=[1,2,3,4]", "axis.0.max = 0.5"]).unwrap();
-    assert_eq!((scene.start(), scene.axes()[0].max()), (Start::State([1.0, 2.0, 3.0, 4.0]), 0.5));
+    assert_eq!((scene.start(), scene.axes()[0].max()), (Start::State(state(&[1.0, 2.0, 3.0, 4.0])), 0.5));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::*;
 use crate::map::plan::Plan;
 use crate::map::scene::{CompanionFile, FileText};
 use rattlemap_dynamics::model::Stops;
+use rattlemap_dynamics::model::state;
 
 const START_PLANE: &str = "[parameters]\ne = 0.5\n\n[[axis]]\nstart = 'v1'\nmin = -2\nmax = 2\ncount = 5\n\n\
                      [[axis]]\nstart = 'x2'\nvalues = [-0.5, 0.25]\n";
@@ -29,7 +30,7 @@ fn cells_have_different_starts_and_share_one_flow() {
         assert_eq!((plan.flow_count(), plan.law_count(), plan.is_basin()), (1, 1, true));
         for id in 0..10 {
             let [v1, x2] = [-2.0 + f64::from(id % 5), [-0.5, 0.25][id as usize / 5]];
-            let start = [others[0], v1, x2, others[3]];
+            let start = state(&[others[0], v1, x2, others[3]]);
             assert_eq!((plan.cell(id).start, plan.start(id, &[])), (start, start));
             assert_eq!(plan.points().values(id as usize), [v1, x2]);
         }
@@ -41,7 +42,7 @@ fn one_axis_may_be_a_parameter() {
     let scene = map(START_PLANE, &["axis.1.parameter=omega", "axis.1.values=[2,4]"]).unwrap();
     let plan = Plan::new(&scene);
     assert_eq!((plan.flow_count(), plan.law_count()), (2, 1));
-    assert_eq!(plan.cell(9).start, [0.0, 2.0, 0.0, 0.0]);
+    assert_eq!(plan.cell(9).start, state(&[0.0, 2.0]));
     assert_eq!(plan.model(9).get("omega"), Ok(4.0));
     assert!(scene.is_basin());
     assert!(scene.fixed().all(|(parameter, _)| parameter.name != "omega"));
@@ -117,7 +118,7 @@ fn a_built_scene_has_axes_of_the_start() {
         .start_axis("v", 0.0..=2.0, 5)
         .build();
     let scene = scene.unwrap();
-    assert_eq!(Plan::new(&scene).cell(14).start, [0.5, 2.0, 0.0, 0.0]);
+    assert_eq!(Plan::new(&scene).cell(14).start, state(&[0.5, 2.0]));
     assert_eq!(scene.title().matches("at the start").count(), 2, "{}", scene.title());
     let identity = scene.identity();
     assert!(identity.contains(&("axis.0.start".to_owned(), "x".to_owned())), "{identity:?}");

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use rattlemap_dynamics::model::{Side, State};
+use rattlemap_dynamics::model::{Side, State, state};
 use rattlemap_dynamics::orbit::{Event, EventKind, Sample, is_reached};
 
 /// The motion between two events.
@@ -116,13 +116,13 @@ impl Pieces {
 mod tests {
     use super::*;
     fn event(kind: EventKind, t: f64) -> Event {
-        let (before, after) = ([0.5, 1.0, 0.0, 0.0], [0.5, 0.2, 0.0, 0.8]);
+        let (before, after) = (state(&[0.5, 1.0]), state(&[0.5, 0.2, 0.0, 0.8]));
         let meshing = (kind == EventKind::MeshStart).then_some(Side::Right);
         Event { kind, gap: 0, side: Side::Right, t, t_mod_period: t % 2.0, before, after, meshing }
     }
 
     fn sample(t: f64, meshing: Option<Side>) -> Sample {
-        Sample { t, state: [t, 0.0, 0.0, 0.0], meshing }
+        Sample { t, state: state(&[t]), meshing }
     }
 
     #[test]
@@ -143,8 +143,8 @@ mod tests {
         let motion = Motion::new(&events, &trace, 2.0);
         let modes: Vec<_> = motion.pieces.iter().map(|p| p.meshing).collect();
         assert_eq!(modes, [None, None, meshing, None]);
-        assert_eq!(motion.pieces[0].points.last().unwrap().1, [0.5, 1.0, 0.0, 0.0]);
-        assert_eq!(motion.pieces[1].points[0], (0.25, [0.5, 0.2, 0.0, 0.8]));
+        assert_eq!(motion.pieces[0].points.last().unwrap().1, state(&[0.5, 1.0]));
+        assert_eq!(motion.pieces[1].points[0], (0.25, state(&[0.5, 0.2, 0.0, 0.8])));
         // The sample at the start of meshing is skipped.
         assert_eq!(motion.pieces[2].points.len(), 3);
         assert_eq!(motion.pieces[3].span(), (0.8, 1.0));
