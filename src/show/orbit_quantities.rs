@@ -3,9 +3,9 @@
 use serde_json::{Map, Value};
 
 use crate::map::scene::Quantity;
+use crate::model_file::FileModel;
 use crate::show::names;
 use crate::show::numbers::Number;
-use crate::model_file::FileModel;
 use crate::show::symbols::with_unit;
 use rattlemap_dynamics::model::{Model, Side};
 use rattlemap_dynamics::number::significant;

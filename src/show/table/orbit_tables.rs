@@ -72,7 +72,8 @@ pub fn write_events(out: impl Write, model: &dyn Model, events: &[Event]) -> Res
         let numbers = [event.t, event.t_mod_period].into_iter().chain(states.copied());
         let texts = texts.into_iter().chain(numbers.map(|x| format!("{x:?}")));
         let impulse = impulse.map_or(String::new(), |x| format!("{x:?}"));
-        table.write_record(texts.chain([impulse]).chain(gaps.as_ref().map(|gaps| gaps[event.gap].clone())))?;
+        table
+            .write_record(texts.chain([impulse]).chain(gaps.as_ref().map(|gaps| gaps[event.gap].clone())))?;
     }
     Ok(table.flush()?)
 }

@@ -787,6 +787,12 @@ impl<'s> Motion<'s> {
         first_derivative(&self.domain, &self.domain.unit_row(gap), &self.point(), 2).0
     }
 
+    /// Whether the acceleration of a gap points in a direction.
+    fn is_pressed(&mut self, gap: usize, direction: Side) -> bool {
+        self.refresh();
+        direction.sign() * self.domain.accelerations[gap].dot(&self.point()) > 0.0
+    }
+
     /// Whether a gap at rest begins to move in a direction.
     fn heads(&mut self, gap: usize, direction: Side) -> bool {
         self.refresh();
@@ -801,6 +807,16 @@ impl<'s> Motion<'s> {
         self.y[gap] = wall.at;
         let closing = direction.sign() * self.rate(gap);
         if closing < 0.0 || closing == 0.0 && !self.heads(gap, direction) {
+            self.leave(gap, direction);
+            return;
+        }
+        let is_tiny = 0.0 < closing && closing < NO_SPEED * self.system.speed;
+        if is_tiny && !wall.contact.is_elastic() && !self.is_pressed(gap, direction) {
+            // Impacts of two gaps in turn end here: both leave their walls from rest.
+            self.y[self.system.n + gap] = 0.0;
+            self.near_grazing = true;
+            self.work.events += 1;
+            self.events_in_period += 1;
             self.leave(gap, direction);
             return;
         }
