@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use rattlemap_dynamics::model::{Side, State, state};
+use rattlemap_dynamics::model::{Side, State};
 use rattlemap_dynamics::orbit::{Event, EventKind, Sample, is_reached};
 
 /// The motion between two events.
@@ -115,6 +115,7 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::state;
     fn event(kind: EventKind, t: f64) -> Event {
         let (before, after) = (state(&[0.5, 1.0]), state(&[0.5, 0.2, 0.0, 0.8]));
         let meshing = (kind == EventKind::MeshStart).then_some(Side::Right);
