@@ -55,8 +55,9 @@ fn components(model: &dyn Model, state: &State) -> Vec<f64> {
 }
 
 fn events(model: &dyn Model, events: &[Event]) -> Vec<Value> {
+    let gaps = orbit_quantities::gaps(model);
     let event = |(event, impulse): (&Event, Option<f64>)| {
-        json!({
+        let mut object = json!({
             "kind": names::kind(event.kind),
             "side": names::side_code(event.side),
             "t": event.t,
@@ -64,7 +65,11 @@ fn events(model: &dyn Model, events: &[Event]) -> Vec<Value> {
             "before": components(model, &event.before),
             "after": components(model, &event.after),
             "impulse": impulse,
-        })
+        });
+        if let Some(gaps) = &gaps {
+            object["gap"] = json!(gaps[event.gap]);
+        }
+        object
     };
     events.iter().zip(orbit_quantities::impulses(model, events)).map(event).collect()
 }

@@ -5,9 +5,8 @@ use serde_json::{Map, Value};
 use crate::map::scene::Quantity;
 use crate::show::names;
 use crate::show::numbers::Number;
-use crate::show::orbit_spectrum::gap;
+use crate::model_file::FileModel;
 use crate::show::symbols::with_unit;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, Side};
 use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::{Event, Orbit};
@@ -33,14 +32,22 @@ fn approaches(orbit: &Orbit, side: Side) -> Option<[f64; 2]> {
     (speeds.count > 0).then_some([speeds.mean, speeds.largest])
 }
 
-/// Returns the impulse of each event on the gap: the jump of its velocity over the compliance of the gap. It is negative at the
+/// Returns the names of a model's gaps, if it has several.
+pub(crate) fn gaps(model: &dyn Model) -> Option<Vec<String>> {
+    let symbols = model.downcast_ref::<FileModel>()?.gap_symbols();
+    (symbols.len() > 1).then(|| symbols.into_iter().map(|[gap, _]| gap).collect())
+}
+
+/// Returns the impulse of each event on the gap: the jump of its velocity over the compliance of the gap, without
+/// impulses of other gaps that rest on their walls. It is negative at the
 /// right wall.
 pub(crate) fn impulses(model: &dyn Model, events: &[Event]) -> Vec<Option<f64>> {
-    let (oscillator, flow) = (model.oscillator().ok(), Flow::of(model).ok());
+    let oscillator = model.oscillator().ok();
     let of = |event: &Event| {
+        let oscillator = oscillator.as_ref()?;
         let [before, after] =
-            [event.before, event.after].map(|state| oscillator.as_ref().map(|o| gap(o, &state, 1)));
-        Some((after? - before?) / flow.as_ref()?.compliance())
+            [event.before, event.after].map(|state| oscillator.gap_value(event.gap, &state, 1));
+        Some((after - before) / oscillator.gap_mobility(event.gap))
     };
     events.iter().map(of).collect()
 }

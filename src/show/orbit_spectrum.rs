@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use rattlemap_dynamics::model::{Model, ModelError, Oscillator, Side, State};
+use rattlemap_dynamics::model::{GapRow, Model, ModelError, Oscillator, Side};
 use rattlemap_dynamics::orbit::{Class, Orbit, trace};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
@@ -22,6 +22,16 @@ const WINDOW_SAMPLES: usize = 1 << 19;
 /// Returns the samples per forcing period that figures need: 400, or 20 for each oscillation of the teeth in meshing, each
 /// oscillation of the highest harmonic and each stage if that is more.
 pub fn samples_per_period(oscillator: &Oscillator) -> usize {
+    if let Some(machine) = &oscillator.machine {
+        let ringing = |(i, gap): (usize, &GapRow)| {
+            let stiffest = gap.walls.iter().flatten().flat_map(|wall| &wall.springs);
+            let stiffest = stiffest.map(|spring| spring.stiffness).fold(0.0, f64::max);
+            (stiffest * machine.mobility(i)).sqrt() / machine.omega
+        };
+        let rates = machine.gaps.iter().enumerate().map(ringing);
+        let forced = [f64::from(machine.highest_order()), machine.schedule.len() as f64];
+        return per_period(rates.chain(forced));
+    }
     let ringing = |stage: usize| {
         let stage = oscillator.in_stage(stage);
         let stiffness = Side::BOTH.map(|side| stage.wall_stiffness_and_damping(side)[0]);
@@ -30,7 +40,12 @@ pub fn samples_per_period(oscillator: &Oscillator) -> usize {
     };
     let ringing = (0..oscillator.stage_count()).map(ringing);
     let forced = [f64::from(oscillator.highest_order()), oscillator.schedule.len() as f64];
-    (20.0 * ringing.chain(forced).fold(0.0, f64::max)).clamp(400.0, 50_000.0) as usize
+    per_period(ringing.chain(forced))
+}
+
+/// Returns the samples per forcing period for rates in multiples of the forcing frequency.
+fn per_period(rates: impl Iterator<Item = f64>) -> usize {
+    (20.0 * rates.fold(0.0, f64::max)).clamp(400.0, 50_000.0) as usize
 }
 
 /// Amplitudes at one frequency.
@@ -74,7 +89,7 @@ impl Spectrum {
         }
         // The last sample belongs to the next period.
         let values = |velocity| {
-            samples[..count].iter().map(|sample| gap(&oscillator, &sample.state, velocity)).collect()
+            samples[..count].iter().map(|sample| oscillator.gap_value(0, &sample.state, velocity)).collect()
         };
         let [z, w]: [Vec<f64>; 2] = [0, 1].map(values);
         let span = cycle.unwrap_or(WINDOW);
@@ -105,12 +120,6 @@ impl Spectrum {
             ),
         }
     }
-}
-
-/// Returns the gap of a state, or with `velocity` 1 its velocity.
-pub(crate) fn gap(oscillator: &Oscillator, state: &State, velocity: usize) -> f64 {
-    let [g1, g2] = oscillator.gap;
-    g1 * state[velocity] + g2 * state[2 + velocity]
 }
 
 /// Returns the amplitudes of a signal over windows. The mean is treated separately, because a window would spread it into the
@@ -232,7 +241,7 @@ mod tests {
         let (oscillator, count) = (pair.oscillator().unwrap(), 1 << 16);
         let samples = trace(&pair, orbit.strobe, orbit.strobe_meshing, 1, count).unwrap();
         let velocities: Vec<f64> =
-            samples[..count].iter().map(|sample| gap(&oscillator, &sample.state, 1)).collect();
+            samples[..count].iter().map(|sample| oscillator.gap_value(0, &sample.state, 1)).collect();
         let largest = spectrum.lines.iter().map(|line| line.amplitudes[1]).fold(0.0, f64::max);
         for (line, sampled) in spectrum.lines.iter().zip(amplitudes(&[&velocities], |_| 1.0)) {
             assert!((line.amplitudes[1] - sampled).abs() < 2e-4 * largest, "{line:?} {sampled}");

@@ -22,7 +22,7 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
     let measured = orbit_quantities::facts(model, orbit);
     for (label, value) in facts(model, orbit).into_iter().chain(measured).chain(instant) {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "{label:<22}{value}");
+        let _ = writeln!(text, "{label:<21} {value}");
     }
     if orbit.class == Class::Failed {
         return text;
@@ -64,7 +64,7 @@ pub fn history_summary(
     let end = history.samples.last().map(|sample| Instant { time: sample.t, state: sample.state });
     facts.extend(end.map(|end| ("end", state(model, end))));
     facts.extend(instant.map(|instant| ("state", state(model, instant))));
-    let mut text: String = facts.iter().map(|(label, value)| format!("{label:<22}{value}\n")).collect();
+    let mut text: String = facts.iter().map(|(label, value)| format!("{label:<21} {value}\n")).collect();
     text += &match history.meshing {
         Some(side) if history.events.is_empty() => {
             format!("\nno events: always in contact with the {} wall\n", names::side(side))
@@ -216,8 +216,11 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
         "impulse".to_owned(),
     ];
     let head = head.into_iter().chain(components(" before")).chain(components(" after")).collect();
+    let gaps = orbit_quantities::gaps(model);
     let row = |(event, impulse): &(&Event, Option<f64>)| -> Vec<String> {
-        let head = [names::kind(event.kind), names::side(event.side)].map(str::to_owned);
+        let side = names::side(event.side);
+        let side = gaps.as_ref().map_or(side.to_owned(), |gaps| format!("{} {side}", gaps[event.gap]));
+        let head = [names::kind(event.kind).to_owned(), side];
         let times = [event.t, event.t_mod_period].map(significant);
         let impulse = impulse.map_or("-".to_owned(), significant);
         let states = event.before[..count].iter().chain(&event.after[..count]).copied();

@@ -181,6 +181,12 @@ impl Machine {
         Machine { drives, schedule: schedule_at(&self.schedule, phase), ..self.clone() }
     }
 
+    /// Returns `row M^-1 row` for a gap, the change of its rate by a unit impulse along its row.
+    pub fn mobility(&self, gap: usize) -> f64 {
+        let row = &self.gaps[gap].row;
+        self.mass.clone().cholesky().map_or(f64::NAN, |factors| row.dot(&factors.solve(row)))
+    }
+
     /// Returns the stage that holds at phase 0.
     pub fn first_stage(&self) -> usize {
         match self.schedule.first() {

@@ -3,7 +3,7 @@
 use nalgebra::{Complex, Matrix2, Vector2};
 use thiserror::Error;
 
-use super::{Machine, Side};
+use super::{MOST_COORDINATES, Machine, Side, State};
 use crate::number::significant;
 
 /// Rounding error that checks of a matrix allow, relative to its entries.
@@ -226,20 +226,22 @@ pub struct Oscillator {
     /// rigid.
     pub friction: Vec<Friction>,
     /// The whole oscillator, if the fields above cannot describe it. It then has its own contact laws, and those fields have no meaning,
-    /// except `degrees` and `omega`. See [`Oscillator::of_machine`].
+    /// except `degrees`, `omega`, and for figures the first walls of the first gap. See [`Oscillator::of_machine`].
     pub machine: Option<Box<Machine>>,
 }
 
 impl Oscillator {
     /// Wraps a machine. Only the reference computes it.
     pub fn of_machine(machine: Machine) -> Oscillator {
+        let first = Side::BOTH.map(|side| machine.gaps[0].walls[side.index()].first().cloned());
+        let far = [f64::INFINITY, f64::NEG_INFINITY];
         let none = Domain { damping: [[0.0; 2]; 2], stiffness: [[0.0; 2]; 2], load: [0.0; 2], preload: 0.0 };
         Oscillator {
             degrees: machine.degrees(),
             mass: [[1.0, 0.0], [0.0, 1.0]],
             gap: [1.0, 0.0],
-            walls: [f64::INFINITY, f64::NEG_INFINITY],
-            contacts: [Contact::Rigid; 2],
+            walls: [0, 1].map(|i| first[i].as_ref().map_or(far[i], |wall| wall.at)),
+            contacts: [0, 1].map(|i| first[i].as_ref().map_or(Contact::Rigid, |wall| wall.contact)),
             omega: machine.omega,
             force: [0.0; 2],
             force_sin: [0.0; 2],
@@ -257,6 +259,37 @@ impl Oscillator {
     /// Returns the forcing period `2 pi / omega`.
     pub fn period(&self) -> f64 {
         std::f64::consts::TAU / self.omega
+    }
+
+    /// Returns the number of gaps.
+    pub fn gap_count(&self) -> usize {
+        self.machine.as_ref().map_or(1, |machine| machine.gaps.len())
+    }
+
+    /// Returns the row of a gap, one entry for each coordinate; 0 for those that it does not have.
+    pub fn gap_row(&self, gap: usize) -> [f64; MOST_COORDINATES] {
+        let mut row = [0.0; MOST_COORDINATES];
+        match &self.machine {
+            Some(machine) => machine.gaps[gap].row.iter().zip(&mut row).for_each(|(x, entry)| *entry = *x),
+            None => row[..2].copy_from_slice(&self.gap),
+        }
+        row
+    }
+
+    /// Returns a gap in a state, or with `velocity` 1 its rate.
+    pub fn gap_value(&self, gap: usize, state: &State, velocity: usize) -> f64 {
+        if self.machine.is_none() {
+            return self.gap[0] * state[velocity] + self.gap[1] * state[2 + velocity];
+        }
+        self.gap_row(gap).iter().enumerate().map(|(i, factor)| factor * state[2 * i + velocity]).sum()
+    }
+
+    /// Returns the change of a gap's rate by a unit impulse along its row.
+    pub fn gap_mobility(&self, gap: usize) -> f64 {
+        match &self.machine {
+            Some(machine) => machine.mobility(gap),
+            None => self.mobility(self.gap),
+        }
     }
 
     /// Returns the oscillator whose phase 0 is this phase of the forcing, in radians.
@@ -826,6 +859,9 @@ impl Oscillator {
     /// A factor on `walls`, the force and `load` that is a power of two multiplies the scale exactly. A change of the
     /// unit of time does not change it.
     pub fn length_scale(&self) -> f64 {
+        if let Some(machine) = &self.machine {
+            return machine.length_scale();
+        }
         let [right, left] = self.walls;
         let half = 0.5 * (right - left);
         if half.is_finite() && half > 0.0 {
@@ -871,6 +907,10 @@ impl Oscillator {
     /// solutions to solutions. The force must then have odd harmonics only, and stages must recur, mirrored, after half a
     /// period.
     pub fn mirror_symmetric(&self) -> bool {
+        if self.machine.is_some() {
+            // No search for symmetric orbits of machines is made.
+            return false;
+        }
         let is_mirrored = |a: Stage, b: Stage| {
             a.free == mirrored(&b.free)
                 && (!self.has_motion_behind(Side::Right)

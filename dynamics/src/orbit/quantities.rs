@@ -5,6 +5,7 @@
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
 use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule, Slips};
+use crate::reference::machine::{Flight, MachineEvent, Point, Signal};
 use crate::reference::{EventKind, FrictionEvent, GapEvent, Observer, Stop, Trajectory, side_of};
 
 /// Nodes in `(0, 1)` and weights of the Gauss-Legendre quadrature on `[-1, 1]`; the other half is symmetric.
@@ -206,9 +207,15 @@ impl<'f> Meter<'f> {
 
     /// Returns the quantities from the beginning to phase 0 of `period`.
     pub(super) fn finish(mut self, period: u64) -> Quantities {
-        self.complete_periods(period);
+        if self.flow.machine.is_none() {
+            self.complete_periods(period);
+        }
         let time = (period - self.first_period) as f64 * self.flow.period;
         let [right, left] = self.contacts;
+        let has_friction = match &self.flow.machine {
+            Some(system) => system.has_friction(),
+            None => self.flow.has_friction(),
+        };
         Quantities {
             approaches: [right, left, right.and(left)].map(Contacts::approaches),
             impact_energy: self.lost / time,
@@ -216,7 +223,7 @@ impl<'f> Meter<'f> {
                 .then(|| [self.force.high, (self.force.square / self.contact_time).sqrt()]),
             displacements: self.displacements.map(|moments| moments.over(time)),
             dissipated: self.dissipated / time,
-            friction: self.flow.has_friction().then(|| FrictionQuantities {
+            friction: has_friction.then(|| FrictionQuantities {
                 sticking: self.sticking_time / time,
                 dissipated: self.heat / time,
             }),
@@ -270,13 +277,11 @@ impl<'f> Meter<'f> {
 
     /// Measures a piece of at most one Taylor step, and returns its end.
     fn fly_piece(&mut self, piece: &Piece<'_>) -> Gap {
-        let below = GAUSS.iter().rev().map(|&(node, weight)| (-node, weight));
-        let nodes = below.chain(GAUSS).map(|(node, weight)| (0.5 + 0.5 * node, 0.5 * weight * piece.length));
         let mut before = (0.0, piece.q, piece.phasor);
         self.include(&before.1);
-        for (share, weight) in nodes {
+        for (share, weight) in nodes() {
             let (q, phasor) = piece.at(share);
-            self.integrate(weight, &q, phasor);
+            self.integrate(weight * piece.length, &q, phasor);
             self.find_extremes(piece, &before, &(share, q, phasor));
             before = (share, q, phasor);
         }
@@ -416,6 +421,69 @@ impl Observer for Meter<'_> {
         self.flow = self.stage.interval(self.interval).in_modes(self.slips);
         (self.q, self.t) = (event.at, event.t);
     }
+
+    fn measures(&self) -> bool {
+        true
+    }
+
+    fn machine_event(&mut self, event: &MachineEvent) {
+        let system = self.flow.machine.as_ref();
+        let has_impacts = system.is_some_and(|system| system.has_impacts(event.gap, event.side, event.wall));
+        if has_impacts && event.kind != EventKind::MeshEnd {
+            let approach = event.side.sign() * event.rates[0];
+            let of_side = &mut self.contacts[event.side.index()];
+            *of_side = of_side.and(Contacts { count: 1, sum: approach, largest: approach });
+        }
+    }
+
+    fn machine_loss(&mut self, energy: f64) {
+        self.lost += energy;
+    }
+
+    fn machine_flight(&mut self, flight: &Flight<'_>) {
+        let (displacements, forces) = (flight.displacements(), flight.contact_forces());
+        let mut before: Option<(f64, Point)> = None;
+        for (share, weight) in nodes().into_iter().chain([(1.0, 0.0)]) {
+            let point = flight.at(share);
+            let (sin, cos) = (self.flow.omega * (flight.start + share * flight.duration)).sin_cos();
+            let weight = weight * flight.duration;
+            for (moments, signal) in self.displacements.iter_mut().zip(&displacements) {
+                moments.integrate(weight, signal.at(&point), [cos, sin]);
+            }
+            self.dissipated += weight * flight.dissipation(&point);
+            self.heat += weight * flight.heat(&point);
+            for signal in &forces {
+                self.force.square += weight * signal.at(&point).powi(2);
+                self.contact_time += weight;
+            }
+            if flight.sticks() {
+                self.sticking_time += weight;
+            }
+            let (start, from) = before.unwrap_or_else(|| (0.0, flight.at(0.0)));
+            let of_displacements = self.displacements.iter_mut().zip(&displacements);
+            let include = |moments: &mut Moments, signal: &Signal| {
+                moments.include(signal.at(&from));
+                moments.include(signal.at(&point));
+                if signal.rate(&from) * signal.rate(&point) < 0.0 {
+                    let rate = |share: f64| signal.rate(&flight.at(share));
+                    moments.include(signal.at(&flight.at(root(start, share, rate))));
+                }
+            };
+            of_displacements.for_each(|(moments, signal)| include(moments, signal));
+            for signal in &forces {
+                include(&mut self.force, signal);
+            }
+            before = Some((share, point));
+        }
+    }
+}
+
+/// Returns nodes and weights of the quadrature on `[0, 1]`.
+fn nodes() -> [(f64, f64); 8] {
+    std::array::from_fn(|i| {
+        let (node, weight) = if i < 4 { GAUSS[3 - i] } else { GAUSS[i - 4] };
+        (0.5 + 0.5 * if i < 4 { -node } else { node }, 0.5 * weight)
+    })
 }
 
 /// Time as a share of a piece, state and phasor.
@@ -437,30 +505,35 @@ impl Piece<'_> {
         (expansion.state(v), expansion.phasor(self.linear.turn * v))
     }
 
-    /// Returns the state at a zero of `rate` between two instants at which it has opposite signs, by the method of
-    /// regula falsi with Anderson and Bjorck's weights (BIT 13, 1973).
-    fn root(&self, mut a: f64, mut b: f64, rate: impl Fn(&Instant) -> f64) -> Gap {
-        let at = |share| {
+    /// Returns the state at a zero of `rate` between two instants at which it has opposite signs.
+    fn root(&self, a: f64, b: f64, rate: impl Fn(&Instant) -> f64) -> Gap {
+        let of = |share| {
             let (q, phasor) = self.at(share);
-            (q, rate(&(share, q, phasor)))
+            rate(&(share, q, phasor))
         };
-        let (mut fa, mut fb) = (at(a).1, at(b).1);
-        let mut best = self.q;
-        for _ in 0..EXTREME_ITERATIONS {
-            let c = b - fb * (b - a) / (fb - fa);
-            let (q, fc) = at(c);
-            best = q;
-            if fc == 0.0 || (c - b).abs() <= f64::EPSILON {
-                break;
-            }
-            if fc * fb < 0.0 {
-                (a, fa) = (b, fb);
-            } else {
-                let weight = 1.0 - fc / fb;
-                fa *= if weight > 0.0 { weight } else { 0.5 };
-            }
-            (b, fb) = (c, fc);
-        }
-        best
+        self.at(root(a, b, of)).0
     }
+}
+
+/// Returns a zero of a function between two numbers at which it has opposite signs, by the method of regula falsi with Anderson and
+/// Bjorck's weights (BIT 13, 1973).
+fn root(mut a: f64, mut b: f64, of: impl Fn(f64) -> f64) -> f64 {
+    let (mut fa, mut fb) = (of(a), of(b));
+    let mut best = a;
+    for _ in 0..EXTREME_ITERATIONS {
+        let c = b - fb * (b - a) / (fb - fa);
+        let fc = of(c);
+        best = c;
+        if fc == 0.0 || (c - b).abs() <= f64::EPSILON {
+            break;
+        }
+        if fc * fb < 0.0 {
+            (a, fa) = (b, fb);
+        } else {
+            let weight = 1.0 - fc / fb;
+            fa *= if weight > 0.0 { weight } else { 0.5 };
+        }
+        (b, fb) = (c, fc);
+    }
+    best
 }

@@ -5,7 +5,7 @@ use super::itinerary::{Itinerary, Recorder};
 use super::quantities::{Meter, Quantities};
 use crate::flow::{DomainKind, Flow};
 use crate::model::{Side, State};
-use crate::reference::machine::{MachineEvent, SlipEvent};
+use crate::reference::machine::{Flight, MachineEvent, SlipEvent};
 use crate::reference::{EventKind, FrictionEvent, GapEvent, Observer, Stop, Trajectory};
 use crate::word::Word;
 
@@ -110,7 +110,20 @@ impl Observer for Log<'_> {
         self.times.push(event.t);
     }
 
+    fn measures(&self) -> bool {
+        self.meter.is_some()
+    }
+
+    fn machine_flight(&mut self, flight: &Flight<'_>) {
+        self.meter.iter_mut().for_each(|meter| meter.machine_flight(flight));
+    }
+
+    fn machine_loss(&mut self, energy: f64) {
+        self.meter.iter_mut().for_each(|meter| meter.machine_loss(energy));
+    }
+
     fn machine_event(&mut self, event: &MachineEvent) {
+        self.meter.iter_mut().for_each(|meter| meter.machine_event(event));
         self.recorders[(event.period - self.start) as usize].machine_event(event);
         self.symbols.extend(event.symbol);
         self.times.push(event.t);

@@ -2,7 +2,7 @@
 
 use std::ops::AddAssign;
 
-use super::machine::{MachineEvent, SlipEvent};
+use super::machine::{Flight, MachineEvent, SlipEvent};
 use super::side_of;
 use crate::flow::{Gap, Slips};
 use crate::model::Side;
@@ -110,6 +110,17 @@ pub trait Observer {
 
     /// Receives one change of a friction mode of a machine, in order of time with the events at walls.
     fn machine_slip(&mut self, _: &SlipEvent) {}
+
+    /// Whether flights and losses of machines are to be reported.
+    fn measures(&self) -> bool {
+        false
+    }
+
+    /// Receives a flight of a machine, within one domain.
+    fn machine_flight(&mut self, _: &Flight<'_>) {}
+
+    /// Receives the energy that a machine loses at an instant: in impacts, and in springs of contacts that end.
+    fn machine_loss(&mut self, _: f64) {}
 }
 
 impl Observer for () {

@@ -23,12 +23,15 @@
 
 mod domain;
 mod events;
+mod flight;
 mod modes;
 mod motion;
 mod polynomial;
 mod system;
 
 pub use events::{MachineEvent, SlipEvent};
+pub use flight::Flight;
+pub(crate) use flight::Signal;
 pub use motion::Motion;
 pub use system::System;
 

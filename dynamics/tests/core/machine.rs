@@ -6,7 +6,9 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{
     Drive, DryFriction, Forces, GapRow, Law, Machine, Oscillator, Restitution, Side, Spring, Wall,
 };
-use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Orbit, Settings, Status, analyse_flow, measure};
+use rattlemap_dynamics::orbit::{
+    Class, EVENT_PERIODS, Orbit, Quantities, Settings, Status, analyse_flow, measure,
+};
 use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, System};
 use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Stop};
 use rayon::prelude::*;
@@ -218,6 +220,19 @@ fn machines_with_friction_and_all_else() {
     );
 }
 
+/// Whether all measured quantities agree.
+fn same_quantities(a: &Orbit, b: &Orbit) -> bool {
+    let (Some(a), Some(b)) = (a.quantities, b.quantities) else { return false };
+    let list = |q: &Quantities| {
+        let approaches = q.approaches.iter().flat_map(|a| [a.count as f64, a.mean, a.largest]);
+        let displacements = q.displacements.iter().flat_map(|d| [d.amplitude, d.mean, d.rms, d.harmonic[0]]);
+        let friction = q.friction.map_or([0.0; 2], |friction| [friction.sticking, friction.dissipated]);
+        let others = [q.impact_energy, q.dissipated].into_iter().chain(q.contact_force.unwrap_or_default());
+        approaches.chain(displacements).chain(friction).chain(others).collect::<Vec<f64>>()
+    };
+    list(&a).iter().zip(list(&b)).all(|(a, b)| (a - b).abs() <= 1e-9 * (1.0 + a.abs()))
+}
+
 /// The analysis of an oscillator and of the same as a machine.
 #[test]
 fn machines_have_the_classes_of_their_oscillators() {
@@ -247,6 +262,7 @@ fn machines_have_the_classes_of_their_oscillators() {
             && measured.period == Some(period)
             && measured.word.as_ref() == Some(&expected.word)
             && (radius(&found) - radius(&expected)).abs() < 1e-7
+            && same_quantities(&found, &expected)
             && (found.mesh_fraction - expected.mesh_fraction).abs() < 1e-9
             && (found.impacts_per_period - expected.impacts_per_period).abs() < 1e-9;
         (agrees, format!("{seed}: {expected:?}\n{found:?}\n{measured:?}"))

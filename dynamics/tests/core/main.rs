@@ -12,6 +12,7 @@ mod friction;
 mod independent;
 mod instants;
 mod machine;
+mod machines;
 mod one_wall;
 mod orbits;
 mod paper;

@@ -6,7 +6,7 @@ use crate::model_file::gap_names;
 use crate::show::error::WriteError;
 use crate::show::names;
 use crate::show::orbit_quantities;
-use crate::show::orbit_spectrum::{Spectrum, gap};
+use crate::show::orbit_spectrum::Spectrum;
 use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Event, EventKind, History, is_reached};
 
@@ -32,7 +32,7 @@ pub fn moments(oscillator: &Oscillator, history: &History) -> Vec<Moment> {
     let History { samples, events, samples_per_period, forcing_period, .. } = history;
     let mut moments = Vec::with_capacity(samples.len() + 2 * events.len());
     let mut add = |t, phase, state: &State, domain, event| {
-        let gap = [0, 1].map(|velocity| gap(oscillator, state, velocity));
+        let gap = [0, 1].map(|velocity| oscillator.gap_value(0, state, velocity));
         moments.push(Moment { t, phase, gap, state: *state, domain: domain_name(domain), event });
     };
     let mut events = events.iter().peekable();
@@ -55,20 +55,24 @@ pub fn moments(oscillator: &Oscillator, history: &History) -> Vec<Moment> {
     moments
 }
 
-/// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`.
+/// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`. With several gaps, the last column is the name of
+/// the gap.
 pub fn write_events(out: impl Write, model: &dyn Model, events: &[Event]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
     let names = model.state_names();
     let states = ["before", "after"].into_iter();
     let states = states.flat_map(|moment| names.iter().map(move |name| format!("{moment}_{name}")));
     let head = ["kind", "side", "t", "t_mod_period"].map(str::to_owned).into_iter().chain(states);
-    table.write_record(head.chain(["impulse".to_owned()]))?;
+    let gaps = orbit_quantities::gaps(model);
+    let of_gap = gaps.as_ref().map(|_| "gap".to_owned());
+    table.write_record(head.chain(["impulse".to_owned()]).chain(of_gap))?;
     for (event, impulse) in events.iter().zip(orbit_quantities::impulses(model, events)) {
         let texts = [names::kind(event.kind).to_owned(), names::side_code(event.side).to_string()];
         let states = [&event.before, &event.after].into_iter().flat_map(|state| &state[..names.len()]);
         let numbers = [event.t, event.t_mod_period].into_iter().chain(states.copied());
         let texts = texts.into_iter().chain(numbers.map(|x| format!("{x:?}")));
-        table.write_record(texts.chain([impulse.map_or(String::new(), |x| format!("{x:?}"))]))?;
+        let impulse = impulse.map_or(String::new(), |x| format!("{x:?}"));
+        table.write_record(texts.chain([impulse]).chain(gaps.as_ref().map(|gaps| gaps[event.gap].clone())))?;
     }
     Ok(table.flush()?)
 }

@@ -68,6 +68,8 @@ pub(super) struct Domain {
     pub(super) accelerations: Vec<Row>,
     /// Whether the acceleration of each coordinate is exactly 0, because constraints hold it.
     pub(super) is_still: [bool; SIZE],
+    /// Damping matrix, with the dampers of contacts.
+    pub(super) damping: DMatrix<f64>,
     /// Longest step.
     pub(super) unit: f64,
     /// Rows of the forces with which rigid walls push gaps that rest on them.
@@ -134,6 +136,7 @@ impl Domain {
             accelerations: (0..n).map(|i| row(&bound, i)).collect(),
             is_still,
             unit: RADIUS / system.rate(&stiffness, &damping),
+            damping,
             pushes,
             holds,
         }
@@ -151,6 +154,24 @@ impl Domain {
         let mut rate = [0.0; WIDTH];
         self.differentiate(point, 1.0, &mut rate);
         rate
+    }
+
+    /// Returns the time derivative of a functional along the motion, as a functional.
+    pub(super) fn rate_of(&self, row: &Row) -> Row {
+        let n = self.n;
+        let mut rate = [0.0; WIDTH];
+        rate[n..2 * n].copy_from_slice(&row.0[..n]);
+        for (acceleration, &factor) in
+            self.accelerations.iter().zip(&row.0[n..]).filter(|(_, factor)| **factor != 0.0)
+        {
+            rate.iter_mut().zip(&acceleration.0).for_each(|(rate, x)| *rate += factor * x);
+        }
+        for (k, omega) in self.rates.iter().enumerate() {
+            let at = 2 * (n + k);
+            rate[at] += omega * row.0[at + 1];
+            rate[at + 1] -= omega * row.0[at];
+        }
+        Row(rate)
     }
 
     /// Writes `factor` times the time derivative of a point to `rate`.
@@ -176,6 +197,17 @@ impl Domain {
             let (done, next) = series.split_at_mut(k + 1);
             self.differentiate(&done[k], h / (k + 1) as f64, &mut next[0]);
         }
+    }
+
+    /// Returns the whole point at a share of a step.
+    pub(super) fn point(&self, series: &Series, share: f64) -> Point {
+        let mut point = [0.0; WIDTH];
+        for term in series.iter().rev() {
+            for (x, term) in point.iter_mut().zip(&term[..self.width]) {
+                *x = *x * share + term;
+            }
+        }
+        point
     }
 
     /// Returns the state at a share of a step.

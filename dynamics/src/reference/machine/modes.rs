@@ -82,15 +82,15 @@ pub(super) struct AtRest {
 
 /// Returns the first derivative of a row that is not zero within rounding, from the derivative `first` on, and its order.
 pub(super) fn first_derivative(domain: &Domain, row: &Row, point: &Point, first: usize) -> (usize, f64) {
-    let mut rate = *point;
+    let mut rate = row.clone();
     for order in 0..first + DERIVATIVES {
         if order >= first {
-            let value = row.dot(&rate);
-            if value.abs() > ROUNDING * row.size(&rate) {
+            let value = rate.dot(point);
+            if value.abs() > ROUNDING * rate.size(point) {
                 return (order, value);
             }
         }
-        rate = domain.derivative(&rate);
+        rate = domain.rate_of(&rate);
     }
     (first + DERIVATIVES, 0.0)
 }

@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 
 use super::domain::{Constraint, Constraints, Domain, DomainKey, Row, Series};
 use super::events::{MachineEvent, SlipEvent};
+use super::flight::Flight;
 use super::modes::{AtRest, GapMode, Modes, ROUNDING, first_derivative};
 use super::polynomial::{Fall, ORDER, first_fall};
 use super::system::System;
@@ -57,6 +58,17 @@ enum Watch {
     RateVanishes(usize),
     /// A holding force reaches its limit for sliding in a direction.
     Slips(usize, Slip),
+}
+
+/// What an impact leads to.
+struct Outcome {
+    /// Modes and state if the gap leaves the wall.
+    free: Modes,
+    bounced: Numbers,
+    /// Modes and state if contact lasts.
+    lasting: Option<(Modes, Numbers)>,
+    /// Acceleration towards the wall, in free motion after the impact, or its first derivative that is not 0.
+    pressing: f64,
 }
 
 /// The motion of a machine, with any number of tangent vectors.
@@ -521,6 +533,19 @@ impl<'s> Motion<'s> {
         let first = self.first_event(&point, &series);
         let (share, time) = first.map_or((1.0, h), |(share, _)| (share, share * h));
         if share > 0.0 {
+            if observer.measures() {
+                let (system, start) = (self.system, self.clock.time());
+                let (domain, modes, series) = (&*self.domain, &self.modes, &*series);
+                observer.machine_flight(&Flight {
+                    system,
+                    domain,
+                    modes,
+                    series,
+                    share,
+                    duration: time,
+                    start,
+                });
+            }
             self.advance(&series, share, time);
         }
         self.series = Some(series);
@@ -617,7 +642,11 @@ impl<'s> Motion<'s> {
         }
         (self.before, self.reset) = (self.y, None);
         let field = self.domain.derivative(&self.point());
+        let energy = self.system.energy(&self.modes, &self.y);
         self.act(watch, observer);
+        if observer.measures() {
+            observer.machine_loss(energy - self.system.energy(&self.modes, &self.y));
+        }
         self.refresh();
         if !self.tangents.is_empty() {
             self.saltate(watch, &row, &field);
@@ -824,49 +853,24 @@ impl<'s> Motion<'s> {
         let (system, n) = (self.system, self.system.n);
         let (approach, number) = (side.sign() * self.rate(gap), system.walls(gap, side).len() - 1);
         let [e, slope] = wall.restitution.at(approach);
-        let (kick, let_go) = self.joint_impact(gap, side);
-        let leaving = e * approach;
-        let before = self.y;
-        let after = |change: f64| {
-            let mut y = before;
-            (0..n).for_each(|i| y[n + i] += kick[i] * change);
-            y
+        let mut kept = [false; MOST_GAPS];
+        let (kick, Outcome { free, bounced, lasting, pressing }) = loop {
+            let (kick, let_go) = self.joint_impact(gap, side, kept);
+            let outcome = self.outcome(gap, side, wall, e, &kick, let_go);
+            // Gaps that would fly too low rest on, or two walls in a corner would be hit in turn infinitely often.
+            let (modes, y) = outcome.lasting.unwrap_or((outcome.free, outcome.bounced));
+            let (domain, point) = (system.domain(modes.key(system)), system.point(&y, self.clock.time()));
+            let low = (0..system.gaps()).find(|&other| {
+                let GapMode::Stuck(side) = self.modes.gaps[other] else { return false };
+                let (row, leaving) = (domain.unit_row(other), -side.sign() * y[n + other]);
+                let presses = side.sign() * first_derivative(&domain, &row, &point, 2).1 > 0.0;
+                let_go[other] && presses && leaving <= self.lowest_speed(&domain, other, &point)
+            });
+            match low {
+                Some(other) => kept[other] = true,
+                None => break (kick, outcome),
+            }
         };
-        let mut modes = self.modes;
-        for other in (0..system.gaps()).filter(|&other| let_go[other]) {
-            let GapMode::Stuck(side) = modes.gaps[other] else { continue };
-            modes.gaps[other] = self.before_last(other, side);
-        }
-        let t = self.clock.time();
-        // Free motion after the impact.
-        let mut bounced = after(-side.sign() * (1.0 + e) * approach);
-        bounced[n + gap] = -side.sign() * leaving;
-        let (free, _) = self.slide_after_jump(&modes, &kick, &mut bounced, None);
-        let point = system.point(&bounced, t);
-        let domain = system.domain(free.key(system));
-        let row = domain.unit_row(gap);
-        let pressing = side.sign() * first_derivative(&domain, &row, &point, 2).1;
-        let lowest =
-            (2.0 * LOWEST_FLIGHT * system.length * domain.accelerations[gap].dot(&point).abs()).sqrt();
-        let is_slow = leaving <= wall.mesh_speed.max(lowest);
-        let mut lasting = None;
-        if is_slow && wall.contact == Contact::Rigid {
-            let mut stopped = after(-side.sign() * approach);
-            stopped[n + gap] = 0.0;
-            let mut held = modes;
-            held.gaps[gap] = GapMode::Stuck(side);
-            let (held, fits) = self.slide_after_jump(&held, &kick, &mut stopped, Some((gap, side)));
-            if fits && held.gaps[gap] == GapMode::Stuck(side) {
-                lasting = Some((held, stopped));
-            }
-        } else if is_slow && pressing > 0.0 {
-            let mut meshing = free;
-            meshing.gaps[gap] = if leaving > 0.0 { GapMode::Onset(side) } else { GapMode::Pressed(side) };
-            let domain = system.domain(meshing.key(system));
-            if side.sign() * first_derivative(&domain, &row, &point, 2).1 > 0.0 {
-                lasting = Some((meshing, bounced));
-            }
-        }
         if lasting.is_none() && pressing <= 0.0 && approach < GRAZING_SPEED * system.speed {
             self.near_grazing = true;
         }
@@ -897,9 +901,68 @@ impl<'s> Motion<'s> {
         self.before = self.y;
     }
 
+    /// Returns the leaving speed of a flight that is not followed in a series of impacts.
+    fn lowest_speed(&self, domain: &Domain, gap: usize, point: &Point) -> f64 {
+        let pressing = domain.accelerations[gap].dot(point).abs();
+        (2.0 * LOWEST_FLIGHT * self.system.length * pressing).sqrt()
+    }
+
+    /// Returns what an impact leads to, given its coefficient of restitution, the changes of all rates, and which gaps at rest it lets go.
+    fn outcome(
+        &self,
+        gap: usize,
+        side: Side,
+        wall: &Wall,
+        e: f64,
+        kick: &[f64],
+        let_go: [bool; MOST_GAPS],
+    ) -> Outcome {
+        let (system, n) = (self.system, self.system.n);
+        let approach = side.sign() * self.rate(gap);
+        let leaving = e * approach;
+        let after = |change: f64| {
+            let mut y = self.y;
+            (0..n).for_each(|i| y[n + i] += kick[i] * change);
+            y
+        };
+        let mut modes = self.modes;
+        for other in (0..system.gaps()).filter(|&other| let_go[other]) {
+            let GapMode::Stuck(side) = modes.gaps[other] else { continue };
+            modes.gaps[other] = self.before_last(other, side);
+        }
+        let mut bounced = after(-side.sign() * (1.0 + e) * approach);
+        bounced[n + gap] = -side.sign() * leaving;
+        let (free, _) = self.slide_after_jump(&modes, kick, &mut bounced, None);
+        let point = system.point(&bounced, self.clock.time());
+        let domain = system.domain(free.key(system));
+        let row = domain.unit_row(gap);
+        let pressing = side.sign() * first_derivative(&domain, &row, &point, 2).1;
+        let is_slow = leaving <= wall.mesh_speed.max(self.lowest_speed(&domain, gap, &point));
+        let mut lasting = None;
+        if is_slow && wall.contact == Contact::Rigid {
+            let mut stopped = after(-side.sign() * approach);
+            stopped[n + gap] = 0.0;
+            let mut held = modes;
+            held.gaps[gap] = GapMode::Stuck(side);
+            let (held, fits) = self.slide_after_jump(&held, kick, &mut stopped, Some((gap, side)));
+            if fits && held.gaps[gap] == GapMode::Stuck(side) {
+                lasting = Some((held, stopped));
+            }
+        } else if is_slow && pressing > 0.0 {
+            let mut meshing = free;
+            meshing.gaps[gap] = if leaving > 0.0 { GapMode::Onset(side) } else { GapMode::Pressed(side) };
+            let domain = system.domain(meshing.key(system));
+            if side.sign() * first_derivative(&domain, &row, &point, 2).1 > 0.0 {
+                lasting = Some((meshing, bounced));
+            }
+        }
+        Outcome { free, bounced, lasting, pressing }
+    }
+
     /// Returns the changes of all rates by an impulse that changes the gap's rate by 1, and which gaps at rest on rigid walls it lets go. The
     /// others stay at rest in the same impact, because their walls push.
-    fn joint_impact(&self, gap: usize, side: Side) -> (Vec<f64>, [bool; MOST_GAPS]) {
+    /// The gaps that are `kept` rest on in any case.
+    fn joint_impact(&self, gap: usize, side: Side, kept: [bool; MOST_GAPS]) -> (Vec<f64>, [bool; MOST_GAPS]) {
         let (system, n) = (self.system, self.system.n);
         let resting: Vec<(usize, Side)> = (0..system.gaps())
             .filter_map(|other| match self.modes.gaps[other] {
@@ -926,12 +989,15 @@ impl<'s> Motion<'s> {
             });
             let impulses = among.try_inverse().map_or(impulse.clone(), |inverse| inverse * &impulse);
             let push = held.iter().zip(impulses.iter()).all(|((other, side), impulse)| {
-                -side.sign() * impulse
-                    >= -ROUNDING * (system.mobility[(gap, gap)] / system.mobility[(*other, *other)]).sqrt()
-                        / own
+                kept[*other]
+                    || -side.sign() * impulse
+                        >= -ROUNDING
+                            * (system.mobility[(gap, gap)] / system.mobility[(*other, *other)]).sqrt()
+                            / own
             });
             let leave = resting.iter().enumerate().filter(|(bit, _)| released >> bit & 1 == 1);
-            let leave = { leave }.all(|(_, &(other, at))| -side.sign() * kick[other] * at.sign() <= 0.0);
+            let leave = { leave }
+                .all(|(_, &(other, at))| !kept[other] && -side.sign() * kick[other] * at.sign() <= 0.0);
             (kick, push && leave)
         };
         for released in 0..1 << resting.len() {
@@ -1096,10 +1162,10 @@ impl<'s> Motion<'s> {
                 }
             }
         }
-        // A gap at rest on its wall may have got another acceleration.
+        // A gap on its wall may have got another rate or acceleration.
         for gap in 0..self.system.gaps() {
-            if let (Some((side, order)), true) = (self.at_wall[gap], self.rate(gap) == 0.0)
-                && order < RELEASE_ORDER
+            if let Some((side, order)) = self.at_wall[gap]
+                && (order < RELEASE_ORDER || self.rate(gap) != 0.0)
             {
                 self.leave(gap, side);
             }

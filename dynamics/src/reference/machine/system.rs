@@ -6,6 +6,7 @@ use std::sync::{Arc, RwLock};
 use nalgebra::{DMatrix, DVector};
 
 use super::domain::{Domain, DomainKey};
+use super::modes::ROUNDING;
 use super::{Numbers, Point, SIZE};
 use crate::model::{Contact, Machine, Side, Wall};
 
@@ -43,7 +44,8 @@ pub struct System {
     pub(super) escape: f64,
     /// `d = to_flow x`, and its inverse.
     to_flow: DMatrix<f64>,
-    from_flow: DMatrix<f64>,
+    pub(super) from_flow: DMatrix<f64>,
+    pub(super) mass: DMatrix<f64>,
     /// Inverse of the mass matrix, and the inverse of its Cholesky factor.
     pub(super) mobility: DMatrix<f64>,
     pub(super) mass_scale: DMatrix<f64>,
@@ -68,7 +70,7 @@ impl System {
         let mobility = 0.5 * (&mobility + mobility.transpose());
         let mass = &back * &machine.mass * &from_flow;
         let mass = 0.5 * (&mass + mass.transpose());
-        let factor = mass.cholesky().expect("the mass matrix is positive definite").l();
+        let factor = mass.clone().cholesky().expect("the mass matrix is positive definite").l();
         let mass_scale = factor.try_inverse().expect("the factor is regular");
         let stages: Vec<StageForces> = machine
             .stages
@@ -81,10 +83,12 @@ impl System {
             .collect();
         let with_force = machine.friction.iter().filter(|friction| friction.force > 0.0);
         let elements = with_force
-            .map(|friction| Element {
-                row: &back * &friction.row,
-                force: friction.force,
-                speed: friction.speed,
+            .map(|friction| {
+                let row = &back * &friction.row;
+                // A row along a gap must not have rounding errors in other entries.
+                let least = ROUNDING * row.amax();
+                let row = row.map(|x| if x.abs() > least { x } else { 0.0 });
+                Element { row, force: friction.force, speed: friction.speed }
             })
             .collect();
         let period = machine.period();
@@ -100,6 +104,7 @@ impl System {
             schedule: machine.schedule.iter().map(|&(turns, stage)| (turns * period, stage)).collect(),
             to_flow,
             from_flow,
+            mass,
             mobility,
             mass_scale,
             stages,

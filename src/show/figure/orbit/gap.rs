@@ -266,14 +266,13 @@ impl OrbitPlot<'_> {
     }
 
     fn gap(&self, state: &State) -> f64 {
-        let [g1, g2] = self.oscillator.gap;
-        g1 * state[0] + g2 * state[2]
+        self.oscillator.gap_value(0, state, 0)
     }
 
     /// Returns the gap as an expression of the displacements.
     fn gap_expression(&self) -> String {
         let mut text = String::new();
-        let terms = self.oscillator.gap.into_iter().zip(self.names.iter().step_by(2));
+        let terms = self.oscillator.gap_row(0).into_iter().zip(self.names.iter().step_by(2));
         for (factor, name) in terms.filter(|(factor, _)| *factor != 0.0) {
             text += match (text.is_empty(), factor < 0.0) {
                 (true, true) => "\u{2212}",

@@ -90,7 +90,10 @@ impl Pieces {
     /// Ends a piece at an event and starts the next.
     fn cross(&mut self, t: f64, event: &Event) {
         self.open().points.push((t, event.before));
-        self.0.push(Piece { meshing: event.meshing, points: vec![(t, event.after)] });
+        let before = self.open().meshing;
+        // Contacts of further gaps are marked, but have no colour.
+        let meshing = if event.gap == 0 { event.meshing } else { before };
+        self.0.push(Piece { meshing, points: vec![(t, event.after)] });
     }
 
     fn push(&mut self, t: f64, sample: &Sample) {

@@ -85,8 +85,8 @@ impl OrbitPlot<'_> {
     /// Draws the walls that the motion reaches, if the gap depends only on this displacement.
     fn draw_upright_walls(&self, canvas: &Canvas, frame: &Frame, displacement: usize) {
         let Rect { left, top, right, bottom } = frame.rect;
-        let gap = self.oscillator.gap;
-        if gap[1 - displacement] != 0.0 {
+        let gap = self.oscillator.gap_row(0);
+        if gap.iter().enumerate().any(|(i, factor)| i != displacement && *factor != 0.0) {
             return;
         }
         for side in self.motion.walls() {

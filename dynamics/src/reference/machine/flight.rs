@@ -1,0 +1,135 @@
+//! What is measured on a flight of a machine.
+
+use super::Point;
+use super::domain::{Domain, Row, Series};
+use super::modes::Modes;
+use super::system::System;
+use crate::flow::Slip;
+use crate::model::Side;
+
+/// A flight within one domain, of at most one Taylor step.
+pub struct Flight<'a> {
+    pub(super) system: &'a System,
+    pub(super) domain: &'a Domain,
+    pub(super) modes: &'a Modes,
+    pub(super) series: &'a Series,
+    /// The part of the series that the flight takes.
+    pub(super) share: f64,
+    /// Duration, and time of the start since phase 0.
+    pub(crate) duration: f64,
+    pub(crate) start: f64,
+}
+
+/// A linear function of the motion, and its rate.
+pub(crate) struct Signal {
+    value: Row,
+    rate: Row,
+}
+
+impl Signal {
+    /// Returns the value at a point.
+    pub(crate) fn at(&self, point: &Point) -> f64 {
+        self.value.dot(point)
+    }
+
+    /// Returns the rate at a point.
+    pub(crate) fn rate(&self, point: &Point) -> f64 {
+        self.rate.dot(point)
+    }
+}
+
+impl Flight<'_> {
+    /// Returns the point after a share of the flight.
+    pub(crate) fn at(&self, share: f64) -> Point {
+        self.domain.point(self.series, self.share * share)
+    }
+
+    fn signal(&self, value: Row) -> Signal {
+        Signal { rate: self.domain.rate_of(&value), value }
+    }
+
+    /// Returns the first two displacements and the first gap. A single coordinate has a second one that is 0.
+    pub(crate) fn displacements(&self) -> [Signal; 3] {
+        let [first, second] = [0, 1].map(|i| self.system.displacement_row(i));
+        [first, second, self.domain.unit_row(0)].map(|row| self.signal(row))
+    }
+
+    /// Returns the forces of the compliant contacts, positive where they push.
+    pub(crate) fn contact_forces(&self) -> Vec<Signal> {
+        let key = self.modes.key(self.system);
+        let engaged = (0..self.system.gaps()).filter(|&gap| key.engaged[gap] != 0);
+        engaged
+            .map(|gap| {
+                let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
+                let (sign, mut row) = (side.sign(), self.domain.unit_row(gap).scaled(0.0));
+                for wall in &self.system.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())] {
+                    let spring = wall.springs[self.modes.stage];
+                    row.0[gap] += sign * spring.stiffness;
+                    row.0[self.system.n + gap] += sign * spring.damping;
+                    row = row.plus(spring.preload - sign * spring.stiffness * wall.at, self.system.width());
+                }
+                self.signal(row)
+            })
+            .collect()
+    }
+
+    /// Returns the power that all dampers take at a point.
+    pub(crate) fn dissipation(&self, point: &Point) -> f64 {
+        let n = self.system.n;
+        let rates = &point[n..2 * n];
+        (0..n).map(|i| rates[i] * (0..n).map(|j| self.domain.damping[(i, j)] * rates[j]).sum::<f64>()).sum()
+    }
+
+    /// Returns the power that dry friction turns into heat at a point.
+    pub(crate) fn heat(&self, point: &Point) -> f64 {
+        let elements = self.system.elements.iter().enumerate().zip(self.modes.slips);
+        let power = |((i, element), slip): ((usize, &super::system::Element), Slip)| {
+            element.force * slip.sign() * self.system.rate_row(i, self.domain).dot(point)
+        };
+        elements.map(power).sum()
+    }
+
+    /// Whether an element with dry friction sticks.
+    pub(crate) fn sticks(&self) -> bool {
+        self.system.elements.iter().zip(self.modes.slips).any(|(_, slip)| slip == Slip::Stick)
+    }
+}
+
+impl System {
+    /// Returns the row of a displacement; 0 for one that the machine does not have.
+    fn displacement_row(&self, i: usize) -> Row {
+        let mut row = [0.0; super::WIDTH];
+        if i < self.n {
+            (0..self.n).for_each(|j| row[j] = self.from_flow[(i, j)]);
+        }
+        Row(row)
+    }
+
+    /// Returns the part of the energy that events change: kinetic energy, and that of the springs and preloads of contacts.
+    pub(super) fn energy(&self, modes: &Modes, y: &[f64]) -> f64 {
+        let (n, key) = (self.n, modes.key(self));
+        let rates = &y[n..2 * n];
+        let kinetic: f64 =
+            (0..n).map(|i| rates[i] * (0..n).map(|j| self.mass[(i, j)] * rates[j]).sum::<f64>()).sum();
+        let of_gap = |gap: usize| {
+            let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
+            let walls = &self.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())];
+            let of_wall = |wall: &crate::model::Wall| {
+                let (spring, depth) = (wall.springs[modes.stage], y[gap] - wall.at);
+                0.5 * spring.stiffness * depth * depth + spring.preload * side.sign() * depth
+            };
+            walls.iter().map(of_wall).sum::<f64>()
+        };
+        0.5 * kinetic + (0..self.gaps()).map(of_gap).sum::<f64>()
+    }
+
+    /// Whether the law of restitution applies to a wall.
+    pub(crate) fn has_impacts(&self, gap: usize, side: Side, wall: usize) -> bool {
+        !self.walls(gap, side)[wall].contact.is_elastic()
+    }
+
+    /// Whether the machine has dry friction.
+    pub(crate) fn has_friction(&self) -> bool {
+        !self.elements.is_empty()
+    }
+}

@@ -1,0 +1,490 @@
+//! What happens at events of a machine.
+
+use rattlemap_dynamics::model::{Contact, Side};
+
+use super::motion::{End, Event, Gap, Mode, Motion, What, side_of, step_of};
+use super::system::{Grip, Linear, Matrix, ROUNDING, Row, Vector};
+
+/// Height of flights, in scales of length, that end a series of impacts.
+const LOWEST_FLIGHT: f64 = 1e-13;
+
+/// Derivative of the state after an event by that before it at a fixed time, and the row that is constant where the event lies.
+type Saltation = (Matrix, Row);
+
+/// The change of velocities in a joint impact: for a change of the gap's rate by 1, with the gaps that rest on.
+struct Joint {
+    change: Vector,
+    /// Gaps that walls release, with the sides of these.
+    released: Vec<(usize, Side)>,
+}
+
+impl Motion<'_> {
+    /// Ends a flight.
+    pub(super) fn act(&mut self, end: End, at_start: bool) {
+        let (grips, mut stuck, before) = (self.grips.clone(), self.stuck(), self.field());
+        let (n, system) = (self.system.degrees, self.system);
+        let one = Matrix::identity(2 * n, 2 * n);
+        let (mut stops, mut jumps) = (None, false);
+        let saltation: Option<Saltation> = match end {
+            End::Rests(i) => {
+                (self.grips[i], stops) = (Grip::Stick, Some(i));
+                Some((one, system.slides[i].clone()))
+            }
+            End::Slips(i, grip) => {
+                let linear = self.linear();
+                (self.grips[i], self.orders[i]) = (grip, 2);
+                self.loosen(i, &linear);
+                Some((one, linear.hold[i].clone()))
+            }
+            End::Crosses(i, direction) => {
+                let events = self.events.len();
+                let reset = self.cross(i, direction, at_start);
+                jumps = self.events.len() > events;
+                reset.map(|reset| (reset, system.z[i].clone()))
+            }
+            End::OnsetEnds(i, side) => {
+                self.enter(i, side);
+                None
+            }
+            End::PressingEnds(i, side) => {
+                let row = self.linear().acceleration[i].clone();
+                self.ends(i, side);
+                Some((one, row))
+            }
+            // The acceleration is continuous, so tangents do not jump.
+            End::PulledOff(i, side) => {
+                self.ends(i, side);
+                self.gaps[i].leaves = Some((side, 3));
+                stuck[i] = None;
+                None
+            }
+            End::Opens(i, side) => {
+                let row = self.pushing(i).expect("the wall only pushes");
+                self.ends(i, side);
+                (self.gaps[i].mode, self.gaps[i].is_unloaded) = (Mode::Open, true);
+                Some((one, row))
+            }
+            End::Closes(i, side) => {
+                let row = self.pushing(i).expect("the wall only pushes");
+                self.record(i, What::Begins, side);
+                let gap = &mut self.gaps[i];
+                (gap.mode, gap.leaves, gap.is_unloaded) = (Mode::Plain, None, true);
+                Some((one, row))
+            }
+        };
+        self.settle(&grips, &stuck, stops, jumps);
+        if let Some((reset, row)) = saltation {
+            self.jump(&reset, &row, &before);
+        }
+    }
+
+    /// The state and the tangents are continuous at a change of the stage.
+    pub(super) fn change(&mut self, stage: usize) {
+        self.stage = stage;
+        let (grips, stuck) = (self.grips.clone(), self.stuck());
+        self.settle(&grips, &stuck, None, true);
+    }
+
+    /// Returns the sides of rigid walls that gaps are at rest on.
+    fn stuck(&self) -> Vec<Option<Side>> {
+        let of = |gap: &Gap| if let Mode::Stuck(side) = gap.mode { Some(side) } else { None };
+        self.gaps.iter().map(of).collect()
+    }
+
+    /// Decides about all that is at rest, ends contacts that are not pressed, and records what the elements do then. They did `before`,
+    /// and the sliding rate of `stops` has become 0. Forces of walls that only push may have jumped.
+    fn settle(&mut self, before: &[Grip], stuck: &[Option<Side>], stops: Option<usize>, jumps: bool) {
+        if jumps {
+            (0..self.gaps.len()).for_each(|i| self.push(i));
+        }
+        let undecided = (self.grips.clone(), self.stuck());
+        loop {
+            self.decide();
+            let linear = self.linear();
+            let is_unpressed = |&i: &usize| {
+                let gap = &self.gaps[i];
+                matches!(gap.mode, Mode::Onset(side)
+                    if !gap.is_unpressed && !linear.is_still[i] && !self.presses(&linear, i, side))
+            };
+            let Some(i) = (0..self.gaps.len()).find(is_unpressed) else { break };
+            self.grips.clone_from(&undecided.0);
+            for (gap, side) in self.gaps.iter_mut().zip(&undecided.1) {
+                if let &Some(side) = side {
+                    (gap.mode, gap.leaves) = (Mode::Stuck(side), None);
+                }
+            }
+            let side = self.gaps[i].contact().expect("an onset");
+            self.ends(i, side);
+        }
+        for (i, side) in stuck.iter().enumerate() {
+            if let &Some(side) = side
+                && !matches!(self.gaps[i].mode, Mode::Stuck(_))
+            {
+                self.record_as(i, What::Ends, side, Some(contact_symbol(side)));
+            }
+        }
+        for (i, &before) in before.iter().enumerate() {
+            let after = self.grips[i];
+            if after != Grip::Stick && after != before && (before == Grip::Stick || stops == Some(i)) {
+                self.slips.push((if before == Grip::Stick { b'7' } else { b'0' }, self.time()));
+            }
+        }
+        self.project();
+    }
+
+    /// Opens or closes the contact with a wall that only pushes by the sign of its force.
+    fn push(&mut self, i: usize) {
+        let mode = self.gaps[i].mode;
+        if self.gaps[i].is_unloaded || !matches!(mode, Mode::Plain | Mode::Open) || self.pushing(i).is_none()
+        {
+            if mode == Mode::Open && self.pushing(i).is_none() {
+                // Without preload and damper, the force behind the wall pushes.
+                self.record(i, What::Begins, side_of(self.gaps[i].level));
+                self.gaps[i].mode = Mode::Plain;
+            }
+            return;
+        }
+        let side = side_of(self.gaps[i].level);
+        let closes = self.closes(i);
+        if mode == Mode::Plain && !closes {
+            let leaves = self.gaps[i].leaves;
+            self.ends(i, side);
+            (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Open, leaves);
+        } else if mode == Mode::Open && closes {
+            self.record(i, What::Begins, side);
+            self.gaps[i].mode = Mode::Plain;
+        }
+    }
+
+    /// Chooses the first consistent modes of all that is at rest: for walls holding before releasing, for friction sticking before a
+    /// positive and a negative rate. The first gap or element changes last.
+    pub(super) fn decide(&mut self) {
+        let stuck = self.stuck();
+        let walls: Vec<(usize, Side)> = (0..stuck.len()).filter_map(|i| Some((i, stuck[i]?))).collect();
+        let sticking: Vec<usize> = (0..self.grips.len()).filter(|&i| self.grips[i] == Grip::Stick).collect();
+        if walls.is_empty() && sticking.is_empty() {
+            return;
+        }
+        let (gaps, grips, orders) = (self.gaps.clone(), self.grips.clone(), self.orders.clone());
+        let sets = 2usize.pow(walls.len() as u32) * 3usize.pow(sticking.len() as u32);
+        for set in 0..sets {
+            (self.gaps, self.grips, self.orders) = (gaps.clone(), grips.clone(), orders.clone());
+            let mut rest = set;
+            for &i in sticking.iter().rev() {
+                self.grips[i] = [Grip::Stick, Grip::Plus, Grip::Minus][rest % 3];
+                self.orders[i] = usize::from(!rest.is_multiple_of(3));
+                rest /= 3;
+            }
+            for &(i, side) in walls.iter().rev() {
+                if !rest.is_multiple_of(2) {
+                    (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Plain, Some((side, 1)));
+                }
+                rest /= 2;
+            }
+            let linear = self.linear();
+            if walls.iter().all(|&(i, side)| self.is_wall_consistent(&linear, i, side))
+                && sticking.iter().all(|&i| self.is_grip_consistent(&linear, i))
+            {
+                for &(i, side) in &walls {
+                    if self.gaps[i].mode == Mode::Plain {
+                        self.leave(i, side, true);
+                    }
+                }
+                return;
+            }
+        }
+        (self.gaps, self.grips, self.orders) = (gaps, grips, orders);
+    }
+
+    fn is_wall_consistent(&self, linear: &Linear, i: usize, side: Side) -> bool {
+        let tends = |row: &Row| side.sign() * linear.tendency(row, &self.y);
+        match self.gaps[i].mode {
+            Mode::Stuck(_) => tends(&linear.pressing[i]) > 0.0,
+            _ => linear.is_still[i] || tends(&linear.acceleration[i]) <= 0.0,
+        }
+    }
+
+    fn is_grip_consistent(&self, linear: &Linear, i: usize) -> bool {
+        match self.grips[i] {
+            Grip::Stick if linear.is_idle[i] => true,
+            Grip::Stick => {
+                self.limits(linear, i).iter().all(|(room, _)| linear.tendency(room, &self.y) >= 0.0)
+            }
+            grip => {
+                let row = &self.system.slides[i] * &linear.a;
+                grip.sign() * linear.tendency(&row, &self.y) > 0.0
+            }
+        }
+    }
+
+    /// Whether the acceleration of a gap presses it to a wall.
+    fn presses(&self, linear: &Linear, i: usize, side: Side) -> bool {
+        !linear.is_still[i] && side.sign() * linear.tendency(&linear.acceleration[i], &self.y) > 0.0
+    }
+
+    /// An element slips. Gaps that it held begin to move, without an acceleration at first. On a rigid wall such a gap may be pressed into
+    /// the wall, and rests on. `before` is the domain in which the element stuck.
+    fn loosen(&mut self, element: usize, before: &Linear) {
+        for i in 0..self.gaps.len() {
+            let linear = self.linear();
+            if !before.is_still[i] || linear.is_still[i] {
+                continue;
+            }
+            let growth = self.of(&(&linear.acceleration[i] * &linear.a)).signum();
+            let wall =
+                self.gaps[i].leaves.filter(|(side, _)| side.sign() == growth).and_then(|(direction, _)| {
+                    let (side, nth) = self.next_wall(i, direction).filter(|wall| wall.0 == direction)?;
+                    Some((side, self.system.machine.gaps[i].walls[side.index()][nth].contact))
+                });
+            match (self.gaps[i].mode, wall) {
+                (Mode::Onset(side), _) if side.sign() == growth => self.gaps[i].is_unpressed = true,
+                (Mode::Onset(side), _) => self.ends(i, side),
+                (Mode::Plain, Some((side, Contact::Rigid))) => {
+                    self.record(i, What::Begins, side);
+                    (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Stuck(side), None);
+                    self.grips[element] = Grip::Stick;
+                }
+                (Mode::Plain, Some((side, _))) => {
+                    self.record(i, What::Begins, side);
+                    self.enter(i, side);
+                    self.gaps[i].leaves = Some((side.mirrored(), 3));
+                }
+                (_, _) => self.gaps[i].leaves = self.gaps[i].leaves.map(|(side, _)| (side, 3)),
+            }
+        }
+    }
+
+    /// Crosses a wall: the gap is then behind it, or in front of it again.
+    fn enter(&mut self, i: usize, direction: Side) {
+        let gap = &mut self.gaps[i];
+        gap.level += step_of(direction);
+        (gap.mode, gap.leaves) = (Mode::Plain, Some((direction.mirrored(), 1)));
+    }
+
+    /// A gap reaches a wall. Returns the change of tangents at a fixed time, if the field jumps.
+    fn cross(&mut self, i: usize, direction: Side, at_start: bool) -> Option<Matrix> {
+        let (side, nth) = self.next_wall(i, direction).expect("a wall");
+        let closing = self.rate(i, direction);
+        if closing <= 0.0 && (at_start || closing < 0.0) {
+            self.gaps[i].leaves = Some((direction, 1));
+            return None;
+        }
+        if let Mode::Onset(own) = self.gaps[i].mode {
+            self.ends(i, own);
+        }
+        let one = Matrix::identity(2 * self.system.degrees, 2 * self.system.degrees);
+        if side != direction {
+            let is_open = self.gaps[i].mode == Mode::Open;
+            if !is_open {
+                self.record(i, What::Ends, side);
+            }
+            self.enter(i, direction);
+            return (!is_open).then_some(one);
+        }
+        match self.system.machine.gaps[i].walls[side.index()][nth].contact {
+            Contact::Impact | Contact::Rigid => Some(self.impact(i, side, nth, closing)),
+            contact => {
+                let origin = self.gaps[i].clone();
+                self.enter(i, direction);
+                if contact == Contact::Pushing && !self.closes(i) {
+                    self.gaps[i].mode = Mode::Open;
+                    return None;
+                }
+                self.record_as(i, What::Begins, side, symbol(&origin, side));
+                Some(one)
+            }
+        }
+    }
+
+    /// Returns the joint impact of a gap with a wall. Gaps at rest on rigid walls rest on if this needs a push of their walls, and the gaps of
+    /// `keep` in any case.
+    fn joint(&self, i: usize, side: Side, keep: &[usize]) -> Joint {
+        let (machine, stuck) = (&self.system.machine, self.stuck());
+        let walls: Vec<(usize, Side)> = (0..stuck.len()).filter_map(|j| Some((j, stuck[j]?))).collect();
+        let hit = &machine.gaps[i].row;
+        for set in 0..2usize.pow(walls.len() as u32) {
+            let is_released = |j: usize| set >> (walls.len() - 1 - j) & 1 == 1;
+            let (released, held): (Vec<_>, Vec<_>) = (0..walls.len()).partition(|&j| is_released(j));
+            let rows: Vec<&Vector> =
+                held.iter().map(|&j| &machine.gaps[walls[j].0].row).chain([hit]).collect();
+            let change = self.system.bonds(&rows).pop().expect("the gap").0;
+            // The impulses of the walls: the rate of the gap changes towards the inside, and those of held gaps do not.
+            let all = Matrix::from_columns(&rows.iter().map(|row| (*row).clone()).collect::<Vec<_>>());
+            let mobility = all.transpose() * &self.system.per_mass * &all;
+            let mut rates = Vector::zeros(rows.len());
+            rates[rows.len() - 1] = -side.sign();
+            let impulses = mobility.try_inverse().expect("independent rows") * rates;
+            let size: f64 = impulses.iter().zip(&rows).map(|(p, row)| p.abs() * row.norm()).sum();
+            let pushes = held.iter().enumerate().all(|(at, &j)| {
+                let is_kept = keep.contains(&walls[j].0);
+                is_kept || -walls[j].1.sign() * impulses[at] * rows[at].norm() >= -ROUNDING * size
+            });
+            let leaves = released.iter().all(|&j| {
+                let (other, own) = walls[j];
+                let rate = machine.gaps[other].row.dot(&change) * -side.sign();
+                !keep.contains(&other) && own.sign() * rate < 0.0
+            });
+            if pushes && leaves {
+                return Joint { change, released: released.into_iter().map(|j| walls[j]).collect() };
+            }
+        }
+        panic!("one set of walls pushes")
+    }
+
+    /// An impact, of which contact may remain. Returns the change of tangents at a fixed time.
+    fn impact(&mut self, i: usize, side: Side, nth: usize, closing: f64) -> Matrix {
+        let (n, system) = (self.system.degrees, self.system);
+        let (gap, s) = (&system.machine.gaps[i], side.sign());
+        let wall = &gap.walls[side.index()][nth];
+        let [mut e, mut slope] = wall.restitution.at(closing);
+        let start = self.clone();
+        // The state after the impact, with this restitution and this mode of the gap.
+        let after = |motion: &mut Self, joint: &Joint, e: f64, mode: Mode| {
+            motion.y.clone_from(&start.y);
+            motion.gaps.clone_from(&start.gaps);
+            motion.grips.clone_from(&start.grips);
+            motion.orders.clone_from(&start.orders);
+            let mut velocities = motion.y.rows_mut(n, n);
+            velocities -= &joint.change * (s * (1.0 + e) * closing);
+            for &(j, side) in &joint.released {
+                (motion.gaps[j].mode, motion.gaps[j].leaves) = (Mode::Plain, Some((side, 1)));
+            }
+            (motion.gaps[i].mode, motion.gaps[i].leaves) = (mode, Some((side, 1)));
+            motion.begin_slides(&joint.change, (1.0 + e) * closing);
+            motion.decide();
+        };
+        let limit = |motion: &Self, gap: usize| {
+            let acceleration = motion.of(&motion.linear().acceleration[gap]).abs();
+            (2.0 * LOWEST_FLIGHT * system.length * acceleration).sqrt()
+        };
+        let (mut keep, mut joint) = (Vec::new(), self.joint(i, side, &[]));
+        let mut lasts;
+        loop {
+            lasts = false;
+            after(self, &joint, e, Mode::Plain);
+            if e * closing <= wall.mesh_speed.max(limit(self, i)) {
+                if wall.contact == Contact::Rigid {
+                    after(self, &joint, 0.0, Mode::Stuck(side));
+                    lasts = matches!(self.gaps[i].mode, Mode::Stuck(_));
+                } else if self.presses(&self.linear(), i, side) {
+                    after(self, &joint, e, if e > 0.0 { Mode::Onset(side) } else { Mode::Plain });
+                    if e == 0.0 {
+                        self.enter(i, side);
+                        self.gaps[i].leaves = Some((side.mirrored(), 2));
+                        self.decide();
+                    }
+                    lasts = self.presses(&self.linear(), i, side);
+                }
+                if !lasts {
+                    after(self, &joint, e, Mode::Plain);
+                }
+            }
+            // Gaps that begin a flight which is too low rest on, or impacts of two gaps in turn could be infinitely many.
+            let linear = self.linear();
+            let low = joint
+                .released
+                .iter()
+                .find(|&&(j, own)| self.presses(&linear, j, own) && -self.rate(j, own) <= limit(self, j));
+            let Some(&(j, _)) = low else { break };
+            self.corners += 1;
+            keep.push(j);
+            joint = start.joint(i, side, &keep);
+        }
+        if lasts && wall.contact == Contact::Rigid {
+            (e, slope) = (0.0, 0.0);
+        }
+        let what = if lasts { What::Begins } else { What::Impact };
+        self.record_as(i, what, side, symbol(&start.gaps[i], side));
+        if !lasts {
+            self.leave(i, side, e == 0.0);
+        } else if matches!(self.gaps[i].mode, Mode::Stuck(_)) {
+            self.gaps[i].leaves = None;
+        }
+        let mut reset = Matrix::identity(2 * n, 2 * n);
+        let mut velocities = reset.view_mut((n, n), (n, n));
+        velocities -= &joint.change * gap.row.transpose() * (1.0 + e + slope * closing);
+        reset
+    }
+
+    /// Begins to slide after an impact that has changed the rate of a gap. Gaps that friction holds on a wall may move.
+    fn begin_slides(&mut self, kick: &Vector, change: f64) {
+        for (i, friction) in self.system.machine.friction.iter().enumerate() {
+            let along = friction.row.dot(kick);
+            if along.abs() > ROUNDING * friction.row.norm() * kick.norm() {
+                self.grips[i] = self.grip(i, ROUNDING * (along * change).abs());
+                self.orders[i] = 0;
+            }
+        }
+        let kicked: Vec<f64> = self.system.machine.gaps.iter().map(|gap| gap.row.dot(kick)).collect();
+        for (i, kicked) in kicked.into_iter().enumerate() {
+            if let Some((side, order)) = self.gaps[i].leaves
+                && order > 1
+                && kicked.abs() > ROUNDING * kick.norm()
+            {
+                self.gaps[i].leaves = Some((side, 1)).filter(|_| self.rate(i, side) < 0.0);
+            }
+        }
+    }
+
+    pub(super) fn field(&self) -> Vector {
+        &self.linear().a * &self.y
+    }
+
+    /// Applies the derivative of an event to the tangents. The event lies where `row y` is constant; `before` is the field before it,
+    /// and state and modes are those after it.
+    fn jump(&mut self, reset: &Matrix, row: &Row, before: &Vector) {
+        if self.tangents.is_none() {
+            return;
+        }
+        let size = 2 * self.system.degrees;
+        let change = self.field().rows(0, size) - reset * before.rows(0, size);
+        let rate = (row * before)[0];
+        let saltation = reset + change * row.columns(0, size) / rate;
+        self.tangents = self.tangents.take().map(|tangents| saltation * tangents);
+    }
+
+    /// Contact ends, and the gap moves without its last wall.
+    fn ends(&mut self, i: usize, side: Side) {
+        self.record(i, What::Ends, side);
+        (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Plain, None);
+    }
+
+    fn leave(&mut self, i: usize, side: Side, is_at_rest: bool) {
+        let linear = self.linear();
+        let row = &linear.acceleration[i];
+        let size: f64 = row.iter().zip(self.y.iter()).map(|(a, b)| (a * b).abs()).sum();
+        let order = match is_at_rest {
+            false => 1,
+            true if self.of(row).abs() > ROUNDING * size => 2,
+            true => 3,
+        };
+        (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Plain, Some((side, order)));
+    }
+
+    fn record(&mut self, i: usize, what: What, side: Side) {
+        let symbol = symbol(&self.gaps[i], side);
+        self.record_as(i, what, side, symbol);
+    }
+
+    fn record_as(&mut self, i: usize, what: What, side: Side, symbol: Option<u8>) {
+        self.gaps[i].origin = Some(side);
+        self.events.push(Event { gap: i, what, side, symbol, t: self.time() });
+    }
+}
+
+fn contact_symbol(side: Side) -> u8 {
+    if side == Side::Right { b'1' } else { b'4' }
+}
+
+/// Returns the symbol of a flight that ends at a wall.
+fn symbol(gap: &Gap, side: Side) -> Option<u8> {
+    if let Some(side) = gap.contact() {
+        return Some(contact_symbol(side));
+    }
+    gap.origin.map(|from| match (from, from == side) {
+        (Side::Right, true) => b'2',
+        (Side::Right, false) => b'3',
+        (Side::Left, true) => b'5',
+        (Side::Left, false) => b'6',
+    })
+}

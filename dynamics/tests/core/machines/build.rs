@@ -1,0 +1,158 @@
+//! Machines from oscillators, and machines from machines.
+
+use nalgebra::{DMatrix, DVector};
+use rattlemap_dynamics::model::{
+    Domain, Drive, DryFriction, Forces, GapRow, Law, Machine, Oscillator, Restitution, Side, Spring, Wall,
+};
+
+/// Returns the machine that moves like an oscillator.
+pub(crate) fn machine_of(o: &Oscillator, law: Law) -> Machine {
+    let n = o.degrees;
+    let vector = |v: [f64; 2]| DVector::from_fn(n, |i, _| v[i]);
+    let matrix = |m: [[f64; 2]; 2]| DMatrix::from_fn(n, n, |i, j| m[i][j]);
+    let (gap, stages) = (vector(o.gap), 0..o.stage_count());
+    let along = |m: DMatrix<f64>| gap.dot(&(m * &gap)) / gap.norm_squared().powi(2);
+    let spring = |before: &Domain, behind: &Domain| Spring {
+        stiffness: along(matrix(behind.stiffness) - matrix(before.stiffness)).max(0.0),
+        // Without a damper, the difference of the matrices is rounding.
+        damping: if behind.damping == before.damping {
+            0.0
+        } else {
+            along(matrix(behind.damping) - matrix(before.damping))
+        },
+        preload: behind.preload,
+    };
+    let walls = |side: Side| -> Vec<Wall> {
+        let i = side.index();
+        if o.walls[i].is_infinite() {
+            return Vec::new();
+        }
+        let mut before: Vec<Domain> = stages.clone().map(|stage| o.stage(stage).free).collect();
+        let first: Vec<Domain> = stages.clone().map(|stage| o.stage(stage).meshing[i]).collect();
+        let outer = o.outer_walls[i].iter().map(|wall| (wall.at, wall.contact, wall.meshing.clone()));
+        let wall = |(at, contact, behind): (f64, _, Vec<Domain>)| {
+            let springs = before.iter().zip(&behind).map(|(before, behind)| spring(before, behind)).collect();
+            before = behind;
+            let restitution = Restitution::constant(law.restitution[i]);
+            Wall { at, contact, restitution, mesh_speed: law.mesh_speed[i], springs }
+        };
+        std::iter::once((o.walls[i], o.contacts[i], first)).chain(outer).map(wall).collect()
+    };
+    let forces = |stage: usize| {
+        let Domain { damping, stiffness, load, .. } = o.stage(stage).free;
+        Forces { damping: matrix(damping), stiffness: matrix(stiffness), load: vector(load) }
+    };
+    let drive = |order: u32, cos, sin| Drive { order, cos: vector(cos), sin: vector(sin) };
+    Machine {
+        omega: o.omega,
+        mass: matrix(o.mass),
+        stages: stages.clone().map(forces).collect(),
+        schedule: o.schedule.clone(),
+        drives: o.all_harmonics().map(|h| drive(h.order, h.cos, h.sin)).collect(),
+        gaps: vec![GapRow { row: gap.clone(), walls: Side::BOTH.map(walls) }],
+        friction: (o.friction.iter())
+            .map(|friction| DryFriction {
+                row: vector(friction.row),
+                force: friction.force,
+                speed: friction.speed,
+            })
+            .collect(),
+    }
+}
+
+/// Returns the machine of machines side by side that do not touch each other. It has the frequency and the schedule of the first one, and
+/// all others have one stage.
+pub(crate) fn side_by_side(machines: &[Machine]) -> Machine {
+    let n: usize = machines.iter().map(Machine::degrees).sum();
+    let stages = machines[0].stages.len();
+    let (mut at, mut offsets) = (0, Vec::new());
+    for machine in machines {
+        offsets.push(at);
+        at += machine.degrees();
+    }
+    let matrix = |of: &dyn Fn(&Machine) -> DMatrix<f64>| {
+        let mut all = DMatrix::zeros(n, n);
+        for (machine, &at) in machines.iter().zip(&offsets) {
+            all.view_mut((at, at), (machine.degrees(), machine.degrees())).copy_from(&of(machine));
+        }
+        all
+    };
+    let wide = |v: &DVector<f64>, at: usize| {
+        let mut all = DVector::zeros(n);
+        all.rows_mut(at, v.len()).copy_from(v);
+        all
+    };
+    let forces = |stage: usize| {
+        let of = |machine: &Machine| machine.stages[stage.min(machine.stages.len() - 1)].clone();
+        Forces {
+            damping: matrix(&|machine| of(machine).damping),
+            stiffness: matrix(&|machine| of(machine).stiffness),
+            load: machines.iter().zip(&offsets).map(|(machine, &at)| wide(&of(machine).load, at)).sum(),
+        }
+    };
+    let (mut drives, mut gaps, mut friction) = (Vec::<Drive>::new(), Vec::new(), Vec::new());
+    for (machine, &at) in machines.iter().zip(&offsets) {
+        for drive in &machine.drives {
+            let (cos, sin) = (wide(&drive.cos, at), wide(&drive.sin, at));
+            match drives.iter_mut().find(|other| other.order == drive.order) {
+                Some(other) => {
+                    other.cos += cos;
+                    other.sin += sin;
+                }
+                None => drives.push(Drive { order: drive.order, cos, sin }),
+            }
+        }
+        for gap in &machine.gaps {
+            let mut gap = GapRow { row: wide(&gap.row, at), walls: gap.walls.clone() };
+            for wall in gap.walls.iter_mut().flatten() {
+                let last = wall.springs[wall.springs.len() - 1];
+                wall.springs.resize(stages, last);
+            }
+            gaps.push(gap);
+        }
+        let moved = machine.friction.iter().map(|one| DryFriction { row: wide(&one.row, at), ..one.clone() });
+        friction.extend(moved);
+    }
+    drives.sort_by_key(|drive| drive.order);
+    Machine {
+        omega: machines[0].omega,
+        mass: matrix(&|machine| machine.mass.clone()),
+        stages: (0..stages).map(forces).collect(),
+        schedule: machines[0].schedule.clone(),
+        drives,
+        gaps,
+        friction,
+    }
+}
+
+/// Returns the machine in coordinates `q` with `x = t q`.
+pub(crate) fn in_coordinates(machine: &Machine, t: &DMatrix<f64>) -> Machine {
+    let square = |m: &DMatrix<f64>| {
+        let all = t.transpose() * m * t;
+        // Rounding must not make a symmetric matrix unsymmetric.
+        let is_symmetric = *m == m.transpose();
+        if is_symmetric { (&all + all.transpose()) * 0.5 } else { all }
+    };
+    let vector = |v: &DVector<f64>| t.transpose() * v;
+    Machine {
+        omega: machine.omega,
+        mass: square(&machine.mass),
+        stages: (machine.stages.iter())
+            .map(|forces| Forces {
+                damping: square(&forces.damping),
+                stiffness: square(&forces.stiffness),
+                load: vector(&forces.load),
+            })
+            .collect(),
+        schedule: machine.schedule.clone(),
+        drives: (machine.drives.iter())
+            .map(|drive| Drive { order: drive.order, cos: vector(&drive.cos), sin: vector(&drive.sin) })
+            .collect(),
+        gaps: (machine.gaps.iter())
+            .map(|gap| GapRow { row: vector(&gap.row), walls: gap.walls.clone() })
+            .collect(),
+        friction: (machine.friction.iter())
+            .map(|one| DryFriction { row: vector(&one.row), ..one.clone() })
+            .collect(),
+    }
+}

@@ -1,0 +1,460 @@
+//! Checks of the integrator of machines: other steps, differences, energy, and motions that other programs compute.
+
+use nalgebra::{DMatrix, DVector};
+use rattlemap_dynamics::model::{Contact, Machine, Side};
+use rayon::prelude::*;
+
+use super::build::{in_coordinates, machine_of, side_by_side};
+use super::motion::{Event, Motion, What};
+use super::random::{Case, Shape, case};
+use super::system::{ANGLE, System};
+use crate::independent::motion::{
+    Mode as PlainMode, Motion as PlainMotion, System as PlainSystem, What as PlainWhat,
+};
+use crate::independent::random::{self as plain, Random};
+
+pub(crate) const SHAPES: [Shape; 10] = [
+    Shape { coordinates: 1, gaps: 1, harmonics: 1, stages: 1, friction: 0, walls: 1 },
+    Shape { coordinates: 2, gaps: 1, harmonics: 2, stages: 2, friction: 1, walls: 2 },
+    Shape { coordinates: 2, gaps: 2, harmonics: 1, stages: 1, friction: 0, walls: 1 },
+    Shape { coordinates: 3, gaps: 2, harmonics: 3, stages: 1, friction: 0, walls: 2 },
+    Shape { coordinates: 3, gaps: 3, harmonics: 1, stages: 2, friction: 0, walls: 1 },
+    Shape { coordinates: 3, gaps: 1, harmonics: 1, stages: 1, friction: 2, walls: 1 },
+    Shape { coordinates: 4, gaps: 2, harmonics: 2, stages: 1, friction: 2, walls: 2 },
+    Shape { coordinates: 5, gaps: 3, harmonics: 4, stages: 2, friction: 1, walls: 3 },
+    Shape { coordinates: 6, gaps: 3, harmonics: 1, stages: 1, friction: 2, walls: 1 },
+    Shape { coordinates: 8, gaps: 3, harmonics: 4, stages: 2, friction: 2, walls: 4 },
+];
+
+/// Returns the shape and the machine of a seed.
+pub(crate) fn any_case(seed: u64) -> Case {
+    case(seed, SHAPES[(seed % SHAPES.len() as u64) as usize])
+}
+
+/// Returns the largest difference of two states relative to the larger state, with velocities divided by a rate.
+pub(crate) fn apart(a: &[f64], b: &[f64], rate: f64) -> f64 {
+    let scale = |i: usize| if i.is_multiple_of(2) { 1.0 } else { 1.0 / rate };
+    let most = |of: &dyn Fn(usize) -> f64| (0..a.len()).map(|i| scale(i) * of(i).abs()).fold(0.0, f64::max);
+    let off = most(&|i| a[i] - b[i]);
+    if off == 0.0 { 0.0 } else { off / most(&|i| a[i]).max(most(&|i| b[i])) }
+}
+
+/// Returns events without their times, gap by gap.
+fn by_gap(events: &[Event], gaps: usize) -> Vec<Vec<(What, Side, Option<u8>)>> {
+    let of = |gap| {
+        events
+            .iter()
+            .filter(|event| event.gap == gap)
+            .map(|event| (event.what, event.side, event.symbol))
+            .collect()
+    };
+    (0..gaps).map(of).collect()
+}
+
+/// Largest effect of errors of velocities by 1e-13 at events, relative to the state, in motions that are compared.
+const MOST_NOISE: f64 = 1e-11;
+
+/// Compares motions with larger and smaller steps.
+fn check_steps(seeds: std::ops::Range<u64>) {
+    let run = |seed: u64| {
+        let case = any_case(seed);
+        let [system, other] = [ANGLE, 0.6 * ANGLE].map(|angle| System::new(&case.machine, angle));
+        let mut motion = Motion::new(&system, &case.start);
+        let mut shaken = motion.shaken();
+        motion.carry_tangents();
+        let mut same = Motion::new(&other, &case.start);
+        same.carry_tangents();
+        let rate = case.machine.omega;
+        let (mut worst, mut worst_tangents, mut periods) = (0.0f64, 0.0f64, 0);
+        for period in 0..4 {
+            let ended = [motion.advance_period(), same.advance_period()];
+            let ends = shaken.iter_mut().all(|one| one.advance_period().is_some());
+            if ended[0].is_none() || !ends {
+                break;
+            }
+            let noise =
+                shaken.iter().map(|one| apart(&one.state(), &motion.state(), rate)).fold(0.0, f64::max);
+            if noise > MOST_NOISE {
+                break;
+            }
+            let off = apart(&motion.state(), &same.state(), rate);
+            let size = motion.derivative().amax().max(1e-6);
+            let off_tangents = (motion.derivative() - same.derivative()).amax() / size;
+            if off.is_nan() || off > 1e-11 + 4.0 * noise || off_tangents > 1e-7 {
+                return Err(format!(
+                    "{seed}: off by {off:e}, tangents {off_tangents:e} of {size:e}, noise {noise:e}, period {period}\n{:?}\n{:?}",
+                    motion.events, same.events
+                ));
+            }
+            let gaps = case.machine.gaps.len();
+            if by_gap(&motion.events, gaps) != by_gap(&same.events, gaps) {
+                return Err(format!("{seed}: events {:?} but {:?}", motion.events, same.events));
+            }
+            (worst, worst_tangents, periods) =
+                (worst.max(off), worst_tangents.max(off_tangents), periods + 1);
+        }
+        Ok((worst, worst_tangents, periods, motion.events.len(), motion.slips.len()))
+    };
+    let all: Vec<_> = seeds.into_par_iter().map(run).collect();
+    let failures: Vec<_> = all.iter().filter_map(|one| one.as_ref().err()).collect();
+    let found: Vec<_> = all.iter().filter_map(|one| one.as_ref().ok()).collect();
+    let worst = found.iter().map(|one| one.0).fold(0.0, f64::max);
+    let tangents = found.iter().map(|one| one.1).fold(0.0, f64::max);
+    let periods: i32 = found.iter().map(|one| one.2).sum();
+    let events: usize = found.iter().map(|one| one.3).sum();
+    let slips: usize = found.iter().map(|one| one.4).sum();
+    println!("{periods} periods, {events} events, {slips} slips, off by {worst:e}, tangents by {tangents:e}");
+    for failure in &failures {
+        println!("{failure}");
+    }
+    assert!(failures.is_empty(), "{}", failures.len());
+}
+
+/// Compares derivatives with differences of motions from neighbouring starts without contact onset, rest and sticking.
+fn check_derivatives(seeds: std::ops::Range<u64>) {
+    let run = |seed: u64| {
+        let case = any_case(seed);
+        let (system, n) = (System::new(&case.machine, ANGLE), case.machine.degrees());
+        let mut motion = Motion::new(&system, &case.start);
+        let mut found = [0; 3];
+        if motion.advance_period().is_none() || motion.is_at_rest() {
+            return Ok((found, 0.0));
+        }
+        motion.events.clear();
+        motion.slips.clear();
+        let image = |i: usize, h: f64| {
+            let (mut moved, mut state) = (motion.clone(), motion.state());
+            if h == 0.0 {
+                moved.carry_tangents();
+            }
+            state[i] += h;
+            moved.set_state(&state);
+            moved.advance_period()?;
+            let what = (
+                by_gap(&moved.events, case.machine.gaps.len()),
+                moved.slips.iter().map(|slip| slip.0).collect::<Vec<_>>(),
+            );
+            let derivative = (h == 0.0).then(|| moved.derivative());
+            Some((DVector::from_vec(moved.state()), derivative, what))
+        };
+        let Some((_, Some(exact), what)) = image(0, 0.0) else { return Ok((found, 0.0)) };
+        let (size, mut worst) = (exact.amax().max(1.0), 0.0f64);
+        for i in 0..2 * n {
+            // A motion with steep turns needs small differences, and one that rounding errors grow in needs large ones.
+            let off = |h: f64| {
+                let [above, below] = [image(i, h / size)?, image(i, -h / size)?];
+                let is_same = above.2 == what && below.2 == what;
+                let change = (above.0 - below.0) * (size / (2.0 * h));
+                is_same.then(|| (change - exact.column(i)).amax() / size)
+            };
+            let mut best = None;
+            for found in [1e-6, 1e-7, 3e-8, 1e-5].into_iter().filter_map(off) {
+                best = Some(best.map_or(found, |best: f64| best.min(found)));
+                if found < 1e-5 {
+                    break;
+                }
+            }
+            let Some(off) = best else {
+                found[2] += 1;
+                continue;
+            };
+            if off > 1e-5 {
+                return Err(format!("{seed}: column {i} off by {off:e} of {size:e}: {what:?}"));
+            }
+            worst = worst.max(off);
+            found[0] += 1;
+            found[1] += usize::from(what.0.iter().flatten().count() > 0);
+        }
+        Ok((found, worst))
+    };
+    let all: Vec<_> = seeds.into_par_iter().map(run).collect();
+    let failures: Vec<_> = all.iter().filter_map(|one| one.as_ref().err()).collect();
+    let found: Vec<_> = all.iter().filter_map(|one| one.as_ref().ok()).collect();
+    let sum = |i: usize| found.iter().map(|one| one.0[i]).sum::<usize>();
+    println!("{} columns, {} with events, {} left out", sum(0), sum(1), sum(2));
+    failures.iter().for_each(|failure| println!("{failure}"));
+    assert!(failures.is_empty(), "{}", failures.len());
+}
+
+/// Energy of motion, of springs, and of springs behind walls in contact.
+fn energy(machine: &Machine, motion: &Motion, state: &[f64]) -> f64 {
+    let n = machine.degrees();
+    let [x, v] = [0, 1].map(|at| DVector::from_fn(n, |i, _| state[2 * i + at]));
+    let forces = &machine.stages[0];
+    let mut energy =
+        0.5 * (v.dot(&(&machine.mass * &v)) + x.dot(&(&forces.stiffness * &x))) - forces.load.dot(&x);
+    for (i, gap) in machine.gaps.iter().enumerate() {
+        let (z, acting) = (gap.row.dot(&x), motion.acting(i));
+        let side = if acting > 0 { Side::Right } else { Side::Left };
+        for wall in &gap.walls[side.index()][..usize::from(acting.unsigned_abs())] {
+            let (spring, depth) = (&wall.springs[0], side.sign() * (z - wall.at));
+            energy += 0.5 * spring.stiffness * depth * depth + spring.preload * depth;
+        }
+    }
+    energy
+}
+
+#[test]
+fn energy_decreases_without_force() {
+    let mut events = 0;
+    for seed in 0..300 {
+        let Case { mut machine, start } = any_case(seed);
+        machine
+            .drives
+            .iter_mut()
+            .for_each(|drive| (drive.cos, drive.sin) = (&drive.cos * 0.0, &drive.sin * 0.0));
+        machine.schedule.clear();
+        let damping = &machine.stages[0].damping;
+        if (damping + damping.transpose()).symmetric_eigenvalues().min() < 0.0 {
+            continue;
+        }
+        machine.friction.iter_mut().for_each(|friction| friction.speed = 0.0);
+        for wall in machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten()) {
+            if wall.contact == Contact::Pushing {
+                wall.contact = Contact::Elastic;
+            }
+        }
+        let system = System::new(&machine, ANGLE);
+        let mut motion = Motion::new(&system, &start);
+        let mut last = energy(&machine, &motion, &motion.state());
+        let size = last.abs().max(1.0);
+        for i in 1..60 {
+            if motion.run(f64::from(i) * system.period / 20.0).is_none() {
+                break;
+            }
+            let now = energy(&machine, &motion, &motion.state());
+            assert!(now <= last + 1e-12 * size, "{seed}: energy {last} grows to {now}: {:?}", motion.events);
+            last = now;
+        }
+        events += motion.events.len();
+    }
+    println!("{events} events");
+    assert!(events > 500);
+}
+
+const PLAIN_SHAPES: [plain::Shape; 5] = {
+    let none = plain::Shape {
+        harmonics: false,
+        stages: false,
+        walls: false,
+        pushing: false,
+        friction: false,
+        wide: false,
+    };
+    [
+        none,
+        plain::Shape { harmonics: true, stages: true, ..none },
+        plain::Shape { walls: true, stages: true, pushing: true, ..none },
+        plain::Shape { friction: true, harmonics: true, ..none },
+        plain::Shape { friction: true, walls: true, stages: true, pushing: true, ..none },
+    ]
+};
+
+/// Largest effect of errors of velocities by 1e-12 at events in motions that are compared with those of oscillators.
+const MOST_PLAIN_NOISE: f64 = 1e-9;
+
+/// Compares the part of a motion from a gap on with the motion of an oscillator, over a period. `noise` is the effect of errors.
+fn same_as_plain(
+    ours: &Motion,
+    gap: usize,
+    state: &[f64],
+    theirs: &PlainMotion,
+    noise: f64,
+) -> Result<f64, String> {
+    let n = theirs.system.degrees;
+    let off = apart(state, &theirs.state()[..2 * n], theirs.rate());
+    if off.is_nan() || off > 1e-10 + 20.0 * noise {
+        return Err(format!("off by {off:e} with noise {noise:e}"));
+    }
+    let what = |what: &PlainWhat| match what {
+        PlainWhat::Impact => What::Impact,
+        PlainWhat::Begins => What::Begins,
+        PlainWhat::Ends => What::Ends,
+    };
+    let events: Vec<_> = theirs.events.iter().map(|(kind, side)| (what(kind), *side)).collect();
+    let own: Vec<_> = ours.events.iter().filter(|event| event.gap == gap).collect();
+    let found: Vec<_> = own.iter().map(|event| (event.what, event.side)).collect();
+    if found != events {
+        return Err(format!("events {found:?} but {events:?}"));
+    }
+    let symbols: Vec<u8> = own.iter().filter_map(|event| event.symbol).collect();
+    let flights: Vec<u8> = theirs.symbols.iter().copied().filter(|symbol| !b"07".contains(symbol)).collect();
+    if symbols != flights {
+        return Err(format!("symbols {symbols:?} but {flights:?}"));
+    }
+    Ok(off)
+}
+
+/// Machines of one to three oscillators that do not touch each other, in other coordinates, move like these oscillators.
+fn check_plain(count: usize, seeds: std::ops::Range<u64>, periods: usize, share: f64) {
+    let run = |seed: u64| {
+        let shape = PLAIN_SHAPES[(seed % 5) as usize];
+        let random = &mut Random(seed);
+        let mut cases: Vec<_> = (0..count as u64)
+            .map(|i| plain::case(1000 * i + seed, plain::Shape { stages: shape.stages && i == 0, ..shape }))
+            .collect();
+        let omega = cases[0].oscillator.omega;
+        cases.iter_mut().for_each(|case| case.oscillator.omega = omega);
+        let machines: Vec<_> = cases.iter().map(|case| machine_of(&case.oscillator, case.law)).collect();
+        let all = side_by_side(&machines);
+        let n = all.degrees();
+        let t = match count {
+            1 if seed.is_multiple_of(2) => DMatrix::identity(n, n),
+            _ => DMatrix::from_fn(n, n, |i, j| random.even(0.4) + if i == j { 1.0 } else { 0.0 }),
+        };
+        let system = System::new(&in_coordinates(&all, &t), ANGLE);
+        let inverse = t.clone().try_inverse().expect("coordinates");
+        let (mut x, mut v) = (DVector::zeros(n), DVector::zeros(n));
+        let (mut at, mut places) = (0, Vec::new());
+        for case in &cases {
+            for i in 0..case.oscillator.degrees {
+                (x[at + i], v[at + i]) = (case.start[2 * i], case.start[2 * i + 1]);
+            }
+            places.push(at);
+            at += case.oscillator.degrees;
+        }
+        let (q, rates) = (&inverse * x, &inverse * v);
+        let start: Vec<f64> = (0..2 * n).map(|i| if i % 2 == 0 { q[i / 2] } else { rates[i / 2] }).collect();
+        let mut ours = Motion::new(&system, &start);
+        let systems: Vec<_> = cases.iter().map(|case| PlainSystem::new(&case.oscillator, 0.2)).collect();
+        let mut theirs: Vec<_> = (cases.iter().zip(&systems))
+            .map(|(case, system)| PlainMotion::new(system, case.law, case.start, PlainMode::Free))
+            .collect();
+        let mut shaken: Vec<_> = theirs.iter().map(PlainMotion::shaken).collect();
+        let (mut worst, mut compared) = (0.0f64, 0);
+        'periods: for period in 0..periods {
+            ours.events.clear();
+            ours.slips.clear();
+            let is_over = ours.advance_period().is_none();
+            let state = ours.state();
+            let of = |at: usize| DVector::from_fn(n, |i, _| state[2 * i + at]);
+            let (x, v) = (&t * of(0), &t * of(1));
+            let mut slips = 0;
+            for (i, motion) in theirs.iter_mut().enumerate() {
+                motion.clear();
+                let Some(noise) = motion.advance_period().and_then(|()| motion.noise(&mut shaken[i])) else {
+                    break 'periods;
+                };
+                if is_over || noise > MOST_PLAIN_NOISE {
+                    break 'periods;
+                }
+                let degrees = cases[i].oscillator.degrees;
+                let own: Vec<f64> = (0..2 * degrees)
+                    .map(|j| if j % 2 == 0 { x[places[i] + j / 2] } else { v[places[i] + j / 2] })
+                    .collect();
+                let off = same_as_plain(&ours, i, &own, motion, noise)
+                    .map_err(|error| format!("{seed}: oscillator {i}, period {period}: {error}"))?;
+                slips += motion.symbols.iter().filter(|symbol| b"07".contains(symbol)).count();
+                worst = worst.max(off);
+            }
+            if slips != ours.slips.len() {
+                return Err(format!("{seed}: {slips} slips but {:?} in period {period}", ours.slips));
+            }
+            compared += 1;
+        }
+        Ok((worst, compared))
+    };
+    let count = (seeds.end - seeds.start) as f64 * periods as f64;
+    let all: Vec<_> = seeds.into_par_iter().map(run).collect();
+    let failures: Vec<&String> = all.iter().filter_map(|one| one.as_ref().err()).collect();
+    let worst = all.iter().filter_map(|one| one.as_ref().ok()).map(|one| one.0).fold(0.0, f64::max);
+    let compared: usize = all.iter().filter_map(|one| one.as_ref().ok()).map(|one| one.1).sum();
+    println!("{compared} of {count} periods, off by {worst:e}");
+    failures.iter().for_each(|failure| println!("{failure}"));
+    assert!(failures.is_empty() && compared as f64 > share * count, "{}", failures.len());
+}
+
+#[test]
+fn machines_of_one_oscillator_move_like_it() {
+    check_plain(1, 0..150, 5, 0.85);
+}
+
+#[test]
+fn machines_of_two_oscillators_move_like_both() {
+    check_plain(2, 0..60, 4, 0.8);
+}
+
+#[test]
+fn machines_of_three_oscillators_move_like_all() {
+    check_plain(3, 0..30, 4, 0.7);
+}
+
+/// The motion does not depend on the coordinates.
+#[test]
+fn other_coordinates_give_the_same_motion() {
+    let run = |seed: u64| {
+        let Case { machine, start } = any_case(seed);
+        let n = machine.degrees();
+        let random = &mut Random(seed);
+        let t = DMatrix::from_fn(n, n, |i, j| random.even(0.8 / n as f64) + if i == j { 1.0 } else { 0.0 });
+        let inverse = t.clone().try_inverse().expect("coordinates");
+        let moved = |m: &DMatrix<f64>, state: &[f64]| -> Vec<f64> {
+            let of = |at: usize| m * DVector::from_fn(n, |i, _| state[2 * i + at]);
+            let (x, v) = (of(0), of(1));
+            (0..2 * n).map(|i| if i % 2 == 0 { x[i / 2] } else { v[i / 2] }).collect()
+        };
+        let other = in_coordinates(&machine, &t);
+        // Without two walls of one gap, the scale of length depends on the coordinates.
+        if (machine.length_scale() - other.length_scale()).abs() > 1e-12 * machine.length_scale() {
+            return Ok(0);
+        }
+        let systems = [&machine, &other].map(|machine| System::new(machine, ANGLE));
+        let mut motion = Motion::new(&systems[0], &start);
+        let mut same = Motion::new(&systems[1], &moved(&inverse, &start));
+        let mut shaken = motion.shaken();
+        let mut compared = 0;
+        for period in 0..4 {
+            let ends = shaken.iter_mut().all(|one| one.advance_period().is_some());
+            if motion.advance_period().is_none() || !ends {
+                break;
+            }
+            let off_of = |state: &[f64]| apart(state, &motion.state(), machine.omega);
+            let noise = shaken.iter().map(|one| off_of(&one.state())).fold(0.0, f64::max);
+            if noise > MOST_NOISE {
+                break;
+            }
+            if same.advance_period().is_none() {
+                return Err(format!("{seed}: no end"));
+            }
+            let off = off_of(&moved(&t, &same.state()));
+            let gaps = machine.gaps.len();
+            if off.is_nan()
+                || off > 1e-11 + 10.0 * noise
+                || by_gap(&motion.events, gaps) != by_gap(&same.events, gaps)
+            {
+                return Err(format!(
+                    "{seed}: off by {off:e} with noise {noise:e} in period {period}: {:?} but {:?}",
+                    motion.events, same.events
+                ));
+            }
+            compared += 1;
+        }
+        Ok(compared)
+    };
+    let all: Vec<Result<i32, String>> = (0..200u64).into_par_iter().map(run).collect();
+    let failures: Vec<_> = all.iter().filter_map(|one| one.as_ref().err()).collect();
+    failures.iter().for_each(|failure| println!("{failure}"));
+    let compared: i32 = all.iter().filter_map(|one| one.as_ref().ok()).sum();
+    println!("{compared} periods");
+    assert!(failures.is_empty() && compared > 400, "{}", failures.len());
+}
+
+#[test]
+fn other_steps_give_the_same_motion() {
+    check_steps(0..300);
+}
+
+#[test]
+fn derivatives_are_limits_of_differences() {
+    check_derivatives(0..200);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn three_thousand_machines_pass_the_checks() {
+    check_steps(300..3300);
+    check_derivatives(200..1200);
+    check_plain(1, 150..1650, 5, 0.8);
+    check_plain(2, 60..360, 4, 0.8);
+    check_plain(3, 30..130, 4, 0.7);
+}

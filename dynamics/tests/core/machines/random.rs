@@ -1,0 +1,251 @@
+//! Random machines, with walls near the amplitudes of their gaps.
+
+use nalgebra::{DMatrix, DVector};
+use rattlemap_dynamics::model::{
+    Contact, Drive, DryFriction, Forces, GapRow, Machine, Restitution, Side, Spring, Wall,
+};
+
+use crate::independent::random::Random;
+
+/// What a random machine has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    pub(crate) coordinates: usize,
+    pub(crate) gaps: usize,
+    /// Largest number of harmonics.
+    pub(crate) harmonics: usize,
+    pub(crate) stages: usize,
+    /// Largest number of elements with dry friction.
+    pub(crate) friction: usize,
+    /// Largest number of walls on a side.
+    pub(crate) walls: usize,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    pub(crate) machine: Machine,
+    /// `(x1, v1, x2, v2, ...)`, with all gaps between their walls.
+    pub(crate) start: Vec<f64>,
+}
+
+type Vector = DVector<f64>;
+type Matrix = DMatrix<f64>;
+
+/// Least eigenvalue of the Gram matrix of unit rows that are not too close to each other.
+const INDEPENDENT: f64 = 0.1;
+
+fn vector(random: &mut Random, n: usize, reach: f64) -> Vector {
+    Vector::from_fn(n, |_, _| random.even(reach))
+}
+
+/// Returns a positive definite matrix: a chain in which each coordinate is coupled to the next one and to the ground.
+fn chain(random: &mut Random, ground: &[f64], coupling: f64) -> Matrix {
+    let n = ground.len();
+    let mut m = Matrix::from_diagonal(&Vector::from_row_slice(ground));
+    for i in 1..n {
+        let k = coupling * random.unit() * (ground[i - 1] * ground[i]).sqrt();
+        m[(i - 1, i - 1)] += k;
+        m[(i, i)] += k;
+        m[(i - 1, i)] -= k;
+        m[(i, i - 1)] -= k;
+    }
+    m
+}
+
+fn are_independent(rows: &[Vector]) -> bool {
+    let unit: Vec<Vector> = rows.iter().map(|row| row.clone().normalize()).collect();
+    let gram = Matrix::from_fn(rows.len(), rows.len(), |i, j| unit[i].dot(&unit[j]));
+    gram.symmetric_eigenvalues().min() > INDEPENDENT
+}
+
+/// Returns a row of one, two or all coordinates.
+fn row(random: &mut Random, n: usize) -> Vector {
+    let mut row = Vector::zeros(n);
+    let first = random.below(n);
+    row[first] = if random.chance(0.7) { 1.0 } else { random.between(0.5, 2.0) };
+    match random.below(3) {
+        0 if n > 1 => row[(first + 1) % n] = -1.0,
+        1 if n > 1 && random.chance(0.5) => row += vector(random, n, 0.5),
+        _ => {}
+    }
+    row
+}
+
+/// Returns the mean and the amplitude of a gap in motion without walls.
+fn reach(machine: &Machine, row: &Vector) -> [f64; 2] {
+    let (n, forces) = (machine.degrees(), &machine.stages[0]);
+    let solved = |m: Matrix, f: Vector| m.lu().solve(&f).unwrap_or_else(|| Vector::zeros(f.len()));
+    let mean = row.dot(&solved(forces.stiffness.clone(), forces.load.clone()));
+    let of = |drive: &Drive| {
+        let rate = f64::from(drive.order) * machine.omega;
+        let (dynamic, damping) = (&forces.stiffness - &machine.mass * (rate * rate), &forces.damping * rate);
+        let mut m = Matrix::zeros(2 * n, 2 * n);
+        for (at, part) in [((0, 0), &dynamic), ((n, n), &dynamic), ((0, n), &damping), ((n, 0), &-&damping)] {
+            m.view_mut(at, (n, n)).copy_from(part);
+        }
+        let force: Vec<f64> = drive.cos.iter().chain(&drive.sin).copied().collect();
+        let x = solved(m, Vector::from_vec(force));
+        row.dot(&x.rows(0, n)).hypot(row.dot(&x.rows(n, n)))
+    };
+    [mean, machine.drives.iter().map(of).sum()]
+}
+
+/// Returns the walls on a side, the first one at a distance from the middle. All but the last are elastic.
+fn walls(random: &mut Random, machine: &Machine, count: usize, at: f64, s: f64, speed: f64) -> Vec<Wall> {
+    let mut walls = Vec::new();
+    let mut at = at;
+    for nth in 0..count {
+        let is_last = nth + 1 == count;
+        let contact = match random.below(if is_last { 5 } else { 1 }) {
+            0 => Contact::Elastic,
+            1 => Contact::Pushing,
+            2 => Contact::Impact,
+            _ => Contact::Rigid,
+        };
+        let force: f64 = machine.drives.iter().map(|drive| drive.cos.amax()).fold(0.0, f64::max);
+        let has_preload = contact.is_elastic() && is_last && random.chance(0.4);
+        let spring = Spring {
+            stiffness: random.logarithmic(20.0, 1e3),
+            damping: if random.chance(0.3) { 0.0 } else { random.logarithmic(0.1, 5.0) },
+            preload: if has_preload { random.even(0.3 * force) } else { 0.0 },
+        };
+        let of_stage = |random: &mut Random| Spring {
+            stiffness: spring.stiffness * random.logarithmic(0.6, 1.6),
+            damping: spring.damping * random.logarithmic(0.6, 1.6),
+            preload: spring.preload * random.between(0.5, 1.5),
+        };
+        let springs =
+            (0..machine.stages.len()).map(|i| if i == 0 { spring } else { of_stage(random) }).collect();
+        let restitution = match random.below(8) {
+            0 | 1 => Restitution::constant(0.0),
+            2 => Restitution {
+                constant: random.between(0.5, 0.95),
+                factor: -random.between(0.02, 0.2) / speed.max(0.1),
+                power: [0.2, 0.5, 1.0, 2.0][random.below(4)],
+            },
+            _ => Restitution::constant(random.between(0.05, 0.9)),
+        };
+        let mesh_speed = if random.chance(0.4) { 0.0 } else { speed * random.logarithmic(1e-3, 0.3) };
+        walls.push(Wall { at, contact, restitution, mesh_speed, springs });
+        at += s * random.logarithmic(0.02, 0.5) * speed / machine.omega;
+    }
+    walls
+}
+
+/// Returns the machine of a seed.
+pub(crate) fn case(seed: u64, shape: Shape) -> Case {
+    let random = &mut Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5851_f42d_4c95_7f2d);
+    let n = shape.coordinates;
+    let masses: Vec<f64> = (0..n).map(|_| random.logarithmic(0.5, 2.0)).collect();
+    let stiff: Vec<f64> = masses.iter().map(|mass| mass * random.logarithmic(1.0, 30.0)).collect();
+    let damp: Vec<f64> = (masses.iter().zip(&stiff))
+        .map(|(mass, stiff)| 2.0 * random.logarithmic(0.02, 0.3) * (mass * stiff).sqrt())
+        .collect();
+    let mass = if random.chance(0.5) {
+        Matrix::from_diagonal(&Vector::from_vec(masses))
+    } else {
+        chain(random, &masses, 0.5)
+    };
+    let (stiffness, mut damping) = (chain(random, &stiff, 1.0), chain(random, &damp, 1.0));
+    if random.chance(0.15) {
+        damping *= -0.2 * random.unit();
+    }
+    if random.chance(0.3) {
+        let skew = Matrix::from_fn(n, n, |_, _| random.even(1.0));
+        damping += &skew - skew.transpose();
+    }
+    let load = if random.chance(0.5) { Vector::zeros(n) } else { vector(random, n, 4.0) };
+    let first = Forces { damping, stiffness, load };
+    let mut stages = vec![first.clone()];
+    for _ in 1..shape.stages {
+        let (stiffer, slower) = (random.logarithmic(0.6, 1.6), random.logarithmic(0.6, 1.6));
+        stages.push(Forces {
+            damping: &first.damping * slower,
+            stiffness: &first.stiffness * stiffer,
+            load: &first.load + if random.chance(0.5) { Vector::zeros(n) } else { vector(random, n, 4.0) },
+        });
+    }
+    let schedule = match shape.stages {
+        1 => Vec::new(),
+        count => {
+            let mut phases: Vec<f64> = (0..count + random.below(3)).map(|_| random.unit()).collect();
+            if random.chance(0.4) {
+                phases[0] = 0.0;
+            }
+            phases.sort_by(f64::total_cmp);
+            phases.iter().enumerate().map(|(i, &phase)| (phase, (i + 1) % count)).collect()
+        }
+    };
+    let mut orders: Vec<u32> =
+        (1..1 + random.below(shape.harmonics)).map(|_| 2 + random.below(5) as u32).collect();
+    orders.push(1);
+    orders.sort_unstable();
+    orders.dedup();
+    let drive = |order: u32| Drive {
+        order,
+        cos: vector(random, n, 8.0),
+        sin: if random.chance(0.3) { Vector::zeros(n) } else { vector(random, n, 8.0) },
+    };
+    let drives = orders.into_iter().map(drive).collect();
+    let omega = random.logarithmic(0.8, 5.0);
+    let mut machine =
+        Machine { omega, mass, stages, schedule, drives, gaps: Vec::new(), friction: Vec::new() };
+    let mut rows: Vec<Vector> = Vec::new();
+    while rows.len() < shape.gaps {
+        rows.push(row(random, n));
+        if !are_independent(&rows) {
+            rows.pop();
+        }
+    }
+    let mut speeds = 0.0f64;
+    for row in &rows {
+        let [mean, amplitude] = reach(&machine, row);
+        // Not every gap has a large part in the motion.
+        let amplitude = amplitude.max(0.05);
+        let speed = amplitude * omega;
+        speeds = speeds.max(speed / row.norm());
+        let has = [[true, true], [true, true], [true, false], [false, true]][random.below(4)];
+        let of = |side: Side| {
+            let at = mean + side.sign() * amplitude * random.between(0.15, 0.9);
+            let count = if has[side.index()] { 1 + random.below(shape.walls) } else { 0 };
+            walls(random, &machine, count, at, side.sign(), speed)
+        };
+        let walls = Side::BOTH.map(of);
+        machine.gaps.push(GapRow { row: row.clone(), walls });
+    }
+    add_friction(random, &mut machine, shape.friction, &rows, speeds);
+    machine.validate().unwrap_or_else(|error| panic!("{seed}: {error}: {machine:?}"));
+    let forces = &machine.stages[0];
+    let x = forces.stiffness.clone().lu().solve(&forces.load).expect("a stiffness");
+    let start = (0..2 * n).map(|i| if i % 2 == 0 { x[i / 2] } else { random.even(0.7 * speeds) }).collect();
+    Case { machine, start }
+}
+
+/// Adds elements along gap rows, or along rows that are independent of all gap rows.
+fn add_friction(random: &mut Random, machine: &mut Machine, most: usize, gaps: &[Vector], speed: f64) {
+    let n = machine.degrees();
+    let force = machine.drives.iter().map(|drive| drive.cos.amax()).fold(0.0, f64::max);
+    let mut all = gaps.to_vec();
+    let mut free: Vec<&Vector> = gaps.iter().collect();
+    for _ in 0..if most > 0 { 1 + random.below(most) } else { 0 } {
+        let is_new = all.len() < n && random.chance(0.6);
+        let row = if is_new {
+            loop {
+                let row = row(random, n);
+                all.push(row.clone());
+                if are_independent(&all) {
+                    break row;
+                }
+                all.pop();
+            }
+        } else if !free.is_empty() {
+            free.swap_remove(random.below(free.len())) * [0.5, 1.0, -1.0][random.below(3)]
+        } else {
+            return;
+        };
+        let size = row.norm();
+        let (force, speed) = (random.logarithmic(0.02, 0.6) * force / size, speed * size);
+        let speed = if random.chance(0.75) { 0.0 } else { random.even(0.5 * speed) };
+        machine.friction.push(DryFriction { row, force, speed });
+    }
+}

@@ -1,0 +1,346 @@
+//! The linear domains of a machine.
+//!
+//! The state is `y = (x, v, 1, cos and sin of each harmonic)`, so that every domain is `y' = A y`. A domain is built when it is first met.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use rattlemap_dynamics::model::{Contact, Machine, Side};
+
+/// A step, in radians of the fastest rate.
+pub(crate) const ANGLE: f64 = 0.6;
+
+/// Terms of Taylor series: `0.6^19 / 19!` is far below rounding.
+const TERMS: usize = 18;
+
+/// Relative size of numbers that are zero but for rounding.
+pub(crate) const ROUNDING: f64 = 1e-12;
+
+pub(crate) type Vector = DVector<f64>;
+pub(crate) type Row = RowDVector<f64>;
+pub(crate) type Matrix = DMatrix<f64>;
+
+/// What an element with dry friction does: it sticks, or slides with a positive or a negative rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Grip {
+    Stick,
+    Plus,
+    Minus,
+}
+
+impl Grip {
+    pub(crate) fn sign(self) -> f64 {
+        [0.0, 1.0, -1.0][self as usize]
+    }
+}
+
+/// What distinguishes the domains of a machine.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Key {
+    pub(crate) stage: usize,
+    /// Number of walls of each gap whose springs act: on the right if positive, on the left if negative.
+    pub(crate) acting: Vec<i8>,
+    /// Gaps at rest on rigid walls.
+    pub(crate) held: Vec<bool>,
+    pub(crate) grips: Vec<Grip>,
+}
+
+/// One linear domain. Rows are applied to the state `y`.
+pub(crate) struct Linear {
+    pub(crate) a: Matrix,
+    /// Length of a step and its exponential.
+    pub(crate) step: (f64, Matrix),
+    /// Accelerations of the gaps. They are 0 for gaps at rest.
+    pub(crate) acceleration: Vec<Row>,
+    /// For each gap at rest on a rigid wall, its acceleration without this wall, and while all else that is at rest stays at rest.
+    pub(crate) pressing: Vec<Row>,
+    /// Forces that make elements stick.
+    pub(crate) hold: Vec<Row>,
+    /// Elements that stick without a force, because walls hold their row.
+    pub(crate) is_idle: Vec<bool>,
+    /// Gaps at rest that no rigid wall holds: friction holds them.
+    pub(crate) is_still: Vec<bool>,
+}
+
+impl Linear {
+    /// Returns the coefficients of the state as a polynomial of the share of a step.
+    pub(crate) fn series(&self, y: &Vector, h: f64) -> Vec<Vector> {
+        let mut terms = vec![y.clone()];
+        for k in 1..=TERMS {
+            let mut next = Vector::zeros(y.len());
+            next.gemv(h / k as f64, &self.a, &terms[k - 1], 0.0);
+            terms.push(next);
+        }
+        terms
+    }
+
+    /// Returns the sign of the first derivative of `row y` that is not zero but for rounding, the value itself included; 0 without one.
+    pub(crate) fn tendency(&self, row: &Row, y: &Vector) -> f64 {
+        let mut row = row.clone();
+        for _ in 0..4 {
+            let value = value(&row, y);
+            let size: f64 = row.iter().zip(y.iter()).map(|(a, b)| (a * b).abs()).sum();
+            if value.abs() > ROUNDING * size {
+                return value.signum();
+            }
+            row = &row * &self.a;
+        }
+        0.0
+    }
+}
+
+/// Returns the value of a row.
+pub(crate) fn value(row: &Row, y: &Vector) -> f64 {
+    row.iter().zip(y.iter()).map(|(a, b)| a * b).sum()
+}
+
+/// Returns the exponential of a matrix by scaling and squaring of its series.
+pub(crate) fn exponential(a: &Matrix) -> Matrix {
+    let size = norm(a);
+    let doublings = (2.0 * size).log2().ceil().max(0.0) as i32;
+    let small = a * 2f64.powi(-doublings);
+    let one = Matrix::identity(a.nrows(), a.nrows());
+    let mut sum = (1..=18).rev().fold(one.clone(), |sum, k| &one + product(&small, &sum) / f64::from(k));
+    for _ in 0..doublings {
+        sum = product(&sum, &sum);
+    }
+    sum
+}
+
+/// Returns the product of two matrices, column by column. In test builds, the product of nalgebra is not optimised.
+pub(crate) fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    let mut all = Matrix::zeros(a.nrows(), b.ncols());
+    for (mut column, b) in all.column_iter_mut().zip(b.column_iter()) {
+        for (a, &b) in a.column_iter().zip(b.iter()).filter(|(_, b)| **b != 0.0) {
+            column.axpy(b, &a, 1.0);
+        }
+    }
+    all
+}
+
+/// Returns the largest sum of the entries' sizes in a row.
+fn norm(a: &Matrix) -> f64 {
+    a.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
+}
+
+/// The change of velocities by an impulse along a row that changes the row's rate by 1 while rows before it are held, and this impulse.
+/// Both are 0 if the rows before it hold the row.
+pub(crate) type Bond = (Vector, f64);
+
+/// A machine with its domains.
+pub(crate) struct System {
+    pub(crate) machine: Machine,
+    pub(crate) degrees: usize,
+    pub(crate) period: f64,
+    /// The length that the limit of short flights is relative to.
+    pub(crate) length: f64,
+    pub(crate) per_mass: Matrix,
+    /// Rows of the gaps and of their rates.
+    pub(crate) z: Vec<Row>,
+    pub(crate) w: Vec<Row>,
+    /// Rows of the sliding rates.
+    pub(crate) slides: Vec<Row>,
+    angle: f64,
+    domains: RefCell<HashMap<Key, Rc<Linear>>>,
+}
+
+impl System {
+    /// Builds the system with steps of `angle` radians of the fastest rate.
+    pub(crate) fn new(machine: &Machine, angle: f64) -> System {
+        let mut machine = machine.clone();
+        machine.friction.retain(|friction| friction.force > 0.0);
+        let degrees = machine.degrees();
+        let mut system = System {
+            degrees,
+            period: machine.period(),
+            length: machine.length_scale(),
+            per_mass: machine.mass.clone().try_inverse().expect("a mass matrix"),
+            z: Vec::new(),
+            w: Vec::new(),
+            slides: Vec::new(),
+            angle,
+            domains: RefCell::default(),
+            machine,
+        };
+        let rows = |at| system.machine.gaps.iter().map(|gap| system.row(&gap.row, at)).collect();
+        let (z, w) = (rows(0), rows(degrees));
+        let slide = |friction: &rattlemap_dynamics::model::DryFriction| {
+            let mut row = system.row(&friction.row, degrees);
+            row[2 * degrees] = -friction.speed;
+            row
+        };
+        let slides = system.machine.friction.iter().map(slide).collect();
+        (system.z, system.w, system.slides) = (z, w, slides);
+        system
+    }
+
+    /// Returns the number of entries of `y`.
+    pub(crate) fn size(&self) -> usize {
+        2 * self.degrees + 1 + 2 * self.machine.drives.len()
+    }
+
+    /// Returns the row of a combination of entries from `at` on.
+    fn row(&self, along: &Vector, at: usize) -> Row {
+        let mut row = Row::zeros(self.size());
+        row.columns_mut(at, self.degrees).copy_from(&along.transpose());
+        row
+    }
+
+    /// Returns the row of the force, positive away from the wall, of spring, damper and preload behind a wall that only pushes. There
+    /// is none if this force cannot pull behind the wall.
+    pub(crate) fn pushing(&self, gap: usize, side: Side, nth: usize, stage: usize) -> Option<Row> {
+        let wall = &self.machine.gaps[gap].walls[side.index()][nth];
+        let spring = &wall.springs[stage];
+        let may_pull = spring.damping != 0.0 || spring.preload != 0.0;
+        if wall.contact != Contact::Pushing || !may_pull {
+            return None;
+        }
+        let s = side.sign();
+        let mut row = (&self.z[gap] * spring.stiffness + &self.w[gap] * spring.damping) * s;
+        row[2 * self.degrees] = spring.preload - s * spring.stiffness * wall.at;
+        Some(row)
+    }
+
+    /// Returns the bonds of rows of velocities, in turn.
+    pub(crate) fn bonds(&self, rows: &[&Vector]) -> Vec<Bond> {
+        let mut mobility = self.per_mass.clone();
+        let bond = |row: &&Vector| {
+            let change = &mobility * *row;
+            let along = row.dot(&change);
+            if along <= ROUNDING * row.dot(&(&self.per_mass * *row)) {
+                return (Vector::zeros(self.degrees), 0.0);
+            }
+            mobility -= &change * change.transpose() / along;
+            (change / along, 1.0 / along)
+        };
+        rows.iter().map(bond).collect()
+    }
+
+    /// Returns the generator of motion in which rows of velocities are constant.
+    fn bound(&self, a: &Matrix, rows: &[&Vector]) -> Matrix {
+        let (n, mut a) = (self.degrees, a.clone());
+        for (row, (change, _)) in rows.iter().zip(self.bonds(rows)) {
+            let rate = row.transpose() * a.rows(n, n);
+            let mut accelerations = a.rows_mut(n, n);
+            accelerations -= change * rate;
+        }
+        a
+    }
+
+    /// Returns the generator without anything at rest, and its fastest rate.
+    fn generator(&self, key: &Key) -> (Matrix, f64) {
+        let (n, machine) = (self.degrees, &self.machine);
+        let forces = &machine.stages[key.stage];
+        let (mut stiffness, mut damping) = (forces.stiffness.clone(), forces.damping.clone());
+        let mut load = forces.load.clone();
+        for (gap, &acting) in machine.gaps.iter().zip(&key.acting) {
+            let side = if acting > 0 { Side::Right } else { Side::Left };
+            let square = &gap.row * gap.row.transpose();
+            for wall in &gap.walls[side.index()][..usize::from(acting.unsigned_abs())] {
+                let spring = &wall.springs[key.stage];
+                stiffness += &square * spring.stiffness;
+                damping += &square * spring.damping;
+                load += &gap.row * (spring.stiffness * wall.at - side.sign() * spring.preload);
+            }
+        }
+        for (friction, grip) in machine.friction.iter().zip(&key.grips) {
+            load -= &friction.row * (friction.force * grip.sign());
+        }
+        let mut a = Matrix::zeros(self.size(), self.size());
+        a.view_mut((0, n), (n, n)).fill_with_identity();
+        let (of_x, of_v) = (&self.per_mass * stiffness, &self.per_mass * damping);
+        a.view_mut((n, 0), (n, n)).copy_from(&-&of_x);
+        a.view_mut((n, n), (n, n)).copy_from(&-&of_v);
+        a.view_mut((n, 2 * n), (n, 1)).copy_from(&(&self.per_mass * load));
+        for (i, drive) in machine.drives.iter().enumerate() {
+            let (cos, sin) = (2 * n + 1 + 2 * i, 2 * n + 2 + 2 * i);
+            a.view_mut((n, cos), (n, 1)).copy_from(&(&self.per_mass * &drive.cos));
+            a.view_mut((n, sin), (n, 1)).copy_from(&(&self.per_mass * &drive.sin));
+            let rate = f64::from(drive.order) * machine.omega;
+            (a[(cos, sin)], a[(sin, cos)]) = (-rate, rate);
+        }
+        let fastest =
+            (norm(&of_x).sqrt() + norm(&of_v)).max(f64::from(machine.highest_order()) * machine.omega);
+        (a, fastest)
+    }
+
+    pub(crate) fn domain(&self, key: &Key) -> Rc<Linear> {
+        if let Some(found) = self.domains.borrow().get(key) {
+            return found.clone();
+        }
+        let built = Rc::new(self.build(key));
+        self.domains.borrow_mut().insert(key.clone(), built.clone());
+        built
+    }
+
+    fn build(&self, key: &Key) -> Linear {
+        let (machine, empty) = (&self.machine, Row::zeros(self.size()));
+        let (gaps, elements) = (0..machine.gaps.len(), 0..machine.friction.len());
+        let (free, fastest) = self.generator(key);
+        let held: Vec<usize> = gaps.clone().filter(|&i| key.held[i]).collect();
+        let sticking: Vec<usize> = elements.clone().filter(|&i| key.grips[i] == Grip::Stick).collect();
+        let gap = |i: usize| &machine.gaps[i].row;
+        let along = |i: usize| &machine.friction[i].row;
+        let walls: Vec<&Vector> = held.iter().map(|&i| gap(i)).collect();
+        // Elements that walls hold are idle.
+        let all: Vec<&Vector> = walls.iter().copied().chain(sticking.iter().map(|&i| along(i))).collect();
+        let bonds = self.bonds(&all);
+        let busy: Vec<usize> =
+            (0..sticking.len()).filter(|j| bonds[walls.len() + j].1 > 0.0).map(|j| sticking[j]).collect();
+        let rows = |walls: &[usize], sticking: &[usize]| -> Vec<&Vector> {
+            walls.iter().map(|&i| gap(i)).chain(sticking.iter().map(|&i| along(i))).collect()
+        };
+        let others =
+            |of: &[usize], i: usize| -> Vec<usize> { of.iter().copied().filter(|&j| j != i).collect() };
+        let at_rest = rows(&held, &busy);
+        let a = self.bound(&free, &at_rest);
+        let mut is_still = vec![false; machine.gaps.len()];
+        let mut acceleration: Vec<Row> = self.w.iter().map(|w| w * &a).collect();
+        for i in gaps.clone() {
+            let with: Vec<&Vector> = at_rest.iter().copied().chain([gap(i)]).collect();
+            let is_given = self.bonds(&with).last().is_some_and(|bond| bond.1 == 0.0);
+            if is_given {
+                acceleration[i] = empty.clone();
+                is_still[i] = !key.held[i] && !self.moves(gap(i), &held, &busy);
+            }
+        }
+        let pressing = |i: usize| match key.held[i] {
+            true => &self.w[i] * self.bound(&free, &rows(&others(&held, i), &busy)),
+            false => empty.clone(),
+        };
+        let hold = |i: usize| {
+            if !busy.contains(&i) {
+                return empty.clone();
+            }
+            let before = rows(&held, &others(&busy, i));
+            let with: Vec<&Vector> = before.iter().copied().chain([along(i)]).collect();
+            let impulse = self.bonds(&with).last().map_or(0.0, |bond| bond.1);
+            self.row(along(i), self.degrees) * self.bound(&free, &before) * impulse
+        };
+        // With few digits, sums of steps have hardly any rounding error.
+        let h = f64::from((self.angle / fastest) as f32);
+        Linear {
+            step: (h, exponential(&(&a * h))),
+            acceleration,
+            pressing: gaps.map(pressing).collect(),
+            hold: elements.clone().map(hold).collect(),
+            is_idle: elements.map(|i| key.grips[i] == Grip::Stick && !busy.contains(&i)).collect(),
+            is_still,
+            a,
+        }
+    }
+
+    /// Whether a gap whose rate is given by rows at rest has a rate, as of a belt that carries it.
+    fn moves(&self, gap: &Vector, held: &[usize], sticking: &[usize]) -> bool {
+        let machine = &self.machine;
+        let walls = held.iter().map(|&i| (machine.gaps[i].row.clone(), 0.0));
+        let belts = sticking.iter().map(|&i| (machine.friction[i].row.clone(), machine.friction[i].speed));
+        let (rows, speeds): (Vec<Vector>, Vec<f64>) = walls.chain(belts).unzip();
+        let shares = Matrix::from_columns(&rows).svd(true, true).solve(gap, ROUNDING).expect("factors");
+        let speed: f64 = shares.iter().zip(&speeds).map(|(share, speed)| share * speed).sum();
+        let size: f64 = shares.iter().zip(&speeds).map(|(share, speed)| (share * speed).abs()).sum();
+        speed.abs() > ROUNDING * size
+    }
+}
