@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use rattlemap::gpu::{AdapterChoice, Features, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::record::Record;
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST, state};
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST};
 
 use rattlemap::cli::bench::spread::Spread;
 use rattlemap_bench::shapes::{SHAPES, Shape};

@@ -260,7 +260,7 @@ mod tests {
     use super::*;
     use crate::gpu::dispatch_policy::{DEDICATED, DispatchPolicy};
     use crate::gpu::{AdapterChoice, Precision};
-    use rattlemap_dynamics::model::{GearPair, state};
+    use rattlemap_dynamics::model::GearPair;
     use std::time::Duration;
 
     #[test]

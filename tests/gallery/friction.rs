@@ -2,7 +2,7 @@
 
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Model, REST, State, state};
+use rattlemap_dynamics::model::{Model, REST, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse_flow};
 
 fn motion(name: &str, values: &[(&str, f64)], start: State) -> Orbit {

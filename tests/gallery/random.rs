@@ -20,7 +20,7 @@ use rattlemap::validate::{
     Draw, Kind, Lanes, Rate, Sample, Stratum, Subject, TOLERATED, differences, replay,
 };
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Model, Oscillator, REST, State, state};
+use rattlemap_dynamics::model::{Law, Model, Oscillator, REST, State};
 use rattlemap_dynamics::orbit::{Budget, Class, Measurement, Settings, Status, measure};
 use rattlemap_dynamics::reference::Trajectory;
 

@@ -23,7 +23,7 @@ use rattlemap::validate::{
     Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, independent, replay, sample,
 };
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, REST, state};
+use rattlemap_dynamics::model::{GearPair, REST};
 use rattlemap_dynamics::orbit::{Class, Status};
 use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::{StrobeMap, multipliers};

@@ -11,7 +11,7 @@ use rattlemap::record::classify::{classify, status};
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::Kind;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, REST, state};
+use rattlemap_dynamics::model::{GearPair, REST};
 use rattlemap_dynamics::orbit::{Class, Measurement, Status, measure};
 
 /// Measures the first cell of a plan on the reference.

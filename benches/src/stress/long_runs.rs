@@ -14,7 +14,7 @@ use super::{Size, Verdict, Watch};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::record::classify::status;
 use rattlemap::record::distance::{farther, is_within};
-use rattlemap_dynamics::model::{GearPair, REST, State, state};
+use rattlemap_dynamics::model::{GearPair, REST, State};
 use rattlemap_dynamics::orbit::Status;
 use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::{Cycle, StrobeMap, refine};

@@ -9,7 +9,7 @@
 //! spiral.
 
 use super::recurrence::Metric;
-use crate::model::{REST, State, difference, dot, state, sum};
+use crate::model::{REST, State, difference, dot, sum};
 use crate::stability::{Cycle, image_of};
 
 /// Largest error of the linear map, relative to the deviation. With 0.1, one cell of 40,000 over restitution and
@@ -104,7 +104,7 @@ mod tests {
 
     use super::*;
     use crate::flow::Flow;
-    use crate::model::GearPair;
+    use crate::model::{GearPair, state};
 
     fn metric() -> Metric {
         Metric::of(&[REST], &Flow::new(&GearPair::paper(0.5).oscillator().unwrap()))

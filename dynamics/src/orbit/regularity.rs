@@ -7,7 +7,7 @@
 //! whether a spiral shrinks. Velocities jump where an impact passes phase 0, and their averages converge slowly.
 
 use super::recurrence::Metric;
-use crate::model::{MOST_COORDINATES, State, difference, state};
+use crate::model::{MOST_COORDINATES, State, difference};
 
 /// Least number of strobe states in a window.
 pub const LEAST_WINDOW: usize = 64;
@@ -68,7 +68,7 @@ fn averages(strobes: &[State], centre: &State, metric: &Metric) -> ([f64; MOST_C
 mod tests {
     use super::*;
     use crate::flow::Flow;
-    use crate::model::GearPair;
+    use crate::model::{GearPair, state};
 
     fn regular(state: impl FnMut(usize) -> State, count: usize) -> bool {
         let strobes: Vec<State> = (0..count).map(state).collect();

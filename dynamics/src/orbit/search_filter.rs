@@ -10,7 +10,7 @@
 //! other cycles and from the starts of earlier searches do not.
 
 use super::recurrence::Metric;
-use crate::model::{State, state};
+use crate::model::State;
 use crate::stability::{Cycle, Exponent, LARGEST_MULTIPLIER, StrobeMap};
 
 /// Distances of recurrences below this are near rounding and need not shrink.
@@ -88,7 +88,7 @@ impl SearchHistory {
 mod tests {
     use super::*;
     use crate::flow::Flow;
-    use crate::model::{GearPair, REST};
+    use crate::model::{GearPair, REST, state};
 
     /// Returns the strobe states of a motion with one multiplier, near a cycle at the origin.
     fn powers(multiplier: f64, start: f64) -> Vec<State> {

@@ -2,7 +2,7 @@
 
 use super::{Budget, Class, Measurement, Settings, Status, analyse, measure};
 use crate::flow::Flow;
-use crate::model::{GearPair, REST, state};
+use crate::model::{GearPair, REST};
 
 fn budget(early_stop: bool, transient_periods: u32) -> Budget {
     Budget {

@@ -3,7 +3,7 @@
 use super::sticking::RELEASE_ORDER;
 use super::{Crossing, EventKind, GapEvent, Mode, Observer, Trajectory, side_of};
 use crate::flow::{DomainKind, Gap, LinearFlow};
-use crate::model::{Contact, Side, state};
+use crate::model::{Contact, Side};
 
 /// Approach speeds below this, relative to the scale of length and the rate of free motion, count as near grazing if
 /// the load pulls away from the wall. The saltation matrix is proportional to the inverse of the approach speed.

@@ -7,7 +7,7 @@ use crate::record::Spelling;
 use crate::show::error::WriteError;
 use crate::show::names::{self, float, optional};
 use crate::show::numbers::Number;
-use rattlemap_dynamics::model::{State, state};
+use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::word::Word;
 
 /// Columns of a point before its states.
@@ -146,7 +146,7 @@ fn spelling(word: Option<&Word>) -> String {
 mod tests {
     use super::*;
     use crate::map::bifurcation::Direction;
-    use rattlemap_dynamics::model::Side;
+    use rattlemap_dynamics::model::{Side, state};
     use rattlemap_dynamics::orbit::{Class, EventKind, Status};
 
     fn text(write: impl FnOnce(&mut Vec<u8>) -> Result<(), WriteError>) -> String {

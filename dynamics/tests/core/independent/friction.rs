@@ -1,6 +1,6 @@
 //! Dry friction in motions by matrix exponentials: closed forms, energy and limits.
 
-use nalgebra::{Matrix2, Vector2, Vector4};
+use nalgebra::{Matrix2, Vector2};
 use rattlemap_dynamics::model::{Contact, Friction, Law, Oscillator, Side, State, state};
 use std::f64::consts::PI;
 

@@ -118,6 +118,7 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::state;
     fn event(kind: EventKind, t: f64) -> Event {
         let (before, after) = (state(&[0.5, 1.0]), state(&[0.5, 0.2, 0.0, 0.8]));
         let meshing = (kind == EventKind::MeshStart).then_some(Side::Right);
