@@ -8,6 +8,13 @@ use super::system::{Grip, Linear, Matrix, ROUNDING, Row, Vector};
 /// Height of flights, in scales of length, that end a series of impacts.
 const LOWEST_FLIGHT: f64 = 1e-13;
 
+/// Number of events at one time, in forcing periods, after which an impact shows that impacts of several gaps follow each other without end.
+const CROWD: usize = 4;
+const AT_ONCE: f64 = 1e-10;
+
+/// Relative rounding error of a rate that an impact has made zero.
+const SMALL: f64 = 1e-14;
+
 /// Derivative of the state after an event by that before it at a fixed time, and the row that is constant where the event lies.
 type Saltation = (Matrix, Row);
 
@@ -22,6 +29,7 @@ impl Motion<'_> {
     /// Ends a flight.
     pub(super) fn act(&mut self, end: End, at_start: bool) {
         let (grips, mut stuck, before) = (self.grips.clone(), self.stuck(), self.field());
+        let is_still = self.linear().is_still.clone();
         let (n, system) = (self.system.degrees, self.system);
         let one = Matrix::identity(2 * n, 2 * n);
         let (mut stops, mut jumps) = (None, false);
@@ -31,10 +39,9 @@ impl Motion<'_> {
                 Some((one, system.slides[i].clone()))
             }
             End::Slips(i, grip) => {
-                let linear = self.linear();
+                let row = self.linear().hold[i].clone();
                 (self.grips[i], self.orders[i]) = (grip, 2);
-                self.loosen(i, &linear);
-                Some((one, linear.hold[i].clone()))
+                Some((one, row))
             }
             End::Crosses(i, direction) => {
                 let events = self.events.len();
@@ -72,7 +79,7 @@ impl Motion<'_> {
                 Some((one, row))
             }
         };
-        self.settle(&grips, &stuck, stops, jumps);
+        self.settle(&grips, &stuck, &is_still, stops, jumps);
         if let Some((reset, row)) = saltation {
             self.jump(&reset, &row, &before);
         }
@@ -80,9 +87,9 @@ impl Motion<'_> {
 
     /// The state and the tangents are continuous at a change of the stage.
     pub(super) fn change(&mut self, stage: usize) {
+        let (grips, stuck, is_still) = (self.grips.clone(), self.stuck(), self.linear().is_still.clone());
         self.stage = stage;
-        let (grips, stuck) = (self.grips.clone(), self.stuck());
-        self.settle(&grips, &stuck, None, true);
+        self.settle(&grips, &stuck, &is_still, None, true);
     }
 
     /// Returns the sides of rigid walls that gaps are at rest on.
@@ -92,8 +99,16 @@ impl Motion<'_> {
     }
 
     /// Decides about all that is at rest, ends contacts that are not pressed, and records what the elements do then. They did `before`,
-    /// and the sliding rate of `stops` has become 0. Forces of walls that only push may have jumped.
-    fn settle(&mut self, before: &[Grip], stuck: &[Option<Side>], stops: Option<usize>, jumps: bool) {
+    /// and the sliding rate of `stops` has become 0. `was_stuck` and `was_still` are the gaps that were at rest. Forces of walls that only
+    /// push may have jumped.
+    fn settle(
+        &mut self,
+        before: &[Grip],
+        was_stuck: &[Option<Side>],
+        was_still: &[bool],
+        stops: Option<usize>,
+        jumps: bool,
+    ) {
         if jumps {
             (0..self.gaps.len()).for_each(|i| self.push(i));
         }
@@ -116,7 +131,8 @@ impl Motion<'_> {
             let side = self.gaps[i].contact().expect("an onset");
             self.ends(i, side);
         }
-        for (i, side) in stuck.iter().enumerate() {
+        self.loosen(before, was_still);
+        for (i, side) in was_stuck.iter().enumerate() {
             if let &Some(side) = side
                 && !matches!(self.gaps[i].mode, Mode::Stuck(_))
             {
@@ -210,6 +226,7 @@ impl Motion<'_> {
             Grip::Stick => {
                 self.limits(linear, i).iter().all(|(room, _)| linear.tendency(room, &self.y) >= 0.0)
             }
+            _ if linear.is_driven[i] => false,
             grip => {
                 let row = &self.system.slides[i] * &linear.a;
                 grip.sign() * linear.tendency(&row, &self.y) > 0.0
@@ -222,36 +239,51 @@ impl Motion<'_> {
         !linear.is_still[i] && side.sign() * linear.tendency(&linear.acceleration[i], &self.y) > 0.0
     }
 
-    /// An element slips. Gaps that it held begin to move, without an acceleration at first. On a rigid wall such a gap may be pressed into
-    /// the wall, and rests on. `before` is the domain in which the element stuck.
-    fn loosen(&mut self, element: usize, before: &Linear) {
-        for i in 0..self.gaps.len() {
+    /// Gaps begin to move that friction has held. A gap on a wall may be pressed to the wall: contact with it begins, and on a rigid wall the
+    /// gap rests on.
+    fn loosen(&mut self, before: &[Grip], was_still: &[bool]) {
+        for i in (0..self.gaps.len()).filter(|&i| was_still[i]) {
             let linear = self.linear();
-            if !before.is_still[i] || linear.is_still[i] {
+            if linear.is_still[i]
+                || matches!(self.gaps[i].mode, Mode::Stuck(_))
+                || self.has_rate(&self.system.w[i])
+            {
                 continue;
             }
-            let growth = self.of(&(&linear.acceleration[i] * &linear.a)).signum();
-            let wall =
-                self.gaps[i].leaves.filter(|(side, _)| side.sign() == growth).and_then(|(direction, _)| {
-                    let (side, nth) = self.next_wall(i, direction).filter(|wall| wall.0 == direction)?;
-                    Some((side, self.system.machine.gaps[i].walls[side.index()][nth].contact))
-                });
-            match (self.gaps[i].mode, wall) {
-                (Mode::Onset(side), _) if side.sign() == growth => self.gaps[i].is_unpressed = true,
-                (Mode::Onset(side), _) => self.ends(i, side),
-                (Mode::Plain, Some((side, Contact::Rigid))) => {
-                    self.record(i, What::Begins, side);
-                    (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Stuck(side), None);
-                    self.grips[element] = Grip::Stick;
+            let row = &linear.acceleration[i];
+            let size: f64 = row.iter().zip(self.y.iter()).map(|(a, b)| (a * b).abs()).sum();
+            let order = if self.of(row).abs() > ROUNDING * size { 2 } else { 3 };
+            if let Mode::Onset(_) = self.gaps[i].mode {
+                self.gaps[i].is_unpressed = order == 3;
+                continue;
+            }
+            let Some((direction, _)) = self.gaps[i].leaves else { continue };
+            self.gaps[i].leaves = Some((direction, order));
+            if direction.sign() * linear.tendency(row, &self.y) <= 0.0 {
+                continue;
+            }
+            let Some((side, nth)) = self.next_wall(i, direction).filter(|wall| wall.0 == direction) else {
+                continue;
+            };
+            self.record(i, What::Begins, side);
+            if self.system.machine.gaps[i].walls[side.index()][nth].contact == Contact::Rigid {
+                (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Stuck(side), None);
+                for (element, _) in before.iter().enumerate().filter(|(_, before)| **before == Grip::Stick) {
+                    if !self.has_rate(&self.system.slides[element]) {
+                        (self.grips[element], self.orders[element]) = (Grip::Stick, 0);
+                    }
                 }
-                (Mode::Plain, Some((side, _))) => {
-                    self.record(i, What::Begins, side);
-                    self.enter(i, side);
-                    self.gaps[i].leaves = Some((side.mirrored(), 3));
-                }
-                (_, _) => self.gaps[i].leaves = self.gaps[i].leaves.map(|(side, _)| (side, 3)),
+                self.decide();
+            } else {
+                self.enter(i, side);
+                self.gaps[i].leaves = Some((side.mirrored(), order));
             }
         }
+    }
+
+    /// Whether the value of a row of velocities is not zero but for rounding.
+    fn has_rate(&self, row: &Row) -> bool {
+        self.of(row).abs() > ROUNDING * self.size_of_rate(row)
     }
 
     /// Crosses a wall: the gap is then behind it, or in front of it again.
@@ -411,7 +443,8 @@ impl Motion<'_> {
         for (i, friction) in self.system.machine.friction.iter().enumerate() {
             let along = friction.row.dot(kick);
             if along.abs() > ROUNDING * friction.row.norm() * kick.norm() {
-                self.grips[i] = self.grip(i, ROUNDING * (along * change).abs());
+                let size = self.size_of_rate(&self.system.slides[i]);
+                self.grips[i] = self.grip(i, ROUNDING * (along * change).abs() + SMALL * size);
                 self.orders[i] = 0;
             }
         }
@@ -468,7 +501,14 @@ impl Motion<'_> {
 
     fn record_as(&mut self, i: usize, what: What, side: Side, symbol: Option<u8>) {
         self.gaps[i].origin = Some(side);
-        self.events.push(Event { gap: i, what, side, symbol, t: self.time() });
+        let t = self.time();
+        let is_crowd = |last: &[Event]| {
+            what != What::Ends
+                && last.len() == CROWD
+                && last.iter().all(|event| t - event.t < AT_ONCE * self.system.period)
+        };
+        self.is_crowded |= is_crowd(&self.events[self.events.len().saturating_sub(CROWD)..]);
+        self.events.push(Event { gap: i, what, side, symbol, t });
     }
 }
 

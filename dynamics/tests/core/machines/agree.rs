@@ -89,7 +89,11 @@ impl Ours<'_> {
         }
         let size = size(&ours);
         let of_derivative = (&ours.derivative - &other.derivative).amax() / size;
-        (noise <= MOST_NOISE && size <= MOST_GROWTH).then_some((ours, other, [noise, of_derivative]))
+        (noise <= MOST_NOISE && size <= MOST_GROWTH && !self.motion.is_crowded).then_some((
+            ours,
+            other,
+            [noise, of_derivative],
+        ))
     }
 }
 

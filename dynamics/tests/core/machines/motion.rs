@@ -99,6 +99,8 @@ pub(crate) struct Motion<'a> {
     pub(crate) events: Vec<Event>,
     /// Ends of sticking, `7`, and reversals, `0`, with their times, which the caller may clear.
     pub(crate) slips: Vec<(u8, f64)>,
+    /// Whether impacts of several gaps have followed each other at one time but for rounding. Their number then depends on rounding.
+    pub(crate) is_crowded: bool,
     /// Number of flights of gaps off walls which impacts of other gaps would have begun, and that are too low.
     pub(crate) corners: usize,
     /// Relative errors of the velocities that are added in turn at events.
@@ -158,6 +160,7 @@ impl<'a> Motion<'a> {
             events: Vec::new(),
             slips: Vec::new(),
             corners: 0,
+            is_crowded: false,
             shaken: [0.0; 4],
         };
         motion.put(start);
@@ -307,13 +310,8 @@ impl<'a> Motion<'a> {
 
     /// Elements without a sliding rate are at rest.
     fn begin_grips(&mut self) {
-        let n = self.system.degrees;
-        let omega = self.system.machine.omega;
-        let (x, v) = (self.y.rows(0, n).amax(), self.y.rows(n, n).abs());
-        for (i, friction) in self.system.machine.friction.iter().enumerate() {
-            let along = friction.row.abs();
-            let size = along.sum() * omega * x + along.dot(&v) + friction.speed.abs();
-            self.grips[i] = self.grip(i, ROUNDING * size);
+        for i in 0..self.grips.len() {
+            self.grips[i] = self.grip(i, ROUNDING * self.size_of_rate(&self.system.slides[i]));
         }
         self.decide();
         self.project();
@@ -327,6 +325,13 @@ impl<'a> Motion<'a> {
             };
             self.gaps[i].leaves = Side::BOTH.into_iter().find(is_on).map(|side| (side, 3));
         }
+    }
+
+    /// Returns the size of the numbers that the value of a row of velocities is computed from.
+    pub(super) fn size_of_rate(&self, row: &Row) -> f64 {
+        let n = self.system.degrees;
+        let rates = row.columns(n, n).abs().sum() * self.system.machine.omega * self.y.rows(0, n).amax();
+        rates + row.iter().zip(self.y.iter()).map(|(a, b)| (a * b).abs()).sum::<f64>()
     }
 
     /// Returns the direction of an element's sliding rate.

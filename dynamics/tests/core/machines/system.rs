@@ -60,6 +60,8 @@ pub(crate) struct Linear {
     pub(crate) hold: Vec<Row>,
     /// Elements that stick without a force, because walls hold their row.
     pub(crate) is_idle: Vec<bool>,
+    /// Elements that slide at a rate which others at rest keep constant.
+    pub(crate) is_driven: Vec<bool>,
     /// Gaps at rest that no rigid wall holds: friction holds them.
     pub(crate) is_still: Vec<bool>,
 }
@@ -296,12 +298,15 @@ impl System {
             |of: &[usize], i: usize| -> Vec<usize> { of.iter().copied().filter(|&j| j != i).collect() };
         let at_rest = rows(&held, &busy);
         let a = self.bound(&free, &at_rest);
+        let is_given = |row: &Vector| {
+            let with: Vec<&Vector> = at_rest.iter().copied().chain([row]).collect();
+            self.bonds(&with).last().is_some_and(|bond| bond.1 == 0.0)
+        };
+        let is_driven = |i: usize| key.grips[i] != Grip::Stick && is_given(along(i));
         let mut is_still = vec![false; machine.gaps.len()];
         let mut acceleration: Vec<Row> = self.w.iter().map(|w| w * &a).collect();
         for i in gaps.clone() {
-            let with: Vec<&Vector> = at_rest.iter().copied().chain([gap(i)]).collect();
-            let is_given = self.bonds(&with).last().is_some_and(|bond| bond.1 == 0.0);
-            if is_given {
+            if is_given(gap(i)) {
                 acceleration[i] = empty.clone();
                 is_still[i] = !key.held[i] && !self.moves(gap(i), &held, &busy);
             }
@@ -326,7 +331,8 @@ impl System {
             acceleration,
             pressing: gaps.map(pressing).collect(),
             hold: elements.clone().map(hold).collect(),
-            is_idle: elements.map(|i| key.grips[i] == Grip::Stick && !busy.contains(&i)).collect(),
+            is_idle: elements.clone().map(|i| key.grips[i] == Grip::Stick && !busy.contains(&i)).collect(),
+            is_driven: elements.map(is_driven).collect(),
             is_still,
             a,
         }
@@ -340,7 +346,7 @@ impl System {
         let (rows, speeds): (Vec<Vector>, Vec<f64>) = walls.chain(belts).unzip();
         let shares = Matrix::from_columns(&rows).svd(true, true).solve(gap, ROUNDING).expect("factors");
         let speed: f64 = shares.iter().zip(&speeds).map(|(share, speed)| share * speed).sum();
-        let size: f64 = shares.iter().zip(&speeds).map(|(share, speed)| (share * speed).abs()).sum();
+        let size = shares.abs().sum() * speeds.iter().fold(0.0, |most: f64, speed| most.max(speed.abs()));
         speed.abs() > ROUNDING * size
     }
 }
