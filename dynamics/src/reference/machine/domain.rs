@@ -110,9 +110,9 @@ impl Domain {
         let multipliers = &constraints.inverse * (&constraints.rows * &free);
         let mut bound = &free - &constraints.moves * &multipliers;
         let mut is_still = [false; SIZE];
-        for i in 0..n {
+        for (i, is_still) in is_still.iter_mut().enumerate().take(n) {
             if constraints.mobility[(i, i)] <= NO_MOBILITY * system.mobility[(i, i)] {
-                is_still[i] = true;
+                *is_still = true;
                 bound.row_mut(i).fill(0.0);
             }
         }

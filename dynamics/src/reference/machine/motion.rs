@@ -695,9 +695,9 @@ impl<'s> Motion<'s> {
     /// Projects the tangents to the constraints: neighbouring motions rest, too.
     fn hold_tangents(&mut self) {
         for tangent in &mut self.tangents {
-            for gap in 0..self.system.gaps() {
-                if let GapMode::Stuck(_) = self.modes.gaps[gap] {
-                    tangent[gap] = 0.0;
+            for (entry, mode) in tangent.iter_mut().zip(self.modes.gaps).take(self.system.gaps()) {
+                if let GapMode::Stuck(_) = mode {
+                    *entry = 0.0;
                 }
             }
             self.system.hold(&self.modes, tangent, true);

@@ -73,8 +73,8 @@ fn bernstein(c: &[f64]) -> Polynomial {
         inverse *= (j + 1) as f64 * RECIPROCALS[degree - j];
     }
     // Each pass adds the neighbours, as in Pascal's triangle.
-    for i in 0..=degree {
-        b[i] = row[0];
+    for (i, b) in b.iter_mut().enumerate().take(degree + 1) {
+        *b = row[0];
         for j in 0..degree - i {
             row[j] += row[j + 1];
         }
