@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::map::scene::Start;
 use crate::record::measures::{MEASURES, Measured};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Model, ModelError, REST, Side, State};
+use rattlemap_dynamics::model::{MOST_COORDINATES, Model, ModelError, Oscillator, REST, Side, State};
 use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Settings, Status};
 use rattlemap_dynamics::word::Word;
 
@@ -92,14 +92,19 @@ pub struct SectionPoint {
     pub after: State,
 }
 
-/// Returns the index of the displacement that has one value at all crossings of a wall, because the gap depends on this
-/// displacement only, in every cell. None if the gap depends on both displacements, or without cells.
+/// Returns the index of the displacement that has one value at all crossings of a wall, because the only gap depends on this
+/// displacement only, in every cell. None if the gap depends on several displacements, with several gaps, or without cells.
 ///
 /// Section points of such a model differ only in velocity and phase, so its displacement is shown at phase 0.
 pub fn fixed(cells: &[(f64, Box<dyn Model>)]) -> Option<usize> {
-    let gap = |model: &dyn Model| model.oscillator().map(|oscillator| oscillator.gap);
-    let fixes = |i: usize| cells.iter().all(|(_, model)| gap(&**model).is_ok_and(|gap| gap[1 - i] == 0.0));
-    (0..2).find(|&i| !cells.is_empty() && fixes(i))
+    let is_alone = |oscillator: &Oscillator, i: usize| {
+        let mut others = oscillator.gap_row(0).into_iter().enumerate().filter(|(j, _)| *j != i);
+        oscillator.gap_count() == 1 && others.all(|(_, factor)| factor == 0.0)
+    };
+    let fixes = |i: usize| {
+        cells.iter().all(|(_, model)| model.oscillator().is_ok_and(|oscillator| is_alone(&oscillator, i)))
+    };
+    (0..MOST_COORDINATES).find(|&i| !cells.is_empty() && fixes(i))
 }
 
 /// Returns the number of columns of a diagram.

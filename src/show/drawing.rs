@@ -25,7 +25,7 @@ use std::io::Write;
 pub use crate::show::color::Color;
 pub use canvas::{Bitmap, Canvas};
 pub use shapes::{Align, Marker, Point, Rect, Shape};
-pub use style::{DARK, FAINT, GEAR_1, GEAR_2, GRID, LARGE, MEDIUM, MESHING, SMALL, WHITE, wall_color};
+pub use style::{BODIES, DARK, FAINT, GEAR_2, GRID, LARGE, MEDIUM, MESHING, SMALL, WHITE, wall_color};
 
 use crate::map::scene::Format;
 use crate::show::error::WriteError;

@@ -1,4 +1,4 @@
-//! Labels of a model's gap and walls in figures. Of several gaps it is the first one.
+//! Labels of a model's gaps and walls in figures.
 
 use rattlemap_dynamics::model::{Model, Side};
 
@@ -10,39 +10,51 @@ use crate::text::expression::Expression;
 /// Largest number of characters of a position in a legend.
 const LONGEST_POSITION: usize = 24;
 
-/// The gap and the positions of the walls, by the symbols of the model.
+/// A gap and the positions of its walls, by the symbols of the model.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WallLabels {
-    /// Symbol of the gap: that of the displacement if it is a single one, else its name.
+    /// Symbol of the gap. One of several gaps has its own name. A single gap has that of its displacement if it is one, else `z`.
     gap: String,
     /// Positions of the right and the left wall: none without a wall, empty if too long for a legend.
     at: [Option<String>; 2],
 }
 
 impl WallLabels {
-    /// Returns the labels of a model. Positions given as expressions in its file do not depend on parameter values.
-    pub(crate) fn of(model: &dyn Model) -> WallLabels {
+    /// Returns the labels of the gap with this index. Positions given as expressions in the model's file do not depend on parameter
+    /// values.
+    pub(crate) fn of(model: &dyn Model, index: usize) -> WallLabels {
         // The library's own models are described by the files of the same name.
         let named = FileModel::built_in(model.name());
         let [gap, _] = gap_names(model);
         match model.downcast_ref::<FileModel>().or(named.as_ref()) {
-            Some(file) => WallLabels::of_file(file.definition(), gap),
+            Some(file) => WallLabels::of_file(file.definition(), index, gap),
             None => WallLabels::of_values(model, gap),
         }
     }
 
-    fn of_file(definition: &Definition, gap: &str) -> WallLabels {
+    /// Returns the labels of the only gap. With several gaps the labels have no positions, because walls of a side differ between gaps.
+    pub(crate) fn of_all(model: &dyn Model) -> WallLabels {
+        let count = model.oscillator().map_or(1, |oscillator| oscillator.gap_count());
+        if count == 1 {
+            return WallLabels::of(model, 0);
+        }
+        let gaps: Vec<WallLabels> = (0..count).map(|index| WallLabels::of(model, index)).collect();
+        let has = |side: Side| gaps.iter().any(|gap| gap.has(side)).then(String::new);
+        WallLabels { gap: String::new(), at: Side::BOTH.map(has) }
+    }
+
+    fn of_file(definition: &Definition, index: usize, gap: &str) -> WallLabels {
         let motion = &definition.motion;
         let is = |entry: &Expression, value: f64| entry.as_number() == Some(value);
-        let first = &motion.gaps[0];
+        let read = &motion.gaps[index];
         let alone = (0..motion.degrees()).find(|&i| {
-            is(&first.row[i], 1.0) && (0..motion.degrees()).all(|j| j == i || is(&first.row[j], 0.0))
+            is(&read.row[i], 1.0) && (0..motion.degrees()).all(|j| j == i || is(&read.row[j], 0.0))
         });
-        let at = |side| definition.wall(side).map(|wall| position(&wall.at));
+        let walls = &definition.walls[index];
+        let at = |side: Side| walls[side.index()].first().map(|wall| position(&wall.at));
         let alone = alone.map(|i| symbol(&motion.coordinates[i]));
-        // Several gaps have names of their own.
-        let own = first.name.as_ref().filter(|_| motion.gaps.len() > 1).map(|name| symbol(name));
-        WallLabels::new(alone.or(own).unwrap_or_else(|| gap.to_owned()), Side::BOTH.map(at))
+        let own = read.name.as_ref().filter(|_| motion.gaps.len() > 1).map(|name| symbol(name));
+        WallLabels::new(own.or(alone).unwrap_or_else(|| gap.to_owned()), Side::BOTH.map(at))
     }
 
     fn of_values(model: &dyn Model, gap: &str) -> WallLabels {
@@ -135,7 +147,7 @@ mod tests {
     use rattlemap_dynamics::model::{GearPair, Stops};
 
     fn labels(model: &dyn Model) -> [String; 3] {
-        let labels = WallLabels::of(model);
+        let labels = WallLabels::of(model, 0);
         let entry = |side: Side| if labels.has(side) { labels.entry(side) } else { String::new() };
         [entry(Side::Right), entry(Side::Left), labels.section()]
     }
@@ -152,6 +164,13 @@ mod tests {
         assert_eq!(built_in("two-masses"), two);
         let stops = ["right wall, x = +0.5", "left wall, x = \u{2212}0.5", "|x| = 0.5"];
         assert_eq!(labels(&Stops::with_restitution(0.5)), stops);
+        let gears = FileModel::built_in("two-loose-gears").unwrap();
+        let positions =
+            [0, 1].map(|gap| Side::BOTH.map(|side| WallLabels::of(&gears, gap).position(side).unwrap()));
+        let expected = [["a = 0", "a = \u{2212}b\u{2081}"], ["b = 0", "b = \u{2212}b\u{2082}"]];
+        assert_eq!(positions, expected);
+        let all = WallLabels::of_all(&gears);
+        assert_eq!([all.entry(Side::Right), all.section()], ["right wall", "the walls"]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Colours and type sizes that all figures share. Lengths are in units of the [drawing](super).
 
 use crate::show::color::Color;
-use rattlemap_dynamics::model::Side;
+use rattlemap_dynamics::model::{MOST_COORDINATES, Side};
 
 /// Background.
 pub const WHITE: Color = [0xff; 3];
@@ -13,10 +13,19 @@ pub const FAINT: Color = [0xa0; 3];
 pub const GRID: Color = [0xe6; 3];
 /// Trajectory while the teeth mesh.
 pub const MESHING: Color = [0x00, 0x9e, 0x73];
-/// Gear 1 where both gears share a panel.
-pub const GEAR_1: Color = DARK;
 /// Gear 2 where both gears share a panel.
 pub const GEAR_2: Color = [0xcc, 0x79, 0xa7];
+/// The bodies of a model where they share a panel, in order. None is a colour of a wall.
+pub const BODIES: [Color; MOST_COORDINATES] = [
+    DARK,
+    GEAR_2,
+    [0x56, 0xb4, 0xe9],
+    [0xb3, 0x8f, 0x00],
+    [0x7a, 0x3f, 0xa8],
+    [0x8c, 0x56, 0x4b],
+    [0x8a, 0x8a, 0x8a],
+    [0x5e, 0x8c, 0x31],
+];
 
 /// Type size of tick labels and legends.
 pub const SMALL: f64 = 23.0;

@@ -24,8 +24,10 @@ use rattlemap_dynamics::orbit::Class;
 /// Default size, and least distance of the panels from the left edge.
 const WIDTH: f64 = 1600.0;
 const HEIGHT: f64 = 1750.0;
-/// Height that a panel of a measured quantity adds.
-const MEASURED_HEIGHT: f64 = 420.0;
+/// Most panels of states in a figure of default size.
+const STATE_PANELS: usize = 3;
+/// Height that a further panel of states or of a measured quantity adds.
+const FURTHER_HEIGHT: f64 = 420.0;
 const PANEL_LEFT: f64 = 130.0;
 /// Height of the panel of exponents, as a share of the height of another panel.
 const EXPONENTS_HEIGHT: f64 = 0.6;
@@ -74,7 +76,9 @@ pub(super) fn draw(
     let is_low = !canvas.is_default() && coloring.strips() > 0;
     let exponents = if is_low { 1.0 } else { EXPONENTS_HEIGHT };
     let shares = [vec![1.0; panels.list.len()], vec![exponents]].concat();
-    let height = HEIGHT + MEASURED_HEIGHT * panels.measured() as f64;
+    let of_states = panels.list.len() - panels.measured();
+    let further = panels.measured() + of_states.saturating_sub(STATE_PANELS);
+    let height = HEIGHT + FURTHER_HEIGHT * further as f64;
     let edges = stacked(canvas, top, height, &shares);
     let axis = |(i, edges): (usize, [f64; 2])| {
         let height = edges[1] - edges[0];

@@ -2,6 +2,7 @@
 
 mod flights;
 mod gap;
+mod gaps;
 mod heading;
 mod motion;
 mod phase_planes;

@@ -43,7 +43,7 @@ impl Panels {
     /// displacements, the panels show its velocity before contact and the displacements at phase 0 instead. Below them, each of
     /// the `numbers` has a panel, except states and the gap if it is one displacement.
     pub fn of(model: &dyn Model, fixed: Option<usize>, numbers: &[Number]) -> Panels {
-        let walls = WallLabels::of(model);
+        let walls = WallLabels::of_all(model);
         let names: Vec<String> = model.state_names().into_iter().map(symbol).collect();
         let displacements = || (0..names.len()).step_by(2);
         let units = model.units();

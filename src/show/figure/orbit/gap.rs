@@ -1,26 +1,30 @@
-//! The gap against time between its walls, with the symbols of the word, and the depth of penetration. Lengths are in pixels.
+//! Each gap against time between its walls, with the symbols of the word, and the depth of penetration. Lengths are in pixels.
 
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::draw_head;
 use crate::show::drawing::{Align, Canvas, DARK, MEDIUM, MESHING, Point, Rect, SMALL, wall_color};
 use crate::show::figure::orbit::flights;
+use crate::show::figure::orbit::gaps::PlotGap;
 use crate::show::figure::orbit::motion::Piece;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
 use crate::show::names;
 use crate::show::symbols::{number, with_unit};
 use rattlemap_dynamics::model::{Contact, Side, State};
+use rattlemap_dynamics::orbit::Event;
 
-/// Default height, and shares of the panels of gap and depth.
+/// Default height with one gap, and shares of the panels of gap and depth.
 const HEIGHT: f64 = 1050.0;
 const SHARES: [f64; 2] = [1.4, 0.75];
+/// Height that the panels of each further gap add, per share.
+const FURTHER: f64 = 320.0;
 /// Room for the walls' names right of the panel in a figure of default size, and the room for their text, which includes the
 /// margin.
 const WALL_NAMES: f64 = 97.0;
 const WALL_TEXT: f64 = 135.0;
 /// Distance from the panel to the walls' names.
 const WALL_AWAY: f64 = 14.0;
-/// Default height of a figure of a motion from the start: without displacements, and of each.
+/// Default height of a figure of a motion from the start: with one gap, and of each further gap and displacement.
 const HISTORY_HEIGHT: [f64; 2] = [760.0, 380.0];
 /// Distance between a symbol of the word and its flight.
 const SYMBOL_AWAY: f64 = 30.0;
@@ -37,72 +41,107 @@ fn wall_name(side: Side) -> String {
     format!("{} wall", names::side(side))
 }
 
+/// Returns the position of a wall: the model's expression, or its value if the expression is too long.
+fn position(canvas: &Canvas, gap: &PlotGap, side: Side) -> Option<String> {
+    let expression = gap.labels.position(side);
+    let value = format!("{} = {}", gap.labels.gap(), number(gap.wall(side)));
+    expression.into_iter().chain([value]).find(|text| canvas.text_width(text, SMALL) <= WALL_TEXT)
+}
+
 impl OrbitPlot<'_> {
     pub(crate) fn draw_gap(&self, canvas: &Canvas) {
-        let free = if self.gap_coordinate().is_some() { "free motion" } else { "gap in free motion" };
+        let are_coordinates = self.gaps.iter().all(|gap| self.gap_coordinate(gap).is_some());
+        let free = if are_coordinates { "free motion" } else { "gap in free motion" };
         let legend = self.legend(self.motion_entries(free), false);
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
-        let shares = if self.has_depth() { &SHARES[..] } else { &SHARES[..1] };
-        let axes = [self.gap_axis(&self.gap_label()), self.depth_axis()];
-        let panels = stacked(canvas, top, HEIGHT, shares).into_iter().zip(axes).collect();
+        // The depth behind the walls of a gap is shown below it.
+        let panels_of = |gap: &PlotGap| if self.has_depth(gap) { &SHARES[..] } else { &SHARES[..1] };
+        let shares: Vec<f64> = self.gaps.iter().flat_map(|gap| panels_of(gap)).copied().collect();
+        let further: f64 = self.gaps[1..].iter().flat_map(|gap| panels_of(gap)).sum();
+        let axes = self.gaps.iter().flat_map(|gap| {
+            let depth = self.has_depth(gap).then(|| self.depth_axis(gap));
+            [self.gap_axis(gap)].into_iter().chain(depth)
+        });
+        let panels =
+            stacked(canvas, top, HEIGHT + FURTHER * further, &shares).into_iter().zip(axes).collect();
         let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, self.wall_names(canvas));
-        let frame = &frames[0];
-        self.draw_gap_panel(canvas, frame);
-        self.draw_symbols(canvas, frame);
-        frame.draw_axes(canvas, frames.len() == 1);
-        if let Some(frame) = frames.get(1) {
-            self.draw_penetration(canvas, frame);
+        let mut rest = &frames[..];
+        for gap in &self.gaps {
+            let (of_gap, below) = rest.split_at(panels_of(gap).len());
+            self.draw_gap_panel(canvas, &of_gap[0], gap);
+            self.draw_symbols(canvas, &of_gap[0], gap);
+            of_gap[0].draw_axes(canvas, of_gap.len() == 1 && below.is_empty());
+            if let Some(frame) = of_gap.get(1) {
+                self.draw_penetration(canvas, frame, gap);
+                frame.draw_axes(canvas, below.is_empty());
+            }
+            rest = below;
         }
     }
 
-    /// Draws the gap and the displacements of a motion from the start, one below the other.
+    /// Draws the gaps and the displacements of a motion from the start, one below the other.
     pub(crate) fn draw_history(&self, canvas: &Canvas) {
         let legend = self.legend(self.motion_entries("free motion"), false);
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
         let displacements = self.other_displacements();
         let label = |index: &usize| format!("displacement, {}", self.names[*index]);
         let others = displacements.iter().map(|index| self.state_axis(&label(index), &[*index], 1.0));
-        let axes: Vec<Axis> = [self.gap_axis(&self.gap_label())].into_iter().chain(others).collect();
-        let height = HISTORY_HEIGHT[0] + HISTORY_HEIGHT[1] * displacements.len() as f64;
+        let axes: Vec<Axis> = self.gaps.iter().map(|gap| self.gap_axis(gap)).chain(others).collect();
+        let height = HISTORY_HEIGHT[0] + HISTORY_HEIGHT[1] * (axes.len() - 1) as f64;
         let panels = stacked(canvas, top, height, &vec![1.0; axes.len()]).into_iter().zip(axes).collect();
         let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, self.wall_names(canvas));
-        self.draw_gap_panel(canvas, &frames[0]);
-        for (frame, &index) in frames[1..].iter().zip(&displacements) {
+        let (of_gaps, of_displacements) = frames.split_at(self.gaps.len());
+        for (frame, gap) in of_gaps.iter().zip(&self.gaps) {
+            self.draw_gap_panel(canvas, frame, gap);
+        }
+        for (frame, &index) in of_displacements.iter().zip(&displacements) {
             frame.draw_grid(canvas);
-            self.draw_motion(canvas, frame, |t, state| (t, state[index]));
+            let gaps = [self.gaps_of(index / 2), self.all_gaps()];
+            self.draw_motion(canvas, frame, gaps.each_ref().map(|gaps| &gaps[..]), |t, state| {
+                (t, state[index])
+            });
         }
         for (n, frame) in frames.iter().enumerate() {
             frame.draw_axes(canvas, n + 1 == frames.len());
         }
     }
 
-    /// Returns the indices of the displacements in the state, without the one that is the gap.
+    /// Returns the indices of the displacements in the state, without those that are gaps.
     fn other_displacements(&self) -> Vec<usize> {
-        (0..self.names.len()).step_by(2).filter(|index| self.gap_coordinate() != Some(*index)).collect()
+        let is_gap = |index: &usize| self.gaps.iter().any(|gap| self.gap_coordinate(gap) == Some(*index));
+        (0..self.names.len()).step_by(2).filter(|index| !is_gap(index)).collect()
     }
 
     /// Returns the index in the state of the displacement that is the gap.
-    fn gap_coordinate(&self) -> Option<usize> {
-        self.names.iter().position(|name| name == self.walls.gap())
+    fn gap_coordinate(&self, gap: &PlotGap) -> Option<usize> {
+        self.names.iter().position(|name| name == gap.labels.gap())
     }
 
-    fn gap_label(&self) -> String {
-        let label = match self.gap_coordinate() {
-            Some(_) => format!("displacement, {}", self.walls.gap()),
-            None => format!("gap, {} = {}", self.walls.gap(), self.gap_expression()),
+    fn gap_label(&self, gap: &PlotGap) -> String {
+        let name = gap.labels.gap();
+        let label = match self.gap_coordinate(gap) {
+            Some(_) => format!("displacement, {name}"),
+            None => format!("gap, {name} = {}", self.gap_expression(gap)),
         };
         with_unit(&label, self.units.gap.as_deref())
     }
 
-    /// Draws the gap between its walls.
-    fn draw_gap_panel(&self, canvas: &Canvas, frame: &Frame) {
-        self.draw_walls(canvas, frame);
-        self.draw_motion(canvas, frame, |t, state| (t, self.gap(state)));
+    /// Draws a gap between its walls, with its own contacts and events.
+    fn draw_gap_panel(&self, canvas: &Canvas, frame: &Frame, gap: &PlotGap) {
+        self.draw_walls(canvas, frame, gap);
+        self.draw_motion(canvas, frame, [&[gap.index]; 2], |t, state| (t, self.gap(gap, state)));
     }
 
-    fn draw_motion(&self, canvas: &Canvas, frame: &Frame, at: impl Fn(f64, &State) -> Point + Copy) {
-        self.draw_lines(canvas, frame, (DARK, MESHING), at);
-        self.draw_markers(canvas, frame, false, at);
+    /// Draws the motion in a panel. `colored` are the gaps whose contact colours it, `marked` those whose events have markers.
+    fn draw_motion(
+        &self,
+        canvas: &Canvas,
+        frame: &Frame,
+        [colored, marked]: [&[usize]; 2],
+        at: impl Fn(f64, &State) -> Point + Copy,
+    ) {
+        self.draw_lines(canvas, frame, colored, (DARK, MESHING), at);
+        self.draw_markers(canvas, frame, marked, false, at);
     }
 
     /// Returns the room for the walls' names right of the panels, beyond half a label.
@@ -110,31 +149,34 @@ impl OrbitPlot<'_> {
         if canvas.is_default() {
             return WALL_NAMES;
         }
-        let walls = Side::BOTH.into_iter().filter(|side| self.contact(*side).is_some());
-        let texts = walls.flat_map(|side| [Some(wall_name(side)), self.position(canvas, side)]).flatten();
+        let walls = self.gaps.iter().flat_map(|gap| {
+            let has = |side: &Side| gap.contact(*side).is_some();
+            Side::BOTH.into_iter().filter(has).map(move |side| (gap, side))
+        });
+        let texts =
+            walls.flat_map(|(gap, side)| [Some(wall_name(side)), position(canvas, gap, side)]).flatten();
         WALL_AWAY + texts.map(|text| canvas.text_width(&text, SMALL)).fold(0.0, f64::max)
     }
 
-    /// Whether the motion meshes with a wall of impacts, so that a panel shows the depth, which is too small to be visible in the
+    /// Whether a gap meshes with a wall of impacts, so that a panel shows the depth, which is too small to be visible in the
     /// gap. Behind an elastic wall the depth is visible; on a rigid wall it is zero.
-    fn has_depth(&self) -> bool {
-        let meshing = self.motion.pieces.iter().filter_map(|piece| piece.meshing);
-        meshing.into_iter().any(|side| self.contact(side) == Some(Contact::Impact))
+    fn has_depth(&self, gap: &PlotGap) -> bool {
+        let walls = self.motion.meshing_walls(gap.index);
+        walls.into_iter().any(|side| gap.contact(side) == Some(Contact::Impact))
     }
 
     /// Returns an axis that holds the motion and both walls, or a single wall if it is near.
-    fn gap_axis(&self, label: &str) -> Axis {
-        let length = self.oscillator.length_scale();
-        let gaps = || self.motion.points().map(|(_, state)| self.gap(state));
+    fn gap_axis(&self, gap: &PlotGap) -> Axis {
+        let gaps = || self.motion.points().map(|(_, state)| self.gap(gap, state));
         let (low, high) = gaps().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(z), b.max(z)));
-        let extent = (high - low).max(self.decayed());
-        let [right, left] = self.oscillator.walls;
-        let are_two = right.is_finite() && left.is_finite();
+        let extent = (high - low).max(gap.decayed());
+        let [right, left] = Side::BOTH.map(|side| gap.wall(side));
+        let are_two = gap.has_two_walls();
         let mut ends: Vec<f64> = Vec::new();
         if are_two {
-            ends.extend([right + 0.25 * length, left - 0.25 * length]);
+            ends.extend([right + 0.25 * gap.length, left - 0.25 * gap.length]);
         }
-        let is_elastic = Side::BOTH.iter().any(|side| self.contact(*side).is_some_and(Contact::is_elastic));
+        let is_elastic = Side::BOTH.iter().any(|side| gap.is_elastic(*side));
         if !are_two || is_elastic {
             ends.extend([high + MOTION_MARGIN * extent, low - MOTION_MARGIN * extent]);
             let near = [(right, right - high, 1.0), (left, low - left, -1.0)];
@@ -142,26 +184,27 @@ impl OrbitPlot<'_> {
                 near.into_iter().filter(|(wall, away, _)| wall.is_finite() && *away < FAR_WALL * extent);
             ends.extend(near.map(|(wall, _, sign)| wall + sign * MOTION_MARGIN * extent));
         }
-        let least_span = if are_two { length } else { self.decayed() };
-        Axis::around(label, gaps().chain(ends), least_span)
+        let least_span = if are_two { gap.length } else { gap.decayed() };
+        Axis::around(&self.gap_label(gap), gaps().chain(ends), least_span)
     }
 
     /// Draws the symbols of the word: behind the wall of a flight that returns to it, else beside the flight. Symbols that
     /// would overlap an earlier one are left out.
-    fn draw_symbols(&self, canvas: &Canvas, frame: &Frame) {
-        let walls = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
-        let is_elastic = |side: Side| self.contact(side).is_some_and(Contact::is_elastic);
+    fn draw_symbols(&self, canvas: &Canvas, frame: &Frame, gap: &PlotGap) {
+        let walls = Side::BOTH.map(|side| frame.at(0.0, gap.wall(side)).1);
+        let of_gap = |(_, event): &&(f64, Event)| event.gap == gap.index;
+        let events: Vec<(f64, Event)> = self.motion.events.iter().filter(of_gap).copied().collect();
         let mut drawn: Vec<Point> = Vec::new();
-        for (t, symbol) in flights::symbols(&self.motion.events, self.cycle) {
+        for (t, symbol) in flights::symbols(&events, self.cycle) {
             let nearest = self.motion.points().min_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
             let Some((_, state)) = nearest else { continue };
-            let (x, y) = frame.at(t, self.gap(state));
+            let (x, y) = frame.at(t, self.gap(gap, state));
             let [mut upper, mut lower] = walls;
             // The symbol of contact with an elastic wall is drawn behind the motion.
-            if symbol == '1' && is_elastic(Side::Right) {
+            if symbol == '1' && gap.is_elastic(Side::Right) {
                 upper = y.min(upper);
             }
-            if symbol == '4' && is_elastic(Side::Left) {
+            if symbol == '4' && gap.is_elastic(Side::Left) {
                 lower = y.max(lower);
             }
             let at = match symbol {
@@ -183,10 +226,10 @@ impl OrbitPlot<'_> {
     }
 
     /// Draws the walls and the areas behind them.
-    fn draw_walls(&self, canvas: &Canvas, frame: &Frame) {
+    fn draw_walls(&self, canvas: &Canvas, frame: &Frame, gap: &PlotGap) {
         let rect = frame.rect;
-        let walls = || Side::BOTH.into_iter().filter(|side| self.contact(*side).is_some());
-        let height = |side: Side| frame.at(0.0, self.oscillator.walls[side.index()]).1;
+        let walls = || Side::BOTH.into_iter().filter(|side| gap.contact(*side).is_some());
+        let height = |side: Side| frame.at(0.0, gap.wall(side)).1;
         let is_visible = |side: Side| (rect.top..=rect.bottom).contains(&height(side));
         for side in walls().filter(|side| is_visible(*side)) {
             let behind = match side {
@@ -197,7 +240,7 @@ impl OrbitPlot<'_> {
         }
         frame.draw_grid(canvas);
         for side in Side::BOTH {
-            for (at, width) in self.wall_lines(side).skip(1) {
+            for (at, width) in gap.wall_lines(side).skip(1) {
                 let y = frame.at(0.0, at).1;
                 if (rect.top..=rect.bottom).contains(&y) {
                     canvas.stroke(&[(rect.left, y), (rect.right, y)], width, wall_color(side));
@@ -215,7 +258,7 @@ impl OrbitPlot<'_> {
             if is_visible(side) {
                 canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, color);
             }
-            let lines = [Some(wall_name(side)), self.position(canvas, side)];
+            let lines = [Some(wall_name(side)), position(canvas, gap, side)];
             let lines = lines.into_iter().flatten().chain(beyond.map(str::to_owned));
             for (line, text) in lines.enumerate() {
                 canvas.text(&text, (x, y - 14.0 + 28.0 * line as f64), SMALL, Align::Left, color);
@@ -223,56 +266,51 @@ impl OrbitPlot<'_> {
         }
     }
 
-    /// Returns the position of a wall: the model's expression, or its value if the expression is too long.
-    fn position(&self, canvas: &Canvas, side: Side) -> Option<String> {
-        let expression = self.walls.position(side);
-        let value = format!("{} = {}", self.walls.gap(), number(self.oscillator.walls[side.index()]));
-        expression.into_iter().chain([value]).find(|text| canvas.text_width(text, SMALL) <= WALL_TEXT)
-    }
-
     /// Returns the depth of penetration into a wall.
-    fn depth(&self, piece: &Piece, state: &State) -> f64 {
-        piece
-            .meshing
-            .map_or(0.0, |side| side.sign() * (self.gap(state) - self.oscillator.walls[side.index()]))
+    fn depth(&self, gap: &PlotGap, piece: &Piece, state: &State) -> f64 {
+        let side = piece.contacts[gap.index];
+        side.map_or(0.0, |side| side.sign() * (self.gap(gap, state) - gap.wall(side)))
     }
 
-    fn depth_axis(&self) -> Axis {
+    fn depth_axis(&self, gap: &PlotGap) -> Axis {
         let pieces = self.motion.pieces.iter();
-        let depths = pieces.flat_map(|p| p.points.iter().map(move |(_, s)| self.depth(p, s)));
-        let label = match self.walls.half() {
-            Some(half) => format!("depth, |{}| \u{2212} {half}", self.walls.gap()),
+        let depths = pieces.flat_map(|p| p.points.iter().map(move |(_, s)| self.depth(gap, p, s)));
+        let label = match gap.labels.half() {
+            Some(half) => format!("depth, |{}| \u{2212} {half}", gap.labels.gap()),
+            None if self.gaps.len() > 1 => format!("depth of {} behind the wall", gap.labels.gap()),
             None => "depth behind the wall".to_owned(),
         };
         let label = with_unit(&label, self.units.gap.as_deref());
-        Axis::around(&label, depths, 1e-6 * self.oscillator.length_scale())
+        Axis::around(&label, depths, 1e-6 * gap.length)
     }
 
-    /// Draws the depth of penetration into the walls.
-    fn draw_penetration(&self, canvas: &Canvas, frame: &Frame) {
+    /// Draws the depth of penetration into the walls, without the axes.
+    fn draw_penetration(&self, canvas: &Canvas, frame: &Frame, gap: &PlotGap) {
         let rect = frame.rect;
         frame.draw_grid(canvas);
         let y = frame.at(0.0, 0.0).1;
         canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, DARK);
         canvas.text("wall", (rect.right + WALL_AWAY, y), SMALL, Align::Left, DARK);
         for piece in &self.motion.pieces {
-            if let Some(side) = piece.meshing {
-                let path: Vec<_> =
-                    piece.points.iter().map(|(t, state)| frame.at(*t, self.depth(piece, state))).collect();
+            if let Some(side) = piece.contacts[gap.index] {
+                let path: Vec<_> = piece
+                    .points
+                    .iter()
+                    .map(|(t, state)| frame.at(*t, self.depth(gap, piece, state)))
+                    .collect();
                 canvas.stroke(&path, FREE_LINE + 0.6, wall_color(side));
             }
         }
-        frame.draw_axes(canvas, true);
     }
 
-    fn gap(&self, state: &State) -> f64 {
-        self.oscillator.gap_value(0, state, 0)
+    fn gap(&self, gap: &PlotGap, state: &State) -> f64 {
+        self.oscillator.gap_value(gap.index, state, 0)
     }
 
     /// Returns the gap as an expression of the displacements.
-    fn gap_expression(&self) -> String {
+    fn gap_expression(&self, gap: &PlotGap) -> String {
         let mut text = String::new();
-        let terms = self.oscillator.gap_row(0).into_iter().zip(self.names.iter().step_by(2));
+        let terms = self.oscillator.gap_row(gap.index).into_iter().zip(self.names.iter().step_by(2));
         for (factor, name) in terms.filter(|(factor, _)| *factor != 0.0) {
             text += match (text.is_empty(), factor < 0.0) {
                 (true, true) => "\u{2212}",

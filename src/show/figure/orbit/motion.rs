@@ -2,18 +2,23 @@
 
 use std::collections::BTreeSet;
 
-use rattlemap_dynamics::model::{Side, State};
+use rattlemap_dynamics::model::{MOST_GAPS, Side, State};
 use rattlemap_dynamics::orbit::{Event, EventKind, Sample, is_reached};
 
 /// The motion between two events.
 pub(crate) struct Piece {
-    /// Wall that the teeth mesh on; none in free motion.
-    pub(crate) meshing: Option<Side>,
+    /// For each gap the side of the wall that it is in contact with; none in free motion.
+    pub(crate) contacts: [Option<Side>; MOST_GAPS],
     /// Times and states in order, at least one.
     pub(crate) points: Vec<(f64, State)>,
 }
 
 impl Piece {
+    /// Whether one of these gaps is in contact.
+    pub(crate) fn is_in_contact(&self, gaps: &[usize]) -> bool {
+        gaps.iter().any(|gap| self.contacts[*gap].is_some())
+    }
+
     /// Returns the times of start and end.
     pub(crate) fn span(&self) -> (f64, f64) {
         (self.points[0].0, self.points[self.points.len() - 1].0)
@@ -28,8 +33,14 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Merges trace and events, and divides times by `unit`. States that are not finite are skipped.
-    pub(crate) fn new(events: &[Event], trace: &[Sample], unit: f64) -> Motion {
+    /// Merges trace and events, and divides times by `unit`. `contacts` holds for each gap the side of the contact at the start of the
+    /// trace. States that are not finite are skipped.
+    pub(crate) fn new(
+        events: &[Event],
+        trace: &[Sample],
+        contacts: [Option<Side>; MOST_GAPS],
+        unit: f64,
+    ) -> Motion {
         let unit = if unit > 0.0 { unit } else { 1.0 };
         let finite = |t: f64, state: &State| t.is_finite() && state.iter().all(|v| v.is_finite());
         // The events of a chaotic orbit may continue after the trace. Those up to one sample after its end belong to it.
@@ -40,7 +51,7 @@ impl Motion {
         };
         let on_trace = |e: &&Event| e.t <= end && finite(e.t, &e.before) && finite(e.t, &e.after);
         let events: Vec<(f64, Event)> = events.iter().filter(on_trace).map(|e| (e.t / unit, *e)).collect();
-        let mut pieces = Pieces::starting_in(trace.first().and_then(|s| s.meshing));
+        let mut pieces = Pieces::starting_in(contacts);
         let mut next = events.iter().peekable();
         for sample in trace.iter().filter(|s| finite(s.t, &s.state)) {
             while let Some((at, event)) = next.next_if(|(_, event)| is_reached(event.t, sample.t)) {
@@ -52,9 +63,14 @@ impl Motion {
         Motion { pieces: pieces.finished(), events }
     }
 
-    /// Whether the motion contains meshing.
+    /// Whether the motion contains contact that lasts, of any gap.
     pub(crate) fn meshes(&self) -> bool {
-        self.pieces.iter().any(|piece| piece.meshing.is_some())
+        self.pieces.iter().any(|piece| piece.contacts.iter().any(Option::is_some))
+    }
+
+    /// Returns the walls of a gap with contact that lasts.
+    pub(crate) fn meshing_walls(&self, gap: usize) -> BTreeSet<Side> {
+        self.pieces.iter().filter_map(|piece| piece.contacts[gap]).collect()
     }
 
     /// Returns the kinds of events that occur, in the order of a legend.
@@ -63,10 +79,10 @@ impl Motion {
         all.into_iter().filter(|kind| self.events.iter().any(|(_, e)| e.kind == *kind)).collect()
     }
 
-    /// Returns the walls with events or meshing.
-    pub(crate) fn walls(&self) -> BTreeSet<Side> {
-        let meshing = self.pieces.iter().filter_map(|piece| piece.meshing);
-        self.events.iter().map(|(_, e)| e.side).chain(meshing).collect()
+    /// Returns the walls of a gap with events or contact.
+    pub(crate) fn walls(&self, gap: usize) -> BTreeSet<Side> {
+        let events = self.events.iter().filter(|(_, event)| event.gap == gap);
+        events.map(|(_, event)| event.side).chain(self.meshing_walls(gap)).collect()
     }
 
     /// Returns all states with their times.
@@ -79,8 +95,8 @@ impl Motion {
 struct Pieces(Vec<Piece>);
 
 impl Pieces {
-    fn starting_in(meshing: Option<Side>) -> Pieces {
-        Pieces(vec![Piece { meshing, points: Vec::new() }])
+    fn starting_in(contacts: [Option<Side>; MOST_GAPS]) -> Pieces {
+        Pieces(vec![Piece { contacts, points: Vec::new() }])
     }
 
     fn open(&mut self) -> &mut Piece {
@@ -90,10 +106,9 @@ impl Pieces {
     /// Ends a piece at an event and starts the next.
     fn cross(&mut self, t: f64, event: &Event) {
         self.open().points.push((t, event.before));
-        let before = self.open().meshing;
-        // Contacts of further gaps are marked, but have no colour.
-        let meshing = if event.gap == 0 { event.meshing } else { before };
-        self.0.push(Piece { meshing, points: vec![(t, event.after)] });
+        let mut contacts = self.open().contacts;
+        contacts[event.gap] = event.meshing;
+        self.0.push(Piece { contacts, points: vec![(t, event.after)] });
     }
 
     fn push(&mut self, t: f64, sample: &Sample) {
@@ -103,9 +118,12 @@ impl Pieces {
             return;
         }
         piece.points.push((t, sample.state));
-        if piece.meshing != sample.meshing {
+        let mut contacts = piece.contacts;
+        // Samples tell the contact of the first gap.
+        contacts[0] = sample.meshing;
+        if piece.contacts != contacts {
             // The events span less than the trace, so this change has no event.
-            self.0.push(Piece { meshing: sample.meshing, points: vec![(t, sample.state)] });
+            self.0.push(Piece { contacts, points: vec![(t, sample.state)] });
         }
     }
 
@@ -118,7 +136,10 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::state;
+    use rattlemap_dynamics::model::state;
+
+    const FREE: [Option<Side>; MOST_GAPS] = [None; MOST_GAPS];
+
     fn event(kind: EventKind, t: f64) -> Event {
         let (before, after) = (state(&[0.5, 1.0]), state(&[0.5, 0.2, 0.0, 0.8]));
         let meshing = (kind == EventKind::MeshStart).then_some(Side::Right);
@@ -144,8 +165,8 @@ mod tests {
             sample(1.5, meshing),
             sample(2.0, None),
         ];
-        let motion = Motion::new(&events, &trace, 2.0);
-        let modes: Vec<_> = motion.pieces.iter().map(|p| p.meshing).collect();
+        let motion = Motion::new(&events, &trace, FREE, 2.0);
+        let modes: Vec<_> = motion.pieces.iter().map(|p| p.contacts[0]).collect();
         assert_eq!(modes, [None, None, meshing, None]);
         assert_eq!(motion.pieces[0].points.last().unwrap().1, state(&[0.5, 1.0]));
         assert_eq!(motion.pieces[1].points[0], (0.25, state(&[0.5, 0.2, 0.0, 0.8])));
@@ -155,15 +176,34 @@ mod tests {
     }
 
     #[test]
+    fn each_gap_has_contacts_of_its_own() {
+        let (right, left) = (Some(Side::Right), Some(Side::Left));
+        let of_second = |event: Event| Event { gap: 1, side: Side::Left, ..event };
+        let events = [
+            event(EventKind::MeshStart, 0.5),
+            of_second(event(EventKind::MeshEnd, 1.0)),
+            event(EventKind::MeshEnd, 1.5),
+        ];
+        let trace = [sample(0.0, None), sample(0.7, right), sample(1.2, right), sample(2.0, None)];
+        let motion = Motion::new(&events, &trace, [None, left, None], 2.0);
+        let contacts: Vec<_> = motion.pieces.iter().map(|piece| piece.contacts).collect();
+        let expected = [[None, left, None], [right, left, None], [right, None, None], [None; 3]];
+        assert_eq!(contacts, expected);
+        assert_eq!(motion.meshing_walls(1).len(), 1);
+        assert!(motion.pieces[2].is_in_contact(&[0, 1]) && !motion.pieces[2].is_in_contact(&[1]));
+        assert_eq!([0, 1, 2].map(|gap| motion.walls(gap).len()), [1, 1, 0]);
+    }
+
+    #[test]
     fn incomplete_data_are_accepted() {
-        assert!(Motion::new(&[], &[], 2.0).pieces.is_empty());
+        assert!(Motion::new(&[], &[], FREE, 2.0).pieces.is_empty());
         let late =
-            Motion::new(&[event(EventKind::Impact, 9.0)], &[sample(0.0, None), sample(1.0, None)], 2.0);
+            Motion::new(&[event(EventKind::Impact, 9.0)], &[sample(0.0, None), sample(1.0, None)], FREE, 2.0);
         assert!(late.events.is_empty());
         let without_event = [sample(0.0, None), sample(1.0, Some(Side::Left)), sample(2.0, None)];
-        assert_eq!(Motion::new(&[], &without_event, 2.0).pieces.len(), 3);
+        assert_eq!(Motion::new(&[], &without_event, FREE, 2.0).pieces.len(), 3);
         let mut broken = sample(1.0, None);
         broken.state[2] = f64::NAN;
-        assert_eq!(Motion::new(&[], &[sample(0.0, None), broken], 2.0).points().count(), 1);
+        assert_eq!(Motion::new(&[], &[sample(0.0, None), broken], FREE, 2.0).points().count(), 1);
     }
 }

@@ -1,17 +1,19 @@
 //! The parts that figures of an orbit share: axes, lines, markers, legend entries. Lengths are in pixels.
 
+use std::collections::BTreeSet;
+
 use crate::show::color::Color;
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::{Entry, Key};
 use crate::show::drawing::{Canvas, DARK, FAINT, MESHING, Marker, Point, Shape, wall_color};
+use crate::show::figure::orbit::gaps::{PlotGap, contacts_at_start};
 use crate::show::figure::orbit::heading;
 use crate::show::figure::orbit::motion::Motion;
 use crate::show::names;
 use crate::show::symbols::{symbol, with_unit};
-use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::{Contact, Model, ModelError, Oscillator, Side, State, Units};
-use rattlemap_dynamics::orbit::{Class, EventKind, History, Orbit, Sample};
+use rattlemap_dynamics::orbit::{Class, Event, EventKind, History, Orbit, Sample};
 
 /// Default width of all figures of an orbit, and least distance of panels from the left edge.
 pub(crate) const ORBIT_WIDTH: f64 = 1600.0;
@@ -27,7 +29,7 @@ pub struct OrbitPlot<'a> {
     pub(crate) units: Units,
     pub(crate) bodies: Vec<&'a str>,
     pub(crate) oscillator: Oscillator,
-    pub(crate) walls: WallLabels,
+    pub(crate) gaps: Vec<PlotGap>,
     pub(crate) motion: Motion,
     /// Label of the axis of time.
     time: String,
@@ -48,8 +50,8 @@ impl<'a> OrbitPlot<'a> {
     /// [`ModelError`] if the model is not valid.
     pub fn new(model: &'a dyn Model, orbit: &Orbit, trace: &[Sample]) -> Result<OrbitPlot<'a>, ModelError> {
         let cycle = matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods));
-        let motion = Motion::new(&orbit.events, trace, orbit.forcing_period);
-        let plot = OrbitPlot::of(model, motion, heading::character(model, orbit))?;
+        let subtitle = heading::character(model, orbit);
+        let plot = OrbitPlot::of(model, (&orbit.events, trace), orbit.forcing_period, subtitle)?;
         Ok(OrbitPlot { cycle, ..plot })
     }
 
@@ -62,19 +64,27 @@ impl<'a> OrbitPlot<'a> {
         start: &State,
         history: &History,
     ) -> Result<OrbitPlot<'a>, ModelError> {
-        let motion = Motion::new(&history.events, &history.samples, 1.0);
-        let plot = OrbitPlot::of(model, motion, heading::from_start(model, start))?;
+        let parts = (&history.events[..], &history.samples[..]);
+        let plot = OrbitPlot::of(model, parts, 1.0, heading::from_start(model, start))?;
         Ok(OrbitPlot { time: with_unit("time, t", plot.units.time.as_deref()), ..plot })
     }
 
-    fn of(model: &'a dyn Model, motion: Motion, subtitle: String) -> Result<OrbitPlot<'a>, ModelError> {
+    fn of(
+        model: &'a dyn Model,
+        (events, trace): (&[Event], &[Sample]),
+        unit_of_time: f64,
+        subtitle: String,
+    ) -> Result<OrbitPlot<'a>, ModelError> {
+        let oscillator = model.oscillator()?;
+        let gaps = PlotGap::all(model, &oscillator);
+        let contacts = contacts_at_start(&gaps, &oscillator, events, trace);
         Ok(OrbitPlot {
             names: model.state_names().into_iter().map(symbol).collect(),
             units: model.units(),
             bodies: model.bodies(),
-            oscillator: model.oscillator()?,
-            walls: WallLabels::of(model),
-            motion,
+            motion: Motion::new(events, trace, contacts, unit_of_time),
+            oscillator,
+            gaps,
             time: "time in forcing periods, t / T".to_owned(),
             cycle: None,
             title: heading::parameters(model),
@@ -82,20 +92,27 @@ impl<'a> OrbitPlot<'a> {
         })
     }
 
-    /// Draws the motion in its colours, free and meshing.
+    /// Returns the gaps whose contact colours the motion of a displacement: those that depend on it. With one gap it is that one.
+    pub(crate) fn gaps_of(&self, displacement: usize) -> Vec<usize> {
+        let depends = |gap: &usize| self.oscillator.gap_row(*gap)[displacement] != 0.0;
+        (0..self.gaps.len()).filter(|gap| self.gaps.len() == 1 || depends(gap)).collect()
+    }
+
+    /// Draws the motion in its colours, free and in contact at one of these gaps.
     pub(crate) fn draw_lines(
         &self,
         canvas: &Canvas,
         frame: &Frame,
+        gaps: &[usize],
         (free, meshing): (Color, Color),
         at: impl Fn(f64, &State) -> Point,
     ) {
         // Many turns in one panel need a thinner line.
         let thin = if self.motion.pieces.len() > 100 { 0.6 } else { 1.0 };
         for piece in &self.motion.pieces {
-            let (color, width) = match piece.meshing {
-                Some(_) if free != meshing => (meshing, MESHING_LINE),
-                _ => (free, FREE_LINE),
+            let (color, width) = match free != meshing && piece.is_in_contact(gaps) {
+                true => (meshing, MESHING_LINE),
+                false => (free, FREE_LINE),
             };
             let path = piece.points.iter().map(|(t, state)| at(*t, state)).map(|(x, y)| frame.at(x, y));
             let path: Vec<_> = path.collect();
@@ -117,16 +134,18 @@ impl<'a> OrbitPlot<'a> {
         }
     }
 
-    /// Draws markers of the events, meshing above impacts. With `both`, impacts have markers before and after.
+    /// Draws markers of the events of these gaps, meshing above impacts. With `both`, impacts have markers before and after.
     pub(crate) fn draw_markers(
         &self,
         canvas: &Canvas,
         frame: &Frame,
+        gaps: &[usize],
         both: bool,
         at: impl Fn(f64, &State) -> Point,
     ) {
         for kind in self.motion.kinds() {
-            for (t, event) in self.motion.events.iter().filter(|(_, event)| event.kind == kind) {
+            let is_shown = |event: &Event| event.kind == kind && gaps.contains(&event.gap);
+            for (t, event) in self.motion.events.iter().filter(|(_, event)| is_shown(event)) {
                 let marker = self.marker(kind, wall_color(event.side));
                 let [before, after] =
                     [at(*t, &event.before), at(*t, &event.after)].map(|(x, y)| frame.at(x, y));
@@ -168,7 +187,8 @@ impl<'a> OrbitPlot<'a> {
         if both && self.motion.events.iter().any(|(_, event)| event.before != event.after) {
             entries.push(Entry::new(Key::Dashes { color: FAINT }, "velocity jump"));
         }
-        for side in self.motion.walls() {
+        let reached: BTreeSet<Side> = self.gaps.iter().flat_map(|gap| self.motion.walls(gap.index)).collect();
+        for side in reached {
             let patch = Key::Patch { color: wall_color(side), opacity: 1.0 };
             entries.push(Entry::new(patch, &format!("{} wall", names::side(side))));
         }
@@ -185,27 +205,19 @@ impl<'a> OrbitPlot<'a> {
 
     /// Returns the name of sustained contact: meshing if a wall has impacts, else contact.
     pub(crate) fn contact_name(&self) -> &'static str {
-        let has_impacts = |side: &Side| self.contact(*side) == Some(Contact::Impact);
-        if Side::BOTH.iter().any(has_impacts) { "meshing" } else { "contact" }
+        let has_impacts =
+            |gap: &PlotGap| Side::BOTH.iter().any(|side| gap.contact(*side) == Some(Contact::Impact));
+        if self.gaps.iter().any(has_impacts) { "meshing" } else { "contact" }
     }
 
-    /// Returns the positions of the walls of a side and the widths of their lines, the first wall first.
-    pub(crate) fn wall_lines(&self, side: Side) -> impl Iterator<Item = (f64, f64)> {
-        let outer = self.oscillator.outer_walls[side.index()].iter().map(|wall| (wall.at, 1.0));
-        std::iter::once((self.oscillator.walls[side.index()], 2.0)).chain(outer)
+    /// Returns the indices of all gaps.
+    pub(crate) fn all_gaps(&self) -> Vec<usize> {
+        self.gaps.iter().map(|gap| gap.index).collect()
     }
 
-    /// Returns the contact law of a wall; none without a wall.
-    pub(crate) fn contact(&self, side: Side) -> Option<Contact> {
-        let i = side.index();
-        self.oscillator.walls[i].is_finite().then(|| self.oscillator.contacts[i])
-    }
-
-    /// Returns the displacements of a motion that counts as decayed: a tenth of half the backlash. With a single wall, which may
-    /// be far away, it is a thousandth of the length scale.
+    /// Returns the displacements of a motion that counts as decayed, the smallest of all gaps.
     pub(crate) fn decayed(&self) -> f64 {
-        let share = if self.oscillator.walls.iter().all(|wall| wall.is_finite()) { 0.1 } else { 1e-3 };
-        share * self.oscillator.length_scale()
+        self.gaps.iter().map(PlotGap::decayed).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns the axis of time.

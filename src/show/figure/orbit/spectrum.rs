@@ -11,6 +11,7 @@ use crate::show::drawing::{Canvas, DARK, GEAR_2, Marker, write_figure};
 use crate::show::error::WriteError;
 use crate::show::figure::orbit::heading;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, ORBIT_WIDTH};
+use crate::show::orbit_quantities::gaps;
 use crate::show::orbit_spectrum::Spectrum;
 use crate::show::symbols::with_unit;
 use crate::show::wall_labels::WallLabels;
@@ -45,8 +46,13 @@ pub(crate) fn draw(style: &FigureStyle, model: &dyn Model, orbit: &Orbit, spectr
     let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
     let canvas = Canvas::new(style, ORBIT_WIDTH);
     let top = draw_head(&canvas, &heading::parameters(model), &subtitle, &[]) + 14.0;
-    let labels = WallLabels::of(model);
-    let quantity = if gap_names(model).contains(&labels.gap()) { "the gap" } else { labels.gap() };
+    let labels = WallLabels::of(model, 0);
+    let quantity = match gap_names(model).contains(&labels.gap()) {
+        // The spectrum is that of the first gap.
+        _ if gaps(model).is_some() => format!("the first gap, {}", labels.gap()),
+        true => "the gap".to_owned(),
+        false => labels.gap().to_owned(),
+    };
     let units = model.units();
     let labels = [
         with_unit(&format!("amplitude of {quantity}"), units.gap.as_deref()),

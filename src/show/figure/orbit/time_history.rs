@@ -3,7 +3,7 @@
 use crate::show::color::Color;
 use crate::show::drawing::frame::{column, stacked};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
-use crate::show::drawing::{Canvas, GEAR_1, GEAR_2, wall_color};
+use crate::show::drawing::{BODIES, Canvas, wall_color};
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, OrbitPlot};
 use crate::show::names;
 use rattlemap_dynamics::model::{Side, State};
@@ -15,12 +15,13 @@ const MESHING_BAND: f64 = 0.16;
 
 impl OrbitPlot<'_> {
     pub(crate) fn draw_time_history(&self, canvas: &Canvas) {
-        let colored = || self.bodies.iter().zip([GEAR_1, GEAR_2]).enumerate();
+        let colored = || self.bodies.iter().zip(BODIES).enumerate();
         let line = |(_, (body, color)): (usize, (&&str, Color))| {
             Entry::new(Key::Line { color, width: FREE_LINE }, body)
         };
         let mut motion: Vec<Entry> = colored().map(line).collect();
-        let meshes = |side: &Side| self.motion.pieces.iter().any(|piece| piece.meshing == Some(*side));
+        let gaps = self.all_gaps();
+        let meshes = |side: &Side| gaps.iter().any(|gap| self.motion.meshing_walls(*gap).contains(side));
         for side in Side::BOTH.into_iter().filter(meshes) {
             let band = Key::Patch { color: wall_color(side), opacity: MESHING_BAND };
             motion.push(Entry::new(band, &format!("{}, {} wall", self.contact_name(), names::side(side))));
@@ -35,8 +36,9 @@ impl OrbitPlot<'_> {
         let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, 0.0);
         for (quantity, frame) in frames.iter().enumerate() {
             for piece in &self.motion.pieces {
-                if let Some(side) = piece.meshing {
-                    let (from, to) = piece.span();
+                let (from, to) = piece.span();
+                // Where several gaps are in contact, their bands lie upon each other.
+                for side in piece.contacts.into_iter().flatten() {
                     canvas.fill(frame.column(from, to), wall_color(side), MESHING_BAND);
                 }
             }
@@ -45,8 +47,8 @@ impl OrbitPlot<'_> {
                 let index = quantity + 2 * i;
                 let at = |t: f64, state: &State| (t, state[index]);
                 self.draw_jumps(canvas, frame, at);
-                self.draw_lines(canvas, frame, (color, color), at);
-                self.draw_markers(canvas, frame, quantity == 1, at);
+                self.draw_lines(canvas, frame, &gaps, (color, color), at);
+                self.draw_markers(canvas, frame, &gaps, quantity == 1, at);
             }
             frame.draw_axes(canvas, quantity == 1);
         }
