@@ -648,8 +648,35 @@ impl<'a> Motion<'a> {
                 self.leave(side, true);
             }
         }
+        self.let_go(before);
         self.mark(before, stops);
         self.project();
+    }
+
+    /// Friction that did `before` may let a gap go on a wall because forces have jumped. If they press the gap to the wall, contact begins.
+    fn let_go(&mut self, before: [Grip; 2]) {
+        let grips = std::mem::replace(&mut self.grips, before);
+        let was_held = self.is_gap_held();
+        self.grips = grips;
+        let Some((side, _)) = self.leaves.filter(|leaves| was_held && leaves.1 > 1) else { return };
+        if self.mode != Mode::Free || self.is_gap_held() {
+            return;
+        }
+        self.leaves = Some((side, 2));
+        if !self.presses(side) || self.contact(side).is_elastic() {
+            return;
+        }
+        self.record(What::Begins, side);
+        if self.contact(side) == Contact::Rigid {
+            (self.mode, self.leaves) = (Mode::Stuck(side), None);
+            for (grip, before) in
+                self.grips.iter_mut().zip(before).filter(|(_, before)| *before == Grip::Stick)
+            {
+                *grip = before;
+            }
+        } else {
+            self.mode = Mode::Sustained(side);
+        }
     }
 
     /// Chooses the first consistent grips of elements at rest, in the order of sticking, positive and negative rate.
