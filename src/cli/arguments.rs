@@ -568,7 +568,7 @@ fn state(text: &str) -> Result<StartState, String> {
         }
         _ => Err(
             "it must be finite numbers: two, such as 0.1,0, for a model of one coordinate; four, such as \
-             0.1,0,-0.2,1.5, for a model of two"
+             0.1,0,-0.2,1.5, for a model of two; and so on"
                 .to_owned(),
         ),
     }
