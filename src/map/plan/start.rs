@@ -4,7 +4,8 @@ use crate::map::random::Random;
 use crate::map::scene::{Draw, Start};
 use crate::record::classify::status;
 use crate::record::{Record, valid};
-use rattlemap_dynamics::model::{Oscillator, REST, State, state};
+use rattlemap_dynamics::model::{Machine, Oscillator, REST, Side, State, state};
+use rattlemap_dynamics::reference::machine::System;
 
 /// Range of random starts: displacements are within this many scales of length of the middle, velocities within this
 /// many times the corresponding velocity. The attractors of the paper's plane are inside.
@@ -17,6 +18,8 @@ pub(super) struct Starts {
     /// Random starts after the first. All cells have the same ones, so that neighbouring cells differ only in their
     /// parameters.
     draws: Vec<[f64; 4]>,
+    /// Further numbers of each start, for models of more than two coordinates.
+    further: Vec<State>,
 }
 
 impl Starts {
@@ -24,7 +27,10 @@ impl Starts {
         let Draw { count, seed } = draw.unwrap_or(Draw { count: 1, seed: 0 });
         let mut random = Random::new(u64::from(seed));
         let draws = (1..count).map(|_| std::array::from_fn(|_| 2.0 * random.unit() - 1.0)).collect();
-        Starts { policy, draws }
+        // A sequence of its own, so that other models keep their starts.
+        let mut random = Random::new(u64::from(seed) ^ FURTHER);
+        let further = (1..count).map(|_| std::array::from_fn(|_| 2.0 * random.unit() - 1.0)).collect();
+        Starts { policy, draws, further }
     }
 
     pub(super) fn count(&self) -> usize {
@@ -46,20 +52,51 @@ impl Starts {
     /// Returns the random start `nth`, from 1. With the scale of length `l`, the gap is uniform between the walls, or
     /// within `2 l` of a single wall; the second displacement is within `4 l`, both velocities within `4 l omega`.
     pub(super) fn random(&self, nth: usize, oscillator: &Oscillator) -> State {
+        if let Some(machine) = &oscillator.machine {
+            return self.random_of_machine(nth, machine);
+        }
         let [gap, v1, x2, v2] = self.draws[nth - 1];
         let length = oscillator.length_scale();
-        let [right, left] = match oscillator.walls {
-            [f64::INFINITY, f64::NEG_INFINITY] => [length, -length],
-            [f64::INFINITY, left] => [left + 2.0 * length, left],
-            [right, f64::NEG_INFINITY] => [right, right - 2.0 * length],
-            both => both,
-        };
-        let (middle, half) = (0.5 * (right + left), 0.5 * (right - left));
-        let (z, x2) = (middle + half * gap, START_RANGE * length * x2);
+        let (z, x2) = (between(oscillator.walls, length, gap), START_RANGE * length * x2);
         let speed = START_RANGE * length * oscillator.omega;
         let [g1, g2] = oscillator.gap;
         state(&[(z - g2 * x2) / g1, speed * v1, x2, speed * v2])
     }
+
+    /// Returns a random start of a machine: all gaps lie between their first walls.
+    fn random_of_machine(&self, nth: usize, machine: &Machine) -> State {
+        let (draws, length, n) = (&self.further[nth - 1], machine.length_scale(), machine.degrees());
+        let (positions, rates) = draws.split_at(n);
+        let mut placed: Vec<f64> = positions.iter().map(|x| START_RANGE * length * x).collect();
+        for ((gap, share), z) in machine.gaps.iter().zip(positions).zip(&mut placed) {
+            let first = |side: Side| gap.walls[side.index()].first().map(|wall| wall.at);
+            let walls =
+                [first(Side::Right).unwrap_or(f64::INFINITY), first(Side::Left).unwrap_or(f64::NEG_INFINITY)];
+            *z = between(walls, length, *share);
+        }
+        let displacements = System::new(machine).displacements(&placed);
+        let speed = START_RANGE * length * machine.omega;
+        let mut start = REST;
+        for (i, (x, v)) in displacements.iter().zip(rates).enumerate() {
+            (start[2 * i], start[2 * i + 1]) = (*x, speed * v);
+        }
+        start
+    }
+}
+
+/// Distinguishes the second sequence of random numbers from the first.
+const FURTHER: u64 = 0x6d61_6368_696e_6573;
+
+/// Returns the gap at a share from -1 to 1 of the room between the walls, or of twice the scale of length at a single wall.
+fn between(walls: [f64; 2], length: f64, share: f64) -> f64 {
+    let [right, left] = match walls {
+        [f64::INFINITY, f64::NEG_INFINITY] => [length, -length],
+        [f64::INFINITY, left] => [left + 2.0 * length, left],
+        [right, f64::NEG_INFINITY] => [right, right - 2.0 * length],
+        both => both,
+    };
+    let (middle, half) = (0.5 * (right + left), 0.5 * (right - left));
+    middle + half * share
 }
 
 /// Returns the start of a run that follows the neighbour with this record.
@@ -75,7 +112,8 @@ pub(crate) fn followed(record: Option<&Record>) -> State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::model::GearPair;
+    use crate::model_file::FileModel;
+    use rattlemap_dynamics::model::{GearPair, Model};
     use rattlemap_dynamics::orbit::Status;
 
     #[test]
@@ -92,6 +130,20 @@ mod tests {
                 let y = starts.random(nth, &oscillator);
                 let gap = y[0] - y[2];
                 assert!((low..=high).contains(&gap) && y.iter().all(|x| x.is_finite()), "{walls:?}: {y:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn drawn_starts_of_a_machine_lie_between_the_walls_of_all_gaps() {
+        let starts = Starts::new(Start::Rest, Some(Draw { count: 100, seed: 3 }));
+        let oscillator = FileModel::built_in("two-loose-gears").unwrap().oscillator().unwrap();
+        for nth in 1..100 {
+            let y = starts.random(nth, &oscillator);
+            for (i, gap) in oscillator.machine.as_ref().unwrap().gaps.iter().enumerate() {
+                let [right, left] = gap.walls.each_ref().map(|walls| walls[0].at);
+                let z = oscillator.gap_value(i, &y, 0);
+                assert!(left < z && z < right && y[1] != 0.0 && y[5] != 0.0, "{y:?}");
             }
         }
     }

@@ -213,6 +213,13 @@ impl System {
         state
     }
 
+    /// Returns displacements at which the gaps have given values. Further values are those of the displacements that complete the gaps to
+    /// coordinates.
+    pub fn displacements(&self, gaps_and_others: &[f64]) -> Vec<f64> {
+        let d = DVector::from_fn(self.n, |i, _| gaps_and_others[i]);
+        (&self.from_flow * d).iter().copied().collect()
+    }
+
     /// Returns the number of entries of [`Point`] that are in use.
     pub(super) fn width(&self) -> usize {
         2 * self.n + 2 * self.orders.len() + 1
