@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Computes results/gallery: a map of each model in scenes/gallery, its validation, and two diagrams. Takes about 40 minutes on two
+# Computes results/gallery: a map of each model in scenes/gallery, its validation, and two diagrams. Takes about 30 minutes on two
 # cores. results/gallery gets figures, manifests and the share of chaos that ends; everything is in out/gallery.
 set -euo pipefail
 cd "$(dirname "$0")/.."

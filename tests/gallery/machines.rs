@@ -167,6 +167,32 @@ fn gears_on_a_heavy_shaft_move_as_each_of_them_alone() {
     assert!(found[4][0].max(found[4][1]) < 1e-10);
 }
 
+/// While both gears move with the shaft, the mass on its spring is that of all three. The gear with the larger ratio of mass to drag leaves
+/// its flank first, where its inertia `m omega^2 S` exceeds its drag.
+#[test]
+fn the_first_gear_leaves_its_flank_where_its_inertia_exceeds_its_drag() {
+    let (k, c, m1, m2, drag): (f64, f64, f64, f64, f64) = (4e5, 200.0, 0.3, 0.2, 2.0);
+    for omega in [120.0, 190.0, 310.0] {
+        let gain = k.hypot(c * omega) / (k - (2.0 + m1 + m2) * omega * omega).hypot(c * omega);
+        let border = drag / (m1 * omega * omega * gain);
+        for (share, leaves) in [(1.0 - 1e-9, false), (1.0 + 1e-9, true)] {
+            let system = System::new(&machine("two-loose-gears", &[("omega", omega), ("A", share * border)]));
+            // The steady motion: the real part of A k / (...) in phase with the drive.
+            let re = k - (2.0 + m1 + m2) * omega * omega;
+            let drive = nalgebra::Complex::new(c * omega, -k) * (share * border);
+            let [at, rate] = {
+                let steady = drive / nalgebra::Complex::new(re, c * omega);
+                [steady.re, -omega * steady.im]
+            };
+            let mut motion = Motion::new(&system, &[at, rate, at, rate, at, rate]);
+            let mut log = Log::default();
+            (0..3).for_each(|_| motion.advance_period(&mut log).unwrap());
+            let left = log.events.iter().any(|event| event.kind == EventKind::MeshEnd);
+            assert_eq!(left, leaves, "omega = {omega}, A = {share} times {border}: {:?}", log.events.len());
+        }
+    }
+}
+
 /// A chain of masses in its normal modes, and a free ball.
 struct Chain {
     /// Normal modes as columns, and the squares of their frequencies.
