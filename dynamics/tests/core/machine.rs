@@ -4,8 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{
-    Drive, DryFriction, Forces, GapRow, Law, Machine, Oscillator, REST, Restitution, Side, Spring,
-    Wall,
+    Drive, DryFriction, Forces, GapRow, Law, Machine, Oscillator, REST, Restitution, Side, Spring, Wall,
 };
 use rattlemap_dynamics::orbit::{
     Class, EVENT_PERIODS, Orbit, Quantities, Settings, Status, analyse_flow, measure,
