@@ -36,6 +36,7 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("turbine-gears", include_str!("../../models/turbine_gears.toml")),
     ("two-loose-gears", include_str!("../../models/two_loose_gears.toml")),
     ("absorber-chain", include_str!("../../models/absorber_chain.toml")),
+    ("viscoelastic-ball", include_str!("../../models/viscoelastic_ball.toml")),
 ];
 
 /// The built-in models, read once. A test shows that each can be read.

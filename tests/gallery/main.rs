@@ -16,6 +16,7 @@ mod engines;
 mod files;
 mod friction;
 mod loose_gear;
+mod machines;
 mod meissner;
 mod random;
 mod single_impact;

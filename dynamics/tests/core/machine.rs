@@ -4,13 +4,14 @@ use nalgebra::{DMatrix, DVector};
 
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{
-    Drive, DryFriction, Forces, GapRow, Law, Machine, Oscillator, Restitution, Side, Spring, Wall,
+    Drive, DryFriction, Forces, GapRow, Law, Machine, Oscillator, REST, Restitution, Side, Spring, Wall,
 };
 use rattlemap_dynamics::orbit::{
     Class, EVENT_PERIODS, Orbit, Quantities, Settings, Status, analyse_flow, measure,
 };
 use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, System};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Stop};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
+use rattlemap_dynamics::stability::UNIT;
 use rayon::prelude::*;
 
 use crate::common::BUDGET;
@@ -272,4 +273,43 @@ fn machines_have_the_classes_of_their_oscillators() {
     others.iter().take(5).for_each(|what| println!("{what}"));
     // Several attractors and slow transients may end elsewhere.
     assert!(others.len() <= 2, "{} of {} differ", others.len(), all.len());
+}
+
+/// Prints how much longer a period of the gear pair takes as a machine.
+#[test]
+#[ignore = "a measurement: --release"]
+fn time_of_a_period_as_a_machine() {
+    for (e, omega) in [(0.06, 5.6), (0.605, 5.6), (0.72, 1.5), (0.9, 3.0)] {
+        let pair = crate::common::paper(e, omega);
+        let (oscillator, law) = (pair.oscillator().unwrap(), pair.law());
+        let (flow, system) = (Flow::new(&oscillator), System::new(&machine_of(&oscillator, law)));
+        let mut times = [[f64::INFINITY; 2]; 2];
+        for _ in 0..5 {
+            for tangents in [false, true] {
+                let mut theirs = Motion::new(&system, &REST);
+                if tangents {
+                    theirs.set_tangents(Motion::unit_tangents(&system)[..1].to_vec());
+                }
+                let begin = std::time::Instant::now();
+                (0..2000).for_each(|_| theirs.advance_period(&mut ()).unwrap());
+                let machine = begin.elapsed().as_secs_f64();
+                let begin = std::time::Instant::now();
+                if tangents {
+                    let mut ours = Trajectory::with_tangents(&flow, law, REST, [UNIT[0]]);
+                    (0..2000).for_each(|_| ours.advance_period(&mut ()).unwrap());
+                } else {
+                    let mut ours = Trajectory::<0>::new(&flow, law, REST);
+                    (0..2000).for_each(|_| ours.advance_period(&mut ()).unwrap());
+                }
+                let tuned = begin.elapsed().as_secs_f64();
+                let of = &mut times[usize::from(tangents)];
+                (of[0], of[1]) = (of[0].min(machine), of[1].min(tuned));
+            }
+        }
+        let [plain, tangent] = times.map(|[machine, tuned]| machine / tuned);
+        let micros = times.map(|of| of.map(|seconds| seconds / 2000.0 * 1e6));
+        println!(
+            "{e} {omega}: {plain:.1} times, with a tangent {tangent:.1} times; microseconds {micros:.1?}"
+        );
+    }
 }

@@ -249,7 +249,8 @@ fn inverse(mass: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. The displacement that is left out for a gap is
-/// the one with the largest entry in what is left of its row.
+/// the one with the largest entry in what is left of its row, of equal ones the one with the smallest mass: a force on a heavy body that
+/// is left out would be computed as a small difference.
 fn coordinates(machine: &Machine) -> DMatrix<f64> {
     let n = machine.degrees();
     let mut rows: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
@@ -258,7 +259,10 @@ fn coordinates(machine: &Machine) -> DMatrix<f64> {
         let row = reduced[i].clone();
         let free = (0..n).filter(|j| !replaced.contains(j));
         let pivot = free
-            .max_by(|&a, &b| row[a].abs().total_cmp(&row[b].abs()).then(b.cmp(&a)))
+            .max_by(|&a, &b| {
+                let lighter = machine.mass[(b, b)].total_cmp(&machine.mass[(a, a)]);
+                row[a].abs().total_cmp(&row[b].abs()).then(lighter).then(b.cmp(&a))
+            })
             .expect("there are not more gaps than coordinates");
         for other in reduced.iter_mut().skip(i + 1) {
             let share = other[pivot] / row[pivot];
