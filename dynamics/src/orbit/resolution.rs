@@ -8,7 +8,7 @@ use super::{Event, Settings};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Allowance, Stop, Trajectory};
-use crate::stability::{Cycle, StrobeMap, UNIT, matrix_of, product, refine};
+use crate::stability::{Cycle, StrobeMap, UNIT, matrix_of, multiply, refine};
 
 /// Rounding error of the motion between two events, in units of the machine epsilon times the size of the motion.
 const ROUNDING: f64 = 4.0;
@@ -80,10 +80,14 @@ pub(super) fn is_below_resolution(
     let (to, from) = (DMatrix::from_diagonal(&units), DMatrix::from_diagonal(&units.map(f64::recip)));
     // Covariance of the errors. The second turn includes growth across the end of the cycle.
     let (mut errors, mut largest) = (DMatrix::zeros(size, size), 0.0f64);
+    let [mut first, mut second] = [(); 2].map(|()| DMatrix::zeros(size, size));
     let rounding = (ROUNDING * epsilon).powi(2);
     for part in parts.iter().chain(&parts) {
-        let part = product(&product(&to, part), &from);
-        errors = product(&product(&part, &errors), &part.transpose());
+        multiply(&to, part, &mut first);
+        multiply(&first, &from, &mut second);
+        multiply(&second, &errors, &mut first);
+        second.transpose_mut();
+        multiply(&first, &second, &mut errors);
         (0..size).for_each(|i| errors[(i, i)] += rounding);
         largest = largest.max(errors.diagonal().max());
     }

@@ -5,7 +5,7 @@
 
 use nalgebra::DMatrix;
 
-use super::product;
+use super::multiply;
 use crate::model::STATE;
 
 /// Whether the modulus of every eigenvalue is below 1; none if the matrix is not finite.
@@ -37,12 +37,13 @@ fn characteristic(a: &DMatrix<f64>) -> [f64; STATE + 1] {
     let size = a.nrows();
     let mut coefficients = [0.0; STATE + 1];
     coefficients[0] = 1.0;
-    let mut power = a.clone();
+    let (mut power, mut next) = (a.clone(), a.clone());
     for (n, place) in coefficients.iter_mut().enumerate().take(size + 1).skip(1) {
         let coefficient = -power.trace() / n as f64;
         *place = coefficient;
         (0..size).for_each(|i| power[(i, i)] += coefficient);
-        power = product(a, &power);
+        multiply(a, &power, &mut next);
+        std::mem::swap(&mut power, &mut next);
     }
     coefficients
 }
