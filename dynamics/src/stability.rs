@@ -12,10 +12,11 @@ mod newton;
 mod unit_circle;
 
 pub use exponent::{CORRELATION_MARGIN, Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
-pub(crate) use matrix::{image_of, matrix_of, multiply, norm, product};
+pub(crate) use matrix::{image_of, multiply, norm};
 pub use newton::refine;
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 
+use matrix::product;
 use nalgebra::linalg::Schur;
 use nalgebra::{Complex, DMatrix, Matrix4};
 
@@ -56,7 +57,14 @@ impl Image {
     /// Returns the derivative on states whose velocities are divided by `rate`, so that its norm and pivots do not
     /// depend on the unit of time.
     pub(crate) fn balanced(&self) -> DMatrix<f64> {
-        balanced(&self.derivative(), self.rate)
+        let size = self.scaled.nrows();
+        DMatrix::from_fn(size, size, self.balanced_entries())
+    }
+
+    /// Returns the entries of [`Image::balanced`].
+    fn balanced_entries(&self) -> impl Fn(usize, usize) -> f64 {
+        let factor = self.log_scale.exp();
+        move |i, j| in_displacements(self.scaled[(i, j)] * factor, self.rate, i, j)
     }
 
     /// Returns the derivative of the map; entries out of the range of f64 are zero or infinite.
@@ -83,18 +91,19 @@ impl StrobeMap {
     ) -> Result<Image, Stop> {
         let rate = seed.flow().rate;
         let never_slid = usize::MAX;
-        let size = seed.flow().state_len();
-        let scaled = DMatrix::identity(size, size);
-        let mut image = Image { state: y, scaled, log_scale: 0.0, near_grazing: false, never_slid, rate };
         match self {
             StrobeMap::Periods(p) => {
                 let mut trajectory = seed.at(y, UNIT);
                 let ended = (0..p).try_for_each(|_| trajectory.advance_period(&mut ()));
                 *work += trajectory.work();
                 ended?;
-                image = image_at(&trajectory, 1.0);
+                Ok(image_at(&trajectory, 1.0))
             }
             StrobeMap::MirroredHalves(p) => {
+                let size = seed.flow().state_len();
+                let scaled = DMatrix::identity(size, size);
+                let mut image =
+                    Image { state: y, scaled, log_scale: 0.0, near_grazing: false, never_slid, rate };
                 // The points of the cycle may lie in different domains.
                 let mut half = seed.at(y, UNIT);
                 for turn in 0..p {
@@ -116,9 +125,9 @@ impl StrobeMap {
                         rate,
                     };
                 }
+                Ok(image)
             }
         }
-        Ok(image)
     }
 
     /// Returns the monodromy matrix of the whole cycle and the logarithm of its factor, from the derivative of this
@@ -159,15 +168,14 @@ fn unit_size(matrix: DMatrix<f64>, log_scale: f64) -> (DMatrix<f64>, f64) {
     if size > 0.0 && size.is_finite() { (matrix / size, log_scale + size.ln()) } else { (matrix, log_scale) }
 }
 
-/// Transforms a matrix on states to one on states whose velocities are divided by `rate`, a power of two.
-fn balanced(matrix: &DMatrix<f64>, rate: f64) -> DMatrix<f64> {
+/// Transforms an entry of a matrix on states to that on states whose velocities are divided by `rate`, a power of two.
+fn in_displacements(entry: f64, rate: f64, i: usize, j: usize) -> f64 {
     let unit = |i: usize| if i % 2 == 1 { rate } else { 1.0 };
-    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * (unit(j) / unit(i)))
+    entry * (unit(j) / unit(i))
 }
 
 fn image_at(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
-    let columns: Vec<State> = trajectory.unit_images().iter().map(|u| u.map(|x| sign * x)).collect();
-    let (scaled, log_scale) = unit_size(matrix_of(&columns), trajectory.log_scale());
+    let (scaled, log_scale) = unit_size(trajectory.unit_images() * sign, trajectory.log_scale());
     Image {
         state: trajectory.state().map(|value| sign * value),
         scaled,

@@ -8,7 +8,7 @@ use super::{Event, Settings};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Allowance, Stop, Trajectory};
-use crate::stability::{Cycle, StrobeMap, UNIT, matrix_of, multiply, refine};
+use crate::stability::{Cycle, StrobeMap, UNIT, multiply, refine};
 
 /// Rounding error of the motion between two events, in units of the machine epsilon times the size of the motion.
 const ROUNDING: f64 = 4.0;
@@ -59,7 +59,7 @@ pub(super) fn is_below_resolution(
     let mut trajectory = seed.at(cycle.state, UNIT);
     let (mut strobes, mut parts) = (vec![cycle.state], Vec::new());
     let mut part = |trajectory: &mut Trajectory<'_, 4>| {
-        parts.push(matrix_of(&trajectory.unit_images()) * trajectory.log_scale().exp());
+        parts.push(trajectory.unit_images() * trajectory.log_scale().exp());
         trajectory.set_tangents(UNIT);
     };
     let mut times = events.windows(2).map(|pair| 0.5 * (pair[0].t + pair[1].t)).peekable();

@@ -27,7 +27,9 @@ pub(crate) fn multiply(a: &DMatrix<f64>, b: &DMatrix<f64>, product: &mut DMatrix
     }
 }
 
-fn multiply_rows<const N: usize>(a: &[f64], b: &[f64], product: &mut [f64]) {
+/// Computes the product of two matrices of `N` rows, which lie in memory column by column.
+#[inline]
+pub(super) fn multiply_rows<const N: usize>(a: &[f64], b: &[f64], product: &mut [f64]) {
     let ((a, _), (b, _), (product, _)) =
         (a.as_chunks::<N>(), b.as_chunks::<N>(), product.as_chunks_mut::<N>());
     for (column, factors) in product.iter_mut().zip(b) {
@@ -65,11 +67,6 @@ fn padded(column: &[f64]) -> State {
     let mut all = REST;
     all[..column.len()].copy_from_slice(column);
     all
-}
-
-/// Returns the matrix with these columns, the tangent vectors of a trajectory.
-pub(crate) fn matrix_of(columns: &[State]) -> DMatrix<f64> {
-    DMatrix::from_fn(columns.len(), columns.len(), |i, j| columns[j][i])
 }
 
 #[cfg(test)]
