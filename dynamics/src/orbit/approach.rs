@@ -49,18 +49,17 @@ pub(super) fn stays(
     tolerance: f64,
 ) -> bool {
     // Fewer entries are faster.
-    let stays = match metric.len() {
-        4 => stays_among::<4>,
-        _ => stays_among::<STATE>,
-    };
-    stays(cycle, &strobe, &is_on_branch, metric, tolerance)
+    match metric.len() {
+        4 => stays_among::<4>(cycle, strobe, is_on_branch, metric, tolerance),
+        _ => stays_among::<STATE>(cycle, strobe, is_on_branch, metric, tolerance),
+    }
 }
 
 /// The test of [`stays`] for states of which `N` entries can differ from 0.
 fn stays_among<const N: usize>(
     cycle: &Cycle,
-    strobe: &dyn Fn(usize) -> Option<State>,
-    is_on_branch: &dyn Fn(usize) -> bool,
+    strobe: impl Fn(usize) -> Option<State>,
+    is_on_branch: impl Fn(usize) -> bool,
     metric: &Metric,
     tolerance: f64,
 ) -> bool {

@@ -1,6 +1,6 @@
 //! Whether rounding decides the period of a cycle.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::analysis::Analysis;
 use super::recurrence::Metric;
@@ -76,18 +76,24 @@ pub(super) fn is_below_resolution(
     strobes.pop();
     let metric = Metric::of(&strobes, flow);
     let size = flow.state_len();
-    let units = DVector::from_fn(size, |i, _| 1.0 / metric.unit(i));
-    let (to, from) = (DMatrix::from_diagonal(&units), DMatrix::from_diagonal(&units.map(f64::recip)));
+    let units: Vec<f64> = (0..size).map(|i| 1.0 / metric.unit(i)).collect();
+    for part in &mut parts {
+        for (j, column) in part.as_mut_slice().chunks_exact_mut(size).enumerate() {
+            column.iter_mut().zip(&units).for_each(|(x, unit)| *x = *x * unit * units[j].recip());
+        }
+        // A part that leaves the range of f64 decides nothing.
+        if !part.iter().all(|x| x.is_finite()) {
+            part.fill(f64::NAN);
+        }
+    }
     // Covariance of the errors. The second turn includes growth across the end of the cycle.
     let (mut errors, mut largest) = (DMatrix::zeros(size, size), 0.0f64);
-    let [mut first, mut second] = [(); 2].map(|()| DMatrix::zeros(size, size));
+    let [mut carried, mut transposed] = [(); 2].map(|()| DMatrix::zeros(size, size));
     let rounding = (ROUNDING * epsilon).powi(2);
     for part in parts.iter().chain(&parts) {
-        multiply(&to, part, &mut first);
-        multiply(&first, &from, &mut second);
-        multiply(&second, &errors, &mut first);
-        second.transpose_mut();
-        multiply(&first, &second, &mut errors);
+        multiply(part, &errors, &mut carried);
+        part.transpose_to(&mut transposed);
+        multiply(&carried, &transposed, &mut errors);
         (0..size).for_each(|i| errors[(i, i)] += rounding);
         largest = largest.max(errors.diagonal().max());
     }
