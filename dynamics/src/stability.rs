@@ -12,7 +12,7 @@ mod newton;
 mod unit_circle;
 
 pub use exponent::{CORRELATION_MARGIN, Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
-pub(crate) use matrix::{image_of, multiply, norm};
+pub(crate) use matrix::{image_of, norm, times};
 pub use newton::refine;
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 

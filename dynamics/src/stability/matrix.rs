@@ -2,49 +2,38 @@
 
 use nalgebra::DMatrix;
 
-use crate::model::{REST, STATE, State, dot};
+use crate::model::{REST, State, dot};
 
-/// Computes the product of two square matrices, in `product`, which has their size. The product of nalgebra depends on the processor
-/// if matrices have more than five rows.
-pub(crate) fn multiply(a: &DMatrix<f64>, b: &DMatrix<f64>, product: &mut DMatrix<f64>) {
-    let size = a.nrows();
-    let (a, b, product) = (a.as_slice(), b.as_slice(), product.as_mut_slice());
-    match size {
-        // A known number of rows is much faster.
-        4 => multiply_rows::<4>(a, b, product),
-        8 => multiply_rows::<8>(a, b, product),
-        STATE => multiply_rows::<STATE>(a, b, product),
-        _ => {
-            for (column, factors) in product.chunks_exact_mut(size).zip(b.chunks_exact(size)) {
-                let mut terms = a.chunks_exact(size).zip(factors);
-                let Some((first, factor)) = terms.next() else { return };
-                column.iter_mut().zip(first).for_each(|(sum, x)| *sum = x * factor);
-                terms.for_each(|(of_a, factor)| {
-                    column.iter_mut().zip(of_a).for_each(|(sum, x)| *sum += x * factor)
-                });
-            }
-        }
-    }
-}
-
-/// Computes the product of two matrices of `N` rows, which lie in memory column by column.
+/// Returns the product of two matrices of `N` rows, given by columns.
 #[inline]
-pub(super) fn multiply_rows<const N: usize>(a: &[f64], b: &[f64], product: &mut [f64]) {
-    let ((a, _), (b, _), (product, _)) =
-        (a.as_chunks::<N>(), b.as_chunks::<N>(), product.as_chunks_mut::<N>());
-    for (column, factors) in product.iter_mut().zip(b) {
+pub(crate) fn times<const N: usize>(a: &[[f64; N]; N], b: &[[f64; N]; N]) -> [[f64; N]; N] {
+    b.map(|factors| {
         let mut sum: [f64; N] = std::array::from_fn(|i| a[0][i] * factors[0]);
-        for (of_a, factor) in a.iter().zip(factors).skip(1) {
-            (0..N).for_each(|i| sum[i] += of_a[i] * factor);
+        for k in 1..N {
+            (0..N).for_each(|i| sum[i] += a[k][i] * factors[k]);
         }
-        *column = sum;
-    }
+        sum
+    })
 }
 
-/// Returns the product of two square matrices.
+/// Returns the product of two square matrices. That of nalgebra depends on the processor if matrices have more than five rows.
 pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut product = DMatrix::zeros(a.nrows(), a.nrows());
-    multiply(a, b, &mut product);
+    let size = a.nrows();
+    // A known number of rows is much faster.
+    if size == 4 {
+        let [a, b] = [a, b].map(|m| std::array::from_fn(|j| std::array::from_fn(|i| m[(i, j)])));
+        return DMatrix::from_column_slice(4, 4, times::<4>(&a, &b).as_flattened());
+    }
+    let mut product = DMatrix::zeros(size, size);
+    let columns = product.as_mut_slice().chunks_exact_mut(size);
+    for (column, factors) in columns.zip(b.as_slice().chunks_exact(size)) {
+        let mut terms = a.as_slice().chunks_exact(size).zip(factors);
+        let Some((first, factor)) = terms.next() else { break };
+        column.iter_mut().zip(first).for_each(|(sum, x)| *sum = x * factor);
+        terms.for_each(|(of_a, factor)| {
+            column.iter_mut().zip(of_a).for_each(|(sum, x)| *sum += x * factor);
+        });
+    }
     product
 }
 

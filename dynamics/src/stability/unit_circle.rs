@@ -3,7 +3,7 @@
 //! It uses the characteristic polynomial (Faddeev and LeVerrier) and the criterion of Schur and Cohn, about a hundred
 //! multiplications for a matrix of four rows.
 
-use super::matrix::multiply_rows;
+use super::times;
 use crate::model::STATE;
 
 /// Whether the modulus of every eigenvalue is below 1; none if the matrix is not finite. `entry` returns the entries of a matrix with
@@ -12,8 +12,8 @@ use crate::model::STATE;
 /// If an eigenvalue lies within rounding of the circle, either answer is possible.
 pub(super) fn lies_within_unit_circle(size: usize, entry: impl Fn(usize, usize) -> f64) -> Option<bool> {
     let mut polynomial = match size {
-        ..=4 => characteristic::<4>(size, entry),
-        ..=8 => characteristic::<8>(size, entry),
+        0..=4 => characteristic::<4>(size, entry),
+        5..=8 => characteristic::<8>(size, entry),
         _ => characteristic::<STATE>(size, entry),
     };
     if !polynomial.iter().all(|c| c.is_finite()) {
@@ -39,7 +39,7 @@ pub(super) fn lies_within_unit_circle(size: usize, entry: impl Fn(usize, usize) 
 fn characteristic<const N: usize>(size: usize, entry: impl Fn(usize, usize) -> f64) -> [f64; STATE + 1] {
     let column = |j| std::array::from_fn(|i| if i.max(j) < size { entry(i, j) } else { 0.0 });
     let matrix: [[f64; N]; N] = std::array::from_fn(column);
-    let (mut power, mut next) = (matrix, matrix);
+    let mut power = matrix;
     let mut coefficients = [0.0; STATE + 1];
     coefficients[0] = 1.0;
     for (n, place) in coefficients.iter_mut().enumerate().take(size + 1).skip(1) {
@@ -47,8 +47,7 @@ fn characteristic<const N: usize>(size: usize, entry: impl Fn(usize, usize) -> f
         let coefficient = -trace / n as f64;
         *place = coefficient;
         (0..size).for_each(|i| power[i][i] += coefficient);
-        multiply_rows::<N>(matrix.as_flattened(), power.as_flattened(), next.as_flattened_mut());
-        std::mem::swap(&mut power, &mut next);
+        power = times(&matrix, &power);
     }
     coefficients
 }
