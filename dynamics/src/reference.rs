@@ -39,11 +39,12 @@ pub use event::{
     EVENTS_PER_PERIOD_CAP, EventKind, FrictionEvent, GapEvent, Observer, STEPS_PER_PERIOD_CAP, Stop, Work,
 };
 use machine::Motion;
+use nalgebra::DMatrix;
 use step_verdict::{Crossing, StepVerdict};
 pub use tangent::NO_SPEED;
 
 use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Schedule, Slips, Step};
-use crate::model::{Law, MOST_FRICTION, REST, Side, State};
+use crate::model::{Law, MOST_FRICTION, Side, State};
 
 /// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
 const RESCALE_STEPS: u64 = 16;
@@ -187,13 +188,20 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.tangents.map(|u| self.flow.to_state(u))
     }
 
-    /// Returns the images of the unit vectors of all entries of a state, [`Flow::state_len`], divided by the exponential of
+    /// Returns the matrix whose columns are the images of the unit vectors of all entries of a state, [`Flow::state_len`], divided by the exponential of
     /// [`log_scale`](Self::log_scale). The trajectory must carry four tangent vectors.
-    pub(crate) fn unit_images(&self) -> Vec<State> {
-        let Some(motion) = &self.machine else { return self.tangents().to_vec() };
-        let mut images = motion.tangents();
-        images.resize(self.flow.state_len(), REST);
-        images
+    pub(crate) fn unit_images(&self) -> DMatrix<f64> {
+        let size = self.flow.state_len();
+        match &self.machine {
+            None => {
+                let columns = self.tangents();
+                DMatrix::from_fn(size, size, |i, j| columns[j][i])
+            }
+            Some(motion) => {
+                let columns = motion.tangents();
+                DMatrix::from_fn(size, size, |i, j| columns.get(j).map_or(0.0, |column| column[i]))
+            }
+        }
     }
 
     /// Returns the logarithm of the common factor of all tangent vectors, which keeps them in the range of f64.

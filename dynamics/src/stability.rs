@@ -7,17 +7,20 @@
 //! `P` is `+1`, that of `Q` is `-1`, and `Q' - I` stays regular.
 
 mod exponent;
+mod matrix;
 mod newton;
 mod unit_circle;
 
 pub use exponent::{CORRELATION_MARGIN, Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
+pub(crate) use matrix::{image_of, norm, times};
 pub use newton::refine;
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 
-use nalgebra::DMatrix;
+use matrix::product;
 use nalgebra::linalg::Schur;
+use nalgebra::{Complex, DMatrix, Matrix4};
 
-use crate::model::{REST, State, dot, state};
+use crate::model::{State, state};
 use crate::reference::{Stop, Trajectory, Work};
 
 /// The unit vectors of two coordinates. As initial tangent vectors they become the columns of the derivative.
@@ -54,7 +57,14 @@ impl Image {
     /// Returns the derivative on states whose velocities are divided by `rate`, so that its norm and pivots do not
     /// depend on the unit of time.
     pub(crate) fn balanced(&self) -> DMatrix<f64> {
-        balanced(&self.derivative(), self.rate)
+        let size = self.scaled.nrows();
+        DMatrix::from_fn(size, size, self.balanced_entries())
+    }
+
+    /// Returns the entries of [`Image::balanced`].
+    fn balanced_entries(&self) -> impl Fn(usize, usize) -> f64 {
+        let factor = self.log_scale.exp();
+        move |i, j| in_displacements(self.scaled[(i, j)] * factor, self.rate, i, j)
     }
 
     /// Returns the derivative of the map; entries out of the range of f64 are zero or infinite.
@@ -81,18 +91,19 @@ impl StrobeMap {
     ) -> Result<Image, Stop> {
         let rate = seed.flow().rate;
         let never_slid = usize::MAX;
-        let size = seed.flow().state_len();
-        let scaled = DMatrix::identity(size, size);
-        let mut image = Image { state: y, scaled, log_scale: 0.0, near_grazing: false, never_slid, rate };
         match self {
             StrobeMap::Periods(p) => {
                 let mut trajectory = seed.at(y, UNIT);
                 let ended = (0..p).try_for_each(|_| trajectory.advance_period(&mut ()));
                 *work += trajectory.work();
                 ended?;
-                image = image_at(&trajectory, 1.0);
+                Ok(image_at(&trajectory, 1.0))
             }
             StrobeMap::MirroredHalves(p) => {
+                let size = seed.flow().state_len();
+                let scaled = DMatrix::identity(size, size);
+                let mut image =
+                    Image { state: y, scaled, log_scale: 0.0, near_grazing: false, never_slid, rate };
                 // The points of the cycle may lie in different domains.
                 let mut half = seed.at(y, UNIT);
                 for turn in 0..p {
@@ -114,9 +125,9 @@ impl StrobeMap {
                         rate,
                     };
                 }
+                Ok(image)
             }
         }
-        Ok(image)
     }
 
     /// Returns the monodromy matrix of the whole cycle and the logarithm of its factor, from the derivative of this
@@ -157,46 +168,14 @@ fn unit_size(matrix: DMatrix<f64>, log_scale: f64) -> (DMatrix<f64>, f64) {
     if size > 0.0 && size.is_finite() { (matrix / size, log_scale + size.ln()) } else { (matrix, log_scale) }
 }
 
-/// Transforms a matrix on states to one on states whose velocities are divided by `rate`, a power of two.
-fn balanced(matrix: &DMatrix<f64>, rate: f64) -> DMatrix<f64> {
+/// Transforms an entry of a matrix on states to that on states whose velocities are divided by `rate`, a power of two.
+fn in_displacements(entry: f64, rate: f64, i: usize, j: usize) -> f64 {
     let unit = |i: usize| if i % 2 == 1 { rate } else { 1.0 };
-    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * (unit(j) / unit(i)))
-}
-
-/// Returns the product of two matrices. That of nalgebra depends on the processor if matrices have more than five rows.
-pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut product = DMatrix::zeros(a.nrows(), b.ncols());
-    for (mut column, factors) in product.column_iter_mut().zip(b.column_iter()) {
-        for (of_a, &factor) in a.column_iter().zip(&factors) {
-            column.iter_mut().zip(&of_a).for_each(|(sum, x)| *sum += x * factor);
-        }
-    }
-    product
-}
-
-/// Returns the image of a vector, with zeros beyond the rows of the matrix.
-pub(crate) fn image_of(matrix: &DMatrix<f64>, vector: &State) -> State {
-    let mut image = REST;
-    for (column, factor) in matrix.column_iter().zip(vector) {
-        image.iter_mut().zip(&column).for_each(|(sum, x)| *sum += x * factor);
-    }
-    image
-}
-
-/// Returns the square root of the sum of the squares of all entries.
-pub(crate) fn norm(matrix: &DMatrix<f64>) -> f64 {
-    let size = matrix.nrows();
-    matrix.as_slice().chunks(size).map(|column| dot(column, column)).sum::<f64>().sqrt()
-}
-
-/// Returns the matrix with these columns, the tangent vectors of a trajectory.
-pub(crate) fn matrix_of(columns: &[State]) -> DMatrix<f64> {
-    DMatrix::from_fn(columns.len(), columns.len(), |i, j| columns[j][i])
+    entry * (unit(j) / unit(i))
 }
 
 fn image_at(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
-    let columns: Vec<State> = trajectory.unit_images().iter().map(|u| u.map(|x| sign * x)).collect();
-    let (scaled, log_scale) = unit_size(matrix_of(&columns), trajectory.log_scale());
+    let (scaled, log_scale) = unit_size(trajectory.unit_images() * sign, trajectory.log_scale());
     Image {
         state: trajectory.state().map(|value| sign * value),
         scaled,
@@ -269,8 +248,19 @@ pub fn multipliers(monodromy: &DMatrix<f64>) -> Option<Vec<[f64; 2]>> {
     if !monodromy.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let schur = Schur::try_new(monodromy.clone(), f64::EPSILON, EIGEN_CAP)?;
-    let mut list: Vec<[f64; 2]> = schur.complex_eigenvalues().iter().map(|m| [m.re, m.im]).collect();
+    // The eigenvalues of four rows need no memory.
+    let eigenvalues = |m: &Complex<f64>| [m.re, m.im];
+    let mut list: Vec<[f64; 2]> = match monodromy.nrows() {
+        4 => {
+            let matrix = Matrix4::from_column_slice(monodromy.as_slice());
+            let schur = Schur::try_new(matrix, f64::EPSILON, EIGEN_CAP)?;
+            schur.complex_eigenvalues().iter().map(eigenvalues).collect()
+        }
+        _ => {
+            let schur = Schur::try_new(monodromy.clone(), f64::EPSILON, EIGEN_CAP)?;
+            schur.complex_eigenvalues().iter().map(eigenvalues).collect()
+        }
+    };
     list.sort_by(|a, b| modulus(*b).total_cmp(&modulus(*a)).then(b[1].total_cmp(&a[1])));
     Some(list)
 }

@@ -310,7 +310,7 @@ mod tests {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
         change(&mut gpu);
         let pair = GearPair::paper(0.5);
-        let lanes = [Lane { flow: 0, law: 0, start: REST }; 1 << 14];
+        let lanes = vec![Lane { flow: 0, law: 0, start: REST }; 1 << 14];
         let flows = [pair.oscillator().unwrap()];
         let settings = LaneSettings::default();
         let error = pollster::block_on(gpu.run(&flows, &[pair.law()], &lanes, &settings)).unwrap_err();

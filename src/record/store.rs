@@ -8,7 +8,7 @@ use bytemuck::Pod;
 
 use super::Record;
 use super::measures::MEASURES;
-use rattlemap_dynamics::model::MOST_COORDINATES;
+use rattlemap_dynamics::model::{MOST_COORDINATES, REST};
 
 /// Records by number, in any container.
 pub trait Records: Debug + Sync {
@@ -122,6 +122,10 @@ impl Records for RecordStore {
         let [lyapunov, lyapunov_error, impacts_per_period, mesh_fraction] =
             self.numbers.each_ref().map(|column| column.get(id));
         let [period, status, symmetric, valid, reserved] = self.flags.get(id);
+        let mut strobe = REST;
+        for (pair, column) in strobe.as_chunks_mut::<2>().0.iter_mut().zip(&self.strobe) {
+            *pair = column.get(id);
+        }
         let (word, word_hash, word_length) = self.word.get(id);
         let (pattern, pattern_hash, pattern_length) = self.pattern.get(id);
         Record {
@@ -129,7 +133,7 @@ impl Records for RecordStore {
             lyapunov_error,
             impacts_per_period,
             mesh_fraction,
-            strobe: std::array::from_fn(|i| self.strobe[i / 2].get(id)[i % 2]),
+            strobe,
             word,
             word_hash,
             word_length,
@@ -162,8 +166,8 @@ impl RecordsMut for RecordStore {
         if self.with_strobes {
             self.strobe
                 .iter_mut()
-                .zip(record.strobe.chunks_exact(2))
-                .for_each(|(column, pair)| column.put(count, id, [pair[0], pair[1]]));
+                .zip(record.strobe.as_chunks::<2>().0)
+                .for_each(|(column, pair)| column.put(count, id, *pair));
         }
         self.periods_run.put(count, id, record.periods_run);
         let &Record { period, status, symmetric, valid, reserved, .. } = record;
@@ -237,7 +241,7 @@ mod tests {
     use crate::record::valid;
     use bytemuck::Zeroable;
     use proptest::prelude::*;
-    use rattlemap_dynamics::model::{REST, state};
+    use rattlemap_dynamics::model::state;
     use rattlemap_dynamics::word::Word;
 
     /// Records of any bits; some are empty, some share their words.

@@ -121,13 +121,13 @@ pub(super) fn neutral_growth(from: u32, periods: f64) -> f64 {
 pub(super) fn is_growing(flow: &Flow, strobes: &[State], exponent: f64) -> bool {
     let (first, second) = strobes.split_at(strobes.len() / 2);
     let expected = SHARED_GROWTH * exponent * second.len() as f64;
+    let largest = |part: &[State]| {
+        let pairs = part.iter().flat_map(|y| y[..flow.state_len()].as_chunks::<2>().0);
+        pairs.fold([0.0f64; 2], |most, pair| [0, 1].map(|i| most[i].max(pair[i].abs())))
+    };
     // Between two walls only the rates can grow.
-    let grows = [0, 1].into_iter().any(|i| {
-        let entries =
-            |y: &State| y[i..flow.state_len()].iter().step_by(2).fold(0.0, |most: f64, x| most.max(x.abs()));
-        let largest = |part: &[State]| part.iter().map(entries).fold(0.0, f64::max);
-        (largest(second) / largest(first)).ln() > expected
-    });
+    let [before, after] = [first, second].map(largest);
+    let grows = [0, 1].into_iter().any(|i| (after[i] / before[i]).ln() > expected);
     flow.escape.is_finite() && (grows || expected < PLAIN_GROWTH)
 }
 

@@ -9,7 +9,7 @@
 //! spiral.
 
 use super::recurrence::Metric;
-use crate::model::{REST, State, difference, dot, sum};
+use crate::model::{STATE, State, difference, dot, sum};
 use crate::stability::{Cycle, image_of};
 
 /// Largest error of the linear map, relative to the deviation. With 0.1, one cell of 40,000 over restitution and
@@ -48,13 +48,30 @@ pub(super) fn stays(
     metric: &Metric,
     tolerance: f64,
 ) -> bool {
-    let deviation = |back: usize| strobe(back).map(|y| difference(&y, &cycle.state));
+    // Fewer entries are faster.
+    match metric.len() {
+        4 => stays_among::<4>(cycle, strobe, is_on_branch, metric, tolerance),
+        _ => stays_among::<STATE>(cycle, strobe, is_on_branch, metric, tolerance),
+    }
+}
+
+/// The test of [`stays`] for states of which `N` entries can differ from 0.
+fn stays_among<const N: usize>(
+    cycle: &Cycle,
+    strobe: impl Fn(usize) -> Option<State>,
+    is_on_branch: impl Fn(usize) -> bool,
+    metric: &Metric,
+    tolerance: f64,
+) -> bool {
+    let deviation = |back: usize| -> Option<[f64; N]> {
+        strobe(back).map(|y| std::array::from_fn(|i| y[i] - cycle.state[i]))
+    };
     let Some(present) = deviation(0) else { return false };
     let (mut after, mut earlier) = (present, Vec::new());
     for back in 1..=HULL_CYCLES {
         let Some(before) = deviation(back).filter(|_| is_on_branch(back)) else { break };
-        let predicted = image_of(&cycle.monodromy, &before);
-        if metric.size(&after, &predicted) > tolerance * metric.size(&before, &REST) {
+        let error = difference(&after, &image_of(&cycle.monodromy, &before));
+        if metric.size(&error) > tolerance * metric.size(&before) {
             break;
         }
         earlier.push(before);
@@ -67,11 +84,11 @@ pub(super) fn stays(
 ///
 /// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step goes from the nearest point so far towards the corner that
 /// lies farthest beyond it, whose position also bounds the distance from below.
-fn is_in_hull(point: &State, corners: &[State], metric: &Metric) -> bool {
+fn is_in_hull<const N: usize>(point: &[f64; N], corners: &[[f64; N]], metric: &Metric) -> bool {
     let target = metric.scaled(point);
-    let norm = |y: &State| dot(y, y).sqrt();
+    let norm = |y: &[f64; N]| dot(y, y).sqrt();
     let allowed = (HULL_DISTANCE * norm(&target)).max(LEAST_HULL_DISTANCE);
-    let corners: Vec<State> =
+    let corners: Vec<[f64; N]> =
         corners.iter().map(|corner| difference(&metric.scaled(corner), &target)).collect();
     // In slow motion the last corner is close to the point, and the steps below would be short.
     if corners.first().is_some_and(|last| norm(last) <= allowed) {
@@ -84,7 +101,7 @@ fn is_in_hull(point: &State, corners: &[State], metric: &Metric) -> bool {
         if square <= allowed * allowed {
             return true;
         }
-        let along = |corner: &State| dot(corner, &nearest);
+        let along = |corner: &[f64; N]| dot(corner, &nearest);
         let farthest = corners
             .iter()
             .fold(origin, |best, corner| if along(corner) < along(&best) { *corner } else { best });
@@ -104,7 +121,7 @@ mod tests {
 
     use super::*;
     use crate::flow::Flow;
-    use crate::model::{GearPair, state};
+    use crate::model::{GearPair, REST, state};
 
     fn metric() -> Metric {
         Metric::of(&[REST], &Flow::new(&GearPair::paper(0.5).oscillator().unwrap()))

@@ -1,7 +1,7 @@
 //! Recurrence of strobe states: candidates for the period of a motion.
 
 use crate::flow::Flow;
-use crate::model::{State, difference};
+use crate::model::State;
 
 /// Largest distance of a recurrence, relative to the size of the motion.
 pub(super) const RECURRENCE_DISTANCE: f64 = 3e-2;
@@ -20,30 +20,41 @@ impl Metric {
     /// scale of length, and that as a velocity, are lower bounds: at a turning point, velocities are rounding errors.
     pub(super) fn of(strobes: &[State], flow: &Flow) -> Metric {
         let len = flow.state_len();
-        let largest = |from: usize| {
-            let entries = strobes.iter().flat_map(|y| y[from..len].iter().step_by(2));
-            entries.fold(0.0, |most: f64, value| most.max(value.abs()))
-        };
-        let position = largest(0).max(flow.length);
-        Metric { position, velocity: largest(1).max(flow.omega * position), len }
+        let mut largest = [0.0f64; 2];
+        for y in strobes {
+            for pair in y[..len].as_chunks::<2>().0 {
+                largest = [0, 1].map(|i| largest[i].max(pair[i].abs()));
+            }
+        }
+        let position = largest[0].max(flow.length);
+        Metric { position, velocity: largest[1].max(flow.omega * position), len }
+    }
+
+    /// Returns the number of entries of a state.
+    pub(super) fn len(&self) -> usize {
+        self.len
     }
 
     /// Returns the distance of two states.
+    #[inline]
     pub(super) fn distance(&self, a: &State, b: &State) -> f64 {
         let difference = |i: usize| (a[i] - b[i]).abs();
-        let largest =
-            |from: usize| (from + 2..self.len).step_by(2).fold(difference(from), |d, i| d.max(difference(i)));
-        (largest(0) / self.position).max(largest(1) / self.velocity)
+        let mut largest = [0, 1].map(|i| difference(i).max(difference(i + 2)));
+        for i in (4..self.len).step_by(2) {
+            largest = [0, 1].map(|j| largest[j].max(difference(i + j)));
+        }
+        (largest[0] / self.position).max(largest[1] / self.velocity)
     }
 
-    /// Returns the size of `a - b`.
-    pub(super) fn size(&self, a: &State, b: &State) -> f64 {
-        let scaled = self.scaled(&difference(a, b));
-        scaled[1..self.len].iter().fold(scaled[0].abs(), |most, value| most.max(value.abs()))
+    /// Returns the size of a difference of states, of which `N` entries can differ from 0.
+    pub(super) fn size<const N: usize>(&self, difference: &[f64; N]) -> f64 {
+        let scaled = self.scaled(difference);
+        scaled[1..].iter().fold(scaled[0].abs(), |most, value| most.max(value.abs()))
     }
 
     /// Returns a difference of states in the units of the metric.
-    pub(super) fn scaled(&self, difference: &State) -> State {
+    #[inline]
+    pub(super) fn scaled<const N: usize>(&self, difference: &[f64; N]) -> [f64; N] {
         std::array::from_fn(|i| difference[i] / self.unit(i))
     }
 

@@ -1,14 +1,14 @@
 //! Whether rounding decides the period of a cycle.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::analysis::Analysis;
 use super::recurrence::Metric;
 use super::{Event, Settings};
 use crate::flow::Flow;
-use crate::model::{Law, State};
+use crate::model::{Law, STATE, State};
 use crate::reference::{Allowance, Stop, Trajectory};
-use crate::stability::{Cycle, StrobeMap, UNIT, matrix_of, product, refine};
+use crate::stability::{Cycle, StrobeMap, UNIT, refine, times};
 
 /// Rounding error of the motion between two events, in units of the machine epsilon times the size of the motion.
 const ROUNDING: f64 = 4.0;
@@ -59,7 +59,7 @@ pub(super) fn is_below_resolution(
     let mut trajectory = seed.at(cycle.state, UNIT);
     let (mut strobes, mut parts) = (vec![cycle.state], Vec::new());
     let mut part = |trajectory: &mut Trajectory<'_, 4>| {
-        parts.push(matrix_of(&trajectory.unit_images()) * trajectory.log_scale().exp());
+        parts.push(trajectory.unit_images() * trajectory.log_scale().exp());
         trajectory.set_tangents(UNIT);
     };
     let mut times = events.windows(2).map(|pair| 0.5 * (pair[0].t + pair[1].t)).peekable();
@@ -75,19 +75,47 @@ pub(super) fn is_below_resolution(
     }
     strobes.pop();
     let metric = Metric::of(&strobes, flow);
-    let size = flow.state_len();
-    let units = DVector::from_fn(size, |i, _| 1.0 / metric.unit(i));
-    let (to, from) = (DMatrix::from_diagonal(&units), DMatrix::from_diagonal(&units.map(f64::recip)));
-    // Covariance of the errors. The second turn includes growth across the end of the cycle.
-    let (mut errors, mut largest) = (DMatrix::zeros(size, size), 0.0f64);
     let rounding = (ROUNDING * epsilon).powi(2);
-    for part in parts.iter().chain(&parts) {
-        let part = product(&product(&to, part), &from);
-        errors = product(&product(&part, &errors), &part.transpose());
-        (0..size).for_each(|i| errors[(i, i)] += rounding);
-        largest = largest.max(errors.diagonal().max());
-    }
+    let largest = match flow.state_len() {
+        0..=4 => largest_variance::<4>(&parts, &metric, rounding),
+        5..=8 => largest_variance::<8>(&parts, &metric, rounding),
+        _ => largest_variance::<STATE>(&parts, &metric, rounding),
+    };
     let pairs = strobes.iter().enumerate().flat_map(|(i, a)| strobes[..i].iter().map(move |b| (a, b)));
     let nearest = pairs.map(|(a, b)| metric.distance(a, b)).fold(1.0, f64::min);
     Ok(largest.sqrt() >= nearest)
+}
+
+/// Returns the largest variance of an error, in the units of the metric, over two turns of a cycle with these derivatives. Each part adds
+/// the variance `rounding` in every direction. A matrix has `N` rows or fewer.
+fn largest_variance<const N: usize>(parts: &[DMatrix<f64>], metric: &Metric, rounding: f64) -> f64 {
+    let units: [f64; N] = std::array::from_fn(|i| 1.0 / metric.unit(i));
+    let inverse = units.map(f64::recip);
+    let in_units = |part: &DMatrix<f64>| {
+        let mut matrix = [[0.0; N]; N];
+        for ((column, entries), factor) in
+            matrix.iter_mut().zip(part.as_slice().chunks_exact(part.nrows())).zip(inverse)
+        {
+            column
+                .iter_mut()
+                .zip(entries)
+                .zip(units)
+                .for_each(|((x, entry), unit)| *x = entry * unit * factor);
+        }
+        // A part that leaves the range of f64 decides nothing.
+        let is_finite = matrix.as_flattened().iter().all(|x| x.is_finite());
+        if is_finite { matrix } else { [[f64::NAN; N]; N] }
+    };
+    let parts: Vec<[[f64; N]; N]> = parts.iter().map(in_units).collect();
+    // Covariance of the errors. The second turn includes growth across the end of the cycle.
+    let (mut errors, mut largest) = ([[0.0; N]; N], 0.0f64);
+    for part in parts.iter().chain(&parts) {
+        let carried = times(part, &errors);
+        errors = times(&carried, &std::array::from_fn(|j| std::array::from_fn(|i| part[i][j])));
+        (0..metric.len()).for_each(|i| {
+            errors[i][i] += rounding;
+            largest = largest.max(errors[i][i]);
+        });
+    }
+    largest
 }

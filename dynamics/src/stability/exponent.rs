@@ -31,10 +31,17 @@ impl Exponent {
     pub fn renormalise<const N: usize>(&mut self, trajectory: &mut Trajectory<'_, N>) {
         let tangents = trajectory.tangents();
         let Some(u) = tangents.first() else { return };
-        let length = u.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let len = trajectory.flow().state_len();
+        let length = u[..len].iter().map(|x| x * x).sum::<f64>().sqrt();
         self.growth.push(length.max(f64::MIN_POSITIVE).ln() + trajectory.log_scale());
-        trajectory
-            .set_tangents(tangents.map(|u| if length > 0.0 { u.map(|x| x / length) } else { FRESH_TANGENT }));
+        trajectory.set_tangents(tangents.map(|mut u| {
+            if length > 0.0 {
+                u[..len].iter_mut().for_each(|x| *x /= length);
+                u
+            } else {
+                FRESH_TANGENT
+            }
+        }));
     }
 
     /// Returns the logarithm of the growth over the last `periods`, or none if fewer were recorded.

@@ -6,7 +6,7 @@ use nalgebra::{
 };
 
 use super::unit_circle::lies_within_unit_circle;
-use super::{Cycle, Image, StrobeMap, balanced, multipliers};
+use super::{Cycle, Image, StrobeMap, multipliers};
 use crate::model::{State, difference, state, sum};
 use crate::reference::{Trajectory, Work};
 
@@ -166,12 +166,18 @@ impl Newton {
 
 /// Whether the derivative has a multiplier above [`UNSTABLE_EXPANSION`].
 fn is_unstable(image: &Image) -> bool {
-    lies_within_unit_circle(&(image.derivative() / UNSTABLE_EXPANSION)) == Some(false)
+    lies_within(image, UNSTABLE_EXPANSION) == Some(false)
 }
 
 /// Whether the derivative has a multiplier above [`LARGEST_MULTIPLIER`]; none if it is not finite.
 fn expands(image: &Image) -> Option<bool> {
-    lies_within_unit_circle(&(image.derivative() / LARGEST_MULTIPLIER)).map(|within| !within)
+    lies_within(image, LARGEST_MULTIPLIER).map(|within| !within)
+}
+
+/// Whether the modulus of all multipliers of the derivative is below `bound`; none if it is not finite.
+fn lies_within(image: &Image, bound: f64) -> Option<bool> {
+    let factor = image.log_scale.exp();
+    lies_within_unit_circle(image.scaled.nrows(), |i, j| image.scaled[(i, j)] * factor / bound)
 }
 
 /// Returns the size that residuals are relative to: that of the state, or the scale of length if that is larger.
@@ -194,14 +200,14 @@ fn in_displacements(y: &State, rate: f64) -> State {
 /// Solves `(P' - I) step = -residual` by least squares, with velocities divided by `rate`, so that the result does
 /// not depend on the unit of time.
 fn newton_step(image: &Image, residual: &State) -> Option<State> {
-    let (derivative, residual) = (image.balanced(), in_displacements(residual, image.rate));
-    let size = derivative.nrows();
-    // Fixed sizes of today's oscillators keep the order of operations, and need no memory.
+    let (size, residual) = (image.scaled.nrows(), in_displacements(residual, image.rate));
+    let entry = image.balanced_entries();
+    // Oscillators of one or two coordinates need no memory.
     let step = if size == 4 {
-        let matrix = Matrix4::from_column_slice(derivative.as_slice()) - Matrix4::identity();
+        let matrix = Matrix4::from_fn(entry) - Matrix4::identity();
         state(balanced_step(matrix, &Vector4::from_column_slice(&residual[..4]))?.as_slice())
     } else {
-        let matrix = derivative - DMatrix::identity(size, size);
+        let matrix = DMatrix::from_fn(size, size, entry) - DMatrix::identity(size, size);
         state(balanced_step(matrix, &DVector::from_column_slice(&residual[..size]))?.as_slice())
     };
     Some(in_displacements(&step, image.rate.recip()))
@@ -228,7 +234,9 @@ where
 
 fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> Option<Cycle> {
     let (scaled, log_scale) = map.monodromy(image);
-    let matrix = balanced(&scaled, image.rate);
+    let size = scaled.nrows();
+    let entry = |i, j| super::in_displacements(scaled[(i, j)], image.rate, i, j);
+    let matrix = DMatrix::from_fn(size, size, entry);
     let mut scaled_multipliers = multipliers(&matrix)?;
     scaled_multipliers.truncate(2 * seed.flow().degrees);
     // Friction that never slides leaves a family of cycles along its row.

@@ -107,7 +107,8 @@ pub(crate) fn encode(batch: &[(u32, Record)], strobes: usize) -> io::Result<(u32
     let mut mask = 0;
     let mut output = DeflateEncoder::new(Vec::new(), Compression::fast());
     for column in 0..COUNT {
-        if rows.iter().all(|row| row[range_of(column, strobes)].iter().all(|byte| *byte == 0)) {
+        let range = range_of(column, strobes);
+        if rows.iter().all(|row| row[range.clone()].iter().all(|byte| *byte == 0)) {
             continue;
         }
         mask |= 1 << column;
