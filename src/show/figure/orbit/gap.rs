@@ -56,8 +56,8 @@ impl OrbitPlot<'_> {
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend) + 14.0;
         // The depth behind the walls of a gap is shown below it.
         let panels_of = |gap: &PlotGap| if self.has_depth(gap) { &SHARES[..] } else { &SHARES[..1] };
-        let shares: Vec<f64> = self.gaps.iter().flat_map(|gap| panels_of(gap)).copied().collect();
-        let further: f64 = self.gaps[1..].iter().flat_map(|gap| panels_of(gap)).sum();
+        let shares: Vec<f64> = self.gaps.iter().flat_map(panels_of).copied().collect();
+        let further: f64 = self.gaps[1..].iter().flat_map(panels_of).sum();
         let axes = self.gaps.iter().flat_map(|gap| {
             let depth = self.has_depth(gap).then(|| self.depth_axis(gap));
             [self.gap_axis(gap)].into_iter().chain(depth)
