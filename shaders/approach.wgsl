@@ -23,7 +23,7 @@ fn store_strobe(itinerary: u32) {
     add_to_averages();
 }
 
-fn trail(strobe: u32) -> array<Real, 4> {
+fn trail(strobe: u32) -> State {
     return motions[lane].trail[strobe % TRAIL];
 }
 
@@ -73,7 +73,7 @@ fn repeats_itself(period: u32) -> bool {
 }
 
 // Whether the motion, which is at the end of its trail, stays near the cycle that has been read.
-fn stays_near_cycle(to: array<Real, 4>) -> bool {
+fn stays_near_cycle(to: State) -> bool {
     let present = difference(trail(search.strobe_count), to);
     let bend = select(LINEAR, Real(1.0), size_of(present) < BENT_WITHIN);
     let blurred = Real(noise());
@@ -96,44 +96,62 @@ fn stays_near_cycle(to: array<Real, 4>) -> bool {
 //
 // E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step leads from the nearest point so far towards the corner that
 // lies farthest beyond it. That corner also gives a lower bound of the distance.
-fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
+fn is_in_hull(point: State, corners: u32, to: State) -> bool {
     let target_point = in_units(point);
-    let allowed = max(OUTSIDE_OF_DEVIATION * sqrt(dot(target_point, target_point)), OUTSIDE_OF_MOTION);
+    let allowed = max(OUTSIDE_OF_DEVIATION * sqrt(inner(target_point, target_point)), OUTSIDE_OF_MOTION);
     if corners > 0u && distance_from_last(target_point, to) <= allowed {
         return true;
     }
-    var nearest = -target_point;
+    var nearest = difference(State(), target_point);
     for (var n = 0u; n < HULL_STEPS; n++) {
-        let square = dot(nearest, nearest);
+        let square = inner(nearest, nearest);
         if square <= allowed * allowed {
             return true;
         }
-        var farthest = -target_point;
+        var farthest = difference(State(), target_point);
         for (var back = 1u; back <= corners; back++) {
             iterations += 1u;
-            let corner = in_units(difference(trail(search.strobe_count - back * tally.candidate), to)) - target_point;
-            farthest = select(farthest, corner, dot(corner, nearest) < dot(farthest, nearest));
+            let corner = difference(in_units(difference(trail(search.strobe_count - back * tally.candidate), to)), target_point);
+            if inner(corner, nearest) < inner(farthest, nearest) {
+                farthest = corner;
+            }
         }
-        let step = farthest - nearest;
-        let gain = -dot(nearest, step);
-        if dot(farthest, nearest) > allowed * sqrt(square) || gain <= ULP * square {
+        let step = difference(farthest, nearest);
+        let gain = -inner(nearest, step);
+        if inner(farthest, nearest) > allowed * sqrt(square) || gain <= ULP * square {
             return false;
         }
-        nearest += step * min(gain / dot(step, step), Real(1.0));
+        let share = min(gain / inner(step, step), Real(1.0));
+        //% for k in 0..DIM
+        nearest[$ku] += step[$ku] * share;
+        //% end
     }
     return false;
 }
 
 // Returns the distance from the deviation before. In slow motion this decides at once; the steps of the search would
 // be short.
-fn distance_from_last(point: vec4<Real>, to: array<Real, 4>) -> Real {
-    let off = in_units(difference(trail(search.strobe_count - tally.candidate), to)) - point;
-    return sqrt(dot(off, off));
+fn distance_from_last(point: State, to: State) -> Real {
+    let off = difference(in_units(difference(trail(search.strobe_count - tally.candidate), to)), point);
+    return sqrt(inner(off, off));
 }
 
 // Returns a deviation in units of the motion.
-fn in_units(u: array<Real, 4>) -> vec4<Real> {
+fn in_units(u: State) -> State {
     let rate = unit_of_rates();
     let position = unit_of_positions();
-    return vec4<Real>(u[0] / position, u[1] / rate, u[2] / position, u[3] / rate);
+    var scaled: State;
+    //% for k in 0..COORDINATES
+    scaled[2u * $ku] = u[2u * $ku] / position;
+    scaled[2u * $ku + 1u] = u[2u * $ku + 1u] / rate;
+    //% end
+    return scaled;
+}
+
+fn inner(a: State, b: State) -> Real {
+    var sum: Real = 0.0;
+    //% for k in 0..COORDINATES
+    sum += a[2u * $ku] * b[2u * $ku] + a[2u * $ku + 1u] * b[2u * $ku + 1u];
+    //% end
+    return sum;
 }

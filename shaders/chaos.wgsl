@@ -52,7 +52,7 @@ fn early_periods() -> u32 {
 // Whether the motion itself grows, by negative damping or stiffness, at a share of its tangents' growth per period; or whether
 // it is too short to know.
 fn is_growing(growth: Real) -> bool {
-    if flows[cell.flow_index].escape < 0.0 {
+    if escape_size() < 0.0 {
         return false;
     }
     let expected = SHARED_GROWTH * growth * (Real(tally.period) - Real(early_periods()));

@@ -188,7 +188,7 @@ fn onset_ends(side: u32) -> Jump {
 }
 
 fn count_event(side: u32) {
-    add_symbol(side);
+    add_symbol_of_flight(side);
     keep_strobe_distance();
     // Meshing that ends before the wall is reached belongs to another branch: its mode differs.
     var code = 2u * tally.mode + side + 1u;

@@ -18,9 +18,9 @@ fn octaves_of(x: Real) -> Real {
 // Growth in octaves if all neighbours end in the same motion: a gap that has stuck to a wall, with one displacement.
 const SUPERSTABLE_GROWTH: Real = -1e9;
 
-fn largest_entry(m: array<Real, 16>) -> Real {
+fn largest_entry(m: Matrix) -> Real {
     var size: Real = 0.0;
-    for (var k = 0u; k < 16u; k++) {
+    for (var k = 0u; k < MATRIX; k++) {
         size = max(size, abs(m[k]));
     }
     return size;
@@ -29,35 +29,35 @@ fn largest_entry(m: array<Real, 16>) -> Real {
 // Returns a matrix with the eigenvalues of `m / size`, by one step of the QR iteration with rotations. Entries of `m`
 // that are large beside its eigenvalues move above the diagonal. Squaring `m` itself would lose the eigenvalues: with
 // 46 as the largest entry beside 0.15, the radius in f32 was wrong by a fifth.
-fn nearly_triangular(m: array<Real, 16>, inverse: Real) -> array<Real, 16> {
+fn nearly_triangular(m: Matrix, inverse: Real) -> Matrix {
     var r = m;
-    for (var k = 0u; k < 16u; k++) {
+    for (var k = 0u; k < MATRIX; k++) {
         r[k] *= inverse;
     }
-    var turns: array<vec2<Real>, 16>;
-    for (var j = 0u; j < 3u; j++) {
-        for (var i = j + 1u; i < 4u; i++) {
-            let a = r[5u * j];
-            let b = r[4u * j + i];
+    var turns: array<vec2<Real>, MATRIX>;
+    for (var j = 0u; j < DIM - 1u; j++) {
+        for (var i = j + 1u; i < DIM; i++) {
+            let a = r[DIM * j + j];
+            let b = r[DIM * j + i];
             let size = sqrt(a * a + b * b);
             let turn = select(vec2<Real>(1.0, 0.0), vec2<Real>(a, b) / max(size, Real(1e-30)), size > 1e-30);
-            for (var k = 0u; k < 4u; k++) {
-                let upper = r[4u * k + j];
-                let lower = r[4u * k + i];
-                r[4u * k + j] = turn.x * upper + turn.y * lower;
-                r[4u * k + i] = turn.x * lower - turn.y * upper;
+            for (var k = 0u; k < DIM; k++) {
+                let upper = r[DIM * k + j];
+                let lower = r[DIM * k + i];
+                r[DIM * k + j] = turn.x * upper + turn.y * lower;
+                r[DIM * k + i] = turn.x * lower - turn.y * upper;
             }
-            turns[4u * j + i] = turn;
+            turns[DIM * j + i] = turn;
         }
     }
-    for (var j = 0u; j < 3u; j++) {
-        for (var i = j + 1u; i < 4u; i++) {
-            let turn = turns[4u * j + i];
-            for (var k = 0u; k < 4u; k++) {
-                let left = r[4u * j + k];
-                let right = r[4u * i + k];
-                r[4u * j + k] = turn.x * left + turn.y * right;
-                r[4u * i + k] = turn.x * right - turn.y * left;
+    for (var j = 0u; j < DIM - 1u; j++) {
+        for (var i = j + 1u; i < DIM; i++) {
+            let turn = turns[DIM * j + i];
+            for (var k = 0u; k < DIM; k++) {
+                let left = r[DIM * j + k];
+                let right = r[DIM * i + k];
+                r[DIM * j + k] = turn.x * left + turn.y * right;
+                r[DIM * i + k] = turn.x * right - turn.y * left;
             }
         }
     }
@@ -89,12 +89,15 @@ fn spectral_growth() -> Real {
         growth += weight * octaves_of(size);
         weight *= 0.5;
         let inverse = 1.0 / size;
-        var square: array<Real, 16>;
-        for (var k = 0u; k < 16u; k++) {
-            let i = k % 4u;
+        var square: Matrix;
+        for (var k = 0u; k < MATRIX; k++) {
+            let i = k % DIM;
             let j = k - i;
-            square[k] = (inverse * inverse) * ((m[i] * m[j] + m[i + 4u] * m[j + 1u])
-                + (m[i + 8u] * m[j + 2u] + m[i + 12u] * m[j + 3u]));
+            var sum: Real = 0.0;
+            //% for k in 0..COORDINATES
+            sum += m[i + 2u * $ku * DIM] * m[j + 2u * $ku] + m[i + (2u * $ku + 1u) * DIM] * m[j + 2u * $ku + 1u];
+            //% end
+            square[k] = (inverse * inverse) * sum;
         }
         m = square;
     }
@@ -106,7 +109,7 @@ fn spectral_growth() -> Real {
 fn restore_columns() {
     for (var n = 0u; n < tallies[lane].column_scalings + tallies[lane].is_superstable; n++) {
         let factor = select(1.0 / LARGE, Real(0.0), tallies[lane].is_superstable == 1u);
-        for (var k = 0u; k < 16u; k++) {
+        for (var k = 0u; k < MATRIX; k++) {
             motions[lane].tangents[k] *= factor;
         }
     }
@@ -255,7 +258,7 @@ fn continue_search() {
 fn restart_search() {
     // Rounding can hold a lane on an unstable cycle for ever.
     let is_unstable = measures.cycle_growth > NEUTRAL * Real(tally.candidate);
-    if is_unstable && search.return_distance >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
+    if is_unstable && search.return_distance >= AT_REST && is_free() {
         motion.q[1] += Real(PERTURBATION * exp2(-f32(AT_REST) / PARTS_PER_OCTAVE)) * measures.rate_scale;
         motion.bound = 0.0;
         search.strobe_count = 0u;
@@ -328,11 +331,11 @@ fn noise() -> f32 {
 
 // Returns the largest amplification by the cycle that was read, relative to the motion.
 fn gain() -> Real {
-    let scales = array<Real, 4>(measures.position_scale, measures.rate_scale, measures.position_scale, measures.rate_scale);
+    let scales = array<Real, 2>(measures.position_scale, measures.rate_scale);
     var most: Real = 1.0;
-    for (var k = 0u; k < 16u; k++) {
+    for (var k = 0u; k < MATRIX; k++) {
         iterations += 1u;
-        let unit = scales[k / 4u] / max(scales[k % 4u], Real(1e-30));
+        let unit = scales[k / DIM % 2u] / max(scales[k % 2u], Real(1e-30));
         most = max(most, abs(motions[lane].tangents[k]) * unit);
     }
     return most;
@@ -382,19 +385,9 @@ fn is_at_rest() -> bool {
     return search.return_distance >= AT_REST && is_there;
 }
 
-// Error of a computed fixed point in rounding errors of the motion, before amplification.
-const MISPLACED: Real = 8.0;
-
-// Whether a motion without events has its limit beyond the wall, by more than the rounding error of a period.
-fn leaves_domain(to: array<Real, 4>) -> bool {
-    let unsure = MISPLACED * ULP * measures.position_scale * Real(limit_of(1.0));
-    let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_ONSET;
-    return may_leave && beyond(to) > unsure;
-}
-
 // Whether the lane is near its cycle, or as near as rounding allows. A fixed point in another domain than the lane's
 // is not its cycle. Near a graze only rest counts.
-fn is_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
+fn is_on_cycle(to: State, is_last: bool) -> bool {
     // Newton's method shows whether the motion continues with the same events, if there is time for it.
     let is_confirmed = !is_last || settings.early_stop == 0u || search.newton_steps > 0u || distance_to_cycle() <= NEWTON_CONVERGED;
     let is_near = is_near_cycle() && keeps_domain(to) && tally.grazes == 0u && is_confirmed;
@@ -402,12 +395,12 @@ fn is_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
 }
 
 // Whether the motion itself has come to rest on its cycle, or as near to it as rounding allows.
-fn rests_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
+fn rests_on_cycle(to: State, is_last: bool) -> bool {
     return search.newton_steps == 0u && moves_no_more(to, is_last);
 }
 
 // Whether the lane rests, or moves by less than rounding, and does not leave its domain.
-fn moves_no_more(to: array<Real, 4>, is_last: bool) -> bool {
+fn moves_no_more(to: State, is_last: bool) -> bool {
     let is_blurred = (search.failed_searches >= MOST_FAILED_SEARCHES || is_last) && search.is_settled != 0u && exp2(-f32(search.return_distance) / PARTS_PER_OCTAVE) < min(noise(), ON_CYCLE);
     return (is_at_rest() || is_blurred) && !leaves_domain(to);
 }

@@ -1,106 +1,13 @@
 // Structs in the buffers, and the buffers' bindings. src/gpu/layout.rs declares the same structs for the host; a test
 // compares names, offsets and sizes. A struct holds either Reals or 32-bit numbers alone, so that it has the same
 // shape in both precisions. src/gpu/shader.rs puts the constants that no shader declares in front of the source.
+//
+// The observers, which search for cycles and chaos, serve two engines of motion: oscillators with one gap (oscillator.wgsl) and machines
+// (machine/machine.wgsl). These two files have the same functions.
 
-// A linear domain in units of its own step: time tau = t / h, rates per step.
-struct Domain {
-    // Propagator of one step minus the identity. Rows: gap, its rate, x, its rate. Columns: these four, then cos,
-    // sin, 1.
-    step: array<Real, 28>,
-    // Accelerations of the gap and of x: factors of gap, rate, x, rate, cos, 1, sin. Only variants with SINE read the last.
-    gap_row: array<Real, 7>,
-    x_row: array<Real, 7>,
-    // Quadratic form of the n-th derivatives that bounds |(n+1)-th derivative of the gap|^2: factors of rate^2, rate
-    // * x_rate, x_rate^2, gap^2, gap * x, x^2.
-    energy: array<Real, 6>,
-    // Growth of that bound per step by the force, for n = 5, and its factor by negative damping and stiffness.
-    growth: Real,
-    swell: Real,
-    // Forcing angle of one step; tan of half of it; sin of it.
-    angle: Real,
-    turn_half: Real,
-    turn_sin: Real,
-    // Form of the power of dampers on the rates of gap and x, in the units of measure.wgsl: factors of rate^2, rate *
-    // x_rate, x_rate^2.
-    damping: array<Real, 3>,
-    // Free steps per step of this domain: a power of two, at most 1.
-    share: Real,
-    // Steps of this domain per free step.
-    substeps: Real,
-}
-
-// Constants that lanes share if they differ in the contact law alone. There is one such struct for each stage and each interval
-// between walls.
-struct Flow {
-    // Free motion, meshing on the right, meshing on the left. Meshing domains measure the gap from their wall.
-    domains: array<Domain, 3>,
-    // Positions of the right and of the left wall.
-    walls: array<Real, 2>,
-    // Change of the rate of x per unit of gap rate that the contact impulse removes.
-    kick: Real,
-    // Length of a free step in time units.
-    h: Real,
-    // Scale of length: half the distance of the first walls, if there are two.
-    length: Real,
-    // Unit of speeds: the scale of length times the rate of free motion, per free step.
-    speed: Real,
-    // Longest infinite series of impacts that is closed by its limit, in free steps.
-    closing: Real,
-    // Sum of the sizes of gap and x beyond which the motion has escaped; negative if energy grows by the force alone.
-    escape: Real,
-    // Contact-free motion. `steady`: steady state at phase 0, in lane units. `contact_free_size`: size of the transient (by the
-    // free domain's energy form) below which no contact will follow; negative if there is no such size. `transient_growth`:
-    // growth of the transient per period, in octaves.
-    steady: array<Real, 4>,
-    contact_free_size: Real,
-    transient_growth: Real,
-    // Acceleration of a gap that rests on the right and on the left wall: a `gap_row` that measures the gap from that
-    // wall.
-    pressing: array<array<Real, 7>, 2>,
-    // Change of the rates of the gap and of x per displacement of the gap, where the motion enters an elastic wall.
-    damper: array<array<Real, 2>, 2>,
-    // Contact force of the right and of the left wall per displacement and per rate of the gap, in the units of
-    // measure.wgsl.
-    springs: array<array<Real, 2>, 2>,
-    // Both displacements of the model as factors of gap and x.
-    displacements: array<array<Real, 2>, 2>,
-    // Contact force of the walls that the gap has passed, positive to the left: factors of gap, rate and 1, in the units of
-    // measure.wgsl.
-    held: array<Real, 3>,
-    // Force of a wall that only pushes, positive inside the interval that it bounds: factors of gap, rate and 1, in these units.
-    push: array<Real, 3>,
-    // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters it.
-    preload: array<array<Real, 2>, 2>,
-}
-
-// Whole numbers of a flow.
-struct FlowShape {
-    // Free steps per forcing period.
-    steps: u32,
-    // Index in `pairs` of its first phasor.
-    phasors: u32,
-    // Number of displacements. With one, the second rests at 0.
-    degrees: u32,
-    // 1 if contact-free motion also requires that x rests at 0.
-    must_rest: u32,
-    // CONTACT_* of the right and of the left wall.
-    contacts: array<u32, 2>,
-    // Index in `pairs` of its harmonics beside the first (harmonics.wgsl), and their number.
-    harmonics: u32,
-    harmonic_count: u32,
-    // Index in `pairs` of the changes of its stage (stages.wgsl), and their number; 0 if there are none.
-    schedule: u32,
-    changes: u32,
-    // Flows of the intervals behind the right and behind the left wall, or NO_FLOW (intervals.wgsl).
-    behind: array<u32, 2>,
-}
-
-// Contact law of the right and of the left wall: restitution, and the largest leaving speed at which a pressed
-// contact lasts.
-struct Law {
-    restitution: array<Real, 2>,
-    mesh_speed: array<Real, 2>,
-}
+// A state of COORDINATES displacements, each followed by its rate; and a matrix of such states as columns.
+alias State = array<Real, DIM>;
+alias Matrix = array<Real, MATRIX>;
 
 // Flow, law and start conditions of one lane.
 struct Cell {
@@ -160,8 +67,8 @@ struct Settings {
 
 // The motion.
 struct MotionNow {
-    // Gap (from the wall while meshing), its rate, x, its rate; rates per free step.
-    q: array<Real, 4>,
+    // Displacements and rates: gap (from the wall while meshing), its rate, x, its rate; rates per free step.
+    q: State,
     // cos and sin of the forcing phase.
     phasor: array<Real, 2>,
     // Fraction of the present free step that has passed.
@@ -186,7 +93,7 @@ struct Measures {
     first_block: Real,
     last_block: Real,
     // Strobe state that later strobes are compared with. While a cycle is read, the cycle's start.
-    anchor: array<Real, 4>,
+    anchor: State,
     // Largest position at strobes, and in the first part of the motion; largest rate there; largest rate. The positions and rates
     // of the whole motion are the units of distances.
     position_scale: Real,
@@ -205,18 +112,18 @@ struct Measures {
 struct Motion {
     now: MotionNow,
     measures: Measures,
-    // Tangent vectors in lane units: one for the exponent, or the four columns of the monodromy matrix.
-    tangents: array<Real, 16>,
+    // Tangent vectors in lane units: one for the exponent, or the columns of the monodromy matrix.
+    tangents: Matrix,
     // The exponent's tangent vector while the matrix takes its place.
-    vector: array<Real, 4>,
+    vector: State,
     // Growth of perturbations on the cycle that is read (check_columns in tangent.wgsl): smallest size of the columns so
     // far, largest ratio of a size to a smaller one before it, and largest size.
     stretch: array<Real, 3>,
     // The last strobe states of the motion (approach.wgsl).
-    trail: array<array<Real, 4>, TRAIL>,
+    trail: array<State, TRAIL>,
     // Weighted averages of gap, x and their squares from a centre: the first window less the second (regularity.wgsl).
     averages: array<Real, 3>,
-    average_centre: array<Real, 4>,
+    average_centre: State,
     // The last state of a lane that is being measured.
     ended: MotionNow,
     // What was measured in the present period, and in all (measure.wgsl).
@@ -376,12 +283,12 @@ struct Tally {
 
 // Results of a lane: real numbers.
 struct Reading {
-    // Gap, its rate per free step, x, its rate.
-    strobe: array<Real, 4>,
     // Exponent per period, natural logarithms, and its standard error.
     growth: Real,
     growth_error: Real,
     mesh_fraction: Real,
+    // Gap, its rate per free step, x, its rate; or displacements and rates of a machine.
+    strobe: State,
 }
 
 // What was measured on a lane, and the columns of its monodromy matrix.
@@ -389,9 +296,9 @@ struct Measured {
     totals: array<Real, SUMS>,
     highs: array<Real, EXTREMES>,
     lows: array<Real, EXTREMES>,
-    tangents: array<Real, 16>,
     // 1 if a cycle was read; the columns mean nothing otherwise.
     has_read: Real,
+    tangents: Matrix,
 }
 
 // Results of a lane: whole numbers.
@@ -432,27 +339,13 @@ const STAGE_DONE: u32 = 3u;
 const STAGE_MEASURING: u32 = 4u; // the lane is decided, and its motion is measured
 
 @group(0) @binding(0) var<uniform> settings: Settings;
-@group(0) @binding(1) var<storage, read> flows: array<Flow>;
-@group(0) @binding(2) var<storage, read> shapes: array<FlowShape>;
-@group(0) @binding(3) var<storage, read> pairs: array<array<Real, 2>>;
-@group(0) @binding(4) var<storage, read> laws: array<Law>;
 @group(0) @binding(5) var<storage, read> cells: array<Cell>;
 @group(0) @binding(6) var<storage, read_write> motions: array<Motion>;
 @group(0) @binding(7) var<storage, read_write> tallies: array<Tally>;
 @group(0) @binding(8) var<storage, read_write> queue: Queue;
-@group(0) @binding(9) var<storage, read> starts: array<array<Real, 4>>;
+@group(0) @binding(9) var<storage, read> starts: array<array<Real, START>>;
 @group(0) @binding(10) var<storage, read_write> readings: array<Reading>;
 @group(0) @binding(11) var<storage, read_write> findings: array<Finding>;
 @group(0) @binding(12) var<storage, read_write> block_starts: array<u32>;
 @group(0) @binding(13) var<storage, read_write> measured: array<Measured>;
 @group(0) @binding(14) var<storage, read_write> workgroups: array<u32, 3>;
-
-// What governs the motion. All modes but the first are followed by the side: mode + SIDE_*.
-const MODE_FREE: u32 = 0u;
-const MODE_SUSTAINED: u32 = 1u;
-const MODE_ONSET: u32 = 3u;
-const MODE_STUCK: u32 = 5u;
-
-const SIDE_RIGHT: u32 = 0u;
-const SIDE_LEFT: u32 = 1u;
-const SIDE_NONE: u32 = 2u;

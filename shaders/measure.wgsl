@@ -53,7 +53,7 @@ fn begin_measuring() {
 fn measure_period() {
     tally.step = 0u;
     motion.theta = 0.0;
-    motion.phasor = array<Real, 2>(1.0, 0.0);
+    restart_phase();
     tally.passes_in_period = 0u;
     tally.events_in_period = 0u;
     for (var k = 0u; k < SUMS; k++) {
@@ -277,23 +277,4 @@ fn measure_contact(approach: Real, leaving: Real) {
 // Measures the release of a contact spring that is not relaxed. The gap is measured from the wall.
 fn measure_release(side: u32) {
     add(SUM_LOST, flows[cell.flow_index].springs[side][0] * motion.q[0] * motion.q[0]);
-}
-
-// Copies what was measured to the place of each result.
-@compute @workgroup_size(WORKGROUP)
-fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.y * settings.row + id.x;
-    if i >= queue.count {
-        return;
-    }
-    let slot = selected_lane(i);
-    var result: Measured;
-    if tallies[slot].is_measured == 1u && tallies[slot].now.status == STATUS_OK {
-        result.totals = motions[slot].totals;
-        result.highs = motions[slot].highs;
-        result.lows = motions[slot].lows;
-    }
-    result.tangents = motions[slot].tangents;
-    result.has_read = Real(tallies[slot].search.has_read);
-    measured[i] = result;
 }

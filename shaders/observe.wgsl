@@ -4,7 +4,7 @@
 fn begin_period() {
     tally.step = 0u;
     motion.theta = 0.0;
-    motion.phasor = array<Real, 2>(1.0, 0.0);
+    restart_phase();
     tally.period += 1u;
     tally.passes_in_period = 0u;
     search.all_events += tally.events_in_period;
@@ -80,24 +80,11 @@ fn last_period() -> u32 {
     return select(settings.decided_by, settings.longest, search.confirms_chaos == 1u);
 }
 
-// Whether the energy of the transient keeps the gap off the walls from now on.
-fn is_non_impacting() -> bool {
-    if tally.mode != MODE_FREE || settings.max_period == 0u {
-        return false;
-    }
-    let s = flows[cell.flow_index].steady;
-    let q = motion.q;
-    if shapes[cell.flow_index].must_rest == 1u && (q[2] != 0.0 || q[3] != 0.0) {
-        return false;
-    }
-    return derivative_bound(q[0] - s[0], q[1] - s[1], q[2] - s[2], q[3] - s[3]) < flows[cell.flow_index].contact_free_size;
-}
-
 // Ends contact-free motion: period 1, and no cycle to read.
 fn end_non_impacting() {
     begin_counting();
     search.cycle = 1u;
-    measures.cycle_growth = flows[cell.flow_index].transient_growth;
+    measures.cycle_growth = contact_free_growth();
     tally.stage = STAGE_DONE;
 }
 
@@ -140,20 +127,11 @@ fn begin_reading() {
     narrow_scales(measures.anchor);
     if EXPONENT {
         save_vector();
-        tally.tangent_count = 4u;
+        tally.tangent_count = DIM;
         begin_columns();
         motions[lane].stretch = array<Real, 3>(1.0, 1.0, 1.0);
         tallies[lane].column_scalings = 0u;
         tallies[lane].is_superstable = 0u;
         tallies[lane].has_overflowed = 0u;
     }
-}
-
-// Returns the present state with the gap measured from the middle, in every domain.
-fn strobe_state() -> array<Real, 4> {
-    var q = motion.q;
-    if tally.mode != MODE_FREE {
-        q[0] += flows[cell.flow_index].walls[side_of(tally.mode)];
-    }
-    return q;
 }

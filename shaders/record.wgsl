@@ -12,10 +12,7 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
         motion = motions[lane].ended;
         tally = tallies[lane].ended;
     }
-    if INTERVALS {
-        // Walls are the same in all stages.
-        cell.flow_index = flow_of_interval(cell.flow_index);
-    }
+    conclude_motion();
     var reading: Reading;
     var finding: Finding;
     finding.slot = lane;
@@ -101,14 +98,6 @@ fn is_near_strobe() -> bool {
     return is_undecided && strobe_distance() < ON_STROBE;
 }
 
-fn mesh_fraction(periods: u32) -> Real {
-    let f = cell.flow_index;
-    let right = Real(tally.mesh_right) * flows[f].domains[1].share;
-    let left = Real(tally.mesh_left) * flows[f].domains[2].share;
-    let steps = Real(tally.mesh_whole) + ((right + left) + motion.mesh_part);
-    return steps / (Real(periods) * Real(shapes[f].steps));
-}
-
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
     // Contact-free motion has not been read, and is symmetric. On a slow approach, or where rounding is amplified,
     // the symmetry is known only if it is broken by far. On a symmetric cycle every impact has a mirror image.
@@ -153,11 +142,11 @@ fn read_pattern(finding: ptr<function, Finding>) {
     var hash = vec2<u32>(tallies[lane].pattern_hash[0], tallies[lane].pattern_hash[1]);
     let first = tallies[lane].pattern[0];
     // The last run continues as the first: both count as one.
-    if length > 1u && (recent & 7u) == (first & 7u) {
-        if length > 7u {
+    if length > 1u && (recent & LATEST_SYMBOL) == (first & LATEST_SYMBOL) {
+        if length > HASH_WINDOW - 1u {
             hash -= hash_window(recent);
         }
-        recent = recent >> 3u;
+        recent = recent >> SYMBOL_BITS;
         length -= 1u;
     }
     (*finding).valid |= VALID_PATTERN;
@@ -166,8 +155,8 @@ fn read_pattern(finding: ptr<function, Finding>) {
     }
     spell(finding, SPELLED_PATTERN_LENGTH, length);
     if length > WORD_SYMBOLS {
-        for (var n = 0u; n < 7u; n++) {
-            recent = append_symbol(recent, (first >> (3u * n)) & 7u);
+        for (var n = 0u; n < HASH_WINDOW - 1u; n++) {
+            recent = append_symbol(recent, (first >> (SYMBOL_BITS * n)) & LATEST_SYMBOL);
             hash += hash_window(recent);
         }
         spell(finding, SPELLED_PATTERN_HASH, hash.x);
@@ -177,8 +166,27 @@ fn read_pattern(finding: ptr<function, Finding>) {
 
 // Adds the hash windows that span the end of the word; all others have been added.
 fn close_hash() {
-    for (var n = 0u; n < 7u; n++) {
-        push_symbol((tallies[lane].word[0] >> (3u * n)) & 7u);
+    for (var n = 0u; n < HASH_WINDOW - 1u; n++) {
+        push_symbol((tallies[lane].word[0] >> (SYMBOL_BITS * n)) & LATEST_SYMBOL);
         add_hash_window();
     }
+}
+
+// Copies what was measured to the place of each result.
+@compute @workgroup_size(WORKGROUP)
+fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = id.y * settings.row + id.x;
+    if i >= queue.count {
+        return;
+    }
+    let slot = selected_lane(i);
+    var result: Measured;
+    if tallies[slot].is_measured == 1u && tallies[slot].now.status == STATUS_OK {
+        result.totals = motions[slot].totals;
+        result.highs = motions[slot].highs;
+        result.lows = motions[slot].lows;
+    }
+    result.tangents = motions[slot].tangents;
+    result.has_read = Real(tallies[slot].search.has_read);
+    measured[i] = result;
 }

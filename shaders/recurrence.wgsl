@@ -50,29 +50,35 @@ fn recurs() -> bool {
 }
 
 // Raises the units of distances to the largest strobe.
-fn widen_scales(q: array<Real, 4>) {
+fn widen_scales(q: State) {
     measures.position_scale = max(measures.position_scale, largest_position(q));
-    measures.rate_scale = max(measures.rate_scale, max(abs(q[1]), abs(q[3])));
+    measures.rate_scale = max(measures.rate_scale, largest_rate(q));
 }
 
 // Lowers the units of distances where a cycle is read, so that the motion before it does not count. A strobe may lie
 // at a turning point or midway between two.
-fn narrow_scales(q: array<Real, 4>) {
-    let angle = flows[cell.flow_index].domains[0].angle;
+fn narrow_scales(q: State) {
+    let angle = unit_of_frequency();
     let position = largest_position(q);
-    let rate = max(abs(q[1]), abs(q[3]));
+    let rate = largest_rate(q);
     measures.position_scale = min(measures.position_scale, max(position, rate / angle));
     measures.rate_scale = min(measures.rate_scale, max(rate, angle * position));
 }
 
-// Returns the largest displacement of a strobe, whose rounding error limits distances. In contact, the gap is the sum of
-// the wall's position and the penetration, which may have opposite signs.
-fn largest_position(q: array<Real, 4>) -> Real {
-    let position = max(abs(q[0]), abs(q[2]));
-    if tally.mode == MODE_FREE {
-        return position;
-    }
-    return max(position, abs(flows[cell.flow_index].walls[side_of(tally.mode)]));
+fn largest_displacement(q: State) -> Real {
+    var size: Real = 0.0;
+    //% for k in 0..COORDINATES
+    size = max(size, abs(q[2u * $ku]));
+    //% end
+    return size;
+}
+
+fn largest_rate(q: State) -> Real {
+    var size: Real = 0.0;
+    //% for k in 0..COORDINATES
+    size = max(size, abs(q[2u * $ku + 1u]));
+    //% end
+    return size;
 }
 
 fn widest() -> u32 {
@@ -99,10 +105,9 @@ fn closest_of(lags: u32) -> u32 {
 
 // Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because at
 // a turning point rates are rounding error.
-fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
-    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / unit_of_positions();
-    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / unit_of_rates();
-    return max(p, r);
+fn distance_between(a: State, b: State) -> Real {
+    let d = difference(a, b);
+    return max(largest_displacement(d) / unit_of_positions(), largest_rate(d) / unit_of_rates());
 }
 
 // Returns the unit of positions: the size of the motion. With stages it is at least the scale of length. Motion that decays to rest
@@ -110,18 +115,18 @@ fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
 // contact (is_non_impacting in observe.wgsl).
 fn unit_of_positions() -> Real {
     var least: Real = 1e-30;
-    if STAGES && shape.changes > 0u {
-        least = flows[cell.flow_index].length;
+    if has_stages() {
+        least = scale_of_length();
     }
     return max(measures.position_scale, least);
 }
 
 fn unit_of_rates() -> Real {
-    let least = flows[cell.flow_index].domains[0].angle * unit_of_positions();
+    let least = unit_of_frequency() * unit_of_positions();
     return max(max(measures.rate_scale, least), Real(1e-30));
 }
 
-fn begin_window(q: array<Real, 4>, lags: u32) {
+fn begin_window(q: State, lags: u32) {
     measures.anchor = q;
     search.anchor_period = tally.period;
     search.window = min(lags, settings.max_period);
@@ -224,6 +229,5 @@ fn judge_lag(found: u32) -> bool {
 // Compares the state half a period after the middle of a cycle of odd period with the mirror image of the cycle's
 // start.
 fn compare_mirror() {
-    let a = measures.anchor;
-    search.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
+    search.mirror = octaves(distance_between(strobe_state(), difference(State(), measures.anchor)));
 }

@@ -13,17 +13,30 @@ var<private> lane: u32;
 var<private> iterations: u32;
 
 // Returns the sum of the sizes. It is a NaN if one of them is.
-fn sum_of_sizes(q: array<Real, 4>) -> Real {
-    return (abs(q[0]) + abs(q[1])) + (abs(q[2]) + abs(q[3]));
+fn sum_of_sizes(q: State) -> Real {
+    var sum: Real = 0.0;
+    //% for k in 0..COORDINATES
+    sum += abs(q[2u * $ku]) + abs(q[2u * $ku + 1u]);
+    //% end
+    return sum;
+}
+
+// Returns the sum of the sizes of the displacements.
+fn sum_of_displacements(q: State) -> Real {
+    var sum: Real = 0.0;
+    //% for k in 0..COORDINATES
+    sum += abs(q[2u * $ku]);
+    //% end
+    return sum;
 }
 
 fn check_finite() {
-    let escape = flows[cell.flow_index].escape;
+    let escape = escape_size();
     let can_escape = escape > 0.0;
-    let is_beyond = can_escape && abs(motion.q[0]) + abs(motion.q[2]) > escape;
+    let is_beyond = can_escape && sum_of_displacements(motion.q) > escape;
     if is_beyond || !is_bounded(sum_of_sizes(motion.q)) {
         tally.status = select(STATUS_NON_FINITE, STATUS_ESCAPE, can_escape);
-        motion.q = array<Real, 4>(0.0, 0.0, 0.0, 0.0);
+        motion.q = State();
     }
 }
 
@@ -83,48 +96,6 @@ fn store_strobe_state() {
     }
 }
 
-// Follows the motion to the next stop phase. Returns false if the lane or its iterations in this dispatch end before.
-// Lanes wait for each other where chatter begins, too.
-fn fly_to_stop_phase() -> bool {
-    if CHATTER {
-        while has_work() && iterations < settings.iterations {
-            if flight_to_chatter() {
-                return true;
-            }
-            if chatters {
-                follow_chatter(tally.origin);
-            }
-        }
-    } else {
-        return flight_to_chatter();
-    }
-    return false;
-}
-
-// Follows the motion to the next stop phase, or to an impact that begins a series of short flights.
-fn flight_to_chatter() -> bool {
-    chatters = false;
-    while has_work() && !chatters && iterations < settings.iterations {
-        if STAGES {
-            change_stage();
-            if motion.bound == 0.0 {
-                renew_bound();
-            }
-        }
-        if scan() == SCAN_BUDGET {
-            break;
-        }
-        if careful() {
-            return true;
-        }
-        // Each step of a lane that is measured is a pass.
-        if !MEASURE && tally.passes_in_period > settings.passes_per_period {
-            tally.status = STATUS_TOO_STIFF;
-        }
-    }
-    return false;
-}
-
 @compute @workgroup_size(WORKGROUP)
 fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.y * settings.row + id.x;
@@ -132,32 +103,21 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     load_lane(selected_lane(i));
-    if STAGES || INTERVALS {
-        cell.flow_index = present_flow();
-    }
-    fetch_constants();
+    resume_motion();
     load_tangent();
-    sync_overtones(tally.step, motion.theta);
-    if !STAGES && motion.bound == 0.0 {
-        // A start: no pass has computed the bound yet.
-        renew_bound();
-    }
+    prepare_motion();
     // Scans, events and strobes are in separate loops, so that lanes do the same work at the same time.
     while has_work() && iterations < settings.iterations {
         if fly_to_stop_phase() {
             if MEASURE {
                 measure_period();
-                if STAGES {
-                    restart_schedule();
-                }
+                begin_schedule();
                 continue;
             }
             load_strobe_state();
             if tally.step >= shape.steps {
                 begin_period();
-                if STAGES {
-                    restart_schedule();
-                }
+                begin_schedule();
             } else {
                 compare_mirror();
             }
@@ -173,5 +133,6 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         begin_measuring();
     }
     store_tangent_now();
+    suspend_motion();
     store_lane();
 }

@@ -1,30 +1,17 @@
 // The word: one symbol for every flight, stored and hashed. The pattern: one symbol for every run of equal symbols.
 
-// Adds the symbol of a flight that ends on `side`. The first flight comes from no wall and has no symbol.
-fn add_symbol(side: u32) {
-    var symbol: u32;
-    if tally.mode != MODE_FREE {
-        symbol = select(4u, 1u, side == SIDE_RIGHT);
-    } else if is_behind_wall() {
-        symbol = select(4u, 1u, side_of_interval() == SIDE_RIGHT);
-    } else if tally.origin == SIDE_RIGHT {
-        symbol = select(3u, 2u, side == SIDE_RIGHT);
-    } else if tally.origin == SIDE_LEFT {
-        symbol = select(6u, 5u, side == SIDE_LEFT);
-    } else {
-        return;
-    }
+// Adds a symbol.
+fn add_symbol(symbol: u32) {
     let n = tally.word_length;
     if WORD && n < 7u * SYMBOLS_PER_NUMBER {
-        tallies[lane].word[n / SYMBOLS_PER_NUMBER] |= symbol << (3u * (n % SYMBOLS_PER_NUMBER));
+        tallies[lane].word[n / SYMBOLS_PER_NUMBER] |= symbol << (SYMBOL_BITS * (n % SYMBOLS_PER_NUMBER));
     }
     tally.word_length = n + 1u;
-    // Before the first symbol, `recent` is zero.
-    if PATTERN && symbol != (tally.recent & 7u) {
+    if PATTERN && (n == 0u || symbol != (tally.recent & LATEST_SYMBOL)) {
         add_run(symbol);
     }
     push_symbol(symbol);
-    if n >= 7u {
+    if n >= HASH_WINDOW - 1u {
         add_hash_window();
     }
 }
@@ -40,12 +27,12 @@ fn begin_pattern() {
 fn add_run(symbol: u32) {
     let n = tallies[lane].pattern_length;
     if n < 7u * SYMBOLS_PER_NUMBER {
-        tallies[lane].pattern[n / SYMBOLS_PER_NUMBER] |= symbol << (3u * (n % SYMBOLS_PER_NUMBER));
+        tallies[lane].pattern[n / SYMBOLS_PER_NUMBER] |= symbol << (SYMBOL_BITS * (n % SYMBOLS_PER_NUMBER));
     }
     let recent = append_symbol(tallies[lane].pattern_recent, symbol);
     tallies[lane].pattern_length = n + 1u;
     tallies[lane].pattern_recent = recent;
-    if n >= 7u {
+    if n >= HASH_WINDOW - 1u {
         let hash = hash_window(recent);
         tallies[lane].pattern_hash[0] += hash.x;
         tallies[lane].pattern_hash[1] += hash.y;
@@ -56,12 +43,16 @@ fn push_symbol(symbol: u32) {
     tally.recent = append_symbol(tally.recent, symbol);
 }
 
-// Appends a symbol to the latest ones and keeps eight.
+// Bits of the latest symbol, and of all that are hashed together.
+const LATEST_SYMBOL: u32 = (1u << SYMBOL_BITS) - 1u;
+const LATEST_SYMBOLS: u32 = (1u << (SYMBOL_BITS * HASH_WINDOW)) - 1u;
+
+// Appends a symbol to the latest ones and keeps HASH_WINDOW of them.
 fn append_symbol(recent: u32, symbol: u32) -> u32 {
-    return ((recent << 3u) | symbol) & 0xffffffu;
+    return ((recent << SYMBOL_BITS) | symbol) & LATEST_SYMBOLS;
 }
 
-// Adds the hash of the eight latest symbols. The sum over all windows does not depend on where the cycle starts.
+// Adds the hash of the latest symbols. The sum over all windows does not depend on where the cycle starts.
 fn add_hash_window() {
     let hash = hash_window(tally.recent);
     tally.hash_low += hash.x;

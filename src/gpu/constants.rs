@@ -6,6 +6,7 @@ use wide::f64x4;
 use super::coordinates::Coordinates;
 use super::features::Features;
 use super::layout::{Domain, Flow};
+use super::machine::MachineConstants;
 use super::pushing::{closed_pages, open_page, push};
 use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::{self, Contact, Side};
@@ -69,12 +70,17 @@ pub struct Constants {
     /// Positions of rigid walls on the right and on the left; infinite without one.
     bounds: [f64; 2],
     coordinates: Coordinates,
+    /// The constants of a machine; the fields above mean nothing then.
+    pub(super) machine: Option<Box<MachineConstants>>,
 }
 
 impl Constants {
     /// Returns the free steps per forcing period: `requested`, or as many as the motion needs. Returns `None` if
     /// there are too many for a lane.
     pub fn steps(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<u32> {
+        if Features::of(oscillator).machine.is_some() {
+            return MachineConstants::steps(oscillator, requested);
+        }
         let oscillator = &*closed_pages(oscillator);
         let of_stages = oscillator.stages.iter().map(|stage| &stage.free);
         let passed = Side::BOTH.into_iter().flat_map(|side| {
@@ -92,6 +98,9 @@ impl Constants {
     /// Derives the constants for the number of steps that [`Constants::steps`] returns.
     pub fn new(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<Constants> {
         let (steps, features) = (Constants::steps(oscillator, requested)?, Features::of(oscillator));
+        if features.machine.is_some() {
+            return Constants::of_machine(oscillator, requested, steps, features);
+        }
         let whole = closed_pages(oscillator);
         let (model, oscillator) = (oscillator, &*whole);
         let period = oscillator.period();
@@ -124,6 +133,7 @@ impl Constants {
                 _ => side.sign() * f64::INFINITY,
             }),
             coordinates,
+            machine: None,
         };
         if let Some(motion) = non_impacting(oscillator) {
             constants.must_rest = motion.resting().is_some();
@@ -133,6 +143,58 @@ impl Constants {
             constants.flow.transient_growth = motion.exponent() * period / std::f64::consts::LN_2;
         }
         Some(constants)
+    }
+
+    fn of_machine(
+        oscillator: &model::Oscillator,
+        requested: Option<u32>,
+        steps: u32,
+        features: Features,
+    ) -> Option<Constants> {
+        let none = Page { harmonics: Vec::new(), contacts: [Contact::Impact; 2], behind: [None; 2] };
+        Some(Constants {
+            flow: Flow { h: oscillator.period() / f64::from(steps), ..Flow::zeroed() },
+            page: none,
+            further: Vec::new(),
+            changes: Vec::new(),
+            steps,
+            mirror_symmetric: false,
+            degrees: oscillator.degrees as u32,
+            must_rest: false,
+            features,
+            bounds: [0.0; 2],
+            coordinates: Coordinates::new(oscillator),
+            machine: Some(Box::new(MachineConstants::new(oscillator, requested)?)),
+        })
+    }
+
+    /// Returns the forcing period.
+    pub(super) fn period(&self) -> f64 {
+        match &self.machine {
+            Some(machine) => machine.period(),
+            None => self.flow.h * f64::from(self.steps),
+        }
+    }
+
+    /// Returns the number of gaps.
+    pub(super) fn gaps(&self) -> usize {
+        self.features.machine.map_or(1, |shape| shape.gaps as usize)
+    }
+
+    /// Returns the numbers of a lane's start: its state, and its modes if it is a machine.
+    pub(super) fn start_numbers(&self, y: model::State) -> Vec<f64> {
+        match &self.machine {
+            Some(machine) => machine.start(y),
+            None => self.start(y).to_vec(),
+        }
+    }
+
+    /// Returns the state of the model from that of a lane.
+    pub(super) fn strobe(&self, q: &[f64]) -> model::State {
+        match &self.machine {
+            Some(machine) => machine.to_state(q),
+            None => self.to_state([q[0], q[1], q[2], q[3]]),
+        }
     }
 
     /// Returns a state in lane units `(z, z', x, x')`, where `x` is the displacement that lanes use beside the gap.

@@ -1,5 +1,6 @@
 //! Features of oscillators for which shaders have code only if it is needed.
 
+use super::machine::{MODES, MOST_DOMAINS, MachineShape, domain_count};
 use super::pushing::has_negative_preload;
 use rattlemap_dynamics::model::{Contact, Oscillator, Side};
 
@@ -25,16 +26,25 @@ pub struct Features {
     pub pushing: bool,
     /// Walls that only push and have a negative preload. No shader has code for these.
     pub negative_preload: bool,
-    /// Dry friction. No shader has code for it.
-    pub friction: bool,
-    /// A [machine](rattlemap_dynamics::model::Machine). No shader has code for it.
-    pub machine: bool,
+    /// Sizes of a [machine](rattlemap_dynamics::model::Machine), or of an oscillator with dry friction, which lanes carry as one.
+    pub machine: Option<MachineShape>,
+    /// More domains of a machine than a table holds.
+    pub too_many_domains: bool,
 }
 
 impl Features {
     /// Returns the features of an oscillator.
     pub fn of(oscillator: &Oscillator) -> Features {
         let mut walls = oscillator.contacts.iter().zip(oscillator.walls);
+        let is_machine = oscillator.machine.is_some()
+            || oscillator.friction.iter().any(|friction| friction.force > 0.0);
+        if is_machine {
+            return Features {
+                machine: Some(MachineShape::of(oscillator)),
+                too_many_domains: domain_count(oscillator) > MOST_DOMAINS,
+                ..Features::default()
+            };
+        }
         let pushing = Side::BOTH.into_iter().any(|side| oscillator.is_pushing_or_preloaded(side));
         Features {
             kinds: walls.any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite()),
@@ -44,8 +54,8 @@ impl Features {
             intervals: oscillator.has_outer_walls() || pushing,
             pushing,
             negative_preload: has_negative_preload(oscillator),
-            friction: oscillator.friction.iter().any(|friction| friction.force > 0.0),
-            machine: oscillator.machine.is_some(),
+            machine: None,
+            too_many_domains: false,
         }
     }
 
@@ -59,8 +69,11 @@ impl Features {
             intervals: self.intervals || other.intervals,
             pushing: self.pushing || other.pushing,
             negative_preload: self.negative_preload || other.negative_preload,
-            friction: self.friction || other.friction,
-            machine: self.machine || other.machine,
+            machine: match (self.machine, other.machine) {
+                (Some(own), Some(others)) => Some(own.and(others)),
+                (own, others) => own.or(others),
+            },
+            too_many_domains: self.too_many_domains || other.too_many_domains,
         }
     }
 
@@ -69,13 +82,21 @@ impl Features {
         self.without_code().into_iter().find_map(|(is_there, feature, _)| is_there.then_some(feature))
     }
 
-    fn without_code(self) -> [(bool, &'static str, &'static str); 3] {
-        let machine = "models of more than two coordinates, of several gaps, or with a restitution that depends on the speed";
+    /// Returns the numbers of a lane's state.
+    pub(super) fn dim(&self) -> usize {
+        self.machine.map_or(4, |shape| shape.dim())
+    }
+
+    /// Returns the numbers of a lane's start.
+    pub(super) fn start_numbers(&self) -> usize {
+        self.machine.map_or(4, |shape| shape.dim() + MODES)
+    }
+
+    fn without_code(self) -> [(bool, &'static str, &'static str); 2] {
         let preload = "a wall that only pushes and has a negative preload";
         [
-            (self.machine, machine, "machine"),
+            (self.too_many_domains, "more than 4096 combinations of modes", "too_many_domains"),
             (self.negative_preload, preload, "negative_preload"),
-            (self.friction, "dry friction", "friction"),
         ]
     }
 
@@ -88,6 +109,11 @@ impl Features {
             (self.stages && !code.stages, "stages", "stages"),
             (self.intervals && !code.intervals, "several walls on one side", "intervals"),
             (self.pushing && !code.pushing, "a wall that only pushes or has a preload", "pushing"),
+            (
+                self.machine.is_some() && self.and(code).machine != code.machine,
+                "a machine of larger sizes",
+                "machine",
+            ),
         ]
         .into_iter()
         .chain(self.without_code())
@@ -102,20 +128,14 @@ mod tests {
     use rattlemap_dynamics::model::Model;
 
     #[test]
-    fn machines_need_the_reference() {
-        let text = FileModel::built_in("impact-oscillator").unwrap().definition().text.clone();
-        let text = text.replace("restitution = \"e\"", "restitution = \"e - 0.1*speed\"");
-        let oscillator = FileModel::parse(&text, "m.toml").unwrap().oscillator().unwrap();
-        let features = Features::default().and(Features::of(&oscillator));
-        assert!(features.needing_reference().unwrap().starts_with("models of more than two coordinates"));
-    }
-
-    #[test]
-    fn dry_friction_needs_the_reference() {
+    fn friction_makes_a_machine_of_an_oscillator() {
         let mut model = FileModel::built_in("friction-oscillator").unwrap();
-        let features = Features::default().and(Features::of(&model.oscillator().unwrap()));
-        assert_eq!(features.needing_reference(), Some("dry friction"));
+        let features = Features::of(&model.oscillator().unwrap());
+        assert_eq!(features.machine.map(|shape| (shape.coordinates, shape.elements)), Some((2, 1)));
+        assert!(features.needing_reference().is_none());
         model.set("f", 0.0).unwrap();
-        assert!(!needs_reference(&model.oscillator().unwrap()));
+        let plain = Features::of(&model.oscillator().unwrap());
+        assert_eq!(plain.machine, None);
+        assert_eq!(plain.and(features).machine, features.machine);
     }
 }

@@ -9,7 +9,7 @@ use std::mem::offset_of;
 use bytemuck::{Pod, Zeroable};
 
 use super::rules::TRAIL;
-use rattlemap_dynamics::model::Contact;
+use rattlemap_dynamics::model::{Contact, STATE};
 
 /// Layout of one struct, for the comparison with the shader.
 #[derive(Clone, Copy, Debug)]
@@ -260,18 +260,17 @@ structs! {
 
     /// Results of a lane: real numbers.
     Reading of f64 {
-        strobe: [f64; 4],
         growth: f64,
         growth_error: f64,
         mesh_fraction: f64,
+        strobe: [f64; MOST_NUMBERS],
     }
 
-    /// What was measured on a lane.
+    /// What was measured on a lane. The columns of the monodromy matrix follow.
     Measured of f64 {
         totals: [f64; SUMS],
         highs: [f64; EXTREMES],
         lows: [f64; EXTREMES],
-        tangents: [f64; 16],
         has_read: f64,
     }
 
@@ -286,6 +285,37 @@ structs! {
         counted: u32,
         symmetric: u32,
         spelling: [u32; SPELLING],
+    }
+}
+
+/// Most numbers of a lane's state.
+const MOST_NUMBERS: usize = STATE;
+
+/// Numbers of the structs whose size depends on the number `dim` of a lane's state.
+impl Motion {
+    pub(super) fn numbers(dim: usize) -> usize {
+        // In `now` and `ended`, the anchor, the vector, the trail, the centre of averages; and the matrix.
+        size_of::<Motion>() / size_of::<f64>() + (dim - 4) * (5 + TRAIL) + (dim * dim - 16)
+    }
+}
+
+impl Reading {
+    pub(super) fn numbers(dim: usize) -> usize {
+        size_of::<Reading>() / size_of::<f64>() - MOST_NUMBERS + dim
+    }
+}
+
+impl Measured {
+    pub(super) fn numbers(dim: usize) -> usize {
+        Self::BEFORE_COLUMNS + dim * dim
+    }
+
+    const BEFORE_COLUMNS: usize = size_of::<Measured>() / size_of::<f64>();
+
+    /// Separates the columns of the monodromy matrix from what comes before them.
+    pub(super) fn split(numbers: &[f64]) -> (&Measured, &[f64]) {
+        let (fixed, columns) = numbers.split_at(Self::BEFORE_COLUMNS);
+        (bytemuck::from_bytes(bytemuck::cast_slice(fixed)), columns)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Conversion of what a lane measured to quantities in the model's units.
 
-use nalgebra::{Matrix2, Matrix4};
+use nalgebra::{Complex, DMatrix, Matrix2, Matrix4};
 
 use super::constants::Constants;
 use super::layout::{Measured, SUMS};
@@ -10,8 +10,8 @@ use rattlemap_dynamics::orbit::{Approaches, Displacement, Quantities};
 type Row = [f64; 2];
 
 /// Returns the quantities of a lane; none if it was not measured. `shaders/measure.wgsl` has the places of the sums.
-pub(super) fn quantities(constants: &Constants, measured: &Measured) -> Option<Quantities> {
-    let Measured { totals, highs, lows, .. } = measured;
+pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quantities> {
+    let (Measured { totals, highs, lows, .. }, _) = Measured::split(measured);
     let [.., dissipated, force, contact, approach, lost, count, periods]: [f64; SUMS] = *totals;
     if periods < 1.0 {
         return None;
@@ -53,12 +53,18 @@ fn displacement([a, b]: Row, totals: &[f64; SUMS], steps: f64, square: f64, ampl
 
 /// Returns modulus and argument of the largest multiplier of a cycle. The columns of the monodromy matrix are the
 /// tangents of a cycle that was read; other cycles are free of contact.
-pub(super) fn multiplier(constants: &Constants, measured: &Measured) -> [f64; 2] {
+pub(super) fn multiplier(constants: &Constants, measured: &[f64]) -> [f64; 2] {
+    let (measured, columns) = Measured::split(measured);
+    if let Some(machine) = &constants.machine {
+        // The padding of a single coordinate has no columns.
+        let (dim, n) = (columns.len().isqrt(), 2 * machine.degrees());
+        return largest(DMatrix::from_fn(n, n, |i, j| columns[dim * j + i]).complex_eigenvalues().iter().copied());
+    }
     let (z, x) = (constants.flow.domains[0].gap_row, constants.flow.domains[0].x_row);
     let generator = [0.0, z[0], 0.0, x[0], 1.0, z[1], 0.0, x[1], 0.0, z[2], 0.0, x[2], 0.0, z[3], 1.0, x[3]];
     let (columns, steps) = match measured.has_read {
         0.0 => (generator, Some(f64::from(constants.steps))),
-        _ => (measured.tangents, None),
+        _ => (columns.try_into().expect("an oscillator has four numbers"), None),
     };
     let eigenvalues = if constants.degrees == 1 {
         let block = Matrix2::new(columns[0], columns[4], columns[1], columns[5]);
@@ -67,6 +73,10 @@ pub(super) fn multiplier(constants: &Constants, measured: &Measured) -> [f64; 2]
         Matrix4::from_column_slice(&columns).complex_eigenvalues().as_slice().to_vec()
     };
     let multipliers = eigenvalues.into_iter().map(|mu| steps.map_or(mu, |steps| (mu * steps).exp()));
+    largest(multipliers)
+}
+
+fn largest(multipliers: impl Iterator<Item = Complex<f64>>) -> [f64; 2] {
     let largest = multipliers.max_by(|a, b| a.norm().total_cmp(&b.norm())).expect("a matrix has eigenvalues");
     // Of a complex pair, the one in the upper half plane.
     [largest.norm(), largest.arg().abs()]

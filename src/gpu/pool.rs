@@ -40,7 +40,7 @@ pub struct Pool {
     lanes: Vec<(u32, Lane)>,
     /// Contents of the buffers, by slot.
     cells: Vec<Cell>,
-    starts: Vec<[f64; 4]>,
+    starts: Vec<f64>,
     /// Iterations of the next round.
     iterations: u32,
     /// Whether a round is under way that no one waits for.
@@ -112,18 +112,20 @@ impl Pool {
         // In a browser, buffers belong to one thread.
         let Tables { constants, is_even, .. } = tables;
         let started: Vec<_> = lanes.par_iter().map(|(_, lane)| start(constants, is_even, lane)).collect();
-        for ((&slot, &lane), started) in slots.iter().rev().zip(lanes).zip(started) {
+        let size = self.settings.features.start_numbers();
+        for ((&slot, &lane), (cell, start)) in slots.iter().rev().zip(lanes).zip(started) {
             let at = slot as usize;
             self.lanes[at] = lane;
-            (self.cells[at], self.starts[at]) = started;
+            self.cells[at] = cell;
+            self.starts[at * size..][..start.len()].copy_from_slice(&start);
             self.active_list.push(slot);
         }
         let Some(buffers) = &self.buffers else { return Ok(()) };
         let real = gpu.precision.bytes();
         gpu.call(|| {
             for at in stretches(slots.iter().rev().map(|&slot| slot as usize)) {
-                let (of_cells, of_starts) = (at.start * size_of::<Cell>(), at.start * 4 * real);
-                let starts = reals(&self.starts[at.clone()], gpu.precision);
+                let (of_cells, of_starts) = (at.start * size_of::<Cell>(), at.start * size * real);
+                let starts = reals(&self.starts[at.start * size..at.end * size], gpu.precision);
                 gpu.write(&buffers.cells, of_cells as u64, bytemuck::cast_slice(&self.cells[at]));
                 gpu.write(&buffers.starts, of_starts as u64, &starts);
             }
@@ -180,7 +182,7 @@ impl Pool {
         let of = |i: usize| {
             let (reading, finding) = (readings[i], findings[i]);
             let (number, Lane { flow, .. }) = lanes[finding.slot as usize];
-            let measured = measured.get(i).copied().map(Box::new);
+            let measured = measured.get(i).cloned();
             LaneResult { number, flow, reading, finding, measured }
         };
         let ended = (0..findings.len()).into_par_iter().map(of).collect();
@@ -224,7 +226,7 @@ impl Pool {
         self.free.extend(had as u32..slots as u32);
         self.lanes.resize(slots, (0, Lane { flow: 0, law: 0, start: REST }));
         self.cells.resize(slots, Cell::zeroed());
-        self.starts.resize(slots, [0.0; 4]);
+        self.starts.resize(slots * self.settings.features.start_numbers(), 0.0);
         Ok(())
     }
 }
@@ -241,16 +243,19 @@ fn stretches(slots: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
     found
 }
 
-/// Returns a lane's entry in the table of cells, and its start in lane units.
-fn start(constants: &[Option<Constants>], is_even: &[bool], lane: &Lane) -> (Cell, [f64; 4]) {
+/// Returns a lane's entry in the table of cells, and its start in lane units; no numbers if it is refused.
+fn start(constants: &[Option<Constants>], is_even: &[bool], lane: &Lane) -> (Cell, Vec<f64>) {
     let cell = Cell { flow_index: lane.flow, law_index: lane.law, refused: Status::Ok.code(), mirror: 0 };
-    let refuse = |status: Status| (Cell { refused: status.code(), ..cell }, [0.0; 4]);
+    let refuse = |status: Status| (Cell { refused: status.code(), ..cell }, Vec::new());
     match &constants[lane.flow as usize] {
         None => refuse(Status::TooStiff),
         Some(_) if !lane.start.iter().all(|x| x.is_finite()) => refuse(Status::NonFinite),
         Some(constants) => {
             let mirror = constants.mirror_symmetric && is_even[lane.law as usize];
-            (Cell { mirror: u32::from(mirror), ..cell }, constants.start(lane.start))
+            // Machines with laws of their own have one law for each flow.
+            let has_laws = constants.machine.as_ref().is_some_and(|machine| machine.has_laws);
+            let law_index = if has_laws { lane.flow } else { lane.law };
+            (Cell { mirror: u32::from(mirror), law_index, ..cell }, constants.start_numbers(lane.start))
         }
     }
 }

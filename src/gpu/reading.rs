@@ -2,7 +2,7 @@
 
 use super::constants::Constants;
 use super::layout::{
-    Finding, Measured, Reading, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD, SPELLED_WORD_LENGTH,
+    Finding, Reading, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD, SPELLED_WORD_LENGTH,
     SYMBOLS_PER_NUMBER,
 };
 use super::measured;
@@ -20,7 +20,7 @@ pub struct LaneResult {
     pub(super) flow: u32,
     pub(super) reading: Reading,
     pub(super) finding: Finding,
-    pub(super) measured: Option<Box<Measured>>,
+    pub(super) measured: Option<Box<[f64]>>,
 }
 
 impl LaneResult {
@@ -73,26 +73,26 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
     };
     let is_valid = |bits: u32| finding.valid & bits != 0;
     if is_valid(valid::STROBE) {
-        record.strobe = constants.to_state(reading.strobe);
+        record.strobe = constants.strobe(&reading.strobe);
     }
     if is_valid(valid::IMPACTS) {
         record.impacts_per_period = f64::from(finding.impacts) / f64::from(finding.counted);
     }
     if is_valid(valid::LYAPUNOV) {
-        let period = constants.flow.h * f64::from(constants.steps);
+        let period = constants.period();
         (record.lyapunov, record.lyapunov_error) = (reading.growth / period, reading.growth_error / period);
         if reading.growth < SUPERSTABLE_BELOW {
             record.lyapunov = f64::NEG_INFINITY;
         }
     }
     if is_valid(valid::WORD) {
-        match spelled(&finding.spelling, SPELLED_WORD, SPELLED_WORD_LENGTH) {
+        match spelled(&finding.spelling, SPELLED_WORD, SPELLED_WORD_LENGTH, constants.gaps()) {
             Ok(word) => record.set_word(&word),
             Err(hashed) => (record.word_length, record.word_hash) = hashed,
         }
     }
     if is_valid(valid::PATTERN) {
-        match spelled(&finding.spelling, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH) {
+        match spelled(&finding.spelling, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, constants.gaps()) {
             Ok(pattern) => record.set_pattern(&pattern),
             Err(hashed) => (record.pattern_length, record.pattern_hash) = hashed,
         }
@@ -101,14 +101,15 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
 }
 
 /// Returns the word at places of a spelling. If it is too long to be stored, returns its length and hash as an error.
-fn spelled(spelling: &[u32], symbols: usize, length: usize) -> Result<Word, (u32, u64)> {
+fn spelled(spelling: &[u32], symbols: usize, length: usize, gaps: usize) -> Result<Word, (u32, u64)> {
+    let code = SymbolCode::of_gaps(gaps);
     let symbol = |i: usize| {
-        b'0' + ((spelling[symbols + i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8
+        let (number, bit) = (i / code.per_number(), code.bits * (i % code.per_number()));
+        b'0' + (spelling[symbols + number] >> bit) as u8 % (1 << code.bits)
     };
     let count = spelling[length] as usize;
-    if count > WORD_SYMBOLS {
+    if count > code.most {
         return Err((spelling[length], joined([spelling[length + 1], spelling[length + 2]])));
     }
-    let symbols: [u8; WORD_SYMBOLS] = std::array::from_fn(|i| if i < count { symbol(i) } else { 0 });
-    Ok(Word::cyclic(&symbols[..count]))
+    Ok(Word::cyclic(&(0..count).map(symbol).collect::<Vec<_>>()))
 }

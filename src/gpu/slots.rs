@@ -12,7 +12,7 @@ use super::{Gpu, GpuError, LaneSettings, Precision};
 use crate::record::limits::LONGEST_CYCLE;
 
 /// What lanes have returned: their averages, what was found out about them, and what was measured on them, if anything was.
-pub(super) type Returned = (Vec<Reading>, Vec<Finding>, Vec<Measured>);
+pub(super) type Returned = (Vec<Reading>, Vec<Finding>, Vec<Box<[f64]>>);
 
 /// Byte offset, in the shader's settings, of the flag that selects lanes for compaction.
 const ENDED: u64 = std::mem::offset_of!(Settings, ended) as u64;
@@ -58,11 +58,25 @@ fn findings(bytes: &[u8], size: usize) -> Vec<Finding> {
     bytes.par_chunks_exact(size).map(widened).collect()
 }
 
+/// Separates the readings of lanes. Numbers that a state does not have are zero.
+fn readings(numbers: &[f64], dim: usize) -> Vec<Reading> {
+    let size = Reading::numbers(dim);
+    let widened = |numbers: &[f64]| {
+        let mut reading = Reading::default();
+        let all: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut reading));
+        all[..size].copy_from_slice(numbers);
+        reading
+    };
+    numbers.par_chunks_exact(size).map(widened).collect()
+}
+
 /// Returns the bytes of device memory that so many slots take.
 pub(super) fn bytes(slots: usize, precision: Precision, settings: &LaneSettings) -> u64 {
-    let measured = if settings.gathers() { 2 * size_of::<Measured>() } else { 0 };
-    let reals = 2 * size_of::<Reading>() + size_of::<[f64; 4]>() + size_of::<Motion>() + measured;
-    let reals = reals / size_of::<f64>() * precision.bytes();
+    let dim = settings.features.dim();
+    let measured = if settings.gathers() { 2 * Measured::numbers(dim) } else { 0 };
+    let reals =
+        2 * Reading::numbers(dim) + settings.features.start_numbers() + Motion::numbers(dim) + measured;
+    let reals = reals * precision.bytes();
     let counts = 2 * finding_bytes(settings) + size_of::<Cell>() + size_of::<Tally>() + 3 * size_of::<u32>();
     (slots * (reals + counts)) as u64
 }
@@ -70,19 +84,19 @@ pub(super) fn bytes(slots: usize, precision: Precision, settings: &LaneSettings)
 impl Slots {
     pub(super) fn new(gpu: &Gpu, slots: usize, settings: &LaneSettings) -> Slots {
         let workgroup = settings.workgroup;
-        let of_reals =
-            |label, bytes: usize| buffer(gpu, label, bytes / size_of::<f64>() * gpu.precision.bytes());
-        let readings = of_reals("readings", slots * size_of::<Reading>());
+        let dim = settings.features.dim();
+        let of_reals = |label, numbers: usize| buffer(gpu, label, numbers * gpu.precision.bytes());
+        let readings = of_reals("readings", slots * Reading::numbers(dim));
         let findings = buffer(gpu, "findings", slots * finding_bytes(settings));
         let places = if settings.gathers() { slots } else { 1 };
-        let measured = of_reals("measured", places * size_of::<Measured>());
+        let measured = of_reals("measured", places * Measured::numbers(dim));
         Slots {
             count: slots,
             workgroup,
             settings: upload(gpu, "settings", bytemuck::bytes_of(&Settings::default())),
             cells: buffer(gpu, "cells", slots * size_of::<Cell>()),
-            starts: of_reals("starts", slots * size_of::<[f64; 4]>()),
-            motions: of_reals("motions", slots * size_of::<Motion>()),
+            starts: of_reals("starts", slots * settings.features.start_numbers()),
+            motions: of_reals("motions", slots * Motion::numbers(dim)),
             tallies: buffer(gpu, "tallies", slots * size_of::<Tally>()),
             queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
             blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
@@ -142,10 +156,11 @@ impl Slots {
         settings: &LaneSettings,
     ) -> Result<Conclusion<'_>, GpuError> {
         let gathers = settings.gathers();
-        let reals = |size: usize| (active_lanes * size / size_of::<f64>() * gpu.precision.bytes()) as u64;
-        let sizes = [reals(size_of::<Reading>()), (active_lanes * finding_bytes(settings)) as u64];
+        let dim = settings.features.dim();
+        let reals = |numbers: usize| (active_lanes * numbers * gpu.precision.bytes()) as u64;
+        let sizes = [reals(Reading::numbers(dim)), (active_lanes * finding_bytes(settings)) as u64];
         let [on_device, measured] = &self.measured;
-        let size_of_measured = if gathers { reals(size_of::<Measured>()) } else { 0 };
+        let size_of_measured = if gathers { reals(Measured::numbers(dim)) } else { 0 };
         let submission = gpu.call(|| {
             gpu.write(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -172,6 +187,7 @@ impl Slots {
         Ok(Conclusion {
             submission,
             active_lanes,
+            dim,
             count: Download::new(gpu, &self.count_readback, COUNT_BYTES),
             readings: Download::new(gpu, readings, sizes[0]),
             findings: Download::new(gpu, findings, sizes[1]),
@@ -184,6 +200,7 @@ impl Slots {
 pub(super) struct Conclusion<'s> {
     submission: wgpu::SubmissionIndex,
     active_lanes: usize,
+    dim: usize,
     count: Download<'s>,
     readings: Download<'s>,
     findings: Download<'s>,
@@ -198,7 +215,7 @@ impl Conclusion<'_> {
         let first = |bytes: usize| bytes / self.active_lanes * count.min(self.active_lanes);
         let readings = self
             .readings
-            .take(gpu, |all| from_reals::<Reading>(&all[..first(all.len())], gpu.precision))
+            .take(gpu, |all| readings(&from_reals(&all[..first(all.len())], gpu.precision), self.dim))
             .await?;
         let findings = self
             .findings
@@ -207,7 +224,10 @@ impl Conclusion<'_> {
         let measured = match self.measured {
             Some(measured) => {
                 measured
-                    .take(gpu, |all| from_reals::<Measured>(&all[..first(all.len())], gpu.precision))
+                    .take(gpu, |all| {
+                        let numbers = from_reals(&all[..first(all.len())], gpu.precision);
+                        numbers.chunks_exact(Measured::numbers(self.dim)).map(Box::from).collect()
+                    })
                     .await?
             }
             None => Vec::new(),

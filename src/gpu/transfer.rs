@@ -32,20 +32,12 @@ pub(super) fn reals<'a, T: bytemuck::Pod>(
     bytes
 }
 
-/// Converts bytes in a precision to structs of real numbers.
-pub(super) fn from_reals<T: bytemuck::Pod + Send>(bytes: &[u8], precision: Precision) -> Vec<T> {
-    let size = size_of::<T>() / size_of::<f64>() * precision.bytes();
-    let widened = |bytes: &[u8]| {
-        let mut item = T::zeroed();
-        let numbers: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut item));
-        for (number, bytes) in numbers.iter_mut().zip(bytes.chunks_exact(size_of::<f32>())) {
-            *number = f64::from(bytemuck::pod_read_unaligned::<f32>(bytes));
-        }
-        item
-    };
+/// Converts bytes in a precision to real numbers.
+pub(super) fn from_reals(bytes: &[u8], precision: Precision) -> Vec<f64> {
+    let widened = |bytes: &[u8]| f64::from(bytemuck::pod_read_unaligned::<f32>(bytes));
     match precision {
         Precision::F64 => bytemuck::pod_collect_to_vec(bytes),
-        Precision::F32 => bytes.par_chunks_exact(size).map(widened).collect(),
+        Precision::F32 => bytes.par_chunks_exact(size_of::<f32>()).map(widened).collect(),
     }
 }
 

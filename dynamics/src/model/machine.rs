@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::oscillator::{MATRIX_TOLERANCE, check_phases, finite, positive, require, schedule_at, turn};
 use super::{
-    Contact, HIGHEST_ORDER, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, OscillatorError, Side,
+    Contact, HIGHEST_ORDER, Law, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, Oscillator, OscillatorError, Side,
 };
 
 /// Largest number of coordinates.
@@ -152,6 +152,75 @@ fn all_finite<'a>(
 }
 
 impl Machine {
+    /// Returns an oscillator of at most two coordinates as a machine.
+    pub fn of(oscillator: &Oscillator, law: Law) -> Machine {
+        let o = oscillator;
+        let n = o.degrees;
+        let matrix = |m: [[f64; 2]; 2]| DMatrix::from_fn(n, n, |i, j| m[i][j]);
+        let vector = |v: [f64; 2]| DVector::from_fn(n, |i, _| v[i]);
+        let stages: Vec<_> = (0..o.stage_count()).map(|stage| o.in_stage(stage)).collect();
+        let walls = |side: Side| {
+            let i = side.index();
+            let count = o.wall_count(side);
+            let spring = |stage: &Oscillator, nth: usize| {
+                // The spring of a wall belongs to the interval in front of it.
+                let interval = if nth == 0 { stage.clone() } else { stage.behind(side, nth) };
+                let [stiffness, damping] = interval.wall_stiffness_and_damping(side);
+                let has_damper = interval.meshing[i].damping != interval.free.damping;
+                Spring {
+                    stiffness,
+                    damping: if has_damper { damping } else { 0.0 },
+                    preload: interval.preload(side),
+                }
+            };
+            let wall = |nth: usize| {
+                let (at, contact) = match nth {
+                    0 => (o.walls[i], o.contacts[i]),
+                    _ => (o.outer_walls[i][nth - 1].at, o.outer_walls[i][nth - 1].contact),
+                };
+                Wall {
+                    at,
+                    contact,
+                    restitution: Restitution::constant(law.restitution[i]),
+                    mesh_speed: law.mesh_speed[i],
+                    springs: stages.iter().map(|stage| spring(stage, nth)).collect(),
+                }
+            };
+            (0..count).map(wall).collect()
+        };
+        Machine {
+            omega: o.omega,
+            mass: matrix(o.mass),
+            stages: stages
+                .iter()
+                .map(|stage| Forces {
+                    damping: matrix(stage.free.damping),
+                    stiffness: matrix(stage.free.stiffness),
+                    load: vector(stage.free.load),
+                })
+                .collect(),
+            schedule: o.schedule.clone(),
+            drives: o
+                .all_harmonics()
+                .map(|harmonic| Drive {
+                    order: harmonic.order,
+                    cos: vector(harmonic.cos),
+                    sin: vector(harmonic.sin),
+                })
+                .collect(),
+            gaps: vec![GapRow { row: vector(o.gap), walls: Side::BOTH.map(walls) }],
+            friction: o
+                .friction
+                .iter()
+                .map(|friction| DryFriction {
+                    row: vector(friction.row),
+                    force: friction.force,
+                    speed: friction.speed,
+                })
+                .collect(),
+        }
+    }
+
     /// Returns the number of coordinates.
     pub fn degrees(&self) -> usize {
         self.mass.nrows()

@@ -28,12 +28,14 @@ mod modes;
 mod motion;
 mod polynomial;
 mod system;
+mod table;
 
 pub use events::{MachineEvent, SlipEvent};
 pub use flight::Flight;
 pub(crate) use flight::Signal;
 pub use motion::Motion;
 pub use system::System;
+pub use table::{Equations, StartModes};
 
 use crate::model::{MOST_HARMONICS, STATE, State};
 

@@ -1,6 +1,5 @@
 //! The engine of machines, on oscillators of two coordinates, against the integrator by matrix exponentials.
 
-use nalgebra::{DMatrix, DVector};
 
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{
@@ -28,74 +27,6 @@ const STATE_OFF: f64 = 1e-10;
 /// Largest difference of the derivatives, relative to the largest entry.
 const DERIVATIVE_OFF: f64 = 1e-7;
 
-/// Describes an oscillator as a machine.
-pub(crate) fn machine_of(o: &Oscillator, law: Law) -> Machine {
-    let n = o.degrees;
-    let matrix = |m: [[f64; 2]; 2]| DMatrix::from_fn(n, n, |i, j| m[i][j]);
-    let vector = |v: [f64; 2]| DVector::from_fn(n, |i, _| v[i]);
-    let stages: Vec<_> = (0..o.stage_count()).map(|stage| o.in_stage(stage)).collect();
-    let walls = |side: Side| {
-        let i = side.index();
-        let count = o.wall_count(side);
-        let spring = |stage: &Oscillator, nth: usize| {
-            // The spring of a wall belongs to the interval in front of it.
-            let interval = if nth == 0 { stage.clone() } else { stage.behind(side, nth) };
-            let [stiffness, damping] = interval.wall_stiffness_and_damping(side);
-            let has_damper = interval.meshing[i].damping != interval.free.damping;
-            Spring {
-                stiffness,
-                damping: if has_damper { damping } else { 0.0 },
-                preload: interval.preload(side),
-            }
-        };
-        let wall = |nth: usize| {
-            let (at, contact) = match nth {
-                0 => (o.walls[i], o.contacts[i]),
-                _ => (o.outer_walls[i][nth - 1].at, o.outer_walls[i][nth - 1].contact),
-            };
-            Wall {
-                at,
-                contact,
-                restitution: Restitution::constant(law.restitution[i]),
-                mesh_speed: law.mesh_speed[i],
-                springs: stages.iter().map(|stage| spring(stage, nth)).collect(),
-            }
-        };
-        (0..count).map(wall).collect()
-    };
-    Machine {
-        omega: o.omega,
-        mass: matrix(o.mass),
-        stages: stages
-            .iter()
-            .map(|stage| Forces {
-                damping: matrix(stage.free.damping),
-                stiffness: matrix(stage.free.stiffness),
-                load: vector(stage.free.load),
-            })
-            .collect(),
-        schedule: o.schedule.clone(),
-        drives: o
-            .all_harmonics()
-            .map(|harmonic| Drive {
-                order: harmonic.order,
-                cos: vector(harmonic.cos),
-                sin: vector(harmonic.sin),
-            })
-            .collect(),
-        gaps: vec![GapRow { row: vector(o.gap), walls: Side::BOTH.map(walls) }],
-        friction: o
-            .friction
-            .iter()
-            .map(|friction| DryFriction {
-                row: vector(friction.row),
-                force: friction.force,
-                speed: friction.speed,
-            })
-            .collect(),
-    }
-}
-
 /// The events at walls.
 #[derive(Default)]
 struct AtWalls(Vec<MachineEvent>);
@@ -111,7 +42,7 @@ impl Observer for AtWalls {
 /// Compares the first periods. Returns the largest differences of states and derivatives.
 fn compare(case: &Case) -> Result<[f64; 2], String> {
     let o = &case.oscillator;
-    let machine = machine_of(o, case.law);
+    let machine = Machine::of(o, case.law);
     machine.validate().map_err(|error| error.to_string())?;
     let (system, exponentials) = (System::new(&machine), motion::System::new(o, ANGLE));
     let mut ours = motion::Motion::new(&exponentials, case.law, case.start, Mode::Free);
@@ -240,7 +171,7 @@ fn machines_have_the_classes_of_their_oscillators() {
     let of = |seed: u64| {
         let shape = Shape { stages: seed % 2 == 1, friction: seed.is_multiple_of(3), ..PLAIN };
         let case = case(seed, shape);
-        let machine = Oscillator::of_machine(machine_of(&case.oscillator, case.law));
+        let machine = Oscillator::of_machine(Machine::of(&case.oscillator, case.law));
         let [flow, whole] = [&case.oscillator, &machine].map(Flow::new);
         let settings = Settings { transient_periods: 200, observed_periods: 64, max_period: 16 };
         let [expected, found] =
@@ -282,7 +213,7 @@ fn time_of_a_period_as_a_machine() {
     for (e, omega) in [(0.06, 5.6), (0.605, 5.6), (0.72, 1.5), (0.9, 3.0)] {
         let pair = crate::common::paper(e, omega);
         let (oscillator, law) = (pair.oscillator().unwrap(), pair.law());
-        let (flow, system) = (Flow::new(&oscillator), System::new(&machine_of(&oscillator, law)));
+        let (flow, system) = (Flow::new(&oscillator), System::new(&Machine::of(&oscillator, law)));
         let mut times = [[f64::INFINITY; 2]; 2];
         for _ in 0..5 {
             for tangents in [false, true] {

@@ -142,6 +142,11 @@ impl Domain {
         }
     }
 
+    /// Returns the time in which the fastest rate turns by one radian.
+    pub(super) fn radian(&self) -> f64 {
+        self.unit / RADIUS
+    }
+
     /// Returns the row of a coordinate, or of its rate.
     pub(super) fn unit_row(&self, entry: usize) -> Row {
         let mut row = [0.0; WIDTH];

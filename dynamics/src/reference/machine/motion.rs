@@ -216,6 +216,21 @@ impl<'s> Motion<'s> {
         self.system
     }
 
+    /// Returns the present modes, the walls that gaps lie on, and those that they come from.
+    pub(super) fn modes(&self) -> (Modes, [Option<(Side, usize)>; MOST_GAPS], [Option<Side>; MOST_GAPS]) {
+        (self.modes, self.at_wall, self.origin)
+    }
+
+    /// Returns the orders of the roots of pushing forces and of sliding rates.
+    pub(super) fn root_orders(&self) -> ([usize; MOST_GAPS], [usize; MOST_FRICTION]) {
+        (self.from_force, self.from_rate)
+    }
+
+    /// Returns the present state in the coordinates of the flow.
+    pub(super) fn flow_state(&self) -> &Numbers {
+        &self.y
+    }
+
     /// Returns the number of completed forcing periods.
     pub fn period(&self) -> u64 {
         self.period

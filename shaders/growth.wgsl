@@ -1,0 +1,298 @@
+// Growth of tangent vectors. Only variants with an exponent contain it.
+
+// The one vector for the exponent. The columns of the monodromy matrix, which are carried while a cycle is read,
+// stay in the buffer.
+var<private> tangent_now: State;
+
+fn tangent(i: u32) -> State {
+    if tally.tangent_count == 1u {
+        return tangent_now;
+    }
+    var u: State;
+    //% for k in 0..DIM
+    u[$ku] = motions[lane].tangents[DIM * i + $ku];
+    //% end
+    return u;
+}
+
+fn set_tangent(i: u32, u: State) {
+    if tally.tangent_count == 1u {
+        tangent_now = u;
+        return;
+    }
+    store_tangent(i, u);
+}
+
+fn store_tangent(i: u32, u: State) {
+    //% for k in 0..DIM
+    motions[lane].tangents[DIM * i + $ku] = u[$ku];
+    //% end
+}
+
+// Loads the tangent vector at the start of a dispatch. The first dispatch with the vector initialises it.
+fn load_tangent() {
+    if GROWTH {
+        tally.carries_growth = 1u;
+        if tally.tangent_count == 0u {
+            resume_growth();
+            store_tangent_now();
+        }
+        //% for k in 0..DIM
+        tangent_now[$ku] = motions[lane].tangents[$ku];
+        //% end
+    }
+}
+
+// Returns a vector with a part in every direction.
+fn initial_tangent() -> State {
+    var u: State;
+    for (var i = 0u; i < DIM; i++) {
+        u[i] = select(Real(0.0), Real(0.5), i < 2u * shapes[cell.flow_index].degrees);
+    }
+    return u;
+}
+
+// Saves the vector while a cycle is read.
+fn save_vector() {
+    if tally.tangent_count == 1u {
+        motions[lane].vector = tangent_now;
+    }
+}
+
+// Multiplies the saved vector by the monodromy matrix of the cycle that was read along the motion. A new vector would
+// first have to turn into its direction, which adds growth: where cycles are read again and again, 0.2 per period of
+// motion whose exponent is zero.
+fn carry_vector() {
+    if search.newton_steps > 0u {
+        return;
+    }
+    let u = motions[lane].vector;
+    let m = motions[lane].tangents;
+    var image: State;
+    for (var i = 0u; i < DIM; i++) {
+        var sum: Real = 0.0;
+        //% for k in 0..COORDINATES
+        sum += m[i + 2u * $ku * DIM] * u[2u * $ku] + m[i + (2u * $ku + 1u) * DIM] * u[2u * $ku + 1u];
+        //% end
+        image[i] = sum;
+    }
+    let size = largest(image);
+    if !(size > 1e-30 && size < 1e30) {
+        motions[lane].vector = initial_tangent();
+        return;
+    }
+    let length = unit(&image, size);
+    motions[lane].vector = image;
+    if GROWTH && tally.period - tally.candidate >= settings.exponent_from {
+        count_growth(Real(log2(f32(size)) + log2(f32(length))), tally.candidate);
+    }
+}
+
+// Scales a vector, whose largest entry is `size`, to unit length. Returns its former length divided by `size`.
+fn unit(u: ptr<function, State>, size: Real) -> Real {
+    // Squares would leave the range of numbers.
+    let scale = 1.0 / size;
+    let v = scaled(*u, scale);
+    let length = sqrt(inner(v, v));
+    *u = scaled(v, 1.0 / length);
+    return length;
+}
+
+fn scaled(u: State, factor: Real) -> State {
+    var v: State;
+    //% for k in 0..DIM
+    v[$ku] = factor * u[$ku];
+    //% end
+    return v;
+}
+
+// Continues with the saved vector.
+fn resume_growth() {
+    tally.tangent_count = select(0u, 1u, GROWTH);
+    tangent_now = motions[lane].vector;
+}
+
+fn store_tangent_now() {
+    if GROWTH && tally.tangent_count == 1u {
+        store_tangent(0u, tangent_now);
+    }
+}
+
+// Starts to carry the columns of the monodromy matrix. With one displacement, x has no neighbours.
+fn begin_columns() {
+    motions[lane].tangents = Matrix();
+    for (var i = 0u; i < 2u * shapes[cell.flow_index].degrees; i++) {
+        motions[lane].tangents[(DIM + 1u) * i] = 1.0;
+    }
+}
+
+// Keeps the columns of the monodromy matrix in range after an event, and measures how much perturbations grow between
+// two instants of the cycle: rounding at the first one is amplified until the second.
+fn check_columns() {
+    let size = size_of_columns();
+    if size >= OUT_OF_RANGE {
+        tallies[lane].has_overflowed = 1u;
+        begin_columns();
+        return;
+    }
+    if size == 0.0 {
+        // All neighbours have become the same motion. New perturbations grow from here on.
+        tallies[lane].is_superstable = 1u;
+        motions[lane].stretch[0] = 1.0;
+        begin_columns();
+        return;
+    }
+    if tallies[lane].is_superstable + tallies[lane].column_scalings == 0u {
+        motions[lane].stretch[2] = max(motions[lane].stretch[2], size);
+    }
+    let smallest = min(motions[lane].stretch[0], size);
+    motions[lane].stretch[0] = smallest;
+    motions[lane].stretch[1] = max(motions[lane].stretch[1], size / smallest);
+    if size * LARGE < 1.0 {
+        iterations += MATRIX;
+        for (var k = 0u; k < MATRIX; k++) {
+            motions[lane].tangents[k] *= LARGE;
+        }
+        motions[lane].stretch[0] *= LARGE;
+        tallies[lane].column_scalings += 1u;
+    }
+}
+
+// Size from which a tangent vector counts as lost: its next step may leave the range of single precision.
+const OUT_OF_RANGE: Real = 1e30;
+
+// Whether a vector is below OUT_OF_RANGE. The function `max` may leave out what is not a number, and a sum does not.
+fn is_in_range(u: State) -> bool {
+    return is_bounded((HUGE / OUT_OF_RANGE) * sum_of_sizes(u));
+}
+
+// Returns the largest entry of the columns, with rates divided by the forcing frequency; OUT_OF_RANGE if a column is lost.
+fn size_of_columns() -> Real {
+    let angle = unit_of_frequency();
+    var most: Real = 0.0;
+    var are_in_range = true;
+    for (var i = 0u; i < DIM; i++) {
+        iterations += 1u;
+        let u = tangent(i);
+        are_in_range = are_in_range && is_in_range(u);
+        let size = max(largest_displacement(u), largest_rate(u) / angle);
+        most = max(most, size * select(Real(1.0), angle, i % 2u == 1u));
+    }
+    return select(OUT_OF_RANGE, most, are_in_range);
+}
+
+// Returns the largest growth of a perturbation between two instants of the cycle that was read; the second may be in the
+// next turn.
+fn cycle_stretch() -> Real {
+    let stretch = motions[lane].stretch;
+    return max(stretch[1], size_of_columns() / stretch[0] * stretch[2]);
+}
+
+fn check_range() {
+    if tally.tangent_count == 1u {
+        rescale_tangent();
+    } else if tally.tangent_count > 1u {
+        check_columns();
+    }
+}
+
+// Many events in one period may take the vector out of the range of single precision. Factors that are taken out of
+// it count as growth of the present period.
+const LARGE: Real = 1099511627776.0;
+const LARGE_OCTAVES: Real = 40.0;
+
+fn rescale_tangent() {
+    let u = tangent_now;
+    if !(largest(u) > LARGE) {
+        return;
+    }
+    tangent_now = scaled(u, 1.0 / LARGE);
+    if tally.period >= settings.exponent_from {
+        motion.block_growth += LARGE_OCTAVES;
+    }
+}
+
+fn largest(u: State) -> Real {
+    return max(largest_displacement(u), largest_rate(u));
+}
+
+// Returns the growth of the one vector since the last strobe, in octaves, and scales the vector to unit length.
+fn renormalise() -> Real {
+    var u = tangent(0u);
+    let size = largest(u);
+    if !is_in_range(u) {
+        // The vector is lost: returns a large growth, and starts with a new vector.
+        set_tangent(0u, initial_tangent());
+        return 100.0;
+    }
+    if !(size > 1e-30) {
+        // Superstable: returns a large loss, and starts with a new vector.
+        set_tangent(0u, initial_tangent());
+        return -100.0;
+    }
+    let length = unit(&u, size);
+    set_tangent(0u, u);
+    // Single precision is enough for averages, and f64 has no logarithm.
+    return Real(log2(f32(size)) + log2(f32(length)));
+}
+
+fn accumulate_growth() {
+    if !GROWTH {
+        return;
+    }
+    let growth = renormalise();
+    if tally.period <= settings.exponent_from {
+        return;
+    }
+    count_growth(growth, 1u);
+}
+
+// Adds growth over a number of periods. A block that a cycle makes longer has the same weight as the others.
+fn count_growth(growth: Real, periods: u32) {
+    motion.block_growth += growth;
+    search.block_periods += periods;
+    if search.block_periods >= settings.exponent_block {
+        let whole = motion.block_growth * (Real(settings.exponent_block) / Real(search.block_periods));
+        // Squared deviations by Welford's update: sums of squares would cancel where blocks are nearly equal.
+        let blocks = Real(search.blocks);
+        let deviation = whole - measures.growth_sum / max(blocks, 1.0);
+        measures.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
+        measures.growth_sum += whole;
+        if search.blocks == 0u {
+            measures.first_block = whole;
+            measures.growth_products = 0.0;
+        } else {
+            measures.growth_products += (measures.last_block - measures.first_block) * (whole - measures.first_block);
+        }
+        measures.last_block = whole;
+        motion.block_growth = 0.0;
+        search.block_periods = 0u;
+        search.blocks += 1u;
+    }
+}
+
+const LN_2: Real = 0.6931471805599453;
+
+// Returns the mean growth of the tangent vector per period, natural logarithms, and its standard error from the means
+// of blocks.
+fn mean_growth() -> vec2<Real> {
+    let blocks = Real(search.blocks);
+    let mean = measures.growth_sum / blocks;
+    let rho = block_correlation(mean);
+    let variance = measures.growth_squares / (blocks * (blocks - 1.0)) * ((1.0 + rho) / (1.0 - rho));
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(mean, sqrt(variance));
+}
+
+// Returns the correlation of neighbouring blocks. It is above zero where blocks are shorter than the correlation time.
+fn block_correlation(mean: Real) -> Real {
+    if search.blocks < FEWEST_BLOCKS || !(measures.growth_squares > 0.0) {
+        return 0.0;
+    }
+    let blocks = Real(search.blocks);
+    let m = mean - measures.first_block;
+    let last = measures.last_block - measures.first_block;
+    let products = measures.growth_products - m * (2.0 * blocks * m - last) + (blocks - 1.0) * m * m;
+    // Deviations from a common mean bias the correlation downwards.
+    let biased = products / measures.growth_squares;
+    return clamp(biased + (1.0 + 3.0 * biased) / blocks, 0.0, 1.0 - CORRELATION_MARGIN / sqrt(blocks));
+}

@@ -1,0 +1,189 @@
+// What observers ask the engine of motion of a machine. The functions are those of oscillator.wgsl.
+
+fn begin_motion() {
+    let start = starts[lane];
+    for (var i = 0u; i < DIM; i++) {
+        motion.q[i] = start[i];
+    }
+    // The host packs the modes like `pack_modes`.
+    tally.mode = u32(start[DIM]);
+    tally.origin = u32(start[DIM + 1u]);
+    tally.order = u32(start[DIM + 2u]);
+    flow = flows[cell.flow_index];
+    shape = shapes[cell.flow_index];
+    // A change of the stage at phase 0 is part of the start.
+    if shape.changes > 0u && change_step() == 0u && change_theta() == 0.0 {
+        tally.next_change = 1u;
+    }
+}
+
+fn resume_motion() {
+    fetch_constants();
+}
+
+fn prepare_motion() {}
+
+fn suspend_motion() {
+    pack_modes();
+}
+
+fn begin_schedule() {
+    tally.next_change = 0u;
+    if shape.changes > 0u && change_step() == 0u && change_theta() == 0.0 {
+        enter_stage();
+    }
+}
+
+fn restart_phase() {}
+
+fn conclude_motion() {
+    fetch_constants();
+}
+
+fn fly_to_stop_phase() -> bool {
+    while has_work() && iterations < settings.iterations {
+        if step() {
+            return true;
+        }
+        if tally.passes_in_period > settings.passes_per_period {
+            tally.status = STATUS_TOO_STIFF;
+        }
+    }
+    return false;
+}
+
+// Machines have no mirror images, so that lanes stop at phase 0 alone.
+fn next_stop_phase() -> u32 {
+    return shape.steps;
+}
+
+fn strobe_state() -> State {
+    return motion.q;
+}
+
+fn largest_position(q: State) -> Real {
+    return largest_displacement(q);
+}
+
+fn unit_of_frequency() -> Real {
+    return flow.omega;
+}
+
+fn scale_of_length() -> Real {
+    return flow.length;
+}
+
+fn escape_size() -> Real {
+    return flow.escape;
+}
+
+fn has_stages() -> bool {
+    return shape.changes > 0u;
+}
+
+// The energy of machines has no bound that would show that no contact follows.
+fn is_non_impacting() -> bool {
+    return false;
+}
+
+fn contact_free_growth() -> Real {
+    return 0.0;
+}
+
+// Whether no gap lies on a wall and no force or rate is at its limit.
+fn is_away_from_roots() -> bool {
+    var is_away = true;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        is_away = is_away && wall_side[gap] == SIDE_NONE && from_force[gap] == 0u;
+    }
+    for (var i = 0u; i < ELEMENTS; i++) {
+        is_away = is_away && from_rate[i] == 0u;
+    }
+    return is_away;
+}
+
+fn may_place(to: State) -> bool {
+    return is_away_from_roots();
+}
+
+fn place(to: State) {
+    var q = to;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        if is_stuck(gap_modes[gap]) {
+            let side = contact_of(gap_modes[gap]);
+            q[2u * gap] = last_wall_at(gap, side);
+        }
+        wall_side[gap] = SIDE_NONE;
+        from_force[gap] = 0u;
+    }
+    for (var i = 0u; i < ELEMENTS; i++) {
+        from_rate[i] = 0u;
+    }
+    hold(&q, 1.0);
+    motion.q = q;
+}
+
+fn keep_modes() {
+    pack_modes();
+    search.newton_start_mode = tally.mode;
+    search.newton_start_origin = tally.origin;
+}
+
+fn restore_modes() {
+    tally.mode = search.newton_start_mode;
+    tally.origin = search.newton_start_origin;
+    tally.order = 0u;
+    unpack_modes();
+}
+
+fn keeps_domain(to: State) -> bool {
+    return beyond(to) < 0.0;
+}
+
+// Returns how far the gaps at `to` lie beyond the walls that end their modes, at most; negative inside.
+fn beyond(to: State) -> Real {
+    var q = to;
+    var most = -HUGE;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        let mode = gap_modes[gap];
+        let z = q[2u * gap];
+        if mode < ONSET {
+            for (var direction = 0u; direction < 2u; direction++) {
+                let wall = wall_ahead(gap, direction);
+                if wall.y != NO_WALL {
+                    most = max(most, sign_of(direction) * (z - wall_at(gap, wall.x, wall.y)));
+                }
+            }
+        } else if mode < STUCK {
+            let side = contact_of(mode);
+            let is_before = mode < PRESSED;
+            most = max(most, select(Real(-1.0), Real(1.0), is_before) * sign_of(side) * (z - last_wall_at(gap, side)));
+        }
+    }
+    return most;
+}
+
+// Error of a computed fixed point in rounding errors of the motion, before amplification.
+const MISPLACED: Real = 8.0;
+
+fn leaves_domain(to: State) -> bool {
+    let unsure = MISPLACED * ULP * measures.position_scale * Real(limit_of(1.0));
+    return tally.events == 0u && is_away_from_roots() && beyond(to) > unsure;
+}
+
+fn is_free() -> bool {
+    var is_free_of_contact = is_away_from_roots();
+    for (var gap = 0u; gap < GAPS; gap++) {
+        is_free_of_contact = is_free_of_contact && gap_modes[gap] == BEYOND;
+    }
+    return is_free_of_contact;
+}
+
+fn mesh_fraction(periods: u32) -> Real {
+    return (Real(tally.mesh_whole) + motion.mesh_part) / (Real(periods) * Real(shape.steps));
+}
+
+// Machines are not measured.
+fn measure_period() {}
+
+fn begin_measuring() {}

@@ -1,0 +1,157 @@
+// Which modes of walls and friction are consistent with a state. The rules are those of the reference
+// (dynamics/src/reference/machine/modes.rs).
+
+// What is decided: gaps that rest on rigid walls, with their sides, and elements without a rate.
+var<private> rest_side: array<u32, GAPS>;
+var<private> rest_element: array<u32, ELEMENT_SLOTS>;
+// The modes that are tried, and those that were chosen.
+var<private> tried_gaps: array<u32, GAPS>;
+var<private> tried_slips: array<u32, ELEMENT_SLOTS>;
+
+fn sign_of_slip(slip: u32) -> Real {
+    return select(select(Real(0.0), Real(-1.0), slip == BACKWARD), Real(1.0), slip == FORWARD);
+}
+
+// Whether the modes that are tried fit the forces at a state.
+fn are_consistent(q: State) -> bool {
+    let domain = domain_of(tried_gaps, tried_slips);
+    for (var gap = 0u; gap < GAPS; gap++) {
+        let side = rest_side[gap];
+        if side == SIDE_NONE {
+            continue;
+        }
+        let pushes = has_push(domain, gap);
+        var line = distance_line(gap, 0.0, 1u - side);
+        var least = 2u;
+        if pushes {
+            line = push_line(domain, gap);
+            least = 0u;
+        }
+        // Without a push the gap leaves the wall, or friction holds it there.
+        let found = lead(line, domain, q, least);
+        if select(found.value > 0.0, !(found.value > 0.0), !pushes) != true {
+            return false;
+        }
+    }
+    for (var i = 0u; i < ELEMENTS; i++) {
+        if rest_element[i] == 0u {
+            continue;
+        }
+        let slip = tried_slips[i];
+        if slip != STICKS {
+            if !(lead(rate_line(i, sign_of_slip(slip)), domain, q, 1u).value > 0.0) {
+                return false;
+            }
+        } else if has_hold(domain, i) {
+            load_sizes(q);
+            let row = hold_row(domain, i);
+            if abs(product(row, 0u)) > element_force(i) + ROUNDING * size_of_product(row) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+// Chooses the first consistent combination of modes: walls hold before they let go, elements stick before they slide. If `keeps`, the present
+// modes come first. Returns false, and leaves the modes, if there is none.
+fn choose(q: State, keeps: bool) -> bool {
+    var releases = 1u;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        releases *= select(1u, 2u, rest_side[gap] != SIDE_NONE);
+    }
+    var slides = 1u;
+    for (var i = 0u; i < ELEMENTS; i++) {
+        slides *= select(1u, 3u, rest_element[i] == 1u);
+    }
+    let given_gaps = tried_gaps;
+    let given_slips = tried_slips;
+    let first = select(0u, 1u, keeps);
+    for (var n = 0u; n < releases * slides + first; n++) {
+        iterations += 1u;
+        if n >= first {
+            var bits = (n - first) / slides;
+            for (var gap = 0u; gap < GAPS; gap++) {
+                let side = rest_side[gap];
+                if side != SIDE_NONE {
+                    tried_gaps[gap] = select(beyond_walls(side, passable(gap, side)), STUCK + side, (bits & 1u) == 0u);
+                    bits = bits >> 1u;
+                }
+            }
+            var digits = (n - first) % slides;
+            for (var i = ELEMENTS; i > 0u; i--) {
+                if rest_element[i - 1u] == 1u {
+                    tried_slips[i - 1u] = digits % 3u;
+                    digits /= 3u;
+                }
+            }
+        }
+        if are_consistent(q) {
+            return true;
+        }
+    }
+    tried_gaps = given_gaps;
+    tried_slips = given_slips;
+    return false;
+}
+
+// Loads a point with the sizes of its numbers.
+fn load_sizes(q: State) {
+    load_point(q);
+    for (var i = 0u; i < WIDTH; i++) {
+        sizes[i] = abs(series[i]);
+    }
+}
+
+fn is_stuck(mode: u32) -> bool {
+    return mode >= STUCK;
+}
+
+// Sets the rates of sticking elements and of gaps at rest to their values without rounding errors. `speeds` is 1 for a state and 0 for a
+// tangent vector.
+fn hold(q: ptr<function, State>, speeds: Real) {
+    var held = 0u;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        if is_stuck(gap_modes[gap]) {
+            held |= 1u << gap;
+            (*q)[2u * gap + 1u] = 0.0;
+        }
+    }
+    if ELEMENTS == 0u {
+        return;
+    }
+    var pivots: array<u32, ELEMENT_SLOTS>;
+    // The second pass completes the first where rows share coordinates.
+    for (var n = 0u; n < 2u * ELEMENTS; n++) {
+        let i = n % ELEMENTS;
+        if i >= shape.elements || slips[i] != STICKS {
+            continue;
+        }
+        let row = AT_ELEMENTS + i * (WIDTH + 1u);
+        if n < ELEMENTS {
+            var pivot = COORDINATES;
+            var most: Real = 0.0;
+            for (var j = 0u; j < COORDINATES; j++) {
+                let size = abs(number(row + 2u * j + 1u));
+                if ((held >> j) & 1u) == 0u && size > most {
+                    pivot = j;
+                    most = size;
+                }
+            }
+            pivots[i] = pivot;
+            held |= (1u << pivot);
+        }
+        let pivot = pivots[i];
+        if pivot == COORDINATES {
+            continue;
+        }
+        // The last number of a sliding rate is the speed with a minus sign.
+        var rest = speeds * number(row + WIDTH - 1u);
+        for (var j = 0u; j < COORDINATES; j++) {
+            if j != pivot {
+                rest += number(row + 2u * j + 1u) * (*q)[2u * j + 1u];
+            }
+        }
+        (*q)[2u * pivot + 1u] = -rest / number(row + 2u * pivot + 1u);
+    }
+}

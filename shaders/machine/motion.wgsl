@@ -1,0 +1,1055 @@
+// The motion of a machine from event to event, by the rules of the reference (dynamics/src/reference/machine/motion.rs).
+
+// Order of the root of the distance when the gap leaves a rigid wall: its acceleration is zero, the derivative is not.
+const RELEASE_ORDER: u32 = 3u;
+// An order that is computed at the end of an event.
+const UNKNOWN_ORDER: u32 = 7u;
+// Decisions on elements at rest after one event.
+const MOST_DECISIONS: u32 = 16u;
+
+// What ends the present modes: the gap reaches the next wall in a direction; the gap of a contact onset comes to its wall, or is not
+// pressed any more; the gap comes back from behind its wall; a wall that only pushes would begin to pull, or begins to push; a rigid wall
+// would have to pull; a sliding rate vanishes; a holding force reaches its limit for sliding in a direction.
+const ENDS_NOTHING: u32 = 0u;
+const ENDS_AT_WALL: u32 = 1u;
+const ENDS_ONSET: u32 = 2u;
+const ENDS_PRESSING: u32 = 3u;
+const LEAVES: u32 = 4u;
+const ENDS_FORCE: u32 = 5u;
+const BEGINS_FORCE: u32 = 6u;
+const ENDS_PUSH: u32 = 7u;
+const ENDS_SLIDING: u32 = 8u;
+const BEGINS_SLIDING: u32 = 9u;
+
+// Such an end: the gap or the element, the side or the mode of friction that follows, the function that is positive before it, and the
+// order of its root at the start.
+struct Watch {
+    kind: u32,
+    index: u32,
+    side: u32,
+    line: Line,
+    order: u32,
+}
+
+const WATCHES_PER_GAP: u32 = 3u;
+const WATCHES: u32 = WATCHES_PER_GAP * GAPS + 2u * ELEMENTS;
+const NO_WALL: u32 = 0xffffffffu;
+
+fn rate_of_gap(gap: u32) -> Real {
+    return motion.q[2u * gap + 1u];
+}
+
+fn is_kept(domain: u32, gap: u32) -> bool {
+    return is_still(domain, gap) && rate_of_gap(gap) == 0.0;
+}
+
+// Side and number of the wall that lies in a direction from the gap; NO_WALL as its number if there is none.
+fn wall_ahead(gap: u32, direction: u32) -> vec2<u32> {
+    let mode = gap_modes[gap];
+    if mode >= ONSET {
+        return vec2<u32>(direction, NO_WALL);
+    }
+    let passed = select(BEYOND - mode, mode - BEYOND, mode >= BEYOND);
+    if passed == 0u || (mode > BEYOND) == (direction == SIDE_RIGHT) {
+        return vec2<u32>(direction, select(NO_WALL, passed, passed < wall_count(gap, direction)));
+    }
+    return vec2<u32>(1u - direction, passed - 1u);
+}
+
+// Side and number of the wall that a contact onset may reach backwards.
+fn wall_behind(gap: u32, side: u32) -> vec2<u32> {
+    let count = wall_count(gap, side);
+    if count > 1u {
+        return vec2<u32>(side, count - 2u);
+    }
+    return vec2<u32>(1u - side, select(NO_WALL, 0u, wall_count(gap, 1u - side) > 0u));
+}
+
+// Order of the root of the distance from the wall in a direction.
+fn order_from_wall(gap: u32, direction: u32) -> u32 {
+    return select(0u, wall_order[gap], wall_side[gap] == direction);
+}
+
+// Side of the last wall that only pushes and behind which the gap is, or SIDE_NONE.
+fn pushing_side(gap: u32) -> u32 {
+    let mode = gap_modes[gap];
+    if mode >= ONSET || mode == BEYOND {
+        return SIDE_NONE;
+    }
+    let side = contact_of(mode);
+    let is_last = mode == beyond_walls(side, wall_count(gap, side));
+    return select(SIDE_NONE, side, is_last && last_kind(gap, side) == LAST_PUSHING);
+}
+
+fn no_watch() -> Watch {
+    return Watch(ENDS_NOTHING, 0u, 0u, row_line(0u, 0.0), 0u);
+}
+
+// Returns the watch with a number.
+fn watch(number_of_watch: u32, domain: u32) -> Watch {
+    var found = no_watch();
+    if number_of_watch >= WATCHES_PER_GAP * GAPS {
+        let i = (number_of_watch - WATCHES_PER_GAP * GAPS) / 2u;
+        let is_first = (number_of_watch - WATCHES_PER_GAP * GAPS) % 2u == 0u;
+        found.index = i;
+        if i >= shape.elements {
+            return found;
+        }
+        if slips[i] != STICKS {
+            if is_first {
+                found.kind = ENDS_SLIDING;
+                found.line = rate_line(i, sign_of_slip(slips[i]));
+                found.order = from_rate[i];
+            }
+        } else if has_hold(domain, i) {
+            found.kind = BEGINS_SLIDING;
+            found.side = select(BACKWARD, FORWARD, is_first);
+            found.line = row_line(hold_row(domain, i), -sign_of_slip(found.side));
+            found.line.constant = element_force(i);
+        }
+        return found;
+    }
+    let gap = number_of_watch / WATCHES_PER_GAP;
+    let nth = number_of_watch % WATCHES_PER_GAP;
+    let mode = gap_modes[gap];
+    let side = contact_of(mode);
+    found.index = gap;
+    found.side = side;
+    if is_stuck(mode) {
+        if nth == 0u && has_push(domain, gap) {
+            found.kind = ENDS_PUSH;
+            found.line = push_line(domain, gap);
+        }
+        return found;
+    }
+    if is_kept(domain, gap) {
+        return found;
+    }
+    if mode < ONSET {
+        if nth < 2u {
+            let wall = wall_ahead(gap, nth);
+            if wall.y != NO_WALL {
+                found.kind = ENDS_AT_WALL;
+                found.side = nth;
+                found.line = distance_line(gap, wall_at(gap, wall.x, wall.y), nth);
+                found.order = order_from_wall(gap, nth);
+            }
+        } else if pushing_side(gap) != SIDE_NONE {
+            found.kind = ENDS_FORCE;
+            found.line = force_line(gap, side, 1.0);
+            found.order = from_force[gap];
+        }
+    } else if mode < PRESSED {
+        if nth == 0u {
+            found.kind = ENDS_ONSET;
+            found.line = distance_line(gap, last_wall_at(gap, side), side);
+            found.order = order_from_wall(gap, side);
+        } else if nth == 1u {
+            found.kind = ENDS_PRESSING;
+            found.line = row_line(acceleration_row(domain, gap), sign_of(side));
+            found.order = from_force[gap];
+        } else {
+            let wall = wall_behind(gap, side);
+            if wall.y != NO_WALL {
+                found.kind = ENDS_AT_WALL;
+                found.side = 1u - side;
+                found.line = distance_line(gap, wall_at(gap, wall.x, wall.y), 1u - side);
+                found.order = order_from_wall(gap, 1u - side);
+            }
+        }
+    } else if nth == 0u {
+        found.kind = LEAVES;
+        found.line = distance_line(gap, last_wall_at(gap, side), 1u - side);
+        found.order = order_from_wall(gap, 1u - side);
+    } else if nth == 1u && mode >= OPEN {
+        found.kind = BEGINS_FORCE;
+        found.line = force_line(gap, side, -1.0);
+        found.order = from_force[gap];
+    }
+    return found;
+}
+
+// Steps of the grid to the next stop phase or change of the stage, at most to the end of the present one.
+fn steps_to_stop() -> Real {
+    var stop: Real = 1.0;
+    if tally.next_change < shape.changes && change_step() == tally.step {
+        stop = change_theta();
+    }
+    return max(stop - motion.theta, Real(0.0));
+}
+
+fn change_step() -> u32 {
+    return u32(table[shape.schedule + 3u * tally.next_change]);
+}
+
+fn change_theta() -> Real {
+    return table[shape.schedule + 3u * tally.next_change + 1u];
+}
+
+// Takes one step: to the first event, or as far as the series or the grid allow. Returns whether it ends at a stop phase.
+fn step() -> bool {
+    tally.passes_in_period += 1u;
+    let domain = present_domain();
+    let remaining = steps_to_stop() * flow.h;
+    let h = min(unit_of(domain), remaining);
+    load_point(motion.q);
+    for (var i = 0u; i < WIDTH; i++) {
+        sizes[i] = abs(series[i]);
+    }
+    expand(domain, h);
+    var first = no_watch();
+    var share: Real = 1.0;
+    for (var n = 0u; n < WATCHES; n++) {
+        let candidate = watch(n, domain);
+        if candidate.kind == ENDS_NOTHING {
+            continue;
+        }
+        for (var k = 0u; k <= TERMS; k++) {
+            powers[k] = value_of(candidate.line, k);
+        }
+        var order = candidate.order;
+        let size = size_of_value(candidate.line);
+        if candidate.kind == BEGINS_SLIDING && abs(powers[0]) <= ROUNDING * size && powers[1] > 0.0 {
+            // The force has just touched its limit.
+            order = 1u;
+        }
+        let fall = first_fall(order, size);
+        if fall < share || (fall <= 1.0 && first.kind == ENDS_NOTHING) {
+            share = fall;
+            first = candidate;
+        } else if fall == NO_ROOT && touches {
+            note_touch(candidate);
+        }
+    }
+    if share > 0.0 {
+        advance(domain, share, share * h);
+    }
+    if first.kind != ENDS_NOTHING {
+        cross(first, domain);
+        if tally.events_in_period > settings.events_per_period {
+            tally.status = STATUS_CAP_EVENTS;
+        }
+        return false;
+    }
+    if h < remaining {
+        return false;
+    }
+    if steps_to_stop_is_change() {
+        motion.theta = change_theta();
+        enter_stage();
+        return false;
+    }
+    motion.theta = 0.0;
+    tally.step += 1u;
+    return tally.step >= next_stop_phase();
+}
+
+// Whether the next stop is a change of the stage.
+fn steps_to_stop_is_change() -> bool {
+    return tally.next_change < shape.changes && change_step() == tally.step;
+}
+
+// A function touches zero within rounding. At an elastic wall without a preload the linearisation is valid with and without contact.
+fn note_touch(touched: Watch) {
+    if touched.kind == BEGINS_SLIDING {
+        return;
+    }
+    if touched.kind == ENDS_AT_WALL && gap_modes[touched.index] < ONSET {
+        let wall = wall_ahead(touched.index, touched.side);
+        let is_elastic = wall.y < passable(touched.index, wall.x);
+        if is_elastic && spring(touched.index, wall.x, wall.y)[2] == 0.0 {
+            return;
+        }
+    }
+    tally.grazes += 1u;
+}
+
+// Moves everything over a part of a step.
+fn advance(domain: u32, share: Real, time: Real) {
+    motion.q = state_after(share);
+    if EXPONENT {
+        for (var i = 0u; i < tally.tangent_count; i++) {
+            load_vector(tangent(i));
+            expand(domain, time);
+            set_tangent(i, state_after(1.0));
+        }
+        check_range();
+    }
+    let part = time / flow.h;
+    // The end of the step of the grid is reached only by a step without an event.
+    motion.theta = min(motion.theta + part, 1.0 - 2.0 * ULP);
+    var is_in_contact = false;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        is_in_contact = is_in_contact || contact_of(contact_mode(gap)) != SIDE_NONE;
+        if !is_kept(domain, gap) {
+            wall_side[gap] = SIDE_NONE;
+        }
+        from_force[gap] = 0u;
+    }
+    for (var i = 0u; i < ELEMENTS; i++) {
+        from_rate[i] = 0u;
+    }
+    if MESH && is_in_contact {
+        count_meshing(part);
+    }
+}
+
+// Mode of a gap that tells its contact.
+fn contact_mode(gap: u32) -> u32 {
+    let mode = gap_modes[gap];
+    if mode >= OPEN && mode < STUCK {
+        return before_last(gap, contact_of(mode));
+    }
+    return mode;
+}
+
+// Adds a part of a step of the grid to the time in contact.
+fn count_meshing(part: Real) {
+    motion.mesh_part += part;
+    let whole = floor(motion.mesh_part);
+    tally.mesh_whole += u32(whole);
+    motion.mesh_part -= whole;
+}
+
+// Counts an event at a wall, and adds the symbol of the flight that ends there.
+fn count_event(gap: u32, side: u32) {
+    let at = contact_of(contact_mode(gap));
+    var symbol = select(4u, 1u, at == SIDE_RIGHT);
+    if at == SIDE_NONE {
+        let is_right = side == SIDE_RIGHT;
+        symbol = select(select(6u, 5u, !is_right), select(3u, 2u, is_right), origins[gap] == SIDE_RIGHT);
+    }
+    if at != SIDE_NONE || origins[gap] != SIDE_NONE {
+        add_symbol(symbol + select(0u, 8u * (gap + 1u), GAPS > 1u));
+    }
+    origins[gap] = side;
+    count(1u + side + 2u * (gap_modes[gap] + 32u * gap));
+}
+
+// Counts a change of friction, with its symbol if `symbol` has one.
+fn count_slip(symbol: u32) {
+    if symbol < NO_SYMBOL {
+        add_symbol(symbol);
+    }
+    count(512u + symbol);
+}
+
+const NO_SYMBOL: u32 = 8u;
+const STICKING_ENDS: u32 = 7u;
+const SLIDING_REVERSES: u32 = 0u;
+
+fn count(code: u32) {
+    keep_strobe_distance();
+    tally.itinerary = mix_bits(tally.itinerary + code);
+    tally.events += 1u;
+    tally.events_in_period += 1u;
+}
+
+// Jump of the rates at an impact: per unit of change of the gap's rate, the gap, and the change per approach speed of neighbours.
+var<private> kick: array<Real, COORDINATES>;
+var<private> kick_gap: u32;
+var<private> kick_factor: Real;
+
+// Changes a vector by the derivative of the jump.
+fn jump(u: State) -> State {
+    var v = u;
+    let change = kick_factor * v[2u * kick_gap + 1u];
+    for (var i = 0u; i < COORDINATES; i++) {
+        v[2u * i + 1u] -= kick[i] * change;
+    }
+    return v;
+}
+
+// Returns the time derivative of the present state.
+fn field(domain: u32) -> State {
+    load_point(motion.q);
+    differentiate(domain, 0u, 1.0);
+    var f: State;
+    for (var i = 0u; i < DIM; i++) {
+        f[i] = series[WIDTH + i];
+    }
+    return f;
+}
+
+// Processes the end of the present modes, and lets the tangents jump.
+fn cross(event: Watch, domain: u32) {
+    let is_at_wall = event.kind == ENDS_AT_WALL || event.kind == ENDS_ONSET || event.kind == LEAVES;
+    if is_at_wall {
+        motion.q[event.line.entry] = -event.line.constant / event.line.factor;
+    }
+    var before: State;
+    var rate: Real = 0.0;
+    if EXPONENT {
+        before = field(domain);
+        rate = value_of(event.line, 1u);
+    }
+    kick_factor = 0.0;
+    act(event);
+    if EXPONENT {
+        saltate(event.line, select(Real(0.0), NO_SPEED * flow.speed, is_at_wall), before, rate,
+            event.kind == ENDS_AT_WALL || event.kind == LEAVES);
+    }
+}
+
+// Applies `S u = R u + (f+ - R f-) (n . u) / (n . f-)` to every tangent vector, and projects it to the constraints.
+fn saltate(line: Line, least: Real, before: State, rate: Real, is_passed: bool) {
+    var change = field(present_domain());
+    var carried = jump(before);
+    let inverse = select(1.0 / rate, Real(0.0), abs(rate) <= least);
+    if abs(rate) <= least && (kick_factor != 0.0 || !is_passed) {
+        tally.grazes += 1u;
+    }
+    for (var i = 0u; i < DIM; i++) {
+        change[i] = (change[i] - carried[i]) * inverse;
+    }
+    for (var n = 0u; n < tally.tangent_count; n++) {
+        let u = tangent(n);
+        load_vector(u);
+        let along = value_of(line, 0u);
+        var v = jump(u);
+        for (var i = 0u; i < DIM; i++) {
+            v[i] += change[i] * along;
+        }
+        for (var gap = 0u; gap < GAPS; gap++) {
+            if is_stuck(gap_modes[gap]) {
+                v[2u * gap] = 0.0;
+            }
+        }
+        hold(&v, 0.0);
+        set_tangent(n, v);
+    }
+    check_range();
+}
+
+fn act(event: Watch) {
+    let i = event.index;
+    var exempt_gap = GAPS;
+    var exempt_element = ELEMENTS;
+    var reached = SIDE_NONE;
+    switch event.kind {
+        case ENDS_AT_WALL: {
+            if gap_modes[i] >= ONSET {
+                end_contact(i, contact_of(gap_modes[i]));
+            }
+            reached = event.side;
+        }
+        case ENDS_ONSET: {
+            gap_modes[i] = PRESSED + event.side;
+            leave(i, 1u - event.side);
+        }
+        case ENDS_PRESSING: {
+            end_contact(i, event.side);
+            wall_side[i] = SIDE_NONE;
+        }
+        case LEAVES: {
+            if gap_modes[i] < OPEN {
+                end_contact(i, event.side);
+                leave(i, event.side);
+            } else {
+                gap_modes[i] = before_last(i, event.side);
+                if sign_of(event.side) * rate_of_gap(i) < 0.0 {
+                    leave(i, event.side);
+                } else {
+                    reached = event.side;
+                }
+            }
+        }
+        case ENDS_FORCE: {
+            end_contact(i, event.side);
+            gap_modes[i] = OPEN + event.side;
+            from_force[i] = 1u;
+        }
+        case BEGINS_FORCE: {
+            begin_force(i, event.side);
+        }
+        case ENDS_PUSH: {
+            end_contact(i, event.side);
+            wall_side[i] = event.side;
+            wall_order[i] = RELEASE_ORDER;
+            exempt_gap = i;
+        }
+        case ENDS_SLIDING: {
+            end_sliding(i);
+        }
+        default: {
+            begin_sliding(i, event.side);
+            exempt_element = i;
+        }
+    }
+    if reached != SIDE_NONE {
+        reach(i, reached);
+    }
+    if event.kind != ENDS_ONSET {
+        settle(exempt_gap, exempt_element);
+    }
+    complete_orders();
+}
+
+// Begins contact with a wall that only pushes.
+fn begin_force(gap: u32, side: u32) {
+    count_event(gap, side);
+    gap_modes[gap] = beyond_walls(side, wall_count(gap, side));
+    from_force[gap] = 1u;
+}
+
+// Ends a lasting contact with the last wall of a side.
+fn end_contact(gap: u32, side: u32) {
+    count_event(gap, side);
+    gap_modes[gap] = before_last(gap, side);
+}
+
+// Notes that a gap lies on the wall in a direction, and does not pass it.
+fn leave(gap: u32, direction: u32) {
+    wall_side[gap] = direction;
+    wall_order[gap] = 1u;
+}
+
+// Computes the orders of all roots at the present state.
+fn complete_orders() {
+    let domain = present_domain();
+    for (var gap = 0u; gap < GAPS; gap++) {
+        if wall_side[gap] == SIDE_NONE {
+            continue;
+        }
+        if rate_of_gap(gap) != 0.0 {
+            wall_order[gap] = 1u;
+        } else if wall_order[gap] < RELEASE_ORDER {
+            wall_order[gap] = lead(distance_line(gap, 0.0, SIDE_RIGHT), domain, motion.q, 2u).order;
+        }
+    }
+    for (var i = 0u; i < ELEMENTS; i++) {
+        if from_rate[i] == UNKNOWN_ORDER {
+            from_rate[i] = lead(rate_line(i, 1.0), domain, motion.q, 1u).order;
+        }
+    }
+}
+
+// Processes a gap that reaches a wall in a direction.
+fn reach(gap: u32, direction: u32) {
+    let wall = wall_ahead(gap, direction);
+    if wall.y == NO_WALL {
+        return;
+    }
+    motion.q[2u * gap] = wall_at(gap, wall.x, wall.y);
+    let domain = present_domain();
+    let closing = sign_of(direction) * rate_of_gap(gap);
+    let is_elastic = wall.y < passable(gap, wall.x);
+    let is_tiny = closing < NO_SPEED * flow.speed;
+    var heads: Real = 1.0;
+    if is_tiny && closing >= 0.0 {
+        heads = lead(distance_line(gap, 0.0, 1u - direction), domain, motion.q, 2u).value;
+    }
+    if closing < 0.0 || (closing == 0.0 && !(heads > 0.0)) {
+        leave(gap, direction);
+        return;
+    }
+    if is_tiny && closing > 0.0 && !is_elastic && !(heads > 0.0) {
+        // Impacts of two gaps in turn end here: both leave their walls from rest.
+        motion.q[2u * gap + 1u] = 0.0;
+        tally.grazes += 1u;
+        count(0u);
+        leave(gap, direction);
+        return;
+    }
+    let next = select(gap_modes[gap] - 1u, gap_modes[gap] + 1u, direction == SIDE_RIGHT);
+    if wall.x != direction {
+        count_event(gap, wall.x);
+        gap_modes[gap] = next;
+        leave(gap, wall.x);
+    } else if is_elastic {
+        let is_pushing = wall.y + 1u == wall_count(gap, wall.x) && last_kind(gap, wall.x) == LAST_PUSHING;
+        if is_pushing && !(lead(force_line(gap, wall.x, 1.0), domain, motion.q, 0u).value > 0.0) {
+            gap_modes[gap] = OPEN + wall.x;
+        } else {
+            count_event(gap, wall.x);
+            gap_modes[gap] = next;
+            if closing < GRAZING_SPEED * flow.speed && spring(gap, wall.x, wall.y)[2] != 0.0 {
+                tally.grazes += 1u;
+            }
+        }
+        leave(gap, 1u - wall.x);
+        if is_pushing {
+            from_force[gap] = UNKNOWN_ORDER;
+        }
+    } else {
+        impact(gap, wall.x);
+    }
+}
+
+// Returns restitution and its derivative at an approach speed.
+fn restitution(gap: u32, side: u32, speed: Real) -> array<Real, 2> {
+    let law = laws[cell.law_index][2u * gap + side];
+    var value = law[0];
+    var slope: Real = 0.0;
+    if law[1] != 0.0 {
+        var ratio: Real = 1.0;
+        // Doubles have no powers.
+        if law[2] == 1.0 {
+            ratio = speed;
+        } else if law[2] == 2.0 {
+            ratio = speed * speed;
+        } else if law[2] == 0.5 {
+            ratio = sqrt(speed);
+        } else {
+            ratio = Real(pow(f32(speed), f32(law[2])));
+        }
+        value += law[1] * ratio;
+        slope = law[1] * law[2] * ratio / max(speed, 1e-30);
+    }
+    let is_inside = value >= 0.0 && value <= 1.0;
+    return array<Real, 2>(clamp(value, Real(0.0), Real(1.0)), select(Real(0.0), slope, is_inside));
+}
+
+// Returns the leaving speed of a flight that is not followed in a series of impacts, for the point that is loaded.
+fn lowest_speed(domain: u32, gap: u32) -> Real {
+    return sqrt(2.0 * LOWEST_FLIGHT * flow.length * abs(product(acceleration_row(domain, gap), 0u)));
+}
+
+// Processes an impact, after which the gap leaves the wall, or a lasting contact begins.
+fn impact(gap: u32, side: u32) {
+    let approach = sign_of(side) * rate_of_gap(gap);
+    let law = restitution(gap, side, approach);
+    let e = law[0];
+    let leaving = e * approach;
+    let is_rigid = last_kind(gap, side) == LAST_RIGID;
+    var before: State = motion.q;
+    var kept = 0u;
+    var lasts = false;
+    var next = motion.q;
+    var pressing: Real = 0.0;
+    for (var trial = 0u; trial <= GAPS; trial++) {
+        let let_go = joint_impact(gap, side, kept);
+        // First the gap leaves its wall; then, if it is slow, contact may last.
+        lasts = false;
+        var is_slow = false;
+        var chosen_gaps = gap_modes;
+        var chosen_slips = slips;
+        for (var stops = 0u; stops < 2u; stops++) {
+            if stops == 1u && !(is_slow && is_rigid) {
+                break;
+            }
+            var q = before;
+            let change = select((1.0 + e) * approach, approach, stops == 1u);
+            for (var i = 0u; i < COORDINATES; i++) {
+                q[2u * i + 1u] -= sign_of(side) * kick[i] * change;
+            }
+            q[2u * gap + 1u] = select(-sign_of(side) * leaving, Real(0.0), stops == 1u);
+            tried_gaps = gap_modes;
+            for (var other = 0u; other < GAPS; other++) {
+                if ((let_go >> other) & 1u) == 1u {
+                    tried_gaps[other] = before_last(other, (gap_modes[other] + 1u) % 2u);
+                }
+            }
+            if stops == 1u {
+                tried_gaps[gap] = STUCK + side;
+            }
+            let fits = slide_after_jump(q, change != 0.0, gap, select(SIDE_NONE, side, stops == 1u));
+            if stops == 1u {
+                lasts = fits && is_stuck(tried_gaps[gap]);
+                if lasts {
+                    next = q;
+                    chosen_gaps = tried_gaps;
+                    chosen_slips = tried_slips;
+                }
+                break;
+            }
+            next = q;
+            chosen_gaps = tried_gaps;
+            chosen_slips = tried_slips;
+            let domain = domain_of(tried_gaps, tried_slips);
+            let line = distance_line(gap, 0.0, 1u - side);
+            pressing = lead(line, domain, q, 2u).value;
+            load_point(q);
+            is_slow = leaving <= max(laws[cell.law_index][2u * gap + side][3], lowest_speed(domain, gap));
+            if is_slow && !is_rigid && pressing > 0.0 {
+                tried_gaps[gap] = select(PRESSED, ONSET, leaving > 0.0) + side;
+                if lead(line, domain_of(tried_gaps, tried_slips), q, 2u).value > 0.0 {
+                    lasts = true;
+                    chosen_gaps = tried_gaps;
+                }
+            }
+        }
+        tried_gaps = chosen_gaps;
+        tried_slips = chosen_slips;
+        // Gaps that would fly too low rest on, or two walls in a corner would be hit in turn infinitely often.
+        var low = 0u;
+        let domain = domain_of(tried_gaps, tried_slips);
+        for (var other = 0u; other < GAPS; other++) {
+            if low == 0u && ((let_go >> other) & 1u) == 1u {
+                let at = (gap_modes[other] + 1u) % 2u;
+                let presses = lead(distance_line(other, 0.0, 1u - at), domain, next, 2u).value > 0.0;
+                load_point(next);
+                if presses && -sign_of(at) * next[2u * other + 1u] <= lowest_speed(domain, other) {
+                    low = 1u << other;
+                }
+            }
+        }
+        kept |= low;
+        if low == 0u {
+            break;
+        }
+    }
+    if !lasts && !(pressing > 0.0) && approach < GRAZING_SPEED * flow.speed {
+        tally.grazes += 1u;
+    }
+    kick_gap = gap;
+    kick_factor = select(1.0 + e + law[1] * approach, Real(1.0), lasts && is_rigid);
+    motion.q = next;
+    count_event(gap, side);
+    if !lasts {
+        tally.impacts += 1u;
+    }
+    gap_modes[gap] = tried_gaps[gap];
+    change_modes(ELEMENTS);
+    if is_stuck(gap_modes[gap]) {
+        wall_side[gap] = SIDE_NONE;
+    } else {
+        leave(gap, select(side, 1u - side, gap_modes[gap] >= PRESSED));
+    }
+}
+
+// Computes the changes of all rates by an impulse that changes the gap's rate by 1, and returns the gaps at rest on rigid walls that it lets
+// go, as bits. The others stay at rest in the same impact, because their walls push. Gaps in `kept` rest on in any case.
+fn joint_impact(gap: u32, side: u32, kept: u32) -> u32 {
+    var resting: array<u32, 2>;
+    var count_of_resting = 0u;
+    for (var other = 0u; other < GAPS; other++) {
+        if other != gap && is_stuck(gap_modes[other]) {
+            resting[count_of_resting] = other;
+            count_of_resting += 1u;
+        }
+    }
+    // The last trial repeats the first one, if no set of released gaps fits.
+    for (var n = 0u; n <= (1u << count_of_resting); n++) {
+        iterations += 1u;
+        let is_last = n == (1u << count_of_resting);
+        let released = select(n, 0u, is_last);
+        // Shares of the impulse that the walls of held gaps add.
+        var shares = array<Real, 2>(0.0, 0.0);
+        var held: array<u32, 2>;
+        var count_of_held = 0u;
+        for (var bit = 0u; bit < count_of_resting; bit++) {
+            if ((released >> bit) & 1u) == 0u {
+                held[count_of_held] = resting[bit];
+                count_of_held += 1u;
+            }
+        }
+        if count_of_held == 1u {
+            shares[0] = mobility(held[0], gap) / mobility(held[0], held[0]);
+        } else if count_of_held == 2u {
+            let a = mobility(held[0], held[0]);
+            let b = mobility(held[0], held[1]);
+            let c = mobility(held[1], held[1]);
+            let inverse = 1.0 / (a * c - b * b);
+            shares[0] = inverse * (c * mobility(held[0], gap) - b * mobility(held[1], gap));
+            shares[1] = inverse * (a * mobility(held[1], gap) - b * mobility(held[0], gap));
+        }
+        var own = mobility(gap, gap);
+        for (var k = 0u; k < count_of_held; k++) {
+            own -= shares[k] * mobility(held[k], gap);
+        }
+        for (var i = 0u; i < COORDINATES; i++) {
+            var moved = mobility(i, gap);
+            for (var k = 0u; k < count_of_held; k++) {
+                moved -= shares[k] * mobility(i, held[k]);
+            }
+            kick[i] = moved / own;
+        }
+        kick[gap] = 1.0;
+        var fits = true;
+        for (var k = 0u; k < count_of_held; k++) {
+            kick[held[k]] = 0.0;
+            let is_kept_here = ((kept >> held[k]) & 1u) == 1u;
+            let at = (gap_modes[held[k]] + 1u) % 2u;
+            // The wall pushes the gap away, so that all rates change by -side kick.
+            let push = -sign_of(side) * sign_of(at) * shares[k];
+            fits = fits && (is_kept_here || push >= -ROUNDING * sqrt(mobility(gap, gap) / mobility(held[k], held[k])));
+        }
+        var let_go = 0u;
+        for (var bit = 0u; bit < count_of_resting; bit++) {
+            if ((released >> bit) & 1u) == 1u {
+                let other = resting[bit];
+                let at = (gap_modes[other] + 1u) % 2u;
+                let_go |= 1u << other;
+                fits = fits && ((kept >> other) & 1u) == 0u && -sign_of(side) * kick[other] * sign_of(at) <= 0.0;
+            }
+        }
+        if fits || is_last {
+            return let_go;
+        }
+    }
+    return 0u;
+}
+
+fn mobility(i: u32, j: u32) -> Real {
+    return number(AT_MOBILITY + i * COORDINATES + j);
+}
+
+// Chooses modes of friction and of other gaps at rest after a jump of the rates to `q`. The modes that are tried are those of the gaps. Returns
+// whether there is a consistent choice.
+fn slide_after_jump(q: State, jumps: bool, gap: u32, stopped: u32) -> bool {
+    var after = q;
+    for (var other = 0u; other < GAPS; other++) {
+        rest_side[other] = SIDE_NONE;
+        if is_stuck(tried_gaps[other]) {
+            rest_side[other] = (tried_gaps[other] + 1u) % 2u;
+        }
+    }
+    if stopped != SIDE_NONE {
+        rest_side[gap] = stopped;
+    }
+    tried_slips = slips;
+    for (var i = 0u; i < ELEMENTS; i++) {
+        rest_element[i] = 0u;
+        if i >= shape.elements {
+            continue;
+        }
+        let row = AT_ELEMENTS + i * (WIDTH + 1u);
+        var moved: Real = 0.0;
+        var size_of_move: Real = 0.0;
+        var rate = number(row + WIDTH - 1u);
+        var size = abs(rate);
+        for (var j = 0u; j < COORDINATES; j++) {
+            let factor = number(row + 2u * j + 1u);
+            moved += factor * kick[j];
+            size_of_move += abs(factor * kick[j]);
+            rate += factor * after[2u * j + 1u];
+            size += abs(factor * after[2u * j + 1u]);
+        }
+        if jumps && abs(moved) > ROUNDING * size_of_move {
+            if abs(rate) <= ROUNDING * size {
+                rest_element[i] = 1u;
+                tried_slips[i] = STICKS;
+            } else {
+                tried_slips[i] = select(BACKWARD, FORWARD, rate > 0.0);
+            }
+        } else {
+            rest_element[i] = select(0u, 1u, slips[i] == STICKS);
+        }
+    }
+    return choose(q, false);
+}
+
+// Lists all elements at rest: gaps on rigid walls, and elements that stick.
+fn list_rest(domain: u32) {
+    for (var gap = 0u; gap < GAPS; gap++) {
+        rest_side[gap] = SIDE_NONE;
+        let mode = gap_modes[gap];
+        if is_stuck(mode) {
+            rest_side[gap] = contact_of(mode);
+        } else if mode < ONSET && wall_side[gap] != SIDE_NONE && is_kept(domain, gap) {
+            let wall = wall_ahead(gap, wall_side[gap]);
+            let is_last = wall.y != NO_WALL && wall.y + 1u == wall_count(gap, wall.x);
+            if is_last && wall.x == wall_side[gap] && last_kind(gap, wall.x) == LAST_RIGID {
+                rest_side[gap] = wall.x;
+            }
+        }
+    }
+    for (var i = 0u; i < ELEMENTS; i++) {
+        rest_element[i] = select(0u, 1u, i < shape.elements && slips[i] == STICKS);
+    }
+    tried_gaps = gap_modes;
+    tried_slips = slips;
+}
+
+// Processes a sliding rate that vanishes.
+fn end_sliding(i: u32) {
+    list_rest(present_domain());
+    rest_element[i] = 1u;
+    let before = slips[i];
+    _ = choose(motion.q, false);
+    if tried_slips[i] == before {
+        // The rate only touches 0, or begins on the wrong side of it.
+        tally.grazes += 1u;
+        count(1u);
+        from_rate[i] = UNKNOWN_ORDER;
+        return;
+    }
+    change_modes(i);
+}
+
+// Processes an element that breaks away.
+fn begin_sliding(i: u32, next: u32) {
+    let before = present_domain();
+    let slip = slips[i];
+    slips[i] = next;
+    let domain = present_domain();
+    var freed = 0u;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        if !(is_kept(before, gap) && !is_still(domain, gap)) {
+            continue;
+        }
+        freed |= 1u << gap;
+        if wall_side[gap] == SIDE_NONE || gap_modes[gap] >= ONSET {
+            continue;
+        }
+        let wall = wall_ahead(gap, wall_side[gap]);
+        let is_rigid = wall.y != NO_WALL && wall.y + 1u == wall_count(gap, wall.x) && last_kind(gap, wall.x) == LAST_RIGID;
+        if is_rigid && wall.x == wall_side[gap] && lead(distance_line(gap, 0.0, 1u - wall.x), domain, motion.q, 3u).value > 0.0 {
+            // The wall holds the gap from here on.
+            slips[i] = slip;
+            count_event(gap, wall.x);
+            gap_modes[gap] = STUCK + wall.x;
+            wall_side[gap] = SIDE_NONE;
+            return;
+        }
+    }
+    from_rate[i] = 2u;
+    count_slip(STICKING_ENDS);
+    for (var gap = 0u; gap < GAPS; gap++) {
+        if ((freed >> gap) & 1u) == 1u {
+            wall_order[gap] = RELEASE_ORDER;
+            if gap_modes[gap] >= ONSET && gap_modes[gap] < PRESSED {
+                from_force[gap] = 1u;
+            }
+        }
+    }
+}
+
+// Decides all modes anew that depend on forces, after a jump of forces or rates. The exempt gap or element has just been decided.
+fn settle(exempt_gap: u32, exempt_element: u32) {
+    for (var n = 0u; n < MOST_DECISIONS; n++) {
+        let domain = present_domain();
+        if settle_pushing(domain) {
+            continue;
+        }
+        list_rest(domain);
+        if exempt_gap < GAPS {
+            rest_side[exempt_gap] = SIDE_NONE;
+        }
+        if exempt_element < ELEMENTS {
+            rest_element[exempt_element] = 0u;
+        }
+        if !choose(motion.q, true) {
+            tally.grazes += 1u;
+            break;
+        }
+        if are_tried_modes_present() {
+            break;
+        }
+        change_modes(ELEMENTS);
+    }
+}
+
+fn are_tried_modes_present() -> bool {
+    var same = true;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        same = same && tried_gaps[gap] == gap_modes[gap];
+    }
+    for (var i = 0u; i < ELEMENTS; i++) {
+        same = same && tried_slips[i] == slips[i];
+    }
+    return same;
+}
+
+// Decides contact onsets and walls that only push anew. Returns whether a mode has changed.
+fn settle_pushing(domain: u32) -> bool {
+    for (var gap = 0u; gap < GAPS; gap++) {
+        let mode = gap_modes[gap];
+        let is_onset = mode >= ONSET && mode < PRESSED;
+        let is_open = mode >= OPEN && mode < STUCK;
+        let side = select(pushing_side(gap), contact_of(mode), is_onset || is_open);
+        let is_new = from_force[gap] == UNKNOWN_ORDER;
+        if side == SIDE_NONE || (from_force[gap] > 0u && !is_new) || is_kept(domain, gap) {
+            continue;
+        }
+        var line = distance_line(gap, 0.0, 1u - side);
+        if !is_onset {
+            line = force_line(gap, side, 1.0);
+        }
+        let found = lead(line, domain, motion.q, select(0u, 2u, is_onset));
+        if is_new {
+            // The wall's mode has just been decided.
+            from_force[gap] = found.order;
+            if found.order > 0u {
+                continue;
+            }
+        }
+        if is_onset && !(found.value > 0.0) {
+            end_contact(gap, side);
+            if wall_side[gap] != SIDE_NONE {
+                leave(gap, side);
+            }
+            return true;
+        }
+        if is_open && found.value > 0.0 {
+            begin_force(gap, side);
+            from_force[gap] = UNKNOWN_ORDER;
+            return true;
+        }
+        if !is_onset && !is_open && found.value < 0.0 {
+            end_contact(gap, side);
+            gap_modes[gap] = OPEN + side;
+            from_force[gap] = UNKNOWN_ORDER;
+            return true;
+        }
+    }
+    return false;
+}
+
+// Enters the modes that were chosen, and counts the changes: of friction first, if the rate of the element `stopped` has vanished.
+fn change_modes(stopped: u32) {
+    for (var n = 0u; n < 2u; n++) {
+        if (n == 0u) == (stopped < ELEMENTS) {
+            change_slips(stopped);
+            continue;
+        }
+        for (var gap = 0u; gap < GAPS; gap++) {
+            if is_stuck(gap_modes[gap]) && tried_gaps[gap] < ONSET {
+                let side = contact_of(gap_modes[gap]);
+                end_contact(gap, side);
+                leave(gap, side);
+            } else if gap_modes[gap] < ONSET && is_stuck(tried_gaps[gap]) {
+                count_event(gap, contact_of(tried_gaps[gap]));
+                wall_side[gap] = SIDE_NONE;
+            }
+            gap_modes[gap] = tried_gaps[gap];
+        }
+    }
+    var q = motion.q;
+    hold(&q, 1.0);
+    motion.q = q;
+}
+
+// Enters the chosen modes of friction.
+fn change_slips(stopped: u32) {
+    for (var i = 0u; i < ELEMENTS; i++) {
+        let before = slips[i];
+        let after = tried_slips[i];
+        if before == after {
+            continue;
+        }
+        slips[i] = after;
+        from_rate[i] = 0u;
+        if after != STICKS {
+            load_sizes(motion.q);
+            let line = rate_line(i, 1.0);
+            if abs(value_of(line, 0u)) <= ROUNDING * size_of_value(line) {
+                from_rate[i] = UNKNOWN_ORDER;
+            }
+        }
+        if before == STICKS {
+            count_slip(STICKING_ENDS);
+        } else if after == STICKS {
+            count_slip(NO_SYMBOL);
+        } else if i == stopped {
+            count_slip(SLIDING_REVERSES);
+        }
+    }
+}
+
+// Enters the stage that begins at the present phase: what depends on forces is decided anew.
+fn enter_stage() {
+    stage = u32(table[shape.schedule + 3u * tally.next_change + 2u]);
+    tally.next_change += 1u;
+    settle(GAPS, ELEMENTS);
+    complete_orders();
+}
+
+// Returns to the begin of the schedule at phase 0. The last stage holds until the first change, which may be there.
+fn restart_schedule() {
+    tally.next_change = 0u;
+    if shape.changes > 0u && change_step() == 0u && change_theta() == 0.0 {
+        enter_stage();
+    }
+}

@@ -1,0 +1,225 @@
+// Taylor series of the motion, and linear functions of it.
+
+// Terms of the series, one point after the other.
+var<private> series: array<Real, SERIES>;
+// Sizes of the terms that have been added up in a point.
+var<private> sizes: array<Real, WIDTH>;
+
+// Rounding error of a sum, relative to the size of its terms.
+const ROUNDING: Real = 32.0 * ULP;
+
+// Derivatives that are compared with zero.
+const DERIVATIVES: u32 = 4u;
+
+// A linear function of a point: `scale` times a row of the table, factors of one displacement and of its rate, and a constant.
+struct Line {
+    scale: Real,
+    row: u32,
+    entry: u32,
+    factor: Real,
+    rate_factor: Real,
+    constant: Real,
+}
+
+fn row_line(row: u32, scale: Real) -> Line {
+    return Line(scale, row, 0u, 0.0, 0.0, 0.0);
+}
+
+// Distance of a gap from a position, in a direction.
+fn distance_line(gap: u32, at: Real, direction: u32) -> Line {
+    let sign = sign_of(direction);
+    return Line(0.0, 0u, 2u * gap, -sign, 0.0, sign * at);
+}
+
+// Force of the last wall of a side.
+fn force_line(gap: u32, side: u32, factor: Real) -> Line {
+    let nth = wall_count(gap, side) - 1u;
+    let law = spring(gap, side, nth);
+    let sign = factor * sign_of(side);
+    return Line(0.0, 0u, 2u * gap, sign * law[0], sign * law[1], factor * law[2] - sign * law[0] * wall_at(gap, side, nth));
+}
+
+// Sliding rate of an element.
+fn rate_line(i: u32, factor: Real) -> Line {
+    return row_line(AT_ELEMENTS + i * (WIDTH + 1u), factor);
+}
+
+fn element_force(i: u32) -> Real {
+    return number(AT_ELEMENTS + i * (WIDTH + 1u) + WIDTH);
+}
+
+fn acceleration_row(domain: u32, i: u32) -> u32 {
+    return domain + IN_DOMAIN_ACCELERATIONS + i * WIDTH;
+}
+
+// Force with which a rigid wall pushes a gap that rests on it, or a constant if other constraints hold the gap.
+fn push_line(domain: u32, gap: u32) -> Line {
+    return row_line(domain + IN_DOMAIN_PUSHES + gap * WIDTH, 1.0);
+}
+
+fn has_push(domain: u32, gap: u32) -> bool {
+    return number(domain + IN_DOMAIN_HAS_PUSH + gap) != 0.0;
+}
+
+// Force that holds a sticking element.
+fn hold_row(domain: u32, i: u32) -> u32 {
+    return domain + IN_DOMAIN_HOLDS + i * WIDTH;
+}
+
+fn has_hold(domain: u32, i: u32) -> bool {
+    return number(domain + IN_DOMAIN_HAS_HOLD + i) != 0.0;
+}
+
+// Whether constraints keep a gap where it is.
+fn is_still(domain: u32, gap: u32) -> bool {
+    return number(domain + IN_DOMAIN_STILL + gap) != 0.0;
+}
+
+// Longest step of a domain.
+fn unit_of(domain: u32) -> Real {
+    return number(domain);
+}
+
+// Value of a row at term `k`.
+fn product(row: u32, k: u32) -> Real {
+    let t = shape.machine + row;
+    let p = k * WIDTH;
+    var sum: Real = 0.0;
+    //% for k in 0..WIDTH
+    sum += table[t + $ku] * series[p + $ku];
+    //% end
+    return sum;
+}
+
+fn size_of_product(row: u32) -> Real {
+    let t = shape.machine + row;
+    var sum: Real = 0.0;
+    //% for k in 0..WIDTH
+    sum += abs(table[t + $ku]) * sizes[$ku];
+    //% end
+    return sum;
+}
+
+fn value_of(line: Line, k: u32) -> Real {
+    let p = k * WIDTH;
+    var value = (line.factor * series[p + line.entry] + line.rate_factor * series[p + line.entry + 1u]) + line.constant * series[p + WIDTH - 1u];
+    if line.scale != 0.0 {
+        value += line.scale * product(line.row, k);
+    }
+    return value;
+}
+
+// Size of the terms that are added up in a value.
+fn size_of_value(line: Line) -> Real {
+    var size = (abs(line.factor) * sizes[line.entry] + abs(line.rate_factor) * sizes[line.entry + 1u]) + abs(line.constant) * sizes[WIDTH - 1u];
+    if line.scale != 0.0 {
+        size += abs(line.scale) * size_of_product(line.row);
+    }
+    return size;
+}
+
+// Makes a state at the present phase the first term.
+fn load_point(q: State) {
+    var y = q;
+    for (var i = 0u; i < DIM; i++) {
+        series[i] = y[i];
+    }
+    for (var m = 0u; m < HARMONICS; m++) {
+        let place = shape.phasors + 2u * (HARMONICS * tally.step + m);
+        let c = table[place];
+        let s = table[place + 1u];
+        let turn = small_turn(motion.theta * Real(shape.orders[m]) * flow.omega * flow.h);
+        series[DIM + 2u * m] = c + (turn.x * c - turn.y * s);
+        series[DIM + 2u * m + 1u] = s + (turn.y * c + turn.x * s);
+    }
+    series[WIDTH - 1u] = 1.0;
+}
+
+// Makes a tangent vector the first term.
+fn load_vector(u: State) {
+    var y = u;
+    for (var i = 0u; i < DIM; i++) {
+        series[i] = y[i];
+    }
+    for (var i = DIM; i < WIDTH; i++) {
+        series[i] = 0.0;
+    }
+}
+
+// Computes term `k + 1`: the time derivative of term `k`, times `factor`.
+fn differentiate(domain: u32, k: u32, factor: Real) {
+    let from_term = k * WIDTH;
+    let to_term = from_term + WIDTH;
+    for (var i = 0u; i < COORDINATES; i++) {
+        series[to_term + 2u * i] = factor * series[from_term + 2u * i + 1u];
+        series[to_term + 2u * i + 1u] = factor * product(acceleration_row(domain, i), k);
+    }
+    for (var m = 0u; m < HARMONICS; m++) {
+        let turn = factor * Real(shape.orders[m]) * flow.omega;
+        let at = DIM + 2u * m;
+        series[to_term + at] = -turn * series[from_term + at + 1u];
+        series[to_term + at + 1u] = turn * series[from_term + at];
+    }
+    series[to_term + WIDTH - 1u] = 0.0;
+    iterations += 1u;
+}
+
+// Computes the terms of a step of length `h`.
+fn expand(domain: u32, h: Real) {
+    for (var k = 0u; k < TERMS; k++) {
+        differentiate(domain, k, h / Real(k + 1u));
+    }
+}
+
+// Returns the state after a share of the step.
+fn state_after(share: Real) -> State {
+    var q: State;
+    for (var i = 0u; i < DIM; i++) {
+        var sum: Real = 0.0;
+        //% for k in 0..TERMS down
+        sum = sum * share + series[$(k+1)u * WIDTH + i];
+        //% end
+        q[i] = sum * share + series[i];
+    }
+    return q;
+}
+
+// The first derivative of a line that is not zero within rounding, and its order.
+struct Lead {
+    order: u32,
+    value: Real,
+}
+
+// Returns the first such derivative of order `least` or higher, at a state and at the present phase. Only its sign has a meaning.
+fn lead(line: Line, domain: u32, q: State, least: u32) -> Lead {
+    load_point(q);
+    for (var i = 0u; i < WIDTH; i++) {
+        sizes[i] = abs(series[i]);
+    }
+    let unit = unit_of(domain);
+    var order = 0u;
+    for (; order < least + DERIVATIVES; order++) {
+        if order >= least {
+            let value = value_of(line, order);
+            if abs(value) > ROUNDING * size_of_value(line) {
+                return Lead(order, value);
+            }
+        }
+        differentiate(domain, order, unit);
+        for (var i = 0u; i < COORDINATES; i++) {
+            let rate = sizes[2u * i + 1u];
+            // The rates of the sizes: all of the old sizes are needed for each.
+            next_sizes[2u * i] = unit * rate;
+            next_sizes[2u * i + 1u] = unit * size_of_product(acceleration_row(domain, i));
+        }
+        for (var i = 0u; i < DIM; i++) {
+            sizes[i] = next_sizes[i];
+        }
+        for (var i = DIM; i < WIDTH; i++) {
+            sizes[i] = abs(series[(order + 1u) * WIDTH + i]);
+        }
+    }
+    return Lead(order, 0.0);
+}
+
+var<private> next_sizes: State;

@@ -1,0 +1,262 @@
+// What observers ask the engine of motion of an oscillator with one gap. Machines answer the same questions in machine/machine.wgsl.
+
+// Loads what the motion needs at the begin of a dispatch. The first part does not need tangent vectors.
+fn resume_motion() {
+    if STAGES || INTERVALS {
+        cell.flow_index = present_flow();
+    }
+    fetch_constants();
+}
+
+fn prepare_motion() {
+    sync_overtones(tally.step, motion.theta);
+    if !STAGES && motion.bound == 0.0 {
+        // A start: no pass has computed the bound yet.
+        renew_bound();
+    }
+}
+
+// Stores what the motion needs, at the end of a dispatch.
+fn suspend_motion() {}
+
+// Begins the schedule of stages at phase 0.
+fn begin_schedule() {
+    if STAGES {
+        restart_schedule();
+    }
+}
+
+// Starts the phase of the forcing anew at phase 0.
+fn restart_phase() {
+    motion.phasor = array<Real, 2>(1.0, 0.0);
+}
+
+// Whether the energy of the transient keeps the gap off the walls from now on.
+fn is_non_impacting() -> bool {
+    if tally.mode != MODE_FREE || settings.max_period == 0u {
+        return false;
+    }
+    let s = flows[cell.flow_index].steady;
+    let q = motion.q;
+    if shapes[cell.flow_index].must_rest == 1u && (q[2] != 0.0 || q[3] != 0.0) {
+        return false;
+    }
+    return derivative_bound(q[0] - s[0], q[1] - s[1], q[2] - s[2], q[3] - s[3]) < flows[cell.flow_index].contact_free_size;
+}
+
+// Returns the growth of the transient of contact-free motion per period, in octaves.
+fn contact_free_growth() -> Real {
+    return flows[cell.flow_index].transient_growth;
+}
+
+// Returns the present state with the gap measured from the middle, in every domain.
+fn strobe_state() -> State {
+    var q = motion.q;
+    if tally.mode != MODE_FREE {
+        q[0] += flows[cell.flow_index].walls[side_of(tally.mode)];
+    }
+    return q;
+}
+
+// Returns the largest displacement of a strobe, whose rounding error limits distances. In contact, the gap is the sum of
+// the wall's position and the penetration, which may have opposite signs.
+fn largest_position(q: State) -> Real {
+    let position = largest_displacement(q);
+    if tally.mode == MODE_FREE {
+        return position;
+    }
+    return max(position, abs(flows[cell.flow_index].walls[side_of(tally.mode)]));
+}
+
+// Returns the forcing frequency in the unit of rates.
+fn unit_of_frequency() -> Real {
+    return flows[cell.flow_index].domains[0].angle;
+}
+
+fn scale_of_length() -> Real {
+    return flows[cell.flow_index].length;
+}
+
+fn escape_size() -> Real {
+    return flows[cell.flow_index].escape;
+}
+
+// Whether forces change at given phases.
+fn has_stages() -> bool {
+    return STAGES && shape.changes > 0u;
+}
+
+// Whether the gap may be at `to` in the present domain, at a phase without event. The contact onset has no bounds.
+fn keeps_domain(to: State) -> bool {
+    return tally.mode >= MODE_ONSET || beyond(to) < 0.0;
+}
+
+// Returns how far `to` lies beyond the nearest end of the present domain; negative inside.
+fn beyond(to: State) -> Real {
+    if tally.mode == MODE_FREE {
+        return max(to[0] - walls[0], walls[1] - to[0]);
+    }
+    let side = side_of(tally.mode);
+    return sign_of(side) * (walls[side] - to[0]);
+}
+
+// Whether Newton's method may put the lane at `to`. In the contact onset the gap is in front of its wall.
+fn may_place(to: State) -> bool {
+    let leaves_onset = is_onset() && !(beyond(to) > 0.0);
+    return !leaves_onset && tally.order == 0u;
+}
+
+// Puts the lane at a strobe state, in its present modes. Newton's method neither starts nor ends on a wall.
+fn place(to: State) {
+    motion.q = to;
+    if tally.mode != MODE_FREE {
+        motion.q[0] -= walls[side_of(tally.mode)];
+    }
+    if sticks() {
+        motion.q[0] = 0.0;
+        motion.q[1] = 0.0;
+    }
+    tally.order = 0u;
+    motion.bound = 0.0;
+}
+
+// Keeps the modes where Newton's method starts, and returns to them.
+fn keep_modes() {
+    search.newton_start_mode = tally.mode;
+    search.newton_start_origin = tally.origin;
+    search.newton_start_interval = tally.interval;
+}
+
+fn restore_modes() {
+    tally.mode = search.newton_start_mode;
+    tally.origin = search.newton_start_origin;
+    if INTERVALS && tally.interval != search.newton_start_interval {
+        tally.interval = search.newton_start_interval;
+        cell.flow_index = present_flow();
+        fetch_constants();
+    }
+}
+
+// Error of a computed fixed point in rounding errors of the motion, before amplification.
+const MISPLACED: Real = 8.0;
+
+// Whether a motion without events has its limit beyond the wall, by more than the rounding error of a period.
+fn leaves_domain(to: State) -> bool {
+    let unsure = MISPLACED * ULP * measures.position_scale * Real(limit_of(1.0));
+    let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_ONSET;
+    return may_leave && beyond(to) > unsure;
+}
+
+// Whether the motion is away from all walls, so that it may be moved a little.
+fn is_free() -> bool {
+    return tally.mode == MODE_FREE && tally.order == 0u;
+}
+
+// Loads what results need of the motion.
+fn conclude_motion() {
+    if INTERVALS {
+        // Walls are the same in all stages.
+        cell.flow_index = flow_of_interval(cell.flow_index);
+    }
+}
+
+fn mesh_fraction(periods: u32) -> Real {
+    let f = cell.flow_index;
+    let right = Real(tally.mesh_right) * flows[f].domains[1].share;
+    let left = Real(tally.mesh_left) * flows[f].domains[2].share;
+    let steps = Real(tally.mesh_whole) + ((right + left) + motion.mesh_part);
+    return steps / (Real(periods) * Real(shapes[f].steps));
+}
+
+// Puts a lane at its start.
+fn begin_motion() {
+    tally.mode = MODE_FREE;
+    tally.origin = SIDE_NONE;
+    motion.q = starts[lane];
+    let walls = flows[cell.flow_index].walls;
+    if motion.q[0] > walls[0] {
+        start_beyond(SIDE_RIGHT);
+    } else if motion.q[0] < walls[1] {
+        start_beyond(SIDE_LEFT);
+    }
+}
+
+// A start beyond the last wall of a side is a sustained contact.
+fn start_beyond(side: u32) {
+    if INTERVALS {
+        while sign_of(side) * (motion.q[0] - flows[cell.flow_index].walls[side]) > 0.0 && shapes[cell.flow_index].behind[side] != NO_FLOW {
+            cell.flow_index = shapes[cell.flow_index].behind[side];
+            tally.interval = max(tally.interval, side) + 2u;
+        }
+        if watches_force() && force_inside(motion.q) < 0.0 {
+            cell.flow_index = shapes[cell.flow_index].behind[side];
+            tally.interval += OPEN - 2u;
+            tally.origin = side;
+        }
+        if sign_of(side) * (motion.q[0] - flows[cell.flow_index].walls[side]) <= 0.0 {
+            return;
+        }
+    }
+    motion.q[0] -= flows[cell.flow_index].walls[side];
+    tally.mode = MODE_SUSTAINED + side;
+    tally.origin = side;
+}
+
+// Adds the symbol of a flight that ends on `side`. The first flight comes from no wall and has no symbol.
+fn add_symbol_of_flight(side: u32) {
+    var symbol: u32;
+    if tally.mode != MODE_FREE {
+        symbol = select(4u, 1u, side == SIDE_RIGHT);
+    } else if is_behind_wall() {
+        symbol = select(4u, 1u, side_of_interval() == SIDE_RIGHT);
+    } else if tally.origin == SIDE_RIGHT {
+        symbol = select(3u, 2u, side == SIDE_RIGHT);
+    } else if tally.origin == SIDE_LEFT {
+        symbol = select(6u, 5u, side == SIDE_LEFT);
+    } else {
+        return;
+    }
+    add_symbol(symbol);
+}
+
+// Follows the motion to the next stop phase. Returns false if the lane or its iterations in this dispatch end before.
+// Lanes wait for each other where chatter begins, too.
+fn fly_to_stop_phase() -> bool {
+    if CHATTER {
+        while has_work() && iterations < settings.iterations {
+            if flight_to_chatter() {
+                return true;
+            }
+            if chatters {
+                follow_chatter(tally.origin);
+            }
+        }
+    } else {
+        return flight_to_chatter();
+    }
+    return false;
+}
+
+// Follows the motion to the next stop phase, or to an impact that begins a series of short flights.
+fn flight_to_chatter() -> bool {
+    chatters = false;
+    while has_work() && !chatters && iterations < settings.iterations {
+        if STAGES {
+            change_stage();
+            if motion.bound == 0.0 {
+                renew_bound();
+            }
+        }
+        if scan() == SCAN_BUDGET {
+            break;
+        }
+        if careful() {
+            return true;
+        }
+        // Each step of a lane that is measured is a pass.
+        if !MEASURE && tally.passes_in_period > settings.passes_per_period {
+            tally.status = STATUS_TOO_STIFF;
+        }
+    }
+    return false;
+}

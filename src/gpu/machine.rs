@@ -1,0 +1,380 @@
+//! Constants of machines: oscillators of up to eight coordinates with several gaps and dry friction.
+//!
+//! Lanes look the equations of motion of their domain up in a table. `shaders/machine/layout.wgsl` describes it.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use crate::record::limits::MOST_STEPS;
+use rattlemap_dynamics::model::{Contact, Law, Machine, Oscillator, Side, State, Wall};
+use rattlemap_dynamics::reference::machine::{StartModes, System};
+
+/// Largest number of domains in a table.
+pub(super) const MOST_DOMAINS: usize = 4096;
+
+/// Numbers of a flow, of its shape and of a law in the shader.
+pub(super) const FLOW: usize = 5;
+pub(super) const SHAPE: usize = 27;
+pub(super) const LAW: usize = 24;
+
+/// Numbers of a start beside the state: the packed modes.
+pub(super) const MODES: usize = 3;
+
+/// Most steps of the grid per turn of the highest harmonic: a step is at most a radian.
+const STEPS_PER_TURN: u32 = 8;
+
+/// Sizes of machines, for which shaders are compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MachineShape {
+    /// Number of coordinates, at least 2.
+    pub coordinates: u32,
+    /// Number of gaps.
+    pub gaps: u32,
+    /// Most elements with dry friction.
+    pub elements: u32,
+    /// Most harmonics of the force.
+    pub harmonics: u32,
+    /// Most walls on one side of a gap.
+    pub walls: u32,
+    /// Most stages.
+    pub stages: u32,
+}
+
+impl MachineShape {
+    /// Returns the sizes of an oscillator.
+    pub fn of(oscillator: &Oscillator) -> MachineShape {
+        let machine = &*machine_of(oscillator, None);
+        let walls = machine.gaps.iter().flat_map(|gap| &gap.walls).map(Vec::len);
+        MachineShape {
+            coordinates: machine.degrees().max(2) as u32,
+            gaps: machine.gaps.len() as u32,
+            elements: machine.friction.len() as u32,
+            harmonics: machine.drives.len() as u32,
+            walls: walls.max().unwrap_or(0).max(1) as u32,
+            stages: machine.stages.len() as u32,
+        }
+    }
+
+    /// Returns sizes that suffice for both.
+    pub fn and(self, other: MachineShape) -> MachineShape {
+        MachineShape {
+            coordinates: self.coordinates.max(other.coordinates),
+            gaps: self.gaps.max(other.gaps),
+            elements: self.elements.max(other.elements),
+            harmonics: self.harmonics.max(other.harmonics),
+            walls: self.walls.max(other.walls),
+            stages: self.stages.max(other.stages),
+        }
+    }
+
+    /// Numbers of a lane's state.
+    pub(super) fn dim(&self) -> usize {
+        2 * self.coordinates as usize
+    }
+
+    /// Numbers that forces depend on: the state, two for each harmonic, and 1.
+    fn width(&self) -> usize {
+        self.dim() + 2 * self.harmonics as usize + 1
+    }
+
+    /// Returns the places in the table, by their names in the shader.
+    pub(super) fn places(&self) -> [(&'static str, usize); 12] {
+        let [n, gaps, elements] = [self.coordinates, self.gaps, self.elements].map(|size| size as usize);
+        let (width, sides) = (self.width(), 2 * gaps * self.walls as usize);
+        let walls = n * n;
+        let springs = walls + sides;
+        let of_elements = springs + 3 * sides * self.stages as usize;
+        let still = 1;
+        let has_push = still + gaps;
+        let has_hold = has_push + gaps;
+        let accelerations = has_hold + elements;
+        let pushes = accelerations + n * width;
+        let holds = pushes + gaps * width;
+        [
+            ("WIDTH", width),
+            ("AT_MOBILITY", 0),
+            ("AT_WALLS", walls),
+            ("AT_SPRINGS", springs),
+            ("AT_ELEMENTS", of_elements),
+            ("AT_DOMAINS", of_elements + elements * (width + 1)),
+            ("IN_DOMAIN_STILL", still),
+            ("IN_DOMAIN_HAS_PUSH", has_push),
+            ("IN_DOMAIN_HAS_HOLD", has_hold),
+            ("IN_DOMAIN_ACCELERATIONS", accelerations),
+            ("IN_DOMAIN_PUSHES", pushes),
+            ("IN_DOMAIN_HOLDS", holds),
+        ]
+    }
+
+    fn place(&self, name: &str) -> usize {
+        let found = self.places().into_iter().find(|&(other, _)| other == name);
+        found.map(|(_, place)| place).expect("the place has a name")
+    }
+
+    /// Returns the numbers of a domain in the table.
+    pub(super) fn domain(&self) -> usize {
+        self.place("IN_DOMAIN_HOLDS") + self.elements as usize * self.width()
+    }
+
+    /// Returns the numbers of a machine's table.
+    fn table(&self, domains: usize) -> usize {
+        self.place("AT_DOMAINS") + domains * self.domain()
+    }
+}
+
+/// Returns the machine of an oscillator, or that which moves like it. Its own laws are kept.
+fn machine_of(oscillator: &Oscillator, law: Option<Law>) -> Box<Machine> {
+    match &oscillator.machine {
+        Some(machine) => machine.clone(),
+        None => Box::new(Machine::of(oscillator, law.unwrap_or(Law::both(0.0, 0.0)))),
+    }
+}
+
+/// Returns the number of domains of an oscillator.
+pub(super) fn domain_count(oscillator: &Oscillator) -> usize {
+    let machine = machine_of(oscillator, None);
+    let modes = |walls: &[Vec<Wall>; 2]| walls.iter().map(Vec::len).sum::<usize>() + 1;
+    let of_gaps: usize = machine.gaps.iter().map(|gap| modes(&gap.walls)).product();
+    machine.stages.len() * of_gaps * 3_usize.pow(machine.friction.len() as u32)
+}
+
+/// Returns the bytes of the table of an oscillator.
+pub(super) fn bytes(oscillator: &Oscillator) -> usize {
+    MachineShape::of(oscillator).table(domain_count(oscillator)) * size_of::<f64>()
+}
+
+/// Constants of one machine.
+#[derive(Clone, Debug)]
+pub struct MachineConstants {
+    system: Box<System>,
+    /// Whether the machine has laws of its own.
+    pub(super) has_laws: bool,
+    /// Steps of the grid per forcing period.
+    pub(super) steps: u32,
+    /// Equations of motion without the shape's places.
+    tables: Arc<MachineTable>,
+}
+
+/// What machines share that differ in frequency and contact laws alone.
+#[derive(Debug)]
+pub(super) struct MachineTable {
+    machine: Machine,
+    equations: Vec<rattlemap_dynamics::reference::machine::Equations>,
+}
+
+thread_local! {
+    /// The table that was made last. Neighbouring cells often have the same one.
+    static LAST: RefCell<Option<Arc<MachineTable>>> = const { RefCell::new(None) };
+}
+
+impl MachineConstants {
+    /// Derives the constants of an oscillator. Returns `None` if lanes cannot carry it.
+    pub(super) fn new(oscillator: &Oscillator, requested: Option<u32>) -> Option<MachineConstants> {
+        let machine = machine_of(oscillator, None);
+        let steps = Self::steps(oscillator, requested)?;
+        let system = Box::new(System::new(&machine));
+        let bare = machine.without_laws();
+        let tables = LAST.with_borrow_mut(|last| match last {
+            Some(tables) if tables.machine == bare => Arc::clone(tables),
+            _ => {
+                let tables = Arc::new(MachineTable { machine: bare, equations: system.equations() });
+                *last = Some(Arc::clone(&tables));
+                tables
+            }
+        });
+        Some(MachineConstants { system, has_laws: oscillator.machine.is_some(), steps, tables })
+    }
+
+    /// Returns the steps of the grid per forcing period: `requested`, or as many as the harmonics need.
+    pub(super) fn steps(oscillator: &Oscillator, requested: Option<u32>) -> Option<u32> {
+        let highest = match &oscillator.machine {
+            Some(machine) => machine.highest_order(),
+            None => oscillator.all_harmonics().map(|harmonic| harmonic.order).max().unwrap_or(1),
+        };
+        let steps = requested.unwrap_or(0).max(STEPS_PER_TURN * highest).next_multiple_of(2);
+        (steps <= MOST_STEPS).then_some(steps)
+    }
+
+    /// Returns the forcing period.
+    pub(super) fn period(&self) -> f64 {
+        self.system.period()
+    }
+
+    /// Returns the number of coordinates.
+    pub(super) fn degrees(&self) -> usize {
+        self.system.machine().degrees()
+    }
+
+    /// Returns what identifies the table.
+    pub(super) fn shared(&self) -> &Arc<MachineTable> {
+        &self.tables
+    }
+
+    /// Returns the numbers of the shader's flow.
+    pub(super) fn flow(&self) -> [f64; FLOW] {
+        let (length, speed, escape) = self.system.scales();
+        let escape = if escape.is_finite() { escape } else { -1.0 };
+        [self.system.machine().omega, self.period() / f64::from(self.steps), length, speed, escape]
+    }
+
+    /// Returns the numbers of the shader's shape, given the places of phasors, schedule and table.
+    pub(super) fn shape(&self, [phasors, schedule, table]: [u32; 3]) -> [u32; SHAPE] {
+        let machine = self.system.machine();
+        let elements = self.system.sliding_rates().len() as u32;
+        let mut shape = [0; SHAPE];
+        shape[..7].copy_from_slice(&[
+            self.steps,
+            phasors,
+            schedule,
+            table,
+            machine.schedule.len() as u32,
+            elements,
+            machine.degrees() as u32,
+        ]);
+        for (place, drive) in shape[7..15].iter_mut().zip(&machine.drives) {
+            *place = drive.order;
+        }
+        for gap in 0..machine.gaps.len() {
+            for side in Side::BOTH {
+                let walls = &machine.gaps[gap].walls[side.index()];
+                shape[15 + 2 * gap + side.index()] = walls.len() as u32;
+                shape[21 + 2 * gap + side.index()] = match walls.last().map(|wall| wall.contact) {
+                    None => 0,
+                    Some(Contact::Impact) => 3,
+                    Some(Contact::Rigid) => 4,
+                    Some(_) if self.system.is_pushing(gap, side) => 2,
+                    Some(_) => 1,
+                };
+            }
+        }
+        shape
+    }
+
+    /// Returns the phasors of the grid: cosine and sine of each harmonic at each step.
+    pub(super) fn phasors(&self, shape: &MachineShape) -> Vec<f64> {
+        let drives = &self.system.machine().drives;
+        let turn = std::f64::consts::TAU / f64::from(self.steps);
+        let of_step = |step: u32| {
+            (0..shape.harmonics as usize).flat_map(move |m| {
+                let order = drives.get(m).map_or(0, |drive| drive.order);
+                let (sin, cos) = (turn * f64::from(step * order % self.steps)).sin_cos();
+                [cos, sin]
+            })
+        };
+        (0..=self.steps).flat_map(of_step).collect()
+    }
+
+    /// Returns the orders of the harmonics and the steps, on which phasors depend.
+    pub(super) fn grid(&self) -> (u32, Vec<u32>) {
+        (self.steps, self.system.machine().drives.iter().map(|drive| drive.order).collect())
+    }
+
+    /// Returns the changes of the stage: step of the grid, fraction of the next step, and stage.
+    pub(super) fn schedule(&self) -> Vec<f64> {
+        let of_change = |&(turns, stage): &(f64, usize)| {
+            let steps = turns * f64::from(self.steps);
+            [steps.floor(), steps.fract(), stage as f64]
+        };
+        self.system.machine().schedule.iter().flat_map(of_change).collect()
+    }
+
+    /// Returns the law of the last walls: restitution and mesh speed, right and left wall of each gap.
+    pub(super) fn law(&self) -> [f64; LAW] {
+        let mut law = [0.0; LAW];
+        for (gap, row) in self.system.machine().gaps.iter().enumerate() {
+            for side in Side::BOTH {
+                if let Some(wall) = row.walls[side.index()].last() {
+                    let at = 4 * (2 * gap + side.index());
+                    let e = wall.restitution;
+                    law[at..at + 4].copy_from_slice(&[e.constant, e.factor, e.power, wall.mesh_speed]);
+                }
+            }
+        }
+        law
+    }
+
+    /// Returns the table.
+    pub(super) fn table(&self, shape: &MachineShape) -> Vec<f64> {
+        let system = &self.system;
+        let (n, size, width) = (self.degrees(), shape.coordinates as usize, shape.width());
+        let mut table = vec![0.0; shape.table(self.tables.equations.len())];
+        let mobility = system.mobilities();
+        for i in 0..size {
+            for j in 0..size {
+                let value = if i < n && j < n { mobility[i * n + j] } else { f64::from(u8::from(i == j)) };
+                table[shape.place("AT_MOBILITY") + i * size + j] = value;
+            }
+        }
+        let most_walls = shape.walls as usize;
+        for (gap, row) in system.machine().gaps.iter().enumerate() {
+            for side in 0..2 {
+                for (nth, wall) in row.walls[side].iter().enumerate() {
+                    let place = (2 * gap + side) * most_walls + nth;
+                    table[shape.place("AT_WALLS") + place] = wall.at;
+                    for (stage, spring) in wall.springs.iter().enumerate() {
+                        let all = stage * 2 * shape.gaps as usize * most_walls + place;
+                        let at = shape.place("AT_SPRINGS") + 3 * all;
+                        table[at..at + 3].copy_from_slice(&[spring.stiffness, spring.damping, spring.preload]);
+                    }
+                }
+            }
+        }
+        // Puts a row of the machine's own sizes at a place.
+        let put = |table: &mut [f64], at: usize, row: &[f64]| {
+            let harmonics = row.len() - 2 * n - 1;
+            table[at..at + 2 * n].copy_from_slice(&row[..2 * n]);
+            let drives = at + shape.dim();
+            table[drives..drives + harmonics].copy_from_slice(&row[2 * n..2 * n + harmonics]);
+            table[at + width - 1] = row[row.len() - 1];
+        };
+        for (i, (row, force)) in system.sliding_rates().iter().enumerate() {
+            let at = shape.place("AT_ELEMENTS") + i * (width + 1);
+            put(&mut table, at, row);
+            table[at + width] = *force;
+        }
+        for (number, equations) in self.tables.equations.iter().enumerate() {
+            let domain = shape.place("AT_DOMAINS") + number * shape.domain();
+            let place = |name: &str| domain + shape.place(name);
+            table[domain] = equations.radian;
+            for (gap, push) in equations.pushes.iter().enumerate() {
+                table[place("IN_DOMAIN_STILL") + gap] = f64::from(u8::from(equations.is_still[gap]));
+                if let Some(row) = push {
+                    table[place("IN_DOMAIN_HAS_PUSH") + gap] = 1.0;
+                    put(&mut table, place("IN_DOMAIN_PUSHES") + gap * width, row);
+                }
+            }
+            for (i, hold) in equations.holds.iter().enumerate() {
+                if let Some(row) = hold {
+                    table[place("IN_DOMAIN_HAS_HOLD") + i] = 1.0;
+                    put(&mut table, place("IN_DOMAIN_HOLDS") + i * width, row);
+                }
+            }
+            for (i, row) in equations.accelerations.iter().enumerate() {
+                put(&mut table, place("IN_DOMAIN_ACCELERATIONS") + i * width, row);
+            }
+        }
+        table
+    }
+
+    /// Returns a start: the state in the coordinates of lanes, and the packed modes.
+    pub(super) fn start(&self, state: State) -> Vec<f64> {
+        let modes: StartModes = self.system.start(&state);
+        let mut start = modes.state[..2 * self.degrees().max(2)].to_vec();
+        let packed = |bits: u32, numbers: &[u32]| {
+            numbers.iter().zip(0..).map(|(number, i)| number << (bits * i)).fold(0, |all, one| all | one)
+        };
+        let orders = modes.walls.map(|(_, order)| order);
+        let packs = [
+            packed(5, &modes.gaps) | packed(2, &modes.slips) << 15 | modes.stage << 19,
+            packed(2, &modes.origins) | packed(2, &modes.walls.map(|(side, _)| side)) << 6,
+            packed(3, &orders) | packed(3, &modes.from_force) << 9 | packed(3, &modes.from_rate) << 18,
+        ];
+        start.extend(packs.map(f64::from));
+        start
+    }
+
+    /// Returns a state of the model.
+    pub(super) fn to_state(&self, strobe: &[f64]) -> State {
+        self.system.state_of(strobe)
+    }
+}
