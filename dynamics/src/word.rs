@@ -58,8 +58,9 @@ impl Word {
     /// Returns the word of the mirror image `(y, t) -> (-y, t + T/2)`, which swaps 1-4, 2-5 and 3-6.
     /// It leaves 0 and 7 as they are.
     pub fn mirrored(&self) -> Word {
-        let image = |&symbol: &u8| match symbol {
-            b'1'..=b'6' => (symbol - b'1' + 3) % 6 + b'1',
+        let image = |&symbol: &u8| match (symbol - b'0') % 8 {
+            1..=3 => symbol + 3,
+            4..=6 => symbol - 3,
             _ => symbol,
         };
         Word::cyclic(&self.0.iter().map(image).collect::<Vec<_>>())

@@ -67,8 +67,8 @@ pub struct Record {
     pub mesh_fraction: f64,
     /// Last strobe state `(x1, v1, x2, v2, ...)`.
     pub strobe: State,
-    /// First 64 symbols, 3 bits each (values 0 to 7), 21 to a `u64`, the first symbol lowest; zero if the word is
-    /// longer.
+    /// All symbols, the first one lowest: 21 of 3 bits to a `u64`, at most 64; or 12 of 5 bits, at most 42, if bit 63 of the first
+    /// number is set, because they have letters of gaps. A longer word has no symbols here.
     pub word: [u64; 4],
     /// Rotation-invariant hash of the whole word.
     pub word_hash: u64,

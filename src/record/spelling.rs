@@ -1,20 +1,50 @@
-//! Words and patterns in records: up to 64 symbols, or hash and length.
+//! Words and patterns in records: up to 64 symbols, or 42 symbols with letters of gaps, or else hash and length.
 
 use super::{Record, WORD_SYMBOLS, valid};
 use rattlemap_dynamics::word::Word;
 
-/// Symbols in one `u64`.
-const PER_WORD: usize = 21;
+/// How the symbols of a word are packed into numbers.
+pub(crate) struct SymbolCode {
+    /// Bits of a symbol.
+    pub(crate) bits: usize,
+    /// Largest number of symbols that a record stores.
+    pub(crate) most: usize,
+    /// Consecutive symbols that are hashed together.
+    pub(crate) window: usize,
+}
 
-/// Consecutive symbols that are hashed together.
-const HASH_WINDOW: usize = 8;
+/// Symbols of a model with one gap.
+const PLAIN: SymbolCode = SymbolCode { bits: 3, most: WORD_SYMBOLS, window: 8 };
+
+/// Symbols with the letters of gaps.
+const LETTERED: SymbolCode = SymbolCode { bits: 5, most: 42, window: 6 };
+
+/// Bit of the first number that tells [`LETTERED`] symbols. Symbols take no more than 63 bits.
+const HAS_LETTERS: u64 = 1 << 63;
+
+impl SymbolCode {
+    fn of(symbols: &[u8]) -> &'static SymbolCode {
+        if symbols.iter().any(|&symbol| symbol > b'7') { &LETTERED } else { &PLAIN }
+    }
+
+    /// Returns the code of a model with a number of gaps.
+    pub(crate) fn of_gaps(gaps: usize) -> &'static SymbolCode {
+        if gaps > 1 { &LETTERED } else { &PLAIN }
+    }
+
+    /// Returns the number and the bit at which a symbol begins.
+    fn place(&self, i: usize) -> (usize, usize) {
+        let per_number = 63 / self.bits;
+        (i / per_number, self.bits * (i % per_number))
+    }
+}
 
 /// A word or a pattern as a record stores it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Spelling {
     /// All its symbols.
     Whole(Word),
-    /// Hash and length of more than 64 symbols.
+    /// Hash and length of a longer word.
     Hashed {
         /// [`word_hash`] of the symbols.
         hash: u64,
@@ -29,7 +59,7 @@ impl Spelling {
         Spelling::unpacked(Spelling::packed(word))
     }
 
-    /// Returns the text for figures and JSON: the symbols in time order, or `#hash/length`; at most 64 characters.
+    /// Returns the text for figures and JSON: the symbols in time order, or `#hash/length`; at most 84 characters.
     pub fn text(&self) -> String {
         match self {
             Spelling::Whole(word) => word.time_order(),
@@ -45,20 +75,29 @@ impl Spelling {
 
     fn packed(word: &Word) -> Packed {
         let symbols = word.symbols();
+        let code = SymbolCode::of(symbols);
         let mut packed = Packed { symbols: [0; 4], hash: word_hash(symbols), length: symbols.len() as u32 };
-        if symbols.len() <= WORD_SYMBOLS {
+        if code.bits == LETTERED.bits {
+            packed.symbols[0] = HAS_LETTERS;
+        }
+        if symbols.len() <= code.most {
             for (i, symbol) in symbols.iter().enumerate() {
-                packed.symbols[i / PER_WORD] |= u64::from(symbol - b'0') << (3 * (i % PER_WORD));
+                let (number, bit) = code.place(i);
+                packed.symbols[number] |= u64::from(symbol - b'0') << bit;
             }
         }
         packed
     }
 
     fn unpacked(Packed { symbols, hash, length }: Packed) -> Spelling {
-        if length as usize > WORD_SYMBOLS {
+        let code = if symbols[0] & HAS_LETTERS == 0 { PLAIN } else { LETTERED };
+        if length as usize > code.most {
             return Spelling::Hashed { hash, length };
         }
-        let symbol = |i: usize| (symbols[i / PER_WORD] >> (3 * (i % PER_WORD)) & 7) as u8 + b'0';
+        let symbol = |i: usize| {
+            let (number, bit) = code.place(i);
+            (symbols[number] >> bit) as u8 % (1 << code.bits) + b'0'
+        };
         // Engines need not store the canonical rotation.
         Spelling::Whole(Word::cyclic(&(0..length as usize).map(symbol).collect::<Vec<_>>()))
     }
@@ -73,14 +112,15 @@ struct Packed {
 
 /// Returns a hash of a cyclic word that does not depend on where the word starts.
 ///
-/// It is the sum over all places of a mix of the eight symbols that begin there, in two halves of 32 bits. An engine
-/// without 64-bit integers can compute it symbol by symbol, and closes the circle with the first seven symbols.
+/// It is the sum over all places of a mix of the eight symbols that begin there (six if they have letters of gaps), in two halves of 32
+/// bits. An engine without 64-bit integers can compute it symbol by symbol, and closes the circle with the first symbols.
 pub fn word_hash(symbols: &[u8]) -> u64 {
-    let n = symbols.len();
+    let (n, code) = (symbols.len(), SymbolCode::of(symbols));
     let mut halves = [0u32; 2];
     for start in 0..n {
-        let code = (0..HASH_WINDOW).fold(0, |code, k| code << 3 | u32::from(symbols[(start + k) % n] - b'0'));
-        halves = add_window(halves, code);
+        let symbol = |k: usize| u32::from(symbols[(start + k) % n] - b'0');
+        let window = (0..code.window).fold(0, |window, k| window << code.bits | symbol(k));
+        halves = add_window(halves, window);
     }
     joined(halves)
 }
@@ -90,7 +130,7 @@ pub(crate) fn joined([low, high]: [u32; 2]) -> u64 {
     u64::from(high) << 32 | u64::from(low)
 }
 
-/// Adds one window of symbols, 3 bits each, to the halves of a hash, as the shader does.
+/// Adds one window of symbols to the halves of a hash, as the shader does.
 fn add_window([low, high]: [u32; 2], code: u32) -> [u32; 2] {
     [low.wrapping_add(mix(code)), high.wrapping_add(mix(code ^ 0x5bd1_e995))]
 }
@@ -159,6 +199,9 @@ mod tests {
             &zeros,
             b"07",
             b"7070",
+            b"8",
+            b"9AI:A",
+            &[b'H'; 42],
         ] {
             let word = Word::cyclic(symbols);
             let mut record = Record::default();
@@ -195,7 +238,13 @@ mod tests {
         let mut record = Record::default();
         record.set_word(&Word::cyclic(&symbols));
         let text = record.spelling().unwrap().text();
-        assert!(text.starts_with('#') && text.ends_with("/100") && text.len() <= 64, "{text}");
+        assert!(text.starts_with('#') && text.ends_with("/100"), "{text}");
+        record.set_word(&Word::cyclic(&[b'9'; 43]));
+        assert!(record.spelling().unwrap().text().ends_with("/43"));
+        let mut lettered: Vec<u8> = (0..60u32).map(|i| b'8' + (i * i % 24) as u8).collect();
+        let hash = word_hash(&lettered);
+        lettered.rotate_left(11);
+        assert_eq!(word_hash(&lettered), hash);
     }
 
     #[test]
