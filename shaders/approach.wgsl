@@ -149,8 +149,8 @@ fn in_units(u: State) -> State {
 }
 
 fn inner(a: State, b: State) -> Real {
-    var sum: Real = 0.0;
-    //% for k in 0..COORDINATES
+    var sum = a[0u] * b[0u] + a[1u] * b[1u];
+    //% for k in 1..COORDINATES
     sum += a[2u * $ku] * b[2u * $ku] + a[2u * $ku + 1u] * b[2u * $ku + 1u];
     //% end
     return sum;

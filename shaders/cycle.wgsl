@@ -93,8 +93,8 @@ fn spectral_growth() -> Real {
         for (var k = 0u; k < MATRIX; k++) {
             let i = k % DIM;
             let j = k - i;
-            var sum: Real = 0.0;
-            //% for k in 0..COORDINATES
+            var sum = m[i] * m[j] + m[i + DIM] * m[j + 1u];
+            //% for k in 1..COORDINATES
             sum += m[i + 2u * $ku * DIM] * m[j + 2u * $ku] + m[i + (2u * $ku + 1u) * DIM] * m[j + 2u * $ku + 1u];
             //% end
             square[k] = (inverse * inverse) * sum;

@@ -70,8 +70,8 @@ fn carry_vector() {
     let m = motions[lane].tangents;
     var image: State;
     for (var i = 0u; i < DIM; i++) {
-        var sum: Real = 0.0;
-        //% for k in 0..COORDINATES
+        var sum = m[i] * u[0u] + m[i + DIM] * u[1u];
+        //% for k in 1..COORDINATES
         sum += m[i + 2u * $ku * DIM] * u[2u * $ku] + m[i + (2u * $ku + 1u) * DIM] * u[2u * $ku + 1u];
         //% end
         image[i] = sum;

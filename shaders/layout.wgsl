@@ -122,7 +122,7 @@ struct Motion {
     // The last strobe states of the motion (approach.wgsl).
     trail: array<State, TRAIL>,
     // Weighted averages of gap, x and their squares from a centre: the first window less the second (regularity.wgsl).
-    averages: array<Real, 3>,
+    averages: array<Real, COORDINATES + 1>,
     average_centre: State,
     // The last state of a lane that is being measured.
     ended: MotionNow,

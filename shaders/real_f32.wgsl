@@ -13,6 +13,12 @@ const ULP: Real = 6e-8;
 // motion may pass the wall there, they are halved down to SHORTEST_STEP.
 const SHORTEST: Real = 0.001;
 const SHORTEST_STEP: Real = 1e-6;
+// Machines: height of a flight, relative to the scale of length, that is not followed in a series of impacts; the narrowest interval, as a
+// share of a step, in which a root is isolated; most halvings, and most steps of the final search.
+const LOWEST_FLIGHT: Real = 1e-6;
+const NARROWEST: Real = 1e-6;
+const MOST_HALVINGS: u32 = 48u;
+const ROOT_STEPS: u32 = 30u;
 // States of this size count as not finite.
 const HUGE: Real = 1e15;
 

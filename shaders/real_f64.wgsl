@@ -7,6 +7,10 @@ const SHORT: Real = 0.191;
 const ULP: Real = 1.2e-16;
 const SHORTEST: Real = 1e-8;
 const SHORTEST_STEP: Real = 1e-14;
+const LOWEST_FLIGHT: Real = 1e-13;
+const NARROWEST: Real = 1e-14;
+const MOST_HALVINGS: u32 = 96u;
+const ROOT_STEPS: u32 = 60u;
 const HUGE: Real = 1e150;
 
 // Compares the bits of an f32, because drivers' fast arithmetic ignores NaN.

@@ -58,8 +58,8 @@ fn size_of(u: State) -> Real {
 fn image_of(u: State) -> State {
     var image: State;
     for (var i = 0u; i < DIM; i++) {
-        var sum: Real = 0.0;
-        //% for k in 0..COORDINATES
+        var sum = motions[lane].tangents[i] * u[0u] + motions[lane].tangents[i + DIM] * u[1u];
+        //% for k in 1..COORDINATES
         sum += motions[lane].tangents[i + 2u * $ku * DIM] * u[2u * $ku] + motions[lane].tangents[i + (2u * $ku + 1u) * DIM] * u[2u * $ku + 1u];
         //% end
         image[i] = sum;

@@ -11,7 +11,7 @@ fn add_to_averages() {
             search.average_length = (budget - tally.period) / 16u * 7u;
             search.average_start = search.strobe_count;
             search.recurrence = 255u;
-            motions[lane].averages = array<Real, 3>();
+            motions[lane].averages = array<Real, COORDINATES + 1>();
             motions[lane].average_centre = strobe_state();
         }
         return;
@@ -24,12 +24,13 @@ fn add_to_averages() {
     let square = (t * (1.0 - t)) * (t * (1.0 - t));
     // The integral of the window from 0 to 1 is 1/630. The second window counts as negative.
     let weight = select(Real(-630.0), Real(630.0), n < length) / Real(length) * square * square;
-    let q = strobe_state();
-    let x = q[0] - motions[lane].average_centre[0];
-    let y = q[2] - motions[lane].average_centre[2];
-    motions[lane].averages[0] += weight * x;
-    motions[lane].averages[1] += weight * y;
-    motions[lane].averages[2] += weight * (x * x + y * y);
+    let u = difference(strobe_state(), motions[lane].average_centre);
+    var squares: Real = 0.0;
+    //% for k in 0..COORDINATES
+    motions[lane].averages[$k] += weight * u[2 * $k];
+    squares += u[2 * $k] * u[2 * $k];
+    //% end
+    motions[lane].averages[COORDINATES] += weight * squares;
 }
 
 // Whether both windows are complete.
@@ -64,7 +65,10 @@ fn is_quasi_periodic() -> bool {
     let d = motions[lane].averages;
     let unit = 1.0 / unit_of_positions();
     let size = distance_of(farthest);
-    let difference = max(max(abs(d[0]), abs(d[1])) * unit, abs(d[2]) * unit * unit / size);
+    var difference = abs(d[COORDINATES]) * unit * unit / size;
+    //% for k in 0..COORDINATES
+    difference = max(difference, abs(d[$k]) * unit);
+    //% end
     let nearest = distance_of(search.recurrence);
     let allowed = LARGEST_DIFFERENCE * nearest;
     let rounding = ROUNDING_OF_AVERAGES * ULP;

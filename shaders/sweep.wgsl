@@ -14,8 +14,8 @@ var<private> iterations: u32;
 
 // Returns the sum of the sizes. It is a NaN if one of them is.
 fn sum_of_sizes(q: State) -> Real {
-    var sum: Real = 0.0;
-    //% for k in 0..COORDINATES
+    var sum = abs(q[0u]) + abs(q[1u]);
+    //% for k in 1..COORDINATES
     sum += abs(q[2u * $ku]) + abs(q[2u * $ku + 1u]);
     //% end
     return sum;
@@ -23,8 +23,8 @@ fn sum_of_sizes(q: State) -> Real {
 
 // Returns the sum of the sizes of the displacements.
 fn sum_of_displacements(q: State) -> Real {
-    var sum: Real = 0.0;
-    //% for k in 0..COORDINATES
+    var sum = abs(q[0u]);
+    //% for k in 1..COORDINATES
     sum += abs(q[2u * $ku]);
     //% end
     return sum;

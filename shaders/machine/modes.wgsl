@@ -123,7 +123,7 @@ fn hold(q: ptr<function, State>, speeds: Real) {
     var pivots: array<u32, ELEMENT_SLOTS>;
     // The second pass completes the first where rows share coordinates.
     for (var n = 0u; n < 2u * ELEMENTS; n++) {
-        let i = n % ELEMENTS;
+        let i = n % ELEMENT_SLOTS;
         if i >= shape.elements || slips[i] != STICKS {
             continue;
         }

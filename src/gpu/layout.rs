@@ -291,11 +291,23 @@ structs! {
 /// Most numbers of a lane's state.
 const MOST_NUMBERS: usize = STATE;
 
+/// Returns the size on the host of a struct in variants whose lanes have `dim` numbers.
+pub fn size_with(host: &StructLayout, dim: usize) -> usize {
+    let numbers = match host.name {
+        "Motion" => Motion::numbers(dim),
+        "Reading" => Reading::numbers(dim),
+        "Measured" => Measured::numbers(dim),
+        _ => return host.size,
+    };
+    numbers * size_of::<f64>()
+}
+
 /// Numbers of the structs whose size depends on the number `dim` of a lane's state.
 impl Motion {
     pub(super) fn numbers(dim: usize) -> usize {
-        // In `now` and `ended`, the anchor, the vector, the trail, the centre of averages; and the matrix.
-        size_of::<Motion>() / size_of::<f64>() + (dim - 4) * (5 + TRAIL) + (dim * dim - 16)
+        // In `now` and `ended`, the anchor, the vector, the trail, the averages and their centre; and the matrix.
+        let of_dim = |dim: usize| dim * (5 + TRAIL) + dim / 2 + dim * dim;
+        size_of::<Motion>() / size_of::<f64>() + of_dim(dim) - of_dim(4)
     }
 }
 
@@ -349,8 +361,10 @@ pub(super) const QUEUE_HEAD: usize = 2;
 pub(super) const COUNT_AT: u64 = 0;
 pub(super) const BEAT_AT: u64 = 4;
 
-/// Symbols that one number of a word or a pattern holds.
-pub(super) const SYMBOLS_PER_NUMBER: usize = 10;
+/// Returns the symbols that one number of a word or a pattern holds.
+pub(super) fn symbols_per_number(bits: usize) -> usize {
+    30 / bits
+}
 
 /// There is no interval behind a wall.
 pub(super) const NO_FLOW: u32 = u32::MAX;

@@ -73,7 +73,7 @@ impl MachineShape {
     }
 
     /// Numbers that forces depend on: the state, two for each harmonic, and 1.
-    fn width(&self) -> usize {
+    pub(super) fn width(&self) -> usize {
         self.dim() + 2 * self.harmonics as usize + 1
     }
 
@@ -106,6 +106,19 @@ impl MachineShape {
         ]
     }
 
+    /// Returns all sizes and places, by their names in the shader.
+    pub(super) fn sizes(&self) -> Vec<(&'static str, u32)> {
+        let mut sizes: Vec<_> = self.places().map(|(name, place)| (name, place as u32)).to_vec();
+        sizes.extend([
+            ("GAPS", self.gaps),
+            ("ELEMENTS", self.elements),
+            ("ELEMENT_SLOTS", self.elements.max(1)),
+            ("WALLS", self.walls),
+            ("DOMAIN", self.domain() as u32),
+        ]);
+        sizes
+    }
+
     fn place(&self, name: &str) -> usize {
         let found = self.places().into_iter().find(|&(other, _)| other == name);
         found.map(|(_, place)| place).expect("the place has a name")
@@ -130,6 +143,15 @@ fn machine_of(oscillator: &Oscillator, law: Option<Law>) -> Box<Machine> {
     }
 }
 
+/// Returns a law of both walls of an oscillator as that of a machine.
+pub(super) fn law_of_walls(law: &Law) -> [f64; LAW] {
+    let mut numbers = [0.0; LAW];
+    for side in 0..2 {
+        numbers[4 * side..][..4].copy_from_slice(&[law.restitution[side], 0.0, 1.0, law.mesh_speed[side]]);
+    }
+    numbers
+}
+
 /// Returns the number of domains of an oscillator.
 pub(super) fn domain_count(oscillator: &Oscillator) -> usize {
     let machine = machine_of(oscillator, None);
@@ -145,7 +167,7 @@ pub(super) fn bytes(oscillator: &Oscillator) -> usize {
 
 /// Constants of one machine.
 #[derive(Clone, Debug)]
-pub struct MachineConstants {
+pub(super) struct MachineConstants {
     system: Box<System>,
     /// Whether the machine has laws of its own.
     pub(super) has_laws: bool,

@@ -19,6 +19,7 @@ mod error;
 mod features;
 mod guard;
 pub mod layout;
+mod machine;
 mod measured;
 mod panics;
 mod pool;
@@ -49,6 +50,7 @@ pub use adapter::{
 pub use constants::Constants;
 pub use error::GpuError;
 pub use features::{Features, needs_reference};
+pub use machine::MachineShape;
 pub use pool::Pool;
 pub use precision::Precision;
 pub use reading::LaneResult;

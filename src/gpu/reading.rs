@@ -3,10 +3,10 @@
 use super::constants::Constants;
 use super::layout::{
     Finding, Reading, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD, SPELLED_WORD_LENGTH,
-    SYMBOLS_PER_NUMBER,
+    symbols_per_number,
 };
 use super::measured;
-use crate::record::{Record, WORD_SYMBOLS, joined, measures, valid};
+use crate::record::{Record, SymbolCode, joined, measures, valid};
 use rattlemap_dynamics::orbit::Quantities;
 use rattlemap_dynamics::word::Word;
 
@@ -104,7 +104,8 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
 fn spelled(spelling: &[u32], symbols: usize, length: usize, gaps: usize) -> Result<Word, (u32, u64)> {
     let code = SymbolCode::of_gaps(gaps);
     let symbol = |i: usize| {
-        let (number, bit) = (i / code.per_number(), code.bits * (i % code.per_number()));
+        let per_number = symbols_per_number(code.bits);
+        let (number, bit) = (i / per_number, code.bits * (i % per_number));
         b'0' + (spelling[symbols + number] >> bit) as u8 % (1 << code.bits)
     };
     let count = spelling[length] as usize;

@@ -5,12 +5,12 @@ use super::constants::PAIRS_PER_HARMONIC;
 use super::features::Features;
 use super::layout::{
     BLOCK, CONTACTS, EXTREMES, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD,
-    SPELLED_WORD_LENGTH, SPELLING, SUMS, SYMBOLS_PER_NUMBER,
+    SPELLED_WORD_LENGTH, SPELLING, SUMS, symbols_per_number,
 };
 use super::precision::Precision;
 use super::rules;
 use super::unroll::unroll;
-use crate::record::{WORD_SYMBOLS, valid};
+use crate::record::{SymbolCode, valid};
 use rattlemap_dynamics::orbit::Status;
 
 /// Options of a compiled shader.
@@ -45,9 +45,29 @@ pub struct Variant {
 /// Default number of invocations per workgroup.
 pub(super) const WORKGROUP: u32 = 64;
 
-/// The shader without the declarations of the precision.
-const BODY: &str = concat!(
+/// What both engines of motion have in common.
+const COMMON: &str = concat!(
     include_str!("../../shaders/layout.wgsl"),
+    include_str!("../../shaders/turn.wgsl"),
+    include_str!("../../shaders/growth.wgsl"),
+    include_str!("../../shaders/observe.wgsl"),
+    include_str!("../../shaders/recurrence.wgsl"),
+    include_str!("../../shaders/chaos.wgsl"),
+    include_str!("../../shaders/regularity.wgsl"),
+    include_str!("../../shaders/word.wgsl"),
+    include_str!("../../shaders/cycle.wgsl"),
+    include_str!("../../shaders/refine.wgsl"),
+    include_str!("../../shaders/approach.wgsl"),
+    include_str!("../../shaders/sweep.wgsl"),
+    include_str!("../../shaders/compact.wgsl"),
+    include_str!("../../shaders/begin.wgsl"),
+    include_str!("../../shaders/record.wgsl"),
+);
+
+/// The motion of oscillators with one gap.
+const OSCILLATOR: &str = concat!(
+    include_str!("../../shaders/tables.wgsl"),
+    include_str!("../../shaders/oscillator.wgsl"),
     include_str!("../../shaders/domain.wgsl"),
     include_str!("../../shaders/phase.wgsl"),
     include_str!("../../shaders/harmonics.wgsl"),
@@ -62,19 +82,17 @@ const BODY: &str = concat!(
     include_str!("../../shaders/events.wgsl"),
     include_str!("../../shaders/chatter.wgsl"),
     include_str!("../../shaders/tangent.wgsl"),
-    include_str!("../../shaders/observe.wgsl"),
-    include_str!("../../shaders/recurrence.wgsl"),
-    include_str!("../../shaders/chaos.wgsl"),
-    include_str!("../../shaders/regularity.wgsl"),
-    include_str!("../../shaders/word.wgsl"),
-    include_str!("../../shaders/cycle.wgsl"),
-    include_str!("../../shaders/refine.wgsl"),
-    include_str!("../../shaders/approach.wgsl"),
     include_str!("../../shaders/measure.wgsl"),
-    include_str!("../../shaders/sweep.wgsl"),
-    include_str!("../../shaders/compact.wgsl"),
-    include_str!("../../shaders/begin.wgsl"),
-    include_str!("../../shaders/record.wgsl"),
+);
+
+/// The motion of machines.
+const MACHINE: &str = concat!(
+    include_str!("../../shaders/machine/layout.wgsl"),
+    include_str!("../../shaders/machine/series.wgsl"),
+    include_str!("../../shaders/machine/root.wgsl"),
+    include_str!("../../shaders/machine/modes.wgsl"),
+    include_str!("../../shaders/machine/motion.wgsl"),
+    include_str!("../../shaders/machine/machine.wgsl"),
 );
 
 impl Variant {
@@ -102,9 +120,26 @@ impl Variant {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        let names = ["TERMS", "SHORT_TERMS"].map(|name| (name, count(real, name)));
-        let [terms, short_terms] = names;
-        let body = unroll(BODY, &[terms, short_terms, ("HARMONICS", self.features.harmonics)]);
+        let machine = self.features.machine;
+        let terms = count(real, "TERMS");
+        let harmonics = machine.map_or(self.features.harmonics, |shape| shape.harmonics);
+        let dim = self.features.dim() as u32;
+        let code = SymbolCode::of_gaps(machine.map_or(1, |shape| shape.gaps as usize));
+        let mut names = vec![
+            ("TERMS", terms),
+            ("SHORT_TERMS", count(real, "SHORT_TERMS")),
+            ("HARMONICS", harmonics),
+            ("COORDINATES", dim / 2),
+            ("DIM", dim),
+        ];
+        let mut machine_sizes = Vec::new();
+        if let Some(shape) = machine {
+            let width = shape.width() as u32;
+            names.push(("WIDTH", width));
+            machine_sizes = shape.sizes();
+            machine_sizes.extend([("SERIES", (terms + 1) * width), ("COEFFICIENTS", terms + 1)]);
+        }
+        let body = unroll(COMMON, &names) + &unroll(if machine.is_some() { MACHINE } else { OSCILLATOR }, &names);
         let valid = VALID.map(|(name, bits)| (format!("VALID_{name}"), bits));
         let status = Status::ALL.map(|s| (format!("STATUS_{}", s.name().to_uppercase()), s.code()));
         let contacts = CONTACTS.map(|(name, code)| (format!("CONTACT_{name}"), code));
@@ -120,12 +155,20 @@ impl Variant {
             ("SPELLED_PATTERN_LENGTH", SPELLED_PATTERN_LENGTH as u32),
             ("SPELLED_PATTERN_HASH", SPELLED_PATTERN_LENGTH as u32 + 1),
             ("EXTREMES", EXTREMES as u32),
-            ("HARMONICS", self.features.harmonics),
+            ("HARMONICS", harmonics),
+            ("DIM", dim),
+            ("MATRIX", dim * dim),
+            ("COORDINATES", dim / 2),
+            ("START", self.features.start_numbers() as u32),
+            ("SYMBOL_BITS", code.bits as u32),
+            ("HASH_WINDOW", code.window as u32),
             ("PAIRS_PER_HARMONIC", PAIRS_PER_HARMONIC as u32),
             ("NO_FLOW", NO_FLOW),
-            ("WORD_SYMBOLS", WORD_SYMBOLS as u32),
-            ("SYMBOLS_PER_NUMBER", SYMBOLS_PER_NUMBER as u32),
+            ("WORD_SYMBOLS", code.most as u32),
+            ("SYMBOLS_PER_NUMBER", symbols_per_number(code.bits) as u32),
         ]
+        .into_iter()
+        .chain(machine_sizes)
         .map(|(name, value)| (name.to_owned(), value));
         let numbers = valid.into_iter().chain(status).chain(contacts).chain(sizes);
         let numbers: String =

@@ -1,12 +1,14 @@
 //! Tables on the device that lanes share: flows and contact laws.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use bytemuck::Zeroable;
 
 use super::constants::{Change, Constants, PAIRS_PER_HARMONIC, Page, phasors as phasors_of};
 use super::features::Features;
 use super::guard::with_error_scopes;
+use super::machine::{self, MachineShape};
 use super::layout::{self, Flow, FlowShape, NO_FLOW, contact_code};
 use super::precision::Precision;
 use super::transfer::{buffer, reals, upload};
@@ -45,6 +47,10 @@ pub(crate) const MOST_BYTES: u64 = 1 << 30;
 /// flows with equal steps share.
 pub(crate) fn bytes(oscillator: &Oscillator, steps: Option<u32>) -> [u64; 2] {
     let phasors = steps.map_or(0, |steps| u64::from(steps) + 1);
+    if Features::of(oscillator).machine.is_some() {
+        let table = size_of::<Constants>() + machine::bytes(oscillator);
+        return [COPIES * table as u64, COPIES * 16 * 8 * phasors];
+    }
     let pair = size_of::<[f64; 2]>();
     let page = size_of::<Constants>()
         + size_of::<FlowShape>()
@@ -92,6 +98,9 @@ impl Tables {
         constants: Vec<Option<Constants>>,
         laws: &[Law],
     ) -> Result<Tables, GpuError> {
+        if let Some(shape) = machine_shape(&constants) {
+            return Tables::of_machines(gpu, constants, laws, shape).await;
+        }
         let flows = constants.len();
         let mut shapes = Vec::with_capacity(flows);
         // Further pages follow those of all flows.
@@ -160,6 +169,70 @@ impl Tables {
         };
         with_error_scopes(gpu, "flows", flows, make).await
     }
+}
+
+impl Tables {
+    /// Uploads machines. Those that differ in frequency and laws alone share one table.
+    async fn of_machines(
+        gpu: &Gpu,
+        constants: Vec<Option<Constants>>,
+        laws: &[Law],
+        shape: MachineShape,
+    ) -> Result<Tables, GpuError> {
+        let count = constants.len();
+        let (mut flows, mut shapes, mut table) = (Vec::new(), Vec::new(), Vec::new());
+        let mut of_flows = Vec::new();
+        let (mut grids, mut machines) = (HashMap::new(), HashMap::new());
+        let mut features: Vec<(usize, Features)> = Vec::new();
+        for (i, constants) in constants.iter().enumerate() {
+            let Some((constants, machine)) = constants.as_ref().and_then(|c| Some((c, c.machine.as_ref()?))) else {
+                // Lanes of a missing flow are refused before they start.
+                flows.extend([0.0; machine::FLOW]);
+                shapes.extend([1; machine::SHAPE]);
+                of_flows.extend([0.0; machine::LAW]);
+                continue;
+            };
+            let mut add = |numbers: Vec<f64>| {
+                let place = table.len() as u32;
+                table.extend(numbers);
+                place
+            };
+            let phasors = *grids.entry(machine.grid()).or_insert_with(|| add(machine.phasors(&shape)));
+            let own = *machines.entry(Arc::as_ptr(machine.shared())).or_insert_with(|| add(machine.table(&shape)));
+            let schedule = add(machine.schedule());
+            flows.extend(machine.flow());
+            shapes.extend(machine.shape([phasors, schedule, own]));
+            of_flows.extend(machine.law());
+            let of_table = Features { machine: Some(shape), ..constants.features };
+            if features.iter().all(|(_, others)| *others != of_table) {
+                features.push((i, of_table));
+            }
+        }
+        table.push(0.0);
+        let has_laws = constants.iter().flatten().any(|c| c.machine.as_ref().is_some_and(|m| m.has_laws));
+        let rows = if has_laws { of_flows } else { laws.iter().flat_map(machine::law_of_walls).collect() };
+        let [flows, table, rows] = [flows, table, rows].map(|numbers| reals(&numbers, gpu.precision));
+        let allowed = gpu.device.limits().max_storage_buffer_binding_size;
+        let needed = table.len().max(flows.len()).max(4 * shapes.len()).max(rows.len()) as u64;
+        if needed > allowed {
+            return Err(GpuError::TooManyFlows { flows: count, needed, allowed });
+        }
+        let make = || Tables {
+            flows: upload(gpu, "flows", &flows),
+            shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
+            pairs: upload(gpu, "machines", &table),
+            laws: upload(gpu, "laws", &rows),
+            constants,
+            is_even: laws.iter().map(Law::is_symmetric).collect(),
+            features,
+        };
+        with_error_scopes(gpu, "flows", count, make).await
+    }
+}
+
+/// Returns sizes that suffice for all machines; none if the flows are oscillators.
+fn machine_shape(constants: &[Option<Constants>]) -> Option<MachineShape> {
+    constants.iter().flatten().filter_map(|constants| constants.features.machine).reduce(MachineShape::and)
 }
 
 /// Rounds the constants of flows and uploads them, those of further pages last; `size` is that of a flow in the lanes'

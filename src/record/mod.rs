@@ -8,7 +8,7 @@ mod spelling;
 mod store;
 
 #[cfg(feature = "gpu")]
-pub(crate) use spelling::joined;
+pub(crate) use spelling::{SymbolCode, joined};
 pub use spelling::{Spelling, word_hash};
 pub use store::{RecordStore, Records, RecordsMut};
 
