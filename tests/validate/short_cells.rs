@@ -6,7 +6,7 @@ use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Integration, Scene, Start};
 use rattlemap::record::Record;
-use rattlemap_dynamics::model::{GearPair, Model, State};
+use rattlemap_dynamics::model::{GearPair, Model, State, state};
 
 const TABLE: &str = include_str!("data/short_cells.csv");
 
@@ -22,7 +22,7 @@ pub(crate) fn plans(group: &str, count: usize) -> Vec<Plan> {
             let numbers: Vec<f64> = row.split(',').map(|number| number.parse().unwrap()).collect();
             let mut pair = GearPair::paper(0.0);
             numbers[..13].iter().enumerate().for_each(|(index, &value)| pair.assign(index, value));
-            plan(pair, numbers[13..].try_into().unwrap())
+            plan(pair, state(&numbers[13..]))
         })
         .collect();
     assert_eq!(plans.len(), count, "{group}");
