@@ -10,8 +10,6 @@ var<private> bernstein: array<Real, COEFFICIENTS>;
 // Whether a function that does not become negative comes so near to zero that rounding decides.
 var<private> touches: bool;
 
-// Rounding error of a coefficient, relative to the sum of all.
-const POLYNOMIAL_ROUNDING: Real = 16.0 * ULP;
 // No root, as a share of a step.
 const NO_ROOT: Real = 2.0;
 

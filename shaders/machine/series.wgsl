@@ -5,9 +5,6 @@ var<private> series: array<Real, SERIES>;
 // Sizes of the terms that have been added up in a point.
 var<private> sizes: array<Real, WIDTH>;
 
-// Rounding error of a sum, relative to the size of its terms.
-const ROUNDING: Real = 32.0 * ULP;
-
 // Derivatives that are compared with zero.
 const DERIVATIVES: u32 = 4u;
 
