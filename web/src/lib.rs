@@ -182,7 +182,7 @@ mod tests {
         for (command, expected) in [
             ("rattlemap map s.toml", "not a command of an orbit"),
             ("rattlemap orbit --set e=2", "e"),
-            ("rattlemap orbit --start 1,2,3,4,5", "--start 1,2,3,4,5 cannot be read"),
+            ("rattlemap orbit --start 1,2,3,4,5", "--start: it must be finite numbers"),
             ("rattlemap orbit --json", "--json cannot be read"),
             ("rattlemap orbit --start 1,2", "x1, v1, x2, v2"),
             ("rattlemap orbit --model model.toml", "no file of the model model.toml"),

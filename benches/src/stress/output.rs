@@ -126,7 +126,7 @@ pub(super) fn mismatches(out: impl Write, mismatches: &[fuzz::Mismatch]) -> Resu
     writer.write_record(header.chain(["x1", "v1", "x2", "v2", "differences", "kind"]))?;
     for mismatch in mismatches {
         let values = (0..GearPair::PARAMETERS.len()).map(|index| mismatch.pair.value(index));
-        let numbers = values.chain(mismatch.start).map(|number| format!("{number:?}"));
+        let numbers = values.chain(mismatch.start[..4].iter().copied()).map(|number| format!("{number:?}"));
         let difference = |difference: &rattlemap::validate::Difference| {
             let side = |value| serde_json::to_string(value).unwrap_or_default().replace('"', "");
             let field = difference.field.name();

@@ -109,8 +109,8 @@ struct SubjectObject {
     kind: Kind,
     parameters: Parameters,
     periods: u32,
-    start: State,
-    state: State,
+    start: [f64; 4],
+    state: [f64; 4],
     events: Vec<f64>,
 }
 
@@ -177,10 +177,15 @@ fn subject(subject: &Subject) -> SubjectObject {
         kind: subject.kind,
         parameters: Parameters::of(&subject.pair),
         periods: PERIODS,
-        start: subject.start,
-        state: subject.exact.state,
+        start: first_four(&subject.start),
+        state: first_four(&subject.exact.state),
         events: subject.exact.events.iter().copied().filter(|t| !t.is_nan()).collect(),
     }
+}
+
+/// Returns the numbers of a state of two coordinates.
+fn first_four(state: &State) -> [f64; 4] {
+    std::array::from_fn(|i| state[i])
 }
 
 /// Writes one row per method, setting and cell, with the largest errors of the cell's variants.
