@@ -9,12 +9,8 @@ fn begin_motion() {
     tally.mode = u32(start[DIM]);
     tally.origin = u32(start[DIM + 1u]);
     tally.order = u32(start[DIM + 2u]);
-    flow = flows[cell.flow_index];
-    shape = shapes[cell.flow_index];
     // A change of the stage at phase 0 is part of the start.
-    if shape.changes > 0u && change_step() == 0u && change_theta() == 0.0 {
-        tally.next_change = 1u;
-    }
+    tally.next_change = u32(start[DIM + 3u]);
 }
 
 fn resume_motion() {
@@ -37,7 +33,8 @@ fn begin_schedule() {
 fn restart_phase() {}
 
 fn conclude_motion() {
-    fetch_constants();
+    flow = flows[cell.flow_index];
+    shape = shapes[cell.flow_index];
 }
 
 fn fly_to_stop_phase() -> bool {

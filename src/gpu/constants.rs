@@ -168,6 +168,13 @@ impl Constants {
         })
     }
 
+    /// Takes the sizes of the machines that a shader is compiled for.
+    pub fn widen(&mut self, features: Features) {
+        if self.machine.is_some() {
+            self.features.machine = features.machine;
+        }
+    }
+
     /// Returns the forcing period.
     pub(super) fn period(&self) -> f64 {
         match &self.machine {
@@ -184,7 +191,7 @@ impl Constants {
     /// Returns the numbers of a lane's start: its state, and its modes if it is a machine.
     pub(super) fn start_numbers(&self, y: model::State) -> Vec<f64> {
         match &self.machine {
-            Some(machine) => machine.start(y),
+            Some(machine) => machine.start(y, self.features.dim()),
             None => self.start(y).to_vec(),
         }
     }

@@ -4,11 +4,6 @@ use super::machine::{MODES, MOST_DOMAINS, MachineShape, domain_count};
 use super::pushing::has_negative_preload;
 use rattlemap_dynamics::model::{Contact, Oscillator, Side};
 
-/// Whether only the reference computes the oscillator.
-pub fn needs_reference(oscillator: &Oscillator) -> bool {
-    Features::of(oscillator).needing_reference().is_some()
-}
-
 /// The features that some oscillators have, or that a shader has code for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Features {

@@ -17,8 +17,8 @@ pub(super) const FLOW: usize = 5;
 pub(super) const SHAPE: usize = 27;
 pub(super) const LAW: usize = 24;
 
-/// Numbers of a start beside the state: the packed modes.
-pub(super) const MODES: usize = 3;
+/// Numbers of a start beside the state: the packed modes, and the next change of the stage.
+pub(super) const MODES: usize = 4;
 
 /// Most steps of the grid per turn of the highest harmonic: a step is at most a radian.
 const STEPS_PER_TURN: u32 = 8;
@@ -379,9 +379,9 @@ impl MachineConstants {
     }
 
     /// Returns a start: the state in the coordinates of lanes, and the packed modes.
-    pub(super) fn start(&self, state: State) -> Vec<f64> {
+    pub(super) fn start(&self, state: State, dim: usize) -> Vec<f64> {
         let modes: StartModes = self.system.start(&state);
-        let mut start = modes.state[..2 * self.degrees().max(2)].to_vec();
+        let mut start = modes.state[..dim].to_vec();
         let packed = |bits: u32, numbers: &[u32]| {
             numbers.iter().zip(0..).map(|(number, i)| number << (bits * i)).fold(0, |all, one| all | one)
         };
@@ -392,6 +392,8 @@ impl MachineConstants {
             packed(3, &orders) | packed(3, &modes.from_force) << 9 | packed(3, &modes.from_rate) << 18,
         ];
         start.extend(packs.map(f64::from));
+        let begins_now = self.system.machine().schedule.first().is_some_and(|change| change.0 == 0.0);
+        start.push(f64::from(u8::from(begins_now)));
         start
     }
 

@@ -49,7 +49,7 @@ pub use adapter::{
 };
 pub use constants::Constants;
 pub use error::GpuError;
-pub use features::{Features, needs_reference};
+pub use features::Features;
 pub use machine::MachineShape;
 pub use pool::Pool;
 pub use precision::Precision;
@@ -363,7 +363,12 @@ impl Gpu {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
-        let tables = self.load(flows, laws, settings.steps_per_period).await?;
+        let constants = flows.iter().map(|flow| {
+            let mut constants = Constants::new(flow, settings.steps_per_period)?;
+            constants.widen(settings.features);
+            Some(constants)
+        });
+        let tables = self.load_constants(constants.collect(), laws).await?;
         self.run_on(&tables, lanes, settings).await
     }
 

@@ -1,8 +1,8 @@
 //! Known answers: newly compiled shaders must reproduce them before they are used.
 
-use super::{Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
+use super::{Constants, Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
 use crate::record::distance::{apart, farther, is_within};
-use rattlemap_dynamics::model::{GearPair, REST, State, state};
+use rattlemap_dynamics::model::{GearPair, Machine, Oscillator, REST, State, state};
 
 /// Forcing periods from rest to the answers.
 const PERIODS: u32 = 20;
@@ -27,8 +27,18 @@ pub(super) async fn check(
     settings: &LaneSettings,
 ) -> Result<(), GpuError> {
     let pairs = ANSWERS.map(|(e, omega, _)| GearPair { omega, ..GearPair::paper(e) });
-    let flows: Vec<_> = pairs.iter().filter_map(|pair| pair.oscillator().ok()).collect();
     let laws = pairs.map(|pair| pair.law());
+    let as_machine = settings.features.machine.is_some();
+    let constants = pairs.iter().zip(laws).map(|(pair, law)| {
+        let mut flow = pair.oscillator().ok()?;
+        if as_machine {
+            flow = Oscillator::of_machine(Machine::of(&flow, law));
+        }
+        let mut constants = Constants::new(&flow, None)?;
+        constants.widen(settings.features);
+        Some(constants)
+    });
+    let constants = constants.collect();
     let lanes = [0, 1, 2, 3].map(|i| (i, Lane { flow: i, law: i, start: REST }));
     let settings = LaneSettings {
         periods: PERIODS,
@@ -42,7 +52,7 @@ pub(super) async fn check(
         batch: None,
         ..*settings
     };
-    let tables = gpu.load(&flows, &laws, None).await?;
+    let tables = gpu.load_constants(constants, &laws).await?;
     let mut pool = Pool::new(gpu, variants, &settings);
     pool.begin(gpu, &tables, &lanes).await?;
     let bar = match gpu.precision {

@@ -352,7 +352,11 @@ impl Plan {
     #[cfg(feature = "gpu")]
     pub fn needs_reference(&self) -> bool {
         let flows = 0..self.flow_count() as u32;
-        flows.into_par_iter().any(|flow| crate::gpu::needs_reference(&self.oscillator(flow)))
+        let measures = self.needs.measures_motion();
+        flows.into_par_iter().any(|flow| {
+            let features = crate::gpu::Features::of(&self.oscillator(flow));
+            features.needing_reference().is_some() || measures && features.machine.is_some()
+        })
     }
 
     /// Returns the number of distinct flows.

@@ -14,6 +14,7 @@ mod features;
 mod growth;
 mod independence;
 mod kinds;
+mod machines;
 mod measures;
 mod neutral;
 mod resonance;

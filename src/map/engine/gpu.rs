@@ -105,6 +105,9 @@ impl<'p> Gpu<'p> {
     pub async fn prepared(prepared: Prepared<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let mut clock = Instant::now();
         let Prepared { plan, constants, survey, took } = prepared;
+        if survey.features.machine.is_some() && plan.needs().measures_motion() {
+            return Err(EngineError::NotOnLanes { feature: MEASURES_OF_MACHINES });
+        }
         if let Some(feature) = survey.features.needing_reference() {
             return Err(EngineError::NotOnLanes { feature });
         }
@@ -266,6 +269,8 @@ impl<'p> Gpu<'p> {
 
     async fn load(&self, constants: Vec<Option<Constants>>, laws: &[u32]) -> Result<Tables, GpuError> {
         let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
+        let mut constants = constants;
+        constants.iter_mut().flatten().for_each(|constants| constants.widen(self.settings.features));
         self.device.load_constants(constants, &laws).await
     }
 
@@ -491,6 +496,10 @@ impl Survey {
         }
     }
 }
+
+/// What lanes do not measure.
+const MEASURES_OF_MACHINES: &str = "quantities such as amplitudes, forces or energies of models with several gaps, more than two coordinates, \
+    dry friction, or a restitution that depends on the speed";
 
 fn survey(plan: &Plan) -> Survey {
     survey_flows(plan, |_, _| ()).map(|((), survey)| survey).reduce(Survey::default, Survey::and)
