@@ -23,11 +23,9 @@ fn suspend_motion() {
     pack_modes();
 }
 
+// The last stage holds until the first change, which may be at phase 0. The first step of the period then has no length.
 fn begin_schedule() {
     tally.next_change = 0u;
-    if shape.changes > 0u && change_step() == 0u && change_theta() == 0.0 {
-        enter_stage();
-    }
 }
 
 fn restart_phase() {}

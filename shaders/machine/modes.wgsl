@@ -15,39 +15,44 @@ fn sign_of_slip(slip: u32) -> Real {
 // Whether the modes that are tried fit the forces at a state.
 fn are_consistent(q: State) -> bool {
     let domain = domain_of(tried_gaps, tried_slips);
-    for (var gap = 0u; gap < GAPS; gap++) {
-        let side = rest_side[gap];
-        if side == SIDE_NONE {
-            continue;
+    for (var n = 0u; n < GAPS + ELEMENTS; n++) {
+        var line: Line;
+        var least = 0u;
+        var wants_positive = true;
+        if n < GAPS {
+            let side = rest_side[n];
+            if side == SIDE_NONE {
+                continue;
+            }
+            wants_positive = has_push(domain, n);
+            if wants_positive {
+                line = push_line(domain, n);
+            } else {
+                // Without a push the gap leaves the wall, or friction holds it there.
+                line = distance_line(n, 0.0, 1u - side);
+                least = 2u;
+            }
+        } else {
+            let i = n - GAPS;
+            let slip = tried_slips[i];
+            if rest_element[i] == 0u {
+                continue;
+            }
+            if slip == STICKS {
+                if has_hold(domain, i) {
+                    load_sizes(q);
+                    let row = hold_row(domain, i);
+                    if abs(product(row, 0u)) > element_force(i) + ROUNDING * size_of_product(row) {
+                        return false;
+                    }
+                }
+                continue;
+            }
+            line = rate_line(i, sign_of_slip(slip));
+            least = 1u;
         }
-        let pushes = has_push(domain, gap);
-        var line = distance_line(gap, 0.0, 1u - side);
-        var least = 2u;
-        if pushes {
-            line = push_line(domain, gap);
-            least = 0u;
-        }
-        // Without a push the gap leaves the wall, or friction holds it there.
-        let found = lead(line, domain, q, least);
-        if select(found.value > 0.0, !(found.value > 0.0), !pushes) != true {
+        if (lead(line, domain, q, least).value > 0.0) != wants_positive {
             return false;
-        }
-    }
-    for (var i = 0u; i < ELEMENTS; i++) {
-        if rest_element[i] == 0u {
-            continue;
-        }
-        let slip = tried_slips[i];
-        if slip != STICKS {
-            if !(lead(rate_line(i, sign_of_slip(slip)), domain, q, 1u).value > 0.0) {
-                return false;
-            }
-        } else if has_hold(domain, i) {
-            load_sizes(q);
-            let row = hold_row(domain, i);
-            if abs(product(row, 0u)) > element_force(i) + ROUNDING * size_of_product(row) {
-                return false;
-            }
         }
     }
     return true;

@@ -9,7 +9,7 @@ const MOST_DECISIONS: u32 = 16u;
 
 // What ends the present modes: the gap reaches the next wall in a direction; the gap of a contact onset comes to its wall, or is not
 // pressed any more; the gap comes back from behind its wall; a wall that only pushes would begin to pull, or begins to push; a rigid wall
-// would have to pull; a sliding rate vanishes; a holding force reaches its limit for sliding in a direction.
+// would have to pull; a sliding rate vanishes; a holding force reaches its limit for sliding in a direction; a stage begins.
 const ENDS_NOTHING: u32 = 0u;
 const ENDS_AT_WALL: u32 = 1u;
 const ENDS_ONSET: u32 = 2u;
@@ -20,6 +20,7 @@ const BEGINS_FORCE: u32 = 6u;
 const ENDS_PUSH: u32 = 7u;
 const ENDS_SLIDING: u32 = 8u;
 const BEGINS_SLIDING: u32 = 9u;
+const BEGINS_STAGE: u32 = 10u;
 
 // Such an end: the gap or the element, the side or the mode of friction that follows, the function that is positive before it, and the
 // order of its root at the start.
@@ -172,7 +173,7 @@ fn watch(number_of_watch: u32, domain: u32) -> Watch {
 // Steps of the grid to the next stop phase or change of the stage, at most to the end of the present one.
 fn steps_to_stop() -> Real {
     var stop: Real = 1.0;
-    if tally.next_change < shape.changes && change_step() == tally.step {
+    if is_change_next() {
         stop = change_theta();
     }
     return max(stop - motion.theta, Real(0.0));
@@ -224,6 +225,10 @@ fn step() -> bool {
     if share > 0.0 {
         advance(domain, share, share * h);
     }
+    if first.kind == ENDS_NOTHING && h >= remaining && is_change_next() {
+        motion.theta = change_theta();
+        first.kind = BEGINS_STAGE;
+    }
     if first.kind != ENDS_NOTHING {
         cross(first, domain);
         if tally.events_in_period > settings.events_per_period {
@@ -234,18 +239,13 @@ fn step() -> bool {
     if h < remaining {
         return false;
     }
-    if steps_to_stop_is_change() {
-        motion.theta = change_theta();
-        enter_stage();
-        return false;
-    }
     motion.theta = 0.0;
     tally.step += 1u;
     return tally.step >= next_stop_phase();
 }
 
-// Whether the next stop is a change of the stage.
-fn steps_to_stop_is_change() -> bool {
+// Whether a change of the stage is the next stop.
+fn is_change_next() -> bool {
     return tally.next_change < shape.changes && change_step() == tally.step;
 }
 
@@ -319,30 +319,45 @@ fn count_event(gap: u32, side: u32) {
         let is_right = side == SIDE_RIGHT;
         symbol = select(select(6u, 5u, !is_right), select(3u, 2u, is_right), origins[gap] == SIDE_RIGHT);
     }
-    if at != SIDE_NONE || origins[gap] != SIDE_NONE {
-        add_symbol(symbol + select(0u, 8u * (gap + 1u), GAPS > 1u));
-    }
+    symbol += select(0u, 8u * (gap + 1u), GAPS > 1u);
+    note(select(symbol, NO_SYMBOL, at == SIDE_NONE && origins[gap] == SIDE_NONE), 1u + side + 2u * (gap_modes[gap] + 32u * gap));
     origins[gap] = side;
-    count(1u + side + 2u * (gap_modes[gap] + 32u * gap));
 }
 
 // Counts a change of friction, with its symbol if `symbol` has one.
 fn count_slip(symbol: u32) {
-    if symbol < NO_SYMBOL {
-        add_symbol(symbol);
-    }
-    count(512u + symbol);
+    note(symbol, 512u + symbol);
 }
 
-const NO_SYMBOL: u32 = 8u;
+const NO_SYMBOL: u32 = 64u;
 const STICKING_ENDS: u32 = 7u;
 const SLIDING_REVERSES: u32 = 0u;
 
-fn count(code: u32) {
-    keep_strobe_distance();
-    tally.itinerary = mix_bits(tally.itinerary + code);
-    tally.events += 1u;
-    tally.events_in_period += 1u;
+// The events of one instant: symbols and codes. They are counted together, because drivers copy functions to each call.
+const MOST_NOTES: u32 = 16u;
+var<private> noted_symbols: array<u32, MOST_NOTES>;
+var<private> noted_codes: array<u32, MOST_NOTES>;
+var<private> note_count: u32;
+
+fn note(symbol: u32, code: u32) {
+    if note_count < MOST_NOTES {
+        noted_symbols[note_count] = symbol;
+        noted_codes[note_count] = code;
+        note_count += 1u;
+    }
+}
+
+fn count_notes() {
+    for (var n = 0u; n < note_count; n++) {
+        if noted_symbols[n] != NO_SYMBOL {
+            add_symbol(noted_symbols[n]);
+        }
+        keep_strobe_distance();
+        tally.itinerary = mix_bits(tally.itinerary + noted_codes[n]);
+        tally.events += 1u;
+        tally.events_in_period += 1u;
+    }
+    note_count = 0u;
 }
 
 // Jump of the rates at an impact: per unit of change of the gap's rate, the gap, and the change per approach speed of neighbours.
@@ -385,7 +400,8 @@ fn cross(event: Watch, domain: u32) {
     }
     kick_factor = 0.0;
     act(event);
-    if EXPONENT {
+    count_notes();
+    if EXPONENT && event.kind != BEGINS_STAGE {
         saltate(event.line, select(Real(0.0), NO_SPEED * flow.speed, is_at_wall), before, rate,
             event.kind == ENDS_AT_WALL || event.kind == LEAVES);
     }
@@ -426,6 +442,7 @@ fn act(event: Watch) {
     var exempt_gap = GAPS;
     var exempt_element = ELEMENTS;
     var reached = SIDE_NONE;
+    var stopped = ELEMENTS;
     switch event.kind {
         case ENDS_AT_WALL: {
             if gap_modes[i] >= ONSET {
@@ -469,18 +486,23 @@ fn act(event: Watch) {
             exempt_gap = i;
         }
         case ENDS_SLIDING: {
-            end_sliding(i);
+            stopped = i;
         }
-        default: {
+        case BEGINS_SLIDING: {
             begin_sliding(i, event.side);
             exempt_element = i;
+        }
+        default: {
+            // What depends on forces is decided anew in the stage that begins.
+            stage = u32(table[shape.schedule + 3u * tally.next_change + 2u]);
+            tally.next_change += 1u;
         }
     }
     if reached != SIDE_NONE {
         reach(i, reached);
     }
     if event.kind != ENDS_ONSET {
-        settle(exempt_gap, exempt_element);
+        settle(exempt_gap, exempt_element, stopped);
     }
     complete_orders();
 }
@@ -507,19 +529,32 @@ fn leave(gap: u32, direction: u32) {
 // Computes the orders of all roots at the present state.
 fn complete_orders() {
     let domain = present_domain();
-    for (var gap = 0u; gap < GAPS; gap++) {
-        if wall_side[gap] == SIDE_NONE {
-            continue;
+    for (var n = 0u; n < GAPS + ELEMENTS; n++) {
+        let is_gap = n < GAPS;
+        let gap = min(n, GAPS - 1u);
+        let element = select(n - GAPS, 0u, is_gap);
+        var line = distance_line(gap, 0.0, SIDE_RIGHT);
+        if is_gap {
+            if wall_side[gap] == SIDE_NONE {
+                continue;
+            }
+            if rate_of_gap(gap) != 0.0 {
+                wall_order[gap] = 1u;
+            }
+            if rate_of_gap(gap) != 0.0 || wall_order[gap] >= RELEASE_ORDER {
+                continue;
+            }
+        } else {
+            if from_rate[element] != UNKNOWN_ORDER {
+                continue;
+            }
+            line = rate_line(element, 1.0);
         }
-        if rate_of_gap(gap) != 0.0 {
-            wall_order[gap] = 1u;
-        } else if wall_order[gap] < RELEASE_ORDER {
-            wall_order[gap] = lead(distance_line(gap, 0.0, SIDE_RIGHT), domain, motion.q, 2u).order;
-        }
-    }
-    for (var i = 0u; i < ELEMENTS; i++) {
-        if from_rate[i] == UNKNOWN_ORDER {
-            from_rate[i] = lead(rate_line(i, 1.0), domain, motion.q, 1u).order;
+        let order = lead(line, domain, motion.q, select(1u, 2u, is_gap)).order;
+        if is_gap {
+            wall_order[gap] = order;
+        } else {
+            from_rate[element] = order;
         }
     }
 }
@@ -535,9 +570,20 @@ fn reach(gap: u32, direction: u32) {
     let closing = sign_of(direction) * rate_of_gap(gap);
     let is_elastic = wall.y < passable(gap, wall.x);
     let is_tiny = closing < NO_SPEED * flow.speed;
+    let is_pushing = wall.x == direction && is_elastic && wall.y + 1u == wall_count(gap, wall.x) && last_kind(gap, wall.x) == LAST_PUSHING;
+    // The acceleration towards the wall, and the force of a wall that only pushes, where they matter.
     var heads: Real = 1.0;
-    if is_tiny && closing >= 0.0 {
-        heads = lead(distance_line(gap, 0.0, 1u - direction), domain, motion.q, 2u).value;
+    var pushes: Real = 1.0;
+    for (var n = 0u; n < 2u; n++) {
+        var line = distance_line(gap, 0.0, 1u - direction);
+        if n == 1u {
+            line = force_line(gap, wall.x, 1.0);
+        }
+        if select(is_tiny && closing >= 0.0, is_pushing, n == 1u) {
+            let value = lead(line, domain, motion.q, select(2u, 0u, n == 1u)).value;
+            heads = select(value, heads, n == 1u);
+            pushes = value;
+        }
     }
     if closing < 0.0 || (closing == 0.0 && !(heads > 0.0)) {
         leave(gap, direction);
@@ -547,7 +593,7 @@ fn reach(gap: u32, direction: u32) {
         // Impacts of two gaps in turn end here: both leave their walls from rest.
         motion.q[2u * gap + 1u] = 0.0;
         tally.grazes += 1u;
-        count(0u);
+        note(NO_SYMBOL, 0u);
         leave(gap, direction);
         return;
     }
@@ -557,8 +603,7 @@ fn reach(gap: u32, direction: u32) {
         gap_modes[gap] = next;
         leave(gap, wall.x);
     } else if is_elastic {
-        let is_pushing = wall.y + 1u == wall_count(gap, wall.x) && last_kind(gap, wall.x) == LAST_PUSHING;
-        if is_pushing && !(lead(force_line(gap, wall.x, 1.0), domain, motion.q, 0u).value > 0.0) {
+        if is_pushing && !(pushes > 0.0) {
             gap_modes[gap] = OPEN + wall.x;
         } else {
             count_event(gap, wall.x);
@@ -656,17 +701,24 @@ fn impact(gap: u32, side: u32) {
             next = q;
             chosen_gaps = tried_gaps;
             chosen_slips = tried_slips;
-            let domain = domain_of(tried_gaps, tried_slips);
-            let line = distance_line(gap, 0.0, 1u - side);
-            pressing = lead(line, domain, q, 2u).value;
-            load_point(q);
-            is_slow = leaving <= max(laws[cell.law_index][2u * gap + side][3], lowest_speed(domain, gap));
-            if is_slow && !is_rigid && pressing > 0.0 {
-                tried_gaps[gap] = select(PRESSED, ONSET, leaving > 0.0) + side;
-                if lead(line, domain_of(tried_gaps, tried_slips), q, 2u).value > 0.0 {
-                    lasts = true;
-                    chosen_gaps = tried_gaps;
+            // The gap must be pressed to the wall without and with contact.
+            for (var with_contact = 0u; with_contact < 2u; with_contact++) {
+                let domain = domain_of(tried_gaps, tried_slips);
+                let value = lead(distance_line(gap, 0.0, 1u - side), domain, q, 2u).value;
+                if with_contact == 1u {
+                    if value > 0.0 {
+                        lasts = true;
+                        chosen_gaps = tried_gaps;
+                    }
+                    break;
                 }
+                pressing = value;
+                load_point(q);
+                is_slow = leaving <= max(laws[cell.law_index][2u * gap + side][3], lowest_speed(domain, gap));
+                if !is_slow || is_rigid || !(pressing > 0.0) {
+                    break;
+                }
+                tried_gaps[gap] = select(PRESSED, ONSET, leaving > 0.0) + side;
             }
         }
         tried_gaps = chosen_gaps;
@@ -852,22 +904,6 @@ fn list_rest(domain: u32) {
     tried_slips = slips;
 }
 
-// Processes a sliding rate that vanishes.
-fn end_sliding(i: u32) {
-    list_rest(present_domain());
-    rest_element[i] = 1u;
-    let before = slips[i];
-    _ = choose(motion.q, false);
-    if tried_slips[i] == before {
-        // The rate only touches 0, or begins on the wrong side of it.
-        tally.grazes += 1u;
-        count(1u);
-        from_rate[i] = UNKNOWN_ORDER;
-        return;
-    }
-    change_modes(i);
-}
-
 // Processes an element that breaks away.
 fn begin_sliding(i: u32, next: u32) {
     let before = present_domain();
@@ -906,28 +942,41 @@ fn begin_sliding(i: u32, next: u32) {
     }
 }
 
-// Decides all modes anew that depend on forces, after a jump of forces or rates. The exempt gap or element has just been decided.
-fn settle(exempt_gap: u32, exempt_element: u32) {
+// Decides all modes anew that depend on forces, after a jump of forces or rates. The exempt gap or element has just been decided. The sliding
+// rate of the element `stopped` has just vanished.
+fn settle(exempt_gap: u32, exempt_element: u32, stopped: u32) {
     for (var n = 0u; n < MOST_DECISIONS; n++) {
         let domain = present_domain();
-        if settle_pushing(domain) {
+        let ends_sliding = n == 0u && stopped < ELEMENTS;
+        if !ends_sliding && settle_pushing(domain) {
             continue;
         }
         list_rest(domain);
+        if ends_sliding {
+            rest_element[stopped] = 1u;
+        }
         if exempt_gap < GAPS {
             rest_side[exempt_gap] = SIDE_NONE;
         }
         if exempt_element < ELEMENTS {
             rest_element[exempt_element] = 0u;
         }
-        if !choose(motion.q, true) {
+        let has_choice = choose(motion.q, !ends_sliding);
+        if ends_sliding && tried_slips[stopped] == slips[stopped] {
+            // The rate only touches 0, or begins on the wrong side of it.
+            tally.grazes += 1u;
+            note(NO_SYMBOL, 1u);
+            from_rate[stopped] = UNKNOWN_ORDER;
+            continue;
+        }
+        if !has_choice {
             tally.grazes += 1u;
             break;
         }
         if are_tried_modes_present() {
             break;
         }
-        change_modes(ELEMENTS);
+        change_modes(select(ELEMENTS, stopped, ends_sliding));
     }
 }
 
@@ -1035,21 +1084,5 @@ fn change_slips(stopped: u32) {
         } else if i == stopped {
             count_slip(SLIDING_REVERSES);
         }
-    }
-}
-
-// Enters the stage that begins at the present phase: what depends on forces is decided anew.
-fn enter_stage() {
-    stage = u32(table[shape.schedule + 3u * tally.next_change + 2u]);
-    tally.next_change += 1u;
-    settle(GAPS, ELEMENTS);
-    complete_orders();
-}
-
-// Returns to the begin of the schedule at phase 0. The last stage holds until the first change, which may be there.
-fn restart_schedule() {
-    tally.next_change = 0u;
-    if shape.changes > 0u && change_step() == 0u && change_theta() == 0.0 {
-        enter_stage();
     }
 }
