@@ -3,6 +3,14 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+/// Random machines and numbers, as the tests of the reference draw them.
+mod independent {
+    #[path = "../../../dynamics/tests/core/independent/random.rs"]
+    pub(crate) mod random;
+}
+#[path = "../../dynamics/tests/core/machines/random.rs"]
+mod random_machines;
+
 mod chatter;
 mod classes;
 mod confirm_chaos;
