@@ -16,9 +16,7 @@ const SHORTEST_STEP: Real = 1e-6;
 // Machines: rounding error of a sum, relative to the size of its terms, and of a coefficient of a polynomial, relative to the sum of all.
 const ROUNDING: Real = 2e-6;
 const POLYNOMIAL_ROUNDING: Real = 1e-6;
-// Machines: height of a flight, relative to the scale of length, that is not followed in a series of impacts; the narrowest interval, as a
-// share of a step, in which a root is isolated; most halvings, and most steps of the final search.
-const LOWEST_FLIGHT: Real = 1e-6;
+// Machines: the narrowest interval, as a share of a step, in which a root is isolated; most halvings, and most steps of the final search.
 const NARROWEST: Real = 1e-6;
 const MOST_HALVINGS: u32 = 48u;
 const ROOT_STEPS: u32 = 30u;

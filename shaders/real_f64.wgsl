@@ -9,7 +9,6 @@ const SHORTEST: Real = 1e-8;
 const SHORTEST_STEP: Real = 1e-14;
 const ROUNDING: Real = 4e-15;
 const POLYNOMIAL_ROUNDING: Real = 2e-15;
-const LOWEST_FLIGHT: Real = 1e-13;
 const NARROWEST: Real = 1e-14;
 const MOST_HALVINGS: u32 = 96u;
 const ROOT_STEPS: u32 = 60u;

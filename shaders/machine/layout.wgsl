@@ -4,7 +4,8 @@
 // equations of motion of every domain (src/gpu/machine.rs), and puts them in a table, by number. The names with capital letters that no
 // file declares are sizes and places in this table.
 //
-// A point lists the numbers that forces depend on: displacements and rates in turn, the cosine and the sine of each harmonic, and 1.
+// A point lists the numbers that forces depend on: displacements and rates in turn, the cosine and the sine of each harmonic, zeros up to a
+// multiple of four numbers, and 1.
 // A row lists the factors of these numbers in a force or an acceleration.
 
 struct Flow {

@@ -627,22 +627,24 @@ fn restitution(gap: u32, side: u32, speed: Real) -> array<Real, 2> {
     var value = law[0];
     var slope: Real = 0.0;
     if law[1] != 0.0 {
-        var ratio: Real = 1.0;
-        // Doubles have no powers.
-        if law[2] == 1.0 {
-            ratio = speed;
-        } else if law[2] == 2.0 {
-            ratio = speed * speed;
-        } else if law[2] == 0.5 {
-            ratio = sqrt(speed);
-        } else {
-            ratio = Real(pow(f32(speed), f32(law[2])));
-        }
+        let ratio = power(speed, law[2]);
         value += law[1] * ratio;
         slope = law[1] * law[2] * ratio / max(speed, 1e-30);
     }
     let is_inside = value >= 0.0 && value <= 1.0;
     return array<Real, 2>(clamp(value, Real(0.0), Real(1.0)), select(Real(0.0), slope, is_inside));
+}
+
+// Returns `x^p` for a positive number, to the precision of its type: f64 has no powers.
+fn power(x: Real, p: Real) -> Real {
+    let octaves = p * octaves_of(clamp(x, Real(1e-30), Real(1e30)));
+    let whole = clamp(round(octaves), Real(-120.0), Real(120.0));
+    let y = (octaves - whole) * LN_2;
+    var sum: Real = 1.0;
+    for (var k = TERMS; k > 0u; k--) {
+        sum = 1.0 + sum * y / Real(k);
+    }
+    return sum * Real(ldexp(1.0, i32(whole)));
 }
 
 // Returns the leaving speed of a flight that is not followed in a series of impacts, for the point that is loaded.

@@ -82,18 +82,20 @@ fn product(row: u32, k: u32) -> Real {
     let t = shape.machine + row;
     let p = k * WIDTH;
     var sum: Real = 0.0;
-    //% for k in 0..WIDTH
-    sum += table[t + $ku] * series[p + $ku];
-    //% end
+    for (var j = 0u; j < WIDTH; j += 4u) {
+        sum += (table[t + j] * series[p + j] + table[t + j + 1u] * series[p + j + 1u])
+            + (table[t + j + 2u] * series[p + j + 2u] + table[t + j + 3u] * series[p + j + 3u]);
+    }
     return sum;
 }
 
 fn size_of_product(row: u32) -> Real {
     let t = shape.machine + row;
     var sum: Real = 0.0;
-    //% for k in 0..WIDTH
-    sum += abs(table[t + $ku]) * sizes[$ku];
-    //% end
+    for (var j = 0u; j < WIDTH; j += 4u) {
+        sum += (abs(table[t + j]) * sizes[j] + abs(table[t + j + 1u]) * sizes[j + 1u])
+            + (abs(table[t + j + 2u]) * sizes[j + 2u] + abs(table[t + j + 3u]) * sizes[j + 3u]);
+    }
     return sum;
 }
 
@@ -129,6 +131,9 @@ fn load_point(q: State) {
         series[DIM + 2u * m] = c + (turn.x * c - turn.y * s);
         series[DIM + 2u * m + 1u] = s + (turn.y * c + turn.x * s);
     }
+    for (var i = DIM + 2u * HARMONICS; i < WIDTH; i++) {
+        series[i] = 0.0;
+    }
     series[WIDTH - 1u] = 1.0;
 }
 
@@ -157,8 +162,11 @@ fn differentiate(domain: u32, k: u32, factor: Real) {
         series[to_term + at] = -turn * series[from_term + at + 1u];
         series[to_term + at + 1u] = turn * series[from_term + at];
     }
-    series[to_term + WIDTH - 1u] = 0.0;
-    iterations += 1u;
+    for (var i = DIM + 2u * HARMONICS; i < WIDTH; i++) {
+        series[to_term + i] = 0.0;
+    }
+    // An iteration of the budget stands for up to eight trips of these loops.
+    iterations += 1u + COORDINATES * WIDTH / 32u;
 }
 
 // Computes the terms of a step of length `h`.

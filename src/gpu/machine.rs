@@ -72,9 +72,9 @@ impl MachineShape {
         2 * self.coordinates as usize
     }
 
-    /// Numbers that forces depend on: the state, two for each harmonic, and 1.
+    /// Numbers that forces depend on: the state, two for each harmonic, and 1 as the last of a multiple of four.
     pub(super) fn width(&self) -> usize {
-        self.dim() + 2 * self.harmonics as usize + 1
+        (self.dim() + 2 * self.harmonics as usize + 1).next_multiple_of(4)
     }
 
     /// Returns the places in the table, by their names in the shader.

@@ -6,6 +6,7 @@ use rattlemap_dynamics::orbit::{
     LINEAR_TOLERANCE, NEAR_STROBE_TURNS, NEUTRAL_ORDER, ON_STROBE_TURNS, PLAIN_GROWTH, ROUNDING_OF_AVERAGES,
     SHARED_GROWTH,
 };
+use rattlemap_dynamics::reference::machine::LOWEST_FLIGHT;
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 use rattlemap_dynamics::stability::CORRELATION_MARGIN;
 
@@ -119,6 +120,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("ESCAPE_GROWTH", ESCAPE_GROWTH),
         ("FOLLOWED_MESH_SPEED", FOLLOWED_MESH_SPEED),
         ("GRAZING_SPEED", GRAZING_SPEED),
+        ("LOWEST_FLIGHT", LOWEST_FLIGHT),
         ("NO_SPEED", NO_SPEED),
         ("NO_THRESHOLD", NO_THRESHOLD),
         ("LARGEST_DIFFERENCE", LARGEST_DIFFERENCE),

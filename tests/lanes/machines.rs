@@ -85,7 +85,7 @@ fn compare(shape: Shape, seeds: u64) {
             let error = distance(&record.strobe, &exact.state, omega) / exact.size;
             let allowed = rounding * exact.amplification;
             let count = (record.impacts_per_period * f64::from(PERIODS)).round() as u64;
-            if record.status != 0 || count != exact.impacts || !(error < allowed) {
+            if record.status != 0 || precision == Precision::F64 && count != exact.impacts || !(error < allowed) {
                 println!("seed {seed}: status {}, {count} impacts for {}, error {error:.1e}, allowed {allowed:.1e}", record.status, exact.impacts);
             } else {
                 worst = worst.max(error / allowed);
@@ -100,4 +100,11 @@ fn compare(shape: Shape, seeds: u64) {
 #[test]
 fn random_machines_move_as_on_the_reference() {
     compare(Shape { coordinates: 3, gaps: 2, harmonics: 2, stages: 2, friction: 1, walls: 2 }, 64);
+}
+
+#[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
+fn large_machines_move_as_on_the_reference() {
+    compare(Shape { coordinates: 2, gaps: 1, harmonics: 3, stages: 1, friction: 2, walls: 3 }, 64);
+    compare(Shape { coordinates: 8, gaps: 3, harmonics: 8, stages: 1, friction: 0, walls: 1 }, 32);
 }

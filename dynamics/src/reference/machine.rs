@@ -33,7 +33,7 @@ mod table;
 pub use events::{MachineEvent, SlipEvent};
 pub use flight::Flight;
 pub(crate) use flight::Signal;
-pub use motion::Motion;
+pub use motion::{LOWEST_FLIGHT, Motion};
 pub use system::System;
 pub use table::{Equations, StartModes};
 

@@ -20,7 +20,7 @@ use crate::reference::{
 use crate::word;
 
 /// Height of a flight, relative to the scale of length, that is not followed in a series of impacts.
-const LOWEST_FLIGHT: f64 = 1e-13;
+pub const LOWEST_FLIGHT: f64 = 1e-13;
 
 /// Order of the root of the distance when the gap leaves a rigid wall: its acceleration is zero, the derivative is not.
 const RELEASE_ORDER: usize = 3;
