@@ -30,6 +30,11 @@ struct FlowShape {
     // Number of elements with friction, and of coordinates.
     elements: u32,
     degrees: u32,
+    // The constants COORDINATES, DIM, WIDTH and TERMS. Some drivers copy out loops whose bounds they know, and take minutes to compile them.
+    coordinates: u32,
+    dim: u32,
+    width: u32,
+    terms: u32,
     // Orders of the harmonics.
     orders: array<u32, 8>,
     // Number of walls: right, left walls of each gap. Kind of the last one: LAST_*.

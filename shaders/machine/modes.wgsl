@@ -103,7 +103,7 @@ fn choose(q: State, keeps: bool) -> bool {
 // Loads a point with the sizes of its numbers.
 fn load_sizes(q: State) {
     load_point(q);
-    for (var i = 0u; i < WIDTH; i++) {
+    for (var i = 0u; i < shape.width; i++) {
         sizes[i] = abs(series[i]);
     }
 }
@@ -136,7 +136,7 @@ fn hold(q: ptr<function, State>, speeds: Real) {
         if n < ELEMENTS {
             var pivot = COORDINATES;
             var most: Real = 0.0;
-            for (var j = 0u; j < COORDINATES; j++) {
+            for (var j = 0u; j < shape.coordinates; j++) {
                 let size = abs(number(row + 2u * j + 1u));
                 if ((held >> j) & 1u) == 0u && size > most {
                     pivot = j;
@@ -152,7 +152,7 @@ fn hold(q: ptr<function, State>, speeds: Real) {
         }
         // The last number of a sliding rate is the speed with a minus sign.
         var rest = speeds * number(row + WIDTH - 1u);
-        for (var j = 0u; j < COORDINATES; j++) {
+        for (var j = 0u; j < shape.coordinates; j++) {
             if j != pivot {
                 rest += number(row + 2u * j + 1u) * (*q)[2u * j + 1u];
             }

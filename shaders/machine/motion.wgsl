@@ -194,7 +194,7 @@ fn step() -> bool {
     let remaining = steps_to_stop() * flow.h;
     let h = min(unit_of(domain), remaining);
     load_point(motion.q);
-    for (var i = 0u; i < WIDTH; i++) {
+    for (var i = 0u; i < shape.width; i++) {
         sizes[i] = abs(series[i]);
     }
     expand(domain, h);
@@ -205,7 +205,8 @@ fn step() -> bool {
         if candidate.kind == ENDS_NOTHING {
             continue;
         }
-        for (var k = 0u; k <= TERMS; k++) {
+        iterations += TERMS * select(1u, 1u + WIDTH / 4u, candidate.line.scale != 0.0);
+        for (var k = 0u; k <= shape.terms; k++) {
             powers[k] = value_of(candidate.line, k);
         }
         var order = candidate.order;
@@ -369,7 +370,7 @@ var<private> kick_factor: Real;
 fn jump(u: State) -> State {
     var v = u;
     let change = kick_factor * v[2u * kick_gap + 1u];
-    for (var i = 0u; i < COORDINATES; i++) {
+    for (var i = 0u; i < shape.coordinates; i++) {
         v[2u * i + 1u] -= kick[i] * change;
     }
     return v;
@@ -380,7 +381,7 @@ fn field(domain: u32) -> State {
     load_point(motion.q);
     differentiate(domain, 0u, 1.0);
     var f: State;
-    for (var i = 0u; i < DIM; i++) {
+    for (var i = 0u; i < shape.dim; i++) {
         f[i] = series[WIDTH + i];
     }
     return f;
@@ -415,7 +416,7 @@ fn saltate(line: Line, least: Real, before: State, rate: Real, is_passed: bool) 
     if abs(rate) <= least && (kick_factor != 0.0 || !is_passed) {
         tally.grazes += 1u;
     }
-    for (var i = 0u; i < DIM; i++) {
+    for (var i = 0u; i < shape.dim; i++) {
         change[i] = (change[i] - carried[i]) * inverse;
     }
     for (var n = 0u; n < tally.tangent_count; n++) {
@@ -423,7 +424,7 @@ fn saltate(line: Line, least: Real, before: State, rate: Real, is_passed: bool) 
         load_vector(u);
         let along = value_of(line, 0u);
         var v = jump(u);
-        for (var i = 0u; i < DIM; i++) {
+        for (var i = 0u; i < shape.dim; i++) {
             v[i] += change[i] * along;
         }
         for (var gap = 0u; gap < GAPS; gap++) {
@@ -641,7 +642,7 @@ fn power(x: Real, p: Real) -> Real {
     let whole = clamp(round(octaves), Real(-120.0), Real(120.0));
     let y = (octaves - whole) * LN_2;
     var sum: Real = 1.0;
-    for (var k = TERMS; k > 0u; k--) {
+    for (var k = shape.terms; k > 0u; k--) {
         sum = 1.0 + sum * y / Real(k);
     }
     return sum * Real(ldexp(1.0, i32(whole)));
@@ -677,7 +678,7 @@ fn impact(gap: u32, side: u32) {
             }
             var q = before;
             let change = select((1.0 + e) * approach, approach, stops == 1u);
-            for (var i = 0u; i < COORDINATES; i++) {
+            for (var i = 0u; i < shape.coordinates; i++) {
                 q[2u * i + 1u] -= sign_of(side) * kick[i] * change;
             }
             q[2u * gap + 1u] = select(-sign_of(side) * leaving, Real(0.0), stops == 1u);
@@ -802,7 +803,7 @@ fn joint_impact(gap: u32, side: u32, kept: u32) -> u32 {
         for (var k = 0u; k < count_of_held; k++) {
             own -= shares[k] * mobility(held[k], gap);
         }
-        for (var i = 0u; i < COORDINATES; i++) {
+        for (var i = 0u; i < shape.coordinates; i++) {
             var moved = mobility(i, gap);
             for (var k = 0u; k < count_of_held; k++) {
                 moved -= shares[k] * mobility(i, held[k]);
@@ -863,7 +864,7 @@ fn slide_after_jump(q: State, jumps: bool, gap: u32, stopped: u32) -> bool {
         var size_of_move: Real = 0.0;
         var rate = number(row + WIDTH - 1u);
         var size = abs(rate);
-        for (var j = 0u; j < COORDINATES; j++) {
+        for (var j = 0u; j < shape.coordinates; j++) {
             let factor = number(row + 2u * j + 1u);
             moved += factor * kick[j];
             size_of_move += abs(factor * kick[j]);

@@ -15,7 +15,7 @@ const NO_ROOT: Real = 2.0;
 
 // Computes the Bernstein form on `[low, high]` of the polynomial whose lowest coefficient is `powers[order]`.
 fn convert(order: u32, low: Real, high: Real) {
-    let degree = TERMS - order;
+    let degree = shape.terms - order;
     for (var i = 0u; i <= degree; i++) {
         bernstein[i] = powers[order + i];
     }
@@ -25,7 +25,6 @@ fn convert(order: u32, low: Real, high: Real) {
             for (var j = degree; j > i; j--) {
                 bernstein[j - 1u] += low * bernstein[j];
             }
-            iterations += 1u;
         }
     }
     // The coefficient of u^j, divided by the binomial coefficient; then sums as in Pascal's triangle.
@@ -38,7 +37,6 @@ fn convert(order: u32, low: Real, high: Real) {
         for (var j = degree; j > i; j--) {
             bernstein[j] += bernstein[j - 1u];
         }
-        iterations += 1u;
     }
 }
 
@@ -47,7 +45,7 @@ fn convert(order: u32, low: Real, high: Real) {
 fn first_fall(order: u32, size: Real) -> Real {
     touches = false;
     var rest: Real = 0.0;
-    for (var k = order + 1u; k <= TERMS; k++) {
+    for (var k = order + 1u; k <= shape.terms; k++) {
         rest += abs(powers[k]);
     }
     let noise = POLYNOMIAL_ROUNDING * select(rest, rest + size, order == 0u);
@@ -57,11 +55,12 @@ fn first_fall(order: u32, size: Real) -> Real {
     if !(powers[order] > 0.0) {
         return 0.0;
     }
-    let degree = TERMS - order;
+    let degree = shape.terms - order;
     var low: Real = 0.0;
     var high: Real = 1.0;
     for (var n = 0u; n < MOST_HALVINGS; n++) {
         convert(order, low, high);
+        iterations += TERMS * (TERMS + 2u);
         var changes = 0u;
         var largest_size = abs(bernstein[0]);
         for (var i = 1u; i <= degree; i++) {
@@ -94,10 +93,10 @@ fn root(order: u32, begin_at: Real, end_at: Real) -> Real {
     var high = end_at;
     var u = 0.5 * (low + high);
     for (var n = 0u; n < ROOT_STEPS; n++) {
-        iterations += 1u;
+        iterations += TERMS;
         var value: Real = 0.0;
         var slope: Real = 0.0;
-        for (var k = TERMS + 1u; k > order; k--) {
+        for (var k = shape.terms + 1u; k > order; k--) {
             slope = slope * u + value;
             value = value * u + powers[k - 1u];
         }

@@ -5,6 +5,11 @@ var<private> series: array<Real, SERIES>;
 // Sizes of the terms that have been added up in a point.
 var<private> sizes: array<Real, WIDTH>;
 
+// Trips of the loops over the rates and over the numbers of a point. Inner loops count: some drivers add up the trips of all loops of a dispatch
+// and stop at a limit.
+const TRIPS_OF_RATES: u32 = COORDINATES * (1u + WIDTH / 4u) + HARMONICS + 4u;
+const TRIPS_OF_POINT: u32 = WIDTH + HARMONICS;
+
 // Derivatives that are compared with zero.
 const DERIVATIVES: u32 = 4u;
 
@@ -82,7 +87,7 @@ fn product(row: u32, k: u32) -> Real {
     let t = shape.machine + row;
     let p = k * WIDTH;
     var sum: Real = 0.0;
-    for (var j = 0u; j < WIDTH; j += 4u) {
+    for (var j = 0u; j < shape.width; j += 4u) {
         sum += (table[t + j] * series[p + j] + table[t + j + 1u] * series[p + j + 1u])
             + (table[t + j + 2u] * series[p + j + 2u] + table[t + j + 3u] * series[p + j + 3u]);
     }
@@ -92,7 +97,7 @@ fn product(row: u32, k: u32) -> Real {
 fn size_of_product(row: u32) -> Real {
     let t = shape.machine + row;
     var sum: Real = 0.0;
-    for (var j = 0u; j < WIDTH; j += 4u) {
+    for (var j = 0u; j < shape.width; j += 4u) {
         sum += (abs(table[t + j]) * sizes[j] + abs(table[t + j + 1u]) * sizes[j + 1u])
             + (abs(table[t + j + 2u]) * sizes[j + 2u] + abs(table[t + j + 3u]) * sizes[j + 3u]);
     }
@@ -120,7 +125,8 @@ fn size_of_value(line: Line) -> Real {
 // Makes a state at the present phase the first term.
 fn load_point(q: State) {
     var y = q;
-    for (var i = 0u; i < DIM; i++) {
+    iterations += TRIPS_OF_POINT;
+    for (var i = 0u; i < shape.dim; i++) {
         series[i] = y[i];
     }
     for (var m = 0u; m < HARMONICS; m++) {
@@ -131,7 +137,7 @@ fn load_point(q: State) {
         series[DIM + 2u * m] = c + (turn.x * c - turn.y * s);
         series[DIM + 2u * m + 1u] = s + (turn.y * c + turn.x * s);
     }
-    for (var i = DIM + 2u * HARMONICS; i < WIDTH; i++) {
+    for (var i = shape.dim + 2u * HARMONICS; i < shape.width; i++) {
         series[i] = 0.0;
     }
     series[WIDTH - 1u] = 1.0;
@@ -140,10 +146,10 @@ fn load_point(q: State) {
 // Makes a tangent vector the first term.
 fn load_vector(u: State) {
     var y = u;
-    for (var i = 0u; i < DIM; i++) {
+    for (var i = 0u; i < shape.dim; i++) {
         series[i] = y[i];
     }
-    for (var i = DIM; i < WIDTH; i++) {
+    for (var i = shape.dim; i < shape.width; i++) {
         series[i] = 0.0;
     }
 }
@@ -152,7 +158,7 @@ fn load_vector(u: State) {
 fn differentiate(domain: u32, k: u32, factor: Real) {
     let from_term = k * WIDTH;
     let to_term = from_term + WIDTH;
-    for (var i = 0u; i < COORDINATES; i++) {
+    for (var i = 0u; i < shape.coordinates; i++) {
         series[to_term + 2u * i] = factor * series[from_term + 2u * i + 1u];
         series[to_term + 2u * i + 1u] = factor * product(acceleration_row(domain, i), k);
     }
@@ -162,16 +168,15 @@ fn differentiate(domain: u32, k: u32, factor: Real) {
         series[to_term + at] = -turn * series[from_term + at + 1u];
         series[to_term + at + 1u] = turn * series[from_term + at];
     }
-    for (var i = DIM + 2u * HARMONICS; i < WIDTH; i++) {
+    for (var i = shape.dim + 2u * HARMONICS; i < shape.width; i++) {
         series[to_term + i] = 0.0;
     }
-    // An iteration of the budget stands for up to eight trips of these loops.
-    iterations += 1u + COORDINATES * WIDTH / 32u;
+    iterations += TRIPS_OF_RATES;
 }
 
 // Computes the terms of a step of length `h`.
 fn expand(domain: u32, h: Real) {
-    for (var k = 0u; k < TERMS; k++) {
+    for (var k = 0u; k < shape.terms; k++) {
         differentiate(domain, k, h / Real(k + 1u));
     }
 }
@@ -179,12 +184,13 @@ fn expand(domain: u32, h: Real) {
 // Returns the state after a share of the step.
 fn state_after(share: Real) -> State {
     var q: State;
-    for (var i = 0u; i < DIM; i++) {
+    iterations += DIM * TERMS;
+    for (var i = 0u; i < shape.dim; i++) {
         var sum: Real = 0.0;
-        //% for k in 0..TERMS down
-        sum = sum * share + series[$(k+1)u * WIDTH + i];
-        //% end
-        q[i] = sum * share + series[i];
+        for (var k = shape.terms + 1u; k > 0u; k--) {
+            sum = sum * share + series[(k - 1u) * WIDTH + i];
+        }
+        q[i] = sum;
     }
     return q;
 }
@@ -198,7 +204,7 @@ struct Lead {
 // Returns the first such derivative of order `least` or higher, at a state and at the present phase. Only its sign has a meaning.
 fn lead(line: Line, domain: u32, q: State, least: u32) -> Lead {
     load_point(q);
-    for (var i = 0u; i < WIDTH; i++) {
+    for (var i = 0u; i < shape.width; i++) {
         sizes[i] = abs(series[i]);
     }
     let unit = unit_of(domain);
@@ -211,16 +217,17 @@ fn lead(line: Line, domain: u32, q: State, least: u32) -> Lead {
             }
         }
         differentiate(domain, order, unit);
-        for (var i = 0u; i < COORDINATES; i++) {
+        iterations += TRIPS_OF_RATES + 2u * TRIPS_OF_POINT;
+        for (var i = 0u; i < shape.coordinates; i++) {
             let rate = sizes[2u * i + 1u];
             // The rates of the sizes: all of the old sizes are needed for each.
             next_sizes[2u * i] = unit * rate;
             next_sizes[2u * i + 1u] = unit * size_of_product(acceleration_row(domain, i));
         }
-        for (var i = 0u; i < DIM; i++) {
+        for (var i = 0u; i < shape.dim; i++) {
             sizes[i] = next_sizes[i];
         }
-        for (var i = DIM; i < WIDTH; i++) {
+        for (var i = shape.dim; i < shape.width; i++) {
             sizes[i] = abs(series[(order + 1u) * WIDTH + i]);
         }
     }

@@ -14,7 +14,7 @@ pub(super) const MOST_DOMAINS: usize = 4096;
 
 /// Numbers of a flow, of its shape and of a law in the shader.
 pub(super) const FLOW: usize = 5;
-pub(super) const SHAPE: usize = 27;
+pub(super) const SHAPE: usize = 31;
 pub(super) const LAW: usize = 24;
 
 /// Numbers of a start beside the state: the packed modes, and the next change of the stage.
@@ -240,11 +240,16 @@ impl MachineConstants {
     }
 
     /// Returns the numbers of the shader's shape, given the places of phasors, schedule and table.
-    pub(super) fn shape(&self, [phasors, schedule, table]: [u32; 3]) -> [u32; SHAPE] {
+    pub(super) fn shape(
+        &self,
+        sizes: &MachineShape,
+        terms: u32,
+        [phasors, schedule, table]: [u32; 3],
+    ) -> [u32; SHAPE] {
         let machine = self.system.machine();
         let elements = self.system.sliding_rates().len() as u32;
         let mut shape = [0; SHAPE];
-        shape[..7].copy_from_slice(&[
+        shape[..11].copy_from_slice(&[
             self.steps,
             phasors,
             schedule,
@@ -252,15 +257,19 @@ impl MachineConstants {
             machine.schedule.len() as u32,
             elements,
             machine.degrees() as u32,
+            sizes.coordinates,
+            sizes.dim() as u32,
+            sizes.width() as u32,
+            terms,
         ]);
-        for (place, drive) in shape[7..15].iter_mut().zip(&machine.drives) {
+        for (place, drive) in shape[11..19].iter_mut().zip(&machine.drives) {
             *place = drive.order;
         }
         for gap in 0..machine.gaps.len() {
             for side in Side::BOTH {
                 let walls = &machine.gaps[gap].walls[side.index()];
-                shape[15 + 2 * gap + side.index()] = walls.len() as u32;
-                shape[21 + 2 * gap + side.index()] = match walls.last().map(|wall| wall.contact) {
+                shape[19 + 2 * gap + side.index()] = walls.len() as u32;
+                shape[25 + 2 * gap + side.index()] = match walls.last().map(|wall| wall.contact) {
                     None => 0,
                     Some(Contact::Impact) => 3,
                     Some(Contact::Rigid) => 4,

@@ -116,10 +116,7 @@ impl Variant {
 
     /// Returns its WGSL source.
     pub fn source(&self) -> String {
-        let real = match self.precision {
-            Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
-            Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
-        };
+        let real = declarations_of(self.precision);
         let machine = self.features.machine;
         let terms = count(real, "TERMS");
         let harmonics = machine.map_or(self.features.harmonics, |shape| shape.harmonics);
@@ -210,6 +207,19 @@ const VALID: [(&str, u32); 10] = [
     ("QUASI_PERIODIC", valid::QUASI_PERIODIC),
     ("NEAR_STROBE", valid::NEAR_STROBE),
 ];
+
+/// Returns the declarations of a precision.
+fn declarations_of(precision: Precision) -> &'static str {
+    match precision {
+        Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
+        Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
+    }
+}
+
+/// Returns the terms of the Taylor series of a step.
+pub(super) fn terms_of(precision: Precision) -> u32 {
+    count(declarations_of(precision), "TERMS")
+}
 
 /// Returns a number that a precision's file declares.
 fn count(real: &str, name: &str) -> u32 {

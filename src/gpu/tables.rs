@@ -11,6 +11,7 @@ use super::guard::with_error_scopes;
 use super::machine::{self, MachineShape};
 use super::layout::{self, Flow, FlowShape, NO_FLOW, contact_code};
 use super::precision::Precision;
+use super::shader::terms_of;
 use super::transfer::{buffer, reals, upload};
 use super::{Gpu, GpuError};
 use rattlemap_dynamics::model::{Law, Oscillator, Side};
@@ -201,7 +202,7 @@ impl Tables {
             let own = *machines.entry(Arc::as_ptr(machine.shared())).or_insert_with(|| add(machine.table(&shape)));
             let schedule = add(machine.schedule());
             flows.extend(machine.flow());
-            shapes.extend(machine.shape([phasors, schedule, own]));
+            shapes.extend(machine.shape(&shape, terms_of(gpu.precision), [phasors, schedule, own]));
             of_flows.extend(machine.law());
             let of_table = Features { machine: Some(shape), ..constants.features };
             if features.iter().all(|(_, others)| *others != of_table) {
