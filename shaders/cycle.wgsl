@@ -131,6 +131,7 @@ fn judge_cycle() {
         search.cycle = tally.candidate;
         return;
     }
+    deflate_columns();
     measures.cycle_growth = spectral_growth();
     measures.cycle_stretch = cycle_stretch();
     restore_columns();

@@ -124,6 +124,7 @@ fn begin_columns() {
     for (var i = 0u; i < 2u * shapes[cell.flow_index].degrees; i++) {
         motions[lane].tangents[(DIM + 1u) * i] = 1.0;
     }
+    constrain_columns();
 }
 
 // Keeps the columns of the monodromy matrix in range after an event, and measures how much perturbations grow between

@@ -129,6 +129,7 @@ fn begin_reading() {
         save_vector();
         tally.tangent_count = DIM;
         begin_columns();
+        begin_cycle();
         motions[lane].stretch = array<Real, 3>(1.0, 1.0, 1.0);
         tallies[lane].column_scalings = 0u;
         tallies[lane].is_superstable = 0u;

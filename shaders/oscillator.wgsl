@@ -19,6 +19,13 @@ fn prepare_motion() {
 // Stores what the motion needs, at the end of a dispatch.
 fn suspend_motion() {}
 
+// Machines project tangent vectors to their constraints, and leave out the multipliers of elements that stick for ever.
+fn constrain_columns() {}
+
+fn begin_cycle() {}
+
+fn deflate_columns() {}
+
 // Begins the schedule of stages at phase 0.
 fn begin_schedule() {
     if STAGES {

@@ -85,6 +85,8 @@ var<private> wall_order: array<u32, GAPS>;
 // Orders of the roots of pushing forces and of sliding rates; 0 without a root.
 var<private> from_force: array<u32, GAPS>;
 var<private> from_rate: array<u32, ELEMENT_SLOTS>;
+// Elements that have slid since the cycle's start, as bits. The counter `is_scan_interrupted`, which machines do not need, stores it.
+var<private> slid: u32;
 // Side of each gap's last event.
 var<private> origins: array<u32, GAPS>;
 
@@ -108,10 +110,12 @@ fn unpack_modes() {
         from_rate[i] = (tally.order >> (18u + 3u * i)) & 7u;
     }
     stage = tally.mode >> 19u;
+    slid = tally.is_scan_interrupted;
 }
 
 fn pack_modes() {
     tally.mode = stage << 19u;
+    tally.is_scan_interrupted = slid;
     tally.origin = 0u;
     tally.order = 0u;
     for (var i = 0u; i < GAPS; i++) {

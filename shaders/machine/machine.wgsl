@@ -30,6 +30,67 @@ fn begin_schedule() {
 
 fn restart_phase() {}
 
+// Projects a tangent vector to the constraints: neighbouring motions rest, too.
+fn constrained(u: State) -> State {
+    var v = u;
+    for (var gap = 0u; gap < GAPS; gap++) {
+        if is_stuck(gap_modes[gap]) {
+            v[2u * gap] = 0.0;
+        }
+    }
+    hold(&v, 0.0);
+    return v;
+}
+
+fn constrain_columns() {
+    for (var n = 0u; n < shape.dim; n++) {
+        set_tangent(n, constrained(tangent(n)));
+    }
+}
+
+fn begin_cycle() {
+    slid = 0u;
+    for (var i = 0u; i < ELEMENTS; i++) {
+        slid |= select(0u, 1u << i, slips[i] != STICKS);
+    }
+}
+
+// An element that sticks for ever keeps the displacement along its row, which gives a multiplier of exactly 1. Other multipliers belong to
+// deviations without this displacement: the matrix is multiplied by the projection to them.
+fn deflate_columns() {
+    if ELEMENTS == 0u {
+        return;
+    }
+    var rows: array<State, ELEMENT_SLOTS>;
+    for (var i = 0u; i < ELEMENTS; i++) {
+        if i >= shape.elements || ((slid >> i) & 1u) == 1u {
+            continue;
+        }
+        var f: State;
+        for (var j = 0u; j < shape.coordinates; j++) {
+            let is_held = j < GAPS && is_stuck(gap_modes[min(j, GAPS - 1u)]);
+            f[2u * j] = select(number(AT_ELEMENTS + i * (WIDTH + 1u) + 2u * j + 1u), Real(0.0), is_held);
+        }
+        for (var other = 0u; other < i; other++) {
+            let along = inner(rows[other], f) / max(inner(rows[other], rows[other]), Real(1e-30));
+            f = difference(f, scaled(rows[other], along));
+        }
+        rows[i] = f;
+        let square = inner(f, f);
+        if !(square > 1e-20) {
+            continue;
+        }
+        iterations += 2u * MATRIX;
+        let image = image_of(f);
+        for (var column = 0u; column < shape.dim; column++) {
+            let share = f[column] / square;
+            for (var k = 0u; k < shape.dim; k++) {
+                motions[lane].tangents[DIM * column + k] -= share * image[k];
+            }
+        }
+    }
+}
+
 fn conclude_motion() {
     flow = flows[cell.flow_index];
     shape = shapes[cell.flow_index];

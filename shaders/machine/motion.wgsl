@@ -427,13 +427,7 @@ fn saltate(line: Line, least: Real, before: State, rate: Real, is_passed: bool) 
         for (var i = 0u; i < shape.dim; i++) {
             v[i] += change[i] * along;
         }
-        for (var gap = 0u; gap < GAPS; gap++) {
-            if is_stuck(gap_modes[gap]) {
-                v[2u * gap] = 0.0;
-            }
-        }
-        hold(&v, 0.0);
-        set_tangent(n, v);
+        set_tangent(n, constrained(v));
     }
     check_range();
 }
@@ -934,6 +928,7 @@ fn begin_sliding(i: u32, next: u32) {
         }
     }
     from_rate[i] = 2u;
+    slid |= 1u << i;
     count_slip(STICKING_ENDS);
     for (var gap = 0u; gap < GAPS; gap++) {
         if ((freed >> gap) & 1u) == 1u {
@@ -1072,6 +1067,7 @@ fn change_slips(stopped: u32) {
             continue;
         }
         slips[i] = after;
+        slid |= select(0u, 1u << i, after != STICKS);
         from_rate[i] = 0u;
         if after != STICKS {
             load_sizes(motion.q);

@@ -345,7 +345,11 @@ impl MachineConstants {
                     for (stage, spring) in wall.springs.iter().enumerate() {
                         let all = stage * 2 * shape.gaps as usize * most_walls + place;
                         let at = shape.place("AT_SPRINGS") + 3 * all;
-                        table[at..at + 3].copy_from_slice(&[spring.stiffness, spring.damping, spring.preload]);
+                        table[at..at + 3].copy_from_slice(&[
+                            spring.stiffness,
+                            spring.damping,
+                            spring.preload,
+                        ]);
                     }
                 }
             }

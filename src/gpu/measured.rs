@@ -58,7 +58,9 @@ pub(super) fn multiplier(constants: &Constants, measured: &[f64]) -> [f64; 2] {
     if let Some(machine) = &constants.machine {
         // The padding of a single coordinate has no columns.
         let (dim, n) = (columns.len().isqrt(), 2 * machine.degrees());
-        return largest(DMatrix::from_fn(n, n, |i, j| columns[dim * j + i]).complex_eigenvalues().iter().copied());
+        return largest(
+            DMatrix::from_fn(n, n, |i, j| columns[dim * j + i]).complex_eigenvalues().iter().copied(),
+        );
     }
     let (z, x) = (constants.flow.domains[0].gap_row, constants.flow.domains[0].x_row);
     let generator = [0.0, z[0], 0.0, x[0], 1.0, z[1], 0.0, x[1], 0.0, z[2], 0.0, x[2], 0.0, z[3], 1.0, x[3]];

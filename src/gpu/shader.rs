@@ -136,7 +136,8 @@ impl Variant {
             machine_sizes = shape.sizes();
             machine_sizes.extend([("SERIES", (terms + 1) * width), ("COEFFICIENTS", terms + 1)]);
         }
-        let body = unroll(COMMON, &names) + &unroll(if machine.is_some() { MACHINE } else { OSCILLATOR }, &names);
+        let body =
+            unroll(COMMON, &names) + &unroll(if machine.is_some() { MACHINE } else { OSCILLATOR }, &names);
         let valid = VALID.map(|(name, bits)| (format!("VALID_{name}"), bits));
         let status = Status::ALL.map(|s| (format!("STATUS_{}", s.name().to_uppercase()), s.code()));
         let contacts = CONTACTS.map(|(name, code)| (format!("CONTACT_{name}"), code));

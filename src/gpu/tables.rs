@@ -8,8 +8,8 @@ use bytemuck::Zeroable;
 use super::constants::{Change, Constants, PAIRS_PER_HARMONIC, Page, phasors as phasors_of};
 use super::features::Features;
 use super::guard::with_error_scopes;
-use super::machine::{self, MachineShape};
 use super::layout::{self, Flow, FlowShape, NO_FLOW, contact_code};
+use super::machine::{self, MachineShape};
 use super::precision::Precision;
 use super::shader::terms_of;
 use super::transfer::{buffer, reals, upload};
@@ -186,7 +186,8 @@ impl Tables {
         let (mut grids, mut machines) = (HashMap::new(), HashMap::new());
         let mut features: Vec<(usize, Features)> = Vec::new();
         for (i, constants) in constants.iter().enumerate() {
-            let Some((constants, machine)) = constants.as_ref().and_then(|c| Some((c, c.machine.as_ref()?))) else {
+            let Some((constants, machine)) = constants.as_ref().and_then(|c| Some((c, c.machine.as_ref()?)))
+            else {
                 // Lanes of a missing flow are refused before they start.
                 flows.extend([0.0; machine::FLOW]);
                 shapes.extend([1; machine::SHAPE]);
@@ -199,7 +200,8 @@ impl Tables {
                 place
             };
             let phasors = *grids.entry(machine.grid()).or_insert_with(|| add(machine.phasors(&shape)));
-            let own = *machines.entry(Arc::as_ptr(machine.shared())).or_insert_with(|| add(machine.table(&shape)));
+            let own =
+                *machines.entry(Arc::as_ptr(machine.shared())).or_insert_with(|| add(machine.table(&shape)));
             let schedule = add(machine.schedule());
             flows.extend(machine.flow());
             shapes.extend(machine.shape(&shape, terms_of(gpu.precision), [phasors, schedule, own]));

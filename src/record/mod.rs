@@ -7,9 +7,9 @@ pub mod measures;
 mod spelling;
 mod store;
 
+pub use spelling::{Spelling, word_hash};
 #[cfg(feature = "gpu")]
 pub(crate) use spelling::{SymbolCode, joined};
-pub use spelling::{Spelling, word_hash};
 pub use store::{RecordStore, Records, RecordsMut};
 
 use bytemuck::{Pod, Zeroable};

@@ -36,7 +36,7 @@ fn run(system: &System, start: &State) -> Option<(State, u64)> {
 
 /// Returns the largest difference of displacements and of rates divided by the forcing frequency.
 fn distance(a: &State, b: &State, omega: f64) -> f64 {
-    let unit = |i: usize| if i % 2 == 0 { 1.0 } else { omega };
+    let unit = |i: usize| if i.is_multiple_of(2) { 1.0 } else { omega };
     (0..a.len()).map(|i| (a[i] - b[i]).abs() / unit(i)).fold(0.0, f64::max)
 }
 
@@ -61,12 +61,13 @@ fn reference(machine: &Machine, start: &State) -> Option<End> {
     (amplification < MOST_AMPLIFICATION).then_some(End { state: end, impacts, amplification, size })
 }
 
-/// Compares lanes with the reference on random machines of a shape.
-fn compare(shape: Shape, seeds: u64) {
+/// Compares lanes with the reference on random machines of a shape. At least so many machines and impacts must be compared.
+fn compare(shape: Shape, seeds: u64, least: [u64; 2]) {
     let cases: Vec<_> = (0..seeds).map(|seed| case(seed, shape)).collect();
     let oscillators: Vec<_> = cases.iter().map(|case| Oscillator::of_machine(case.machine.clone())).collect();
     let starts: Vec<State> = cases.iter().map(|case| state(&case.start)).collect();
-    let sizes = oscillators.iter().map(|o| Features::of(o).machine.unwrap()).reduce(MachineShape::and).unwrap();
+    let sizes =
+        oscillators.iter().map(|o| Features::of(o).machine.unwrap()).reduce(MachineShape::and).unwrap();
     let features = Features { machine: Some(sizes), ..Features::default() };
     let settings = LaneSettings { features, ..LaneSettings::only(PERIODS) };
     let lanes: Vec<_> = (0..).zip(&starts).map(|(flow, &start)| Lane { flow, law: 0, start }).collect();
@@ -74,37 +75,35 @@ fn compare(shape: Shape, seeds: u64) {
         cases.par_iter().zip(&starts).map(|(case, start)| reference(&case.machine, start)).collect();
     for precision in Precision::ALL {
         let mut gpu = open(precision);
-        let clock = std::time::Instant::now();
         let records =
             pollster::block_on(gpu.run(&oscillators, &[Law::both(0.0, 0.0)], &lanes, &settings)).unwrap();
-        println!("{precision:?} {:.1} s", clock.elapsed().as_secs_f64());
-        let (rounding, mut compared, mut impacts, mut worst) = (if precision == Precision::F32 { 1e-5 } else { 1e-13 }, 0, 0, 0.0f64);
+        let rounding = if precision == Precision::F32 { 1e-5 } else { 1e-13 };
         for (seed, (record, exact)) in records.iter().zip(&exact).enumerate() {
             let Some(exact) = exact else { continue };
-            let omega = cases[seed].machine.omega;
-            let error = distance(&record.strobe, &exact.state, omega) / exact.size;
+            assert_eq!(record.status, 0, "{precision:?}, seed {seed}");
+            let error = distance(&record.strobe, &exact.state, cases[seed].machine.omega) / exact.size;
             let allowed = rounding * exact.amplification;
-            let count = (record.impacts_per_period * f64::from(PERIODS)).round() as u64;
-            if record.status != 0 || precision == Precision::F64 && count != exact.impacts || !(error < allowed) {
-                println!("seed {seed}: status {}, {count} impacts for {}, error {error:.1e}, allowed {allowed:.1e}", record.status, exact.impacts);
-            } else {
-                worst = worst.max(error / allowed);
+            assert!(error < allowed, "{precision:?}, seed {seed}: error {error:.1e}, allowed {allowed:.1e}");
+            // Single precision ends a series of impacts a few impacts earlier.
+            if precision == Precision::F64 {
+                let impacts = record.impacts_per_period * f64::from(PERIODS);
+                assert_eq!(impacts.round() as u64, exact.impacts, "seed {seed}");
             }
-            compared += 1;
-            impacts += exact.impacts;
         }
-        println!("{precision:?}: {compared} of {seeds} machines, {impacts} impacts, worst {worst:.1e}");
     }
+    let compared = exact.iter().flatten();
+    let [count, impacts] = compared.fold([0, 0], |[count, impacts], end| [count + 1, impacts + end.impacts]);
+    assert!(count >= least[0] && impacts >= least[1], "{count} machines and {impacts} impacts were compared");
 }
 
 #[test]
 fn random_machines_move_as_on_the_reference() {
-    compare(Shape { coordinates: 3, gaps: 2, harmonics: 2, stages: 2, friction: 1, walls: 2 }, 64);
+    compare(Shape { coordinates: 3, gaps: 2, harmonics: 2, stages: 2, friction: 1, walls: 2 }, 64, [30, 200]);
 }
 
 #[test]
 #[ignore = "takes minutes; scripts/test.sh --all"]
 fn large_machines_move_as_on_the_reference() {
-    compare(Shape { coordinates: 2, gaps: 1, harmonics: 3, stages: 1, friction: 2, walls: 3 }, 64);
-    compare(Shape { coordinates: 8, gaps: 3, harmonics: 8, stages: 1, friction: 0, walls: 1 }, 32);
+    compare(Shape { coordinates: 2, gaps: 1, harmonics: 3, stages: 1, friction: 2, walls: 3 }, 64, [12, 30]);
+    compare(Shape { coordinates: 8, gaps: 3, harmonics: 8, stages: 1, friction: 0, walls: 1 }, 32, [25, 500]);
 }

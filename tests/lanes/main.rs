@@ -5,6 +5,7 @@ mod common;
 
 /// Random machines and numbers, as the tests of the reference draw them.
 mod independent {
+    #[allow(dead_code, reason = "machines need the numbers alone")]
     #[path = "../../../dynamics/tests/core/independent/random.rs"]
     pub(crate) mod random;
 }

@@ -73,9 +73,15 @@ fn variants(precision: Precision) -> [Variant; 23] {
             ..measuring(true, true)
         },
         Variant { features: Features { intervals: true, pushing: true, ..class.features }, ..everything },
-        Variant { features: Features { machine: Some(machine(2, 1, 0, 1)), ..Features::default() }, ..everything },
+        Variant {
+            features: Features { machine: Some(machine(2, 1, 0, 1)), ..Features::default() },
+            ..everything
+        },
         Variant { features: Features { machine: Some(machine(3, 2, 1, 2)), ..Features::default() }, ..class },
-        Variant { features: Features { machine: Some(machine(8, 3, 2, 8)), ..Features::default() }, ..everything },
+        Variant {
+            features: Features { machine: Some(machine(8, 3, 2, 8)), ..Features::default() },
+            ..everything
+        },
         Variant {
             features: Features { machine: Some(machine(4, 3, 2, 0)), ..Features::default() },
             exponent: false,

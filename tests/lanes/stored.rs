@@ -37,8 +37,11 @@ fn table(precision: Precision) -> PathBuf {
 fn row(record: &Record) -> String {
     let word = record.spelling().map(|word| word.text()).unwrap_or_default();
     let numbers = [record.lyapunov, record.lyapunov_error, record.impacts_per_period, record.mesh_fraction];
-    let bits: String =
-        numbers.into_iter().chain(record.strobe[..4].iter().copied()).map(|x| format!(",{:016x}", x.to_bits())).collect();
+    let bits: String = numbers
+        .into_iter()
+        .chain(record.strobe[..4].iter().copied())
+        .map(|x| format!(",{:016x}", x.to_bits()))
+        .collect();
     let Record { status, period, periods_run, symmetric, word_hash, pattern_hash, .. } = record;
     format!("{status},{period},{word},{periods_run},{symmetric},{word_hash:016x},{pattern_hash:016x}{bits}")
 }

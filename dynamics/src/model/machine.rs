@@ -10,7 +10,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::oscillator::{MATRIX_TOLERANCE, check_phases, finite, positive, require, schedule_at, turn};
 use super::{
-    Contact, HIGHEST_ORDER, Law, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, Oscillator, OscillatorError, Side,
+    Contact, HIGHEST_ORDER, Law, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, Oscillator,
+    OscillatorError, Side,
 };
 
 /// Largest number of coordinates.

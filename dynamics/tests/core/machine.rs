@@ -1,10 +1,7 @@
 //! The engine of machines, on oscillators of two coordinates, against the integrator by matrix exponentials.
 
-
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{
-    Drive, DryFriction, Forces, GapRow, Law, Machine, Oscillator, REST, Restitution, Side, Spring, Wall,
-};
+use rattlemap_dynamics::model::{Machine, Oscillator, REST};
 use rattlemap_dynamics::orbit::{
     Class, EVENT_PERIODS, Orbit, Quantities, Settings, Status, analyse_flow, measure,
 };

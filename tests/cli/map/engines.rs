@@ -120,10 +120,13 @@ fn an_environment_that_leaves_no_adapter_is_named() {
 
 /// Software drivers serve as graphics device here.
 #[test]
-fn graphics_devices_refuse_dry_friction_and_name_the_processor() {
+fn graphics_devices_refuse_amplitudes_with_friction_and_name_the_processor() {
     let folder = with_scene(
-        "model = 'friction-oscillator'\n[[axis]]\nparameter = 'f'\nvalues = [0.0, 0.5]\n[[axis]]\nparameter = 'omega'\nvalues = [0.5, 0.8]\n",
+        "model = 'friction-oscillator'\n[[axis]]\nparameter = 'f'\nvalues = [0.0, 0.5]\n[[axis]]\nparameter = 'omega'\nvalues = [0.5, 0.8]\n[outputs]\nquantities = ['class', 'amplitude']\n",
     );
-    let parts = ["graphics devices do not compute dry friction, the processor does (--engine cpu)"];
+    let parts = [
+        "graphics devices do not compute quantities such as amplitudes",
+        "the processor does (--engine cpu)",
+    ];
     fails(&folder, "map s.toml --engine gpu", 2, &parts);
 }

@@ -216,9 +216,19 @@ impl<'s> Motion<'s> {
         self.system
     }
 
-    /// Returns the present modes, the walls that gaps lie on, and those that they come from.
-    pub(super) fn modes(&self) -> (Modes, [Option<(Side, usize)>; MOST_GAPS], [Option<Side>; MOST_GAPS]) {
-        (self.modes, self.at_wall, self.origin)
+    /// Returns the present modes.
+    pub(super) fn modes(&self) -> Modes {
+        self.modes
+    }
+
+    /// Returns the walls that gaps lie on: the direction, and the order of the root of the distance.
+    pub(super) fn walls_at(&self) -> [Option<(Side, usize)>; MOST_GAPS] {
+        self.at_wall
+    }
+
+    /// Returns the side of each gap's last event.
+    pub(super) fn origins(&self) -> [Option<Side>; MOST_GAPS] {
+        self.origin
     }
 
     /// Returns the orders of the roots of pushing forces and of sliding rates.

@@ -172,20 +172,23 @@ impl Motion<'_> {
     fn start_modes(&self) -> StartModes {
         let (system, y) = (self.system(), self.flow_state());
         let side = |side: Option<Side>| side.map_or(2, side_code);
-        let (modes, at_wall, origin) = self.modes();
+        let modes = self.modes();
         let mut state = [0.0; SIZE];
         for i in 0..system.n {
             (state[2 * i], state[2 * i + 1]) = (y[i], y[system.n + i]);
         }
-        let slip = |slip: Slip| Slip::ALL.iter().position(|&other| other == slip).expect("all are listed") as u32;
+        let slip =
+            |slip: Slip| Slip::ALL.iter().position(|&other| other == slip).expect("all are listed") as u32;
         let (from_force, from_rate) = self.root_orders();
         StartModes {
             state,
             gaps: modes.gaps.map(gap_code),
             slips: modes.slips.map(slip),
             stage: modes.stage as u32,
-            origins: origin.map(side),
-            walls: at_wall.map(|at| at.map_or((2, 0), |(side, order)| (side_code(side), order as u32))),
+            origins: self.origins().map(side),
+            walls: self
+                .walls_at()
+                .map(|at| at.map_or((2, 0), |(side, order)| (side_code(side), order as u32))),
             from_force: from_force.map(|order| order as u32),
             from_rate: from_rate.map(|order| order as u32),
         }

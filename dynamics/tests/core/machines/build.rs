@@ -1,64 +1,7 @@
 //! Machines from oscillators, and machines from machines.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{
-    Domain, Drive, DryFriction, Forces, GapRow, Law, Machine, Oscillator, Restitution, Side, Spring, Wall,
-};
-
-/// Returns the machine that moves like an oscillator.
-pub(crate) fn machine_of(o: &Oscillator, law: Law) -> Machine {
-    let n = o.degrees;
-    let vector = |v: [f64; 2]| DVector::from_fn(n, |i, _| v[i]);
-    let matrix = |m: [[f64; 2]; 2]| DMatrix::from_fn(n, n, |i, j| m[i][j]);
-    let (gap, stages) = (vector(o.gap), 0..o.stage_count());
-    let along = |m: DMatrix<f64>| gap.dot(&(m * &gap)) / gap.norm_squared().powi(2);
-    let spring = |before: &Domain, behind: &Domain| Spring {
-        stiffness: along(matrix(behind.stiffness) - matrix(before.stiffness)).max(0.0),
-        // Without a damper, the difference of the matrices is rounding.
-        damping: if behind.damping == before.damping {
-            0.0
-        } else {
-            along(matrix(behind.damping) - matrix(before.damping))
-        },
-        preload: behind.preload,
-    };
-    let walls = |side: Side| -> Vec<Wall> {
-        let i = side.index();
-        if o.walls[i].is_infinite() {
-            return Vec::new();
-        }
-        let mut before: Vec<Domain> = stages.clone().map(|stage| o.stage(stage).free).collect();
-        let first: Vec<Domain> = stages.clone().map(|stage| o.stage(stage).meshing[i]).collect();
-        let outer = o.outer_walls[i].iter().map(|wall| (wall.at, wall.contact, wall.meshing.clone()));
-        let wall = |(at, contact, behind): (f64, _, Vec<Domain>)| {
-            let springs = before.iter().zip(&behind).map(|(before, behind)| spring(before, behind)).collect();
-            before = behind;
-            let restitution = Restitution::constant(law.restitution[i]);
-            Wall { at, contact, restitution, mesh_speed: law.mesh_speed[i], springs }
-        };
-        std::iter::once((o.walls[i], o.contacts[i], first)).chain(outer).map(wall).collect()
-    };
-    let forces = |stage: usize| {
-        let Domain { damping, stiffness, load, .. } = o.stage(stage).free;
-        Forces { damping: matrix(damping), stiffness: matrix(stiffness), load: vector(load) }
-    };
-    let drive = |order: u32, cos, sin| Drive { order, cos: vector(cos), sin: vector(sin) };
-    Machine {
-        omega: o.omega,
-        mass: matrix(o.mass),
-        stages: stages.clone().map(forces).collect(),
-        schedule: o.schedule.clone(),
-        drives: o.all_harmonics().map(|h| drive(h.order, h.cos, h.sin)).collect(),
-        gaps: vec![GapRow { row: gap.clone(), walls: Side::BOTH.map(walls) }],
-        friction: (o.friction.iter())
-            .map(|friction| DryFriction {
-                row: vector(friction.row),
-                force: friction.force,
-                speed: friction.speed,
-            })
-            .collect(),
-    }
-}
+use rattlemap_dynamics::model::{Drive, DryFriction, Forces, GapRow, Machine};
 
 /// Returns the machine of machines side by side that do not touch each other. It has the frequency and the schedule of the first one, and
 /// all others have one stage.

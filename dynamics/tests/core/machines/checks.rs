@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{Contact, Machine, Side};
 use rayon::prelude::*;
 
-use super::build::{in_coordinates, machine_of, side_by_side};
+use super::build::{in_coordinates, side_by_side};
 use super::motion::{Event, Motion, What};
 use super::random::{Case, Shape, case};
 use super::system::{ANGLE, System};
@@ -307,7 +307,7 @@ fn check_plain(count: usize, seeds: std::ops::Range<u64>, periods: usize, share:
             .collect();
         let omega = cases[0].oscillator.omega;
         cases.iter_mut().for_each(|case| case.oscillator.omega = omega);
-        let machines: Vec<_> = cases.iter().map(|case| machine_of(&case.oscillator, case.law)).collect();
+        let machines: Vec<_> = cases.iter().map(|case| Machine::of(&case.oscillator, case.law)).collect();
         let all = side_by_side(&machines);
         let n = all.degrees();
         let t = match count {
