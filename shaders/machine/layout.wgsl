@@ -87,6 +87,8 @@ var<private> from_force: array<u32, GAPS>;
 var<private> from_rate: array<u32, ELEMENT_SLOTS>;
 // Elements that have slid since the cycle's start, as bits. The counter `is_scan_interrupted`, which machines do not need, stores it.
 var<private> slid: u32;
+// Bit of `slid`: the columns of the monodromy matrix are new.
+const NEW_COLUMNS: u32 = 4u;
 // Side of each gap's last event.
 var<private> origins: array<u32, GAPS>;
 

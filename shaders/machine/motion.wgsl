@@ -190,6 +190,12 @@ fn change_theta() -> Real {
 // Takes one step: to the first event, or as far as the series or the grid allow. Returns whether it ends at a stop phase.
 fn step() -> bool {
     tally.passes_in_period += 1u;
+    if EXPONENT && (slid & NEW_COLUMNS) != 0u {
+        slid ^= NEW_COLUMNS;
+        for (var n = 0u; n < tally.tangent_count; n++) {
+            set_tangent(n, constrained(tangent(n)));
+        }
+    }
     let domain = present_domain();
     let remaining = steps_to_stop() * flow.h;
     let h = min(unit_of(domain), remaining);

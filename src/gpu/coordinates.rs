@@ -151,14 +151,14 @@ impl Coordinates {
         (norm(domain.dissipation()) + gyroscopic, norm(domain.stiffness).sqrt())
     }
 
-    /// Returns the change of the accelerations of the gap and of `x`, per unit of gap rate, by a damper along the gap
-    /// behind a wall.
     /// Returns the decrease of the accelerations of gap and `x` by the preload of a wall.
     pub(super) fn preload(&self, oscillator: &Oscillator, side: Side) -> [f64; 2] {
         let push = side.sign() * oscillator.preload(side);
         [push * self.compliance(), push * self.accelerated(self.gap)[self.other]]
     }
 
+    /// Returns the change of the accelerations of the gap and of `x`, per unit of gap rate, by a damper along the gap
+    /// behind a wall.
     pub(super) fn damper(&self, free: &Domain, behind: &Domain) -> [f64; 2] {
         let (g, p) = (self.gap, 1 - self.other);
         let c = (behind.damping[p][p] - free.damping[p][p]) / (g[p] * g[p]);

@@ -2,9 +2,13 @@
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
-use crate::common::gpu::open;
+use crate::common::gpu::{all_records, map, open};
 use crate::random_machines::{Shape, case};
 use rattlemap::gpu::{Features, Lane, LaneSettings, MachineShape, Precision};
+use rattlemap::map::engine::{Cpu, Engine};
+use rattlemap::map::plan::Plan;
+use rattlemap::map::scene::{Purpose, Scene};
+use rattlemap::record::classify::classify;
 use rattlemap_dynamics::model::{Law, Machine, Oscillator, State, state};
 use rattlemap_dynamics::reference::machine::{Motion, System};
 use rayon::prelude::*;
@@ -94,6 +98,35 @@ fn compare(shape: Shape, seeds: u64, least: [u64; 2]) {
     let compared = exact.iter().flatten();
     let [count, impacts] = compared.fold([0, 0], |[count, impacts], end| [count + 1, impacts + end.impacts]);
     assert!(count >= least[0] && impacts >= least[1], "{count} machines and {impacts} impacts were compared");
+}
+
+/// Cells with gears at rest, two periods, and chaos.
+const SCENE: &str = r#"
+model = "two-loose-gears"
+[[axis]]
+parameter = "omega"
+min = 80.0
+max = 400.0
+count = 4
+[[axis]]
+parameter = "A"
+min = 1e-5
+max = 8e-4
+count = 3
+"#;
+
+#[test]
+fn lanes_decide_classes_of_machines_as_the_reference_does() {
+    let plan = Plan::new(&Scene::parse(SCENE, "s", &[], Purpose::Map).unwrap());
+    let expected = all_records(&plan, &mut Engine::Cpu(Cpu::new(&plan)));
+    let found = map(&plan, &mut open(Precision::F32));
+    for (id, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        assert_eq!((classify(found), found.period), (classify(expected), expected.period), "cell {id}");
+        if expected.period > 0 {
+            let off = (found.lyapunov - expected.lyapunov).abs() / expected.lyapunov.abs();
+            assert!(off < 0.02, "cell {id}: {} for {}", found.lyapunov, expected.lyapunov);
+        }
+    }
 }
 
 #[test]

@@ -231,7 +231,7 @@ pub struct Oscillator {
 }
 
 impl Oscillator {
-    /// Wraps a machine. Only the reference computes it.
+    /// Wraps a machine.
     pub fn of_machine(machine: Machine) -> Oscillator {
         let first = Side::BOTH.map(|side| machine.gaps[0].walls[side.index()].first().cloned());
         let far = [f64::INFINITY, f64::NEG_INFINITY];
