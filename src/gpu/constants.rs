@@ -170,7 +170,7 @@ impl Constants {
 
     /// Takes the sizes of the machines that a shader is compiled for.
     pub fn widen(&mut self, features: Features) {
-        if self.machine.is_some() {
+        if self.machine.is_some() && features.machine.is_some() {
             self.features.machine = features.machine;
         }
     }

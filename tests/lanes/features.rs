@@ -446,6 +446,6 @@ fn excluded_features_are_refused() {
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "negative_preload", .. }), "{error}");
     let friction = vec![Friction { row: [1.0, 0.0], force: 0.1, speed: 0.0 }];
     let cells = [(Oscillator { friction, ..free.oscillator() }, Law::both(0.5, 0.0), REST)];
-    let error = kinds::run(Precision::F32, &cells, &settings(&cells)).unwrap_err();
-    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "friction", .. }), "{error}");
+    let error = kinds::run(Precision::F32, &cells, &LaneSettings::only(1)).unwrap_err();
+    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "machine", .. }), "{error}");
 }
