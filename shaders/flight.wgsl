@@ -150,14 +150,6 @@ fn scan() -> u32 {
     return verdict;
 }
 
-// Adds a part of a step, in free steps, to the time spent meshing.
-fn count_meshing(part: Real) {
-    motion.mesh_part += part;
-    let whole = floor(motion.mesh_part);
-    tally.mesh_whole += u32(whole);
-    motion.mesh_part -= whole;
-}
-
 // Counts the time of a short flight from the last of several walls as contact: the springs in front of that wall still press.
 fn count_short_contact(part: Real) {
     if MESH && is_behind_wall() {

@@ -136,3 +136,11 @@ fn begin_reading() {
         tallies[lane].has_overflowed = 0u;
     }
 }
+
+// Adds a part of a step, in free steps, to the time spent meshing.
+fn count_meshing(part: Real) {
+    motion.mesh_part += part;
+    let whole = floor(motion.mesh_part);
+    tally.mesh_whole += u32(whole);
+    motion.mesh_part -= whole;
+}

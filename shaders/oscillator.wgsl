@@ -1,6 +1,6 @@
 // What observers ask the engine of motion of an oscillator with one gap. Machines answer the same questions in machine/machine.wgsl.
 
-// Loads what the motion needs at the begin of a dispatch. The first part does not need tangent vectors.
+// Loads constants at the start of a dispatch.
 fn resume_motion() {
     if STAGES || INTERVALS {
         cell.flow_index = present_flow();
@@ -8,6 +8,7 @@ fn resume_motion() {
     fetch_constants();
 }
 
+// Prepares the first step of a dispatch, after the tangent vector has been loaded.
 fn prepare_motion() {
     sync_overtones(tally.step, motion.theta);
     if !STAGES && motion.bound == 0.0 {
@@ -19,7 +20,8 @@ fn prepare_motion() {
 // Stores what the motion needs, at the end of a dispatch.
 fn suspend_motion() {}
 
-// Machines project tangent vectors to their constraints, and leave out the multipliers of elements that stick for ever.
+// Machines project new columns of the monodromy matrix to their constraints, note which elements slide, and leave out the multipliers of
+// elements that stick for ever. An oscillator with one gap needs none of this.
 fn constrain_columns() {}
 
 fn begin_cycle() {}

@@ -1,8 +1,8 @@
 // Constants of machines: oscillators of one to eight coordinates with several gaps and dry friction.
 //
 // A lane is in one domain at a time: a stage, a mode of every gap, and a mode of every element with friction. The host computes the
-// equations of motion of every domain (src/gpu/machine.rs), and puts them in a table, by number. The names with capital letters that no
-// file declares are sizes and places in this table.
+// equations of motion of every domain and writes them to a table (src/gpu/machine.rs). Constants that no file declares, such as WIDTH and
+// AT_WALLS, are sizes and places of this table.
 //
 // A point lists the numbers that forces depend on: displacements and rates in turn, the cosine and the sine of each harmonic, zeros up to a
 // multiple of four numbers, and 1.

@@ -7,23 +7,21 @@ const UNKNOWN_ORDER: u32 = 7u;
 // Decisions on elements at rest after one event.
 const MOST_DECISIONS: u32 = 16u;
 
-// What ends the present modes: the gap reaches the next wall in a direction; the gap of a contact onset comes to its wall, or is not
-// pressed any more; the gap comes back from behind its wall; a wall that only pushes would begin to pull, or begins to push; a rigid wall
-// would have to pull; a sliding rate vanishes; a holding force reaches its limit for sliding in a direction; a stage begins.
+// Kinds of events.
 const ENDS_NOTHING: u32 = 0u;
-const ENDS_AT_WALL: u32 = 1u;
-const ENDS_ONSET: u32 = 2u;
-const ENDS_PRESSING: u32 = 3u;
-const LEAVES: u32 = 4u;
-const ENDS_FORCE: u32 = 5u;
-const BEGINS_FORCE: u32 = 6u;
-const ENDS_PUSH: u32 = 7u;
-const ENDS_SLIDING: u32 = 8u;
-const BEGINS_SLIDING: u32 = 9u;
-const BEGINS_STAGE: u32 = 10u;
+const ENDS_AT_WALL: u32 = 1u; // the gap reaches the next wall in a direction
+const ENDS_ONSET: u32 = 2u; // the gap of a contact onset comes to its wall
+const ENDS_PRESSING: u32 = 3u; // the gap of a contact onset is not pressed to its wall any more
+const LEAVES: u32 = 4u; // the gap comes back from behind its wall
+const ENDS_FORCE: u32 = 5u; // a wall that only pushes would begin to pull
+const BEGINS_FORCE: u32 = 6u; // a wall that only pushes begins to push
+const ENDS_PUSH: u32 = 7u; // a rigid wall would have to pull
+const ENDS_SLIDING: u32 = 8u; // a sliding rate vanishes
+const BEGINS_SLIDING: u32 = 9u; // a holding force reaches its limit for sliding in a direction
+const BEGINS_STAGE: u32 = 10u; // the stage of the forces changes
 
-// Such an end: the gap or the element, the side or the mode of friction that follows, the function that is positive before it, and the
-// order of its root at the start.
+// An event that may come. `index`: its gap or its element with friction. `side`: a side, or the mode of friction that follows. `line`: a
+// function that is positive before the event and zero at it. `order`: the order of its root at the start of the step, 0 without one.
 struct Watch {
     kind: u32,
     index: u32,
@@ -308,14 +306,6 @@ fn contact_mode(gap: u32) -> u32 {
         return before_last(gap, contact_of(mode));
     }
     return mode;
-}
-
-// Adds a part of a step of the grid to the time in contact.
-fn count_meshing(part: Real) {
-    motion.mesh_part += part;
-    let whole = floor(motion.mesh_part);
-    tally.mesh_whole += u32(whole);
-    motion.mesh_part -= whole;
 }
 
 // Counts an event at a wall, and adds the symbol of the flight that ends there.

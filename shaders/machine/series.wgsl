@@ -77,9 +77,9 @@ fn is_still(domain: u32, gap: u32) -> bool {
     return number(domain + IN_DOMAIN_STILL + gap) != 0.0;
 }
 
-// Longest step of a domain.
+// Longest step of a domain: the fastest rate turns by a radian, or the step of the grid ends.
 fn unit_of(domain: u32) -> Real {
-    return number(domain);
+    return min(number(domain), flow.h);
 }
 
 // Value of a row at term `k`.

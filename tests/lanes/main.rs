@@ -4,9 +4,10 @@
 mod common;
 
 /// Random machines and numbers, as the tests of the reference draw them.
+#[path = "."]
 mod independent {
     #[allow(dead_code, reason = "machines need the numbers alone")]
-    #[path = "../../../dynamics/tests/core/independent/random.rs"]
+    #[path = "../../dynamics/tests/core/independent/random.rs"]
     pub(crate) mod random;
 }
 #[path = "../../dynamics/tests/core/machines/random.rs"]

@@ -10,10 +10,13 @@ use super::{Numbers, SIZE};
 use crate::flow::{Slip, Slips};
 use crate::model::{Contact, MOST_GAPS, Machine, Side};
 
+/// Frequency below all others, for equations that do not depend on it.
+const LOWEST_FREQUENCY: f64 = 1e-100;
+
 /// The equations of motion of one domain.
 #[derive(Clone, Debug)]
 pub struct Equations {
-    /// Longest time over which the fastest rate turns by one radian.
+    /// Time in which the fastest rate turns by one radian.
     pub radian: f64,
     /// Whether constraints keep each coordinate.
     pub is_still: Vec<bool>,
@@ -196,10 +199,11 @@ impl Motion<'_> {
 }
 
 impl Machine {
-    /// Returns the machine without what does not change the equations of its domains: frequency, restitution and mesh speeds.
+    /// Returns the machine without what does not change the equations of its domains: restitution and mesh speeds are 0, and the frequency
+    /// is so low that it does not limit [`Equations::radian`].
     pub fn without_laws(&self) -> Machine {
         let mut machine = self.clone();
-        machine.omega = 1.0;
+        machine.omega = LOWEST_FREQUENCY;
         for wall in machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten()) {
             wall.restitution = crate::model::Restitution::constant(0.0);
             wall.mesh_speed = 0.0;
