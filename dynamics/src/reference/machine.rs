@@ -12,7 +12,7 @@
 //!
 //! # Steps and events
 //!
-//! A step is a Taylor polynomial of order 22 from the present state, over at most 1.6 radians of the fastest rate, so that its remainder is
+//! A step is a Taylor polynomial of order 23 from the present state, over at most 1.6 radians of the fastest rate, so that its remainder is
 //! below rounding. Whatever ends a mode is the root of a linear function of `a` (a *watch*), which on a step is a polynomial, too.
 //! Its Bernstein coefficients show that it has no root, or isolate the first one. So no event is missed, at any step length.
 //!

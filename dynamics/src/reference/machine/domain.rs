@@ -1,12 +1,15 @@
 //! The linear equations of motion of one combination of modes.
 
+use std::borrow::Cow;
+use std::sync::OnceLock;
+
 use nalgebra::{DMatrix, DVector};
 
-use super::polynomial::{ORDER, Polynomial};
+use super::polynomial::{ORDER, Polynomial, Weights, combine, rest};
 use super::system::System;
 use super::{Numbers, Point, SIZE, WIDTH};
 use crate::flow::Slip;
-use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
+use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 
 /// Taylor radius: the largest product of a step and the rate of its domain.
 const RADIUS: f64 = 1.6;
@@ -23,6 +26,16 @@ pub(super) struct DomainKey {
     /// The rigid wall that each gap rests on.
     pub(super) held: [Option<Side>; MOST_GAPS],
     pub(super) slips: [Slip; MOST_FRICTION],
+}
+
+impl DomainKey {
+    /// Returns a number that no other domain has.
+    pub(super) fn code(&self) -> u32 {
+        let engaged = self.engaged.iter().map(|engaged| (9, (engaged + 4) as u32));
+        let held = self.held.iter().map(|held| (3, held.map_or(0, |side| 1 + side.index() as u32)));
+        let slips = self.slips.iter().map(|&slip| (3, slip as u32));
+        engaged.chain(held).chain(slips).fold(self.stage as u32, |code, (count, digit)| count * code + digit)
+    }
 }
 
 /// A linear functional of a [`Point`].
@@ -54,8 +67,19 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The Taylor terms of a step, as multiples of powers of the share of the step.
-pub(super) type Series = [Point; ORDER + 1];
+/// Coefficients of a coordinate on the longest step: for each entry of the point at its start, a polynomial of the share.
+type Table = Box<[Polynomial]>;
+
+/// A step of a domain. The coordinates are polynomials of the share of the step.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    point: Point,
+    pub(super) coordinates: [Polynomial; MOST_COORDINATES],
+    /// Bounds on the changes of the coordinates.
+    pub(super) changes: [f64; MOST_COORDINATES],
+    /// Duration.
+    h: f64,
+}
 
 /// One linear domain.
 #[derive(Clone, Debug)]
@@ -76,6 +100,20 @@ pub(super) struct Domain {
     pub(super) pushes: [Option<Row>; MOST_GAPS],
     /// Rows of the forces that hold sticking elements. None if other constraints hold the element.
     pub(super) holds: [Option<Row>; MOST_FRICTION],
+    tables: OnceLock<Vec<Table>>,
+    /// Carries tangent vectors over the longest step.
+    whole: OnceLock<Carrier>,
+}
+
+impl Default for Path {
+    fn default() -> Path {
+        Path {
+            point: [0.0; WIDTH],
+            coordinates: [[0.0; ORDER + 1]; MOST_COORDINATES],
+            changes: [0.0; MOST_COORDINATES],
+            h: 0.0,
+        }
+    }
 }
 
 impl Domain {
@@ -139,6 +177,8 @@ impl Domain {
             damping,
             pushes,
             holds,
+            tables: OnceLock::new(),
+            whole: OnceLock::new(),
         }
     }
 
@@ -156,8 +196,16 @@ impl Domain {
 
     /// Returns the time derivative of a point.
     pub(super) fn derivative(&self, point: &Point) -> Point {
+        let n = self.n;
         let mut rate = [0.0; WIDTH];
-        self.differentiate(point, 1.0, &mut rate);
+        rate[..n].copy_from_slice(&point[n..2 * n]);
+        for (rate, row) in rate[n..].iter_mut().zip(&self.accelerations) {
+            *rate = dot(&row.0[..self.width], &point[..self.width]);
+        }
+        for (k, omega) in self.rates.iter().enumerate() {
+            let at = 2 * (n + k);
+            (rate[at], rate[at + 1]) = (-omega * point[at + 1], omega * point[at]);
+        }
         rate
     }
 
@@ -179,82 +227,137 @@ impl Domain {
         Row(rate)
     }
 
-    /// Writes `factor` times the time derivative of a point to `rate`.
-    fn differentiate(&self, point: &Point, factor: f64, rate: &mut Point) {
-        let n = self.n;
-        for i in 0..n {
-            rate[i] = factor * point[n + i];
-        }
-        for (rate, row) in rate[n..].iter_mut().zip(&self.accelerations) {
-            *rate = factor * dot(&row.0[..self.width], &point[..self.width]);
-        }
-        for (k, omega) in self.rates.iter().enumerate() {
-            let (at, turn) = (2 * (n + k), factor * omega);
-            (rate[at], rate[at + 1]) = (-turn * point[at + 1], turn * point[at]);
-        }
-        rate[self.width - 1] = 0.0;
-    }
-
-    /// Computes the Taylor terms of a step of length `h`.
-    pub(super) fn expand(&self, point: &Point, h: f64, series: &mut Series) {
-        series[0] = *point;
-        for k in 0..ORDER {
-            let (done, next) = series.split_at_mut(k + 1);
-            self.differentiate(&done[k], h / (k + 1) as f64, &mut next[0]);
-        }
-    }
-
-    /// Returns the whole point at a share of a step.
-    pub(super) fn point(&self, series: &Series, share: f64) -> Point {
-        let mut point = [0.0; WIDTH];
-        for term in series.iter().rev() {
-            for (x, term) in point.iter_mut().zip(&term[..self.width]) {
-                *x = *x * share + term;
+    /// Returns the coefficients of all coordinates on the longest step.
+    fn new_tables(&self) -> Vec<Table> {
+        let table = |i: usize| {
+            let mut table = vec![[0.0; ORDER + 1]; self.width].into_boxed_slice();
+            let mut row = self.unit_row(i);
+            for k in 0..=ORDER {
+                table.iter_mut().zip(&row.0).for_each(|(column, x)| column[k] = *x);
+                row = self.rate_of(&row).scaled(self.unit / (k + 1) as f64);
             }
+            table
+        };
+        (0..self.n).map(table).collect()
+    }
+
+    fn tables(&self) -> &[Table] {
+        self.tables.get_or_init(|| self.new_tables())
+    }
+
+    /// Follows the motion from a point over a time `h` of at most the longest step.
+    pub(super) fn follow(&self, point: &Point, h: f64, path: &mut Path) {
+        (path.point, path.h) = (*point, h);
+        let part = h / self.unit;
+        for ((coordinate, change), table) in
+            path.coordinates.iter_mut().zip(&mut path.changes).zip(self.tables())
+        {
+            *coordinate = combine(table, &point[..self.width]);
+            if h < self.unit {
+                let mut power = 1.0;
+                for c in coordinate.iter_mut() {
+                    *c *= power;
+                    power *= part;
+                }
+            }
+            *change = rest(coordinate);
         }
-        point
     }
 
     /// Returns the state at a share of a step.
-    pub(super) fn state(&self, series: &Series, share: f64) -> Numbers {
+    pub(super) fn state(&self, path: &Path, share: f64) -> Numbers {
+        let weights = Weights::at(share);
         let mut y = [0.0; SIZE];
-        if share == 1.0 {
-            // The small terms first.
-            for term in series.iter().rev() {
-                y.iter_mut().zip(&term[..2 * self.n]).for_each(|(y, term)| *y += term);
-            }
-            return y;
-        }
-        for term in series.iter().rev() {
-            for (y, term) in y.iter_mut().zip(&term[..2 * self.n]) {
-                *y = *y * share + term;
-            }
+        for (i, coordinate) in path.coordinates.iter().enumerate().take(self.n) {
+            let [value, slope] = weights.of(coordinate);
+            (y[i], y[self.n + i]) = (value, slope / path.h);
         }
         y
     }
 
-    /// Returns a functional on a step.
-    pub(super) fn along(&self, row: &Row, series: &Series) -> Polynomial {
-        let row = &row.0[..self.width];
-        std::array::from_fn(|k| dot(row, &series[k][..self.width]))
+    /// Returns the whole point at a share of a step.
+    pub(super) fn point(&self, path: &Path, share: f64) -> Point {
+        let mut point = [0.0; WIDTH];
+        point[..SIZE].copy_from_slice(&self.state(path, share));
+        for (k, omega) in self.rates.iter().enumerate() {
+            let at = 2 * (self.n + k);
+            let ([cos, sin], (sin_turn, cos_turn)) =
+                ([path.point[at], path.point[at + 1]], (omega * share * path.h).sin_cos());
+            (point[at], point[at + 1]) = (cos * cos_turn - sin * sin_turn, sin * cos_turn + cos * sin_turn);
+        }
+        point[self.width - 1] = 1.0;
+        point
     }
 
-    /// Returns a tangent vector after a time of at most one step.
-    pub(super) fn carry(&self, tangent: &Numbers, time: f64) -> Numbers {
-        let n = self.n;
-        let (mut term, mut sum) = (*tangent, *tangent);
-        for k in 1..=ORDER {
-            let factor = time / k as f64;
-            let mut next = [0.0; SIZE];
-            for i in 0..n {
-                next[i] = factor * term[n + i];
-                let row = &self.accelerations[i].0;
-                next[n + i] = factor * (0..2 * n).map(|j| row[j] * term[j]).sum::<f64>();
+    /// Returns a functional on a step.
+    pub(super) fn along(&self, row: &Row, path: &Path) -> Polynomial {
+        let (n, row) = (self.n, &row.0);
+        let mut sum = [0.0; ORDER + 1];
+        sum[0] = row[self.width - 1];
+        for (i, coordinate) in path.coordinates.iter().enumerate().take(n) {
+            if row[i] != 0.0 {
+                sum.iter_mut().zip(coordinate).for_each(|(sum, c)| *sum += row[i] * c);
             }
-            term = next;
-            (0..2 * n).for_each(|i| sum[i] += term[i]);
+            if row[n + i] != 0.0 {
+                let factor = row[n + i] / path.h;
+                (0..ORDER).for_each(|k| sum[k] += factor * (k + 1) as f64 * coordinate[k + 1]);
+            }
+        }
+        for (k, omega) in self.rates.iter().enumerate() {
+            let at = 2 * (n + k);
+            if row[at] == 0.0 && row[at + 1] == 0.0 {
+                continue;
+            }
+            let [mut cos, mut sin] = [path.point[at], path.point[at + 1]];
+            for (k, sum) in sum.iter_mut().enumerate() {
+                *sum += row[at] * cos + row[at + 1] * sin;
+                let turn = omega * path.h / (k + 1) as f64;
+                (cos, sin) = (-turn * sin, turn * cos);
+            }
         }
         sum
+    }
+
+    /// Returns the matrix that carries tangent vectors over a time of at most the longest step. Row `i` has `2 n` entries.
+    pub(super) fn carrier(&self, time: f64) -> Cow<'_, Carrier> {
+        if time == self.unit {
+            Cow::Borrowed(self.whole.get_or_init(|| self.new_carrier(time)))
+        } else {
+            Cow::Owned(self.new_carrier(time))
+        }
+    }
+
+    fn new_carrier(&self, time: f64) -> Carrier {
+        let (n, weights) = (self.n, Weights::at(time / self.unit));
+        let mut carrier = Carrier([[0.0; SIZE]; SIZE]);
+        for (i, table) in self.tables().iter().enumerate() {
+            for (j, column) in table[..2 * n].iter().enumerate() {
+                let [value, slope] = weights.of(column);
+                (carrier.0[j][i], carrier.0[j][n + i]) = (value, slope / self.unit);
+            }
+        }
+        carrier
+    }
+}
+
+/// Carries tangent vectors along a flight: the images of the unit vectors.
+#[derive(Clone, Debug)]
+pub(super) struct Carrier([Numbers; SIZE]);
+
+impl Carrier {
+    /// Returns the image of a tangent vector with `size` entries.
+    pub(super) fn carry(&self, tangent: &Numbers, size: usize) -> Numbers {
+        const PART: usize = 4;
+        let mut image = [0.0; SIZE];
+        for part in 0..size.div_ceil(PART) {
+            let mut sums = [0.0; PART];
+            for (column, x) in self.0.iter().zip(&tangent[..size]) {
+                let terms = &column[part * PART..][..PART];
+                (0..PART).for_each(|i| sums[i] += x * terms[i]);
+            }
+            image[part * PART..][..PART].copy_from_slice(&sums);
+        }
+        image
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is measured on a flight of a machine.
 
 use super::Point;
-use super::domain::{Domain, Row, Series};
+use super::domain::{Domain, Path, Row};
 use super::modes::Modes;
 use super::system::System;
 use crate::flow::Slip;
@@ -12,8 +12,8 @@ pub struct Flight<'a> {
     pub(super) system: &'a System,
     pub(super) domain: &'a Domain,
     pub(super) modes: &'a Modes,
-    pub(super) series: &'a Series,
-    /// The part of the series that the flight takes.
+    pub(super) path: &'a Path,
+    /// The part of the step that the flight takes.
     pub(super) share: f64,
     /// Duration, and time of the start since phase 0.
     pub(crate) duration: f64,
@@ -41,7 +41,7 @@ impl Signal {
 impl Flight<'_> {
     /// Returns the point after a share of the flight.
     pub(crate) fn at(&self, share: f64) -> Point {
-        self.domain.point(self.series, self.share * share)
+        self.domain.point(self.path, self.share * share)
     }
 
     fn signal(&self, value: Row) -> Signal {

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::domain::{Constraint, Constraints, Domain, DomainKey, Row, Series};
+use super::domain::{Constraint, Constraints, Domain, DomainKey, Path, Row};
 use super::events::{MachineEvent, SlipEvent};
 use super::flight::Flight;
 use super::modes::{AtRest, GapMode, Modes, ROUNDING, first_derivative};
-use super::polynomial::{Fall, ORDER, first_fall};
-use super::system::System;
-use super::{Numbers, Point, SIZE, WIDTH};
+use super::polynomial::{Fall, first_fall};
+use super::system::{Phasors, System};
+use super::{Numbers, Point, SIZE};
 use crate::flow::{Slip, Slips};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::reference::{
@@ -78,10 +78,13 @@ pub struct Motion<'s> {
     modes: Modes,
     key: DomainKey,
     domain: Arc<Domain>,
-    /// Memory for the Taylor terms of a step.
-    series: Option<Box<Series>>,
+    /// Memory for a step, and for what may end the present modes.
+    path: Option<Box<Path>>,
+    watches: Vec<Watch>,
     y: Numbers,
     clock: Clock,
+    /// The harmonics at the present time.
+    phasors: Phasors,
     goal: f64,
     period: u64,
     /// Index of the next change of the stage.
@@ -122,9 +125,11 @@ impl<'s> Motion<'s> {
             modes,
             key: modes.key(system),
             domain: system.domain(modes.key(system)),
-            series: None,
+            path: None,
+            watches: Vec::new(),
             y: system.to_flow(state),
             clock: Clock::default(),
+            phasors: system.phasors(0.0),
             goal: 0.0,
             period: 0,
             change: usize::from(begins_now),
@@ -349,12 +354,12 @@ impl<'s> Motion<'s> {
     /// A [`Stop`] if the motion cannot be continued.
     pub fn advance_period(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
         self.advance_to(self.system.period, observer)?;
-        self.clock.set(0.0);
+        self.set_clock(0.0);
         self.change = 0;
         if self.system.schedule.first().is_some_and(|change| change.0 == 0.0) {
-            self.clock.set(self.system.period);
+            self.set_clock(self.system.period);
             self.enter_stage(self.system.schedule[0].1, observer);
-            self.clock.set(0.0);
+            self.set_clock(0.0);
             self.change = 1;
         }
         self.period += 1;
@@ -397,8 +402,13 @@ impl<'s> Motion<'s> {
         if is_over { Err(Stop::CapEvents) } else { Ok(()) }
     }
 
+    fn set_clock(&mut self, time: f64) {
+        self.clock.set(time);
+        self.phasors = self.system.phasors(time);
+    }
+
     fn point(&self) -> Point {
-        self.system.point(&self.y, self.clock.time())
+        self.system.point(&self.y, &self.phasors)
     }
 
     /// Enters the domain of the present modes.
@@ -439,8 +449,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Lists everything that may end the present modes.
-    fn watches(&self) -> Vec<Watch> {
-        let mut watches = Vec::new();
+    fn watches(&self, watches: &mut Vec<Watch>) {
         for gap in 0..self.system.gaps() {
             if let GapMode::Stuck(side) = self.modes.gaps[gap] {
                 watches.push(Watch::PushEnds(gap, side));
@@ -481,7 +490,6 @@ impl<'s> Motion<'s> {
                 _ => watches.push(Watch::RateVanishes(i)),
             }
         }
-        watches
     }
 
     /// Returns side and number of the wall that a contact onset may reach backwards.
@@ -495,23 +503,14 @@ impl<'s> Motion<'s> {
     /// Returns the function whose root a watch is, positive before, and the order of its root at this instant.
     fn function(&self, watch: Watch) -> (Row, usize) {
         let (system, domain, width) = (self.system, &self.domain, self.system.width());
-        let distance = |gap: usize, at: f64, direction: Side| {
+        if let Some((gap, at, direction)) = self.distance(watch) {
             let sign = direction.sign();
-            let order =
-                self.at_wall[gap].map_or(0, |(side, order)| if side == direction { order } else { 0 });
-            (domain.unit_row(gap).scaled(-sign).plus(sign * at, width), order)
-        };
+            return (
+                domain.unit_row(gap).scaled(-sign).plus(sign * at, width),
+                self.order_at_wall(gap, direction),
+            );
+        }
         match watch {
-            Watch::Wall(gap, direction) => {
-                let ahead = match self.modes.gaps[gap] {
-                    GapMode::Onset(side) => self.behind(gap, side),
-                    _ => self.wall_ahead(gap, direction),
-                };
-                let (side, number) = ahead.expect("the watch was listed");
-                distance(gap, system.walls(gap, side)[number].at, direction)
-            }
-            Watch::OnsetEnds(gap, side) => distance(gap, self.last_wall(gap, side).at, side),
-            Watch::Leaves(gap, side) => distance(gap, self.last_wall(gap, side).at, side.mirrored()),
             Watch::PressingEnds(gap, side) => {
                 (domain.accelerations[gap].scaled(side.sign()), self.from_force[gap])
             }
@@ -527,6 +526,7 @@ impl<'s> Motion<'s> {
                 let hold = domain.holds[i].as_ref().expect("the watch was listed");
                 (hold.scaled(-next.sign()).plus(system.elements[i].force, width), 0)
             }
+            Watch::Wall(..) | Watch::OnsetEnds(..) | Watch::Leaves(..) => unreachable!("these are distances"),
         }
     }
 
@@ -553,45 +553,45 @@ impl<'s> Motion<'s> {
         let remaining = self.clock.remaining(self.goal);
         let h = self.domain.unit.min(remaining);
         let point = self.point();
-        let mut series = self.series.take().unwrap_or_else(|| Box::new([[0.0; WIDTH]; ORDER + 1]));
-        self.domain.expand(&point, h, &mut series);
-        let first = self.first_event(&point, &series);
+        let mut path = self.path.take().unwrap_or_default();
+        self.domain.follow(&point, h, &mut path);
+        let first = self.first_event(&point, &path);
         let (share, time) = first.map_or((1.0, h), |(share, _)| (share, share * h));
         if share > 0.0 {
             if observer.measures() {
                 let (system, start) = (self.system, self.clock.time());
-                let (domain, modes, series) = (&*self.domain, &self.modes, &*series);
+                let (domain, modes, path) = (&*self.domain, &self.modes, &*path);
                 observer.machine_flight(&Flight {
                     system,
                     domain,
                     modes,
-                    series,
+                    path,
                     share,
                     duration: time,
                     start,
                 });
             }
-            self.advance(&series, share, time);
+            self.advance(&path, share, time);
         }
-        self.series = Some(series);
+        self.path = Some(path);
         if let Some((_, watch)) = first {
             self.cross(watch, observer);
             return self.check_events();
         }
         if h == remaining {
-            self.clock.set(self.goal);
+            self.set_clock(self.goal);
         }
         self.check_size()
     }
 
     /// Returns the share of the step at which the first watch ends the modes.
-    fn first_event(&mut self, point: &Point, series: &Series) -> Option<(f64, Watch)> {
+    fn first_event(&mut self, point: &Point, path: &Path) -> Option<(f64, Watch)> {
         let mut first: Option<(f64, Watch)> = None;
-        for watch in self.watches() {
-            let (row, order) = self.function(watch);
-            let order = if self.touches_limit(watch, &row, point) { 1 } else { order };
-            let function = self.domain.along(&row, series);
-            match first_fall(&function, order, row.size(point)) {
+        let mut watches = std::mem::take(&mut self.watches);
+        watches.clear();
+        self.watches(&mut watches);
+        for &watch in &watches {
+            match self.fall(watch, point, path) {
                 Fall::None => {}
                 Fall::Touches => self.note_touch(watch),
                 Fall::At(share) if first.is_none_or(|(earliest, _)| share < earliest) => {
@@ -600,7 +600,47 @@ impl<'s> Motion<'s> {
                 Fall::At(_) => {}
             }
         }
+        self.watches = watches;
         first
+    }
+
+    /// Returns where a watch ends the modes on a step.
+    fn fall(&self, watch: Watch, point: &Point, path: &Path) -> Fall {
+        if let Some((gap, at, direction)) = self.distance(watch) {
+            let (order, sign) = (self.order_at_wall(gap, direction), direction.sign());
+            let (size, change) = (at.abs() + point[gap].abs(), path.changes[gap]);
+            if order == 0 && sign * (at - point[gap]) > change + ROUNDING * (change + size) {
+                return Fall::None;
+            }
+            let mut distance = path.coordinates[gap].map(|c| -sign * c);
+            distance[0] += sign * at;
+            return first_fall(&distance, order, size);
+        }
+        let (row, order) = self.function(watch);
+        let order = if self.touches_limit(watch, &row, point) { 1 } else { order };
+        first_fall(&self.domain.along(&row, path), order, row.size(point))
+    }
+
+    /// Returns gap, position and direction of the wall whose distance a watch is.
+    fn distance(&self, watch: Watch) -> Option<(usize, f64, Side)> {
+        match watch {
+            Watch::Wall(gap, direction) => {
+                let ahead = match self.modes.gaps[gap] {
+                    GapMode::Onset(side) => self.behind(gap, side),
+                    _ => self.wall_ahead(gap, direction),
+                };
+                let (side, number) = ahead.expect("the watch was listed");
+                Some((gap, self.system.walls(gap, side)[number].at, direction))
+            }
+            Watch::OnsetEnds(gap, side) => Some((gap, self.last_wall(gap, side).at, side)),
+            Watch::Leaves(gap, side) => Some((gap, self.last_wall(gap, side).at, side.mirrored())),
+            _ => None,
+        }
+    }
+
+    /// Returns the order of the root of the distance from a wall at this instant.
+    fn order_at_wall(&self, gap: usize, direction: Side) -> usize {
+        self.at_wall[gap].map_or(0, |(side, order)| if side == direction { order } else { 0 })
     }
 
     /// Large displacements make all steps short.
@@ -616,13 +656,15 @@ impl<'s> Motion<'s> {
     }
 
     /// Moves everything to a share of a step.
-    fn advance(&mut self, series: &Series, share: f64, time: f64) {
-        self.y = self.domain.state(series, share);
+    fn advance(&mut self, path: &Path, share: f64, time: f64) {
+        self.y = self.domain.state(path, share);
         if !self.tangents.is_empty() {
-            self.tangents = self.tangents.iter().map(|tangent| self.domain.carry(tangent, time)).collect();
+            let (carrier, size) = (self.domain.carrier(time), 2 * self.system.n);
+            self.tangents.iter_mut().for_each(|tangent| *tangent = carrier.carry(tangent, size));
             self.rescale_tangents();
         }
         self.clock.advance(time);
+        self.phasors = self.system.phasors(self.clock.time());
         if (0..self.system.gaps()).any(|gap| self.contact(gap).is_some()) {
             self.contact_time += time;
         }
@@ -900,7 +942,7 @@ impl<'s> Motion<'s> {
             let outcome = self.outcome(gap, side, wall, e, &kick, let_go);
             // Gaps that would fly too low rest on, or two walls in a corner would be hit in turn infinitely often.
             let (modes, y) = outcome.lasting.unwrap_or((outcome.free, outcome.bounced));
-            let (domain, point) = (system.domain(modes.key(system)), system.point(&y, self.clock.time()));
+            let (domain, point) = (system.domain(modes.key(system)), system.point(&y, &self.phasors));
             let low = (0..system.gaps()).find(|&other| {
                 let GapMode::Stuck(side) = self.modes.gaps[other] else { return false };
                 let (row, leaving) = (domain.unit_row(other), -side.sign() * y[n + other]);
@@ -974,7 +1016,7 @@ impl<'s> Motion<'s> {
         let mut bounced = after(-side.sign() * (1.0 + e) * approach);
         bounced[n + gap] = -side.sign() * leaving;
         let (free, _) = self.slide_after_jump(&modes, kick, &mut bounced, None);
-        let point = system.point(&bounced, self.clock.time());
+        let point = system.point(&bounced, &self.phasors);
         let domain = system.domain(free.key(system));
         let row = domain.unit_row(gap);
         let pressing = side.sign() * first_derivative(&domain, &row, &point, 2).1;
@@ -1011,6 +1053,10 @@ impl<'s> Motion<'s> {
                 _ => None,
             })
             .collect();
+        if resting.is_empty() {
+            let own = system.mobility[(gap, gap)];
+            return ((0..n).map(|i| system.mobility[(i, gap)] / own).collect(), [false; MOST_GAPS]);
+        }
         let solve = |released: usize| {
             let held = resting.iter().enumerate().filter(|(bit, _)| released >> bit & 1 == 0);
             let held: Vec<(usize, Side)> = held.map(|(_, &pair)| pair).collect();
@@ -1088,7 +1134,7 @@ impl<'s> Motion<'s> {
                 at_rest.elements[i] = modes.slips[i] == Slip::Stick;
             }
         }
-        let point = system.point(y, self.clock.time());
+        let point = system.point(y, &self.phasors);
         match system.consistent(&modes, &at_rest, &point) {
             Some(chosen) => (chosen, true),
             None => (modes, false),

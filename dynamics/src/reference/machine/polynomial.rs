@@ -3,8 +3,8 @@
 //! In Bernstein form, the number of roots in an interval is at most the number of sign changes of the coefficients, and one sign change
 //! means exactly one root (Descartes' rule). Other intervals are halved by de Casteljau's algorithm.
 
-/// Order of the Taylor polynomial of a step.
-pub(super) const ORDER: usize = 22;
+/// Order of the Taylor polynomial of a step. There are four times a whole number of coefficients, for products of registers.
+pub(super) const ORDER: usize = 23;
 
 /// Coefficients of a polynomial in powers of the share of the step.
 pub(super) type Polynomial = [f64; ORDER + 1];
@@ -29,6 +29,15 @@ pub(super) enum Fall {
     At(f64),
 }
 
+/// Returns the sum of the sizes of all coefficients but the first.
+pub(super) fn rest(c: &Polynomial) -> f64 {
+    let mut sums = [0.0; 4];
+    for c in c.chunks_exact(4) {
+        (0..4).for_each(|i| sums[i] += c[i].abs());
+    }
+    sums[0] - c[0].abs() + sums[1] + (sums[2] + sums[3])
+}
+
 /// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. `size` bounds
 /// the terms that cancel in the coefficients.
 pub(super) fn first_fall(polynomial: &Polynomial, order: usize, size: f64) -> Fall {
@@ -42,60 +51,78 @@ pub(super) fn first_fall(polynomial: &Polynomial, order: usize, size: f64) -> Fa
         return Fall::At(0.0);
     }
     let mut touches = false;
-    let b = bernstein(c);
+    let b = combine(&BERNSTEIN[order], c);
     match isolate(&b[..c.len()], [0.0, 1.0], noise, 0, &mut touches) {
-        Some(bracket) => Fall::At(root(c, bracket)),
+        Some((bracket, guess)) => Fall::At(root(c, bracket, guess)),
         None if touches => Fall::Touches,
         None => Fall::None,
     }
 }
 
-/// `1 / n`; 0 for 0.
-const RECIPROCALS: [f64; ORDER + 1] = {
-    let mut all = [0.0; ORDER + 1];
-    let mut n = 1;
-    while n <= ORDER {
-        all[n] = 1.0 / n as f64;
-        n += 1;
+/// Largest order of a root at the start of a step.
+const MOST_ORDER: usize = 6;
+
+/// Columns of the matrices that give the Bernstein coefficients of a polynomial without its first `order` terms:
+/// `b_i = sum_j C(i, j) / C(degree, j) c_j`.
+static BERNSTEIN: [[Polynomial; ORDER + 1]; MOST_ORDER + 1] = {
+    let mut all = [[[0.0; ORDER + 1]; ORDER + 1]; MOST_ORDER + 1];
+    let mut order = 0;
+    while order <= MOST_ORDER {
+        let degree = ORDER - order;
+        let mut i = 0;
+        while i <= degree {
+            let (mut j, mut entry) = (0, 1.0);
+            while j <= i {
+                all[order][j][i] = entry;
+                entry *= (i - j) as f64 / (degree - j) as f64;
+                j += 1;
+            }
+            i += 1;
+        }
+        order += 1;
     }
     all
 };
 
-/// Returns the Bernstein coefficients on `[0, 1]`.
-fn bernstein(c: &[f64]) -> Polynomial {
-    let degree = c.len() - 1;
-    let mut b = [0.0; ORDER + 1];
-    // b_i = sum_j C(i, j) / C(degree, j) c_j
-    let mut row = [0.0; ORDER + 1];
-    let mut inverse = 1.0;
-    for (j, (row, c)) in row.iter_mut().zip(c).enumerate() {
-        *row = c * inverse;
-        inverse *= (j + 1) as f64 * RECIPROCALS[degree - j];
-    }
-    // Each pass adds the neighbours, as in Pascal's triangle.
-    for (i, b) in b.iter_mut().enumerate().take(degree + 1) {
-        *b = row[0];
-        for j in 0..degree - i {
-            row[j] += row[j + 1];
+/// Returns the sum of polynomials with given factors.
+pub(super) fn combine(polynomials: &[Polynomial], factors: &[f64]) -> Polynomial {
+    const PART: usize = 8;
+    let mut sum = [0.0; ORDER + 1];
+    // The sums of one part stay in registers.
+    for part in 0..(ORDER + 1) / PART {
+        let mut sums = [0.0; PART];
+        for (polynomial, factor) in polynomials.iter().zip(factors) {
+            let terms = &polynomial[part * PART..][..PART];
+            (0..PART).for_each(|i| sums[i] += factor * terms[i]);
         }
+        sum[part * PART..][..PART].copy_from_slice(&sums);
     }
-    b
+    sum
 }
 
-/// Returns an interval with the first root only.
-fn isolate(b: &[f64], [lo, hi]: [f64; 2], noise: f64, depth: u32, touches: &mut bool) -> Option<[f64; 2]> {
+/// Returns an interval with the first root only, and a guess of the root.
+fn isolate(
+    b: &[f64],
+    [lo, hi]: [f64; 2],
+    noise: f64,
+    depth: u32,
+    touches: &mut bool,
+) -> Option<([f64; 2], f64)> {
     let degree = b.len() - 1;
     if b.iter().all(|&b| b > 0.0) {
         return None;
     }
     let changes = b.windows(2).filter(|pair| (pair[0] > 0.0) != (pair[1] > 0.0)).count();
     if changes == 1 && b[0] > 0.0 {
-        return Some([lo, hi]);
+        // Where the polygon of the coefficients, which is near the function, meets zero.
+        let i = b.iter().position(|&b| b <= 0.0).unwrap_or(degree);
+        let place = (i as f64 - b[i] / (b[i] - b[i - 1])) / degree as f64;
+        return Some(([lo, hi], lo + (hi - lo) * place));
     }
     let size = b.iter().fold(0.0f64, |size, b| size.max(b.abs()));
     if depth == MOST_HALVINGS || size <= noise {
         *touches = true;
-        return (b[degree] < -noise).then_some([lo, hi]);
+        return (b[degree] < -noise).then_some(([lo, hi], 0.5 * (lo + hi)));
     }
     let [left, right] = halves(b);
     let middle = 0.5 * (lo + hi);
@@ -117,14 +144,40 @@ fn halves(b: &[f64]) -> [Polynomial; 2] {
     [left, right]
 }
 
+/// Powers of a share, and their derivatives, to evaluate several polynomials there.
+pub(super) struct Weights([Polynomial; 2]);
+
+impl Weights {
+    pub(super) fn at(share: f64) -> Weights {
+        let mut weights = [[0.0; ORDER + 1]; 2];
+        weights[0][0] = 1.0;
+        for k in 1..=ORDER {
+            weights[0][k] = share * weights[0][k - 1];
+            weights[1][k] = k as f64 * weights[0][k - 1];
+        }
+        Weights(weights)
+    }
+
+    /// Returns value and slope. Four sums run side by side, each from its smallest term on.
+    pub(super) fn of(&self, c: &Polynomial) -> [f64; 2] {
+        self.0.each_ref().map(|weights| {
+            let mut sums = [0.0; 4];
+            for (c, weights) in c.chunks_exact(4).zip(weights.chunks_exact(4)).rev() {
+                (0..4).for_each(|i| sums[i] += c[i] * weights[i]);
+            }
+            sums[3] + sums[2] + (sums[1] + sums[0])
+        })
+    }
+}
+
 /// Returns value and slope.
 fn value(c: &[f64], u: f64) -> [f64; 2] {
     c.iter().rev().fold([0.0, 0.0], |[value, slope], c| [value * u + c, slope * u + value])
 }
 
 /// Finds the only root in an interval by Newton's method, or by bisection where that leaves the interval.
-fn root(c: &[f64], [mut lo, mut hi]: [f64; 2]) -> f64 {
-    let mut u = 0.5 * (lo + hi);
+fn root(c: &[f64], [mut lo, mut hi]: [f64; 2], guess: f64) -> f64 {
+    let mut u = guess;
     for _ in 0..ROOT_CAP {
         let [value, slope] = value(c, u);
         if value > 0.0 {

@@ -1,6 +1,6 @@
 //! A machine in the coordinates of its flow, with the domains that motions have met.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::{Arc, RwLock};
 
 use nalgebra::{DMatrix, DVector};
@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::domain::{Domain, DomainKey};
 use super::modes::ROUNDING;
 use super::{Numbers, Point, SIZE};
-use crate::model::{Contact, Machine, Side, Wall};
+use crate::model::{Contact, MOST_HARMONICS, Machine, Side, Wall};
 
 /// Displacement, in scales of length, from which no motion is expected to return if energy can grow.
 const ESCAPE: f64 = 1e9;
@@ -28,6 +28,9 @@ pub(super) struct Element {
     pub(super) force: f64,
     pub(super) speed: f64,
 }
+
+/// Cosine and sine of each harmonic.
+pub(super) type Phasors = [[f64; 2]; MOST_HARMONICS + 1];
 
 /// A machine, prepared for its motions. Domains are shared by all motions.
 #[derive(Clone, Debug)]
@@ -56,7 +59,7 @@ pub struct System {
     pub(super) elements: Vec<Element>,
     /// Changes of the stage: time since phase 0, and stage.
     pub(super) schedule: Vec<(f64, usize)>,
-    domains: Arc<RwLock<HashMap<DomainKey, Arc<Domain>>>>,
+    domains: Arc<RwLock<BTreeMap<u32, Arc<Domain>>>>,
 }
 
 impl System {
@@ -180,11 +183,11 @@ impl System {
 
     /// Returns the domain of a combination of modes, and builds it if it is the first time.
     pub(super) fn domain(&self, key: DomainKey) -> Arc<Domain> {
-        if let Some(domain) = self.domains.read().expect("no builder panics").get(&key) {
+        if let Some(domain) = self.domains.read().expect("no builder panics").get(&key.code()) {
             return Arc::clone(domain);
         }
         let domain = Arc::new(Domain::new(self, key));
-        self.domains.write().expect("no builder panics").entry(key).or_insert(domain).clone()
+        self.domains.write().expect("no builder panics").entry(key.code()).or_insert(domain).clone()
     }
 
     /// Converts a state `(x1, v1, ...)` to `(d1 .. dn, w1 .. wn)`.
@@ -225,15 +228,23 @@ impl System {
         2 * self.n + 2 * self.orders.len() + 1
     }
 
-    /// Completes a state to a point at a time since phase 0.
-    pub(super) fn point(&self, y: &[f64], t: f64) -> Point {
+    /// Returns cosine and sine of all harmonics at a time since phase 0.
+    pub(super) fn phasors(&self, t: f64) -> Phasors {
+        let mut phasors = [[0.0; 2]; MOST_HARMONICS + 1];
+        for (phasor, order) in phasors.iter_mut().zip(&self.orders) {
+            let (sin, cos) = (order * self.machine.omega * t).sin_cos();
+            *phasor = [cos, sin];
+        }
+        phasors
+    }
+
+    /// Completes a state to a point.
+    pub(super) fn point(&self, y: &[f64], phasors: &Phasors) -> Point {
         let mut point = [0.0; super::WIDTH];
         let states = 2 * self.n;
         point[..states].copy_from_slice(&y[..states]);
-        for (k, order) in self.orders.iter().enumerate() {
-            let (sin, cos) = (order * self.machine.omega * t).sin_cos();
-            (point[states + 2 * k], point[states + 2 * k + 1]) = (cos, sin);
-        }
+        let (phases, _) = point[states..].as_chunks_mut();
+        phases.iter_mut().zip(phasors).take(self.orders.len()).for_each(|(phase, phasor)| *phase = *phasor);
         point[self.width() - 1] = 1.0;
         point
     }
