@@ -169,7 +169,8 @@ impl Flow {
         if let Some(machine) = &oscillator.machine {
             let system = System::new(machine);
             (flow.length, flow.speed, flow.escape) = system.units();
-            (flow.symmetric, flow.non_impacting, flow.machine) = (false, None, Some(system));
+            (flow.symmetric, flow.machine) = (false, Some(system));
+            flow.non_impacting = NonImpacting::of_machine(machine);
             return flow;
         }
         if !oscillator.friction.is_empty() {

@@ -232,6 +232,14 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
+    /// Whether no contact lasts, at any gap.
+    pub(crate) fn is_free(&self) -> bool {
+        match &self.machine {
+            Some(motion) => motion.is_free(),
+            None => self.meshing().is_none(),
+        }
+    }
+
     /// Returns the present interval between walls, [`Flow::interval`].
     pub(crate) fn interval(&self) -> i32 {
         self.interval

@@ -16,6 +16,11 @@ struct Flow {
     length: Real,
     speed: Real,
     escape: Real,
+    // Contact-free motion: twice the energy of a transient below which no contact follows, negative if there is none; growth of the
+    // transient per period, in octaves; and steady state at phase 0.
+    contact_free_energy: Real,
+    transient_growth: Real,
+    steady: array<Real, 16>,
 }
 
 struct FlowShape {

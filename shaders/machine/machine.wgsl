@@ -136,13 +136,34 @@ fn has_stages() -> bool {
     return shape.changes > 0u;
 }
 
-// The energy of machines has no bound that would show that no contact follows.
+// Whether the energy of the transient keeps all gaps off the walls from now on.
 fn is_non_impacting() -> bool {
-    return false;
+    if flow.contact_free_energy <= 0.0 || settings.max_period == 0u {
+        return false;
+    }
+    for (var gap = 0u; gap < GAPS; gap++) {
+        if gap_modes[gap] != BEYOND {
+            return false;
+        }
+    }
+    iterations += DIM + COORDINATES * COORDINATES;
+    var transient = motion.q;
+    for (var i = 0u; i < shape.dim; i++) {
+        transient[i] -= flow.steady[i];
+    }
+    var twice_energy = Real(0.0);
+    for (var i = 0u; i < shape.coordinates; i++) {
+        for (var j = 0u; j < shape.coordinates; j++) {
+            let place = AT_ENERGY + i * COORDINATES + j;
+            twice_energy += number(place) * transient[2u * i + 1u] * transient[2u * j + 1u];
+            twice_energy += number(place + COORDINATES * COORDINATES) * transient[2u * i] * transient[2u * j];
+        }
+    }
+    return twice_energy < flow.contact_free_energy;
 }
 
 fn contact_free_growth() -> Real {
-    return 0.0;
+    return flow.transient_growth;
 }
 
 // Whether no gap lies on a wall and no force or rate is at its limit.

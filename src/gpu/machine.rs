@@ -7,14 +7,14 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 use crate::record::limits::MOST_STEPS;
-use rattlemap_dynamics::model::{Contact, Law, Machine, Oscillator, Side, State, Wall};
+use rattlemap_dynamics::model::{Contact, Law, Machine, NonImpacting, Oscillator, STATE, Side, State, Wall};
 use rattlemap_dynamics::reference::machine::{StartModes, System};
 
 /// Largest number of domains in a table.
 pub(super) const MOST_DOMAINS: usize = 4096;
 
 /// Numbers of a flow, of its shape and of a law in the shader.
-pub(super) const FLOW: usize = 5;
+pub(super) const FLOW: usize = 7 + STATE;
 pub(super) const SHAPE: usize = 31;
 pub(super) const LAW: usize = 24;
 
@@ -26,6 +26,9 @@ const STEPS_PER_TURN: u32 = 8;
 
 /// Longest step in the table, in time units: without stiffness and damping there is none. It is a number in f32.
 const LONGEST_STEP: f64 = 1e30;
+
+/// Largest limit of an energy in the table, a number in f32.
+const LARGEST_ENERGY: f64 = 1e30;
 
 /// Sizes of machines, for which shaders are compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -82,12 +85,13 @@ impl MachineShape {
     }
 
     /// Returns the places in the table, by their names in the shader.
-    pub(super) fn places(&self) -> [(&'static str, usize); 12] {
+    pub(super) fn places(&self) -> [(&'static str, usize); 13] {
         let [n, gaps, elements] = [self.coordinates, self.gaps, self.elements].map(|size| size as usize);
         let (width, sides) = (self.width(), 2 * gaps * self.walls as usize);
         let walls = n * n;
         let springs = walls + sides;
-        let of_elements = springs + 3 * sides * self.stages as usize;
+        let energy = springs + 3 * sides * self.stages as usize;
+        let of_elements = energy + 2 * n * n;
         let still = 1;
         let has_push = still + gaps;
         let has_hold = has_push + gaps;
@@ -99,6 +103,7 @@ impl MachineShape {
             ("AT_MOBILITY", 0),
             ("AT_WALLS", walls),
             ("AT_SPRINGS", springs),
+            ("AT_ENERGY", energy),
             ("AT_ELEMENTS", of_elements),
             ("AT_DOMAINS", of_elements + elements * (width + 1)),
             ("IN_DOMAIN_STILL", still),
@@ -239,7 +244,26 @@ impl MachineConstants {
     pub(super) fn flow(&self) -> [f64; FLOW] {
         let (length, speed, escape) = self.system.scales();
         let escape = if escape.is_finite() { escape } else { -1.0 };
-        [self.system.machine().omega, self.period() / f64::from(self.steps), length, speed, escape]
+        let omega = self.system.machine().omega;
+        let mut flow = [0.0; FLOW];
+        flow[..7].copy_from_slice(&[
+            omega,
+            self.period() / f64::from(self.steps),
+            length,
+            speed,
+            escape,
+            -1.0,
+            0.0,
+        ]);
+        let motion = NonImpacting::of_machine(self.system.machine());
+        // Lanes in single precision do not know whether a body rests.
+        if let Some(motion) = motion.filter(|motion| motion.resting().is_none()) {
+            // Without walls the energy has no limit.
+            flow[5] = motion.reach().min(LARGEST_ENERGY);
+            flow[6] = motion.exponent() * self.period() / std::f64::consts::LN_2;
+            flow[7..].copy_from_slice(&self.system.listed_state(&motion.steady()));
+        }
+        flow
     }
 
     /// Returns the numbers of the shader's shape, given the places of phasors, schedule and table.
@@ -337,6 +361,11 @@ impl MachineConstants {
             for j in 0..size {
                 let value = if i < n && j < n { mobility[i * n + j] } else { f64::from(u8::from(i == j)) };
                 table[shape.place("AT_MOBILITY") + i * size + j] = value;
+            }
+        }
+        for (form, matrix) in system.energy_forms().iter().enumerate() {
+            for (k, value) in matrix.iter().enumerate() {
+                table[shape.place("AT_ENERGY") + (form * size + k / n) * size + k % n] = *value;
             }
         }
         let most_walls = shape.walls as usize;

@@ -9,7 +9,7 @@ use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::model::{Law, Machine, Oscillator, State, state};
+use rattlemap_dynamics::model::{GearPair, Law, Machine, NonImpacting, Oscillator, REST, State, state};
 use rattlemap_dynamics::reference::machine::{Motion, System};
 use rayon::prelude::*;
 
@@ -126,6 +126,23 @@ fn lanes_decide_classes_of_machines_as_the_reference_does() {
             let off = (found.lyapunov - expected.lyapunov).abs() / expected.lyapunov.abs();
             assert!(off < 0.02, "cell {id}: {} for {}", found.lyapunov, expected.lyapunov);
         }
+    }
+}
+
+/// Lanes decide motion without contact as soon as its energy is too low for one.
+#[test]
+fn contact_free_motion_of_machines_ends_early() {
+    let slow = |omega: f64| GearPair { omega, r1: 0.02, r2: 0.02, ..GearPair::paper(0.8) };
+    let machine = |omega: f64| Machine::of(&slow(omega).oscillator().unwrap(), slow(omega).law());
+    let oscillators = [9.0, 11.0].map(|omega| Oscillator::of_machine(machine(omega)));
+    let settings = LaneSettings { features: Features::of(&oscillators[0]), ..LaneSettings::default() };
+    let lanes = [0, 1].map(|flow| Lane { flow, law: 0, start: REST });
+    let run = open(Precision::F32).run(&oscillators, &[Law::both(0.0, 0.0)], &lanes, &settings);
+    for (record, oscillator) in pollster::block_on(run).unwrap().iter().zip(&oscillators) {
+        let motion = NonImpacting::of_machine(oscillator.machine.as_ref().unwrap()).unwrap();
+        assert_eq!((record.period, record.status, record.impacts_per_period), (1, 0, 0.0));
+        assert!(record.periods_run < 100, "{} periods", record.periods_run);
+        assert!((record.lyapunov / motion.exponent() - 1.0).abs() < 1e-5, "{}", record.lyapunov);
     }
 }
 

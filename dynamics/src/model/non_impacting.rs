@@ -7,12 +7,12 @@
 //! |z - z_0| <= sum |g . X_n| + sqrt(2 E g K^-1 g),   z_0 = g . K^-1 load
 //! ```
 //!
-//! for all time, with `X_n` the complex amplitudes of the steady response to each harmonic (Cauchy-Schwarz in the inner product of K). If
+//! for all time, and every gap of a machine likewise, with `X_n` the complex amplitudes of the steady response to each harmonic (Cauchy-Schwarz in the inner product of K). If
 //! that interval lies between the walls, the motion has no further event.
 
-use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
+use nalgebra::{Complex, DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
-use super::{Harmonic, Oscillator, State, is_semidefinite, state};
+use super::{Drive, Harmonic, Machine, Oscillator, REST, Side, State, is_semidefinite, state};
 
 /// Margin for rounding: of the distance to a wall, relative to twice the scale of length, and of the decay rate,
 /// relative to the excitation frequency.
@@ -22,13 +22,17 @@ const MARGIN: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub struct NonImpacting {
     steady: State,
-    mass: [[f64; 2]; 2],
-    stiffness: Matrix2<f64>,
+    /// Coordinates that move, and their mass and stiffness matrices.
+    moving: Vec<usize>,
+    mass: DMatrix<f64>,
+    stiffness: DMatrix<f64>,
     /// Largest `sqrt(2 E)` of a transient that touches no wall.
     reach: f64,
     /// Eigenvalue of free motion with the largest real part.
     slowest: Complex<f64>,
-    resting: Option<usize>,
+    /// Coordinates that must be at rest, and the largest displacement and rate that count as rest.
+    resting: Vec<usize>,
+    rest: [f64; 2],
 }
 
 impl NonImpacting {
@@ -72,7 +76,8 @@ impl NonImpacting {
         let room = (walls[0] - gap.dot(&middle)).min(gap.dot(&middle) - walls[1]) - swing;
         let reach = (room - MARGIN * 2.0 * oscillator.length_scale()) / gap.dot(&(compliance * gap)).sqrt();
         let inverse_mass = matrix(oscillator.inverse_mass());
-        let slowest = || slowest(&(inverse_mass * stiffness), &(inverse_mass * damping));
+        let generator = || generator(&(inverse_mass * stiffness), &(inverse_mass * damping));
+        let slowest = || slowest(generator().complex_eigenvalues().as_slice());
         // Eigenvalues take longest: they come last.
         let slowest = (reach > 0.0).then(slowest).filter(|slowest| slowest.re < -MARGIN * omega)?;
         // Added to -0, a zero keeps its sign.
@@ -84,7 +89,87 @@ impl NonImpacting {
             }
         }
         (0..2).for_each(|i| steady[2 * i] += middle[i]);
-        Some(NonImpacting { steady: state(&steady), mass, stiffness, reach, slowest, resting: None })
+        let [mass, stiffness] = [matrix(mass), stiffness].map(|m| DMatrix::from_fn(2, 2, |i, j| m[(i, j)]));
+        let (moving, resting, rest) = (vec![0, 1], Vec::new(), [0.0; 2]);
+        Some(NonImpacting { steady: state(&steady), moving, mass, stiffness, reach, slowest, resting, rest })
+    }
+
+    /// Computes the contact-free steady motion of a machine. Returns none if it touches a wall or is not stable, or if the machine
+    /// has stages or dry friction. Bodies that nothing moves between the walls must then be at rest.
+    pub fn of_machine(machine: &Machine) -> Option<NonImpacting> {
+        if !machine.schedule.is_empty() || machine.friction.iter().any(|friction| friction.force > 0.0) {
+            return None;
+        }
+        let n = machine.degrees();
+        let resting: Vec<usize> = (0..n).filter(|&i| is_left_alone(machine, i)).collect();
+        let all = NonImpacting::of_coordinates(machine, &(0..n).collect::<Vec<_>>());
+        if all.is_some() || resting.is_empty() || resting.len() == n {
+            return all;
+        }
+        let moving: Vec<usize> = (0..n).filter(|i| !resting.contains(i)).collect();
+        let motion = NonImpacting::of_coordinates(machine, &moving)?;
+        let forces = &machine.stages[0];
+        let rates = resting.iter().map(|&i| {
+            let [m, c, k] = [&machine.mass, &forces.damping, &forces.stiffness].map(|matrix| matrix[(i, i)]);
+            (Complex::from(c * c - 4.0 * m * k).sqrt() - c) / (2.0 * m)
+        });
+        let slowest =
+            rates.fold(motion.slowest, |slowest, own| if own.re > slowest.re { own } else { slowest });
+        // Bodies at rest are so within the margin of the distance to a wall.
+        let rest = [1.0, machine.omega].map(|unit| 1e-3 * MARGIN * machine.length_scale() * unit);
+        (slowest.re <= 0.0).then_some(NonImpacting { resting, rest, slowest, ..motion })
+    }
+
+    /// Computes the contact-free steady motion of some coordinates of a machine while the others stay at 0.
+    fn of_coordinates(machine: &Machine, moving: &[usize]) -> Option<NonImpacting> {
+        let (n, forces) = (moving.len(), &machine.stages[0]);
+        let matrix = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| m[(moving[i], moving[j])]);
+        let vector = |v: &DVector<f64>| DVector::from_fn(n, |i, _| v[moving[i]]);
+        let [mass, stiffness, damping] = [&machine.mass, &forces.stiffness, &forces.damping].map(matrix);
+        let dissipation = (0.5 * (&damping + damping.transpose())).symmetric_eigenvalues();
+        if dissipation.min() < -MARGIN * dissipation.amax() {
+            return None;
+        }
+        let compliance = stiffness.clone().cholesky()?.inverse();
+        let response = |drive: &Drive| {
+            let omega = f64::from(drive.order) * machine.omega;
+            let dynamic = (&stiffness - &mass * (omega * omega)).map(Complex::from)
+                + damping.map(|c| Complex::new(0.0, omega * c));
+            let force = DVector::from_fn(n, |i, _| Complex::new(drive.cos[moving[i]], -drive.sin[moving[i]]));
+            Some((omega, dynamic.try_inverse()? * force))
+        };
+        let responses = machine.drives.iter().map(response).collect::<Option<Vec<_>>>()?;
+        let middle = &compliance * vector(&forces.load);
+        let mut reach = f64::INFINITY;
+        for gap in &machine.gaps {
+            let row = vector(&gap.row);
+            let (mean, complex) = (row.dot(&middle), row.map(Complex::from));
+            let swing: f64 = responses.iter().map(|(_, x)| complex.dot(x).norm()).sum();
+            let room = |side: Side| {
+                let nearest =
+                    gap.walls[side.index()].first().map_or(f64::INFINITY, |wall| side.sign() * wall.at);
+                nearest - side.sign() * mean
+            };
+            let room =
+                room(Side::Right).min(room(Side::Left)) - swing - MARGIN * 2.0 * machine.length_scale();
+            // A gap between bodies at rest has no compliance, and then its room alone matters.
+            let share = room / row.dot(&(&compliance * &row)).sqrt();
+            reach = reach.min(if room > 0.0 { share } else { room });
+        }
+        let inverse = mass.clone().cholesky()?.inverse();
+        let mut generator = DMatrix::zeros(2 * n, 2 * n);
+        generator.view_mut((0, n), (n, n)).fill_with_identity();
+        generator.view_mut((n, 0), (n, n)).copy_from(&-(&inverse * &stiffness));
+        generator.view_mut((n, n), (n, n)).copy_from(&-(&inverse * &damping));
+        let slowest = || slowest(generator.complex_eigenvalues().as_slice());
+        let slowest = (reach > 0.0).then(slowest).filter(|slowest| slowest.re < -MARGIN * machine.omega)?;
+        let mut steady = REST;
+        for (i, &place) in moving.iter().enumerate() {
+            steady[2 * place] = middle[i] + responses.iter().map(|(_, x)| x[i].re).sum::<f64>();
+            steady[2 * place + 1] = responses.iter().map(|(omega, x)| -omega * x[i].im).sum();
+        }
+        let (moving, resting, rest) = (moving.to_vec(), Vec::new(), [0.0; 2]);
+        Some(NonImpacting { steady, moving, mass, stiffness, reach, slowest, resting, rest })
     }
 
     /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
@@ -109,25 +194,33 @@ impl NonImpacting {
             let own = (root - c) / (2.0 * m);
             let slowest = if own.re > motion.slowest.re { own } else { motion.slowest };
             // Rest that any perturbation leaves is not stable.
-            (slowest.re <= 0.0).then_some(NonImpacting { resting: Some(resting), slowest, ..motion })
+            (slowest.re <= 0.0).then_some(NonImpacting { resting: vec![resting], slowest, ..motion })
         })
     }
 
     /// Returns the index of the degree of freedom that must be at rest, if one must.
     pub fn resting(&self) -> Option<usize> {
-        self.resting
+        self.resting.first().copied()
     }
 
     /// Whether free motion from `y` at phase 0 certainly has no further event.
     pub fn is_certain(&self, y: State) -> bool {
-        if self.resting.is_some_and(|i| [y[2 * i], y[2 * i + 1]] != [0.0; 2]) {
+        let [displacement, rate] = self.rest;
+        if self.resting.iter().any(|&i| y[2 * i].abs() > displacement || y[2 * i + 1].abs() > rate) {
             return false;
         }
-        let q: [f64; 4] = std::array::from_fn(|i| y[i] - self.steady[i]);
-        let x = Vector2::new(q[0], q[2]);
-        let [[m1, m], [_, m2]] = self.mass;
-        let kinetic = m1 * q[1] * q[1] + m2 * q[3] * q[3] + 2.0 * m * q[1] * q[3];
-        let twice_energy = kinetic + x.dot(&(self.stiffness * x));
+        let n = self.moving.len();
+        let off = |i: usize| y[i] - self.steady[i];
+        let mut q = REST;
+        for (i, &place) in self.moving.iter().enumerate() {
+            (q[2 * i], q[2 * i + 1]) = (off(2 * place), off(2 * place + 1));
+        }
+        let mut kinetic: f64 = (0..n).map(|i| self.mass[(i, i)] * q[2 * i + 1] * q[2 * i + 1]).sum();
+        for i in 0..n {
+            kinetic += (0..i).map(|j| 2.0 * self.mass[(i, j)] * q[2 * j + 1] * q[2 * i + 1]).sum::<f64>();
+        }
+        let force = |i: usize| (0..n).map(|j| self.stiffness[(i, j)] * q[2 * j]).sum::<f64>();
+        let twice_energy = kinetic + (0..n).map(|i| q[2 * i] * force(i)).sum::<f64>();
         twice_energy < self.reach * self.reach
     }
 
@@ -169,16 +262,30 @@ fn with_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
     copied
 }
 
-/// Returns the eigenvalue of free motion with the largest real part, in the upper half plane.
-fn slowest(stiffness: &Matrix2<f64>, damping: &Matrix2<f64>) -> Complex<f64> {
+/// Whether nothing moves a coordinate at rest between the walls.
+fn is_left_alone(machine: &Machine, i: usize) -> bool {
+    let forces = &machine.stages[0];
+    let matrices = [&machine.mass, &forces.damping, &forces.stiffness];
+    let is_alone = |j: usize| i == j || matrices.iter().all(|m| m[(i, j)] == 0.0 && m[(j, i)] == 0.0);
+    (0..machine.degrees()).all(is_alone)
+        && forces.load[i] == 0.0
+        && machine.drives.iter().all(|drive| drive.cos[i] == 0.0 && drive.sin[i] == 0.0)
+}
+
+/// Returns the generator of free motion of two coordinates, given the products of the inverse mass matrix with stiffness and damping.
+fn generator(stiffness: &Matrix2<f64>, damping: &Matrix2<f64>) -> Matrix4<f64> {
     let mut generator = Matrix4::zeros();
     generator.fixed_view_mut::<2, 2>(0, 2).fill_with_identity();
     generator.fixed_view_mut::<2, 2>(2, 0).copy_from(&-stiffness);
     generator.fixed_view_mut::<2, 2>(2, 2).copy_from(&-damping);
-    let eigenvalues = generator.complex_eigenvalues();
+    generator
+}
+
+/// Returns the eigenvalue with the largest real part, in the upper half plane.
+fn slowest(eigenvalues: &[Complex<f64>]) -> Complex<f64> {
     let slowest =
         eigenvalues.iter().copied().max_by(|a, b| a.re.total_cmp(&b.re).then(a.im.total_cmp(&b.im)));
-    slowest.expect("there are four")
+    slowest.expect("there is a coordinate")
 }
 
 #[cfg(test)]
@@ -261,5 +368,46 @@ mod tests {
             }
         }
         assert!((20..190).contains(&certain), "{certain} of 200");
+    }
+
+    #[test]
+    fn a_machine_has_the_contact_free_motion_of_its_oscillator() {
+        for omega in [8.1, 9.0, 11.0] {
+            let pair = pair(omega);
+            let oscillator = pair.oscillator().unwrap();
+            let one = NonImpacting::new(&oscillator).unwrap();
+            let other = NonImpacting::of_machine(&Machine::of(&oscillator, pair.law())).unwrap();
+            let off = (0..4).map(|i| (one.steady[i] - other.steady[i]).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-13 && (one.reach / other.reach - 1.0).abs() < 1e-12, "{omega}: {off:e}");
+            assert!((one.exponent() / other.exponent() - 1.0).abs() < 1e-12);
+            for size in [0.5, 0.99, 1.01] {
+                let start = sum(&one.steady, &state(&[size * one.reach / one.stiffness[(0, 0)].sqrt()]), 1.0);
+                assert_eq!(other.is_certain(start), size < 1.0, "{omega}, {size}");
+                assert_eq!(one.is_certain(start), other.is_certain(start));
+            }
+        }
+        assert!(
+            NonImpacting::of_machine(&Machine::of(&pair(7.0).oscillator().unwrap(), pair(7.0).law()))
+                .is_none()
+        );
+    }
+
+    /// A ball in the slot of an oscillator: nothing moves the ball until the slot hits it.
+    #[test]
+    fn a_body_that_nothing_moves_must_be_at_rest() {
+        let mut machine = Machine::of(&pair(11.0).oscillator().unwrap(), pair(11.0).law());
+        let forces = &mut machine.stages[0];
+        (forces.stiffness[(1, 1)], forces.damping[(1, 1)]) = (0.0, 0.0);
+        let motion = NonImpacting::of_machine(&machine).unwrap();
+        assert!(motion.is_neutral() && motion.resting() == Some(1));
+        let [x1, v1, ..] = motion.steady();
+        assert!(motion.is_certain(motion.steady()) && motion.is_certain(state(&[x1, v1, 1e-14])));
+        assert!(!motion.is_certain(state(&[x1, v1, 0.0, 1e-9])));
+        let flow = Flow::new(&Oscillator::of_machine(machine));
+        let mut trajectory = Trajectory::<0>::new(&flow, pair(11.0).law(), motion.steady());
+        for _ in 0..200 {
+            trajectory.advance_period(&mut ()).unwrap();
+            assert!(motion.is_certain(trajectory.state()), "{:?}", trajectory.state());
+        }
     }
 }

@@ -287,7 +287,7 @@ impl Analysis<'_> {
     /// Returns the orbit of motion that certainly has no further event, without waiting for its transient to decay.
     fn non_impacting(&self, trajectory: &Trajectory<'_, 0>) -> Result<Option<Orbit>, Stop> {
         let is_certain =
-            |motion: &&NonImpacting| trajectory.meshing().is_none() && motion.is_certain(trajectory.state());
+            |motion: &&NonImpacting| trajectory.is_free() && motion.is_certain(trajectory.state());
         let Some(motion) = self.flow.non_impacting().filter(is_certain) else { return Ok(None) };
         let steady = Trajectory::new(self.flow, self.law, motion.steady());
         let newton = &mut Newton::default();

@@ -312,7 +312,7 @@ impl<'a> CellRun<'a> {
     /// Whether the motion certainly has no further event.
     fn is_non_impacting<const N: usize>(&self, trajectory: &Trajectory<'a, N>) -> bool {
         let free = self.analysis.flow.non_impacting();
-        trajectory.meshing().is_none() && free.is_some_and(|free| free.is_certain(trajectory.state()))
+        trajectory.is_free() && free.is_some_and(|free| free.is_certain(trajectory.state()))
     }
 
     /// Builds the results of contact-free motion, which converges to its steady response.

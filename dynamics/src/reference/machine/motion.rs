@@ -274,6 +274,11 @@ impl<'s> Motion<'s> {
         }
     }
 
+    /// Whether no contact lasts.
+    pub(crate) fn is_free(&self) -> bool {
+        (0..self.system.gaps()).all(|gap| self.contact(gap).is_none())
+    }
+
     /// Returns the modes of dry friction.
     pub fn slips(&self) -> Slips {
         self.modes.slips
@@ -665,7 +670,7 @@ impl<'s> Motion<'s> {
         }
         self.clock.advance(time);
         self.phasors = self.system.phasors(self.clock.time());
-        if (0..self.system.gaps()).any(|gap| self.contact(gap).is_some()) {
+        if !self.is_free() {
             self.contact_time += time;
         }
         if self.system.elements.iter().zip(self.modes.slips).any(|(_, slip)| slip == Slip::Stick) {

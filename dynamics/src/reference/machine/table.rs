@@ -124,7 +124,7 @@ impl System {
         }
     }
 
-    /// Lists displacements and rates in turn.
+    /// Lists a point: displacements and rates in turn, and what forces depend on beside them.
     fn listed(&self, point: &[f64]) -> Vec<f64> {
         let states = (0..self.n).flat_map(|i| [point[i], point[self.n + i]]);
         states.chain(point[2 * self.n..self.width()].iter().copied()).collect()
@@ -144,6 +144,26 @@ impl System {
     /// Returns the changes of the rates by unit impulses, row by row.
     pub fn mobilities(&self) -> Vec<f64> {
         (0..self.n * self.n).map(|k| self.mobility[(k / self.n, k % self.n)]).collect()
+    }
+
+    /// Returns the mass matrix and the stiffness matrix of free motion in stage 0, in the coordinates of the flow, row by row.
+    pub fn energy_forms(&self) -> [Vec<f64>; 2] {
+        [&self.mass, &self.stages[0].stiffness]
+            .map(|matrix| (0..self.n * self.n).map(|k| matrix[(k / self.n, k % self.n)]).collect())
+    }
+
+    /// Converts a state `(x1, v1, ...)` to `(d1, w1, ...)`.
+    pub fn listed_state(&self, state: &[f64]) -> Numbers {
+        self.in_turn(&self.to_flow(state))
+    }
+
+    /// Lists displacements and rates in turn.
+    fn in_turn(&self, y: &Numbers) -> Numbers {
+        let mut listed = [0.0; SIZE];
+        for i in 0..self.n {
+            (listed[2 * i], listed[2 * i + 1]) = (y[i], y[self.n + i]);
+        }
+        listed
     }
 
     /// Whether a wall only pushes, and its force differs from that of a wall that may pull.
@@ -176,10 +196,7 @@ impl Motion<'_> {
         let (system, y) = (self.system(), self.flow_state());
         let side = |side: Option<Side>| side.map_or(2, side_code);
         let modes = self.modes();
-        let mut state = [0.0; SIZE];
-        for i in 0..system.n {
-            (state[2 * i], state[2 * i + 1]) = (y[i], y[system.n + i]);
-        }
+        let state = system.in_turn(y);
         let slip =
             |slip: Slip| Slip::ALL.iter().position(|&other| other == slip).expect("all are listed") as u32;
         let (from_force, from_rate) = self.root_orders();
