@@ -41,7 +41,6 @@ mod constrained;
 mod energy;
 mod expansion;
 mod few;
-mod friction;
 mod gap_polynomial;
 mod generator;
 mod linear;
@@ -50,12 +49,9 @@ mod row;
 mod short_flight;
 mod taylor;
 
-use friction::{FrictionFlows, Watches};
 use nalgebra::Matrix2;
 
 pub(crate) use expansion::{EXPANSION_REACH, Expansion, TERMS, turned};
-pub(crate) use friction::{Element, Watch};
-pub use friction::{Slip, Slips};
 pub use linear::LinearFlow;
 pub(crate) use linear::Step;
 pub(crate) use pushing::PushingForce;
@@ -63,7 +59,11 @@ pub(crate) use row::Row;
 pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 
-use crate::model::{Contact, Law, Model, ModelError, NonImpacting, Oscillator, REST, Side, State, state};
+use std::borrow::Cow;
+
+use crate::model::{
+    Contact, Law, Machine, Model, ModelError, NonImpacting, Oscillator, REST, Side, State, state,
+};
 use crate::reference::machine::System;
 
 /// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Oscillator::other`].
@@ -98,7 +98,7 @@ pub struct Flow {
     pub escape: f64,
     /// The oscillator.
     pub oscillator: Oscillator,
-    /// The whole system, if the oscillator is a machine. The flows of this structure then have no meaning.
+    /// The whole system, if the oscillator is a machine or has dry friction. The flows of this structure then have no meaning.
     pub machine: Option<System>,
     /// Scale of speed: the scale of length times the rate of free motion.
     pub(crate) speed: f64,
@@ -131,13 +131,6 @@ pub struct Flow {
     held: Option<[f64; 3]>,
     /// Flows of the intervals behind the first right wall and the first left wall, from the inside to the outside.
     behind: [Vec<Flow>; 2],
-    /// Flows under dry friction, of this stage and interval.
-    friction: Option<Box<FrictionFlows>>,
-    /// For the flow of one combination of friction modes: the functions that end them, whether an element sticks, and whether the sticking
-    /// elements hold the gap still in front of a wall or behind it.
-    watches: Option<Box<Watches>>,
-    pub(crate) sticks: bool,
-    pub(crate) holds_gap: bool,
     /// Flows of the further stages, and the changes of the stage: time since phase 0, and the stage that begins there.
     stages: Vec<Flow>,
     schedule: Vec<(f64, usize)>,
@@ -166,26 +159,19 @@ impl Flow {
     /// Computes the flow of an oscillator that [`Oscillator::validate`] accepts.
     pub fn new(oscillator: &Oscillator) -> Flow {
         let mut flow = Flow::in_stages(oscillator);
-        if let Some(machine) = &oscillator.machine {
-            let system = System::new(machine);
+        let has_friction = oscillator.friction.iter().any(|friction| friction.force > 0.0);
+        let machine = match &oscillator.machine {
+            Some(machine) => Some(Cow::Borrowed(&**machine)),
+            None => has_friction.then(|| Cow::Owned(Machine::of(oscillator, Law::both(0.0, 0.0)))),
+        };
+        if let Some(machine) = machine {
+            let system = System::new(&machine);
             (flow.length, flow.speed, flow.escape) = system.units();
             (flow.symmetric, flow.machine) = (false, Some(system));
-            flow.non_impacting = NonImpacting::of_machine(machine);
+            flow.non_impacting = NonImpacting::of_machine(&machine);
             return flow;
         }
-        if !oscillator.friction.is_empty() {
-            flow.add_friction();
-        }
         flow
-    }
-
-    /// Adds the flows under dry friction, in all stages and intervals.
-    fn add_friction(&mut self) {
-        self.friction = FrictionFlows::new(self).map(Box::new);
-        if self.friction.is_some() {
-            self.non_impacting = None;
-        }
-        self.behind.iter_mut().flatten().chain(&mut self.stages).for_each(Flow::add_friction);
     }
 
     fn in_stages(oscillator: &Oscillator) -> Flow {
@@ -296,40 +282,10 @@ impl Flow {
             free,
             meshing,
             held: None,
-            friction: None,
-            watches: None,
-            sticks: false,
-            holds_gap: false,
             behind: Default::default(),
             stages: Vec::new(),
             schedule: Vec::new(),
         }
-    }
-
-    /// Returns the elements with dry friction.
-    pub(crate) fn friction(&self) -> &[Element] {
-        self.friction.as_ref().map_or(&[], |friction| &friction.elements)
-    }
-
-    /// Returns the flow in which the elements with dry friction are in given modes.
-    #[inline]
-    pub(crate) fn in_modes(&self, slips: Slips) -> &Flow {
-        self.friction.as_ref().map_or(self, |friction| friction.flow(slips))
-    }
-
-    /// Whether this is the flow of one combination of friction modes.
-    #[inline(always)]
-    pub(crate) fn has_friction(&self) -> bool {
-        self.watches.is_some()
-    }
-
-    /// Returns the functions that end the friction modes in a domain.
-    pub(crate) fn watches(&self, kind: DomainKind) -> &[Option<Watch>] {
-        let place = match kind {
-            DomainKind::Free => 0,
-            DomainKind::Meshing(side) => 1 + side.index(),
-        };
-        self.watches.as_ref().map_or(&[], |watches| &watches[place])
     }
 
     /// Returns the flow of an interval between neighbouring walls: 0 between the first walls, `n` behind the nth right wall, `-n`
@@ -390,11 +346,7 @@ impl Flow {
         let domains = [&self.free, &self.meshing[0], &self.meshing[1]];
         let of_stages =
             self.stages.iter().chain(self.behind.iter().flatten()).map(Flow::bytes).sum::<usize>();
-        let of_friction = self.friction.as_ref().map_or(0, |friction| friction.bytes());
-        size_of::<Flow>()
-            + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>()
-            + of_stages
-            + of_friction
+        size_of::<Flow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>() + of_stages
     }
 
     /// Whether `(y, t) -> (-y, t + T/2)` maps solutions to solutions: both walls and their laws are alike.

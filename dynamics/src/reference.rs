@@ -20,7 +20,6 @@ mod clock;
 mod contact;
 mod elastic;
 mod event;
-mod friction;
 mod localisation;
 pub mod machine;
 mod pushing;
@@ -35,16 +34,14 @@ pub use allowance::Allowance;
 pub use chatter::{CLOSING_ANGLE, NO_THRESHOLD};
 pub(crate) use clock::Clock;
 pub use contact::GRAZING_SPEED;
-pub use event::{
-    EVENTS_PER_PERIOD_CAP, EventKind, FrictionEvent, GapEvent, Observer, STEPS_PER_PERIOD_CAP, Stop, Work,
-};
+pub use event::{EVENTS_PER_PERIOD_CAP, EventKind, GapEvent, Observer, STEPS_PER_PERIOD_CAP, Stop, Work};
 use machine::Motion;
 use nalgebra::DMatrix;
 use step_verdict::{Crossing, StepVerdict};
 pub use tangent::NO_SPEED;
 
-use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Schedule, Slips, Step};
-use crate::model::{Law, MOST_FRICTION, Side, State};
+use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Schedule, Step};
+use crate::model::{Law, Side, State};
 
 /// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
 const RESCALE_STEPS: u64 = 16;
@@ -100,7 +97,7 @@ pub(crate) fn side_of(interval: i32) -> Side {
 pub struct Trajectory<'f, const N: usize = 0> {
     /// The motion, if the oscillator is a machine. The other fields then have no meaning.
     machine: Option<Box<Motion<'f>>>,
-    /// The flow of the present stage, interval and modes of friction.
+    /// The flow of the present stage and interval.
     flow: &'f Flow,
     /// The flow of the present stage, in all intervals.
     stage: &'f Flow,
@@ -115,12 +112,6 @@ pub struct Trajectory<'f, const N: usize = 0> {
     from_wall: Option<(Side, usize)>,
     /// Order of the root of the pushing wall's force at this instant; 0 if the force is not 0.
     from_force: usize,
-    /// Modes of dry friction.
-    slips: Slips,
-    /// Orders of the roots of the sliding rates at this instant; 0 if the rate is not 0, or held at 0.
-    from_rate: [usize; MOST_FRICTION],
-    /// Whether each element has slid since the start.
-    has_slid: [bool; MOST_FRICTION],
     /// Whether the flight that begins here may be a short flight.
     short_flight: bool,
     /// A contact that must be processed first: the motion starts on this wall.
@@ -139,7 +130,6 @@ pub struct Trajectory<'f, const N: usize = 0> {
     events_in_period: u64,
     steps_in_period: u64,
     meshing_time: f64,
-    sticking_time: f64,
     near_grazing: bool,
     work: Work,
     allowance: Allowance<'f>,
@@ -163,7 +153,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             self.q[0] += shares[0] * (self.q[0] - wall);
         }
         (1..4).for_each(|i| self.q[i] += shares[i] * self.q[i]);
-        self.hold_rates();
     }
 
     /// Returns the flow.
@@ -286,26 +275,12 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     /// Returns the total time during which an element with dry friction stuck.
     pub fn sticking_time(&self) -> f64 {
-        if let Some(motion) = &self.machine {
-            return motion.sticking_time();
-        }
-        self.sticking_time
+        self.machine.as_ref().map_or(0.0, |motion| motion.sticking_time())
     }
 
     /// Returns the number of elements with dry friction that have not slid since the start.
     pub(crate) fn never_slid(&self) -> usize {
-        if let Some(motion) = &self.machine {
-            return motion.never_slid();
-        }
-        self.schedule.whole.friction().iter().zip(self.has_slid).filter(|(_, has_slid)| !has_slid).count()
-    }
-
-    /// Returns the modes of dry friction.
-    pub(crate) fn slips(&self) -> Slips {
-        if let Some(motion) = &self.machine {
-            return motion.slips();
-        }
-        self.slips
+        self.machine.as_ref().map_or(0, |motion| motion.never_slid())
     }
 
     /// Whether any event was so near to grazing that the linearisation is not reliable.
@@ -531,10 +506,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Notes that the motion has left the place of the last event.
     #[inline(always)]
     fn depart(&mut self) {
-        if !self.flow.holds_gap {
-            self.from_wall = None;
-        }
-        (self.from_force, self.from_rate) = (0, [0; MOST_FRICTION]);
+        self.from_wall = None;
+        self.from_force = 0;
     }
 
     /// Moves everything to `until`, a time `s` away, within a clear step.
@@ -569,9 +542,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     fn count_meshing(&mut self, s: f64) {
         if self.mode.domain() != DomainKind::Free || self.interval != 0 {
             self.meshing_time += s;
-        }
-        if self.flow.sticks {
-            self.sticking_time += s;
         }
     }
 }

@@ -993,7 +993,7 @@ fn settle_pushing(domain: u32) -> bool {
         let is_open = mode >= OPEN && mode < STUCK;
         let side = select(pushing_side(gap), contact_of(mode), is_onset || is_open);
         let is_new = from_force[gap] == UNKNOWN_ORDER;
-        if side == SIDE_NONE || (from_force[gap] > 0u && !is_new) || is_kept(domain, gap) {
+        if side == SIDE_NONE || (from_force[gap] > 0u && !is_new) || (is_onset && is_kept(domain, gap)) {
             continue;
         }
         var line = distance_line(gap, 0.0, 1u - side);

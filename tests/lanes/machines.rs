@@ -137,8 +137,9 @@ fn contact_free_motion_of_machines_ends_early() {
     let oscillators = [9.0, 11.0].map(|omega| Oscillator::of_machine(machine(omega)));
     let settings = LaneSettings { features: Features::of(&oscillators[0]), ..LaneSettings::default() };
     let lanes = [0, 1].map(|flow| Lane { flow, law: 0, start: REST });
-    let run = open(Precision::F32).run(&oscillators, &[Law::both(0.0, 0.0)], &lanes, &settings);
-    for (record, oscillator) in pollster::block_on(run).unwrap().iter().zip(&oscillators) {
+    let (mut gpu, laws) = (open(Precision::F32), [Law::both(0.0, 0.0)]);
+    let records = pollster::block_on(gpu.run(&oscillators, &laws, &lanes, &settings)).unwrap();
+    for (record, oscillator) in records.iter().zip(&oscillators) {
         let motion = NonImpacting::of_machine(oscillator.machine.as_ref().unwrap()).unwrap();
         assert_eq!((record.period, record.status, record.impacts_per_period), (1, 0, 0.0));
         assert!(record.periods_run < 100, "{} periods", record.periods_run);

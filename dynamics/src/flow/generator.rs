@@ -37,17 +37,6 @@ impl Generator {
         }
     }
 
-    /// Replaces the accelerations of the gap and of the other displacement.
-    pub(super) fn set_accelerations(&mut self, [gap, other]: [Row; 2]) {
-        for j in 0..7 {
-            self.matrix[(1, j)] = gap.base[j];
-            self.matrix[(3, j)] = other.base[j];
-        }
-        for (wave, (gap, other)) in self.waves.iter_mut().zip(gap.waves.iter().zip(other.waves.iter())) {
-            (wave.gap, wave.other) = (gap.1, other.1);
-        }
-    }
-
     /// Multiplies a row by the matrix, from the left: the derivative of the row's product with `a`.
     pub(super) fn derivative(&self, row: &Row) -> Row {
         let omega = self.matrix[(5, 4)];

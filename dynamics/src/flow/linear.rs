@@ -102,11 +102,6 @@ impl LinearFlow {
         LinearFlow::in_domain(oscillator, domain, generator, rate)
     }
 
-    /// Builds the flow of a domain under constraints, given its generator.
-    pub(super) fn held(oscillator: &Oscillator, domain: &Domain, generator: Generator) -> LinearFlow {
-        LinearFlow::in_domain(oscillator, domain, generator, rate(oscillator, domain))
-    }
-
     fn in_domain(oscillator: &Oscillator, domain: &Domain, generator: Generator, rate: f64) -> LinearFlow {
         let bounds = |table: &[Columns], unit: f64| {
             let bound = |n: u32| {
@@ -127,28 +122,6 @@ impl LinearFlow {
         n: u32,
     ) -> EnergyBound {
         EnergyBound::new(oscillator, domain, row, &self.table[n as usize - 1], n, self.unit)
-    }
-
-    /// Builds the flow of a gap at rest on a rigid wall while dry friction holds the other displacement's rate. Only the forcing changes
-    /// `pressing`.
-    pub(super) fn at_rest(oscillator: &Oscillator, generator: Generator, pressing: Row) -> LinearFlow {
-        let omega = oscillator.omega;
-        let sixth = |[cos, sin]: [f64; 2], order: u32| cos.hypot(sin) * (omega * f64::from(order)).powi(6);
-        let waves = pressing.waves.iter().map(|&(order, factors)| sixth(factors, order));
-        let forced = sixth([pressing.base[4], pressing.base[5]], 1) + waves.sum::<f64>();
-        let bounds = |_: &[Columns], unit: f64| {
-            let columns = Columns::ZERO.plus_constant(2, forced * unit.powi(6) / 14400.0);
-            [EnergyBound::NONE, EnergyBound::of(columns, 0.0, 0.0)]
-        };
-        let rate = rate(oscillator, &oscillator.free);
-        LinearFlow::assemble(oscillator, generator, rate, pressing, bounds)
-    }
-
-    /// Returns the first two time derivatives of a row.
-    pub(super) fn derivatives(&self, row: &Row) -> [Row; 2] {
-        let slope = self.generator.derivative(row);
-        let curvature = self.generator.derivative(&slope);
-        [slope, curvature]
     }
 
     /// Builds the flow of a gap at rest on a rigid wall, while the other displacement moves. Its

@@ -47,20 +47,6 @@ impl Row {
         self.waves.iter().map(term).fold(first, |sum, term| sum + term)
     }
 
-    /// Returns the sum of the moduli of all terms, which rounding errors of the product are relative to.
-    pub(crate) fn size(&self, q: &Gap) -> f64 {
-        let [z, w, x, v, cos, sin, one] = self.base;
-        let waves = self.waves.iter().map(|&(_, [cos, sin])| cos.hypot(sin)).sum::<f64>();
-        let state: f64 = [z, w, x, v].iter().zip(q).map(|(factor, q)| (factor * q).abs()).sum();
-        state + cos.hypot(sin) + waves + one.abs()
-    }
-
-    /// Returns the row multiplied by a factor.
-    pub(crate) fn scaled(&self, factor: f64) -> Row {
-        let scaled = |&(order, factors): &(u32, [f64; 2])| (order, factors.map(|x| factor * x));
-        Row { base: self.base.map(|x| factor * x), waves: self.waves.iter().map(scaled).collect() }
-    }
-
     /// Returns the sum of two rows, the second one multiplied by a factor.
     pub(crate) fn plus(&self, factor: f64, other: &Row) -> Row {
         let sum = |a: [f64; 2], b: [f64; 2]| std::array::from_fn(|i| a[i] + factor * b[i]);

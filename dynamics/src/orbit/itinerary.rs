@@ -6,7 +6,7 @@
 use crate::flow::Flow;
 use crate::model::Side;
 use crate::reference::machine::{MachineEvent, SlipEvent};
-use crate::reference::{FrictionEvent, GapEvent, Observer};
+use crate::reference::{GapEvent, Observer};
 
 /// Largest distance from phase 0, in turns, of an event that a slow approach may still move to the other side.
 pub const NEAR_STROBE_TURNS: f64 = 1e-3;
@@ -53,11 +53,6 @@ impl Observer for Recorder {
         let code =
             1 + u64::from(event.side == Side::Right) + 2 * u64::from(is_on_wall) + 4 * event.kind as u64;
         self.add(code, event.t);
-    }
-
-    fn friction(&mut self, event: &FrictionEvent) {
-        let modes = event.slips.iter().fold(1, |code, &slip| 3 * code + slip as u64);
-        self.add(16 * modes, event.t);
     }
 
     fn machine_event(&mut self, event: &MachineEvent) {

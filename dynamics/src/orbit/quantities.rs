@@ -4,9 +4,9 @@
 //! and the meter evaluates the exact flow there: integrals by Gauss-Legendre quadrature of order 16 over pieces of at
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
-use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule, Slips};
+use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule};
 use crate::reference::machine::{Flight, MachineEvent, Point, Signal};
-use crate::reference::{EventKind, FrictionEvent, GapEvent, Observer, Stop, Trajectory, side_of};
+use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory, side_of};
 
 /// Nodes in `(0, 1)` and weights of the Gauss-Legendre quadrature on `[-1, 1]`; the other half is symmetric.
 const GAUSS: [(f64, f64); 4] = [
@@ -140,8 +140,6 @@ pub(super) struct Meter<'f> {
     stage: &'f Flow,
     /// The present interval between walls.
     interval: i32,
-    /// Present modes of dry friction.
-    slips: Slips,
     schedule: Schedule<'f>,
     /// Domain, state and time since phase 0 at the beginning of the present flight.
     kind: DomainKind,
@@ -165,13 +163,11 @@ impl<'f> Meter<'f> {
     pub(super) fn new(flow: &'f Flow, trajectory: &Trajectory<'_>) -> Meter<'f> {
         let (schedule, stage) = Schedule::new(flow);
         let interval = trajectory.interval();
-        let slips = trajectory.slips();
-        let flow = stage.interval(interval).in_modes(slips);
+        let flow = stage.interval(interval);
         Meter {
             flow,
             stage,
             interval,
-            slips,
             schedule,
             kind: trajectory.domain(),
             q: flow.to_gap(trajectory.state()),
@@ -212,10 +208,7 @@ impl<'f> Meter<'f> {
         }
         let time = (period - self.first_period) as f64 * self.flow.period;
         let [right, left] = self.contacts;
-        let has_friction = match &self.flow.machine {
-            Some(system) => system.has_friction(),
-            None => self.flow.has_friction(),
-        };
+        let has_friction = self.flow.machine.as_ref().is_some_and(|system| system.has_friction());
         Quantities {
             approaches: [right, left, right.and(left)].map(Contacts::approaches),
             impact_energy: self.lost / time,
@@ -258,7 +251,7 @@ impl<'f> Meter<'f> {
     }
 
     fn enter_stage(&mut self, stage: &'f Flow) {
-        (self.stage, self.flow) = (stage, stage.interval(self.interval).in_modes(self.slips));
+        (self.stage, self.flow) = (stage, stage.interval(self.interval));
     }
 
     /// Measures the present flight over a time within one stage, and returns its end.
@@ -301,12 +294,6 @@ impl<'f> Meter<'f> {
         if let Some(force) = self.compliant_force(q) {
             self.force.square += weight * force * force;
             self.contact_time += weight;
-        }
-        if self.flow.sticks {
-            self.sticking_time += weight;
-        }
-        for (element, slip) in self.stage.friction().iter().zip(self.slips) {
-            self.heat += weight * element.force * slip.sign() * element.rate(q);
         }
     }
 
@@ -407,19 +394,11 @@ impl Observer for Meter<'_> {
             EventKind::MeshStart if event.interval == self.interval => DomainKind::Meshing(event.side),
             _ => DomainKind::Free,
         };
-        (self.interval, self.slips) = (event.interval, event.slips);
-        self.flow = self.stage.interval(self.interval).in_modes(self.slips);
+        self.interval = event.interval;
+        self.flow = self.stage.interval(self.interval);
         self.q = event.after;
         self.t = event.t;
         self.include(&event.after);
-    }
-
-    fn friction(&mut self, event: &FrictionEvent) {
-        self.complete_periods(event.period);
-        self.fly_to(event.t);
-        self.slips = event.slips;
-        self.flow = self.stage.interval(self.interval).in_modes(self.slips);
-        (self.q, self.t) = (event.at, event.t);
     }
 
     fn measures(&self) -> bool {

@@ -6,7 +6,7 @@ use super::quantities::{Meter, Quantities};
 use crate::flow::{DomainKind, Flow};
 use crate::model::{Side, State};
 use crate::reference::machine::{Flight, MachineEvent, SlipEvent};
-use crate::reference::{EventKind, FrictionEvent, GapEvent, Observer, Stop, Trajectory};
+use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
 use crate::word::Word;
 
 /// Largest distance from phase 0, in turns, of an event that lies on the strobe.
@@ -101,13 +101,6 @@ impl Observer for Log<'_> {
         self.symbols.extend(event.symbol);
         self.times.push(event.t);
         self.events.event(event);
-    }
-
-    fn friction(&mut self, event: &FrictionEvent) {
-        self.recorders[(event.period - self.start) as usize].friction(event);
-        self.meter.iter_mut().for_each(|meter| meter.friction(event));
-        self.symbols.extend(event.symbol);
-        self.times.push(event.t);
     }
 
     fn measures(&self) -> bool {

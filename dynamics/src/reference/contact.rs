@@ -28,7 +28,6 @@ impl<const N: usize> Trajectory<'_, N> {
             } else if beyond == 0.0 {
                 self.origin = Some(side);
                 let closing = side.sign() * self.q[1];
-                // A rigid wall holds a gap at rest before friction does.
                 let is_rigid = self.flow.contacts[side.index()] == Contact::Rigid;
                 let kind = if is_rigid { DomainKind::Meshing(side) } else { DomainKind::Free };
                 let into = closing > 0.0 || closing == 0.0 && self.presses(kind, side, &self.q);
@@ -53,20 +52,17 @@ impl<const N: usize> Trajectory<'_, N> {
             }
             Crossing::MeshEnds(side) if self.flow.contacts[side.index()].is_elastic() => {
                 self.come_out(side, observer);
-                self.recheck_friction(observer);
             }
             Crossing::ForceEnds(side) => self.open(side, observer),
             Crossing::ForceBegins(side) => self.close(side, observer),
             Crossing::Returns(side) => {
                 self.come_back(side, observer);
-                self.recheck_friction(observer);
             }
             Crossing::MeshEnds(side) => {
                 self.q[0] = self.flow.wall(side);
                 let rate = self.q[1];
                 self.end_meshing(side, &ALONG_GAP, rate, observer);
                 self.leave(side);
-                self.recheck_friction(observer);
             }
             Crossing::Through(side) => {
                 self.q[0] = self.flow.wall(side.mirrored());
@@ -74,8 +70,6 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.end_meshing(side, &ALONG_GAP, rate, observer);
                 self.contact(side.mirrored(), observer);
             }
-            Crossing::RateVanishes(i) => self.end_sliding(i, observer),
-            Crossing::Slips(i, next) => self.begin_sliding(i, next, observer),
             Crossing::PressingEnds(side) if self.mode == Mode::Stuck(side) => self.release(side, observer),
             Crossing::PressingEnds(side) => {
                 let linear = self.flow.domain(DomainKind::Meshing(side));
@@ -85,14 +79,6 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.end_meshing(side, &normal, rate, observer);
                 self.from_wall = None;
             }
-        }
-    }
-
-    /// Decides sticking elements anew after an event at a wall.
-    #[inline(always)]
-    fn recheck_friction(&mut self, observer: &mut impl Observer) {
-        if self.flow.sticks {
-            self.recheck_sticking(Some(self.q[1]), observer);
         }
     }
 
@@ -117,14 +103,12 @@ impl<const N: usize> Trajectory<'_, N> {
         match contact {
             Contact::Elastic | Contact::Pushing => {
                 self.go_behind(side, observer);
-                self.recheck_friction(observer);
             }
             Contact::Rigid => {
-                let before = (self.flow, self.slips);
                 if !self.sticks(side) {
                     return false;
                 }
-                self.stick(side, before, observer);
+                self.stick(side, observer);
             }
             Contact::Impact => return false,
         }
@@ -142,15 +126,10 @@ impl<const N: usize> Trajectory<'_, N> {
         let kick = self.flow.kick;
         let reset = move |u: &Gap| [u[0], -e * u[1], u[2], u[3] + kick * (1.0 + e) * u[1]];
         let after = reset(&before);
-        let (flow_before, slips_before) = (self.flow, self.slips);
-        if flow_before.has_friction() {
-            self.slide_after_jump(DomainKind::Free, &after);
-        }
-
         let free = self.flow.domain(DomainKind::Free);
         let pressing = side.sign() * free.acceleration(&after, &self.phasor);
         let pressed = pressing > 0.0 || pressing == 0.0 && self.presses(DomainKind::Free, side, &after);
-        let meshes = leaving <= self.lasting_speed(side, pressing)
+        let meshes = leaving <= self.law.mesh_speed[side.index()]
             && pressed
             && self.flow.contacts[side.index()] == Contact::Impact
             && self.presses(DomainKind::Meshing(side), side, &after);
@@ -163,15 +142,12 @@ impl<const N: usize> Trajectory<'_, N> {
             (EventKind::Impact, DomainKind::Free)
         };
         if N > 0 {
-            let field_before = flow_before.domain(DomainKind::Free).field(&before, &self.phasor);
+            let field_before = self.flow.domain(DomainKind::Free).field(&before, &self.phasor);
             let field_after = self.flow.domain(next).field(&after, &self.phasor);
             self.saltate(reset, &ALONG_GAP, before[1], &field_before, &field_after);
         }
         self.q = after;
         self.record(kind, side, before, observer);
-        if flow_before.has_friction() {
-            self.record_slips(slips_before, observer);
-        }
         if meshes {
             self.start_meshing(side, leaving);
             let meshing = self.flow.domain(DomainKind::Meshing(side));
@@ -181,7 +157,7 @@ impl<const N: usize> Trajectory<'_, N> {
             self.work.impacts += 1;
             self.leave(side);
             self.short_flight = self.expects_short_flight(free, leaving, pressing);
-            if pressed && !self.flow.has_friction() {
+            if pressed {
                 self.close_chatter(side, leaving, observer);
             }
         }
@@ -267,7 +243,6 @@ impl<const N: usize> Trajectory<'_, N> {
             kind,
             side,
             interval,
-            slips: self.slips,
             symbol,
             period: self.period,
             t: self.clock.time(),
@@ -280,10 +255,7 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Corrects a start of a step that rounding has put on or beyond its boundary, as when an event lies within
     /// rounding of the strobe. Returns whether there was anything to correct.
     pub(super) fn settle_start(&mut self, observer: &mut impl Observer) -> bool {
-        if self.settle_friction(observer) {
-            return true;
-        }
-        if self.from_wall.is_some() || self.from_force > 0 || self.flow.holds_gap {
+        if self.from_wall.is_some() || self.from_force > 0 {
             return false;
         }
         match self.mode {
@@ -318,8 +290,7 @@ impl<const N: usize> Trajectory<'_, N> {
             Mode::Onset(side) => {
                 let onset_over = side.sign() * (self.q[0] - self.flow.wall(side)) >= 0.0;
                 let linear = self.flow.domain(DomainKind::Meshing(side));
-                let pulls = !self.begins_unpressed()
-                    && side.sign() * linear.acceleration(&self.q, &self.phasor) <= 0.0;
+                let pulls = side.sign() * linear.acceleration(&self.q, &self.phasor) <= 0.0;
                 let through = side.sign() * (self.q[0] - self.flow.wall(side.mirrored())) <= 0.0;
                 if through && side.sign() * self.q[1] < 0.0 {
                     self.act(Crossing::Through(side), observer);

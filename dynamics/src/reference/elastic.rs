@@ -75,7 +75,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let of = side_of(if outwards { next } else { self.interval });
         self.record_in(next, kind, of, self.q, false, observer);
         self.interval = next;
-        self.flow = self.stage.interval(next).in_modes(self.slips);
+        self.flow = self.stage.interval(next);
         self.level[0] = self.level[0].min(self.flow.domain(DomainKind::Free).levels - 1);
         self.leave(side.mirrored());
     }

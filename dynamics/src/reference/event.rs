@@ -4,7 +4,7 @@ use std::ops::AddAssign;
 
 use super::machine::{Flight, MachineEvent, SlipEvent};
 use super::side_of;
-use crate::flow::{Gap, Slips};
+use crate::flow::Gap;
 use crate::model::Side;
 
 /// Largest number of events in one forcing period.
@@ -56,8 +56,6 @@ pub struct GapEvent {
     pub side: Side,
     /// The interval between walls after the event, [`Flow::interval`](crate::flow::Flow).
     pub(crate) interval: i32,
-    /// Modes of dry friction after the event.
-    pub(crate) slips: Slips,
     /// Symbol `b'1'..=b'6'` of the flight that ends here; none for the first flight, which comes from no wall.
     pub symbol: Option<u8>,
     /// Number of completed forcing periods.
@@ -82,28 +80,10 @@ impl GapEvent {
     }
 }
 
-/// A change of the mode of dry friction, in gap coordinates.
-#[derive(Clone, Copy, Debug)]
-pub struct FrictionEvent {
-    /// Modes after the event.
-    pub slips: Slips,
-    /// Symbol `b'7'` if a phase of sticking ends, and `b'0'` if sliding reverses without sticking.
-    pub symbol: Option<u8>,
-    /// Number of completed forcing periods.
-    pub period: u64,
-    /// Time since the last phase 0, in `[0, T]`.
-    pub t: f64,
-    /// Gap coordinates.
-    pub(crate) at: Gap,
-}
-
 /// Receives the events of a trajectory. `()` ignores them, a vector stores those at walls. Machines have events of their own.
 pub trait Observer {
     /// Receives one event at a wall. Events come in order of time.
     fn event(&mut self, event: &GapEvent);
-
-    /// Receives one change of a friction mode, in order of time with the events at walls.
-    fn friction(&mut self, _: &FrictionEvent) {}
 
     /// Receives one event of a machine at a wall.
     fn machine_event(&mut self, _: &MachineEvent) {}

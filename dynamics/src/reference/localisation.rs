@@ -74,8 +74,6 @@ impl<const N: usize> Trajectory<'_, N> {
             Crossing::ForceBegins(side) => self.wall_force(side, linear, q, phasor)[0] < 0.0,
             Crossing::Through(side) => side.sign() * (q[0] - self.flow.wall(side.mirrored())) > 0.0,
             Crossing::PressingEnds(side) => side.sign() * linear.acceleration(q, phasor) > 0.0,
-            Crossing::RateVanishes(i) => self.friction_rates(i, None, q, phasor)[0] > 0.0,
-            Crossing::Slips(i, next) => self.friction_rates(i, Some(next), q, phasor)[0] > 0.0,
         }
     }
 
@@ -116,12 +114,6 @@ impl<const N: usize> Trajectory<'_, N> {
                 }
                 Crossing::ForceEnds(side) | Crossing::ForceBegins(side) => {
                     root_of(linear, &expansion, u, |q, phasor| self.wall_force(side, linear, q, phasor))
-                }
-                Crossing::RateVanishes(i) => {
-                    root_of(linear, &expansion, u, |q, phasor| self.friction_rates(i, None, q, phasor))
-                }
-                Crossing::Slips(i, next) => {
-                    root_of(linear, &expansion, u, |q, phasor| self.friction_rates(i, Some(next), q, phasor))
                 }
             };
             let next = expansion.start + root.unwrap_or(f64::NAN);

@@ -27,6 +27,7 @@ mod flight;
 mod modes;
 mod motion;
 mod polynomial;
+mod slip;
 mod system;
 mod table;
 
@@ -34,6 +35,7 @@ pub use events::{MachineEvent, SlipEvent};
 pub use flight::Flight;
 pub(crate) use flight::Signal;
 pub use motion::{LOWEST_FLIGHT, Motion};
+pub use slip::{Slip, Slips};
 pub use system::System;
 pub use table::{Equations, StartModes};
 

@@ -18,9 +18,7 @@ impl<const N: usize> Trajectory<'_, N> {
     #[inline(always)]
     pub(super) fn expects_short_flight(&self, linear: &LinearFlow, leaving: f64, pressing: f64) -> bool {
         let speed_change = pressing * linear.unit;
-        // The series says nothing on friction.
-        !self.flow.has_friction()
-            && 2.0 * leaving < TRIED_SHARE * LONGEST_SHORT_FLIGHT * speed_change
+        2.0 * leaving < TRIED_SHARE * LONGEST_SHORT_FLIGHT * speed_change
             && speed_change > LEAST_PRESSING * self.flow.speed
             && leaving > 0.0
     }

@@ -13,7 +13,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     #[inline(never)]
     pub(super) fn enter_stage(&mut self, flow: &'f Flow, observer: &mut impl Observer) {
         self.stage = flow;
-        self.flow = flow.interval(self.interval).in_modes(self.slips);
+        self.flow = flow.interval(self.interval);
         self.short_flight = false;
         let levels = |kind: DomainKind| self.flow.domain(kind).levels - 1;
         let in_contact = if self.mode == Mode::Free { self.level[1] } else { levels(self.mode.domain()) };
@@ -23,7 +23,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 self.record(EventKind::MeshEnd, side, self.q, observer);
                 self.leave(side);
             }
-            Mode::Onset(side) if !self.flow.holds_gap => {
+            Mode::Onset(side) => {
                 let meshing = self.flow.domain(DomainKind::Meshing(side));
                 if side.sign() * meshing.acceleration(&self.q, &self.phasor) <= 0.0 {
                     self.record(EventKind::MeshEnd, side, self.q, observer);
@@ -41,9 +41,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 self.start_from_force(side);
             }
             _ => {}
-        }
-        if self.flow.sticks {
-            self.recheck_sticking(None, observer);
         }
         // The gap is on a wall if an event occurs at this instant. At rest, the new acceleration decides.
         if let (Some((side, _)), 0.0) = (self.from_wall, self.q[1]) {

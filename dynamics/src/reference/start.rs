@@ -3,8 +3,8 @@
 use super::clock::Clock;
 use super::machine::{Motion, System};
 use super::{Allowance, Mode, Trajectory, Work};
-use crate::flow::{DomainKind, Flow, Schedule, Slip, Slips};
-use crate::model::{Contact, Law, MOST_FRICTION, Side, State};
+use crate::flow::{DomainKind, Flow, Schedule};
+use crate::model::{Contact, Law, Side, State};
 
 /// Distance of a gap that lies on a wall, relative to the wall's position or the scale of length.
 const ON_WALL: f64 = 1e-9;
@@ -45,8 +45,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let machine = flow.machine.as_ref();
         let interval = stage.interval_of(stage.to_gap(y)[0]);
         let flow = stage.interval(interval);
-        let slips = Self::modes_of(flow, y);
-        let flow = flow.in_modes(slips);
         let mut trajectory = Trajectory {
             machine: None,
             flow,
@@ -58,9 +56,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             origin: None,
             from_wall: None,
             from_force: 0,
-            slips,
-            from_rate: [0; MOST_FRICTION],
-            has_slid: [false; MOST_FRICTION],
             short_flight: false,
             pending: None,
             q: flow.to_gap(y),
@@ -74,19 +69,17 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             events_in_period: 0,
             steps_in_period: 0,
             meshing_time: 0.0,
-            sticking_time: 0.0,
             near_grazing: false,
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
         };
         if let Some(system) = machine {
-            let mut motion = Motion::new(system, &y);
+            let mut motion = Motion::new(system, &y).with_law(law_of_walls(trajectory.schedule.whole, law));
             motion.set_tangents(of_machine(system, tangents));
             trajectory.machine = Some(Box::new(motion));
             return trajectory;
         }
         trajectory.enter();
-        trajectory.start_friction();
         trajectory
     }
 
@@ -108,9 +101,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             origin: self.origin,
             from_wall: self.from_wall,
             from_force: self.from_force,
-            slips: self.slips,
-            from_rate: self.from_rate,
-            has_slid: self.has_slid,
             short_flight: self.short_flight,
             pending: self.pending,
             q: self.q,
@@ -124,7 +114,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             events_in_period: self.events_in_period,
             steps_in_period: self.steps_in_period,
             meshing_time: self.meshing_time,
-            sticking_time: self.sticking_time,
             near_grazing: self.near_grazing,
             work: self.work,
             allowance: self.allowance,
@@ -139,7 +128,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             let motion = motion.at(&y, of_machine(motion.system(), tangents));
             return Trajectory { machine: Some(Box::new(motion)), ..self.carrying(tangents) };
         }
-        self.start_in(self.interval, self.mode, self.slips, self.origin, y, tangents)
+        self.start_in(self.interval, self.mode, self.origin, y, tangents)
     }
 
     /// Starts a trajectory in a given mode of an interval. If the state lies in another interval, it determines the mode.
@@ -147,7 +136,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         &self,
         interval: i32,
         mode: Mode,
-        slips: Slips,
         origin: Option<Side>,
         y: State,
         tangents: [State; M],
@@ -163,7 +151,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if let Mode::Sustained(side) | Mode::Open(side) = started.mode
             && is_elastic(side)
         {
-            started.take_modes(slips);
             return started;
         }
         let mode = match mode {
@@ -176,7 +163,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             (started.mode, started.from_wall, started.pending) = (mode, None, None);
         }
         started.origin = origin;
-        started.take_modes(slips);
         started
     }
 
@@ -185,8 +171,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if let (Some(motion), Some(other)) = (&self.machine, &other.machine) {
             return motion.is_where(other);
         }
-        (self.interval, self.mode, self.slips, self.origin, self.from_wall)
-            == (other.interval, other.mode, other.slips, other.origin, other.from_wall)
+        (self.interval, self.mode, self.origin, self.from_wall)
+            == (other.interval, other.mode, other.origin, other.from_wall)
     }
 
     /// Whether another trajectory is in the same domain. Contact onset and sustained contact count as different,
@@ -200,7 +186,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             (self.q[0] - wall).abs() <= ON_WALL * wall.abs().max(self.flow.length)
         };
         self.interval == other.interval
-            && self.slips == other.slips
             && (self.mode == other.mode
                 || self.meshing() == other.meshing() && self.meshing().is_some_and(is_between))
     }
@@ -208,9 +193,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Starts a trajectory at phase 0 from the mirror image of the present state, in the mirrored domain.
     pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         let y = self.state().map(|value| -value);
-        let (mode, slips) = (self.mode.mirrored(), self.slips.map(Slip::mirrored));
-        self.start_in(-self.interval, mode, slips, self.origin.map(Side::mirrored), y, tangents)
+        self.start_in(-self.interval, self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
     }
+}
+
+/// Returns the law of both walls, unless the machine has laws of its own.
+fn law_of_walls(flow: &Flow, law: Law) -> Option<Law> {
+    flow.oscillator.machine.is_none().then_some(law)
 }
 
 /// Returns the tangents of a machine: four stand for the unit vectors of all coordinates.

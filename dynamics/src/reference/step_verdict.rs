@@ -2,7 +2,7 @@
 
 use super::{Mode, Trajectory};
 use crate::certificate::{Bernstein, Bracket, ROOMY, Verdict, judge};
-use crate::flow::{Gap, LinearFlow, Phasor, Slip, Step};
+use crate::flow::{Gap, LinearFlow, Phasor, Step};
 use crate::model::Side;
 
 /// Distance from a wall that is rounding error, relative to the wall's position or the scale of length.
@@ -30,10 +30,6 @@ pub(super) enum Crossing {
     ForceBegins(Side),
     /// Motion in open contact returns to its wall; this is not an event.
     Returns(Side),
-    /// The sliding rate of an element with dry friction vanishes.
-    RateVanishes(usize),
-    /// The force that holds an element with dry friction reaches its limit for sliding in a direction.
-    Slips(usize, Slip),
 }
 
 /// The verdict on a step.
@@ -52,16 +48,6 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Checks everything that could end the flight within one step.
     #[inline(always)]
     pub(super) fn step_verdict(&self, linear: &LinearFlow, step: &Step) -> StepVerdict {
-        if self.flow.has_friction() {
-            self.verdict_with_friction(linear, step)
-        } else {
-            self.at_walls(linear, step)
-        }
-    }
-
-    /// Checks everything at walls that could end the flight within one step.
-    #[inline(always)]
-    pub(super) fn at_walls(&self, linear: &LinearFlow, step: &Step) -> StepVerdict {
         let gap = step.gap(&self.q, &self.phasor);
         let remainder = step.u6 * linear.gap_bound.remainder(&self.q, &self.phasor, step.u);
         let order = self.from_wall.map_or(0, |(_, order)| order);
@@ -158,7 +144,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let (q, phasor) = step.end(&self.q, &self.phasor);
         let pressing = Bernstein::new(rates(&self.q, &self.phasor), rates(&q, &phasor), step.h);
         let remainder = step.u6 * linear.pressing_bound.remainder(&self.q, &self.phasor, step.u);
-        match judge(&pressing, 0.0, side.sign(), usize::from(self.begins_unpressed()), remainder) {
+        match judge(&pressing, 0.0, side.sign(), 0, remainder) {
             Verdict::Clear { roomy } => StepVerdict::Clear { roomy },
             Verdict::Crossing(bracket) => StepVerdict::Crossing(Crossing::PressingEnds(side), bracket),
             Verdict::Unclear => StepVerdict::Unclear,

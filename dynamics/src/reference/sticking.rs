@@ -5,8 +5,8 @@
 //! wall, the gap leaves it, from rest and with zero acceleration. State and vector field are continuous there, so
 //! tangents do not jump.
 
-use super::{EventKind, Mode, NO_SPEED, Observer, StepVerdict, Stop, Trajectory};
-use crate::flow::{DomainKind, Flow, Gap, Slips};
+use super::{EventKind, Mode, Observer, StepVerdict, Stop, Trajectory};
+use crate::flow::{DomainKind, Gap};
 use crate::model::Side;
 
 /// Order of the root of the distance when the gap leaves the wall: its acceleration is zero, the derivative of the
@@ -15,20 +15,11 @@ pub(super) const RELEASE_ORDER: usize = 3;
 
 impl<const N: usize> Trajectory<'_, N> {
     /// Whether a contact with a rigid wall lasts: its leaving speed is low enough, and at rest it is pressed.
-    /// Elements with dry friction then have their modes of rest.
-    pub(super) fn sticks(&mut self, side: Side) -> bool {
+    pub(super) fn sticks(&self, side: Side) -> bool {
         let leaving = self.law.restitution[side.index()] * self.q[1].abs();
-        let (at_rest, before) = (self.at_rest_on(side), (self.flow, self.slips, self.from_rate, self.level));
+        let at_rest = self.at_rest_on(side);
         let kind = DomainKind::Meshing(side);
-        if self.flow.has_friction() {
-            self.slide_after_jump(kind, &at_rest);
-        }
-        let pressing = self.flow.domain(kind).acceleration(&at_rest, &self.phasor);
-        let lasts = leaving <= self.lasting_speed(side, pressing) && self.presses(kind, side, &at_rest);
-        if !lasts {
-            (self.flow, self.slips, self.from_rate, self.level) = before;
-        }
-        lasts
+        leaving <= self.law.mesh_speed[side.index()] && self.presses(kind, side, &at_rest)
     }
 
     /// Returns the state after an impact that stops the gap.
@@ -42,44 +33,21 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Neighbouring motions reach the wall earlier or later and come to rest, too. The approach speed cancels in
     /// `S = R + (f+ - R f-) n^T / (n f-)`, where `R` is the impact that stops the gap. What remains is the
     /// displacement of the other coordinate, and its damping by the gap's velocity.
-    /// `flow_before` and `slips_before` are those of the motion up to the wall.
     #[inline(never)]
-    pub(super) fn stick(
-        &mut self,
-        side: Side,
-        (flow_before, slips_before): (&Flow, Slips),
-        observer: &mut impl Observer,
-    ) {
+    pub(super) fn stick(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
         let before = self.q;
         self.q = self.at_rest_on(side);
-        let breaks_away = slips_before != self.slips && flow_before.sticks;
-        if N > 0 && breaks_away {
+        if N > 0 {
             let kick = self.flow.kick;
-            let field = flow_before.domain(DomainKind::Free).field(&before, &self.phasor);
-            let next = self.flow.domain(DomainKind::Meshing(side)).field(&self.q, &self.phasor);
-            let stop = |u: &Gap| [u[0], 0.0, u[2], u[3] + kick * u[1]];
-            self.saltate(stop, &[1.0, 0.0, 0.0, 0.0], before[1], &field, &next);
-        } else if N > 0 {
-            let (kick, gaps) = (self.flow.kick, self.tangents.map(|u| u[0]));
-            let meshing = flow_before.domain(DomainKind::Meshing(side));
+            let meshing = self.flow.domain(DomainKind::Meshing(side));
             let row = meshing.second_acceleration_row().base;
             let drag = row[1] - kick * row[3];
             self.tangents =
                 self.tangents.map(|[z, w, x, v]| [0.0, 0.0, x + kick * z, v + kick * w - drag * z]);
-            if slips_before != self.slips && before[1].abs() >= NO_SPEED * self.flow.speed {
-                // The friction that acts along the wall has changed.
-                let rate =
-                    |flow: &Flow| flow.domain(DomainKind::Meshing(side)).field(&self.q, &self.phasor)[3];
-                let jump = (rate(self.flow) - rate(flow_before)) / before[1];
-                for (tangent, of_gap) in self.tangents.iter_mut().zip(gaps) {
-                    tangent[3] += jump * of_gap;
-                }
-            }
         }
         self.record(EventKind::MeshStart, side, before, observer);
         self.rest_on(side);
-        self.record_slips(slips_before, observer);
     }
 
     /// Sets the mode of rest on a rigid wall.
@@ -107,7 +75,7 @@ impl<const N: usize> Trajectory<'_, N> {
                     &computed
                 }
             };
-            match self.earlier_of_friction(self.pressing_ahead(linear, step, side), step) {
+            match self.pressing_ahead(linear, step, side) {
                 StepVerdict::Clear { roomy } => {
                     self.level[1] = level.saturating_sub(usize::from(roomy));
                     self.clear_step(linear, step, until);

@@ -6,7 +6,8 @@ use crate::common::{REST, near, paper};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Domain, Friction, Law, Oscillator, state};
 use rattlemap_dynamics::orbit::{Class, Settings, analyse_flow};
-use rattlemap_dynamics::reference::{FrictionEvent, GapEvent, Observer, Trajectory};
+use rattlemap_dynamics::reference::machine::SlipEvent;
+use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
 
 /// A single mass on a spring, between no walls, with `m = k = 1`.
 fn block(omega: f64, drive: f64, friction: f64) -> Oscillator {
@@ -43,7 +44,7 @@ struct Slides(Vec<(Option<u8>, f64)>);
 impl Observer for Slides {
     fn event(&mut self, _: &GapEvent) {}
 
-    fn friction(&mut self, event: &FrictionEvent) {
+    fn machine_slip(&mut self, event: &SlipEvent) {
         self.0.push((event.symbol, event.t));
     }
 }

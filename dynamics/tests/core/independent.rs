@@ -13,7 +13,8 @@ use rattlemap_dynamics::model::{Contact, Side, State};
 use rattlemap_dynamics::orbit::{
     Budget, Class, EVENT_PERIODS, Measurement, Orbit, Status, analyse_flow, measure,
 };
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
+use rattlemap_dynamics::reference::machine::MachineEvent;
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
 use rayon::prelude::*;
 
 use crate::common::BUDGET;
@@ -54,6 +55,31 @@ const CREEP: f64 = 2e-5;
 /// Forcing periods after which a motion that is not near a cycle is not followed any more.
 const MOST_PERIODS: usize = 200;
 
+/// What happens at walls, in both engines of the reference.
+#[derive(Default)]
+struct AtWalls(Vec<(What, Side)>);
+
+impl AtWalls {
+    fn add(&mut self, kind: EventKind, side: Side) {
+        let what = match kind {
+            EventKind::Impact => What::Impact,
+            EventKind::MeshStart => What::Begins,
+            EventKind::MeshEnd => What::Ends,
+        };
+        self.0.push((what, side));
+    }
+}
+
+impl Observer for AtWalls {
+    fn event(&mut self, event: &GapEvent) {
+        self.add(event.kind, event.side);
+    }
+
+    fn machine_event(&mut self, event: &MachineEvent) {
+        self.add(event.kind, event.side);
+    }
+}
+
 /// How the motions of a model agree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Agreement {
@@ -87,15 +113,11 @@ fn first_periods(case: &Case, system: &System) -> Result<(f64, [usize; 2]), Stri
     if is_preloaded {
         shaken.push(Motion::new(&other, case.law, case.start, Mode::Free));
     }
-    let of = |event: &GapEvent| match event.kind {
-        EventKind::Impact => (What::Impact, event.side),
-        EventKind::MeshStart => (What::Begins, event.side),
-        EventKind::MeshEnd => (What::Ends, event.side),
-    };
     let mut worst = 0.0f64;
     for period in 0..FIRST {
-        let mut events = Vec::<GapEvent>::new();
-        let ended = theirs.advance_period(&mut events);
+        let mut at_walls = AtWalls::default();
+        let ended = theirs.advance_period(&mut at_walls);
+        let events = at_walls.0;
         ours.events.clear();
         let noise = ours.advance_period().and_then(|()| ours.noise(&mut shaken));
         // Near rest on a wall with a preload, contacts have no end. Friction makes the series converge, which the other integrator may leave.
@@ -113,7 +135,6 @@ fn first_periods(case: &Case, system: &System) -> Result<(f64, [usize; 2]), Stri
             return Err(format!("off by {off:e} with noise {noise:e} in period {period}"));
         }
         worst = worst.max(off);
-        let events: Vec<_> = events.iter().map(of).collect();
         if ours.events != events {
             return Err(format!("events {:?} but {events:?} in period {period}", ours.events));
         }

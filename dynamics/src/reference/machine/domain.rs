@@ -6,9 +6,9 @@ use std::sync::OnceLock;
 use nalgebra::{DMatrix, DVector};
 
 use super::polynomial::{ORDER, Polynomial, Weights, combine, rest};
+use super::slip::Slip;
 use super::system::System;
 use super::{Numbers, Point, SIZE, WIDTH};
-use crate::flow::Slip;
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 
 /// Taylor radius: the largest product of a step and the rate of its domain.

@@ -1,7 +1,7 @@
 //! Events of a machine.
 
 use super::Numbers;
-use crate::flow::Slips;
+use super::slip::Slips;
 use crate::model::Side;
 use crate::reference::EventKind;
 

@@ -3,8 +3,8 @@
 use super::Point;
 use super::domain::{Domain, Path, Row};
 use super::modes::Modes;
+use super::slip::Slip;
 use super::system::System;
-use crate::flow::Slip;
 use crate::model::Side;
 
 /// A flight within one domain, of at most one Taylor step.

@@ -1,9 +1,9 @@
 //! Modes of walls and friction, and which of them are consistent with a state.
 
 use super::domain::{Domain, DomainKey, Row};
+use super::slip::{Slip, Slips};
 use super::system::System;
 use super::{Numbers, Point};
-use crate::flow::{Slip, Slips};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
 
 /// Rounding error of a sum, relative to the size of its terms.

@@ -9,10 +9,10 @@ use super::events::{MachineEvent, SlipEvent};
 use super::flight::Flight;
 use super::modes::{AtRest, GapMode, Modes, ROUNDING, first_derivative};
 use super::polynomial::{Fall, first_fall};
+use super::slip::{Slip, Slips};
 use super::system::{Phasors, System};
 use super::{Numbers, Point, SIZE};
-use crate::flow::{Slip, Slips};
-use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
+use crate::model::{Contact, Law, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::reference::{
     Allowance, Clock, EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, NO_SPEED, Observer,
     STEPS_PER_PERIOD_CAP, Stop, Work,
@@ -110,6 +110,8 @@ pub struct Motion<'s> {
     near_grazing: bool,
     work: Work,
     allowance: Allowance<'s>,
+    /// The law of both walls, if the machine has none of its own.
+    law: Option<Law>,
 }
 
 impl<'s> Motion<'s> {
@@ -149,6 +151,7 @@ impl<'s> Motion<'s> {
             near_grazing: false,
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
+            law: None,
         };
         motion.enter();
         motion
@@ -157,7 +160,7 @@ impl<'s> Motion<'s> {
     /// Starts from another state at phase 0, in the modes of this motion and with its remaining allowance. The state alone does not determine
     /// the modes: a gap just in front of a wall may be free or in a contact onset.
     pub fn at(&self, state: &[f64], tangents: Vec<Numbers>) -> Motion<'s> {
-        let mut started = Motion::new(self.system, state);
+        let mut started = Motion::new(self.system, state).with_law(self.law);
         started.allowance = self.allowance();
         started.origin = self.origin;
         for gap in 0..self.system.gaps() {
@@ -302,6 +305,17 @@ impl<'s> Motion<'s> {
     /// Returns the counters of work.
     pub fn work(&self) -> Work {
         self.work
+    }
+
+    /// Applies a law of restitution and mesh speed to both walls of the first gap, instead of the machine's own laws.
+    pub(crate) fn with_law(mut self, law: Option<Law>) -> Self {
+        self.law = law;
+        self
+    }
+
+    /// Returns the coefficient of restitution of a wall, and its derivative, at an approach speed.
+    fn restitution(&self, side: Side, wall: &Wall, speed: f64) -> [f64; 2] {
+        self.law.map_or_else(|| wall.restitution.at(speed), |law| [law.restitution[side.index()], 0.0])
     }
 
     /// Sets the work that the motion may take from here on.
@@ -940,7 +954,7 @@ impl<'s> Motion<'s> {
     fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut impl Observer) {
         let (system, n) = (self.system, self.system.n);
         let (approach, number) = (side.sign() * self.rate(gap), system.walls(gap, side).len() - 1);
-        let [e, slope] = wall.restitution.at(approach);
+        let [e, slope] = self.restitution(side, wall, approach);
         let mut kept = [false; MOST_GAPS];
         let (kick, Outcome { free, bounced, lasting, pressing }) = loop {
             let (kick, let_go) = self.joint_impact(gap, side, kept);
@@ -1025,7 +1039,8 @@ impl<'s> Motion<'s> {
         let domain = system.domain(free.key(system));
         let row = domain.unit_row(gap);
         let pressing = side.sign() * first_derivative(&domain, &row, &point, 2).1;
-        let is_slow = leaving <= wall.mesh_speed.max(self.lowest_speed(&domain, gap, &point));
+        let mesh_speed = self.law.map_or(wall.mesh_speed, |law| law.mesh_speed[side.index()]);
+        let is_slow = leaving <= mesh_speed.max(self.lowest_speed(&domain, gap, &point));
         let mut lasting = None;
         if is_slow && wall.contact == Contact::Rigid {
             let mut stopped = after(-side.sign() * approach);
@@ -1267,11 +1282,11 @@ impl<'s> Motion<'s> {
     /// Decides contact onsets and walls that only push anew. Returns whether a mode has changed.
     fn settle_pushing(&mut self, point: &Point, observer: &mut impl Observer) -> bool {
         for gap in 0..self.system.gaps() {
-            if self.from_force[gap] > 0 || self.is_kept(gap) {
+            if self.from_force[gap] > 0 {
                 continue;
             }
             match self.modes.gaps[gap] {
-                GapMode::Onset(side) => {
+                GapMode::Onset(side) if !self.is_kept(gap) => {
                     let row = self.domain.unit_row(gap);
                     if side.sign() * first_derivative(&self.domain, &row, point, 2).1 <= 0.0 {
                         self.end_contact(gap, side, observer);

@@ -5,9 +5,9 @@
 use super::domain::{Domain, DomainKey, Row};
 use super::modes::GapMode;
 use super::motion::Motion;
+use super::slip::{Slip, Slips};
 use super::system::System;
 use super::{Numbers, SIZE};
-use crate::flow::{Slip, Slips};
 use crate::model::{Contact, MOST_GAPS, Machine, Side};
 
 /// Frequency below all others, for equations that do not depend on it.
