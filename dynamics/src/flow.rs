@@ -158,19 +158,16 @@ impl Flow {
 
     /// Computes the flow of an oscillator that [`Oscillator::validate`] accepts.
     pub fn new(oscillator: &Oscillator) -> Flow {
-        let mut flow = Flow::in_stages(oscillator);
         let has_friction = oscillator.friction.iter().any(|friction| friction.force > 0.0);
         let machine = match &oscillator.machine {
-            Some(machine) => Some(Cow::Borrowed(&**machine)),
-            None => has_friction.then(|| Cow::Owned(Machine::of(oscillator, Law::both(0.0, 0.0)))),
+            Some(machine) => Cow::Borrowed(&**machine),
+            None if has_friction => Cow::Owned(Machine::of(oscillator, Law::both(0.0, 0.0))),
+            None => return Flow::in_stages(oscillator),
         };
-        if let Some(machine) = machine {
-            let system = System::new(&machine);
-            (flow.length, flow.speed, flow.escape) = system.units();
-            (flow.symmetric, flow.machine) = (false, Some(system));
-            flow.non_impacting = NonImpacting::of_machine(&machine);
-            return flow;
-        }
+        let (system, mut flow) = (System::new(&machine), Flow::in_one_interval(oscillator));
+        (flow.length, flow.speed, flow.escape) = system.units();
+        (flow.symmetric, flow.non_impacting) = (false, NonImpacting::of_machine(&machine));
+        flow.machine = Some(system);
         flow
     }
 
