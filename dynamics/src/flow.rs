@@ -166,7 +166,7 @@ impl Flow {
         };
         let (system, mut flow) = (System::new(&machine), Flow::in_one_interval(oscillator));
         (flow.length, flow.speed, flow.escape) = system.units();
-        (flow.symmetric, flow.non_impacting) = (false, NonImpacting::of_machine(&machine));
+        flow.non_impacting = NonImpacting::of_machine(&machine);
         flow.machine = Some(system);
         flow
     }

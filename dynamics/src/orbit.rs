@@ -33,7 +33,10 @@ pub use cell::{Measurement, measure, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;
-pub use quantities::{Approaches, Displacement, FrictionQuantities, Quantities};
+pub use quantities::{
+    Approaches, DISPLACEMENTS, Displacement, FrictionQuantities, Quantities, place_of_displacement,
+    place_of_gap,
+};
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};
 pub use resolution::rounding_decides;

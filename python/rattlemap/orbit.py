@@ -135,7 +135,8 @@ class Orbit:
         """All events in order of time: a structured array, shape (events,).
 
         Fields: ``kind`` (``impact``, ``mesh_start``, ``mesh_end``), ``side`` (1 right, -1 left), ``t`` (since phase 0 of
-        the cycle), ``t_mod_period`` (in [0, T)), ``before`` and ``after`` (states), ``impulse`` (of the contact on the gap).
+        the cycle), ``t_mod_period`` (in [0, T)), ``before`` and ``after`` (states), ``impulse`` (of the contact on the gap);
+        and ``gap``, the name of the gap, if the model has several gaps and the motion has events.
         """
         events = self._facts["events"]
         count = len(self._native.state_names)
@@ -148,6 +149,7 @@ class Orbit:
                 ("before", np.float64, (count,)),
                 ("after", np.float64, (count,)),
                 ("impulse", np.float64),
+                *([("gap", "U32")] if any("gap" in event for event in events) else []),
             ]
         )
         assert kind.names is not None
@@ -165,7 +167,8 @@ class Orbit:
         -------
         pandas.DataFrame
             The columns of ``trajectory.csv``: ``t`` since phase 0 of the cycle, ``phase`` of the forcing in turns, the gap
-            ``z`` and its velocity ``w``, the state, ``domain`` (``free``, ``meshing_right``, ``meshing_left``). Each
+            ``z`` and its velocity ``w``, the state, ``domain`` (``free``, ``meshing_right``, ``meshing_left``). A model with
+            several gaps has these columns for each gap, with its name: ``a``, ``a_rate``, ``domain_a``. Each
             event has two more rows, ``before`` and ``after`` in ``moment``, with its kind in ``event`` and its ``side``
             (1 or -1; 0 in other rows). Empty if the motion failed.
 

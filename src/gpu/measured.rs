@@ -34,7 +34,7 @@ pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quan
         impact_energy: lost * energy / (steps * h),
         contact_force: (contact > 0.0)
             .then(|| [highs[3] * force_unit, (force / contact).max(0.0).sqrt() * force_unit]),
-        displacements: [0, 1, 2].map(displacement),
+        displacements: std::array::from_fn(|i| if i < 3 { displacement(i) } else { Displacement::default() }),
         dissipated: dissipated * energy / (steps * h),
         friction: None,
     })

@@ -80,6 +80,8 @@ impl Direction {
 /// One event as a point of the section `|z| = b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SectionPoint {
+    /// Index of the gap.
+    pub gap: usize,
     /// The wall.
     pub side: Side,
     /// Kind of the event.
@@ -243,6 +245,7 @@ impl Column {
 impl Column {
     fn of(value: f64, orbit: Orbit) -> Column {
         let point = |event: &orbit::Event| SectionPoint {
+            gap: event.gap,
             side: event.side,
             kind: event.kind,
             t_mod_period: event.t_mod_period,

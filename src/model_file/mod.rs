@@ -103,6 +103,32 @@ pub fn gap_names(model: &dyn Model) -> [&'static str; 2] {
     }
 }
 
+/// Returns the names of the columns of each gap and its velocity: those of [`gap_names`] for one gap, else its name, and its name with
+/// `_rate`. A rate has a further underscore where a parameter, a coordinate or a velocity has its name.
+pub fn gap_columns(model: &dyn Model) -> Vec<[String; 2]> {
+    let Some(names) = several_gaps(model) else {
+        return vec![gap_names(model).map(str::to_owned)];
+    };
+    let is_taken = |name: &String| {
+        let mut parameters = model.parameters().iter().map(|parameter| &*parameter.name);
+        parameters.any(|other| other == name) || model.state_names().contains(&&**name)
+    };
+    let rate = |name: &String| {
+        let mut rate = format!("{name}_rate");
+        while is_taken(&rate) || names.contains(&rate) {
+            rate.push('_');
+        }
+        rate
+    };
+    names.iter().map(|name| [name.clone(), rate(name)]).collect()
+}
+
+/// Returns the names of a model's gaps, if it has several.
+pub fn several_gaps(model: &dyn Model) -> Option<Vec<String>> {
+    let symbols = model.downcast_ref::<FileModel>()?.gap_symbols();
+    (symbols.len() > 1).then(|| symbols.into_iter().map(|[gap, _]| gap).collect())
+}
+
 /// Models are equal if their texts, values and start phases are.
 impl PartialEq for FileModel {
     fn eq(&self, other: &FileModel) -> bool {

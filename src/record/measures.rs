@@ -2,11 +2,16 @@
 
 use super::distance::{apart, farther};
 use super::{Record, valid};
-use rattlemap_dynamics::model::State;
-use rattlemap_dynamics::orbit::{Measurement, Orbit, Quantities};
+use rattlemap_dynamics::model::{MOST_COORDINATES, MOST_GAPS, State};
+use rattlemap_dynamics::orbit::{
+    DISPLACEMENTS, Measurement, Orbit, Quantities, place_of_displacement, place_of_gap,
+};
 
 /// Number of numbers in [`Record::measures`].
-pub const MEASURES: usize = places_before(GROUPS.len());
+pub const MEASURES: usize = FURTHER + FURTHER_DISPLACEMENTS * numbers_before(GROUPS.len());
+
+/// First of the numbers of further displacements and gaps in [`Record::measures`].
+pub(crate) const FURTHER: usize = places_before(GROUPS.len());
 
 /// Quantities that a scene requests by one name, in the order of their places in a record.
 #[rustfmt::skip]
@@ -78,7 +83,7 @@ struct Number {
     name: &'static str,
     title: &'static str,
     dimension: Dimension,
-    /// Returns the number of a motion, and of one of [both displacements, gap].
+    /// Returns the number of a motion, and of one of its [displacements](Quantities::displacements).
     read: fn(&Measured<'_>, usize) -> Option<f64>,
 }
 
@@ -118,10 +123,44 @@ fn relative(distance: f64, scale: f64) -> f64 {
     if distance == 0.0 { 0.0 } else { distance / scale }
 }
 
-/// Number of displacements of an oscillator, and of its gap.
-const DISPLACEMENTS: usize = 3;
-/// Index of the gap among the displacements.
-const GAP: usize = 2;
+/// Returns the numbers of each displacement in the groups before one of them.
+const fn numbers_before(group: usize) -> usize {
+    let (mut i, mut numbers) = (0, 0);
+    while i < group {
+        if GROUPS[i].of_displacements {
+            numbers += GROUPS[i].numbers.len();
+        }
+        i += 1;
+    }
+    numbers
+}
+
+/// Number of displacements and gaps with places in their group: the first two displacements and the first gap. The numbers of all others
+/// follow behind those of all groups.
+const FIRST_DISPLACEMENTS: usize = 3;
+const FURTHER_DISPLACEMENTS: usize = DISPLACEMENTS - FIRST_DISPLACEMENTS;
+
+/// A displacement or a gap.
+#[derive(Clone, Copy, Debug)]
+enum Subject {
+    Displacement(usize),
+    Gap(usize),
+}
+
+impl Subject {
+    /// Returns all, in the order of columns in tables.
+    fn all() -> impl Iterator<Item = Subject> {
+        (0..MOST_COORDINATES).map(Subject::Displacement).chain((0..MOST_GAPS).map(Subject::Gap))
+    }
+
+    /// Returns the place in [`Quantities::displacements`].
+    fn place(self) -> usize {
+        match self {
+            Subject::Displacement(i) => place_of_displacement(i),
+            Subject::Gap(i) => place_of_gap(i),
+        }
+    }
+}
 
 impl Record {
     /// Replaces the phases of harmonics.
@@ -136,7 +175,7 @@ impl Record {
 
 impl Group {
     const fn places(&self) -> usize {
-        self.numbers.len() * if self.of_displacements { DISPLACEMENTS } else { 1 }
+        self.numbers.len() * if self.of_displacements { FIRST_DISPLACEMENTS } else { 1 }
     }
 
     /// Returns the group of a name.
@@ -183,51 +222,65 @@ pub struct Measure {
     pub place: usize,
     /// Its quantity.
     pub group: &'static Group,
-    /// The displacement that it describes; 2 is the gap.
-    displacement: Option<usize>,
+    /// The displacement or gap that it describes.
+    subject: Option<Subject>,
     number: &'static Number,
 }
 
-/// Returns all numbers of a record, in the order of their places.
+/// Returns all numbers of a record, in the order of columns in tables.
 pub fn all() -> impl Iterator<Item = Measure> {
-    let of_group = |group: &'static Group| {
-        let displacements = if group.of_displacements { DISPLACEMENTS } else { 1 };
-        (0..displacements).flat_map(move |i| {
-            group.numbers.iter().map(move |number| (group, group.of_displacements.then_some(i), number))
+    let of_group = |(index, group): (usize, &'static Group)| {
+        let subjects: Vec<Option<Subject>> = match group.of_displacements {
+            true => Subject::all().map(Some).collect(),
+            false => vec![None],
+        };
+        subjects.into_iter().flat_map(move |subject| {
+            let nth = subject.map_or(0, Subject::place);
+            let first = match nth.checked_sub(FIRST_DISPLACEMENTS) {
+                None => places_before(index) + nth * group.numbers.len(),
+                Some(nth) => {
+                    FURTHER + FURTHER_DISPLACEMENTS * numbers_before(index) + nth * group.numbers.len()
+                }
+            };
+            group.numbers.iter().enumerate().map(move |(i, number)| Measure {
+                place: first + i,
+                group,
+                subject,
+                number,
+            })
         })
     };
-    GROUPS.iter().flat_map(of_group).enumerate().map(|(place, (group, displacement, number))| Measure {
-        place,
-        group,
-        displacement,
-        number,
-    })
+    GROUPS.iter().enumerate().flat_map(of_group)
 }
 
 impl Measure {
-    /// Whether a motion with these state components has the number.
-    pub fn is_of(&self, state_names: &[&str]) -> bool {
-        self.subject(state_names).is_some()
+    /// Whether a motion with these state components and gaps has the number. There are names of gaps only if there are several.
+    pub fn is_of(&self, state_names: &[&str], gaps: &[String]) -> bool {
+        self.subject(state_names, gaps).is_some()
     }
 
-    /// Returns the name of the displacement, or an empty text if the number describes the whole motion; none if the model
+    /// Returns the name of the displacement or gap, or an empty text if the number describes the whole motion; none if the model
     /// has no such displacement.
-    pub fn subject<'n>(&self, state_names: &[&'n str]) -> Option<&'n str> {
-        match self.displacement {
+    pub fn subject<'n>(&self, state_names: &[&'n str], gaps: &'n [String]) -> Option<&'n str> {
+        match self.subject {
             None => Some(""),
-            Some(GAP) => Some("gap"),
-            Some(i) => state_names.get(2 * i).copied(),
+            Some(Subject::Gap(0)) if gaps.is_empty() => Some("gap"),
+            Some(Subject::Gap(i)) => gaps.get(i).map(String::as_str),
+            Some(Subject::Displacement(i)) => state_names.get(2 * i).copied(),
         }
     }
 
-    /// Returns the index of the displacement that the number describes; none for the gap and for the whole motion.
+    /// Returns the index of the displacement that the number describes; none for a gap and for the whole motion.
     pub fn coordinate(&self) -> Option<usize> {
-        self.displacement.filter(|&i| i != GAP)
+        match self.subject {
+            Some(Subject::Displacement(i)) => Some(i),
+            _ => None,
+        }
     }
 
-    /// Returns the name in tables, layers and Python for a model with these state components.
-    pub fn name(&self, state_names: &[&str]) -> String {
-        match self.subject(state_names) {
+    /// Returns the name in tables, layers and Python for a model with these state components and gaps.
+    pub fn name(&self, state_names: &[&str], gaps: &[String]) -> String {
+        match self.subject(state_names, gaps) {
             Some(subject) if !subject.is_empty() => format!("{}_{subject}", self.number.name),
             _ => self.number.name.to_owned(),
         }
@@ -260,7 +313,7 @@ impl Measure {
 
     /// Returns the number of a motion.
     pub fn read(&self, motion: &Measured<'_>) -> Option<f64> {
-        (self.number.read)(motion, self.displacement.unwrap_or(0)).filter(|value| value.is_finite())
+        (self.number.read)(motion, self.subject.map_or(0, Subject::place)).filter(|value| value.is_finite())
     }
 
     /// Returns the difference of two values: of angles, the shorter way round.
@@ -355,7 +408,8 @@ mod tests {
 
     #[test]
     fn each_number_has_a_place_and_each_quantity_a_bit_of_its_own() {
-        let places: Vec<usize> = all().map(|measure| measure.place).collect();
+        let mut places: Vec<usize> = all().map(|measure| measure.place).collect();
+        places.sort_unstable();
         assert_eq!(places, (0..MEASURES).collect::<Vec<_>>());
         let bits = GROUPS.iter().fold(valid::PATTERN * 2 - 1, |bits, group| {
             assert_eq!(bits & group.bit, 0, "{}", group.name);
@@ -366,15 +420,20 @@ mod tests {
 
     #[test]
     fn names_contain_those_of_the_models_displacements() {
-        let names = |states: &[&str]| -> Vec<String> {
-            let own = |group: &Group| group.measures().filter(|m| m.is_of(states)).collect::<Vec<_>>();
+        let of = |states: &[&str], gaps: &[String]| -> Vec<String> {
+            let own = |group: &Group| group.measures().filter(|m| m.is_of(states, gaps)).collect::<Vec<_>>();
             let groups = ["amplitude", "harmonic", "multiplier"].map(|name| own(Group::named(name).unwrap()));
-            groups.concat().iter().map(|measure| measure.name(states)).collect()
+            groups.concat().iter().map(|measure| measure.name(states, gaps)).collect()
         };
+        let names = |states: &[&str]| of(states, &[]);
         let one = "amplitude_y mean_y amplitude_gap mean_gap harmonic_y harmonic_phase_y harmonic_gap \
                    harmonic_phase_gap multiplier multiplier_argument";
         assert_eq!(names(&["y", "vy"]).join(" "), one);
         assert_eq!(names(&["x1", "v1", "x2", "v2"]).len(), 14);
+        let three = of(&["s", "vs", "x", "vx", "y", "vy"], &["a".to_owned(), "b".to_owned()]);
+        let amplitudes =
+            "amplitude_s mean_s amplitude_x mean_x amplitude_y mean_y amplitude_a mean_a amplitude_b mean_b";
+        assert_eq!(three[..10].join(" "), amplitudes);
     }
 
     #[test]
@@ -408,6 +467,7 @@ mod tests {
             distance("harmonic", |record, first| record.measures[first + 1] += std::f64::consts::TAU + 1e-3);
         assert!((turned - 1e-3).abs() < 1e-6, "{turned}");
         assert!(distance("rms", |record, first| record.measures[first + 2] = 0.6) > 0.19, "the gap");
+        assert!(distance("rms", |record, _| record.measures[MEASURES - 17] = 0.6) > 0.19, "the last gap");
     }
 
     /// An amplitude that is a thousand times smaller than the mean.
@@ -425,7 +485,7 @@ mod tests {
 
     #[test]
     fn averages_of_angles_and_of_mirror_images_stay_between_their_values() {
-        let named = |name: &str| all().find(|measure| measure.name(&["x", "v"]) == name).unwrap();
+        let named = |name: &str| all().find(|measure| measure.name(&["x", "v"], &[]) == name).unwrap();
         let phase = named("harmonic_phase_x").average(&[(3.0, 0.75), (-3.0, 0.25)]);
         assert!((phase - (3.0 + 0.25 * (std::f64::consts::TAU - 6.0))).abs() < 1e-12, "{phase}");
         assert_eq!(named("mean_x").average(&[(0.25, 0.75), (-0.25, 0.25)]), 0.25);

@@ -52,10 +52,11 @@ pub mod valid {
 
 /// Results of one cell, in one fixed layout for all engines, precisions and variants.
 ///
-/// 472 bytes, no padding, little-endian. Files contain the entries of the strobe state that the model has, but four at least: 376
-/// bytes for one or two coordinates, and 16 more for each further one.
+/// 792 bytes, no padding, little-endian. Files contain the entries of the strobe state that the model has, but four at least: 376
+/// bytes for one or two coordinates, and 16 more for each further one; and 320 bytes of measured quantities only of models with more
+/// displacements or gaps.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Record {
     /// Largest Lyapunov exponent per unit time.
     pub lyapunov: f64,
@@ -94,6 +95,12 @@ pub struct Record {
     pub reserved: u32,
     /// Measured quantities, at the places of [`measures::all`].
     pub measures: [f64; MEASURES],
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Zeroable::zeroed()
+    }
 }
 
 /// Rounding error of a mesh fraction of 1. Lanes count whole steps, without error.

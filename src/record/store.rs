@@ -62,9 +62,9 @@ impl<R: AsRef<[Record]> + AsMut<[Record]> + Debug + Sync + ?Sized> RecordsMut fo
 /// A fixed number of records, stored by column.
 ///
 /// A column that is zero in all records takes no memory, and equal words are stored once. A map of classes and
-/// exponents takes 24 bytes per run; a [`Record`] takes 472. Records come back to the bit, but for strobe states,
+/// exponents takes 24 bytes per run; a [`Record`] takes 792. Records come back to the bit, but for strobe states,
 /// which are stored on request only.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct RecordStore {
     count: usize,
     with_strobes: bool,
@@ -79,6 +79,12 @@ pub struct RecordStore {
     pattern: Distinct<([u64; 4], u64, u32)>,
 }
 
+impl Default for RecordStore {
+    fn default() -> Self {
+        RecordStore::new(0, false)
+    }
+}
+
 impl RecordStore {
     /// Creates `count` empty records, with room for strobe states on request.
     pub fn new(count: usize, with_strobes: bool) -> RecordStore {
@@ -86,7 +92,7 @@ impl RecordStore {
             count,
             with_strobes,
             numbers: Default::default(),
-            measures: Default::default(),
+            measures: std::array::from_fn(|_| Column::default()),
             strobe: Default::default(),
             periods_run: Column::default(),
             flags: Distinct::default(),

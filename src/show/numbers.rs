@@ -2,6 +2,7 @@
 
 use crate::map::bifurcation::Column;
 use crate::map::scene::Quantity;
+use crate::model_file::several_gaps;
 use crate::record::measures::{Dimension, MEASURES, Measure, Measured};
 use crate::show::cells::{Cells, Row};
 use crate::show::symbols::{symbol, with_unit};
@@ -44,8 +45,9 @@ impl Number {
         let mut quantities = quantities.to_vec();
         quantities.sort_unstable();
         let (names, units) = (model.state_names(), model.units());
+        let gaps = several_gaps(model).unwrap_or_default();
         let mut numbers: Vec<Number> =
-            quantities.into_iter().flat_map(|quantity| of_quantity(quantity, &names)).collect();
+            quantities.into_iter().flat_map(|quantity| of_quantity(quantity, &names, &gaps)).collect();
         for number in &mut numbers {
             number.unit = unit(number, &units);
             number.label = with_unit(&number.label, number.unit.as_deref());
@@ -103,7 +105,7 @@ fn unit(number: &Number, units: &Units) -> Option<String> {
     }
 }
 
-fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
+fn of_quantity(quantity: Quantity, states: &[&str], gaps: &[String]) -> Vec<Number> {
     match quantity {
         Quantity::ImpactRate => vec![Number {
             name: "impact_rate".to_owned(),
@@ -132,9 +134,9 @@ fn of_quantity(quantity: Quantity, states: &[&str]) -> Vec<Number> {
         }
         _ => {
             let of = |measure: Measure| {
-                let subject = measure.subject(states)?;
+                let subject = measure.subject(states, gaps)?;
                 Some(Number {
-                    name: measure.name(states),
+                    name: measure.name(states, gaps),
                     title: measure.title(subject),
                     label: measure.title(&symbol(subject)),
                     subject: [measure.part(), subject].join(" ").trim().to_owned(),
@@ -182,5 +184,9 @@ mod tests {
         let force = with("force_unit = 'kN'");
         assert!(units(&force, Quantity::ContactForceMax).iter().all(|unit| unit == "kN"));
         assert_eq!(Number::of(&model, &[Quantity::Rms])[0].label, "root mean square of x [mm]");
+        let gears = FileModel::built_in("two-loose-gears").unwrap();
+        let labels: Vec<String> = Number::of(&gears, &[Quantity::Rms]).into_iter().map(|n| n.label).collect();
+        let names = ["s", "x\u{2081}", "x\u{2082}", "a", "b"];
+        assert_eq!(labels, names.map(|name| format!("root mean square of {name} [m]")));
     }
 }

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::model_file::several_gaps;
 use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
@@ -55,7 +56,7 @@ fn components(model: &dyn Model, state: &State) -> Vec<f64> {
 }
 
 fn events(model: &dyn Model, events: &[Event]) -> Vec<Value> {
-    let gaps = orbit_quantities::gaps(model);
+    let gaps = several_gaps(model);
     let event = |(event, impulse): (&Event, Option<f64>)| {
         let mut object = json!({
             "kind": names::kind(event.kind),

@@ -3,7 +3,6 @@
 use serde_json::{Map, Value};
 
 use crate::map::scene::Quantity;
-use crate::model_file::FileModel;
 use crate::show::names;
 use crate::show::numbers::Number;
 use crate::show::symbols::with_unit;
@@ -30,12 +29,6 @@ pub(crate) fn object(model: &dyn Model, orbit: &Orbit) -> Value {
 fn approaches(orbit: &Orbit, side: Side) -> Option<[f64; 2]> {
     let speeds = orbit.quantities.as_ref()?.approaches[side.index()];
     (speeds.count > 0).then_some([speeds.mean, speeds.largest])
-}
-
-/// Returns the names of a model's gaps, if it has several.
-pub(crate) fn gaps(model: &dyn Model) -> Option<Vec<String>> {
-    let symbols = model.downcast_ref::<FileModel>()?.gap_symbols();
-    (symbols.len() > 1).then(|| symbols.into_iter().map(|[gap, _]| gap).collect())
 }
 
 /// Returns the impulse of each event on the gap: the jump of its velocity over the compliance of the gap, without

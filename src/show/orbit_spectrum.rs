@@ -1,4 +1,4 @@
-//! Spectra of the gap and its velocity, by a discrete Fourier transform of samples of the exact flow.
+//! Spectra of the gaps and their velocities, by a discrete Fourier transform of samples of the exact flow.
 //!
 //! A periodic motion is transformed over exactly one cycle. Its lines lie at multiples of the forcing frequency divided by the
 //! number of periods, without leakage. For any other motion the mean is subtracted, and squares are averaged over Hann windows
@@ -49,12 +49,12 @@ fn per_period(rates: impl Iterator<Item = f64>) -> usize {
 }
 
 /// Amplitudes at one frequency.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Line {
     /// Frequency in multiples of the forcing frequency.
     pub(crate) frequency: f64,
-    /// Amplitudes of the gap and of its velocity; at frequency 0 the absolute value of the mean.
-    pub(crate) amplitudes: [f64; 2],
+    /// Amplitudes of each gap and of its velocity; at frequency 0 the absolute value of the mean.
+    pub(crate) amplitudes: Vec<[f64; 2]>,
 }
 
 /// A spectrum.
@@ -88,25 +88,32 @@ impl Spectrum {
             return Ok(None);
         }
         // The last sample belongs to the next period.
-        let values = |velocity| {
-            samples[..count].iter().map(|sample| oscillator.gap_value(0, &sample.state, velocity)).collect()
+        let values = |gap, velocity| -> Vec<f64> {
+            let samples = samples[..count].iter();
+            samples.map(|sample| oscillator.gap_value(gap, &sample.state, velocity)).collect()
         };
-        let [z, w]: [Vec<f64>; 2] = [0, 1].map(values);
         let span = cycle.unwrap_or(WINDOW);
-        let frequencies =
-            (0..=(wanted / 10).min(per_period / 4) * span as usize).map(|k| k as f64 / f64::from(span));
-        let lines = match cycle {
-            // The gap is continuous, and the derivative of its series is the series of the velocity. Samples of the velocity would
-            // locate jumps only to within their spacing.
-            Some(_) => frequencies
-                .zip(amplitudes(&[&z], |_| 1.0))
-                .map(|(frequency, z)| Line { frequency, amplitudes: [z, z * frequency * oscillator.omega] })
-                .collect(),
-            None => frequencies
-                .zip(through_windows(&z).into_iter().zip(through_windows(&w)))
-                .map(|(frequency, (z, w))| Line { frequency, amplitudes: [z, w] })
-                .collect(),
+        let frequency = |k: usize| k as f64 / f64::from(span);
+        let of_gap = |gap| -> Vec<[f64; 2]> {
+            let z = values(gap, 0);
+            match cycle {
+                // The gap is continuous, and the derivative of its series is the series of the velocity. Samples of the velocity
+                // would locate jumps only to within their spacing.
+                Some(_) => {
+                    let lines = amplitudes(&[&z], |_| 1.0).into_iter().enumerate();
+                    lines.map(|(k, z)| [z, z * frequency(k) * oscillator.omega]).collect()
+                }
+                None => {
+                    let w = through_windows(&values(gap, 1));
+                    through_windows(&z).into_iter().zip(w).map(<[f64; 2]>::from).collect()
+                }
+            }
         };
+        let gaps: Vec<Vec<[f64; 2]>> = (0..oscillator.gap_count()).map(of_gap).collect();
+        let line =
+            |k: usize| Line { frequency: frequency(k), amplitudes: gaps.iter().map(|gap| gap[k]).collect() };
+        let last = (wanted / 10).min(per_period / 4) * span as usize;
+        let lines = (0..=last).map(line).collect();
         Ok(Some(Spectrum { lines, cycle }))
     }
 
@@ -187,7 +194,7 @@ mod tests {
         let size = pair.force / (pair.k1 - pair.m1 * omega * omega).hypot(pair.r1 * omega);
         for line in &spectrum.lines {
             let expected = if line.frequency == 1.0 { [size, size * omega] } else { [0.0; 2] };
-            for (found, expected) in line.amplitudes.into_iter().zip(expected) {
+            for (found, expected) in line.amplitudes[0].into_iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-12 * size * omega, "{line:?}, not {expected}");
             }
         }
@@ -242,9 +249,9 @@ mod tests {
         let samples = trace(&pair, orbit.strobe, orbit.strobe_meshing, 1, count).unwrap();
         let velocities: Vec<f64> =
             samples[..count].iter().map(|sample| oscillator.gap_value(0, &sample.state, 1)).collect();
-        let largest = spectrum.lines.iter().map(|line| line.amplitudes[1]).fold(0.0, f64::max);
+        let largest = spectrum.lines.iter().map(|line| line.amplitudes[0][1]).fold(0.0, f64::max);
         for (line, sampled) in spectrum.lines.iter().zip(amplitudes(&[&velocities], |_| 1.0)) {
-            assert!((line.amplitudes[1] - sampled).abs() < 2e-4 * largest, "{line:?} {sampled}");
+            assert!((line.amplitudes[0][1] - sampled).abs() < 2e-4 * largest, "{line:?} {sampled}");
         }
     }
 
@@ -253,8 +260,8 @@ mod tests {
         let (orbit, spectrum) = spectrum(&GearPair::paper(0.65));
         assert_eq!((orbit.class, spectrum.cycle), (Class::Chaotic, None));
         assert_eq!(spectrum.lines[1].frequency, 1.0 / 128.0);
-        let [mean, next] = [0, 1].map(|k| spectrum.lines[k].amplitudes[0]);
+        let [mean, next] = [0, 1].map(|k| spectrum.lines[k].amplitudes[0][0]);
         assert!(next < 0.1 * mean, "the mean spread into the first line: {mean} {next}");
-        assert!(spectrum.lines[64..128].iter().all(|line| line.amplitudes[0] > 1e-4));
+        assert!(spectrum.lines[64..128].iter().all(|line| line.amplitudes[0][0] > 1e-4));
     }
 }

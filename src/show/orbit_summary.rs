@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::model_file::several_gaps;
 use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
@@ -216,7 +217,7 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
         "impulse".to_owned(),
     ];
     let head = head.into_iter().chain(components(" before")).chain(components(" after")).collect();
-    let gaps = orbit_quantities::gaps(model);
+    let gaps = several_gaps(model);
     let row = |(event, impulse): &(&Event, Option<f64>)| -> Vec<String> {
         let side = names::side(event.side);
         let side = gaps.as_ref().map_or(side.to_owned(), |gaps| format!("{} {side}", gaps[event.gap]));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer};
 
 use crate::map::scene::Scene;
-use crate::model_file::gap_names;
+use crate::model_file::gap_columns;
 use rattlemap_dynamics::model::Model;
 
 /// Names and values of parameters, in the order of the model's table.
@@ -42,9 +42,9 @@ pub(crate) fn units(model: &dyn Model) -> Option<BTreeMap<String, String>> {
     let units = model.units();
     let parameters = model.parameters().iter().map(|p| (&*p.name, p.unit.as_ref().map(ToString::to_string)));
     let states = model.state_names().into_iter().enumerate().map(|(i, name)| (name, units.component(i)));
-    let [z, w] = gap_names(model);
-    let others = [(z, units.gap.clone()), (w, units.gap_velocity()), ("t", units.time.clone())];
-    let all = parameters.chain(states).chain(others);
+    let gaps = gap_columns(model);
+    let of_gaps = gaps.iter().flat_map(|[z, w]| [(&**z, units.gap.clone()), (&**w, units.gap_velocity())]);
+    let all = parameters.chain(states).chain(of_gaps).chain([("t", units.time.clone())]);
     let named: BTreeMap<_, _> = all.filter_map(|(name, unit)| Some((name.to_owned(), unit?))).collect();
     (!named.is_empty()).then_some(named)
 }

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::map::bifurcation::{Column, fixed};
 use crate::map::scene::{self, Along, Format, Scene};
+use crate::model_file::several_gaps;
 use crate::show::drawing::axis::Scale;
 use crate::show::figure;
 use crate::show::figure::bifurcation::Panels;
@@ -54,7 +55,10 @@ pub fn write(
     let (names, fixed) = (scene.base().state_names(), fixed(&scene.line()));
     if wanted.contains(&Format::Csv) {
         let axis = &parameter.name;
-        folder.replace(POINTS, |out| bifurcation_tables::write_points(out, axis, &names, columns))?;
+        let gaps = several_gaps(scene.base());
+        folder.replace(POINTS, |out| {
+            bifurcation_tables::write_points(out, axis, &names, gaps.as_deref(), columns)
+        })?;
         folder.replace(COLUMNS_CSV, |out| bifurcation_tables::write_columns(out, axis, &numbers, columns))?;
         files.extend([POINTS, COLUMNS_CSV]);
         if fixed.is_some() {

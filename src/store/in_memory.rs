@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::map::bifurcation::Column;
 use crate::map::scene::Scene;
+use crate::model_file::several_gaps;
 use crate::show::cells::Cells;
 use crate::show::error::WriteError;
 pub use crate::show::layers::SharedColors;
@@ -80,11 +81,12 @@ pub fn diagram(
 ) -> Result<Diagram, OutputError> {
     let (axis, names) = (&*scene.axes()[0].parameter().name, scene.base().state_names());
     let numbers = Number::of(scene.base(), &scene.outputs().quantities);
+    let gaps = several_gaps(scene.base());
     let manifest = bifurcation(scene, arguments, columns, [elapsed, Duration::ZERO], &[]);
     Ok(Diagram {
         manifest: manifest.to_string(),
         columns: text(|to| bifurcation_tables::write_columns(to, axis, &numbers, columns))?,
-        points: text(|to| bifurcation_tables::write_points(to, axis, &names, columns))?,
+        points: text(|to| bifurcation_tables::write_points(to, axis, &names, gaps.as_deref(), columns))?,
     })
 }
 
@@ -109,7 +111,7 @@ pub fn trajectory(
 /// # Errors
 /// [`OutputError`] if the model is not valid.
 pub fn history(model: &dyn Model, history: &History) -> Result<String, OutputError> {
-    let moments = orbit_tables::moments(&model.oscillator()?, history);
+    let moments = orbit_tables::moments(model, history)?;
     text(|to| orbit_tables::write_trajectory(to, model, &moments))
 }
 

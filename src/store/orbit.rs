@@ -187,7 +187,7 @@ pub fn write_history(
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Clock::now();
     inventory::clear_for(folder, names())?;
-    let moments = orbit_tables::moments(&model.oscillator()?, history);
+    let moments = orbit_tables::moments(model, history)?;
     folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, model, &moments))?;
     folder.replace(EVENTS, |out| orbit_tables::write_events(out, model, &history.events))?;
     let mut files = vec![TRAJECTORY, EVENTS];
@@ -223,7 +223,7 @@ pub(crate) fn moments(
         samples_per_period,
         forcing_period: orbit.forcing_period,
     };
-    Ok(orbit_tables::moments(&model.oscillator()?, &history))
+    orbit_tables::moments(model, &history)
 }
 
 /// Returns the object that `orbit --json` prints.

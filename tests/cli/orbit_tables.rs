@@ -77,3 +77,70 @@ fn a_spectrum_contains_the_lines_of_its_cycle() {
         assert!(manifest.contains(&format!("\"name\": \"{name}\"")), "{manifest}");
     }
 }
+
+/// A model with three coordinates and two gaps. Its gears leave their driving flanks and are back on them at phase 0.
+#[test]
+fn tables_have_the_names_of_all_coordinates_and_gaps() {
+    let (folder, scene) = (
+        empty(),
+        "model = 'two-loose-gears'\n[[axis]]\nparameter = 'A'\nmin = 2e-4\nmax = 3e-4\ncount = 2\n",
+    );
+    fs::write(
+        folder.path().join("line.toml"),
+        format!("{scene}[outputs]\nquantities = ['amplitude', 'rms']\n"),
+    )
+    .unwrap();
+    run(&folder, "orbit --model two-loose-gears --set A=3e-4 --out o").code(0);
+    run(&folder, "bifurcation line.toml --quiet").code(0);
+    let table = |name: &str| rows(&folder.path().join(name));
+    let (header, moments) = table("o/trajectory.csv");
+    assert_eq!(header, "t,phase,a,a_rate,b,b_rate,s,vs,x1,v1,x2,v2,domain_a,domain_b,event,side,moment,gap");
+    let mut seen = [[0; 2]; 2];
+    for row in &moments {
+        let number = |i: usize| row[i].parse::<f64>().unwrap();
+        for (i, (gap, backlash)) in [("a", 1e-4), ("b", 1.5e-4)].into_iter().enumerate() {
+            let z = number(2 + 2 * i);
+            assert!((z - (number(6) - number(8 + 2 * i))).abs() < 1e-18, "{row:?}");
+            assert!((number(3 + 2 * i) - (number(7) - number(9 + 2 * i))).abs() < 1e-14, "{row:?}");
+            let is_on_flank = z.abs() < 1e-15;
+            assert!(row[12 + i] != "meshing_right" || is_on_flank, "{row:?}");
+            if row[17] == gap {
+                let at = if row[15] == "1" { 0.0 } else { -backlash };
+                assert!((z - at).abs() < 1e-15, "{row:?}");
+                seen[i][0] += 1;
+            }
+            seen[i][1] += u32::from(row[12 + i] == "meshing_right");
+        }
+        assert_eq!(row[14].is_empty(), row[17].is_empty(), "{row:?}");
+    }
+    assert!(seen.iter().flatten().all(|&count| count > 10), "{seen:?}");
+    assert_eq!(moments[0][12..14], ["meshing_right", "meshing_right"]);
+    let (header, lines) = table("o/spectrum.csv");
+    assert_eq!(header, "frequency,a,a_rate,b,b_rate");
+    // The mean of each gap.
+    for i in [1, 3] {
+        let samples = moments.iter().filter(|row| row[14].is_empty());
+        let values: Vec<f64> = samples.skip(1).map(|row| row[1 + i].parse().unwrap()).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        assert!(
+            (lines[0][i].parse::<f64>().unwrap() / mean.abs() - 1.0).abs() < 1e-3,
+            "{} {mean}",
+            lines[0][i]
+        );
+    }
+    let (header, points) = table("out/line/bifurcation.csv");
+    assert!(header.ends_with("_before,s,vs,x1,v1,x2,v2,gap"), "{header}");
+    assert!(["a", "b"].iter().all(|gap| points.iter().any(|row| row.last().unwrap() == gap)));
+    let (header, columns) = table("out/line/bifurcation_columns.csv");
+    let names = "amplitude_s,mean_s,amplitude_x1,mean_x1,amplitude_x2,mean_x2,amplitude_a,mean_a,amplitude_b,mean_b,\
+                 rms_s,rms_x1,rms_x2,rms_a,rms_b";
+    assert!(header.ends_with(names), "{header}");
+    for row in columns {
+        let measured: Vec<f64> = row[row.len() - 15..].iter().map(|x| x.parse().unwrap()).collect();
+        // Means are linear, and the second backlash is larger.
+        let mean = |i: usize| measured[2 * i + 1];
+        assert!((mean(4) - (mean(0) - mean(2))).abs() < 1e-12 && mean(4) < 0.0, "{row:?}");
+        assert!((mean(3) - (mean(0) - mean(1))).abs() < 1e-12 && mean(3) < 0.0, "{row:?}");
+        assert!(measured[8] > measured[6] && measured.iter().step_by(2).take(5).all(|x| *x > 0.0), "{row:?}");
+    }
+}

@@ -1,24 +1,27 @@
-//! Cycles with closed forms, computed by the reference and by lanes in f32 and f64.
+//! Motions with closed forms, computed by the reference and by lanes in f32 and f64.
 
 use nalgebra::Matrix4;
 
 use crate::ball::{ball, bounce, window};
 use crate::clearance;
 use crate::clutch;
-use crate::common::apart;
 use crate::common::closed_form::Walled;
 use crate::common::gpu::open;
 use crate::cycle::{eigenvalues, followed, multipliers};
 use crate::elastic::{backlash, bilinear, soft};
 use crate::loose_gear::gear;
+use crate::machines;
+use crate::meissner;
+use crate::models;
 use crate::single_impact::stable;
-use rattlemap::gpu::{Features, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{Features, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, State, state};
+use rattlemap_dynamics::model::{Contact, Law, Model, Oscillator, State, state};
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
+use rattlemap_dynamics::reference::machine::{Motion, System};
 
 /// A stable cycle with a closed form.
 struct Known {
@@ -81,6 +84,16 @@ fn known_cycles() -> Vec<Known> {
             }
         }
     }
+    for cycle in models::cycles() {
+        let models::Cycle { what, oscillator, law, period, strobe: [x, v], radius, impacts, stays } = cycle;
+        let (strobe, impacts) = (state(&[x, v]), f64::from(impacts));
+        list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays });
+    }
+    for cycle in machines::cycles() {
+        let machines::Cycle { what, machine, strobe, radius, impacts } = cycle;
+        let (oscillator, law) = (Oscillator::of_machine(machine), Law::both(0.0, 0.0));
+        list.push(Known { what, oscillator, law, period: 1, strobe, radius, impacts, stays: false });
+    }
     for cycle in clutch::cycles() {
         let clutch::Cycle { oscillator, law, period, strobe: [x, v], radius, impacts, stays } = cycle;
         let what = format!("clutch, omega = {}, F = {}", oscillator.omega, oscillator.force[0]);
@@ -142,6 +155,28 @@ fn start(known: &Known) -> State {
     known.strobe.map(|x| 1.001 * x)
 }
 
+/// Returns the largest difference of displacements, and of velocities over the forcing frequency.
+fn distance(a: &State, b: &State, omega: f64) -> f64 {
+    let unit = |i: usize| if i.is_multiple_of(2) { 1.0 } else { omega };
+    (0..a.len()).map(|i| (a[i] - b[i]).abs() / unit(i)).fold(0.0, f64::max)
+}
+
+/// Returns the states of a cycle at phase 0.
+fn images(known: &Known) -> Vec<State> {
+    let Some(machine) = &known.oscillator.machine else {
+        let at = |n: u32| followed(&known.oscillator, known.law, known.strobe, n).end;
+        return (0..known.period).map(at).collect();
+    };
+    let system = System::new(machine);
+    let mut motion = Motion::new(&system, &known.strobe);
+    let next = |_| {
+        let state = motion.state();
+        motion.advance_period(&mut ()).expect("an ordinary motion");
+        state
+    };
+    (0..known.period).map(next).collect()
+}
+
 /// Returns the errors of a record: that of the state, relative to the motion, and that of the logarithm of the
 /// multiplier.
 fn off(known: &Known, record: &Record) -> [f64; 2] {
@@ -149,15 +184,18 @@ fn off(known: &Known, record: &Record) -> [f64; 2] {
     let impacts = known.impacts / f64::from(known.period);
     assert!((record.impacts_per_period - impacts).abs() < 1e-9, "{}: {record:?}", known.what);
     assert_eq!(record.is_always_in_contact(), known.stays, "{}: {record:?}", known.what);
-    let at = |n: u32| followed(&known.oscillator, known.law, known.strobe, n).end;
-    let near = (0..known.period).map(|n| apart(record.strobe, at(n))).fold(f64::INFINITY, f64::min);
-    let size = known.strobe.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let omega = known.oscillator.omega;
+    let apart = |at: State| distance(&record.strobe, &at, omega);
+    let near = images(known).into_iter().map(apart).fold(f64::INFINITY, f64::min);
+    let size = distance(&known.strobe, &state(&[]), omega);
     let span = f64::from(known.period) * known.oscillator.period();
+    // A cycle at rest has no size.
+    let error = if near == 0.0 { 0.0 } else { near / size };
     if known.radius == 0.0 {
-        assert_eq!((near, record.lyapunov), (0.0, f64::NEG_INFINITY), "{}: {record:?}", known.what);
-        return [0.0; 2];
+        assert_eq!(record.lyapunov, f64::NEG_INFINITY, "{}: {record:?}", known.what);
+        return [error, 0.0];
     }
-    [near / size, (record.lyapunov * span - known.radius.ln()).abs()]
+    [error, (record.lyapunov * span - known.radius.ln()).abs()]
 }
 
 fn worst(known_cycles: &[Known], records: &[Record], engine: &str) -> [f64; 2] {
@@ -182,19 +220,71 @@ fn the_reference_finds_known_cycles() {
     assert!(state < 1e-12 && multiplier < 1e-12, "{state:e} {multiplier:e}");
 }
 
-fn check_lanes(precision: Precision, bars: [f64; 2]) {
-    let known_cycles = known_cycles();
-    let flows: Vec<Oscillator> = known_cycles.iter().map(|known| known.oscillator.clone()).collect();
-    let laws: Vec<Law> = known_cycles.iter().map(|known| known.law).collect();
+/// Runs a lane for each oscillator with its law and start.
+fn run(gpu: &mut Gpu, cells: &[(Oscillator, Law, State)], settings: &LaneSettings) -> Vec<Record> {
+    let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.0.clone()).collect();
+    let laws: Vec<Law> = cells.iter().map(|cell| cell.1).collect();
     let lanes: Vec<Lane> =
-        (0..).zip(&known_cycles).map(|(i, known)| Lane { flow: i, law: i, start: start(known) }).collect();
+        (0..).zip(cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.2 }).collect();
+    pollster::block_on(gpu.run(&flows, &laws, &lanes, settings)).unwrap()
+}
+
+/// Returns settings with the features of all these oscillators.
+fn settings<'o>(oscillators: impl Iterator<Item = &'o Oscillator>, settings: LaneSettings) -> LaneSettings {
+    LaneSettings {
+        features: oscillators.map(Features::of).fold(settings.features, Features::and),
+        ..settings
+    }
+}
+
+/// Compares lanes with all closed forms. `bars` are the largest errors of [`off`].
+fn check_lanes(precision: Precision, bars: [f64; 2]) {
+    // Machines need a shader of their own.
+    let is_machine = |known: &Known| Features::of(&known.oscillator).machine.is_some();
+    let (machines, plain): (Vec<Known>, Vec<Known>) = known_cycles().into_iter().partition(is_machine);
     let mut gpu = open(precision);
-    let settings = LaneSettings::within(&budget());
-    let features = flows.iter().map(Features::of).fold(settings.features, Features::and);
-    let settings = LaneSettings { features, ..settings };
-    let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &settings)).unwrap();
-    let [state, multiplier] = worst(&known_cycles, &records, precision.name());
-    assert!(state < bars[0] && multiplier < bars[1], "{state:e} {multiplier:e}");
+    for group in [&machines, &plain] {
+        let cells: Vec<_> =
+            group.iter().map(|known| (known.oscillator.clone(), known.law, start(known))).collect();
+        let settings = settings(cells.iter().map(|cell| &cell.0), LaneSettings::within(&budget()));
+        let records = run(&mut gpu, &cells, &settings);
+        let [state, multiplier] = worst(group, &records, precision.name());
+        assert!(state < bars[0] && multiplier < bars[1], "{state:e} {multiplier:e}");
+    }
+    check_borders(&mut gpu, &plain);
+    check_chain(&mut gpu, bars[0]);
+}
+
+/// Small motion of Meissner's equation meets the stops where rest is unstable, and nowhere else. The shader is that of the `plain` cycles.
+fn check_borders(gpu: &mut Gpu, plain: &[Known]) {
+    let points = meissner::points();
+    let small = state(&[0.01]);
+    let cells: Vec<_> =
+        points.iter().map(|point| (point.model.oscillator().unwrap(), point.model.law(), small)).collect();
+    let all = plain.iter().map(|known| &known.oscillator).chain(cells.iter().map(|cell| &cell.0));
+    let records = run(gpu, &cells, &settings(all, LaneSettings::within(&budget())));
+    for (point, record) in points.iter().zip(&records) {
+        let stays = record.period == 1 && record.is_contact_free();
+        assert_eq!(stays, point.is_stable, "{}: {record:?}", point.what);
+    }
+}
+
+/// Forcing periods over which lanes follow the chain.
+const CHAIN_PERIODS: u32 = 8;
+
+/// Compares the chain of masses with its closed form between impacts.
+fn check_chain(gpu: &mut Gpu, bar: f64) {
+    let (machine, start, end, impacts) = machines::chain(CHAIN_PERIODS);
+    let (omega, flow) = (machine.omega, Oscillator::of_machine(machine));
+    let settings = settings([&flow].into_iter(), LaneSettings::only(CHAIN_PERIODS));
+    let [record] = run(gpu, &[(flow, Law::both(0.0, 0.0), start)], &settings)[..] else {
+        unreachable!("one lane has one record")
+    };
+    let off = distance(&record.strobe, &end, omega) / distance(&end, &state(&[]), omega);
+    println!("chain: state {off:.1e} after {impacts} impacts");
+    let found = (record.impacts_per_period * f64::from(CHAIN_PERIODS)).round();
+    assert_eq!((record.status, found), (0, f64::from(impacts)));
+    assert!(impacts > 3 && off < bar, "{impacts} {off:e}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Machines: two loose gears on a heavy shaft, a chain between impacts in closed form, harmonics and their phase, restitution that depends
 //! on the speed, and the balance of energy.
 
-use nalgebra::{DMatrix, DVector, Matrix2, RowVector2};
+use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2};
 
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::flow::Flow;
@@ -16,7 +16,8 @@ use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer};
 use crate::ball::{self, bounce};
 use crate::common::apart;
 use crate::common::closed_form::{self, Linear, Walled};
-use crate::cycle::off_the_integrator;
+use crate::cycle::{eigenvalues, off_the_integrator};
+use crate::pieces;
 
 /// Returns the machine of a model in `models/`.
 fn machine(name: &str, values: &[(&str, f64)]) -> Machine {
@@ -76,15 +77,19 @@ impl Gears {
     /// Returns the whole machine, with a shaft of a given mass.
     fn together(&self, shaft: f64) -> Machine {
         let drive = self.swing * (STIFFNESS - self.omega * self.omega) / STIFFNESS;
+        // The drive of the file is A sin(omega t).
+        self.with(shaft, &[("A", drive), ("c", 0.0)]).at_phase(1.5 * std::f64::consts::PI)
+    }
+
+    /// Returns the machine with a shaft of a given mass, and further values.
+    fn with(&self, shaft: f64, values: &[(&str, f64)]) -> Machine {
         let [m1, m2] = self.mass;
         let [drag1, drag2] = self.drag;
         let [b1, b2] = self.backlash;
-        let values = [
+        let own = [
             ("omega", self.omega),
-            ("A", drive),
             ("M", shaft),
             ("k", STIFFNESS * shaft),
-            ("c", 0.0),
             ("m1", m1),
             ("m2", m2),
             ("drag1", drag1),
@@ -94,8 +99,7 @@ impl Gears {
             ("b2", b2),
             ("e", self.e),
         ];
-        // The drive of the file is A sin(omega t).
-        machine("two-loose-gears", &values).at_phase(1.5 * std::f64::consts::PI)
+        machine("two-loose-gears", &[&own[..], values].concat())
     }
 
     /// Returns one gear alone, in closed form.
@@ -121,6 +125,65 @@ impl Gears {
     fn starts(&self) -> [[f64; 2]; 2] {
         self.backlash.map(|backlash| [-0.5 * backlash, 0.1 * self.swing * self.omega])
     }
+}
+
+/// A stable cycle of a machine, of one forcing period.
+pub(crate) struct Cycle {
+    pub(crate) what: String,
+    pub(crate) machine: Machine,
+    pub(crate) strobe: State,
+    /// Modulus of the largest multiplier.
+    pub(crate) radius: f64,
+    pub(crate) impacts: f64,
+}
+
+/// Mass of a shaft that does not feel the gears, within rounding.
+const HEAVY: f64 = 1e16;
+
+/// Returns cycles: each of two loose gears on a heavy shaft that is driven through a spring and a damper, and bounces of a viscoelastic
+/// ball.
+pub(crate) fn cycles() -> Vec<Cycle> {
+    let mut list = Vec::new();
+    let cases = [(5e-4, 0.8, [2e-3, 5e-3]), (5e-4, 0.6, [1e-3, 1e-3]), (7e-4, 0.6, [5e-3, 5e-3])];
+    for (swing, e, backlash) in cases {
+        let gears = Gears { swing, e, backlash, ..GEARS };
+        // The shaft moves by -S cos(omega t) where the drive A sin(omega t) has this phase at t = 0.
+        let (omega, damping) = (gears.omega, 200.0);
+        let drive = Complex::new(STIFFNESS, damping * omega);
+        let gain = drive / (drive - omega * omega);
+        let phase = 1.5 * std::f64::consts::PI - gain.arg();
+        let values = [("c", damping * HEAVY), ("A", swing / gain.norm())];
+        let machine = gears.with(HEAVY, &values).at_phase(phase.rem_euclid(std::f64::consts::TAU));
+        let mut strobe = state(&[-swing, 0.0]);
+        let (mut radius, mut impacts) = ((-0.5 * damping * machine.period()).exp(), 0.0);
+        for gear in [0, 1] {
+            let walled = gears.alone(gear);
+            let walls = [[0.0, e], [-backlash[gear], e]];
+            let pieces = pieces::between(&[walled.free.into()], &[0.0], walls);
+            let what = format!("gear {gear} at S = {swing}");
+            let (oscillator, law) = walled.oscillator();
+            let ([z, w], period, end) = pieces.settled(&what, &oscillator, law, gears.starts()[gear]);
+            assert_eq!(period, 1, "{what}");
+            (strobe[2 * gear + 2], strobe[2 * gear + 3]) = (-swing - z, -w);
+            impacts += f64::from(end.impacts);
+            radius = radius.max(eigenvalues(end.tangent.transpose().into())[0].norm());
+        }
+        let what = format!("two loose gears, S = {swing}, e = {e}");
+        list.push(Cycle { what, machine, strobe, radius, impacts });
+    }
+    for (loss, share) in [(0.2, 0.3), (0.3, 0.5), (0.4, 0.9)] {
+        let Bounce { shaking, strobe, product, sum, .. } = Bounce::of(loss, share);
+        let radius = eigenvalues([[0.0, -product], [1.0, sum]])[0].norm();
+        let machine = machine("viscoelastic-ball", &[("A", shaking), ("B", loss)]);
+        list.push(Cycle {
+            what: format!("viscoelastic ball, B = {loss}"),
+            machine,
+            strobe,
+            radius,
+            impacts: 1.0,
+        });
+    }
+    list
 }
 
 /// A shaft of finite mass feels the gears, and deviates from its motion in proportion to the inverse of its mass. Times are compared
@@ -248,13 +311,56 @@ impl Chain {
         end[2 * LINKS] += tau * y[2 * LINKS + 1];
         end
     }
+
+    /// Follows the motion from phase 0 over so many periods. Returns the last state and the number of impacts.
+    fn run(&self, start: &State, periods: u32) -> (State, u32) {
+        let (period, ball, e) = (std::f64::consts::TAU / self.omega, 0.2, 0.7);
+        let h = period / PLACES as f64;
+        let gap = |y: &State| y[2 * LINKS] - y[2 * LINKS - 2];
+        let is_outside = |y: &State| gap(y).abs() > 0.5;
+        let (mut y, mut impacts) = (*start, 0);
+        for _ in 0..periods {
+            let mut t = 0.0;
+            loop {
+                let steps = (1..).map(|j| h * f64::from(j)).take_while(|&tau| tau < period - t);
+                let Some(mut hi) = steps.chain([period - t]).find(|&tau| is_outside(&self.after(t, &y, tau)))
+                else {
+                    y = self.after(t, &y, period - t);
+                    break;
+                };
+                let mut lo = (hi - h).max(0.0);
+                for _ in 0..60 {
+                    let middle = 0.5 * (lo + hi);
+                    if is_outside(&self.after(t, &y, middle)) { hi = middle } else { lo = middle }
+                }
+                y = self.after(t, &y, hi);
+                t += hi;
+                y[2 * LINKS] = y[2 * LINKS - 2] + gap(&y).clamp(-0.5, 0.5);
+                let rate = y[2 * LINKS + 1] - y[2 * LINKS - 1];
+                let impulse = -(1.0 + e) * rate / (1.0 / self.mass + 1.0 / ball);
+                y[2 * LINKS - 1] -= impulse / self.mass;
+                y[2 * LINKS + 1] += impulse / ball;
+                impacts += 1;
+            }
+        }
+        (y, impacts)
+    }
+}
+
+/// Instants per period at which the chain's gap is compared with its walls.
+const PLACES: usize = 4000;
+
+/// Returns a chain, the state at the start, and state and number of impacts after so many periods.
+pub(crate) fn chain(periods: u32) -> (Machine, State, State, u32) {
+    let start = std::array::from_fn(|i| 0.1 * (1.0 + 3.7 * i as f64).sin() * if i < 14 { 1.0 } else { 0.01 });
+    let (end, impacts) = Chain::new().run(&start, periods);
+    (machine("absorber-chain", &CHAIN), start, end, impacts)
 }
 
 #[test]
 fn a_chain_moves_in_its_normal_modes_until_the_ball_hits_it() {
-    let (chain, system) = (Chain::new(), System::new(&machine("absorber-chain", &CHAIN)));
-    let start: [f64; 16] =
-        std::array::from_fn(|i| 0.1 * (1.0 + 3.7 * i as f64).sin() * if i < 14 { 1.0 } else { 0.01 });
+    let (machine_of_chain, start, end, _) = chain(8);
+    let (chain, system) = (Chain::new(), System::new(&machine_of_chain));
     let free = System::new(&{
         let mut wide = machine("absorber-chain", &CHAIN);
         wide.gaps[0].walls.iter_mut().flatten().for_each(|wall| wall.at *= 100.0);
@@ -301,6 +407,10 @@ fn a_chain_moves_in_its_normal_modes_until_the_ball_hits_it() {
         let flown = (period + 1 - from.0) as f64 * system.period() - from.1;
         worst[0] = worst[0].max(apart(motion.state(), chain.after(from.1, &at, flown)));
         (from, at) = ((period + 1, 0.0), motion.state());
+        if period == 7 {
+            let off = apart(at, end);
+            assert!(off < 1e-12, "after 8 periods: {off:e}");
+        }
     }
     println!("{impacts} impacts: flights, other velocities, momentum, energy {worst:?}");
     assert!(impacts > 20 && worst.into_iter().all(|off| off < 1e-12), "{impacts} {worst:?}");
@@ -555,29 +665,47 @@ fn restitution_by_speed_is_limited() {
 /// The orbit of one bounce per period needs the approach speed `w = T/(1 + e(w))`. Its multipliers have the product `e s` and the sum
 /// `-(e + s) - (1 + e)(1 + s)(G cos(phi) - 1)`, with the derivative `s = e + e' w` of the leaving speed. Without dependence on the speed
 /// this is the sum in `ball.rs`.
-#[test]
-fn a_viscoelastic_ball_bounces_once_per_period_in_closed_form() {
-    for (loss, share) in [(0.2, 0.3), (0.3, 0.5), (0.4, 0.5), (0.4, 0.9), (0.5, 0.2)] {
+struct Bounce {
+    /// Acceleration of the table in units of gravity.
+    shaking: f64,
+    strobe: State,
+    approach: f64,
+    /// Product and sum of the multipliers.
+    product: f64,
+    sum: f64,
+}
+
+impl Bounce {
+    /// Returns the orbit for a loss `1 - e(1)`, at a share of the range of accelerations in which it is stable with constant restitution.
+    fn of(loss: f64, share: f64) -> Bounce {
         let e = |w: f64| 1.0 - loss * w.powf(0.2);
         let w = (0..200).fold(4.0, |w, _| 0.5 * (w + std::f64::consts::TAU / (1.0 + e(w))));
         let (e, slope) = (e(w), e(w) - 0.2 * loss * w.powf(0.2));
         let [fold, doubles] = ball::window(e);
         let shaking = fold + share * (doubles - fold);
-        let start = bounce(shaking, e).0;
+        // The phase of the impact has a negative sine.
+        let downwards = shaking * (1.0 - (fold / shaking).powi(2)).sqrt() - 1.0;
+        let sum = -(e + slope) - (1.0 + e) * (1.0 + slope) * downwards;
+        Bounce { shaking, strobe: bounce(shaking, e).0, approach: w, product: e * slope, sum }
+    }
+}
+
+#[test]
+fn a_viscoelastic_ball_bounces_once_per_period_in_closed_form() {
+    for (loss, share) in [(0.2, 0.3), (0.3, 0.5), (0.4, 0.5), (0.4, 0.9), (0.5, 0.2)] {
+        let Bounce { shaking, strobe, approach, product, sum } = Bounce::of(loss, share);
         let system = System::new(&machine("viscoelastic-ball", &[("A", shaking), ("B", loss)]));
-        let mut motion = Motion::new(&system, &start);
+        let mut motion = Motion::new(&system, &strobe);
         motion.set_tangents(Motion::unit_tangents(&system));
         let mut log = Log::default();
         motion.advance_period(&mut log).unwrap();
         let [event] = log.events[..] else { panic!("{:?}", log.events) };
-        let off = apart(motion.state(), start);
+        let off = apart(motion.state(), strobe);
         let matrix = motion.derivative();
-        let downwards = shaking * event.t.cos() - 1.0;
-        let trace = matrix.trace() + e + slope + (1.0 + e) * (1.0 + slope) * downwards;
-        let det = matrix.determinant() - e * slope;
-        println!("B = {loss}, e = {e:.3}: state {off:.1e}, multipliers {:.1e}", trace.abs().max(det.abs()));
+        let (trace, det) = (matrix.trace() - sum, matrix.determinant() - product);
+        println!("B = {loss}: state {off:.1e}, multipliers {:.1e}", trace.abs().max(det.abs()));
         assert!(off < 1e-12 && trace.abs().max(det.abs()) < 1e-12, "{off:e} {trace:e} {det:e}");
-        assert!((event.rates[0] + w).abs() < 1e-12);
+        assert!((event.rates[0] + approach).abs() < 1e-12);
     }
 }
 

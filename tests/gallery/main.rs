@@ -18,5 +18,7 @@ mod friction;
 mod loose_gear;
 mod machines;
 mod meissner;
+mod models;
+mod pieces;
 mod random;
 mod single_impact;

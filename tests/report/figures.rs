@@ -286,7 +286,7 @@ fn columns(count: u32, points: u32) -> Vec<Column> {
                 0.0,
                 -side.sign() * (1.4 - 0.4 * spread),
             ]);
-            SectionPoint { side, kind: EventKind::Impact, t_mod_period: 0.0, before: at, after: at }
+            SectionPoint { gap: 0, side, kind: EventKind::Impact, t_mod_period: 0.0, before: at, after: at }
         };
         let points = if class == Class::Chaotic { (0..points).map(point).collect() } else { vec![] };
         Column {

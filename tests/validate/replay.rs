@@ -162,8 +162,10 @@ fn averages_near_a_cycle_may_be_off_by_the_distance() {
     let text = "model = 'gear-pair'\n[[axis]]\nparameter = 'e'\nvalues = [0.6, 0.61]\n[[axis]]\nparameter = 'omega'\n\
                 values = [5.142857142857143, 5.15]\n[outputs]\nquantities = ['class', 'lyapunov', 'amplitude']\n";
     let plan = Plan::new(&Scene::parse(text, "test", &[], Purpose::Map).unwrap());
-    let mean =
-        measures::all().find(|measure| measure.name(&["x1", "v1", "x2", "v2"]) == "mean_gap").unwrap().place;
+    let mean = measures::all()
+        .find(|measure| measure.name(&["x1", "v1", "x2", "v2"], &[]) == "mean_gap")
+        .unwrap()
+        .place;
     let found = |distance: f64, off: f64| {
         let mut records = cpu_records(&plan);
         records[0].strobe[0] += distance;

@@ -8,7 +8,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::oscillator::{MATRIX_TOLERANCE, check_phases, finite, positive, require, schedule_at, turn};
+use super::oscillator::{
+    MATRIX_TOLERANCE, check_phases, finite, positive, recurs_after_half_a_period, require, schedule_at, turn,
+};
 use super::{
     Contact, HIGHEST_ORDER, Law, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, Oscillator,
     OscillatorError, Side,
@@ -263,6 +265,31 @@ impl Machine {
             Some(&(0.0, stage)) => stage,
             _ => self.schedule.last().map_or(0, |&(_, stage)| stage),
         }
+    }
+
+    /// Whether `(y, t) -> (-y, t + T/2)` maps motions to motions: the walls of each gap are mirror images with equal laws, the force has odd
+    /// harmonics only, no surface moves, and the stages recur, mirrored, after half a period.
+    pub fn mirror_symmetric(&self) -> bool {
+        let pairs = || self.gaps.iter().flat_map(|gap| gap.walls[0].iter().zip(&gap.walls[1]));
+        let is_alike = |(right, left): (&Wall, &Wall)| {
+            right.at == -left.at
+                && right.contact == left.contact
+                && right.restitution == left.restitution
+                && right.mesh_speed == left.mesh_speed
+        };
+        // `i` and `j` are stages half a period apart.
+        let is_mirrored = |i: usize, j: usize| {
+            let (a, b) = (&self.stages[i], &self.stages[j]);
+            let springs = |(right, left): (&Wall, &Wall)| {
+                right.contact == Contact::Rigid || right.springs[i] == left.springs[j]
+            };
+            a.damping == b.damping && a.stiffness == b.stiffness && a.load == -&b.load && pairs().all(springs)
+        };
+        self.gaps.iter().all(|gap| gap.walls[0].len() == gap.walls[1].len())
+            && pairs().all(is_alike)
+            && self.drives.iter().all(|drive| drive.order % 2 == 1)
+            && self.friction.iter().all(|friction| friction.speed == 0.0)
+            && recurs_after_half_a_period(&self.schedule, is_mirrored)
     }
 
     /// Checks all ranges.

@@ -907,38 +907,45 @@ impl Oscillator {
     /// solutions to solutions. The force must then have odd harmonics only, and stages must recur, mirrored, after half a
     /// period.
     pub fn mirror_symmetric(&self) -> bool {
-        if self.machine.is_some() {
-            // No search for symmetric orbits of machines is made.
-            return false;
+        if let Some(machine) = &self.machine {
+            return machine.mirror_symmetric();
         }
-        let is_mirrored = |a: Stage, b: Stage| {
-            a.free == mirrored(&b.free)
-                && (!self.has_motion_behind(Side::Right)
-                    || a.meshing[0] == mirrored(&b.meshing[1]) && b.meshing[0] == mirrored(&a.meshing[1]))
-        };
-        let half = self.schedule.len() / 2;
-        let recurs = |(i, &(begins, index)): (usize, &(f64, usize))| {
-            let (later, mirror) = self.schedule[i + half];
-            (later - begins - 0.5).abs() < SAME_PHASE && is_mirrored(self.stage(index), self.stage(mirror))
-        };
         let [right, left] = &self.outer_walls;
-        let are_mirrored = |(right, left): (&OuterWall, &OuterWall)| {
-            // With stages the mirror image of each domain would have to be looked up; no such model is known.
-            right.at == -left.at
-                && right.contact == left.contact
-                && self.stages.is_empty()
-                && (right.contact == Contact::Rigid || right.meshing[0] == mirrored(&left.meshing[0]))
+        // `i` and `j` are stages half a period apart.
+        let is_mirrored = |i: usize, j: usize| {
+            let (a, b) = (self.stage(i), self.stage(j));
+            let behind = |(right, left): (&OuterWall, &OuterWall)| {
+                right.contact == Contact::Rigid || right.meshing[i] == mirrored(&left.meshing[j])
+            };
+            a.free == mirrored(&b.free)
+                && (!self.has_motion_behind(Side::Right) || a.meshing[0] == mirrored(&b.meshing[1]))
+                && right.iter().zip(left).all(behind)
         };
         self.walls[0] == -self.walls[1]
             && self.contacts[0] == self.contacts[1]
             && right.len() == left.len()
-            && right.iter().zip(left).all(are_mirrored)
+            && right
+                .iter()
+                .zip(left)
+                .all(|(right, left)| right.at == -left.at && right.contact == left.contact)
             && self.harmonics.iter().all(|harmonic| harmonic.order % 2 == 1)
             && self.friction.iter().all(|friction| friction.speed == 0.0)
-            && match self.schedule.len() {
-                0 => is_mirrored(self.stage(0), self.stage(0)),
-                changes => changes % 2 == 0 && self.schedule.iter().enumerate().take(half).all(recurs),
-            }
+            && recurs_after_half_a_period(&self.schedule, is_mirrored)
+    }
+}
+
+/// Whether the stage half a period after each stage of a schedule is its mirror image, in both orders.
+pub(super) fn recurs_after_half_a_period(
+    schedule: &[(f64, usize)],
+    is_mirrored: impl Fn(usize, usize) -> bool,
+) -> bool {
+    let half = schedule.len() / 2;
+    let recurs = |(&(begins, stage), &(later, mirror)): (&(f64, usize), &(f64, usize))| {
+        (later - begins - 0.5).abs() < SAME_PHASE && is_mirrored(stage, mirror) && is_mirrored(mirror, stage)
+    };
+    match schedule.len() {
+        0 => is_mirrored(0, 0),
+        changes => changes % 2 == 0 && schedule.iter().zip(&schedule[half..]).all(recurs),
     }
 }
 

@@ -400,7 +400,8 @@ impl Analysis<'_> {
     /// symmetric; for these the half-period map is tried first, because it is more reliable.
     pub(super) fn maps(&self, period: u32) -> Vec<StrobeMap> {
         let whole = StrobeMap::Periods(period);
-        if period % 2 == 1 && self.flow.mirror_symmetric(&self.law) {
+        // The mirror image of a machine's modes is not known, so that `smallest` tests the symmetry of its cycles.
+        if period % 2 == 1 && self.flow.mirror_symmetric(&self.law) && self.flow.machine.is_none() {
             vec![StrobeMap::MirroredHalves(period), whole]
         } else {
             vec![whole]
@@ -409,6 +410,27 @@ impl Analysis<'_> {
 
     /// Returns the cycle with its smallest period, and with its symmetry tested.
     pub(super) fn smallest(
+        &self,
+        newton: &mut Newton,
+        seed: &Trajectory<'_>,
+        cycle: Cycle,
+        metric: &Metric,
+    ) -> Option<Cycle> {
+        let mut cycle = self.with_smallest_period(newton, seed, cycle, metric)?;
+        let may_be_symmetric = cycle.period % 2 == 1 && self.flow.mirror_symmetric(&self.law);
+        if may_be_symmetric && self.flow.machine.is_some() {
+            let mut half = seed.at(cycle.state, []);
+            let middle = (0..cycle.period / 2).try_for_each(|_| half.advance_period(&mut ()));
+            middle.and_then(|()| half.advance_to(0.5 * self.flow.period, &mut ())).ok()?;
+            let distance = metric.distance(&half.state().map(|value| -value), &cycle.state);
+            // The map amplifies the rounding error of the fixed point.
+            let image = newton.apply(StrobeMap::Periods(cycle.period), seed, cycle.state)?;
+            cycle.symmetric = distance < ON_CYCLE * norm(&image.balanced()).max(1.0);
+        }
+        Some(cycle)
+    }
+
+    fn with_smallest_period(
         &self,
         newton: &mut Newton,
         seed: &Trajectory<'_>,

@@ -5,6 +5,7 @@
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
 use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule};
+use crate::model::{MOST_COORDINATES, MOST_GAPS};
 use crate::reference::machine::{Flight, MachineEvent, Point, Signal};
 use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory, side_of};
 
@@ -19,6 +20,19 @@ const GAUSS: [(f64, f64); 4] = [
 /// Largest number of iterations that locate an extreme.
 const EXTREME_ITERATIONS: usize = 60;
 
+/// Largest number of displacements and gaps.
+pub const DISPLACEMENTS: usize = MOST_COORDINATES + MOST_GAPS;
+
+/// Returns the place of a displacement in [`Quantities::displacements`].
+pub fn place_of_displacement(i: usize) -> usize {
+    if i < 2 { i } else { i + 1 }
+}
+
+/// Returns the place of a gap in [`Quantities::displacements`].
+pub fn place_of_gap(i: usize) -> usize {
+    if i == 0 { 2 } else { MOST_COORDINATES + i }
+}
+
 /// Quantities of one motion over a whole number of forcing periods, in the units of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quantities {
@@ -29,8 +43,8 @@ pub struct Quantities {
     pub impact_energy: f64,
     /// Largest and root mean square force of compliant contacts, positive if it presses; none without such contact.
     pub contact_force: Option<[f64; 2]>,
-    /// Both displacements and the gap.
-    pub displacements: [Displacement; 3],
+    /// The first two displacements, the first gap, the other displacements and the other gaps; 0 where the oscillator has no more.
+    pub displacements: [Displacement; DISPLACEMENTS],
     /// Energy that all dampers take per unit time.
     pub dissipated: f64,
     /// Dry friction; none without it.
@@ -120,7 +134,11 @@ impl Moments {
         self.high = self.high.max(value);
     }
 
+    /// Returns the averages over a time; 0 of a displacement that the oscillator does not have.
     fn over(&self, time: f64) -> Displacement {
+        if self.high < self.low {
+            return Displacement::default();
+        }
         let [cos, sin] = [self.cos, self.sin].map(|x| 2.0 * x / time);
         Displacement {
             amplitude: 0.5 * (self.high - self.low),
@@ -150,7 +168,7 @@ pub(super) struct Meter<'f> {
     contacts: [Contacts; 2],
     lost: f64,
     dissipated: f64,
-    displacements: [Moments; 3],
+    displacements: [Moments; DISPLACEMENTS],
     force: Moments,
     contact_time: f64,
     sticking_time: f64,
@@ -177,7 +195,7 @@ impl<'f> Meter<'f> {
             contacts: Default::default(),
             lost: 0.0,
             dissipated: 0.0,
-            displacements: [Moments::NONE; 3],
+            displacements: [Moments::NONE; DISPLACEMENTS],
             force: Moments::NONE,
             contact_time: 0.0,
             sticking_time: 0.0,
@@ -426,7 +444,8 @@ impl Observer for Meter<'_> {
             let point = flight.at(share);
             let (sin, cos) = (self.flow.omega * (flight.start + share * flight.duration)).sin_cos();
             let weight = weight * flight.duration;
-            for (moments, signal) in self.displacements.iter_mut().zip(&displacements) {
+            for (place, signal) in &displacements {
+                let moments = &mut self.displacements[*place];
                 moments.integrate(weight, signal.at(&point), [cos, sin]);
             }
             self.dissipated += weight * flight.dissipation(&point);
@@ -439,7 +458,6 @@ impl Observer for Meter<'_> {
                 self.sticking_time += weight;
             }
             let (start, from) = before.unwrap_or_else(|| (0.0, flight.at(0.0)));
-            let of_displacements = self.displacements.iter_mut().zip(&displacements);
             let include = |moments: &mut Moments, signal: &Signal| {
                 moments.include(signal.at(&from));
                 moments.include(signal.at(&point));
@@ -448,7 +466,7 @@ impl Observer for Meter<'_> {
                     moments.include(signal.at(&flight.at(root(start, share, rate))));
                 }
             };
-            of_displacements.for_each(|(moments, signal)| include(moments, signal));
+            displacements.iter().for_each(|(place, signal)| include(&mut self.displacements[*place], signal));
             for signal in &forces {
                 include(&mut self.force, signal);
             }

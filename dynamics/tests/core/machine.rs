@@ -1,7 +1,8 @@
 //! The engine of machines, on oscillators of two coordinates, against the integrator by matrix exponentials.
 
+use nalgebra::DVector;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Machine, Oscillator, REST};
+use rattlemap_dynamics::model::{Drive, DryFriction, Law, Machine, Oscillator, REST};
 use rattlemap_dynamics::orbit::{
     Class, EVENT_PERIODS, Orbit, Quantities, Settings, Status, analyse_flow, measure,
 };
@@ -190,6 +191,7 @@ fn machines_have_the_classes_of_their_oscillators() {
             && found.word == expected.word
             && measured.period == Some(period)
             && measured.word.as_ref() == Some(&expected.word)
+            && found.symmetric == expected.symmetric
             && (radius(&found) - radius(&expected)).abs() < 1e-7
             && same_quantities(&found, &expected)
             && (found.mesh_fraction - expected.mesh_fraction).abs() < 1e-9
@@ -201,6 +203,82 @@ fn machines_have_the_classes_of_their_oscillators() {
     others.iter().take(5).for_each(|what| println!("{what}"));
     // Several attractors and slow transients may end elsewhere.
     assert!(others.len() <= 2, "{} of {} differ", others.len(), all.len());
+}
+
+/// The gear pair as a machine, with a stage that begins at phase 0.1 and recurs, mirrored, after half a period.
+fn mirrored_pair(e: f64) -> Machine {
+    let pair = crate::common::paper(e, 5.6);
+    let mut machine = Machine::of(&pair.oscillator().unwrap(), pair.law());
+    let mut other = machine.stages[0].clone();
+    machine.stages[0].load[0] = 0.1;
+    other.load[0] = -0.1;
+    machine.stages.push(other);
+    machine.schedule = vec![(0.1, 1), (0.6, 0)];
+    machine.gaps[0].walls.iter_mut().flatten().for_each(|wall| wall.springs.push(wall.springs[0]));
+    machine.validate().unwrap();
+    machine
+}
+
+/// A change of a machine.
+type Change = fn(&mut Machine);
+
+/// Changes after which the mirror image of a motion is no motion.
+const UNSYMMETRIC: [Change; 7] = [
+    |machine| machine.stages[0].load[1] = 0.05,
+    |machine| machine.stages[1].stiffness[(0, 0)] *= 1.1,
+    |machine| machine.schedule[1].0 = 0.65,
+    |machine| machine.gaps[0].walls[0][0].at *= 1.1,
+    |machine| machine.gaps[0].walls[1][0].restitution.constant *= 0.9,
+    |machine| {
+        let second = Drive { order: 2, ..machine.drives[0].clone() };
+        machine.drives.push(second);
+    },
+    |machine| {
+        let row = DVector::from_vec(vec![1.0, 0.0]);
+        machine.friction.push(DryFriction { row, force: 0.1, speed: 0.2 });
+    },
+];
+
+#[test]
+fn the_mirror_image_of_a_motion_is_a_motion_of_a_symmetric_machine() {
+    let off = |machine: &Machine| {
+        let [system, later] = [machine, &machine.at_phase(std::f64::consts::PI)].map(System::new);
+        let y = [0.3, 1.0, 0.1, -2.0];
+        let mut motion = Motion::new(&system, &y);
+        let mut image = Motion::new(&later, &y.map(|x| -x));
+        for motion in [&mut motion, &mut image] {
+            motion.advance_period(&mut ()).unwrap();
+        }
+        assert!(motion.work().impacts > 0);
+        motion.state().iter().zip(image.state()).map(|(a, b)| (a + b).abs()).fold(0.0, f64::max)
+    };
+    let machine = mirrored_pair(0.5);
+    assert!(machine.mirror_symmetric() && off(&machine) < 1e-12, "{:e}", off(&machine));
+    for (i, change) in UNSYMMETRIC.into_iter().enumerate() {
+        let mut changed = machine.clone();
+        change(&mut changed);
+        assert!(!changed.mirror_symmetric() && off(&changed) > 1e-4, "{i}: {:e}", off(&changed));
+    }
+}
+
+/// Cycles of the gear pair lose their symmetry in the pitchfork at e = 0.5419.
+#[test]
+fn a_cycle_of_a_machine_is_symmetric_up_to_the_pitchfork() {
+    for (e, change, symmetric) in
+        [(0.3, None, true), (0.541, None, true), (0.543, None, false), (0.3, Some(UNSYMMETRIC[4]), false)]
+    {
+        let pair = crate::common::paper(e, 5.6);
+        let mut machine = Machine::of(&pair.oscillator().unwrap(), pair.law());
+        if let Some(change) = change {
+            change(&mut machine);
+        }
+        let flow = Flow::new(&Oscillator::of_machine(machine));
+        let law = Law::both(0.0, 0.0);
+        let orbit = analyse_flow(&flow, law, REST, &Settings::default(), EVENT_PERIODS);
+        let measured = measure(&flow, law, REST, &BUDGET);
+        assert_eq!((orbit.class, measured.period), (Class::Periodic { period: 1 }, Some(1)), "{e}");
+        assert_eq!((orbit.symmetric, measured.symmetric), (Some(symmetric), Some(symmetric)), "{e}");
+    }
 }
 
 /// Prints how much longer a period of the gear pair takes as a machine.

@@ -239,14 +239,14 @@ impl Quantity {
         QUANTITIES.iter().map(|&(_, quantity)| quantity).filter(is_measured).collect()
     }
 
-    /// Returns the names of its columns for a model with these state components, if it is a measured quantity or the state.
-    pub fn columns(self, state_names: &[&str]) -> Vec<String> {
+    /// Returns the names of its columns for a model with these state components and names of several gaps, if it is a measured quantity or the state.
+    pub fn columns(self, state_names: &[&str], gaps: &[String]) -> Vec<String> {
         match self {
             Quantity::ImpactRate => vec![self.name().to_owned()],
             Quantity::State => state_names.iter().map(|name| format!("state_{name}")).collect(),
             _ => {
                 let measures = self.group().into_iter().flat_map(|group| group.measures());
-                measures.filter(|m| m.is_of(state_names)).map(|m| m.name(state_names)).collect()
+                measures.filter(|m| m.is_of(state_names, gaps)).map(|m| m.name(state_names, gaps)).collect()
             }
         }
     }

@@ -14,7 +14,7 @@ const COUNT_ROUNDING: f64 = 1e-9;
 
 /// Errors of the continuous quantities of audited cells; none if the scene does not request a quantity, or leaves it
 /// empty in filled cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     /// Errors of the largest Lyapunov exponent.
     pub lyapunov: Option<Deviation>,
@@ -41,6 +41,12 @@ pub struct Deviation {
     pub worst: f64,
     /// Number of cells whose values differ by 1 or more.
     pub off_by_one: usize,
+}
+
+impl Default for Errors {
+    fn default() -> Self {
+        Errors { lyapunov: None, impacts: None, mesh: None, measures: [None; MEASURES] }
+    }
 }
 
 impl Errors {

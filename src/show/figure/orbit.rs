@@ -2,7 +2,7 @@
 
 mod flights;
 mod gap;
-mod gaps;
+pub(crate) mod gaps;
 mod heading;
 mod motion;
 mod phase_planes;

@@ -28,20 +28,24 @@ pub(super) const COLUMN_FIELDS: [&str; 11] = [
     "periods_run",
 ];
 
-/// Writes `bifurcation.csv`: the section points, with the states before and after the event.
+/// Writes `bifurcation.csv`: the section points, with the states before and after the event. The last column is the gap's name if `gaps` has
+/// the names of several.
 pub fn write_points(
     out: impl io::Write,
     axis: &str,
     names: &[&str],
+    gaps: Option<&[String]>,
     columns: &[Column],
 ) -> Result<(), WriteError> {
     let fields = POINT_FIELDS.map(str::to_owned).into_iter().chain(state_fields(names));
+    let fields = fields.chain(gaps.map(|_| "gap".to_owned()));
     write_rows(out, axis, fields.collect(), columns, |column| {
         let states = |point: &SectionPoint| [point.before, point.after].map(|state| texts(state, names));
         let row = |point: &SectionPoint| {
             let head = [names::side_code(point.side).to_string(), names::kind(point.kind).to_owned()];
             let head = head.into_iter().chain([float(point.t_mod_period)]);
-            head.chain(states(point).concat()).collect()
+            let gap = gaps.map(|gaps| gaps[point.gap].clone());
+            head.chain(states(point).concat()).chain(gap).collect()
         };
         column.points.iter().map(row).collect()
     })
@@ -162,6 +166,7 @@ mod tests {
     #[test]
     fn a_point_has_a_row_and_a_column_without_points_has_one_row() {
         let point = SectionPoint {
+            gap: 1,
             side: Side::Left,
             kind: EventKind::MeshStart,
             t_mod_period: 0.1,
@@ -175,8 +180,16 @@ mod tests {
             "e,class,period,status,side,kind,t_mod_period,x1_before,v1_before,x2_before,v2_before,x1,v1,x2,v2\n\
              {row}\n{row}\n1.0,chaotic,,ok,,,,,,,,,,,\n"
         );
-        assert_eq!(text(|out| write_points(out, "e", &["x1", "v1", "x2", "v2"], &columns)), expected);
-        let text = text(|out| write_points(out, "e", &["x1", "v1"], &upwards(&columns[1])));
+        assert_eq!(text(|out| write_points(out, "e", &["x1", "v1", "x2", "v2"], None, &columns)), expected);
+        let gaps = ["a".to_owned(), "b".to_owned()];
+        let text_of_gaps = text(|out| write_points(out, "e", &["x1", "v1"], Some(&gaps), &columns));
+        let lines: Vec<&str> = text_of_gaps.lines().collect();
+        assert!(
+            lines[0].ends_with(",x1,v1,gap") && lines[1].ends_with(",0.30000000000000004,b"),
+            "{text_of_gaps}"
+        );
+        assert!(lines[3].ends_with(",chaotic,,ok,,,,,,,,"), "{text_of_gaps}");
+        let text = text(|out| write_points(out, "e", &["x1", "v1"], None, &upwards(&columns[1])));
         assert!(
             text.starts_with("e,direction,class,") && text.ends_with("\n1.0,up,chaotic,,ok,,,,,,,\n"),
             "{text}"

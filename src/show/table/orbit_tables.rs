@@ -2,13 +2,14 @@
 
 use std::io::Write;
 
-use crate::model_file::gap_names;
+use crate::model_file::{gap_columns, several_gaps};
 use crate::show::error::WriteError;
+use crate::show::figure::orbit::gaps::{PlotGap, contacts_at_start};
 use crate::show::names;
 use crate::show::orbit_quantities;
 use crate::show::orbit_spectrum::Spectrum;
-use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
-use rattlemap_dynamics::orbit::{Event, EventKind, History, is_reached};
+use rattlemap_dynamics::model::{Model, ModelError, Side, State};
+use rattlemap_dynamics::orbit::{Event, History, is_reached};
 
 /// A row of the motion: a sample, or the state before or after an event.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,42 +18,63 @@ pub struct Moment {
     pub t: f64,
     /// Phase of the forcing in turns.
     pub phase: f64,
-    /// Gap and its velocity.
-    pub gap: [f64; 2],
+    /// Each gap and its velocity.
+    pub gaps: Vec<[f64; 2]>,
     /// State. Only the components of the model are used.
     pub state: State,
-    /// `free`, `meshing_right` or `meshing_left`.
-    pub domain: &'static str,
-    /// Kind and side of the event, and `before` or `after`.
-    pub event: Option<(&'static str, i8, &'static str)>,
+    /// For each gap `free`, `meshing_right` or `meshing_left`.
+    pub domains: Vec<&'static str>,
+    /// Kind and side of the event, `before` or `after`, and the index of the gap.
+    pub event: Option<(&'static str, i8, &'static str, usize)>,
 }
 
 /// Merges samples with the states before and after every event. A sample at the time of an event would repeat it.
-pub fn moments(oscillator: &Oscillator, history: &History) -> Vec<Moment> {
+///
+/// # Errors
+/// [`ModelError`] if the model is not valid.
+pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, ModelError> {
     let History { samples, events, samples_per_period, forcing_period, .. } = history;
+    let oscillator = model.oscillator()?;
     let mut moments = Vec::with_capacity(samples.len() + 2 * events.len());
-    let mut add = |t, phase, state: &State, domain, event| {
-        let gap = [0, 1].map(|velocity| oscillator.gap_value(0, state, velocity));
-        moments.push(Moment { t, phase, gap, state: *state, domain: domain_name(domain), event });
+    let gaps = PlotGap::all(model, &oscillator);
+    let mut contacts = contacts_at_start(&gaps, &oscillator, events, samples);
+    let is_machine = oscillator.machine.is_some();
+    if !is_machine {
+        contacts[0] = history.meshing;
+    }
+    let mut add = |t, phase, state: &State, contacts: &[Option<Side>], event| {
+        let gap = |gap| [0, 1].map(|velocity| oscillator.gap_value(gap, state, velocity));
+        moments.push(Moment {
+            t,
+            phase,
+            gaps: (0..gaps.len()).map(gap).collect(),
+            state: *state,
+            domains: contacts[..gaps.len()].iter().copied().map(domain_name).collect(),
+            event,
+        });
     };
     let mut events = events.iter().peekable();
-    let (mut domain, mut last) = (history.meshing, f64::NEG_INFINITY);
+    let mut last = f64::NEG_INFINITY;
     for (i, sample) in samples.iter().enumerate() {
         while let Some(event) = events.next_if(|event| is_reached(event.t, sample.t)) {
             let phase = event.t_mod_period / forcing_period;
-            let mark = |moment| Some((names::kind(event.kind), names::side_code(event.side), moment));
-            add(event.t, phase, &event.before, domain, mark("before"));
-            domain = domain_after(event);
-            add(event.t, phase, &event.after, domain, mark("after"));
+            let (kind, side) = (names::kind(event.kind), names::side_code(event.side));
+            let mark = |moment| Some((kind, side, moment, event.gap));
+            add(event.t, phase, &event.before, &contacts, mark("before"));
+            contacts[event.gap] = event.meshing;
+            add(event.t, phase, &event.after, &contacts, mark("after"));
             last = event.t;
         }
         if sample.t > last {
             let phase = (i % samples_per_period) as f64 / *samples_per_period as f64;
-            domain = sample.meshing;
-            add(sample.t, phase, &sample.state, domain, None);
+            // Samples tell the contact of the first gap. Before it moves, a machine has not decided on gaps at rest.
+            if i > 0 || !is_machine {
+                contacts[0] = sample.meshing;
+            }
+            add(sample.t, phase, &sample.state, &contacts, None);
         }
     }
-    moments
+    Ok(moments)
 }
 
 /// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`. With several gaps, the last column is the name of
@@ -63,7 +85,7 @@ pub fn write_events(out: impl Write, model: &dyn Model, events: &[Event]) -> Res
     let states = ["before", "after"].into_iter();
     let states = states.flat_map(|moment| names.iter().map(move |name| format!("{moment}_{name}")));
     let head = ["kind", "side", "t", "t_mod_period"].map(str::to_owned).into_iter().chain(states);
-    let gaps = orbit_quantities::gaps(model);
+    let gaps = several_gaps(model);
     let of_gap = gaps.as_ref().map(|_| "gap".to_owned());
     table.write_record(head.chain(["impulse".to_owned()]).chain(of_gap))?;
     for (event, impulse) in events.iter().zip(orbit_quantities::impulses(model, events)) {
@@ -78,24 +100,32 @@ pub fn write_events(out: impl Write, model: &dyn Model, events: &[Event]) -> Res
     Ok(table.flush()?)
 }
 
-/// Writes `trajectory.csv`, one row per moment.
+/// Writes `trajectory.csv`, one row per moment. With several gaps, each has a column `domain_` with its name, and the last column is the name
+/// of the gap of an event.
 pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
-    let (state_names, gap_names) = (model.state_names(), gap_names(model));
-    let head = ["t", "phase"].into_iter().chain(gap_names).chain(state_names.iter().copied());
-    table.write_record(head.chain(["domain", "event", "side", "moment"]))?;
-    for Moment { t, phase, gap, state, domain, event } in moments {
-        let numbers = [*t, *phase].into_iter().chain(*gap).chain(state[..state_names.len()].iter().copied());
-        let texts = numbers.map(|x| format!("{x:?}")).chain([(*domain).to_owned()]);
-        let marks = event.map(|(kind, side, moment)| [kind.to_owned(), side.to_string(), moment.to_owned()]);
-        table.write_record(texts.chain(marks.unwrap_or_default()))?;
+    let (state_names, several) = (model.state_names(), several_gaps(model));
+    let own = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let domains = match &several {
+        Some(gaps) => gaps.iter().map(|gap| format!("domain_{gap}")).collect(),
+        None => own(&["domain"]),
+    };
+    let of_gap = several.as_ref().map_or(Vec::new(), |_| own(&["gap"]));
+    let gaps = gap_columns(model).concat();
+    let head =
+        [own(&["t", "phase"]), gaps, own(&state_names), domains, own(&["event", "side", "moment"]), of_gap];
+    table.write_record(head.concat())?;
+    for Moment { t, phase, gaps, state, domains, event } in moments {
+        let numbers = [*t, *phase].into_iter().chain(gaps.concat());
+        let numbers = numbers.chain(state[..state_names.len()].iter().copied());
+        let texts = numbers.map(|x| format!("{x:?}")).chain(own(domains));
+        let marks = event
+            .map(|(kind, side, moment, _)| [kind.to_owned(), side.to_string(), moment.to_owned()])
+            .unwrap_or_default();
+        let of_gap = several.as_ref().map(|gaps| event.map_or(String::new(), |(.., gap)| gaps[gap].clone()));
+        table.write_record(texts.chain(marks).chain(of_gap))?;
     }
     Ok(table.flush()?)
-}
-
-/// Returns the wall that the teeth mesh on after an event.
-fn domain_after(event: &Event) -> Option<Side> {
-    (event.kind == EventKind::MeshStart).then_some(event.side)
 }
 
 fn domain_name(meshing: Option<Side>) -> &'static str {
@@ -109,10 +139,10 @@ fn domain_name(meshing: Option<Side>) -> &'static str {
 /// Writes `spectrum.csv`, one row per line of the spectrum.
 pub fn write_spectrum(out: impl Write, model: &dyn Model, spectrum: &Spectrum) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
-    table.write_record(["frequency"].into_iter().chain(gap_names(model)))?;
+    table.write_record(["frequency".to_owned()].into_iter().chain(gap_columns(model).concat()))?;
     for line in &spectrum.lines {
-        let [z, w] = line.amplitudes;
-        table.write_record([line.frequency, z, w].map(|x| format!("{x:?}")))?;
+        let numbers = [line.frequency].into_iter().chain(line.amplitudes.concat());
+        table.write_record(numbers.map(|x| format!("{x:?}")))?;
     }
     Ok(table.flush()?)
 }

@@ -12,22 +12,28 @@ use flate2::read::DeflateDecoder;
 use flate2::write::DeflateEncoder;
 
 use crate::record::Record;
-use crate::record::measures::{GROUPS, places_before};
+use crate::record::measures::{FURTHER, GROUPS, places_before};
 
 /// Number of bytes of an id and its record in memory.
 pub(crate) const ROW: usize = ID + size_of::<Record>();
 const ID: usize = size_of::<u32>();
 
-/// Number of columns without measured quantities, and of all columns.
+/// Number of columns without measured quantities, and of all columns. The last one has the measured quantities of displacements and gaps
+/// that oscillators of at most two coordinates with one gap do not have.
 const BEFORE: usize = 17;
-const COUNT: usize = BEFORE + GROUPS.len();
+const LAST: usize = BEFORE + GROUPS.len();
+const COUNT: usize = LAST + 1;
 
 /// Names of the columns, in the order of their bits. A later version may add columns at the end.
 pub(crate) const NAMES: [&str; COUNT] = {
     let mut names = [""; COUNT];
     let mut i = 0;
     while i < COUNT {
-        names[i] = if i < BEFORE { FIRST_NAMES[i] } else { GROUPS[i - BEFORE].name };
+        names[i] = match i {
+            LAST => "further_displacements",
+            _ if i < BEFORE => FIRST_NAMES[i],
+            _ => GROUPS[i - BEFORE].name,
+        };
         i += 1;
     }
     names
@@ -55,8 +61,11 @@ const FIRST_NAMES: [&str; BEFORE] = [
 
 /// Returns the offset of a column in a row and the size of its numbers in bytes.
 fn place(column: usize) -> (usize, usize) {
-    let of_group = |group: usize| (ID + offset_of!(Record, measures) + 8 * places_before(group), 8);
-    PLACES.get(column).copied().unwrap_or_else(|| of_group(column - BEFORE))
+    let of_measure = |place: usize| (ID + offset_of!(Record, measures) + 8 * place, 8);
+    match column {
+        LAST => of_measure(FURTHER),
+        _ => PLACES.get(column).copied().unwrap_or_else(|| of_measure(places_before(column - BEFORE))),
+    }
 }
 
 /// Places of the columns without measured quantities. The last one includes the reserved bytes.
@@ -171,7 +180,7 @@ mod tests {
     fn files_contain_the_strobe_entries_that_the_model_has() {
         for (coordinates, bytes) in [(2, 376), (3, 392), (8, 472)] {
             let strobes = 2 * coordinates;
-            let whole: usize = (1..COUNT).map(|column| bytes_of(column, strobes).count()).sum();
+            let whole: usize = (1..LAST).map(|column| bytes_of(column, strobes).count()).sum();
             assert_eq!(whole, bytes, "{coordinates} coordinates");
             let entries: Vec<f64> = (1..=strobes).map(|n| n as f64 / 3.0).collect();
             let record = Record { strobe: state(&entries), period: 3, ..Record::default() };

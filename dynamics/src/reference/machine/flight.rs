@@ -6,6 +6,7 @@ use super::modes::Modes;
 use super::slip::Slip;
 use super::system::System;
 use crate::model::Side;
+use crate::orbit::{place_of_displacement, place_of_gap};
 
 /// A flight within one domain, of at most one Taylor step.
 pub struct Flight<'a> {
@@ -48,10 +49,12 @@ impl Flight<'_> {
         Signal { rate: self.domain.rate_of(&value), value }
     }
 
-    /// Returns the first two displacements and the first gap. A single coordinate has a second one that is 0.
-    pub(crate) fn displacements(&self) -> [Signal; 3] {
-        let [first, second] = [0, 1].map(|i| self.system.displacement_row(i));
-        [first, second, self.domain.unit_row(0)].map(|row| self.signal(row))
+    /// Returns all displacements and gaps, by their places in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
+    pub(crate) fn displacements(&self) -> Vec<(usize, Signal)> {
+        let displacements = (0..self.system.machine().degrees())
+            .map(|i| (place_of_displacement(i), self.system.displacement_row(i)));
+        let gaps = (0..self.system.gaps()).map(|gap| (place_of_gap(gap), self.domain.unit_row(gap)));
+        displacements.chain(gaps).map(|(place, row)| (place, self.signal(row))).collect()
     }
 
     /// Returns the forces of the compliant contacts, positive where they push.

@@ -1,11 +1,12 @@
 //! Panels of a diagram: which quantities of a model it shows.
 
-use crate::map::bifurcation::Column;
+use crate::map::bifurcation::{Column, SectionPoint};
 use crate::map::scene::Quantity;
+use crate::model_file::several_gaps;
 use crate::show::numbers::Number;
 use crate::show::symbols::{symbol, with_unit};
 use crate::show::wall_labels::WallLabels;
-use rattlemap_dynamics::model::{Model, Side, State};
+use rattlemap_dynamics::model::{MOST_COORDINATES, Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::EventKind;
 
 /// Panels and wall labels of a diagram.
@@ -21,6 +22,8 @@ pub(crate) struct Panel {
     pub(crate) label: String,
     component: usize,
     pub(crate) states: States,
+    /// Indices of the gaps whose crossings the panel shows.
+    gaps: Vec<usize>,
     /// The quantity that the panel shows instead of states.
     number: Option<Number>,
 }
@@ -39,7 +42,8 @@ pub(crate) enum States {
 }
 
 impl Panels {
-    /// Returns the panels of a model: displacements at the walls. If the walls [fix](crate::map::bifurcation::fixed) one of the
+    /// Returns the panels of a model: displacements at the walls. With several gaps, a displacement is shown at the walls of those that
+    /// depend on it. If the walls [fix](crate::map::bifurcation::fixed) one of the
     /// displacements, the panels show its velocity before contact and the displacements at phase 0 instead. Below them, each of
     /// the `numbers` has a panel, except states and the gap if it is one displacement.
     pub fn of(model: &dyn Model, fixed: Option<usize>, numbers: &[Number]) -> Panels {
@@ -47,15 +51,17 @@ impl Panels {
         let names: Vec<String> = model.state_names().into_iter().map(symbol).collect();
         let displacements = || (0..names.len()).step_by(2);
         let units = model.units();
+        let of_gaps = Gaps::of(model);
         let panel = |label: String, component, states| Panel {
             label: with_unit(&label, units.component(component).as_deref()),
             component,
             states,
+            gaps: of_gaps.on(component / 2),
             number: None,
         };
         let mut list: Vec<Panel> = match fixed.map(|i| 2 * i + 1).filter(|velocity| *velocity < names.len()) {
             None => {
-                let label = |i: usize| format!("{} at {}", names[i], walls.section());
+                let label = |i: usize| format!("{} at {}{}", names[i], walls.section(), of_gaps.named(i / 2));
                 displacements().map(|i| panel(label(i), i, States::Crossings)).collect()
             }
             Some(velocity) => {
@@ -74,6 +80,7 @@ impl Panels {
             label: number.label.clone(),
             component: 0,
             states: States::None,
+            gaps: Vec::new(),
             number: Some(number.clone()),
         }));
         Panels { list, walls }
@@ -90,12 +97,47 @@ impl Panels {
     }
 }
 
+/// The gaps of a model.
+struct Gaps {
+    /// Rows of the gaps; none of a model that is not valid.
+    rows: Vec<[f64; MOST_COORDINATES]>,
+    /// Names, if there are several.
+    names: Option<Vec<String>>,
+}
+
+impl Gaps {
+    fn of(model: &dyn Model) -> Gaps {
+        let oscillator = model.oscillator().ok();
+        let rows =
+            |oscillator: Oscillator| (0..oscillator.gap_count()).map(|gap| oscillator.gap_row(gap)).collect();
+        Gaps { rows: oscillator.map_or(Vec::new(), rows), names: several_gaps(model) }
+    }
+
+    /// Returns the gaps that depend on a displacement: all, if none does or there is only one.
+    fn on(&self, displacement: usize) -> Vec<usize> {
+        let all = 0..self.rows.len().max(1);
+        let depends = |gap: &usize| self.rows[*gap][displacement] != 0.0;
+        match self.names.is_some() && all.clone().any(|gap| depends(&gap)) {
+            true => all.filter(depends).collect(),
+            false => all.collect(),
+        }
+    }
+
+    /// Completes a label with the names of the gaps that depend on a displacement, if there are several.
+    fn named(&self, displacement: usize) -> String {
+        let Some(names) = &self.names else { return String::new() };
+        let names: Vec<String> = self.on(displacement).into_iter().map(|gap| symbol(&names[gap])).collect();
+        format!(" of {}", names.join(" and "))
+    }
+}
+
 impl Panel {
     /// Returns the values in a column, with the wall of each unless it is a state at phase 0.
     pub(crate) fn values(&self, column: &Column) -> Vec<(f64, Option<Side>)> {
         let component = |state: &State| state[self.component];
         let crossings = |wanted: fn(EventKind) -> bool| -> Vec<(f64, Option<Side>)> {
-            let points = column.points.iter().filter(|point| wanted(point.kind));
+            let is_shown = |point: &&SectionPoint| wanted(point.kind) && self.gaps.contains(&point.gap);
+            let points = column.points.iter().filter(is_shown);
             points.map(|point| (component(&point.before), Some(point.side))).collect()
         };
         match self.states {
@@ -113,8 +155,37 @@ impl Panel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::model::GearPair;
+    use crate::model_file::FileModel;
+    use rattlemap_dynamics::model::{GearPair, REST, state};
     use rattlemap_dynamics::orbit::Class;
+
+    #[test]
+    fn a_displacement_is_shown_at_the_walls_of_its_gaps() {
+        let model = FileModel::built_in("two-loose-gears").unwrap();
+        let panels = Panels::of(&model, None, &[]);
+        let labels: Vec<&str> = panels.list.iter().map(|panel| &*panel.label).collect();
+        let expected = [
+            "s at the walls of a and b [m]",
+            "x\u{2081} at the walls of a [m]",
+            "x\u{2082} at the walls of b [m]",
+        ];
+        assert_eq!(labels, expected);
+        let point = |gap| SectionPoint {
+            gap,
+            side: Side::Right,
+            kind: EventKind::Impact,
+            t_mod_period: 0.0,
+            before: state(&[1.0, 0.0, 2.0, 0.0, 3.0]),
+            after: REST,
+        };
+        let column = Column { points: vec![point(0), point(1)], ..Column::plain(0.0, Class::Chaotic) };
+        let values: Vec<Vec<f64>> = panels
+            .list
+            .iter()
+            .map(|panel| panel.values(&column).into_iter().map(|(x, _)| x).collect())
+            .collect();
+        assert_eq!(values, [vec![1.0, 1.0], vec![2.0], vec![3.0]]);
+    }
 
     #[test]
     fn each_measured_number_has_a_panel_below_the_displacements() {

@@ -69,9 +69,9 @@ impl PlotGap {
         share * self.length
     }
 
-    /// Returns the side of the contact in which a trace starts, if there is one. Samples tell it of the first gap only. A further
-    /// gap starts in contact if its first event ends a contact, if it is behind an elastic wall, or if it rests on a wall and has
-    /// no events.
+    /// Returns the side of the contact in which a trace starts, if there is one. The first sample tells it of the first gap, except of a
+    /// machine, which decides on gaps at rest when it moves. Any other gap starts in contact if its first event ends a contact, if it is
+    /// behind an elastic wall, or if it rests on a wall and has no events.
     pub(crate) fn contact_at_start(
         &self,
         oscillator: &Oscillator,
@@ -79,7 +79,7 @@ impl PlotGap {
         trace: &[Sample],
     ) -> Option<Side> {
         let start = trace.first()?;
-        if self.index == 0 {
+        if self.index == 0 && (start.meshing.is_some() || oscillator.machine.is_none()) {
             return start.meshing;
         }
         let first = events.iter().find(|event| event.gap == self.index);

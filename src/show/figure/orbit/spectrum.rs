@@ -1,9 +1,9 @@
-//! The spectra of gap and velocity, one below the other.
+//! The spectra of each gap and its velocity, one below the other.
 
 use std::io::Write;
 
 use crate::map::scene::{FigureStyle, Format};
-use crate::model_file::gap_names;
+use crate::model_file::{gap_names, several_gaps};
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::draw_head;
@@ -11,7 +11,6 @@ use crate::show::drawing::{Canvas, DARK, GEAR_2, Marker, write_figure};
 use crate::show::error::WriteError;
 use crate::show::figure::orbit::heading;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, ORBIT_WIDTH};
-use crate::show::orbit_quantities::gaps;
 use crate::show::orbit_spectrum::Spectrum;
 use crate::show::symbols::with_unit;
 use crate::show::wall_labels::WallLabels;
@@ -24,7 +23,7 @@ const SMALLEST_SHARE: f64 = 1e-5;
 /// Spectra of more lines have thinner strokes and smaller dots.
 const THICK_LINES: usize = 200;
 
-/// Default height.
+/// Default height with one gap.
 const HEIGHT: f64 = 1050.0;
 
 /// Name of the figure's file without its extension.
@@ -46,51 +45,57 @@ pub(crate) fn draw(style: &FigureStyle, model: &dyn Model, orbit: &Orbit, spectr
     let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
     let canvas = Canvas::new(style, ORBIT_WIDTH);
     let top = draw_head(&canvas, &heading::parameters(model), &subtitle, &[]) + 14.0;
-    let labels = WallLabels::of(model, 0);
-    let quantity = match gap_names(model).contains(&labels.gap()) {
-        // The spectrum is that of the first gap.
-        _ if gaps(model).is_some() => format!("the first gap, {}", labels.gap()),
-        true => "the gap".to_owned(),
-        false => labels.gap().to_owned(),
-    };
     let units = model.units();
-    let labels = [
-        with_unit(&format!("amplitude of {quantity}"), units.gap.as_deref()),
-        with_unit("amplitude of its velocity", units.gap_velocity().as_deref()),
-    ];
+    let label = |(gap, which): (usize, usize)| {
+        let labels = WallLabels::of(model, gap);
+        let has_symbol = several_gaps(model).is_some() || !gap_names(model).contains(&labels.gap());
+        let quantity = if has_symbol { labels.gap() } else { "the gap" };
+        match which {
+            0 => with_unit(&format!("amplitude of {quantity}"), units.gap.as_deref()),
+            _ => {
+                let quantity =
+                    several_gaps(model).map_or("its velocity".to_owned(), |names| format!("{}'", names[gap]));
+                with_unit(&format!("amplitude of {quantity}"), units.gap_velocity().as_deref())
+            }
+        }
+    };
+    let count = spectrum.lines.first().map_or(1, |line| line.amplitudes.len());
+    let shown: Vec<(usize, usize)> = (0..count).flat_map(|gap| [(gap, 0), (gap, 1)]).collect();
     let end = spectrum.lines.last().map_or(1.0, |line| line.frequency);
     let x = Axis::exact("frequency in multiples of the forcing frequency", 0.0, end);
-    let y = |(which, label): (usize, &String)| {
-        Axis::decades(label, visible(spectrum, which).map(|(_, size)| size))
+    let y = |&quantity: &(usize, usize)| {
+        Axis::decades(&label(quantity), visible(spectrum, quantity).map(|(_, size)| size))
     };
-    let edges = stacked(&canvas, top, HEIGHT, &[1.0, 1.0]);
-    let panels = edges.into_iter().zip(labels.iter().enumerate().map(y)).collect();
-    for (which, frame) in column(&canvas, panels, &x, ORBIT_LEFT, 0.0).iter().enumerate() {
-        draw_panel(&canvas, frame, spectrum, which);
+    let edges = stacked(&canvas, top, HEIGHT * count as f64, &vec![1.0; shown.len()]);
+    let panels = edges.into_iter().zip(shown.iter().map(y)).collect();
+    let frames = column(&canvas, panels, &x, ORBIT_LEFT, 0.0);
+    for (i, (frame, &quantity)) in frames.iter().zip(&shown).enumerate() {
+        draw_panel(&canvas, frame, spectrum, quantity, i + 1 == shown.len());
     }
     canvas
 }
 
-/// Returns frequencies and amplitudes of the gap, or with `which` 1 of its velocity.
-fn lines(spectrum: &Spectrum, which: usize) -> impl Iterator<Item = (f64, f64)> {
-    spectrum.lines.iter().map(move |line| (line.frequency, line.amplitudes[which]))
+/// Returns frequencies and amplitudes of a gap, or with `which` 1 of its velocity.
+fn lines(spectrum: &Spectrum, (gap, which): (usize, usize)) -> impl Iterator<Item = (f64, f64)> {
+    spectrum.lines.iter().map(move |line| (line.frequency, line.amplitudes[gap][which]))
 }
 
 /// Returns those that are drawn.
-fn visible(spectrum: &Spectrum, which: usize) -> impl Iterator<Item = (f64, f64)> {
-    let largest = lines(spectrum, which).map(|(_, size)| size).fold(0.0, f64::max);
-    lines(spectrum, which).filter(move |&(_, size)| size > SMALLEST_SHARE * largest)
+fn visible(spectrum: &Spectrum, quantity: (usize, usize)) -> impl Iterator<Item = (f64, f64)> {
+    let largest = lines(spectrum, quantity).map(|(_, size)| size).fold(0.0, f64::max);
+    lines(spectrum, quantity).filter(move |&(_, size)| size > SMALLEST_SHARE * largest)
 }
 
-fn draw_panel(canvas: &Canvas, frame: &Frame, spectrum: &Spectrum, which: usize) {
+/// Draws a panel. The last one has the labels of the axis of frequencies.
+fn draw_panel(canvas: &Canvas, frame: &Frame, spectrum: &Spectrum, quantity: (usize, usize), is_last: bool) {
     frame.draw_grid(canvas);
     if spectrum.cycle.is_none() {
         let path: Vec<_> =
-            lines(spectrum, which).map(|(frequency, size)| frame.at(frequency, size)).collect();
+            lines(spectrum, quantity).map(|(frequency, size)| frame.at(frequency, size)).collect();
         canvas.stroke(&path, 1.4, DARK);
     } else {
         let [width, radius] = if spectrum.lines.len() <= THICK_LINES { [FREE_LINE, 5.0] } else { [1.0, 2.5] };
-        for (frequency, size) in visible(spectrum, which) {
+        for (frequency, size) in visible(spectrum, quantity) {
             let at = frame.at(frequency, size);
             canvas.stroke(&[(at.0, frame.rect.bottom), at], width, DARK);
             // Subharmonics have another colour than multiples of the forcing frequency.
@@ -98,5 +103,5 @@ fn draw_panel(canvas: &Canvas, frame: &Frame, spectrum: &Spectrum, which: usize)
             canvas.marker(at, Marker::dot(color, radius));
         }
     }
-    frame.draw_axes(canvas, which == 1);
+    frame.draw_axes(canvas, is_last);
 }
