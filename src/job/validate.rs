@@ -24,10 +24,6 @@ use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
 /// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
 const NAMED_CELLS: usize = 8;
 
-/// Message for a map that `validate` refuses.
-const NO_JUDGE: &str = "this map cannot be validated: the second engine that would check it does not compute models of more \
-                        than two coordinates, of several gaps, or with a restitution that depends on the speed";
-
 /// A finished map whose sample is to be computed again.
 pub struct ValidateJob {
     folder: Folder,
@@ -76,10 +72,6 @@ impl ValidateJob {
         }
         let scene = finished::scene(&map)?;
         let mut loaded = LoadedMap::read(&map, &scene, observer)?;
-        // All cells have the same model.
-        if loaded.plan.oscillator(0).machine.is_some() {
-            return Err(JobError::Usage(format!("{}: {NO_JUDGE}", dir.display())));
-        }
         let precision = precision(map.manifest())?;
         let survey = loaded.survey();
         let sample = validate::sample(&loaded.plan, &loaded.stored.records, samples, seed);

@@ -16,8 +16,9 @@ use crate::record::Record;
 use crate::record::classify::{classify, status};
 use crate::record::distance::{self, farther};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Model, State};
+use rattlemap_dynamics::model::{Law, Machine, Model, Oscillator, State, Wall};
 use rattlemap_dynamics::orbit::{self, Budget, Class, Status, measure_until};
+use rattlemap_dynamics::reference::machine::Motion;
 use rattlemap_dynamics::reference::{Allowance, Trajectory};
 use rattlemap_dynamics::stability::{UNIT, multipliers};
 
@@ -156,8 +157,23 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// Computes the cell with another contact law.
-    pub(super) fn obeying(&self, law: Law) -> Answer {
+    /// Returns the meshing speeds of all walls with impacts; for an oscillator of one gap, of both sides.
+    pub(super) fn mesh_speeds(&self) -> Vec<f64> {
+        match &self.flow.machine {
+            Some(system) => impact_walls(&mut system.machine().clone()).map(|wall| wall.mesh_speed).collect(),
+            None => self.law.mesh_speed.to_vec(),
+        }
+    }
+
+    /// Computes the cell with this multiple of all meshing speeds.
+    pub(super) fn with_mesh_speeds(&self, factor: f64) -> Answer {
+        if let Some(system) = &self.flow.machine {
+            let mut machine = system.machine().clone();
+            impact_walls(&mut machine).for_each(|wall| wall.mesh_speed *= factor);
+            let flow = Box::new(Flow::new(&Oscillator::of_machine(machine)));
+            return self.reached(&flow, self.law, self.start);
+        }
+        let law = Law { mesh_speed: self.law.mesh_speed.map(|speed| factor * speed), ..self.law };
         self.reached(&self.flow, law, self.start)
     }
 
@@ -243,12 +259,31 @@ impl<'a> Cell<'a> {
 
     /// Returns logarithms of the largest multiplier over `period` periods, for motions perturbed after each period.
     pub(super) fn multipliers_from(&self, state: State, period: u32) -> Vec<f64> {
-        let log_radius = |end: Trajectory<'_, 4>| {
-            let columns = end.tangents();
-            let [re, im] = *multipliers(&DMatrix::from_fn(4, 4, |i, j| columns[j][i]))?.first()?;
-            Some(re.hypot(im).ln() + end.log_scale())
+        let log_radius = |columns: &[State], log_scale: f64| {
+            let size = columns.len();
+            let [re, im] = *multipliers(&DMatrix::from_fn(size, size, |i, j| columns[j][i]))?.first()?;
+            Some(re.hypot(im).ln() + log_scale)
         };
-        self.perturbed_motions(state, period, UNIT).filter_map(log_radius).collect()
+        let Some(system) = &self.flow.machine else {
+            let ends = self.perturbed_motions(state, period, UNIT);
+            return ends.filter_map(|end| log_radius(&end.tangents(), end.log_scale())).collect();
+        };
+        // A trajectory has a fixed number of tangents, so the machine's own motion is followed.
+        let log_radius_of = |k: u64| {
+            let mut random = Random::new(self.seed ^ k);
+            let mut motion = Motion::new(system, &state).allowing(Allowance::UNLIMITED.until(self.halt));
+            motion.set_tangents(Motion::unit_tangents(system));
+            let mut log_scale = 0.0;
+            for _ in 0..period {
+                motion.advance_period(&mut ()).ok()?;
+                log_scale += motion.log_scale();
+                let perturbed =
+                    motion.state().map(|x| x * (1.0 + self.resolution * (2.0 * random.unit() - 1.0)));
+                motion = motion.at(&perturbed, motion.tangents());
+            }
+            log_radius(&motion.tangents(), log_scale)
+        };
+        (0..TURNS).filter_map(log_radius_of).collect()
     }
 
     /// Follows a few motions from a state, each perturbed after each period.
@@ -297,17 +332,22 @@ impl<'a> Cell<'a> {
         // The meshing speed is compared with velocities, so it is perturbed by their rounding errors. Both walls get the
         // same change, so that a symmetric law stays symmetric.
         let draw = 2.0 * Random::new(!(self.seed ^ k)).unit() - 1.0;
-        let mut law = model.law();
-        for speed in &mut law.mesh_speed {
+        let perturb = |speed: &mut f64| {
             let share = self.resolution * units[1].max(*speed) / speed.max(f64::MIN_POSITIVE);
             *speed *= 1.0 + share.min(MOST_OF_MESH_SPEED) * draw;
+        };
+        let mut law = model.law();
+        law.mesh_speed.iter_mut().for_each(perturb);
+        let mut oscillator = model.oscillator().ok()?;
+        if let Some(machine) = &mut oscillator.machine {
+            impact_walls(machine).for_each(|wall| perturb(&mut wall.mesh_speed));
         }
         let units = self.units(&self.start);
         let mut start = self.start;
         for (i, x) in start.iter_mut().enumerate().take(self.model.state_names().len()) {
             *x += self.resolution * units[i % 2] * (2.0 * random.unit() - 1.0);
         }
-        let flow = Box::new(Flow::new(&model.oscillator().ok()?));
+        let flow = Box::new(Flow::new(&oscillator));
         Some(Perturbed { flow, law, start, resolution: self.resolution, random, halt: self.halt })
     }
 }
@@ -323,6 +363,12 @@ impl Perturbed<'_> {
         }
         Some(trajectory.state())
     }
+}
+
+/// Returns the walls of a machine that have a law of impact.
+fn impact_walls(machine: &mut Machine) -> impl Iterator<Item = &mut Wall> {
+    let walls = machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten());
+    walls.filter(|wall| !wall.contact.is_elastic())
 }
 
 /// Draws the relative changes of a state by rounding over one period.

@@ -7,7 +7,6 @@ use super::cell::Cell;
 use super::compare::Answer;
 use super::rate::Rate;
 use crate::record::classify::classify;
-use rattlemap_dynamics::model::Law;
 use rattlemap_dynamics::orbit::Class;
 
 /// Rates of change with half the meshing speed, among meshing cells. Periods, words and patterns are compared if the motion
@@ -37,7 +36,8 @@ impl HalfMesh {
 /// Changes in one cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Changes {
-    mesh_speed: [f64; 2],
+    /// The meshing speed, if it is the same at all walls.
+    mesh_speed: Option<f64>,
     class: bool,
     /// Whether period, word and pattern of a cycle change.
     cycle: Option<[bool; 3]>,
@@ -46,10 +46,11 @@ pub(super) struct Changes {
 /// Compares a cell's answer `truth` with the answer for half the meshing speed; none if the motion does not mesh or the
 /// meshing speed is zero.
 pub(super) fn changes(cell: &Cell<'_>, truth: &Answer) -> Option<Changes> {
-    if truth.record.mesh_fraction <= 0.0 || cell.law.mesh_speed.iter().all(|&speed| speed <= 0.0) {
+    let speeds = cell.mesh_speeds();
+    if truth.record.mesh_fraction <= 0.0 || speeds.iter().all(|&speed| speed <= 0.0) {
         return None;
     }
-    let halved = cell.obeying(Law { mesh_speed: cell.law.mesh_speed.map(|speed| 0.5 * speed), ..cell.law });
+    let halved = cell.with_mesh_speeds(0.5);
     let [before, after] = [truth, &halved].map(|answer| classify(&answer.record));
     let cycle = match (before, after) {
         (Class::Periodic { period: before }, Class::Periodic { period: after }) => {
@@ -58,17 +59,18 @@ pub(super) fn changes(cell: &Cell<'_>, truth: &Answer) -> Option<Changes> {
         }
         _ => None,
     };
-    Some(Changes { mesh_speed: cell.law.mesh_speed, class: before.index() != after.index(), cycle })
+    let mesh_speed = speeds.first().copied().filter(|first| speeds.iter().all(|speed| speed == first));
+    Some(Changes { mesh_speed, class: before.index() != after.index(), cycle })
 }
 
 /// Computes the rates over all meshing cells; none if there are none.
 pub(super) fn rates(changes: &[Changes]) -> Option<HalfMesh> {
     let cycles: Vec<[bool; 3]> = changes.iter().filter_map(|changes| changes.cycle).collect();
     let of = |k: usize| Rate::new(cycles.iter().filter(|cycle| cycle[k]).count(), cycles.len());
-    let [first, _] = changes.first()?.mesh_speed;
-    let is_common = changes.iter().flat_map(|changes| changes.mesh_speed).all(|speed| speed == first);
+    let first = changes.first()?.mesh_speed;
+    let is_common = changes.iter().all(|changes| changes.mesh_speed == first);
     Some(HalfMesh {
-        mesh_speed: is_common.then_some(first),
+        mesh_speed: first.filter(|_| is_common),
         classes: Rate::new(changes.iter().filter(|changes| changes.class).count(), changes.len()),
         periods: of(0),
         words: of(1),

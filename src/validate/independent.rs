@@ -1,5 +1,6 @@
 //! Independent judge: an adaptive ODE solver with event location that shares only the description of the oscillator with
-//! the reference.
+//! the reference. All oscillators are judged as machines; [`flight`] and [`field`] know two coordinates only, and the benchmarks measure
+//! their speed.
 //!
 //! The motion is integrated over the whole budget. It is periodic if its strobe states recur and the cycle is stable;
 //! multipliers come from finite differences of neighbouring motions. It is chaotic if a neighbouring motion separates from
@@ -8,27 +9,24 @@
 pub mod dop853;
 pub mod field;
 pub mod flight;
+pub mod machine;
 #[cfg(test)]
 mod tests;
 
+use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nalgebra::{DMatrix, Matrix4};
+use nalgebra::DMatrix;
 
 use crate::map::plan::Plan;
 use crate::record::classify::CHAOS_ERRORS;
 use crate::record::distance::{self, farther};
 use crate::record::{Record, Records, valid};
-use dop853::Solver;
-use flight::{Ended, Flight, Slip};
-use rattlemap_dynamics::model::{Law, MOST_FRICTION, Oscillator, Side, State};
+use machine::Flight;
+use rattlemap_dynamics::model::{Law, MOST_FRICTION, Machine, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Status};
-use rattlemap_dynamics::reference::EventKind;
 use rattlemap_dynamics::stability::{multipliers, standard_error};
 use rattlemap_dynamics::word::Word;
-
-/// Relative and absolute tolerance of one step.
-const TOLERANCE: f64 = 1e-12;
 
 /// Relative distance below which two strobe states are the same.
 const RECURS: f64 = 1e-7;
@@ -49,24 +47,22 @@ const LEAST_MULTIPLIER: f64 = 1e-4;
 /// A motion that advances from strobe to strobe.
 #[derive(Clone)]
 struct Strobed<'a> {
-    solver: Solver,
-    period: f64,
-    /// Time since phase 0 at which states are compared.
-    from: f64,
     flight: Flight,
-    /// The last event before the current period.
-    before: Option<Ended>,
-    tally: Tally,
+    /// Forcing period.
+    period: f64,
+    /// Phase at which states are compared, in radians.
+    from: f64,
     /// Once set, the integration stops.
     halt: &'a AtomicBool,
 }
 
-/// Events and meshing time since the tally began.
+/// Events and time in contact since the tally began.
 #[derive(Clone, Debug, Default)]
 struct Tally {
     impacts: usize,
     /// Whether an infinite series of impacts was cut off, so that `impacts` is too small.
     series: bool,
+    /// Time in contact, in radians of the forcing.
     meshing_time: f64,
     symbols: Vec<u8>,
     /// Phases of events, in turns.
@@ -75,28 +71,13 @@ struct Tally {
     slipped: [bool; MOST_FRICTION],
 }
 
-impl Tally {
-    /// Counts changes of friction.
-    fn count(&mut self, slips: impl Iterator<Item = Slip>, period: f64) {
-        for slip in slips {
-            self.symbols.extend(slip.symbol);
-            self.phases.push((slip.t / period).fract());
-            self.slipped[slip.element] = true;
-        }
-    }
-}
-
 impl Strobed<'_> {
     fn new<'a>(oscillator: &Oscillator, law: Law, start: State, halt: &'a AtomicBool) -> Strobed<'a> {
-        Strobed {
-            solver: Solver { omega: oscillator.omega, tolerance: TOLERANCE },
-            period: oscillator.period(),
-            from: 0.0,
-            flight: Flight::new(oscillator, law, start),
-            before: None,
-            tally: Tally::default(),
-            halt,
-        }
+        let flight = match &oscillator.machine {
+            Some(machine) => Flight::new(machine, &start),
+            None => Flight::new(&Machine::of(oscillator, law), &start),
+        };
+        Strobed { flight, period: oscillator.period(), from: 0.0, halt }
     }
 
     /// Advances by one forcing period; none if the solver fails or is halted.
@@ -104,45 +85,22 @@ impl Strobed<'_> {
         if self.halt.load(Ordering::Relaxed) {
             return None;
         }
-        let meshed = self.flight.meshing().is_some();
-        let until = self.from + self.period;
-        self.solver.advance(&mut self.flight, self.from, until)?;
-        let mut meshing_since = meshed.then_some(self.from);
-        let mut slips = std::mem::take(&mut self.flight.slips).into_iter().peekable();
-        for (n, ended) in std::mem::take(&mut self.flight.events).into_iter().enumerate() {
-            self.tally.count(std::iter::from_fn(|| slips.next_if(|slip| slip.after <= n)), self.period);
-            self.tally.series |= ended.after_series;
-            self.tally.phases.push((ended.t / self.period).fract());
-            if ended.kind == EventKind::Impact {
-                self.tally.impacts += 1;
-            }
-            match (meshing_since, ended.meshing) {
-                (None, Some(_)) => meshing_since = Some(ended.t),
-                (Some(since), None) => {
-                    self.tally.meshing_time += ended.t - since;
-                    meshing_since = None;
-                }
-                _ => {}
-            }
-            self.tally.symbols.extend(self.before.map(|before| symbol(before, ended.side)));
-            self.before = Some(ended);
-        }
-        self.tally.count(slips, self.period);
-        self.tally.meshing_time += meshing_since.map_or(0.0, |since| until - since);
-        Some(())
+        self.flight.events.clear();
+        self.flight.slips.clear();
+        self.flight.advance(self.from, self.from + TAU)
     }
 
     /// Returns the elements with dry friction that stuck all the time. Neighbouring motions keep their distance along these rows.
     fn stuck_for_good(&self) -> [bool; MOST_FRICTION] {
         let sticks = self.flight.sticks();
-        std::array::from_fn(|i| sticks[i] && !self.tally.slipped[i])
+        std::array::from_fn(|i| sticks[i] && !self.flight.tally.slipped[i])
     }
 
     /// Returns the state at the next phase 0, after an event there.
     fn strobe(&self) -> Option<State> {
         let mut flight = self.flight.clone();
         if self.from > 0.0 {
-            self.solver.advance(&mut flight, self.from, self.period * (1.0 + ON_STROBE))?;
+            flight.advance(self.from, TAU * (1.0 + ON_STROBE))?;
         }
         Some(flight.state())
     }
@@ -150,7 +108,7 @@ impl Strobed<'_> {
     /// Compares states in the middle of the longest flight from here on. Returns false if they are compared there already
     /// or no event lies at phase 0.
     fn leave_strobe(&mut self) -> Option<bool> {
-        let mut phases = std::mem::take(&mut self.tally.phases);
+        let mut phases = std::mem::take(&mut self.flight.tally.phases);
         if self.from > 0.0 || !phases.iter().any(|phase| (phase - phase.round()).abs() < ON_STROBE) {
             return Some(false);
         }
@@ -158,22 +116,10 @@ impl Strobed<'_> {
         phases.extend(self.flight.change_phases());
         phases.sort_by(f64::total_cmp);
         let longest = phases.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
-        let from = 0.5 * (longest[0] + longest[1]) * self.period;
-        self.solver.advance(&mut self.flight, 0.0, from)?;
+        let from = 0.5 * (longest[0] + longest[1]) * TAU;
+        self.flight.advance(0.0, from)?;
         self.from = from;
         Some(true)
-    }
-}
-
-/// Returns the symbol of a flight between two events.
-fn symbol(before: Ended, side: Side) -> u8 {
-    match (before.meshing, before.side, side) {
-        (Some(Side::Right), ..) => b'1',
-        (Some(Side::Left), ..) => b'4',
-        (_, Side::Right, Side::Right) => b'2',
-        (_, Side::Right, Side::Left) => b'3',
-        (_, Side::Left, Side::Left) => b'5',
-        (_, Side::Left, Side::Right) => b'6',
     }
 }
 
@@ -186,28 +132,32 @@ pub fn record(plan: &Plan, id: u32, records: &dyn Records) -> Option<Record> {
 pub(super) fn record_until(plan: &Plan, id: u32, records: &dyn Records, halt: &AtomicBool) -> Option<Record> {
     let cell = plan.cell(id);
     let (oscillator, start) = (plan.oscillator(cell.flow), plan.start(id, records));
-    follow(Strobed::new(&oscillator, plan.law(cell.law), start, halt), &oscillator, plan.budget())
+    follow(Strobed::new(&oscillator, plan.law(cell.law), start, halt), plan.budget())
 }
 
-fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> Option<Record> {
+fn follow(mut motion: Strobed<'_>, budget: &Budget) -> Option<Record> {
     let stored = 2 * budget.settings.max_period as usize + 1;
     let mut strobes = Vec::new();
     for n in 0..budget.periods() as usize {
         if n + stored == budget.periods() as usize {
-            motion.tally = Tally::default();
+            motion.flight.tally = Tally::default();
         }
         motion.advance()?;
-        strobes.push(motion.flight.q);
+        strobes.push(motion.flight.coordinates());
     }
     if motion.leave_strobe()? {
-        return follow(motion, oscillator, budget);
+        return follow(motion, budget);
     }
     let window = &strobes[strobes.len().saturating_sub(stored)..];
-    let largest = |i: usize| window.iter().map(|q| q[i].abs().max(q[i + 2].abs())).fold(0.0, f64::max);
-    let position = largest(0).max(oscillator.length_scale());
-    let units = [position, largest(1).max(oscillator.omega * position)];
-    let apart = |a: &[f64; 4], b: &[f64; 4]| {
-        (0..4).map(|i| distance::apart(a[i], b[i]) / units[i % 2]).fold(0.0, farther)
+    // Displacements are in scales of length and rates per radian, so the least units are 1.
+    let largest = |kind: usize| {
+        window.iter().flat_map(|q| q[kind..].iter().step_by(2)).fold(0.0f64, |most, x| most.max(x.abs()))
+    };
+    let position = largest(0).max(1.0);
+    let units = [position, largest(1).max(position)];
+    let apart = |a: &[f64], b: &[f64]| {
+        let pairs = a.iter().zip(b).enumerate();
+        pairs.map(|(i, (a, b))| distance::apart(*a, *b) / units[i % 2]).fold(0.0, farther)
     };
     let recurs = |lag: usize, within: f64| {
         (lag..window.len()).rev().take(lag).all(|n| apart(&window[n], &window[n - lag]) < within)
@@ -220,54 +170,62 @@ fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> 
         {
             return None;
         }
-        Some(lag) => cycle(&motion, lag as u32, oscillator.degrees, units)?,
+        Some(lag) => cycle(&motion, lag as u32, units)?,
         None => chaos(motion, budget.settings.observed_periods, units)?,
     };
     Some(Record { periods_run: budget.periods(), ..record })
 }
 
-/// Computes the derivative of the strobe map over one period by central differences.
-fn derivative(
-    on: &Strobed,
-    degrees: usize,
-    units: [f64; 2],
+/// Returns the motion displaced along a coordinate; none if what is at rest allows no displacement.
+fn displaced(
+    flight: &Flight,
+    coordinate: usize,
+    by: f64,
     for_good: [bool; MOST_FRICTION],
-) -> Option<Matrix4<f64>> {
-    let image = |j: usize, by: f64| {
-        let mut direction = [0.0; 4];
-        direction[j] = by;
-        let mut other = Strobed { flight: on.flight.displaced(&direction, for_good), ..on.clone() };
-        other.advance()?;
-        Some(other.flight.q)
-    };
-    let mut derivative = Matrix4::zeros();
-    let held = if on.flight.is_stuck() { 2 } else { 0 };
-    for j in held..2 * degrees {
+) -> Option<Flight> {
+    let own = flight.coordinates();
+    let mut direction = vec![0.0; own.len()];
+    direction[coordinate] = by;
+    Some(flight.displaced(&direction, for_good)).filter(|other| other.coordinates() != own)
+}
+
+/// Computes the derivative of the strobe map over one period by central differences.
+fn derivative(on: &Strobed, units: [f64; 2], for_good: [bool; MOST_FRICTION]) -> Option<DMatrix<f64>> {
+    let size = on.flight.coordinates().len();
+    let mut derivative = DMatrix::zeros(size, size);
+    for j in 0..size {
         let by = DISPLACEMENT * units[j % 2];
-        let (ahead, behind) = (image(j, by)?, image(j, -by)?);
-        (0..4).for_each(|i| derivative[(i, j)] = (ahead[i] - behind[i]) / (2.0 * by));
+        let [ahead, behind] = [by, -by].map(|by| displaced(&on.flight, j, by, for_good));
+        let (Some(ahead), Some(behind)) = (ahead, behind) else { continue };
+        let image = |flight: Flight| {
+            let mut other = Strobed { flight, ..on.clone() };
+            other.advance()?;
+            Some(other.flight.coordinates())
+        };
+        let (ahead, behind) = (image(ahead)?, image(behind)?);
+        (0..size).for_each(|i| derivative[(i, j)] = (ahead[i] - behind[i]) / (2.0 * by));
     }
     Some(derivative)
 }
 
 /// Builds the record of a cycle; none if it is unstable.
-fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<Record> {
-    let span = f64::from(period) * on.period;
+fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
     let for_good = on.stuck_for_good();
     let mut motion = on.clone();
-    motion.tally = Tally::default();
-    let mut monodromy = Matrix4::identity();
+    motion.flight.tally = Tally::default();
+    let size = on.flight.coordinates().len();
+    let mut monodromy = DMatrix::identity(size, size);
     for _ in 0..period {
-        monodromy = derivative(&motion, degrees, units, for_good)? * monodromy;
+        monodromy = derivative(&motion, units, for_good)? * monodromy;
         motion.advance()?;
     }
-    let [re, im] = *multipliers(&DMatrix::from_column_slice(4, 4, monodromy.as_slice()))?.first()?;
-    let (radius, tally) = (re.hypot(im), &motion.tally);
+    let [re, im] = *multipliers(&monodromy)?.first()?;
+    let (radius, tally) = (re.hypot(im), &motion.flight.tally);
     let mut record = Record {
         period,
-        lyapunov: radius.ln() / span,
+        lyapunov: radius.ln() / (f64::from(period) * on.period),
         impacts_per_period: tally.impacts as f64 / f64::from(period),
-        mesh_fraction: tally.meshing_time / span,
+        mesh_fraction: tally.meshing_time / (f64::from(period) * TAU),
         strobe: on.strobe()?,
         status: Status::Ok.code(),
         valid: valid::PERIOD | valid::IMPACTS | valid::MESH | valid::STROBE,
@@ -290,37 +248,37 @@ fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<R
 /// Builds the record of a chaotic motion; none unless a neighbouring motion separates from it on average.
 fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
     let for_good = motion.stuck_for_good();
-    motion.tally = Tally::default();
+    motion.flight.tally = Tally::default();
+    let size = motion.flight.coordinates().len();
+    let by = DISPLACEMENT * units[0];
     let mut other = motion.clone();
-    let mut aside = [0.0; 4];
-    aside[if motion.flight.is_stuck() { 2 } else { 0 }] = DISPLACEMENT * units[0];
-    other.flight = motion.flight.displaced(&aside, for_good);
+    other.flight = (0..size).step_by(2).find_map(|j| displaced(&motion.flight, j, by, for_good))?;
     let mut growth = Vec::new();
     for _ in 0..periods {
         motion.advance()?;
         other.advance()?;
-        let difference: [f64; 4] =
-            std::array::from_fn(|i| (other.flight.q[i] - motion.flight.q[i]) / units[i % 2]);
+        let (own, others) = (motion.flight.coordinates(), other.flight.coordinates());
+        let difference: Vec<f64> = (0..size).map(|i| (others[i] - own[i]) / units[i % 2]).collect();
         let length = difference.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
         growth.push((length / DISPLACEMENT).ln());
         // The neighbour starts again in the same direction, at the initial distance.
-        other = motion.clone();
-        aside = std::array::from_fn(|i| DISPLACEMENT * units[i % 2] * difference[i] / length);
+        let aside: Vec<f64> =
+            (0..size).map(|i| DISPLACEMENT * units[i % 2] * difference[i] / length).collect();
         other.flight = motion.flight.displaced(&aside, for_good);
     }
     let mean = growth.iter().sum::<f64>() / growth.len().max(1) as f64;
     let error = standard_error(&growth);
-    let span = f64::from(periods);
+    let (span, tally) = (f64::from(periods), &motion.flight.tally);
     let mut record = Record {
         lyapunov: mean / motion.period,
         lyapunov_error: error / motion.period,
-        impacts_per_period: motion.tally.impacts as f64 / span,
-        mesh_fraction: motion.tally.meshing_time / (span * motion.period),
+        impacts_per_period: tally.impacts as f64 / span,
+        mesh_fraction: tally.meshing_time / (span * TAU),
         status: Status::Ok.code(),
         valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH,
         ..Record::default()
     };
-    if motion.tally.series {
+    if tally.series {
         record.valid &= !valid::IMPACTS;
     }
     (mean > CHAOS_ERRORS * error).then_some(record)

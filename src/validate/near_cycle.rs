@@ -11,7 +11,8 @@ use crate::record::distance::apart;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Class, Status};
-use rattlemap_dynamics::reference::{Allowance, GapEvent, Trajectory};
+use rattlemap_dynamics::reference::machine::MachineEvent;
+use rattlemap_dynamics::reference::{Allowance, GapEvent, Observer, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 /// Returns the record with the exponent of the cycle itself, if the reference confirms the record's exponent at the
@@ -61,13 +62,27 @@ fn is_within_scatter(cell: &Cell<'_>, state: State, log_multiplier: f64, period:
 pub(super) fn meets_strobe(cell: &Cell<'_>, state: State, period: u32) -> bool {
     let mut trajectory =
         Trajectory::<0>::new(&cell.flow, cell.law, state).allowing(Allowance::UNLIMITED.until(cell.halt));
-    let mut met: Vec<GapEvent> = Vec::new();
+    let mut met = Times::default();
     if (0..period).any(|_| trajectory.advance_period(&mut met).is_err()) {
         return false;
     }
     let bar = ROUNDING_FACTOR * rules::on_strobe(cell.precision);
-    met.iter().any(|event| {
-        let turns = event.t / cell.flow.period;
+    met.0.iter().any(|t| {
+        let turns = t / cell.flow.period;
         apart(turns, turns.round()) < bar
     })
+}
+
+/// Times of events since phase 0.
+#[derive(Default)]
+struct Times(Vec<f64>);
+
+impl Observer for Times {
+    fn event(&mut self, event: &GapEvent) {
+        self.0.push(event.t);
+    }
+
+    fn machine_event(&mut self, event: &MachineEvent) {
+        self.0.push(event.t);
+    }
 }

@@ -1,11 +1,16 @@
 //! Compares the judge with an integrator by matrix exponentials, on random models with harmonics, stages, further walls and dry friction.
 
+mod integrators;
+mod machines;
+
+use std::f64::consts::TAU;
+
 use rayon::prelude::*;
 
-use crate::motion::{ANGLE, Mode, Motion, System, What};
-use crate::random::{Shape, case};
-use rattlemap::validate::independent::dop853::Solver;
-use rattlemap::validate::independent::flight::Flight;
+use integrators::independent::motion::{ANGLE, Mode, Motion, System, What};
+use integrators::independent::random::{Shape, case};
+use rattlemap::validate::independent::machine::Flight;
+use rattlemap_dynamics::model::Machine;
 use rattlemap_dynamics::reference::EventKind;
 
 /// Forcing periods of a comparison.
@@ -46,17 +51,16 @@ fn the_judge_agrees_with_matrix_exponentials() {
             let case = case(seed, shape);
             let (oscillator, system) = (&case.oscillator, System::new(&case.oscillator, ANGLE));
             let mut ours = Motion::new(&system, case.law, case.start, Mode::Free);
-            let mut judge = Flight::new(oscillator, case.law, case.start);
+            let mut judge = Flight::new(&Machine::of(oscillator, case.law), &case.start);
             ours.carry_tangents();
-            let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
             for _ in 0..PERIODS {
                 ours.advance_period()?;
-                solver.advance(&mut judge, 0.0, oscillator.period())?;
+                judge.advance(0.0, TAU)?;
             }
-            let theirs = judge.events.iter().map(|ended| match ended.kind {
-                EventKind::Impact => (What::Impact, ended.side),
-                EventKind::MeshStart => (What::Begins, ended.side),
-                EventKind::MeshEnd => (What::Ends, ended.side),
+            let theirs = judge.events.iter().map(|event| match event.kind {
+                EventKind::Impact => (What::Impact, event.side),
+                EventKind::MeshStart => (What::Begins, event.side),
+                EventKind::MeshEnd => (What::Ends, event.side),
             });
             let of_friction = ours.symbols.iter().copied().filter(|symbol| matches!(symbol, b'0' | b'7'));
             let same = theirs.eq(ours.events.iter().copied())

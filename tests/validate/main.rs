@@ -3,11 +3,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod fixtures;
-#[allow(dead_code, reason = "the tests of the reference use the rest")]
-#[path = "../../dynamics/tests/core/independent/motion.rs"]
-mod motion;
-#[path = "../../dynamics/tests/core/independent/random.rs"]
-mod random;
 mod short_cells;
 
 mod chaos_ends;
@@ -16,6 +11,7 @@ mod exponentials;
 mod half_mesh;
 mod independent;
 mod kinds;
+mod machines;
 mod not_finite;
 mod replay;
 mod short_lanes;

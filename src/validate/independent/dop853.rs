@@ -6,7 +6,7 @@
 use std::cell::Cell;
 
 use ode_solvers::dop_shared::OutputType;
-use ode_solvers::{Dop853, System, Vector5};
+use ode_solvers::{Dop853, SVector, System};
 
 use super::field::Equations;
 use super::flight::{Flight, Sighting};
@@ -22,32 +22,63 @@ const SHORTEST: f64 = 1e-12;
 /// Largest number of steps of one integration.
 const MOST_STEPS: u32 = 100_000;
 
-/// Equations of motion of two degrees of freedom with state `(x1, v1, x2, v2)` in any coordinates. Time is a fifth state:
-/// the crate evaluates stage 12 at the wrong time (its table has 0 for `c_12 = 1`), which does not affect an autonomous
-/// system.
-struct Motion<A, W> {
-    accelerations: A,
+/// Equations of motion of a state whose last entry is the time: the crate evaluates stage 12 at the wrong time (its table has 0 for
+/// `c_12 = 1`), which does not affect an autonomous system.
+struct Motion<F, W> {
+    /// Writes the derivative of a state.
+    field: F,
     /// Receives each step and returns whether to stop there.
     watch: W,
 }
 
-impl<A, W> System<f64, Vector5<f64>> for Motion<A, W>
+impl<const N: usize, F, W> System<f64, SVector<f64, N>> for Motion<F, W>
 where
-    A: Fn(f64, &Gap) -> [f64; 2],
-    W: FnMut(f64, &Gap) -> bool,
+    F: Fn(&[f64; N]) -> [f64; N],
+    W: FnMut(f64, &[f64; N]) -> bool,
 {
-    fn system(&self, _: f64, y: &Vector5<f64>, dy: &mut Vector5<f64>) {
-        let [a, b] = (self.accelerations)(y[4], &state(y));
-        *dy = Vector5::new(y[1], a, y[3], b, 1.0);
+    fn system(&self, _: f64, y: &SVector<f64, N>, dy: &mut SVector<f64, N>) {
+        dy.data.0[0] = (self.field)(&y.data.0[0]);
     }
 
-    fn solout(&mut self, x: f64, y: &Vector5<f64>, _: &Vector5<f64>) -> bool {
-        (self.watch)(x, &state(y))
+    fn solout(&mut self, x: f64, y: &SVector<f64, N>, _: &SVector<f64, N>) -> bool {
+        (self.watch)(x, &y.data.0[0])
     }
 }
 
-fn state(y: &Vector5<f64>) -> Gap {
+fn gap(y: &[f64; 5]) -> Gap {
     [y[0], y[1], y[2], y[3]]
+}
+
+/// Integrates from `start`, whose last entry is the time. `watch` may stop the integration after any step. Returns times since the start
+/// and states; none if the crate fails.
+pub(super) fn integrate<const N: usize>(
+    start: [f64; N],
+    duration: f64,
+    Integration { tolerance, longest, samples }: Integration,
+    field: impl Fn(&[f64; N]) -> [f64; N],
+    watch: impl FnMut(f64, &[f64; N]) -> bool,
+) -> Option<Vec<(f64, [f64; N])>> {
+    let mut solver = Dop853::from_param(
+        Motion { field, watch },
+        0.0,
+        duration,
+        samples.unwrap_or(duration),
+        SVector::from(start),
+        tolerance,
+        tolerance,
+        0.9,
+        0.0,
+        0.333,
+        6.0,
+        duration.min(longest),
+        0.0,
+        MOST_STEPS,
+        // The crate's stiffness test reacts to rounding, so it is disabled.
+        u32::MAX,
+        if samples.is_some() { OutputType::Dense } else { OutputType::Sparse },
+    );
+    solver.integrate().ok()?;
+    Some(solver.x_out().iter().copied().zip(solver.y_out().iter().map(|y| y.data.0[0])).collect())
 }
 
 /// Settings of an integration.
@@ -70,7 +101,7 @@ impl Integration {
         t: f64,
         duration: f64,
         accelerations: impl Fn(f64, &Gap) -> [f64; 2],
-        watch: impl FnMut(f64, &Gap) -> bool,
+        mut watch: impl FnMut(f64, &Gap) -> bool,
     ) -> Option<Vec<(f64, Gap)>> {
         if duration < SHORTEST {
             let [a, b] = accelerations(t, start);
@@ -79,27 +110,13 @@ impl Integration {
                 [y[0] + duration * y[1], y[1] + duration * a, y[2] + duration * y[3], y[3] + duration * b];
             return Some(vec![(0.0, *start), (duration, end)]);
         }
-        let mut solver = Dop853::from_param(
-            Motion { accelerations, watch },
-            0.0,
-            duration,
-            self.samples.unwrap_or(duration),
-            Vector5::new(start[0], start[1], start[2], start[3], t),
-            self.tolerance,
-            self.tolerance,
-            0.9,
-            0.0,
-            0.333,
-            6.0,
-            duration.min(self.longest),
-            0.0,
-            MOST_STEPS,
-            // The crate's stiffness test reacts to rounding, so it is disabled.
-            u32::MAX,
-            if self.samples.is_some() { OutputType::Dense } else { OutputType::Sparse },
-        );
-        solver.integrate().ok()?;
-        Some(solver.x_out().iter().copied().zip(solver.y_out().iter().map(state)).collect())
+        let start = [start[0], start[1], start[2], start[3], t];
+        let field = |y: &[f64; 5]| {
+            let [a, b] = accelerations(y[4], &gap(y));
+            [y[1], a, y[3], b, 1.0]
+        };
+        let solution = integrate(start, duration, *self, field, |x, y| watch(x, &gap(y)))?;
+        Some(solution.iter().map(|(x, y)| (*x, gap(y))).collect())
     }
 }
 

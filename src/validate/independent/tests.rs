@@ -2,12 +2,13 @@
 
 mod friction;
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::dop853::Solver;
-use super::flight::{Ended, Flight};
+use super::machine::{Event, Flight};
 use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, Oscillator, REST, Side, Stage, State, state,
+    Contact, Domain, Harmonic, Law, Machine, Oscillator, REST, Side, Stage, State, state,
 };
 use rattlemap_dynamics::reference::EventKind;
 
@@ -50,14 +51,13 @@ fn stage(stiffness: f64, load: f64) -> Stage {
 }
 
 /// Integrates some periods and a part of the next. Returns the state, and the events of the last one.
-fn run(oscillator: &Oscillator, law: Law, start: State, turns: f64) -> (State, Vec<Ended>) {
+fn run(oscillator: &Oscillator, law: Law, start: State, turns: f64) -> (State, Vec<Event>) {
     oscillator.validate().unwrap();
-    let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
-    let mut flight = Flight::new(oscillator, law, start);
+    let mut flight = Flight::new(&Machine::of(oscillator, law), &start);
     let mut left = turns;
     loop {
         flight.events.clear();
-        solver.advance(&mut flight, 0.0, left.min(1.0) * oscillator.period()).unwrap();
+        flight.advance(0.0, left.min(1.0) * TAU).unwrap();
         left -= 1.0;
         if left <= 0.0 {
             return (flight.state(), flight.events);
@@ -148,11 +148,11 @@ fn a_stiffness_that_alternates_is_integrated_piece_by_piece() {
 }
 
 /// Checks kinds and times of events, in turns, on the left wall.
-fn check_events(events: &[Ended], expected: &[(EventKind, f64)], period: f64) {
+fn check_events(events: &[Event], expected: &[(EventKind, f64)]) {
     assert_eq!(events.len(), expected.len(), "{events:?}");
-    for (ended, (kind, turns)) in events.iter().zip(expected) {
-        let off = ended.t / period - turns;
-        assert!(ended.kind == *kind && ended.side == Side::Left && off.abs() < 1e-12, "{ended:?}, {turns}");
+    for (event, (kind, turns)) in events.iter().zip(expected) {
+        let off = event.t / TAU - turns;
+        assert!(event.kind == *kind && event.side == Side::Left && off.abs() < 1e-12, "{event:?}, {turns}");
     }
 }
 
@@ -169,7 +169,7 @@ fn a_stage_releases_a_mass_at_rest() {
         let schedule = vec![(lifts, 1), (lifts + 0.3, 0)];
         let oscillator = Oscillator { stages: vec![stage(0.0, 2.0)], schedule, ..floor.clone() };
         let (y, events) = run(&oscillator, Law::both(0.0, 0.0), REST, 3.0);
-        check_events(&events, &expected, oscillator.period());
+        check_events(&events, &expected);
         assert_eq!(y[..2], [0.0; 2]);
     }
 }
@@ -186,9 +186,8 @@ fn derivatives_of_the_force_decide_about_rest() {
         };
         let (_, events) = run(&oscillator, Law::both(0.0, 0.0), REST, 2.0);
         let expected: &[_] = if stays { &[] } else { &[(EventKind::MeshEnd, 1.0)] };
-        let at_end: Vec<_> =
-            events.into_iter().filter(|ended| ended.t > 0.99 * oscillator.period()).collect();
-        check_events(&at_end, expected, oscillator.period());
+        let at_end: Vec<_> = events.into_iter().filter(|event| event.t > 0.99 * TAU).collect();
+        check_events(&at_end, expected);
     }
 }
 
@@ -203,12 +202,12 @@ fn a_stage_ends_a_contact_onset() {
     let (fall, onset, rise, last) = (0.2 * period, 0.05 * period, 0.65 * period, 0.1 * period);
     let (v, h) = (fall, 0.5 * fall * fall);
     let (y, events) = run(&oscillator, Law::both(0.5, 10.0), state(&[h]), 1.0);
-    check_events(&events, &[(EventKind::MeshStart, 0.2), (EventKind::MeshEnd, 0.25)], period);
+    check_events(&events, &[(EventKind::MeshStart, 0.2), (EventKind::MeshEnd, 0.25)]);
     let moved = |[x, v]: [f64; 2], load: f64, t: f64| [x + v * t + 0.5 * load * t * t, v + load * t];
     let exact = moved(moved(moved([0.0, 0.5 * v], -1.0, onset), 3.0, rise), -1.0, last);
     assert_near(&y[..2], &exact, 1e-11, "after the onset");
     // In a stage that presses the mass, the onset goes on.
     let pressed = Oscillator { stages: vec![stage(0.0, -3.0)], ..oscillator };
     let (_, events) = run(&pressed, Law::both(0.5, 10.0), state(&[h]), 0.3);
-    check_events(&events, &[(EventKind::MeshStart, 0.2)], period);
+    check_events(&events, &[(EventKind::MeshStart, 0.2)]);
 }

@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use rattlemap_dynamics::model::{Contact, Side};
 
 use super::system::{Grip, Key, Linear, Matrix, ROUNDING, Row, System, Vector, exponential, product, value};
-use crate::independent::motion::first_fall;
+use super::super::independent::motion::first_fall;
 
 /// Relative errors of velocities that stand for those of rounding, which are smaller.
 const SHAKEN: f64 = 1e-13;

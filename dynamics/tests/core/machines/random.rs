@@ -5,7 +5,7 @@ use rattlemap_dynamics::model::{
     Contact, Drive, DryFriction, Forces, GapRow, Machine, Restitution, Side, Spring, Wall,
 };
 
-use crate::independent::random::Random;
+use super::super::independent::random::Random;
 
 /// What a random machine has.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,481 @@
+//! A machine without units, in coordinates whose first entries are its gaps, and its linear domains.
+//!
+//! Lengths are in scales of length and times in radians of the forcing. The coordinates `d` are the gaps and some of the displacements,
+//! so that a gap can be set exactly to a wall; `w` are their rates. Functionals of the motion are rows of the point
+//! `(d, w, cos and sin of each harmonic, 1)`.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use rattlemap_dynamics::model::{
+    Contact, Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, MOST_HARMONICS,
+    Machine, REST, Restitution, Side, Spring, State, Wall,
+};
+
+/// Largest number of entries of a point.
+pub(super) const WIDTH: usize = 2 * MOST_COORDINATES + 2 * (MOST_HARMONICS + 1) + 1;
+
+/// Coordinates and rates, of which the first `2 n` are in use.
+pub(super) type Numbers = [f64; 2 * MOST_COORDINATES];
+
+/// What rows are applied to.
+pub(super) type Point = [f64; WIDTH];
+
+/// A functional of the motion.
+pub(super) type Row = [f64; WIDTH];
+
+/// Relative rounding error of sums, and of mobilities that vanish.
+pub(super) const ROUNDING: f64 = 1e-12;
+
+/// How the surfaces of an element with dry friction move.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Slide {
+    /// The sliding rate stays 0.
+    #[default]
+    Sticks,
+    /// The sliding rate is positive.
+    Forwards,
+    /// The sliding rate is negative.
+    Backwards,
+}
+
+impl Slide {
+    /// All modes, in the order in which they are tried.
+    pub(super) const ALL: [Slide; 3] = [Slide::Sticks, Slide::Forwards, Slide::Backwards];
+
+    pub(super) fn sign(self) -> f64 {
+        [0.0, 1.0, -1.0][self as usize]
+    }
+}
+
+/// What determines the equations of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Key {
+    pub(super) stage: usize,
+    /// Number of walls of each gap whose springs act, negative on the left.
+    pub(super) acting: [i8; MOST_GAPS],
+    /// Sides of the rigid walls on which gaps rest.
+    pub(super) held: [Option<Side>; MOST_GAPS],
+    pub(super) slides: [Slide; MOST_FRICTION],
+}
+
+/// An element with dry friction: factors of `w` in the sliding rate.
+#[derive(Debug)]
+pub(super) struct Element {
+    pub(super) row: DVector<f64>,
+    pub(super) force: f64,
+    pub(super) speed: f64,
+}
+
+/// The equations of motion of one combination of modes.
+#[derive(Debug)]
+pub(super) struct Domain {
+    n: usize,
+    pub(super) width: usize,
+    /// Angular frequencies of the harmonics.
+    orders: Vec<u32>,
+    pub(super) accelerations: Vec<Row>,
+    /// Coordinates whose rate cannot change.
+    pub(super) is_still: [bool; MOST_COORDINATES],
+    /// Forces by which rigid walls push the gaps that rest on them.
+    pub(super) pushes: [Option<Row>; MOST_GAPS],
+    /// Forces that hold elements. An element whose row others hold has none.
+    pub(super) holds: [Option<Row>; MOST_FRICTION],
+    /// Time in which the fastest rate turns by one radian.
+    pub(super) radian: f64,
+}
+
+pub(super) fn dot(row: &[f64], point: &[f64]) -> f64 {
+    row.iter().zip(point).map(|(a, b)| a * b).sum()
+}
+
+/// Returns the sum of the sizes of the terms of [`dot`].
+pub(super) fn size(row: &Row, point: &Point) -> f64 {
+    row.iter().zip(point).map(|(a, b)| (a * b).abs()).sum()
+}
+
+/// Returns `factor row + constant`.
+pub(super) fn affine(row: &Row, factor: f64, constant: f64, width: usize) -> Row {
+    let mut row = row.map(|x| factor * x);
+    row[width - 1] += constant;
+    row
+}
+
+impl Domain {
+    /// Returns the row of a coordinate, or of its rate.
+    pub(super) fn unit(&self, entry: usize) -> Row {
+        let mut row = [0.0; WIDTH];
+        row[entry] = 1.0;
+        row
+    }
+
+    /// Returns a point.
+    pub(super) fn point(&self, y: &[f64], t: f64) -> Point {
+        let n = self.n;
+        let mut point = [0.0; WIDTH];
+        point[..2 * n].copy_from_slice(&y[..2 * n]);
+        let (sin, cos) = t.sin_cos();
+        for (k, &order) in self.orders.iter().enumerate() {
+            let phasor = Complex::new(cos, sin).powu(order);
+            (point[2 * (n + k)], point[2 * (n + k) + 1]) = (phasor.re, phasor.im);
+        }
+        point[self.width - 1] = 1.0;
+        point
+    }
+
+    /// Returns the time derivative of a point.
+    pub(super) fn derivative(&self, point: &Point) -> Point {
+        let n = self.n;
+        let mut rate = [0.0; WIDTH];
+        rate[..n].copy_from_slice(&point[n..2 * n]);
+        for (rate, row) in rate[n..2 * n].iter_mut().zip(&self.accelerations) {
+            *rate = dot(&row[..self.width], &point[..self.width]);
+        }
+        for (k, &order) in self.orders.iter().enumerate() {
+            let (at, order) = (2 * (n + k), f64::from(order));
+            (rate[at], rate[at + 1]) = (-order * point[at + 1], order * point[at]);
+        }
+        rate
+    }
+
+    /// Returns a point and its derivatives.
+    pub(super) fn jet<const N: usize>(&self, point: &Point) -> [Point; N] {
+        let mut jet = [*point; N];
+        (1..N).for_each(|k| jet[k] = self.derivative(&jet[k - 1]));
+        jet
+    }
+
+    /// Returns the row of a functional's time derivative.
+    fn rate_of(&self, row: &Row) -> Row {
+        let n = self.n;
+        let mut rate = [0.0; WIDTH];
+        rate[n..2 * n].copy_from_slice(&row[..n]);
+        for (acceleration, factor) in self.accelerations.iter().zip(&row[n..2 * n]) {
+            rate.iter_mut().zip(acceleration).for_each(|(rate, x)| *rate += factor * x);
+        }
+        for (k, &order) in self.orders.iter().enumerate() {
+            let (at, order) = (2 * (n + k), f64::from(order));
+            rate[at] += order * row[at + 1];
+            rate[at + 1] -= order * row[at];
+        }
+        rate
+    }
+
+    /// Returns order and value of the first derivative, from `first` on, that is not 0 but for rounding; the value 0 if four are 0.
+    pub(super) fn tendency(&self, row: &Row, point: &Point, first: usize) -> (usize, f64) {
+        let mut row = *row;
+        for order in 0..first + 4 {
+            let value = dot(&row, point);
+            if order >= first && value.abs() > ROUNDING * size(&row, point) {
+                return (order, value);
+            }
+            row = self.rate_of(&row);
+        }
+        (first + 4, 0.0)
+    }
+}
+
+/// Constraints on rates.
+pub(super) struct Constraints {
+    /// Rows of `w` that are held, without those that others hold.
+    pub(super) rows: DMatrix<f64>,
+    /// Which of the given rows these are.
+    pub(super) kept: Vec<usize>,
+    /// Inverse of `rows mobility rows^T`.
+    pub(super) inverse: DMatrix<f64>,
+    /// Changes of `w` by unit impulses that the constraints allow.
+    pub(super) mobility: DMatrix<f64>,
+}
+
+impl Constraints {
+    pub(super) fn new(mobility: &DMatrix<f64>, rows: &[DVector<f64>]) -> Constraints {
+        let (mut left, mut kept) = (mobility.clone(), Vec::new());
+        for (i, row) in rows.iter().enumerate() {
+            let along = &left * row;
+            let free = row.dot(&along);
+            if free > ROUNDING * row.dot(&(mobility * row)) {
+                left -= &along * along.transpose() / free;
+                kept.push(i);
+            }
+        }
+        let rows = DMatrix::from_fn(kept.len(), mobility.nrows(), |i, j| rows[kept[i]][j]);
+        let inverse = (&rows * mobility * rows.transpose()).try_inverse().expect("independent rows");
+        Constraints { rows, kept, inverse, mobility: left }
+    }
+
+    /// Removes the part of rates that the constraints forbid. They hold their rows at these `speeds`.
+    pub(super) fn project(&self, mobility: &DMatrix<f64>, w: &mut DVector<f64>, speeds: &[f64]) {
+        let speeds = DVector::from_fn(self.kept.len(), |i, _| speeds[self.kept[i]]);
+        *w -= mobility * self.rows.transpose() * &self.inverse * (&self.rows * &*w - speeds);
+    }
+}
+
+/// A machine with the domains that motions have met.
+#[derive(Debug)]
+pub(super) struct System {
+    /// The machine without units, in the coordinates `d`.
+    pub(super) machine: Machine,
+    pub(super) n: usize,
+    /// Displacements over `units[0]` are these combinations of coordinates.
+    from_coordinates: DMatrix<f64>,
+    to_coordinates: DMatrix<f64>,
+    /// Units of displacements and velocities.
+    pub(super) units: [f64; 2],
+    pub(super) mobility: DMatrix<f64>,
+    /// Inverse factor of the mass matrix.
+    factor: DMatrix<f64>,
+    /// The elements that have a force.
+    pub(super) elements: Vec<Element>,
+    domains: RefCell<HashMap<Key, Rc<Domain>>>,
+}
+
+impl System {
+    pub(super) fn new(machine: &Machine) -> System {
+        let to_coordinates = coordinates(machine);
+        let from_coordinates = to_coordinates.clone().try_inverse().expect("the rows are independent");
+        let length = machine.length_scale();
+        let units = [length, length * machine.omega];
+        let machine = transformed(machine, units, &from_coordinates);
+        let factors = machine.mass.clone().cholesky().expect("the mass matrix is positive definite");
+        let element = |DryFriction { row, force, speed }: &DryFriction| {
+            // A row along a gap must not have rounding errors in other entries.
+            let least = ROUNDING * row.amax();
+            let row = row.map(|x| if x.abs() > least { x } else { 0.0 });
+            Element { row, force: *force, speed: *speed }
+        };
+        System {
+            n: machine.degrees(),
+            units,
+            mobility: factors.inverse(),
+            factor: factors.l().try_inverse().expect("the factor is regular"),
+            elements: machine.friction.iter().filter(|friction| friction.force > 0.0).map(element).collect(),
+            from_coordinates,
+            to_coordinates,
+            machine,
+            domains: RefCell::default(),
+        }
+    }
+
+    pub(super) fn gaps(&self) -> usize {
+        self.machine.gaps.len()
+    }
+
+    pub(super) fn walls(&self, gap: usize, side: Side) -> &[Wall] {
+        &self.machine.gaps[gap].walls[side.index()]
+    }
+
+    /// Converts a state to coordinates.
+    pub(super) fn to_coordinates(&self, state: &State) -> Numbers {
+        let (n, t) = (self.n, &self.to_coordinates);
+        let entry = |i: usize, kind: usize| {
+            (0..n).map(|j| t[(i, j)] * state[2 * j + kind]).sum::<f64>() / self.units[kind]
+        };
+        std::array::from_fn(|i| if i < 2 * n { entry(i % n, i / n) } else { 0.0 })
+    }
+
+    /// Converts coordinates to a state.
+    pub(super) fn to_state(&self, y: &Numbers) -> State {
+        let (n, t) = (self.n, &self.from_coordinates);
+        let mut state = REST;
+        for (i, entry) in state[..2 * n].iter_mut().enumerate() {
+            let rates = &y[n * (i % 2)..];
+            *entry = self.units[i % 2] * (0..n).map(|j| t[(i / 2, j)] * rates[j]).sum::<f64>();
+        }
+        state
+    }
+
+    /// Returns the row of an element's sliding rate.
+    pub(super) fn sliding_rate(&self, i: usize) -> Row {
+        let mut row = [0.0; WIDTH];
+        row[self.n..2 * self.n].copy_from_slice(self.elements[i].row.as_slice());
+        row[self.width() - 1] = -self.elements[i].speed;
+        row
+    }
+
+    /// Returns the row of the force, positive away from it, of the last wall of a side if this wall only pushes. There is none if the
+    /// force never pulls behind the wall.
+    pub(super) fn pushing(&self, gap: usize, side: Side, stage: usize) -> Option<Row> {
+        let wall = self.walls(gap, side).last()?;
+        let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
+        if wall.contact != Contact::Pushing || !may_pull {
+            return None;
+        }
+        let (spring, s) = (wall.springs[stage], side.sign());
+        let mut row = [0.0; WIDTH];
+        (row[gap], row[self.n + gap]) = (s * spring.stiffness, s * spring.damping);
+        row[self.width() - 1] = spring.preload - s * spring.stiffness * wall.at;
+        Some(row)
+    }
+
+    fn width(&self) -> usize {
+        2 * self.n + 2 * self.machine.drives.len() + 1
+    }
+
+    /// Returns the row of `w` of a gap.
+    pub(super) fn gap_row(&self, gap: usize) -> DVector<f64> {
+        DVector::from_fn(self.n, |i, _| f64::from(u8::from(i == gap)))
+    }
+
+    pub(super) fn domain(&self, key: Key) -> Rc<Domain> {
+        if let Some(found) = self.domains.borrow().get(&key) {
+            return Rc::clone(found);
+        }
+        let built = Rc::new(self.build(key));
+        self.domains.borrow_mut().insert(key, Rc::clone(&built));
+        built
+    }
+
+    /// Returns the largest rate of stiffness and damping.
+    fn fastest(&self, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> f64 {
+        let norm = |m: &DMatrix<f64>| (&self.factor * m * self.factor.transpose()).singular_values().max();
+        norm(stiffness).sqrt() + norm(damping)
+    }
+
+    fn build(&self, key: Key) -> Domain {
+        let (n, width, machine) = (self.n, self.width(), &self.machine);
+        let Forces { mut stiffness, mut damping, mut load } = machine.stages[key.stage].clone();
+        for (gap, &acting) in key.acting.iter().enumerate().take(self.gaps()) {
+            let side = if acting > 0 { Side::Right } else { Side::Left };
+            for wall in &self.walls(gap, side)[..usize::from(acting.unsigned_abs())] {
+                let Spring { stiffness: k, damping: c, preload } = wall.springs[key.stage];
+                stiffness[(gap, gap)] += k;
+                damping[(gap, gap)] += c;
+                load[gap] += k * wall.at - side.sign() * preload;
+            }
+        }
+        for (element, slide) in self.elements.iter().zip(key.slides) {
+            load -= &element.row * (slide.sign() * element.force);
+        }
+        let mut forces = DMatrix::zeros(n, width);
+        forces.columns_mut(0, n).copy_from(&-&stiffness);
+        forces.columns_mut(n, n).copy_from(&-&damping);
+        for (k, Drive { cos, sin, .. }) in machine.drives.iter().enumerate() {
+            forces.set_column(2 * (n + k), cos);
+            forces.set_column(2 * (n + k) + 1, sin);
+        }
+        forces.set_column(width - 1, &load);
+        let gaps = || (0..self.gaps()).filter(|&gap| key.held[gap].is_some());
+        let elements = || (0..self.elements.len()).filter(|&i| key.slides[i] == Slide::Sticks);
+        let rows =
+            gaps().map(|gap| self.gap_row(gap)).chain(elements().map(|i| self.elements[i].row.clone()));
+        let bound = Constraints::new(&self.mobility, &rows.collect::<Vec<_>>());
+        // The forces of the constraints are `-multipliers`.
+        let multipliers = &bound.inverse * &bound.rows * &self.mobility * &forces;
+        let accelerations = &bound.mobility * &forces;
+        let row = |m: &DMatrix<f64>, i: usize, factor: f64| -> Row {
+            std::array::from_fn(|j| if j < width { factor * m[(i, j)] } else { 0.0 })
+        };
+        let is_still = |i: usize| i < n && bound.mobility[(i, i)] <= ROUNDING * self.mobility[(i, i)];
+        let is_still: [bool; MOST_COORDINATES] = std::array::from_fn(is_still);
+        let (held, holding) = (gaps().count(), elements().collect::<Vec<_>>());
+        let mut pushes = [None; MOST_GAPS];
+        let mut holds = [None; MOST_FRICTION];
+        for (at, &which) in bound.kept.iter().enumerate() {
+            match gaps().nth(which) {
+                Some(gap) => {
+                    let sign = key.held[gap].map_or(1.0, Side::sign);
+                    pushes[gap] = Some(row(&multipliers, at, sign));
+                }
+                None => holds[holding[which - held]] = Some(row(&multipliers, at, 1.0)),
+            }
+        }
+        let highest = f64::from(machine.highest_order());
+        Domain {
+            n,
+            width,
+            orders: machine.drives.iter().map(|drive| drive.order).collect(),
+            accelerations: (0..n)
+                .map(|i| if is_still[i] { [0.0; WIDTH] } else { row(&accelerations, i, 1.0) })
+                .collect(),
+            is_still,
+            pushes,
+            holds,
+            radian: self.fastest(&stiffness, &damping).max(highest).recip(),
+        }
+    }
+}
+
+/// Returns the rows of the coordinates: the gaps, and displacements that complete them. For each gap the displacement is left out that has
+/// the largest part in the mobility of what is left of its row.
+fn coordinates(machine: &Machine) -> DMatrix<f64> {
+    let n = machine.degrees();
+    let mut rest: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
+    let mut left_out = Vec::new();
+    for i in 0..rest.len() {
+        let row = rest[i].clone();
+        let part = |j: usize| row[j] * row[j] / machine.mass[(j, j)];
+        let others = (0..n).filter(|j| !left_out.contains(j));
+        let most = others.max_by(|&a, &b| part(a).total_cmp(&part(b))).expect("a coordinate for each gap");
+        for other in &mut rest[i + 1..] {
+            let share = other[most] / row[most];
+            *other -= &row * share;
+        }
+        left_out.push(most);
+    }
+    let unit = |j: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == j)));
+    let rows = machine.gaps.iter().map(|gap| gap.row.clone());
+    let rows: Vec<_> = rows.chain((0..n).filter(|j| !left_out.contains(j)).map(unit)).collect();
+    DMatrix::from_fn(n, n, |i, j| rows[i][j])
+}
+
+/// Returns a machine in units of displacement and velocity, and in other coordinates. Forces are those along the coordinates, over the unit
+/// of displacement.
+fn transformed(machine: &Machine, [length, speed]: [f64; 2], from: &DMatrix<f64>) -> Machine {
+    let (back, omega) = (from.transpose(), machine.omega);
+    let matrix = |m: &DMatrix<f64>, factor: f64| &back * m * from * factor;
+    let vector = |v: &DVector<f64>| &back * v / length;
+    let forces = |Forces { damping, stiffness, load }: &Forces| Forces {
+        damping: matrix(damping, omega),
+        stiffness: matrix(stiffness, 1.0),
+        load: vector(load),
+    };
+    let wall = |wall: &Wall| {
+        let spring = |&Spring { stiffness, damping, preload }: &Spring| Spring {
+            stiffness,
+            damping: damping * omega,
+            preload: preload / length,
+        };
+        let Restitution { constant, factor, power } = wall.restitution;
+        // A constant coefficient may have any power.
+        let factor = if factor == 0.0 { 0.0 } else { factor * speed.powf(power) };
+        Wall {
+            at: wall.at / length,
+            restitution: Restitution { constant, factor, power },
+            mesh_speed: wall.mesh_speed / speed,
+            springs: wall.springs.iter().map(spring).collect(),
+            ..wall.clone()
+        }
+    };
+    let mass = matrix(&machine.mass, omega * omega);
+    Machine {
+        omega: 1.0,
+        mass: 0.5 * (&mass + mass.transpose()),
+        stages: machine.stages.iter().map(forces).collect(),
+        schedule: machine.schedule.clone(),
+        drives: machine
+            .drives
+            .iter()
+            .map(|Drive { order, cos, sin }| Drive { order: *order, cos: vector(cos), sin: vector(sin) })
+            .collect(),
+        gaps: machine
+            .gaps
+            .iter()
+            .map(|GapRow { row, walls }| GapRow {
+                row: row.clone(),
+                walls: walls.each_ref().map(|walls| walls.iter().map(wall).collect()),
+            })
+            .collect(),
+        friction: machine
+            .friction
+            .iter()
+            .map(|DryFriction { row, force, speed: belt }| DryFriction {
+                row: &back * row,
+                force: force / length,
+                speed: belt / speed,
+            })
+            .collect(),
+    }
+}
