@@ -11,6 +11,7 @@ use crate::map::plan::{Cell, Parts, stores_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
 use crate::map::sweep::LARGEST_BATCH;
+use crate::model_file::several_gaps;
 use crate::record::Record;
 use crate::store::folder::Folder;
 use crate::store::map;
@@ -255,13 +256,13 @@ fn disk(scene: &Scene) -> [u64; 2] {
             Quantity::Class => class,
             Quantity::Symmetric => 1,
             Quantity::State => state_bytes(scene),
-            measured => numbers(*measured),
+            measured => numbers(scene, *measured),
         };
         quantities.iter().map(column).sum()
     };
     let figures = |quantity: &Quantity| match quantity {
         Quantity::State => state_bytes(scene) / 8,
-        other => (numbers(*other) / 8).max(1),
+        other => (numbers(scene, *other) / 8).max(1),
     };
     let figures: u64 = quantities.iter().map(figures).sum();
     let file = |format: &Format| match format {
@@ -292,7 +293,7 @@ fn drawn(scene: &Scene) -> u64 {
         Quantity::Word | Quantity::Pattern => 4 + draws,
         Quantity::Lyapunov | Quantity::Impacts | Quantity::Mesh | Quantity::ImpactRate => 5 * draws,
         Quantity::Class | Quantity::Symmetric | Quantity::State => 0,
-        measured => 5 * draws * numbers(*measured) / 8,
+        measured => 5 * draws * numbers(scene, *measured) / 8,
     };
     // Two layers of classes, and the numbers of the layer that is being made.
     let layers = outputs.quantities.iter().map(layer).sum::<u64>() + 10 * draws;
@@ -315,7 +316,7 @@ fn stored_run(scene: &Scene, with_strobes: bool) -> u64 {
         Quantity::Impacts | Quantity::Mesh | Quantity::ImpactRate => 8,
         Quantity::Word | Quantity::Pattern => 4,
         Quantity::Class | Quantity::Lyapunov | Quantity::Symmetric | Quantity::State => 0,
-        measured => numbers(*measured),
+        measured => numbers(scene, *measured),
     };
     let is_exponent = |quantity: &Quantity| matches!(quantity, Quantity::Class | Quantity::Lyapunov);
     let exponent = if quantities.iter().any(is_exponent) || scene.is_basin() { 16 } else { 0 };
@@ -331,8 +332,10 @@ fn state_bytes(scene: &Scene) -> u64 {
 }
 
 /// Bytes of the numbers of a measured quantity.
-fn numbers(quantity: Quantity) -> u64 {
-    quantity.group().map_or(0, |group| 8 * group.measures().count() as u64)
+fn numbers(scene: &Scene, quantity: Quantity) -> u64 {
+    let model = scene.base();
+    let gaps = several_gaps(model).unwrap_or_default();
+    8 * quantity.columns(&model.state_names(), &gaps).len() as u64
 }
 
 fn list_rows(scene: &Scene) -> u64 {
@@ -388,7 +391,7 @@ mod tests {
     use super::*;
     use crate::map::plan::Plan;
     use crate::map::scene::{FileText, Purpose};
-    use crate::record::measures::MEASURES;
+    use crate::record::measures;
     use crate::record::{RecordStore, RecordsMut};
     use rattlemap_dynamics::flow::Flow;
     use rattlemap_dynamics::model::state;
@@ -476,12 +479,15 @@ mod tests {
                 lyapunov_error: number(needs.exponent),
                 impacts_per_period: number(needs.impacts),
                 mesh_fraction: number(needs.mesh),
-                measures: [0.5; MEASURES],
                 strobe: state(&[1.0; 4]),
                 period: 1,
                 periods_run: 100,
                 ..Record::default()
             };
+            let names = scene.base().state_names();
+            for measure in measures::all().filter(|measure| measure.is_of(&names, &[])) {
+                record.measures[measure.place] = 0.5;
+            }
             record.clear_measures(|group| !needs.has(group));
             if needs.word {
                 let word = rattlemap_dynamics::word::Word::cyclic(b"13");

@@ -87,10 +87,10 @@ fn tables_have_the_names_of_all_coordinates_and_gaps() {
     );
     fs::write(
         folder.path().join("line.toml"),
-        format!("{scene}[outputs]\nquantities = ['amplitude', 'rms']\n"),
+        format!("{scene}[integration]\ntransient_periods = 40\nobserved_periods = 8\n[outputs]\nquantities = ['amplitude', 'rms']\n"),
     )
     .unwrap();
-    run(&folder, "orbit --model two-loose-gears --set A=3e-4 --out o").code(0);
+    run(&folder, "orbit --model two-loose-gears --set A=3e-4 --transient 40 --periods 8 --out o").code(0);
     run(&folder, "bifurcation line.toml --quiet").code(0);
     let table = |name: &str| rows(&folder.path().join(name));
     let (header, moments) = table("o/trajectory.csv");
@@ -137,10 +137,13 @@ fn tables_have_the_names_of_all_coordinates_and_gaps() {
     assert!(header.ends_with(names), "{header}");
     for row in columns {
         let measured: Vec<f64> = row[row.len() - 15..].iter().map(|x| x.parse().unwrap()).collect();
-        // Means are linear, and the second backlash is larger.
-        let mean = |i: usize| measured[2 * i + 1];
-        assert!((mean(4) - (mean(0) - mean(2))).abs() < 1e-12 && mean(4) < 0.0, "{row:?}");
-        assert!((mean(3) - (mean(0) - mean(1))).abs() < 1e-12 && mean(3) < 0.0, "{row:?}");
-        assert!(measured[8] > measured[6] && measured.iter().step_by(2).take(5).all(|x| *x > 0.0), "{row:?}");
+        let [amplitude, mean] = [0, 1].map(|part| move |i: usize| 2 * i + part);
+        for (gap, (gear, backlash)) in [(3, (1, 1e-4)), (4, (2, 1.5e-4))] {
+            let expected = measured[mean(0)] - measured[mean(gear)];
+            assert!((measured[mean(gap)] - expected).abs() < 1e-12 && expected < 0.0, "{row:?}");
+            let size = measured[amplitude(gap)];
+            assert!(size > 0.0 && size < 0.5 * backlash + 1e-12, "{row:?}");
+            assert!(measured[10 + gap] > expected.abs() && measured[10 + gap] < backlash, "{row:?}");
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Motions with closed forms, computed by the reference and by lanes in f32 and f64.
 
+use std::sync::LazyLock;
+
 use nalgebra::Matrix4;
 
 use crate::ball::{ball, bounce, window};
@@ -37,6 +39,9 @@ struct Known {
     /// Whether it is in contact all the time.
     stays: bool,
 }
+
+/// All cycles. Computing them takes longer than following one on all engines.
+static KNOWN: LazyLock<Vec<Known>> = LazyLock::new(known_cycles);
 
 fn known_cycles() -> Vec<Known> {
     let mut list = Vec::new();
@@ -198,7 +203,7 @@ fn off(known: &Known, record: &Record) -> [f64; 2] {
     [error, (record.lyapunov * span - known.radius.ln()).abs()]
 }
 
-fn worst(known_cycles: &[Known], records: &[Record], engine: &str) -> [f64; 2] {
+fn worst(known_cycles: &[&Known], records: &[Record], engine: &str) -> [f64; 2] {
     let mut worst = [0.0f64; 2];
     for (known, record) in known_cycles.iter().zip(records) {
         let off = off(known, record);
@@ -210,13 +215,13 @@ fn worst(known_cycles: &[Known], records: &[Record], engine: &str) -> [f64; 2] {
 
 #[test]
 fn the_reference_finds_known_cycles() {
-    let known_cycles = known_cycles();
-    let record = |known: &Known| {
+    let record = |known: &&Known| {
         let flow = Flow::new(&known.oscillator);
         measured_record(&measure(&flow, known.law, start(known), &budget()), &Needs::EVERYTHING)
     };
-    let records: Vec<Record> = known_cycles.iter().map(record).collect();
-    let [state, multiplier] = worst(&known_cycles, &records, "reference");
+    let all: Vec<&Known> = KNOWN.iter().collect();
+    let records: Vec<Record> = all.iter().map(record).collect();
+    let [state, multiplier] = worst(&all, &records, "reference");
     assert!(state < 1e-12 && multiplier < 1e-12, "{state:e} {multiplier:e}");
 }
 
@@ -240,8 +245,8 @@ fn settings<'o>(oscillators: impl Iterator<Item = &'o Oscillator>, settings: Lan
 /// Compares lanes with all closed forms. `bars` are the largest errors of [`off`].
 fn check_lanes(precision: Precision, bars: [f64; 2]) {
     // Machines need a shader of their own.
-    let is_machine = |known: &Known| Features::of(&known.oscillator).machine.is_some();
-    let (machines, plain): (Vec<Known>, Vec<Known>) = known_cycles().into_iter().partition(is_machine);
+    let is_machine = |known: &&Known| Features::of(&known.oscillator).machine.is_some();
+    let (machines, plain): (Vec<&Known>, Vec<&Known>) = KNOWN.iter().partition(is_machine);
     let mut gpu = open(precision);
     for group in [&machines, &plain] {
         let cells: Vec<_> =
@@ -256,7 +261,7 @@ fn check_lanes(precision: Precision, bars: [f64; 2]) {
 }
 
 /// Small motion of Meissner's equation meets the stops where rest is unstable, and nowhere else. The shader is that of the `plain` cycles.
-fn check_borders(gpu: &mut Gpu, plain: &[Known]) {
+fn check_borders(gpu: &mut Gpu, plain: &[&Known]) {
     let points = meissner::points();
     let small = state(&[0.01]);
     let cells: Vec<_> =

@@ -8,7 +8,7 @@ use crate::common::closed_form::Linear;
 use crate::cycle::followed;
 
 /// Instants per period at which a motion is compared with the ends of its mode.
-const PLACES: usize = 20_000;
+const PLACES: usize = 4000;
 
 /// A linear oscillator under several harmonics.
 #[derive(Clone, Debug)]
