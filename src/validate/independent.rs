@@ -177,12 +177,7 @@ fn follow(mut motion: Strobed<'_>, budget: &Budget) -> Option<Record> {
 }
 
 /// Returns the motion displaced along a coordinate; none if what is at rest allows no displacement.
-fn displaced(
-    flight: &Flight,
-    coordinate: usize,
-    by: f64,
-    for_good: [bool; MOST_FRICTION],
-) -> Option<Flight> {
+fn displaced(flight: &Flight, coordinate: usize, by: f64, for_good: [bool; MOST_FRICTION]) -> Option<Flight> {
     let own = flight.coordinates();
     let mut direction = vec![0.0; own.len()];
     direction[coordinate] = by;

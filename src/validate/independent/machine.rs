@@ -17,8 +17,7 @@ use super::dop853::{Integration, integrate};
 use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Machine, Side, State};
 use rattlemap_dynamics::reference::EventKind;
 
-pub use system::Slide;
-use system::{Constraints, Domain, Key, Numbers, Point, Row, System, affine, dot, size};
+use system::{Constraints, Domain, Key, Numbers, Point, Row, Slide, System, affine, dot, size};
 
 /// Relative and absolute tolerance of one step.
 const TOLERANCE: f64 = 1e-12;
@@ -172,7 +171,7 @@ pub struct Flight {
 impl Flight {
     /// Builds a motion that starts at phase 0. A gap beyond a rigid wall is moved to this wall.
     pub fn new(machine: &Machine, start: &State) -> Flight {
-        let system = Rc::new(System::new(machine));
+        let system = Rc::new(System::new(machine, start));
         let gap = Gap { level: 0, mode: Mode::Plain, on_wall: None, from_force: 0, origin: None };
         let mut flight = Flight {
             stage: machine.first_stage(),
@@ -523,7 +522,7 @@ fn locate(
                 (value, rate) = (value * tau + term, rate * tau + value);
             }
             let next = tau - value / rate;
-            if !(next > 0.5 * tau && next < 2.0 * tau) {
+            if !(0.5 * tau..2.0 * tau).contains(&next) {
                 break;
             }
             tau = next;
@@ -538,7 +537,7 @@ fn locate(
             return Some((tau + step, taylor(domain, &point, step)));
         }
         // Near a double root the polynomial's root is as good as any.
-        if !(step.abs() < 0.1 * tau) {
+        if step.is_nan() || step.abs() >= 0.1 * tau {
             return Some((tau, y));
         }
         tau += step;

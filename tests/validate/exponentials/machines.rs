@@ -92,8 +92,7 @@ fn compare(seed: u64) -> Result<Compared, String> {
         };
         for gap in 0..gaps {
             let of_gap = judge.events.iter().filter(|event| event.gap == gap);
-            let theirs: Vec<Happening> =
-                of_gap.map(|event| (event.kind, event.side, event.symbol)).collect();
+            let theirs: Vec<Happening> = of_gap.map(|event| (event.kind, event.side, event.symbol)).collect();
             if own(&ours, gap) != own(&others[0], gap) {
                 return Ok(found);
             }
@@ -106,7 +105,10 @@ fn compare(seed: u64) -> Result<Compared, String> {
         }
         let judged = judge.state();
         let off = apart(&ours.state(), &judged[..2 * machine.degrees()], machine.omega);
-        if off.is_nan() || off > AGREEMENT + NOISES * noise || judged[2 * machine.degrees()..STATE].iter().any(|x| *x != 0.0) {
+        if off.is_nan()
+            || off > AGREEMENT + NOISES * noise
+            || judged[2 * machine.degrees()..STATE].iter().any(|x| *x != 0.0)
+        {
             return Err(format!("period {period}: off by {off:e} with noise {noise:e}"));
         }
         found.worst = found.worst.max(off);

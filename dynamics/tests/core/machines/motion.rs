@@ -7,8 +7,8 @@ use std::rc::Rc;
 use nalgebra::DVector;
 use rattlemap_dynamics::model::{Contact, Side};
 
-use super::system::{Grip, Key, Linear, Matrix, ROUNDING, Row, System, Vector, exponential, product, value};
 use super::super::independent::motion::first_fall;
+use super::system::{Grip, Key, Linear, Matrix, ROUNDING, Row, System, Vector, exponential, product, value};
 
 /// Relative errors of velocities that stand for those of rounding, which are smaller.
 const SHAKEN: f64 = 1e-13;

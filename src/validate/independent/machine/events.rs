@@ -375,7 +375,8 @@ impl Flight {
             if *y != self.y && moves > ROUNDING * most {
                 key.slides[i] = self.slide_at(i, &point);
             }
-            at_rest.elements[i] = key.slides[i] == Slide::Sticks;
+            // An element that has only begun to slide is at rest, too.
+            at_rest.elements[i] = key.slides[i] == Slide::Sticks || self.slide_at(i, &point) == Slide::Sticks;
         }
         self.consistent(key, &at_rest, &point)
     }

@@ -30,9 +30,12 @@ pub(super) type Row = [f64; WIDTH];
 /// Relative rounding error of sums, and of mobilities that vanish.
 pub(super) const ROUNDING: f64 = 1e-12;
 
+/// Length below which a machine has no scale of length.
+const NO_LENGTH: f64 = 1e-100;
+
 /// How the surfaces of an element with dry friction move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Slide {
+pub(super) enum Slide {
     /// The sliding rate stays 0.
     #[default]
     Sticks,
@@ -75,7 +78,7 @@ pub(super) struct Element {
 pub(super) struct Domain {
     n: usize,
     pub(super) width: usize,
-    /// Angular frequencies of the harmonics.
+    /// Orders of the harmonics.
     orders: Vec<u32>,
     pub(super) accelerations: Vec<Row>,
     /// Coordinates whose rate cannot change.
@@ -233,10 +236,16 @@ pub(super) struct System {
 }
 
 impl System {
-    pub(super) fn new(machine: &Machine) -> System {
+    pub(super) fn new(machine: &Machine, start: &State) -> System {
         let to_coordinates = coordinates(machine);
         let from_coordinates = to_coordinates.clone().try_inverse().expect("the rows are independent");
-        let length = machine.length_scale();
+        // A machine without walls and loads has no length, so its start gives one.
+        let of_start = start.iter().step_by(2).fold(0.0f64, |most, x| most.max(x.abs()));
+        let length = match machine.length_scale() {
+            scale if scale > NO_LENGTH => scale,
+            _ if of_start > NO_LENGTH => of_start,
+            _ => 1.0,
+        };
         let units = [length, length * machine.omega];
         let machine = transformed(machine, units, &from_coordinates);
         let factors = machine.mass.clone().cholesky().expect("the mass matrix is positive definite");
