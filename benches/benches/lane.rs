@@ -2,12 +2,14 @@
 
 use std::time::Instant;
 
-use rattlemap::gpu::{AdapterChoice, Features, Gpu, Lane, LaneSettings, Precision};
+use cpu_time::ProcessTime;
+use rattlemap::gpu::{AdapterChoice, Features, Gpu, Lane, LaneSettings, Precision, is_hardware};
 use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST};
+use rattlemap_dynamics::reference::machine::{Motion, System};
 
 use rattlemap::cli::bench::spread::Spread;
-use rattlemap_bench::shapes::{SHAPES, Shape};
+use rattlemap_bench::shapes::{CHAINS, Chain, SHAPES, Shape};
 
 /// Returns a variant of the shader.
 type Rewrite = fn(String) -> String;
@@ -56,6 +58,8 @@ struct Size {
     exponents: &'static [bool],
     /// Shapes of oscillators.
     shapes: &'static [Shape],
+    /// Shapes of machines.
+    chains: &'static [Chain],
 }
 
 /// Returns the full size for measurements, and a tiny one for tests.
@@ -64,11 +68,19 @@ fn size() -> Size {
     match measured {
         true => {
             let (precisions, exponents) = (&Precision::ALL, &[false, true]);
-            Size { side: 48, periods: 100, runs: 5, precisions, exponents, shapes: &SHAPES }
+            Size { side: 48, periods: 100, runs: 5, precisions, exponents, shapes: &SHAPES, chains: &CHAINS }
         }
         false => {
             let (precisions, exponents) = (&[Precision::F32], &[false]);
-            Size { side: 3, periods: 3, runs: 1, precisions, exponents, shapes: &SHAPES[..1] }
+            Size {
+                side: 3,
+                periods: 3,
+                runs: 1,
+                precisions,
+                exponents,
+                shapes: &SHAPES[..1],
+                chains: &CHAINS[..1],
+            }
         }
     }
 }
@@ -159,10 +171,76 @@ fn by_shape(plane: &Plane, size: &Size) {
     }
 }
 
+/// Returns the processor time of all threads for some work, in seconds. It is less noisy than elapsed time.
+fn processor_seconds(work: impl FnOnce()) -> f64 {
+    let start = ProcessTime::now();
+    work();
+    start.elapsed().as_secs_f64()
+}
+
+/// Integrates machines from rest. Returns the number of events.
+fn on_reference(systems: &[System], periods: u32) -> u64 {
+    let events = |system| {
+        let mut motion = Motion::new(system, &REST);
+        (0..periods).for_each(|_| motion.advance_period(&mut ()).expect("an ordinary cell"));
+        motion.work().events
+    };
+    systems.iter().map(events).sum()
+}
+
+/// Prints a table of the times of machines by shape, on the reference and on lanes. Both compute the same cells by turns.
+fn of_machines(size: &Size, on_lanes: bool) {
+    let precisions = if on_lanes { size.precisions } else { &[] };
+    let mut gpus: Vec<_> = precisions.iter().map(|&precision| open(precision, |source| source)).collect();
+    println!(
+        "{0} x {0} cells, {1} periods from rest, median of {2} runs",
+        size.side, size.periods, size.runs
+    );
+    println!(
+        "us per forcing period of a cell, and per event: of processor time, or of elapsed time on a graphics card"
+    );
+    let names: String = precisions.iter().map(|precision| format!(" lanes, {precision:?} |")).collect();
+    println!("| coordinates | gaps | harmonics | stages | events per period | reference |{names}");
+    for chain in size.chains {
+        let machines = chain.cells(size.side as usize);
+        let systems: Vec<_> = machines.iter().map(System::new).collect();
+        let lanes = (0..machines.len() as u32).map(|flow| Lane { flow, law: 0, start: REST }).collect();
+        let flows = machines.into_iter().map(Oscillator::of_machine).collect();
+        let plane = Plane { flows, laws: vec![Law::both(0.0, 0.0)], lanes };
+        for gpu in &mut gpus {
+            // Compiles the shader.
+            plane.run(gpu, &Size { periods: 1, ..*size }, false);
+        }
+        let mut events = 0;
+        let mut times = vec![Vec::new(); 1 + gpus.len()];
+        for _ in 0..size.runs {
+            times[0].push(processor_seconds(|| events = on_reference(&systems, size.periods)));
+            for (times, gpu) in times[1..].iter_mut().zip(&mut gpus) {
+                let mut elapsed = 0.0;
+                let of_processor = processor_seconds(|| elapsed = plane.run(gpu, size, false).0);
+                times.push(if is_hardware(gpu.adapter()) { elapsed } else { of_processor });
+            }
+        }
+        let (periods, events) = (systems.len() as f64 * f64::from(size.periods), events as f64);
+        let of = |times| {
+            let micros = 1e6 * Spread::of(times).median;
+            format!(" {:.0}, {:.0} |", micros / periods, micros / events)
+        };
+        let columns: String = times.into_iter().map(of).collect();
+        let Chain { coordinates, gaps, harmonics, stages } = chain;
+        println!("| {coordinates} | {gaps} | {harmonics} | {stages} | {:.1} |{columns}", events / periods);
+    }
+}
+
 fn main() {
     let size = size();
+    let is_given = |name: &str| std::env::args().any(|argument| argument == name);
+    if is_given("machines") {
+        let (side, periods) = (size.side.min(8), size.periods.min(20));
+        return of_machines(&Size { side, periods, ..size }, !is_given("reference"));
+    }
     let plane = Plane::new(size.side);
-    if std::env::args().any(|a| a == "shapes") {
+    if is_given("shapes") {
         return by_shape(&plane, &size);
     }
     let lane_periods = plane.lanes.len() as f64 * f64::from(size.periods);

@@ -5,11 +5,12 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use rattlemap_bench::shapes::SHAPES;
+use rattlemap_bench::shapes::{CHAINS, SHAPES};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST, State, state};
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
 use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::reference::machine::{Motion, System};
 
 /// Sizes of one run.
 #[derive(Clone, Copy)]
@@ -164,6 +165,30 @@ fn per_period_by_shape(c: &mut Criterion) {
     group.finish();
 }
 
+/// Times chains of masses on the engine of machines.
+fn per_period_of_machines(c: &mut Criterion) {
+    let size = size();
+    // Machines take longer than oscillators of two coordinates.
+    let (side, periods) = (size.side.div_ceil(2), size.periods / 10 + 1);
+    let mut group = c.benchmark_group("per period of machines");
+    group.throughput(Throughput::Elements((side * side) as u64 * periods));
+    group.sample_size(10);
+    for chain in CHAINS {
+        let systems: Vec<_> = chain.cells(side).iter().map(System::new).collect();
+        let work = |motions: &mut Vec<Motion<'_>>, periods: u64| {
+            for motion in motions {
+                (0..periods).for_each(|_| motion.advance_period(&mut ()).expect("an ordinary cell"));
+            }
+        };
+        let mut start: Vec<_> = systems.iter().map(|system| Motion::new(system, &REST)).collect();
+        work(&mut start, size.transient / 4);
+        group.bench_function(chain.name(), |b| {
+            b.iter_batched_ref(|| start.clone(), |motions| work(motions, periods), BatchSize::LargeInput)
+        });
+    }
+    group.finish();
+}
+
 fn flow(c: &mut Criterion) {
     let oscillator = GearPair::paper(0.5).oscillator().expect("valid parameters");
     c.bench_function("flow of one frequency", |b| b.iter(|| Flow::new(black_box(&oscillator))));
@@ -173,6 +198,7 @@ criterion_group! {
     name = benches;
     // Plots would need fonts of the system.
     config = Criterion::default().without_plots();
-    targets = per_period, per_period_with_tangent, per_event, per_period_of_a_map, per_period_by_shape, flow
+    targets = per_period, per_period_with_tangent, per_event, per_period_of_a_map, per_period_by_shape,
+        per_period_of_machines, flow
 }
 criterion_main!(benches);

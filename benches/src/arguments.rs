@@ -22,6 +22,7 @@ pub(crate) enum Instrument {
     Stress(Stress),
     Scale(Scale),
     HostCost(HostCost),
+    Machines(Machines),
 }
 
 /// Error of strobe states and event times against run time per period, for every method
@@ -135,6 +136,16 @@ pub(crate) struct HostCost {
     /// costs. Writes scaling.csv. The map of expensive cells is the main map with an eighth of the columns and rows.
     #[arg(long)]
     pub(crate) scaling: bool,
+}
+
+/// Time of the reference on a chain of masses, whose cells other programs read
+///
+/// Integrates a chain of four masses with two gaps on one core. Writes machines.json: the machine, the starts and results of its
+/// cells, and the time per forcing period of a cell.
+#[derive(Debug, Args)]
+pub(crate) struct Machines {
+    #[command(flatten)]
+    pub(crate) run: Options,
 }
 
 /// Options of all instruments.

@@ -1,6 +1,7 @@
 //! The instruments' commands.
 
 pub(crate) mod host_cost;
+pub(crate) mod machines;
 pub(crate) mod scale;
 pub(crate) mod stress;
 pub(crate) mod work_precision;

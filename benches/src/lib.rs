@@ -1,6 +1,7 @@
 //! Instruments: measurements of speed, accuracy and scale that everyone can repeat.
 
 pub mod host_cost;
+pub mod machines;
 pub mod phase;
 pub mod scale;
 pub mod scaling;
