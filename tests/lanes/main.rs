@@ -4,14 +4,16 @@
 mod common;
 
 /// Random machines and numbers, as the tests of the reference draw them.
-#[path = "."]
-mod independent {
-    #[allow(dead_code, reason = "machines need the numbers alone")]
-    #[path = "../../dynamics/tests/core/independent/random.rs"]
-    pub(crate) mod random;
+#[path = "../../dynamics/tests/core"]
+mod random_models {
+    pub(crate) mod independent {
+        #[allow(dead_code, reason = "machines need the numbers alone")]
+        pub(crate) mod random;
+    }
+    pub(crate) mod machines {
+        pub(crate) mod random;
+    }
 }
-#[path = "../../dynamics/tests/core/machines/random.rs"]
-mod random_machines;
 
 mod chatter;
 mod classes;
