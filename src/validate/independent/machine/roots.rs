@@ -74,8 +74,8 @@ fn halves(coefficients: &[f64]) -> ([f64; COEFFICIENTS], [f64; COEFFICIENTS]) {
     let count = coefficients.len();
     let (mut left, mut right) = ([0.0; COEFFICIENTS], [0.0; COEFFICIENTS]);
     right[..count].copy_from_slice(coefficients);
-    for k in 0..count {
-        left[k] = right[0];
+    for (k, left) in left.iter_mut().enumerate().take(count) {
+        *left = right[0];
         for i in 0..count - 1 - k {
             right[i] = 0.5 * (right[i] + right[i + 1]);
         }
