@@ -213,7 +213,11 @@ impl Tables {
         }
         table.push(0.0);
         let has_laws = constants.iter().flatten().any(|c| c.machine.as_ref().is_some_and(|m| m.has_laws));
-        let rows = if has_laws { of_flows } else { laws.iter().flat_map(machine::law_of_walls).collect() };
+        // Laws of walls first, then those of machines that have their own.
+        let mut rows: Vec<f64> = laws.iter().flat_map(machine::law_of_walls).collect();
+        if has_laws {
+            rows.extend(of_flows);
+        }
         let [flows, table, rows] = [flows, table, rows].map(|numbers| reals(&numbers, gpu.precision));
         let allowed = gpu.device.limits().max_storage_buffer_binding_size;
         let needed = table.len().max(flows.len()).max(4 * shapes.len()).max(rows.len()) as u64;
