@@ -41,7 +41,7 @@ use step_verdict::{Crossing, StepVerdict};
 pub use tangent::NO_SPEED;
 
 use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Schedule, Step};
-use crate::model::{Law, Side, State};
+use crate::model::{Law, REST, Side, State};
 
 /// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
 const RESCALE_STEPS: u64 = 16;
@@ -172,7 +172,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// [`log_scale`](Self::log_scale).
     pub fn tangents(&self) -> [State; N] {
         if let Some(motion) = &self.machine {
-            return motion.tangents().try_into().expect("there are N tangents");
+            let tangents = motion.tangents();
+            // Four stand for the unit vectors, of which one coordinate has two.
+            return std::array::from_fn(|i| tangents.get(i).copied().unwrap_or(REST));
         }
         self.tangents.map(|u| self.flow.to_state(u))
     }

@@ -376,6 +376,7 @@ fn a_chain_moves_in_its_normal_modes_until_the_ball_hits_it() {
     let (m, mb, e) = (1.3, 0.2, 0.7);
     let reduced = m * mb / (m + mb);
     let mut motion = Motion::new(&system, &start);
+    motion.set_tangents(Motion::unit_tangents(&system));
     let (mut from, mut at) = ((0u64, 0.0), start);
     let (mut worst, mut impacts) = ([0.0f64; 4], 0);
     for period in 0..40u64 {
@@ -408,8 +409,12 @@ fn a_chain_moves_in_its_normal_modes_until_the_ball_hits_it() {
         worst[0] = worst[0].max(apart(motion.state(), chain.after(from.1, &at, flown)));
         (from, at) = ((period + 1, 0.0), motion.state());
         if period == 7 {
-            let off = apart(at, end);
-            assert!(off < 1e-12, "after 8 periods: {off:e}");
+            // Impacts amplify rounding errors of the ball's position.
+            let (off, amplification) = (apart(at, end), motion.derivative().amax());
+            assert!(
+                off < 1e-13 * amplification,
+                "after 8 periods: {off:e}, amplified {amplification:e} times"
+            );
         }
     }
     println!("{impacts} impacts: flights, other velocities, momentum, energy {worst:?}");

@@ -144,29 +144,31 @@ fn halves(b: &[f64]) -> [Polynomial; 2] {
     [left, right]
 }
 
-/// Powers of a share, and their derivatives, to evaluate several polynomials there.
+/// Powers of a share, and their derivatives, to evaluate several polynomials there. The first one of each is left out.
 pub(super) struct Weights([Polynomial; 2]);
 
 impl Weights {
     pub(super) fn at(share: f64) -> Weights {
         let mut weights = [[0.0; ORDER + 1]; 2];
-        weights[0][0] = 1.0;
+        let mut power = 1.0;
         for k in 1..=ORDER {
-            weights[0][k] = share * weights[0][k - 1];
-            weights[1][k] = k as f64 * weights[0][k - 1];
+            weights[1][k] = if k == 1 { 0.0 } else { k as f64 * power };
+            power *= share;
+            weights[0][k] = power;
         }
         Weights(weights)
     }
 
-    /// Returns value and slope. Four sums run side by side, each from its smallest term on.
+    /// Returns value and slope. Four sums run side by side, each from its smallest term on, and the largest term comes last.
     pub(super) fn of(&self, c: &Polynomial) -> [f64; 2] {
-        self.0.each_ref().map(|weights| {
+        let later = self.0.each_ref().map(|weights| {
             let mut sums = [0.0; 4];
             for (c, weights) in c.chunks_exact(4).zip(weights.chunks_exact(4)).rev() {
                 (0..4).for_each(|i| sums[i] += c[i] * weights[i]);
             }
-            sums[3] + sums[2] + (sums[1] + sums[0])
-        })
+            sums[3] + sums[2] + sums[0] + sums[1]
+        });
+        [c[0] + later[0], c[1] + later[1]]
     }
 }
 
