@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Times peers and the one-core engine alternately on the same cells. Installs numba and heyoka in a virtual environment.
-# Writes out/bench/peers/peers.csv, for `rattlemap-bench work-precision --peers`, and steps.csv. Arguments go to
-# measure.py: --rounds N, --quick.
+# Writes out/bench/peers/peers.csv, for `rattlemap-bench work-precision --peers`, steps.csv and machines.csv. Arguments go to
+# the Python programs: --rounds N, --quick.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -18,4 +18,6 @@ fi
 # Every program gets one core.
 export NUMBA_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=1
 export NUMBA_CACHE_DIR="$PWD/out/peers-venv/cache"
-exec "$environment/bin/python" benches/peers/measure.py "$binary" out/bench/peers "$@"
+for program in measure heyoka_machine; do
+    "$environment/bin/python" "benches/peers/$program.py" "$binary" out/bench/peers "$@"
+done
