@@ -257,7 +257,10 @@ fn check_lanes(precision: Precision, bars: [f64; 2]) {
         assert!(state < bars[0] && multiplier < bars[1], "{state:e} {multiplier:e}");
     }
     check_borders(&mut gpu, &plain);
-    check_chain(&mut gpu, bars[0]);
+    // Impacts amplify errors of the chain by more than 1e4, so that single precision would show nothing.
+    if precision == Precision::F64 {
+        check_chain(&mut gpu, bars[0]);
+    }
 }
 
 /// Small motion of Meissner's equation meets the stops where rest is unstable, and nowhere else. The shader is that of the `plain` cycles.
