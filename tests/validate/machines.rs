@@ -34,7 +34,8 @@ fn a_map_of_a_machine_is_judged_and_a_falsified_record_is_found() {
     let differs = |record: &Record, judge: &Record| {
         !differences(record, judge, Precision::F64, plan.oscillator(0).period(), plan.budget()).is_empty()
     };
-    // The judge finds a reference that computes with a restitution which is off by a hundredth.
+    // The judge finds a reference that computes with a restitution which is off by a hundredth. Gears that come to rest on their flanks
+    // once per period forget it.
     let others = cpu_records(&gears("0.594"));
     let cycles = judged.iter().filter(|(id, judge)| {
         judge.period > 0
@@ -43,7 +44,7 @@ fn a_map_of_a_machine_is_judged_and_a_falsified_record_is_found() {
     });
     let cycles: Vec<_> = cycles.collect();
     let wrong = cycles.iter().filter(|(id, judge)| differs(&others[*id as usize], judge)).count();
-    assert!(cycles.len() >= 4 && 2 * wrong > cycles.len(), "{wrong} of {}", cycles.len());
+    assert!(cycles.len() >= 4 && 4 * wrong > cycles.len(), "{wrong} of {}", cycles.len());
     // A record of another cell.
     let (id, other) = (cycles[0].0, cycles[1].0);
     records[id as usize] = others[other as usize];
