@@ -9,7 +9,7 @@ use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::model::{GearPair, Law, Machine, NonImpacting, Oscillator, REST, State, state};
+use rattlemap_dynamics::model::{GearPair, Law, Machine, NonImpacting, Oscillator, State, state};
 use rattlemap_dynamics::reference::machine::{Motion, System};
 use rayon::prelude::*;
 
@@ -136,11 +136,18 @@ fn contact_free_motion_of_machines_ends_early() {
     let machine = |omega: f64| Machine::of(&slow(omega).oscillator().unwrap(), slow(omega).law());
     let oscillators = [9.0, 11.0].map(|omega| Oscillator::of_machine(machine(omega)));
     let settings = LaneSettings { features: Features::of(&oscillators[0]), ..LaneSettings::default() };
-    let lanes = [0, 1].map(|flow| Lane { flow, law: 0, start: REST });
+    let steady =
+        |oscillator: &Oscillator| NonImpacting::of_machine(oscillator.machine.as_ref().unwrap()).unwrap();
+    // From rest, the gears would rattle.
+    let lanes = [0, 1].map(|flow| {
+        let mut start = steady(&oscillators[flow as usize]).steady();
+        start[0] += 0.05;
+        Lane { flow, law: 0, start }
+    });
     let (mut gpu, laws) = (open(Precision::F32), [Law::both(0.0, 0.0)]);
     let records = pollster::block_on(gpu.run(&oscillators, &laws, &lanes, &settings)).unwrap();
     for (record, oscillator) in records.iter().zip(&oscillators) {
-        let motion = NonImpacting::of_machine(oscillator.machine.as_ref().unwrap()).unwrap();
+        let motion = steady(oscillator);
         assert_eq!((record.period, record.status, record.impacts_per_period), (1, 0, 0.0));
         assert!(record.periods_run < 100, "{} periods", record.periods_run);
         assert!((record.lyapunov / motion.exponent() - 1.0).abs() < 1e-5, "{}", record.lyapunov);
