@@ -150,11 +150,12 @@ pub(super) struct Weights([Polynomial; 2]);
 impl Weights {
     pub(super) fn at(share: f64) -> Weights {
         let mut weights = [[0.0; ORDER + 1]; 2];
+        let [values, slopes] = &mut weights;
         let mut power = 1.0;
-        for k in 1..=ORDER {
-            weights[1][k] = if k == 1 { 0.0 } else { k as f64 * power };
+        for (k, (value, slope)) in values.iter_mut().zip(slopes).enumerate().skip(1) {
+            *slope = if k == 1 { 0.0 } else { k as f64 * power };
             power *= share;
-            weights[0][k] = power;
+            *value = power;
         }
         Weights(weights)
     }
