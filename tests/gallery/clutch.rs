@@ -5,8 +5,9 @@ use nalgebra::Matrix2;
 use crate::common::apart;
 use crate::common::closed_form::Linear;
 use crate::cycle::followed;
+use crate::models::Cycle;
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::model::{Law, Model, Oscillator, REST, state};
+use rattlemap_dynamics::model::{Model, REST, state};
 
 /// `x'' + 2 zeta x' + f(x) = F_m + F cos(omega t)`: f has the slope 0 up to |x| = 1, `SLOPES[1]` up to 2 and `SLOPES[2]` up to the
 /// stops at 4.
@@ -18,20 +19,6 @@ const RESTITUTION: f64 = 0.4;
 
 /// Steps per period at which the position is compared with the ends of its piece.
 const PLACES: usize = 20_000;
-
-/// A cycle of the clutch.
-pub(crate) struct Cycle {
-    pub(crate) oscillator: Oscillator,
-    pub(crate) law: Law,
-    pub(crate) period: u32,
-    /// Displacement and velocity at phase 0.
-    pub(crate) strobe: [f64; 2],
-    /// Modulus of the largest multiplier.
-    pub(crate) radius: f64,
-    pub(crate) impacts: u32,
-    /// Whether the hub never returns to the free play.
-    pub(crate) stays: bool,
-}
 
 /// Returns the equation of motion on one piece of the characteristic: 0 is the free play, 2 the main stage. `sign` is that of x.
 fn piece(omega: f64, force: f64, piece: usize, sign: f64) -> Linear {
@@ -127,7 +114,8 @@ pub(crate) fn cycles() -> Vec<Cycle> {
             let period = (1..=4).find(closes).unwrap_or_else(|| panic!("no cycle at {omega}, {force}"));
             let End { y: strobe, tangent, impacts, stays } = run(omega, force, [x, v], period);
             let radius = tangent.complex_eigenvalues().iter().fold(0.0f64, |size, mu| size.max(mu.norm()));
-            Cycle { oscillator, law, period, strobe, radius, impacts, stays }
+            let what = format!("clutch, omega = {omega}, F = {force}");
+            Cycle { what, oscillator, law, period, strobe, radius, impacts, stays }
         })
         .collect()
 }

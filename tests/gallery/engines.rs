@@ -103,10 +103,11 @@ fn known_cycles() -> Vec<Known> {
             }
         }
     }
-    for cycle in models::cycles() {
-        let models::Cycle { what, oscillator, law, period, strobe: [x, v], radius, impacts, stays } = cycle;
-        let (strobe, impacts) = (state(&[x, v]), f64::from(impacts));
-        let unit = oscillator.omega;
+    let of_clutch = clutch::cycles().into_iter().map(|cycle| (cycle, true));
+    for (cycle, is_bare) in models::cycles().into_iter().map(|cycle| (cycle, false)).chain(of_clutch) {
+        let models::Cycle { what, oscillator, law, period, strobe, radius, impacts, stays } = cycle;
+        let unit = if is_bare { 1.0 } else { oscillator.omega };
+        let (strobe, impacts) = (state(&strobe), f64::from(impacts));
         list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays, unit });
     }
     for cycle in machines::cycles() {
@@ -114,12 +115,6 @@ fn known_cycles() -> Vec<Known> {
         let (oscillator, law) = (Oscillator::of_machine(machine), Law::both(0.0, 0.0));
         let unit = oscillator.omega;
         list.push(Known { what, oscillator, law, period: 1, strobe, radius, impacts, stays: false, unit });
-    }
-    for cycle in clutch::cycles() {
-        let clutch::Cycle { oscillator, law, period, strobe: [x, v], radius, impacts, stays } = cycle;
-        let what = format!("clutch, omega = {}, F = {}", oscillator.omega, oscillator.force[0]);
-        let (strobe, impacts) = (state(&[x, v]), f64::from(impacts));
-        list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays, unit: 1.0 });
     }
     let settling = [
         ("bilinear", bilinear(1.7, 1.0), [0.0, 0.0], 0),

@@ -11,6 +11,7 @@ mod random_models {
         pub(crate) mod random;
     }
     pub(crate) mod machines {
+        #[allow(dead_code, reason = "the tests of the reference use the rest")]
         pub(crate) mod random;
     }
 }

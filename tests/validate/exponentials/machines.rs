@@ -6,7 +6,7 @@ use rattlemap_dynamics::reference::EventKind;
 use rayon::prelude::*;
 
 use super::integrators::machines::motion::{Motion, What};
-use super::integrators::machines::random::{Shape, case};
+use super::integrators::machines::random::{any_case, apart};
 use super::integrators::machines::system::{ANGLE, System};
 
 /// Forcing periods of a comparison.
@@ -21,28 +21,7 @@ const NOISES: f64 = 20.0;
 /// Motions in which known errors have a larger effect are not compared further.
 const MOST_NOISE: f64 = 1e-9;
 
-const SHAPES: [Shape; 10] = [
-    Shape { coordinates: 1, gaps: 1, harmonics: 1, stages: 1, friction: 0, walls: 1 },
-    Shape { coordinates: 2, gaps: 1, harmonics: 2, stages: 2, friction: 1, walls: 2 },
-    Shape { coordinates: 2, gaps: 2, harmonics: 1, stages: 1, friction: 0, walls: 1 },
-    Shape { coordinates: 3, gaps: 2, harmonics: 3, stages: 1, friction: 0, walls: 2 },
-    Shape { coordinates: 3, gaps: 3, harmonics: 1, stages: 2, friction: 0, walls: 1 },
-    Shape { coordinates: 3, gaps: 1, harmonics: 1, stages: 1, friction: 2, walls: 1 },
-    Shape { coordinates: 4, gaps: 2, harmonics: 2, stages: 1, friction: 2, walls: 2 },
-    Shape { coordinates: 5, gaps: 3, harmonics: 4, stages: 2, friction: 1, walls: 3 },
-    Shape { coordinates: 6, gaps: 3, harmonics: 1, stages: 1, friction: 2, walls: 1 },
-    Shape { coordinates: 8, gaps: 3, harmonics: 4, stages: 2, friction: 2, walls: 4 },
-];
-
 type Happening = (EventKind, Side, Option<u8>);
-
-/// Returns the largest difference of two states relative to the larger one, with velocities over a rate.
-fn apart(a: &[f64], b: &[f64], rate: f64) -> f64 {
-    let scale = |i: usize| if i.is_multiple_of(2) { 1.0 } else { 1.0 / rate };
-    let most = |of: &dyn Fn(usize) -> f64| (0..a.len()).map(|i| scale(i) * of(i).abs()).fold(0.0, f64::max);
-    let off = most(&|i| a[i] - b[i]);
-    if off == 0.0 { 0.0 } else { off / most(&|i| a[i]).max(most(&|i| b[i])) }
-}
 
 /// What agrees: periods, events, and changes of friction.
 #[derive(Debug, Default)]
@@ -54,7 +33,7 @@ struct Compared {
 /// Compares the first periods of a motion. The order of events at one time has no meaning for two gaps, so events are compared gap by
 /// gap.
 fn compare(seed: u64) -> Result<Compared, String> {
-    let case = case(seed, SHAPES[seed as usize % SHAPES.len()]);
+    let case = any_case(seed);
     let (machine, gaps) = (&case.machine, case.machine.gaps.len());
     let [system, other] = [ANGLE, 0.6 * ANGLE].map(|angle| System::new(machine, angle));
     let start = |system| Motion::new(system, &case.start);

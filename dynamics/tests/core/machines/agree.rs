@@ -3,10 +3,9 @@
 use rattlemap_dynamics::model::{Machine, Side};
 use rayon::prelude::*;
 
-use super::checks::{any_case, apart};
 use super::engine::{Follower, Period};
 use super::motion::{Event, Motion, What};
-use super::random::Case;
+use super::random::{Case, any_case, apart};
 use super::system::{ANGLE, System};
 
 /// Forcing periods that are compared.

@@ -6,38 +6,12 @@ use rayon::prelude::*;
 
 use super::build::{in_coordinates, side_by_side};
 use super::motion::{Event, Motion, What};
-use super::random::{Case, Shape, case};
+use super::random::{Case, any_case, apart};
 use super::system::{ANGLE, System};
 use crate::independent::motion::{
     Mode as PlainMode, Motion as PlainMotion, System as PlainSystem, What as PlainWhat,
 };
 use crate::independent::random::{self as plain, Random};
-
-pub(crate) const SHAPES: [Shape; 10] = [
-    Shape { coordinates: 1, gaps: 1, harmonics: 1, stages: 1, friction: 0, walls: 1 },
-    Shape { coordinates: 2, gaps: 1, harmonics: 2, stages: 2, friction: 1, walls: 2 },
-    Shape { coordinates: 2, gaps: 2, harmonics: 1, stages: 1, friction: 0, walls: 1 },
-    Shape { coordinates: 3, gaps: 2, harmonics: 3, stages: 1, friction: 0, walls: 2 },
-    Shape { coordinates: 3, gaps: 3, harmonics: 1, stages: 2, friction: 0, walls: 1 },
-    Shape { coordinates: 3, gaps: 1, harmonics: 1, stages: 1, friction: 2, walls: 1 },
-    Shape { coordinates: 4, gaps: 2, harmonics: 2, stages: 1, friction: 2, walls: 2 },
-    Shape { coordinates: 5, gaps: 3, harmonics: 4, stages: 2, friction: 1, walls: 3 },
-    Shape { coordinates: 6, gaps: 3, harmonics: 1, stages: 1, friction: 2, walls: 1 },
-    Shape { coordinates: 8, gaps: 3, harmonics: 4, stages: 2, friction: 2, walls: 4 },
-];
-
-/// Returns the shape and the machine of a seed.
-pub(crate) fn any_case(seed: u64) -> Case {
-    case(seed, SHAPES[(seed % SHAPES.len() as u64) as usize])
-}
-
-/// Returns the largest difference of two states relative to the larger state, with velocities divided by a rate.
-pub(crate) fn apart(a: &[f64], b: &[f64], rate: f64) -> f64 {
-    let scale = |i: usize| if i.is_multiple_of(2) { 1.0 } else { 1.0 / rate };
-    let most = |of: &dyn Fn(usize) -> f64| (0..a.len()).map(|i| scale(i) * of(i).abs()).fold(0.0, f64::max);
-    let off = most(&|i| a[i] - b[i]);
-    if off == 0.0 { 0.0 } else { off / most(&|i| a[i]).max(most(&|i| b[i])) }
-}
 
 /// Returns events without their times, gap by gap.
 fn by_gap(events: &[Event], gaps: usize) -> Vec<Vec<(What, Side, Option<u8>)>> {
