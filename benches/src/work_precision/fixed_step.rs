@@ -72,12 +72,12 @@ impl Grid {
                 } else {
                     after(rest)
                 };
-                let Some(sighting) = flight.find_ending(true, &y, t, rest, &end, after, None) else {
+                let Some(sighting) = flight.find_ending(true, &y, t, rest, &end, after) else {
                     flight.q = end;
                     flight.leave_wall();
                     break;
                 };
-                let tau = flight.locate(t, sighting, after)?;
+                let tau = flight.locate(true, t, sighting, after)?;
                 flight.q = after(tau);
                 offset += tau;
                 flight.act(sighting.ending, start + offset, tau == 0.0);

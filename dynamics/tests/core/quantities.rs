@@ -61,7 +61,7 @@ fn quantities_are_those_of_dense_samples() {
     let samples = trace(&pair, orbit.strobe, orbit.strobe_meshing, period, 200_000).unwrap();
     let count = (samples.len() - 1) as f64;
     let of = quantities(&orbit);
-    for (i, displacement) in of.displacements.iter().enumerate() {
+    for (i, displacement) in of.displacements.iter().take(3).enumerate() {
         let value = |y: &State| [y[0], y[2], y[0] - y[2]][i];
         let values = || samples[1..].iter().map(|sample| value(&sample.state));
         let mean = values().sum::<f64>() / count;

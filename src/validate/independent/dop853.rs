@@ -160,7 +160,7 @@ impl Solver {
             let watch = |x: f64, y: &Gap| {
                 let (begun, q) = std::mem::replace(&mut last, (x, *y));
                 let after = |tau| self.after(field, q, t + begun, tau).unwrap_or(q);
-                let sighting = flight.find_ending(begun == 0.0, &q, t + begun, x - begun, y, after, None);
+                let sighting = flight.find_ending(begun == 0.0, &q, t + begun, x - begun, y, after);
                 found.set(sighting.map(|sighting| StepWithEnding { start: begun, y: q, sighting }));
                 sighting.is_some()
             };
@@ -171,20 +171,7 @@ impl Solver {
                 return end.iter().all(|x| x.is_finite()).then_some(());
             };
             let after = |tau| self.after(field, y, t + start, tau).unwrap_or([f64::NAN; 4]);
-            let (begun, first) = (t + start, start == 0.0);
-            let (mut sighting, mut tau) = (sighting, flight.locate(begun, sighting, after)?);
-            // The first guess may be wrong about the order of several endings in a step.
-            while flight.has_friction()
-                && tau > 0.0
-                && let other = Some(sighting.ending)
-                && let Some(earlier) = flight.find_ending(first, &y, begun, tau, &after(tau), after, other)
-            {
-                let sooner = flight.locate(begun, earlier, after)?;
-                if sooner >= tau {
-                    break;
-                }
-                (sighting, tau) = (earlier, sooner);
-            }
+            let tau = flight.locate(start == 0.0, t + start, sighting, after)?;
             flight.q = after(tau);
             t += start + tau;
             flight.act(sighting.ending, t, start + tau == 0.0);

@@ -6,9 +6,6 @@ use nalgebra::{Complex, Matrix2, Vector2};
 use rattlemap_dynamics::flow::{Gap, Phasor};
 use rattlemap_dynamics::model::{Domain, Harmonic, Oscillator, State, state};
 
-/// Relative difference of parallel rows.
-const PARALLEL: f64 = 1e-12;
-
 /// Conversion between displacements and gap coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Coordinates {
@@ -32,24 +29,6 @@ impl Coordinates {
     /// Returns the change of `v` by an impulse that changes the gap's rate by 1.
     pub(super) fn kick(&self) -> f64 {
         self.kick
-    }
-
-    /// Converts a row of velocities to one of `(w, v)`. A row parallel to that of the gap has no part in `v`.
-    pub(super) fn rate_row(&self, row: [f64; 2]) -> [f64; 2] {
-        let (own, rest) = (self.gap[self.other], self.gap[1 - self.other]);
-        let parts = [row[self.other] * rest, row[1 - self.other] * own];
-        let of_other = match parts[0] - parts[1] {
-            part if part.abs() <= PARALLEL * parts[0].abs().max(parts[1].abs()) => 0.0,
-            part => part / rest,
-        };
-        [row[1 - self.other] / rest, of_other]
-    }
-
-    /// Returns the accelerations of gap and displacement by unit forces on both displacements.
-    pub(super) fn per_force(&self, oscillator: &Oscillator) -> Matrix2<f64> {
-        let mut to_gap = Matrix2::new(self.gap[0], self.gap[1], 0.0, 0.0);
-        to_gap[(1, self.other)] = 1.0;
-        to_gap * inverse(oscillator.mass)
     }
 
     /// Converts a state to gap coordinates.
@@ -93,15 +72,18 @@ pub struct Equations {
 impl Equations {
     /// Builds the equations of one domain.
     pub fn new(oscillator: &Oscillator, domain: &Domain) -> Equations {
-        let coordinates = Coordinates::new(oscillator);
-        let Coordinates { gap, other, .. } = coordinates;
-        // Matrix from `(z, x)` to displacements.
+        let Coordinates { gap, other, .. } = Coordinates::new(oscillator);
+        // Matrices from displacements to `(z, x)` and back.
         let [own, rest] = if other == 1 { gap } else { [gap[1], gap[0]] };
+        let to_gap = match other {
+            1 => Matrix2::new(own, rest, 0.0, 1.0),
+            _ => Matrix2::new(rest, own, 1.0, 0.0),
+        };
         let from_gap = match other {
             1 => Matrix2::new(1.0 / own, -rest / own, 0.0, 1.0),
             _ => Matrix2::new(0.0, 1.0, 1.0 / own, -rest / own),
         };
-        let per_mass = coordinates.per_force(oscillator);
+        let per_mass = to_gap * inverse(oscillator.mass);
         let matrix =
             |m: [[f64; 2]; 2]| -per_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * from_gap;
         let (k, c) = (matrix(domain.stiffness), matrix(domain.damping));
@@ -116,18 +98,15 @@ impl Equations {
         }
     }
 
-    /// Returns the equations with a further constant part of the accelerations.
-    pub(super) fn loaded(&self, load: Vector2<f64>) -> Equations {
-        Equations { load: [self.load[0] + load[0], self.load[1] + load[1]], ..self.clone() }
-    }
-
-    /// Returns the equations with both accelerations multiplied by a matrix.
-    pub(super) fn times(&self, m: &Matrix2<f64>) -> Equations {
-        let of = |[a, b]: [f64; 2]| [0, 1].map(|i| m[(i, 0)] * a + m[(i, 1)] * b);
-        let columns: [[f64; 2]; 4] = std::array::from_fn(|j| of([self.rows[0][j], self.rows[1][j]]));
+    /// Returns the equations with the gap held at rest by a wall that takes up its acceleration.
+    pub(super) fn held(&self, coordinates: &Coordinates) -> Equations {
+        let kick = coordinates.kick();
+        let of = |pair: [f64; 2]| [0.0, pair[1] - kick * pair[0]];
+        let [gap, kept] = self.rows;
+        let row = std::array::from_fn(|j| kept[j] - kick * gap[j]);
         let drive = |drive: &Drive| Drive { factors: drive.factors.map(of), ..*drive };
         Equations {
-            rows: [0, 1].map(|i| columns.map(|column| column[i])),
+            rows: [[0.0; 4], row],
             force: self.force.map(of),
             harmonics: self.harmonics.iter().map(drive).collect(),
             load: of(self.load),
@@ -160,11 +139,6 @@ impl Equations {
     /// Returns the derivatives of first and second degree of the gap's acceleration by these equations, along the motion by
     /// the equations `along`.
     pub(super) fn gap_rates(&self, along: &Equations, q: &Gap, phasor: Phasor, omega: f64) -> [f64; 2] {
-        self.rates(along, q, phasor, omega).map(|[of_gap, _]| of_gap)
-    }
-
-    /// Returns the derivatives of first and second degree of both accelerations.
-    pub(super) fn rates(&self, along: &Equations, q: &Gap, phasor: Phasor, omega: f64) -> [[f64; 2]; 2] {
         let [cos, sin] = phasor;
         let change = |field: &Equations, rates: &Gap, [cos, sin]: Phasor, degree: u32| {
             let [by_cos, by_sin] = &field.force;
@@ -182,7 +156,7 @@ impl Equations {
         let (rates, turned) = ([q[1], a, q[3], b], [-omega * sin, omega * cos]);
         let [c, d] = change(along, &rates, turned, 1);
         let second = change(self, &[a, c, b, d], [-omega * omega * cos, -omega * omega * sin], 2);
-        [change(self, &rates, turned, 1), second]
+        [change(self, &rates, turned, 1)[0], second[0]]
     }
 
     /// Returns an upper bound of the undamped frequencies.

@@ -1,18 +1,13 @@
 //! Flights and contacts for an integrator with time steps: finds where a step meets a wall and applies the contact law.
 //! The equations of motion are in gap coordinates `(z, w, x, v)`, in which a gap can be set exactly to a wall.
 
-mod friction;
-
 use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::field::{Coordinates, Equations};
 use rattlemap_dynamics::flow::{Gap, Phasor};
-use rattlemap_dynamics::model::{Contact, Law, MOST_FRICTION, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::reference::EventKind;
-
-use friction::{Domains, Element, Slidings};
-pub use friction::{Sliding, Slip};
 
 /// Largest number of iterations of a root search.
 const ROOT_CAP: u32 = 100;
@@ -25,19 +20,6 @@ const TURN_CAP: u32 = 30;
 /// An infinite series of impacts ends when its remaining duration is below this, in radians of free motion. The error is
 /// of second order in this value.
 const SERIES_ENDS: f64 = 1e-6;
-
-/// With dry friction, a series of impacts ends when its flights are this high, relative to the scale of length: hardly higher than
-/// rounding errors.
-const LOWEST_FLIGHT: f64 = 1e-13;
-
-/// Time until a root that counts as rounding, in radians of the longest step.
-const AT_ONCE: f64 = 1e-15;
-
-/// Deceleration of a sliding rate from 0, relative to that by friction, that counts as rounding.
-const NO_RETURN: f64 = 1e-9;
-
-/// Longest flight, in radians of the longest step, that a polynomial of third degree describes. The distance from the wall may be rounding.
-const SHORT_FLIGHT: f64 = 1e-4;
 
 /// Relative penetration of a wall that counts as rounding if the gap is opening.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -63,21 +45,12 @@ pub enum Ending {
     Closes(Side),
     /// A gap behind a wall that does not push now returns to the wall. This is not an event.
     Returns(Side),
-    /// The rate of a sliding element vanishes.
-    RateVanishes(usize),
-    /// The force that holds an element reaches its limit.
-    Slips(usize, Sliding),
 }
 
 impl Ending {
     /// Whether the gap meets a wall; otherwise an acceleration changes sign.
     fn is_of_gap(self) -> bool {
         !matches!(self, Ending::PressingEnds(_) | Ending::PulledOff(_) | Ending::Opens(_) | Ending::Closes(_))
-            && !self.is_of_friction()
-    }
-
-    fn is_of_friction(self) -> bool {
-        matches!(self, Ending::RateVanishes(_) | Ending::Slips(..))
     }
 }
 
@@ -99,10 +72,8 @@ pub struct Sighting {
     pub ending: Ending,
     /// Zero if the start itself lies beyond the ending, by rounding.
     pub within: f64,
-    /// First guess of the root; the root itself if it equals `within`.
+    /// First guess of the root.
     pub guess: f64,
-    /// Order of the root with which the step starts, or 0.
-    order: u32,
 }
 
 /// An event that ended a flight.
@@ -141,19 +112,10 @@ pub struct Flight {
     mode: Mode,
     /// The ending at which the present motion starts, and the order of that root.
     from: Option<(Ending, u32)>,
-    /// Elements with dry friction.
-    elements: Arc<[Element]>,
-    slidings: Slidings,
-    /// For each element, the order of the root of its sliding rate or holding force at the start of the present motion, or 0.
-    starts: [u32; MOST_FRICTION],
-    /// Scale of length.
-    length: f64,
     /// Gap coordinates.
     pub q: Gap,
     /// Events since the caller last took them.
     pub events: Vec<Ended>,
-    /// Changes of friction since the caller last took them.
-    pub slips: Vec<Slip>,
 }
 
 /// The walls of an interval and the motion between them.
@@ -161,34 +123,29 @@ pub struct Flight {
 struct Interval {
     walls: [f64; 2],
     contacts: [Contact; 2],
-    /// For each stage, the equations of all combinations of friction modes.
-    domains: Vec<Vec<Domains>>,
+    /// For each stage, the equations of free motion, and of lasting contact with the right and the left wall.
+    fields: Vec<[Equations; 3]>,
     /// For each stage, stiffness, damping and preload of the right and of the left wall, if these only push.
     pushing: Vec<[Option<[f64; 3]>; 2]>,
 }
 
 impl Interval {
     /// `nth` is the number of walls in front of the interval, none between the first walls.
-    fn new(
-        oscillator: &Oscillator,
-        coordinates: &Coordinates,
-        elements: &[Element],
-        side: Side,
-        nth: usize,
-    ) -> Interval {
+    fn new(oscillator: &Oscillator, coordinates: &Coordinates, side: Side, nth: usize) -> Interval {
         let of_stage = |stage: usize| {
             let alone = oscillator.in_stage(stage);
             if nth == 0 { alone } else { alone.behind(side, nth) }
         };
-        let domains = |stage: usize| {
+        let fields = |stage: usize| {
             let oscillator = of_stage(stage);
             let free = Equations::new(&oscillator, &oscillator.free);
             let behind = |side: Side| match oscillator.contacts[side.index()] {
-                _ if oscillator.walls[side.index()].is_infinite() => Some(free.clone()),
-                Contact::Rigid => None,
-                _ => Some(Equations::new(&oscillator, &oscillator.meshing[side.index()])),
+                _ if oscillator.walls[side.index()].is_infinite() => free.clone(),
+                Contact::Rigid => free.held(coordinates),
+                _ => Equations::new(&oscillator, &oscillator.meshing[side.index()]),
             };
-            friction::domains(&free, Side::BOTH.map(behind), coordinates, elements)
+            let [right, left] = Side::BOTH.map(behind);
+            [free, right, left]
         };
         let pushing = |stage: usize| {
             let oscillator = of_stage(stage);
@@ -206,7 +163,7 @@ impl Interval {
         Interval {
             walls,
             contacts,
-            domains: stages.clone().map(domains).collect(),
+            fields: stages.clone().map(fields).collect(),
             pushing: stages.map(pushing).collect(),
         }
     }
@@ -218,8 +175,7 @@ impl Flight {
     pub fn new(oscillator: &Oscillator, law: Law, start: State) -> Flight {
         let coordinates = Coordinates::new(oscillator);
         let [right, left] = oscillator.outer_walls.each_ref().map(Vec::len);
-        let elements = &friction::elements(oscillator, &coordinates)[..];
-        let interval = |side| move |nth| Interval::new(oscillator, &coordinates, elements, side, nth);
+        let interval = |side| move |nth| Interval::new(oscillator, &coordinates, side, nth);
         let intervals =
             (1..=left).rev().map(interval(Side::Left)).chain((0..=right).map(interval(Side::Right)));
         let mut flight = Flight {
@@ -235,13 +191,8 @@ impl Flight {
             fastest: f64::from(oscillator.highest_order()) * oscillator.omega,
             mode: Mode::Free,
             from: None,
-            elements: elements.into(),
-            slidings: [Sliding::Sticks; MOST_FRICTION],
-            starts: [0; MOST_FRICTION],
-            length: oscillator.length_scale(),
             q: coordinates.gap(&start),
             events: Vec::new(),
-            slips: Vec::new(),
         };
         for side in Side::BOTH {
             while let Some(next) = flight.next_interval(side)
@@ -258,7 +209,6 @@ impl Flight {
                 false => flight.mode = Mode::Open(side),
             }
         }
-        flight.start_friction();
         flight
     }
 
@@ -297,45 +247,21 @@ impl Flight {
         matches!(self.mode, Mode::Stuck(_))
     }
 
-    /// Returns the elements that stick.
-    pub fn sticks(&self) -> [bool; MOST_FRICTION] {
-        std::array::from_fn(|i| i < self.elements.len() && self.slidings[i] == Sliding::Sticks)
-    }
-
-    /// Returns a motion displaced by `by` in gap coordinates. A gap at rest on a wall is not displaced, and sliding rates of 0 stay 0.
-    /// Elements that stick `for_good` are not displaced along their rows.
-    pub fn displaced(&self, by: &Gap, for_good: [bool; MOST_FRICTION]) -> Flight {
+    /// Returns a motion displaced by `by` in gap coordinates. A gap at rest on a wall is not displaced.
+    pub fn displaced(&self, by: &Gap) -> Flight {
         let mut other = self.clone();
-        let mut by = *by;
-        let is_on_wall = || Side::BOTH.into_iter().any(|side| self.q[0] == self.wall(side));
-        if self.is_stuck() || self.holds_gap() && is_on_wall() {
-            (by[0], by[1]) = (0.0, 0.0);
-        }
-        if self.has_friction() {
-            self.project(&mut by, for_good);
-        }
-        (0..4).for_each(|i| other.q[i] += by[i]);
+        let held = if self.is_stuck() { 2 } else { 0 };
+        (held..4).for_each(|i| other.q[i] += by[i]);
         other
     }
 
     /// Returns the present equations of motion.
     #[inline]
     pub fn field(&self) -> &Equations {
-        &self.domains().fields[self.domain()]
-    }
-
-    /// Returns the index of the present equations of motion.
-    #[inline]
-    fn domain(&self) -> usize {
         match self.mode {
-            Mode::Free | Mode::Open(_) => 0,
-            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => domain_behind(side),
+            Mode::Free | Mode::Open(_) => self.free_field(),
+            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => self.meshing_field(side),
         }
-    }
-
-    #[inline]
-    fn domains(&self) -> &Domains {
-        self.domains_in(self.slidings)
     }
 
     /// Returns the longest step in which no ending can be missed: a radian of free motion, or of meshing during contact
@@ -346,9 +272,7 @@ impl Flight {
             Mode::Sustained(side) if self.pushing(side).is_some() => self.meshing_field(side),
             _ => self.free_field(),
         };
-        let rate =
-            if self.elements.is_empty() { field.rate() } else { field.rate().max(self.field().rate()) };
-        rate.max(self.fastest).recip()
+        field.rate().max(self.fastest).recip()
     }
 
     /// Returns the phases in turns at which the stage changes.
@@ -372,44 +296,38 @@ impl Flight {
         self.stage = stage;
         // The phase of a whole period is 0 without rounding.
         let exact = t % self.period;
-        self.check_rest(exact, t);
         match self.mode {
-            Mode::Stuck(side) if !self.presses(&self.domains().push, side, &self.q, exact) => {
+            Mode::Stuck(side) if !self.presses(self.free_field(), side, &self.q, exact) => {
                 self.leave(side, exact);
                 self.record(t, EventKind::MeshEnd, side);
             }
-            Mode::Onset(side)
-                if !self.holds_gap()
-                    && self.pressing(self.meshing_field(side), side, &self.q, exact) <= 0.0 =>
-            {
-                self.act(Ending::PressingEnds(side), t, true);
+            Mode::Onset(side) if self.pressing(self.meshing_field(side), side, &self.q, exact) <= 0.0 => {
+                self.act(Ending::PressingEnds(side), t, false);
             }
             Mode::Sustained(side) if !self.closes(side, exact) => {
-                self.act(Ending::Opens(side), t, true);
+                self.act(Ending::Opens(side), t, false);
                 self.from = None;
             }
             Mode::Open(side) if self.closes(side, exact) => {
-                self.act(Ending::Closes(side), t, true);
+                self.act(Ending::Closes(side), t, false);
                 self.from = None;
             }
             _ => {}
         }
-        self.check_rest(exact, t);
     }
 
     /// Records that the next step does not start on a wall.
     #[inline]
     pub fn leave_wall(&mut self) {
         self.from = None;
-        self.starts = [0; MOST_FRICTION];
     }
 
     fn free_field(&self) -> &Equations {
-        &self.domains().fields[0]
+        &self.intervals[self.interval].fields[self.stage][0]
     }
 
     fn meshing_field(&self, side: Side) -> &Equations {
-        &self.domains().fields[domain_behind(side)]
+        &self.intervals[self.interval].fields[self.stage][if side == Side::Right { 1 } else { 2 }]
     }
 
     fn wall(&self, side: Side) -> f64 {
@@ -499,11 +417,9 @@ impl Flight {
             }
             Ending::PressingEnds(side) => (self.pressing(self.field(), side, q, t), 0.0),
             Ending::PulledOff(side) => {
-                let push = &self.domains().push;
-                (self.pressing(push, side, q, t), self.pressing_rate(push, self.field(), side, q, t))
+                let free = self.free_field();
+                (self.pressing(free, side, q, t), self.pressing_rate(free, self.field(), side, q, t))
             }
-            Ending::RateVanishes(i) => self.sliding_speed(i, q, t),
-            Ending::Slips(i, next) => self.holding(i, next, q, t),
         }
     }
 
@@ -515,9 +431,8 @@ impl Flight {
 
     /// Finds the earliest ending in a step of length `h` from `q0` at time `t` to `q1`. The distance is tested at the end
     /// of the step and at its minimum, which a cubic Hermite polynomial predicts. `first` says that the step starts with
-    /// the flight. `after(tau)` integrates from `q0`. The ending `but` is not searched.
+    /// the flight. `after(tau)` integrates from `q0`.
     #[inline]
-    #[expect(clippy::too_many_arguments, reason = "a step")]
     pub fn find_ending(
         &self,
         first: bool,
@@ -526,46 +441,10 @@ impl Flight {
         h: f64,
         q1: &Gap,
         after: impl Fn(f64) -> Gap,
-        but: Option<Ending>,
     ) -> Option<Sighting> {
-        let find = |ending| {
-            if Some(ending) == but { None } else { self.find(ending, first, q0, t, h, q1, &after) }
-        };
-        let earlier = |a: &Sighting, b: &Sighting| a.guess.total_cmp(&b.guess);
-        let at_walls = || self.endings().into_iter().filter_map(find).min_by(earlier);
-        if self.elements.is_empty() {
-            return at_walls();
-        }
-        let at_walls = if self.holds_gap() { None } else { at_walls() };
-        at_walls.into_iter().chain(self.endings_of_friction().filter_map(find)).min_by(earlier)
-    }
-
-    /// Returns the order of the root with which the present motion starts.
-    fn order_at_start(&self, ending: Ending) -> Option<u32> {
-        match ending {
-            Ending::RateVanishes(i) | Ending::Slips(i, _) => Some(self.starts[i]).filter(|&order| order > 0),
-            _ => self.from.filter(|(from, _)| *from == ending).map(|(_, order)| order),
-        }
-    }
-
-    /// Whether the start, with this distance and rate, is really the end of a friction mode.
-    fn ends_at_start(&self, ending: Ending, (distance, rate): (f64, f64)) -> bool {
-        match ending {
-            Ending::RateVanishes(i) => rate < -NO_RETURN * self.elements[i].friction_rate(),
-            Ending::Slips(..) => distance > 0.0 || rate < 0.0,
-            _ => false,
-        }
-    }
-
-    /// Whether a sliding rate is 0 but for rounding, and would cross 0.
-    fn ends_at_once(&self, ending: Ending, (distance, rate): (f64, f64)) -> bool {
-        matches!(ending, Ending::RateVanishes(_)) && distance < -rate * AT_ONCE * self.longest_step()
-    }
-
-    /// Whether an element has dry friction.
-    #[inline]
-    pub fn has_friction(&self) -> bool {
-        !self.elements.is_empty()
+        let find = |ending| self.find(ending, first, q0, t, h, q1, &after);
+        let sightings = self.endings().into_iter().filter_map(find);
+        sightings.min_by(|a, b| a.guess.total_cmp(&b.guess))
     }
 
     #[expect(clippy::too_many_arguments, reason = "a step")]
@@ -579,37 +458,22 @@ impl Flight {
         q1: &Gap,
         after: impl Fn(f64) -> Gap,
     ) -> Option<Sighting> {
+        let starts_there = first && self.from.is_some_and(|(from, _)| from == ending);
         let left = self.distance(ending, q0, t);
-        let order = self.order_at_start(ending).filter(|_| first && !self.ends_at_start(ending, left));
-        let (starts_there, order) = (order.is_some(), order.unwrap_or(0));
-        if !starts_there && (left.0 <= 0.0 || self.ends_at_once(ending, left)) {
-            return Some(Sighting { ending, within: 0.0, guess: 0.0, order });
-        }
-        if starts_there
-            && self.has_friction()
-            && let Some(short) = self.short_flight(ending, q0, t, left.1).filter(|short| *short < h)
-        {
-            return Some(Sighting { ending, within: short, guess: short, order });
+        if !starts_there && left.0 <= 0.0 {
+            return Some(Sighting { ending, within: 0.0, guess: 0.0 });
         }
         let right = self.distance(ending, q1, t + h);
         // The gap leaves its wall slowly.
-        let rounding = match ending {
-            Ending::RateVanishes(i) => Some(self.rate_rounding(i, q1)),
-            _ => ending.is_of_gap().then_some(ROUNDING * q1[0].abs()),
-        };
-        let is_rounding = right.1 > 0.0 && rounding.is_some_and(|rounding| right.0 >= -rounding);
+        let is_rounding = ending.is_of_gap() && right.1 > 0.0 && right.0 >= -ROUNDING * q1[0].abs();
         if right.0 < 0.0 && !(starts_there && is_rounding) {
             let share = if starts_there { second_root(left, right, h) } else { left.0 / (left.0 - right.0) };
-            return Some(Sighting { ending, within: h, guess: h * share.clamp(0.01, 0.99), order });
+            return Some(Sighting { ending, within: h, guess: h * share.clamp(0.01, 0.99) });
         }
         if right.1 <= 0.0 {
             return None;
         }
-        let left = match (starts_there, ending) {
-            (true, Ending::RateVanishes(_)) => (0.0, left.1.max(0.0)),
-            (true, _) => (0.0, left.1),
-            (false, _) => left,
-        };
+        let left = if starts_there { (0.0, left.1) } else { left };
         let mut turn = h * turning_point(left, right, h)?;
         // The polynomial only predicts the minimum; the equations decide.
         if ending.is_of_gap() {
@@ -628,31 +492,20 @@ impl Flight {
             }
         }
         let is_beyond = self.distance(ending, &after(turn), t + turn).0 < 0.0;
-        is_beyond.then_some(Sighting { ending, within: turn, guess: 0.5 * turn, order })
-    }
-
-    /// Returns the duration of a flight that returns to its wall at once. `rate` is that of the distance.
-    fn short_flight(&self, ending: Ending, q: &Gap, t: f64, rate: f64) -> Option<f64> {
-        let field = self.field();
-        let sign = rate.signum() * q[1].signum();
-        let acceleration = sign * field.accelerations(q, self.phasor(t))[0];
-        let first = -2.0 * rate / acceleration;
-        if !ending.is_of_gap() || first <= 0.0 || first > SHORT_FLIGHT * self.longest_step() {
-            return None;
-        }
-        let jerk = sign * field.gap_rates(field, q, self.phasor(t), self.omega)[0];
-        // One step of Newton's method for rate + acceleration t / 2 + jerk t^2 / 6.
-        Some(first - jerk * first * first / (3.0 * acceleration + 2.0 * jerk * first))
+        is_beyond.then_some(Sighting { ending, within: turn, guess: 0.5 * turn })
     }
 
     /// Locates an ending: Newton's method on the integrator with the root at the start divided out, and bisection if it
     /// fails. Returns the time since `t`; none if neither converges.
-    pub fn locate(&self, t: f64, sighting: Sighting, after: impl Fn(f64) -> Gap) -> Option<f64> {
-        let Sighting { ending, within, guess, order } = sighting;
-        if within == guess {
-            return Some(guess);
+    pub fn locate(&self, first: bool, t: f64, sighting: Sighting, after: impl Fn(f64) -> Gap) -> Option<f64> {
+        let Sighting { ending, within, guess } = sighting;
+        if within == 0.0 {
+            return Some(0.0);
         }
-        let order = f64::from(order);
+        let order = match self.from {
+            Some((from, order)) if first && from == ending => f64::from(order),
+            _ => 0.0,
+        };
         let (mut lo, mut hi, mut tau) = (0.0, within, guess);
         for trial in 0..ROOT_CAP {
             let q = after(tau);
@@ -690,12 +543,7 @@ impl Flight {
     /// Applies an ending at the present state and time. `settling` says that the flight started there, so that rounding
     /// alone may have caused the ending.
     pub fn act(&mut self, ending: Ending, t: f64, settling: bool) {
-        if self.has_friction() && !settling {
-            self.leave_wall();
-        }
         match ending {
-            Ending::RateVanishes(i) => self.end_sliding(i, t),
-            Ending::Slips(i, next) => self.slip(i, next, t),
             Ending::Contact(side) => self.contact(side, t, settling),
             Ending::OnsetEnds(side) => {
                 self.put_on_wall(side);
@@ -739,7 +587,7 @@ impl Flight {
                 self.leave(side, t);
             }
             Ending::Returns(side) => self.contact(side, t, false),
-            Ending::PulledOff(side) if settling && self.presses(&self.domains().push, side, &self.q, t) => {
+            Ending::PulledOff(side) if settling && self.presses(self.free_field(), side, &self.q, t) => {
                 self.from = Some((ending, 1));
             }
             Ending::PulledOff(side) => {
@@ -747,9 +595,6 @@ impl Flight {
                 self.from = Some((Ending::Contact(side), 3));
                 self.record(t, EventKind::MeshEnd, side);
             }
-        }
-        if !ending.is_of_friction() {
-            self.check_rest(t, t);
         }
     }
 
@@ -791,40 +636,21 @@ impl Flight {
         };
         let (after, at_rest) = (kicked(e), kicked(0.0));
         let presses = |q: &Gap| {
-            let modes = |domain: usize| self.domains_in(self.after_jump(domain, q, t));
-            match (self.is_rigid(side), domain_behind(side)) {
-                (true, behind) => self.presses(&modes(behind).push, side, q, t),
-                (false, behind) => {
-                    [0, behind].into_iter().all(|i| self.presses(&modes(i).fields[i], side, q, t))
-                }
-            }
+            self.presses(self.free_field(), side, q, t)
+                && (self.is_rigid(side) || self.presses(self.meshing_field(side), side, q, t))
         };
         let is_slow = leaving <= self.law.mesh_speed[side.index()];
-        let is_negligible = match self.has_friction() {
-            false => {
-                let pressing = self.pressing(self.free_field(), side, &at_rest, t);
-                let has_end = e < 1.0 && self.law.mesh_speed[side.index()] == 0.0 && pressing > 0.0;
-                has_end && 2.0 * leaving < SERIES_ENDS * (1.0 - e) * pressing * self.longest_step()
-            }
-            true => {
-                let (domain, q) =
-                    if self.is_rigid(side) { (domain_behind(side), &at_rest) } else { (0, &after) };
-                let domains = self.domains_in(self.after_jump(domain, q, t));
-                let field = if self.is_rigid(side) { &domains.push } else { &domains.fields[0] };
-                let height = LOWEST_FLIGHT * self.length;
-                leaving * leaving <= 2.0 * height * self.pressing(field, side, q, t)
-            }
+        let is_series_over = !is_slow && e < 1.0 && self.law.mesh_speed[side.index()] == 0.0 && {
+            let pressing = self.pressing(self.free_field(), side, &at_rest, t);
+            let is_pressed = pressing > 0.0 && presses(&at_rest);
+            is_pressed && 2.0 * leaving < SERIES_ENDS * (1.0 - e) * pressing * self.longest_step()
         };
-        let is_series_over = !is_slow && is_negligible && presses(&at_rest);
         let rests = is_series_over || is_slow && self.is_rigid(side);
         let lasts = (is_slow || is_series_over) && presses(if rests { &at_rest } else { &after });
-        let q = if lasts && rests { at_rest } else { after };
-        let slidings = self.after_jump(if lasts { domain_behind(side) } else { 0 }, &q, t);
-        self.q = q;
+        self.q = if lasts && rests { at_rest } else { after };
         if !lasts {
-            self.record(t, EventKind::Impact, side);
-            self.enter(slidings, t, true);
             self.leave(side, t);
+            self.record(t, EventKind::Impact, side);
             return;
         }
         (self.mode, self.from) = match (self.is_rigid(side), leaving > 0.0 && !rests) {
@@ -836,7 +662,6 @@ impl Flight {
         if let Some(ended) = self.events.last_mut() {
             ended.after_series = is_series_over;
         }
-        self.enter(slidings, t, true);
     }
 
     /// Begins free motion from a wall.
@@ -858,12 +683,6 @@ impl Flight {
     fn put_on_wall(&mut self, side: Side) {
         self.q[0] = self.wall(side);
     }
-}
-
-/// Returns the index of the equations of contact with a wall.
-#[inline]
-fn domain_behind(side: Side) -> usize {
-    if side == Side::Right { 1 } else { 2 }
 }
 
 /// Error bound of the cubic through the ends of a step of one radian, relative to its slopes.
