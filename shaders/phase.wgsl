@@ -40,11 +40,3 @@ fn steps_to_stop(stop: u32) -> Real {
     }
     return steps_to_stop_phase(stop);
 }
-
-// Returns the step at which the lane must stop: phase 0, or half a period in the middle period of a cycle that is
-// read and may be its own mirror image.
-fn next_stop_phase() -> u32 {
-    let steps = shape.steps;
-    let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.periods_to_read == tally.candidate + 1u;
-    return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
-}

@@ -96,6 +96,14 @@ fn store_strobe_state() {
     }
 }
 
+// Returns the step at which the lane must stop: phase 0, or half a period in the middle period of a cycle that is
+// read and may be its own mirror image.
+fn next_stop_phase() -> u32 {
+    let steps = shape.steps;
+    let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.periods_to_read == tally.candidate + 1u;
+    return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.y * settings.row + id.x;

@@ -35,7 +35,7 @@ pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;
 pub use quantities::{
     Approaches, DISPLACEMENTS, Displacement, FrictionQuantities, Quantities, place_of_displacement,
-    place_of_gap,
+    place_of_gap, quantities_after,
 };
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};

@@ -107,11 +107,6 @@ fn fly_to_stop_phase() -> bool {
     return false;
 }
 
-// Machines have no mirror images, so that lanes stop at phase 0 alone.
-fn next_stop_phase() -> u32 {
-    return shape.steps;
-}
-
 fn strobe_state() -> State {
     return motion.q;
 }
@@ -259,7 +254,7 @@ fn mesh_fraction(periods: u32) -> Real {
     return (Real(tally.mesh_whole) + motion.mesh_part) / (Real(periods) * Real(shape.steps));
 }
 
-// Machines are not measured.
+// The host measures machines (src/map/engine/gpu.rs).
 fn measure_period() {}
 
 fn begin_measuring() {}

@@ -245,8 +245,9 @@ fn step() -> bool {
         return false;
     }
     motion.theta = 0.0;
+    let stop = next_stop_phase();
     tally.step += 1u;
-    return tally.step >= next_stop_phase();
+    return tally.step >= stop;
 }
 
 // Whether a change of the stage is the next stop.

@@ -151,6 +151,7 @@ impl Constants {
         steps: u32,
         features: Features,
     ) -> Option<Constants> {
+        let machine = MachineConstants::new(oscillator, requested)?;
         let none = Page { harmonics: Vec::new(), contacts: [Contact::Impact; 2], behind: [None; 2] };
         Some(Constants {
             flow: Flow { h: oscillator.period() / f64::from(steps), ..Flow::zeroed() },
@@ -158,13 +159,13 @@ impl Constants {
             further: Vec::new(),
             changes: Vec::new(),
             steps,
-            mirror_symmetric: false,
+            mirror_symmetric: machine.is_mirror_symmetric(),
             degrees: oscillator.degrees as u32,
             must_rest: false,
             features,
             bounds: [0.0; 2],
             coordinates: Coordinates::new(oscillator),
-            machine: Some(Box::new(MachineConstants::new(oscillator, requested)?)),
+            machine: Some(Box::new(machine)),
         })
     }
 

@@ -6,6 +6,8 @@ use std::borrow::Cow;
 use std::cell::RefCell;
 use std::sync::Arc;
 
+use nalgebra::Complex;
+
 use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::{Contact, Law, Machine, NonImpacting, Oscillator, STATE, Side, State, Wall};
 use rattlemap_dynamics::reference::machine::{StartModes, System};
@@ -235,6 +237,11 @@ impl MachineConstants {
         self.system.machine().degrees()
     }
 
+    /// Whether the mirror image of a motion, half a period later, is a motion. Laws that are not the machine's own are not compared.
+    pub(super) fn is_mirror_symmetric(&self) -> bool {
+        self.system.machine().mirror_symmetric()
+    }
+
     /// Returns what identifies the table.
     pub(super) fn shared(&self) -> &Arc<MachineTable> {
         &self.tables
@@ -264,6 +271,13 @@ impl MachineConstants {
             flow[7..].copy_from_slice(&self.system.listed_state(&motion.steady()));
         }
         flow
+    }
+
+    /// Returns the largest multiplier of motion without contact.
+    pub(super) fn contact_free_multiplier(&self) -> Option<Complex<f64>> {
+        let motion = NonImpacting::of_machine(self.system.machine())?;
+        let [re, im] = motion.multiplier(self.period());
+        Some(Complex::new(re, im))
     }
 
     /// Returns the numbers of the shader's shape, given the places of phasors, schedule and table.

@@ -56,6 +56,9 @@ fn displacement([a, b]: Row, totals: &[f64; SUMS], steps: f64, square: f64, ampl
 pub(super) fn multiplier(constants: &Constants, measured: &[f64]) -> [f64; 2] {
     let (measured, columns) = Measured::split(measured);
     if let Some(machine) = &constants.machine {
+        if measured.has_read == 0.0 {
+            return largest(machine.contact_free_multiplier().into_iter());
+        }
         // The padding of a single coordinate has no columns.
         let (dim, n) = (columns.len().isqrt(), 2 * machine.degrees());
         return largest(

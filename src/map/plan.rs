@@ -352,11 +352,9 @@ impl Plan {
     #[cfg(feature = "gpu")]
     pub fn needs_reference(&self) -> bool {
         let flows = 0..self.flow_count() as u32;
-        let measures = self.needs.measures_motion();
-        flows.into_par_iter().any(|flow| {
-            let features = crate::gpu::Features::of(&self.oscillator(flow));
-            features.needing_reference().is_some() || measures && features.machine.is_some()
-        })
+        flows
+            .into_par_iter()
+            .any(|flow| crate::gpu::Features::of(&self.oscillator(flow)).needing_reference().is_some())
     }
 
     /// Returns the number of distinct flows.
@@ -404,8 +402,8 @@ pub(crate) fn stores_flows(flows: u64, runs: u64) -> bool {
 fn needs(quantities: &[Quantity]) -> Needs {
     let has = |quantity| quantities.contains(&quantity);
     Needs {
-        // The exponent distinguishes chaos from a cycle that was not found.
-        exponent: has(Quantity::Lyapunov) || has(Quantity::Class),
+        // The exponent distinguishes chaos from a cycle that was not found, and comes with the multiplier.
+        exponent: [Quantity::Lyapunov, Quantity::Class, Quantity::Multiplier].into_iter().any(has),
         lyapunov: has(Quantity::Lyapunov),
         impacts: has(Quantity::Impacts) || has(Quantity::ImpactRate),
         mesh: has(Quantity::Mesh),

@@ -388,6 +388,13 @@ impl Record {
         self.clear_measures(|group| valid & group.bit == 0);
     }
 
+    /// Sets all measured quantities but the multiplier.
+    pub fn set_quantities(&mut self, quantities: Option<&Quantities>) {
+        let mut parts = all().filter(|measure| measure.group.name == "multiplier").map(|part| part.of(self));
+        let multiplier = parts.next().flatten().zip(parts.next().flatten()).map(<[f64; 2]>::from);
+        self.set_measures(&Measured { quantities, multiplier });
+    }
+
     /// Removes the numbers of some quantities.
     pub fn clear_measures(&mut self, is_cleared: impl Fn(&Group) -> bool) {
         for measure in all().filter(|measure| is_cleared(measure.group)) {

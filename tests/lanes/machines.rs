@@ -7,8 +7,10 @@ use crate::random_models::machines::random::{Shape, case};
 use rattlemap::gpu::{Features, Lane, LaneSettings, MachineShape, Precision};
 use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::Plan;
-use rattlemap::map::scene::{Purpose, Scene};
+use rattlemap::map::scene::{FileText, Purpose, Scene};
 use rattlemap::record::classify::classify;
+use rattlemap::record::measures::GROUPS;
+use rattlemap::record::valid;
 use rattlemap_dynamics::model::{GearPair, Law, Machine, NonImpacting, Oscillator, State, state};
 use rattlemap_dynamics::reference::machine::{Motion, System};
 use rayon::prelude::*;
@@ -127,6 +129,84 @@ fn lanes_decide_classes_of_machines_as_the_reference_does() {
             assert!(off < 0.02, "cell {id}: {} for {}", found.lyapunov, expected.lyapunov);
         }
     }
+}
+
+/// A mass between mirrored walls. Its cycles are their own mirror images, or in pairs.
+const MIRRORED: &str = r#"
+name = "mirrored"
+title = "Mass between walls"
+summary = "a mass between two walls that return less of faster impacts"
+[parameters]
+F = { default = 1.0, meaning = "force" }
+omega = { default = 1.0, meaning = "frequency" }
+[motion]
+coordinates = ["x"]
+mass = [["1"]]
+damping = [["0.4"]]
+stiffness = [["0.2"]]
+force = ["F"]
+frequency = "omega"
+gap = ["1"]
+[[contact]]
+side = "right"
+at = "0.5"
+law = "impact"
+restitution = "0.8 - 0.05*speed"
+[[contact]]
+side = "left"
+at = "-0.5"
+law = "impact"
+restitution = "0.8 - 0.05*speed"
+"#;
+
+const SCENE_OF_MIRRORED: &str = r#"
+model = "mirrored.toml"
+[[axis]]
+parameter = "F"
+values = [1.0, 2.0]
+[[axis]]
+parameter = "omega"
+values = [1.4, 1.7, 2.0, 2.3, 2.6, 4.0]
+"#;
+
+/// The processor measures the motion in which lanes end.
+#[test]
+fn maps_of_machines_have_the_symmetry_and_the_quantities_of_the_reference() {
+    let quantities: Vec<String> = GROUPS.iter().map(|group| format!("{:?}", group.name)).collect();
+    let outputs = format!("[outputs]\nquantities = [\"symmetric\", {}]\n", quantities.join(", "));
+    let model = |_, _: &str| Ok(FileText { name: "mirrored".into(), text: MIRRORED.into() });
+    let (mut measured, mut symmetric) = (0, [0, 0]);
+    for scene in [SCENE, SCENE_OF_MIRRORED] {
+        let scene = format!("{scene}{outputs}");
+        let scene = Scene::parse_with_files(&scene, "s", &[], Purpose::Map, None, &model).unwrap();
+        let plan = Plan::new(&scene);
+        let expected = all_records(&plan, &mut Engine::Cpu(Cpu::new(&plan)));
+        let found = map(&plan, &mut open(Precision::F32));
+        for (id, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            let is_certain = expected.status == 0 && expected.period > 0;
+            if !is_certain || classify(found) != classify(expected) {
+                continue;
+            }
+            if found.valid & valid::SYMMETRIC != 0 {
+                assert_eq!(found.symmetric, expected.symmetric, "cell {id}");
+                symmetric[found.symmetric as usize] += 1;
+            }
+            // Without impacts their energy is a rounding error.
+            for group in GROUPS
+                .iter()
+                .filter(|group| group.name != "impact_energy" || expected.impacts_per_period > 0.0)
+            {
+                assert_eq!(found.valid & group.bit, expected.valid & group.bit, "cell {id}: {}", group.name);
+                let distance = group.distance(found, expected, 1e-3);
+                assert!(distance < 1e-3, "cell {id}: {} differs by {distance:.1e}", group.name);
+            }
+            measured += 1;
+        }
+    }
+    assert!(
+        measured >= 17 && symmetric[0] >= 2 && symmetric[1] >= 5,
+        "{measured} measured, symmetric: {symmetric:?}"
+    );
 }
 
 /// Lanes decide motion without contact as soon as its energy is too low for one.

@@ -6,6 +6,8 @@
 //!
 //! A gap is a row of displacements `z = row . x` with walls on one side or on both. The force of a contact acts along this row.
 
+use std::cmp::Ordering;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::oscillator::{
@@ -13,7 +15,7 @@ use super::oscillator::{
 };
 use super::{
     Contact, HIGHEST_ORDER, Law, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, Oscillator,
-    OscillatorError, Side,
+    OscillatorError, Side, State, state,
 };
 
 /// Largest number of coordinates.
@@ -265,6 +267,49 @@ impl Machine {
             Some(&(0.0, stage)) => stage,
             _ => self.schedule.last().map_or(0, |&(_, stage)| stage),
         }
+    }
+
+    /// Returns one displacement for each gap, in order: the one with the largest factor in what is left of the gap's row after the earlier
+    /// displacements have been eliminated, and of several the first by `order`.
+    pub(crate) fn displacements_of_gaps(&self, order: impl Fn(usize, usize) -> Ordering) -> Vec<usize> {
+        let mut rows: Vec<DVector<f64>> = self.gaps.iter().map(|gap| gap.row.clone()).collect();
+        let mut chosen = Vec::new();
+        for i in 0..rows.len() {
+            let row = rows[i].clone();
+            let others = (0..self.degrees()).filter(|j| !chosen.contains(j));
+            let largest = others.min_by(|&a, &b| row[b].abs().total_cmp(&row[a].abs()).then(order(a, b)));
+            let pivot = largest.expect("there are not more gaps than coordinates");
+            for other in &mut rows[i + 1..] {
+                let share = other[pivot] / row[pivot];
+                *other -= &row * share;
+            }
+            chosen.push(pivot);
+        }
+        chosen
+    }
+
+    /// Returns a state with each gap that is beyond a rigid wall moved onto this wall. For each gap the displacement with the largest factor
+    /// in it moves, of equal ones the first; the others and all velocities stay.
+    pub fn put_on_walls(&self, start: &[f64]) -> State {
+        let limit = |gap: &GapRow, side: Side| match gap.walls[side.index()].last() {
+            Some(wall) if wall.contact == Contact::Rigid => wall.at,
+            _ => side.sign() * f64::INFINITY,
+        };
+        let moves = DVector::from_iterator(
+            self.gaps.len(),
+            self.gaps.iter().map(|gap| {
+                let value = gap.row.iter().zip(start.iter().step_by(2)).map(|(a, x)| a * x).sum::<f64>();
+                value.min(limit(gap, Side::Right)).max(limit(gap, Side::Left)) - value
+            }),
+        );
+        let mut moved = state(start);
+        if moves.iter().any(|&by| by != 0.0) {
+            let pivots = self.displacements_of_gaps(|a, b| a.cmp(&b));
+            let rows = DMatrix::from_fn(pivots.len(), pivots.len(), |i, k| self.gaps[i].row[pivots[k]]);
+            let by = rows.lu().solve(&moves).expect("the rows of the gaps are independent");
+            pivots.iter().zip(&by).for_each(|(pivot, by)| moved[2 * pivot] += by);
+        }
+        moved
     }
 
     /// Whether `(y, t) -> (-y, t + T/2)` maps motions to motions: the walls of each gap are mirror images with equal laws, the force has odd

@@ -4,8 +4,9 @@
 //! and the meter evaluates the exact flow there: integrals by Gauss-Legendre quadrature of order 16 over pieces of at
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
+use super::Budget;
 use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule};
-use crate::model::{MOST_COORDINATES, MOST_GAPS};
+use crate::model::{Law, MOST_COORDINATES, MOST_GAPS, State};
 use crate::reference::machine::{Flight, MachineEvent, Point, Signal};
 use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory, side_of};
 
@@ -82,6 +83,31 @@ pub struct Displacement {
     pub rms: f64,
     /// Amplitude `a > 0` and phase `phi` in `(-pi, pi]` of the component `a cos(omega t + phi)`.
     pub harmonic: [f64; 2],
+}
+
+/// Measures the motion that continues from a strobe state: over one cycle of `period` forcing periods, or over the observed periods of the
+/// budget if `period` is 0. The motion follows a cycle once before it is measured, so that `strobe` may be rounded. Motion without further
+/// contact is measured in its steady state.
+///
+/// Returns `None` if the motion cannot be continued.
+pub fn quantities_after(
+    flow: &Flow,
+    law: Law,
+    strobe: State,
+    period: u32,
+    budget: &Budget,
+) -> Option<Quantities> {
+    let begin = |state| Trajectory::<0>::new(flow, law, state).allowing(budget.allowance());
+    let mut trajectory = begin(strobe);
+    let steady = flow.non_impacting().filter(|motion| trajectory.is_free() && motion.is_certain(strobe));
+    if let Some(motion) = steady {
+        return Meter::measure(flow, &mut begin(motion.steady()), 1).ok();
+    }
+    for _ in 0..period {
+        trajectory.advance_period(&mut ()).ok()?;
+    }
+    let observed = budget.settings.observed_periods.max(1);
+    Meter::measure(flow, &mut trajectory, if period > 0 { period } else { observed }).ok()
 }
 
 /// Approach speeds so far.

@@ -9,7 +9,7 @@ pub(crate) mod random;
 use std::time::{Duration, Instant};
 
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Side, State};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State, state};
 use rattlemap_dynamics::orbit::{
     Budget, Class, EVENT_PERIODS, Measurement, Orbit, Status, analyse_flow, measure,
 };
@@ -18,6 +18,7 @@ use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Stop, Traject
 use rayon::prelude::*;
 
 use crate::common::BUDGET;
+use crate::machines::random::any_case;
 use cycle::{Cycle, follow, settle};
 use motion::{ANGLE, Mode, Motion, System, What, distance};
 use random::{Case, Shape, case};
@@ -335,15 +336,33 @@ const LONGEST_TIME: Duration = Duration::from_secs(2);
 
 const WIDE: Shape = Shape { harmonics: true, stages: true, wide: true, ..PLAIN };
 
-/// Measures models of wide ranges. Every motion must end in time, with finite numbers.
-fn check_ends(shape: Shape, seeds: std::ops::Range<u64>, longest: Duration) {
+/// Returns a random model with wide ranges.
+fn wide(shape: Shape) -> impl Fn(u64) -> (Oscillator, Law, State) {
+    move |seed| {
+        let case = case(seed, shape);
+        (case.oscillator, case.law, case.start)
+    }
+}
+
+/// Returns a random machine, which has its contact laws itself.
+fn machine(seed: u64) -> (Oscillator, Law, State) {
+    let case = any_case(seed);
+    (Oscillator::of_machine(case.machine), Law::both(0.0, 0.0), state(&case.start))
+}
+
+/// Measures random models. Every motion must end in time, with finite numbers.
+fn check_ends(
+    model: impl Fn(u64) -> (Oscillator, Law, State) + Sync,
+    seeds: std::ops::Range<u64>,
+    longest: Duration,
+) {
     let ends: Vec<_> = seeds
         .into_par_iter()
         .map(|seed| {
-            let case = case(seed, shape);
+            let (oscillator, law, start) = model(seed);
             let clock = Instant::now();
             let budget = Budget { undecided_periods: 0, ..BUDGET };
-            let measured = measure(&Flow::new(&case.oscillator), case.law, case.start, &budget);
+            let measured = measure(&Flow::new(&oscillator), law, start, &budget);
             let numbers = [measured.impacts_per_period, measured.mesh_fraction];
             let is_finite = measured.strobe.iter().chain(&numbers).all(|x| x.is_finite())
                 && measured.lyapunov.is_none_or(|[exponent, error]| !exponent.is_nan() && error.is_finite());
@@ -363,18 +382,24 @@ fn check_ends(shape: Shape, seeds: std::ops::Range<u64>, longest: Duration) {
 
 #[test]
 fn two_hundred_wide_models_end_with_finite_numbers() {
-    check_ends(WIDE, 0..200, LONGEST_TIME);
+    check_ends(wide(WIDE), 0..200, LONGEST_TIME);
 }
 
 #[test]
 #[ignore = "minutes"]
 fn ten_thousand_wide_models_end_with_finite_numbers() {
-    check_ends(WIDE, 0..10_000, LONGEST_TIME);
+    check_ends(wide(WIDE), 0..10_000, LONGEST_TIME);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn ten_thousand_machines_end_with_finite_numbers() {
+    check_ends(machine, 0..10_000, LONGEST_TIME);
 }
 
 /// Slow forces drive some of these motions through thousands of contacts in each period.
 #[test]
 #[ignore = "minutes"]
 fn a_thousand_wide_models_with_pushing_walls_end_with_finite_numbers() {
-    check_ends(Shape { pushing: true, ..WIDE }, 0..1000, 10 * LONGEST_TIME);
+    check_ends(wide(Shape { pushing: true, ..WIDE }), 0..1000, 10 * LONGEST_TIME);
 }

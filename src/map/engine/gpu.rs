@@ -20,7 +20,10 @@ use crate::gpu::{
 use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};
 use crate::record::Record;
+use crate::record::classify::status;
+use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Oscillator, Side};
+use rattlemap_dynamics::orbit::quantities_after;
 
 /// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
@@ -105,9 +108,6 @@ impl<'p> Gpu<'p> {
     pub async fn prepared(prepared: Prepared<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let mut clock = Instant::now();
         let Prepared { plan, constants, survey, took } = prepared;
-        if survey.features.machine.is_some() && plan.needs().measures_motion() {
-            return Err(EngineError::NotOnLanes { feature: MEASURES_OF_MACHINES });
-        }
         if let Some(feature) = survey.features.needing_reference() {
             return Err(EngineError::NotOnLanes { feature });
         }
@@ -203,7 +203,13 @@ impl<'p> Gpu<'p> {
             Err(GpuError::Halted) => ended.retain(|(_, record)| !is_on_strobe(record)),
             compared => compared.map_err(|error| self.error(error, ended.len()))?,
         }
-        ended.par_iter_mut().for_each(|(_, record)| drop_unrequested(record, self.plan.needs()));
+        let on_processor = self.settings.features.machine.is_some() && plan.needs().measures_motion();
+        ended.par_iter_mut().for_each(|(id, record)| {
+            if on_processor {
+                measure_on_processor(plan, &plan.cell(*id), record);
+            }
+            drop_unrequested(record, plan.needs());
+        });
         Ok(ended)
     }
 
@@ -441,13 +447,22 @@ fn settings_after(plan: &Plan, survey: &Survey) -> LaneSettings {
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
         multiplier: plan.needs().has_any(&[Quantity::Multiplier]),
-        measures: measures(plan),
+        // Lanes of machines do not measure: the processor does.
+        measures: measures(plan).filter(|_| survey.features.machine.is_none()),
         chatter: survey.chatter,
         features: survey.features,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
         steps_per_period: requested_steps(plan),
         ..default
     }
+}
+
+/// Measures the motion that continues from the last strobe state of a lane: its next cycle, or the observed periods of aperiodic motion.
+fn measure_on_processor(plan: &Plan, cell: &Cell, record: &mut Record) {
+    let Some(strobe) = record.state().filter(|_| !status(record).is_failure()) else { return };
+    let (flow, law) = (Flow::new(&plan.oscillator(cell.flow)), plan.law(cell.law));
+    let quantities = quantities_after(&flow, law, strobe, record.period, plan.budget());
+    record.set_quantities(quantities.as_ref());
 }
 
 /// Returns what lanes measure for the requested quantities.
@@ -496,10 +511,6 @@ impl Survey {
         }
     }
 }
-
-/// What lanes do not measure.
-const MEASURES_OF_MACHINES: &str = "quantities such as amplitudes, forces or energies of models with several gaps, more than two coordinates, \
-    dry friction, or a restitution that depends on the speed";
 
 fn survey(plan: &Plan) -> Survey {
     survey_flows(plan, |_, _| ()).map(|((), survey)| survey).reduce(Survey::default, Survey::and)

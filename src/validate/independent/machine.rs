@@ -178,7 +178,7 @@ impl Flight {
             gaps: [gap; MOST_GAPS],
             slides: [Slide::Sticks; MOST_FRICTION],
             from_rate: [0; MOST_FRICTION],
-            y: system.to_coordinates(start),
+            y: system.to_coordinates(&machine.put_on_walls(start)),
             tally: Tally::default(),
             events: Vec::new(),
             slips: Vec::new(),

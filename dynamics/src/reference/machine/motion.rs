@@ -117,7 +117,7 @@ pub struct Motion<'s> {
 impl<'s> Motion<'s> {
     /// Starts at phase 0 in the state `(x1, v1, x2, v2, ...)`.
     ///
-    /// A gap behind a wall is in contact, and a gap behind a rigid wall is moved onto the wall.
+    /// A gap behind a wall is in contact, and a gap behind a rigid wall is moved onto the wall ([`put_on_walls`](crate::model::Machine::put_on_walls)).
     pub fn new(system: &'s System, state: &[f64]) -> Motion<'s> {
         let stage = system.machine.first_stage();
         let modes = Modes { stage, gaps: [GapMode::Beyond(0); MOST_GAPS], slips: Slips::default() };
@@ -129,7 +129,7 @@ impl<'s> Motion<'s> {
             domain: system.domain(modes.key(system)),
             path: None,
             watches: Vec::new(),
-            y: system.to_flow(state),
+            y: system.to_flow(&system.machine.put_on_walls(state)),
             clock: Clock::default(),
             phasors: system.phasors(0.0),
             goal: 0.0,

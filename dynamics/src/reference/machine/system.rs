@@ -259,31 +259,16 @@ fn inverse(mass: &DMatrix<f64>) -> DMatrix<f64> {
     mass.clone().cholesky().expect("the mass matrix is positive definite").inverse()
 }
 
-/// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. The displacement that is left out for a gap is
-/// the one with the largest entry in what is left of its row, of equal ones the one with the smallest mass: a force on a heavy body that
-/// is left out would be computed as a small difference.
+/// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. Of displacements with equal factors in a gap,
+/// the lightest is left out: a force on a heavy body that is left out would be computed as a small difference.
 fn coordinates(machine: &Machine) -> DMatrix<f64> {
     let n = machine.degrees();
+    let mass = |i: usize| machine.mass[(i, i)];
+    let left_out = machine.displacements_of_gaps(|a, b| mass(a).total_cmp(&mass(b)).then(a.cmp(&b)));
     let mut rows: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
-    let (mut reduced, mut replaced) = (rows.clone(), Vec::new());
-    for i in 0..reduced.len() {
-        let row = reduced[i].clone();
-        let free = (0..n).filter(|j| !replaced.contains(j));
-        let pivot = free
-            .max_by(|&a, &b| {
-                let lighter = machine.mass[(b, b)].total_cmp(&machine.mass[(a, a)]);
-                row[a].abs().total_cmp(&row[b].abs()).then(lighter).then(b.cmp(&a))
-            })
-            .expect("there are not more gaps than coordinates");
-        for other in reduced.iter_mut().skip(i + 1) {
-            let share = other[pivot] / row[pivot];
-            *other -= &row * share;
-        }
-        replaced.push(pivot);
-    }
     rows.extend(
         (0..n)
-            .filter(|j| !replaced.contains(j))
+            .filter(|j| !left_out.contains(j))
             .map(|j| DVector::from_fn(n, |i, _| f64::from(u8::from(i == j)))),
     );
     DMatrix::from_fn(n, n, |i, j| rows[i][j])

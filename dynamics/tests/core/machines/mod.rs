@@ -8,5 +8,5 @@ mod checks;
 mod engine;
 mod joint;
 mod motion;
-mod random;
+pub(crate) mod random;
 mod system;

@@ -408,20 +408,16 @@ impl System {
 }
 
 /// Returns the rows of the coordinates: the gaps, and displacements that complete them. For each gap the displacement is left out that has
-/// the largest factor in what is left of its row; of equal ones the lightest, then the first. A start behind a rigid wall moves that
-/// displacement.
+/// the largest part in the mobility of what is left of its row.
 fn coordinates(machine: &Machine) -> DMatrix<f64> {
     let n = machine.degrees();
     let mut rest: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
     let mut left_out = Vec::new();
     for i in 0..rest.len() {
         let row = rest[i].clone();
-        let order = |&a: &usize, &b: &usize| {
-            let factors = row[b].abs().total_cmp(&row[a].abs());
-            factors.then(machine.mass[(a, a)].total_cmp(&machine.mass[(b, b)]))
-        };
+        let part = |j: usize| row[j] * row[j] / machine.mass[(j, j)];
         let others = (0..n).filter(|j| !left_out.contains(j));
-        let most = others.min_by(order).expect("a coordinate for each gap");
+        let most = others.max_by(|&a, &b| part(a).total_cmp(&part(b))).expect("a coordinate for each gap");
         for other in &mut rest[i + 1..] {
             let share = other[most] / row[most];
             *other -= &row * share;
