@@ -18,7 +18,10 @@ publish() {
 for scene in scenes/gallery/*.toml; do
     name="$(basename "$scene" .toml)"
     "$program" map "$scene" --engine cpu --out "$out/$name" --force
-    publish "$name" map.png
+    case "$name" in
+        friction_oscillator | relief_valve) publish "$name" pattern.png ;;
+        *) publish "$name" map.png ;;
+    esac
 done
 
 publish loose_gear impact_energy.png
