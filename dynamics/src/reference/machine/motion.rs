@@ -1370,7 +1370,8 @@ impl<'s> Motion<'s> {
             let reverses = before != Slip::Stick && after != Slip::Stick;
             let row = self.system.rate_row(i, &self.domain);
             let point = self.point();
-            let is_at_rest = row.dot(&point).abs() <= ROUNDING * row.size(&point);
+            // The rate of an element that has just stopped is 0 but for the error of its time.
+            let is_at_rest = stopped == Some(i) || row.dot(&point).abs() <= ROUNDING * row.size(&point);
             self.from_rate[i] = usize::from(after != Slip::Stick && is_at_rest);
             match before {
                 Slip::Stick => self.record_slip(Some(b'7'), observer),
