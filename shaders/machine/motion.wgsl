@@ -1069,7 +1069,7 @@ fn change_slips(stopped: u32) {
         if after != STICKS {
             load_sizes(motion.q);
             let line = rate_line(i, 1.0);
-            // The rate of an element that has just stopped is 0 but for the error of its time.
+            // An element that has just stopped has a small rate, because its time has a rounding error.
             if i == stopped || abs(value_of(line, 0u)) <= ROUNDING * size_of_value(line) {
                 from_rate[i] = UNKNOWN_ORDER;
             }

@@ -237,7 +237,8 @@ impl MachineConstants {
         self.system.machine().degrees()
     }
 
-    /// Whether the mirror image of a motion, half a period later, is a motion. Laws that are not the machine's own are not compared.
+    /// Whether the mirror image of a motion, half a period later, is a motion. It does not compare contact laws that are stored outside the
+    /// machine.
     pub(super) fn is_mirror_symmetric(&self) -> bool {
         self.system.machine().mirror_symmetric()
     }

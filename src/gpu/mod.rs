@@ -120,7 +120,7 @@ pub struct LaneSettings {
     pub chatter: bool,
     /// Features that flows may have.
     pub features: Features,
-    /// What is measured on lanes whose class is decided.
+    /// What is measured on motions whose class is decided. Lanes of machines do not measure; `measure_machines` completes their records.
     pub measures: Option<Measures>,
     /// Whether records contain the largest multiplier of cycles.
     pub multiplier: bool,
@@ -152,7 +152,12 @@ pub struct LaneSettings {
 impl LaneSettings {
     /// Whether results contain what was measured.
     pub(super) fn gathers(&self) -> bool {
-        self.multiplier || self.measures.is_some()
+        self.multiplier || self.measured_on_lanes().is_some()
+    }
+
+    /// Returns what lanes measure themselves.
+    pub(super) fn measured_on_lanes(&self) -> Option<Measures> {
+        self.measures.filter(|_| self.features.machine.is_none())
     }
 }
 
@@ -465,7 +470,7 @@ impl Gpu {
             measures: None,
             keep,
         };
-        let measuring = settings.measures.map(|measures| Variant {
+        let measuring = settings.measured_on_lanes().map(|measures| Variant {
             // The number of periods does not change the shader.
             measures: Some(Measures { periods: 1, ..measures }),
             exponent: false,

@@ -274,7 +274,7 @@ fn uniform(
         exponent_block: averaging.block,
         max_period: settings.max_period.min(LONGEST_CYCLE),
         early_stop: u32::from(early_stop),
-        measured_periods: settings.measures.map_or(0, |measures| measures.periods.max(1)),
+        measured_periods: settings.measured_on_lanes().map_or(0, |measures| measures.periods.max(1)),
         ended: 0,
     }
 }

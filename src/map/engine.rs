@@ -34,7 +34,7 @@ pub use gpu::{Gpu, Prepared};
 pub(crate) use requested::drop_unrequested;
 pub use requested::measured_record;
 #[cfg(feature = "gpu")]
-pub(crate) use section::compare_at_sections;
+pub(crate) use section::{compare_at_sections, measure_machines};
 
 #[cfg(feature = "gpu")]
 use crate::gpu::AdapterId;

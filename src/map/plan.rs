@@ -402,7 +402,7 @@ pub(crate) fn stores_flows(flows: u64, runs: u64) -> bool {
 fn needs(quantities: &[Quantity]) -> Needs {
     let has = |quantity| quantities.contains(&quantity);
     Needs {
-        // The exponent distinguishes chaos from a cycle that was not found, and comes with the multiplier.
+        // The exponent distinguishes chaos from a cycle that was not found. Lanes compute the multiplier together with it.
         exponent: [Quantity::Lyapunov, Quantity::Class, Quantity::Multiplier].into_iter().any(has),
         lyapunov: has(Quantity::Lyapunov),
         impacts: has(Quantity::Impacts) || has(Quantity::ImpactRate),

@@ -6,7 +6,7 @@ use super::Subject;
 use super::sample::Sample;
 use super::states::HORIZON;
 use crate::gpu::{self, Features, Gpu, GpuError, Lane, LaneSettings};
-use crate::map::engine::{compare_at_sections, drop_unrequested, lane_settings};
+use crate::map::engine::{compare_at_sections, drop_unrequested, lane_settings, measure_machines};
 use crate::map::plan::Plan;
 use crate::record::{Record, Records};
 use rattlemap_dynamics::model::State;
@@ -146,5 +146,6 @@ pub async fn run_lanes(
         (flows[lane.flow as usize].clone(), laws[lane.law as usize])
     };
     compare_at_sections(gpu, &mut numbered, of, settings).await?;
+    measure_machines(&mut numbered, of, settings);
     Ok(numbered.into_iter().map(|(_, record)| record).collect())
 }

@@ -269,8 +269,8 @@ impl Machine {
         }
     }
 
-    /// Returns one displacement for each gap, in order: the one with the largest factor in what is left of the gap's row after the earlier
-    /// displacements have been eliminated, and of several the first by `order`.
+    /// Chooses one displacement for each gap, by Gaussian elimination: the one with the largest remaining factor in the gap's row, and of equal
+    /// ones the first by `order`.
     pub(crate) fn displacements_of_gaps(&self, order: impl Fn(usize, usize) -> Ordering) -> Vec<usize> {
         let mut rows: Vec<DVector<f64>> = self.gaps.iter().map(|gap| gap.row.clone()).collect();
         let mut chosen = Vec::new();
@@ -288,8 +288,8 @@ impl Machine {
         chosen
     }
 
-    /// Returns a state with each gap that is beyond a rigid wall moved onto this wall. For each gap the displacement with the largest factor
-    /// in it moves, of equal ones the first; the others and all velocities stay.
+    /// Moves each gap that is beyond a rigid wall onto this wall, and returns the state. For each gap, one displacement changes: the one with
+    /// the largest factor in the gap, and of equal ones the first. All velocities stay.
     pub fn put_on_walls(&self, start: &[f64]) -> State {
         let limit = |gap: &GapRow, side: Side| match gap.walls[side.index()].last() {
             Some(wall) if wall.contact == Contact::Rigid => wall.at,

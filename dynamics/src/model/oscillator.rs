@@ -97,8 +97,8 @@ const LEAST_LENGTH: f64 = 1e-150;
 /// Distance of phases, in turns, that is rounding.
 const SAME_PHASE: f64 = 1e-12;
 
-/// Displacement, in scales of length, from which no motion is expected to return.
-const ESCAPE: f64 = 1e9;
+/// Displacement, in scales of length, from which no motion is expected to return if energy can grow.
+pub(crate) const ESCAPE: f64 = 1e6;
 
 /// Displacement from which no motion is expected to return if nothing gives a scale of length: no force, no load, and no wall but at 0.
 const ESCAPE_WITHOUT_SCALE: f64 = 1e100;

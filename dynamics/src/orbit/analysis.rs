@@ -599,9 +599,7 @@ impl Analysis<'_> {
 
     /// Measures a period of contact-free motion in its steady response.
     pub(super) fn steady_quantities(&self, motion: &NonImpacting) -> Option<Quantities> {
-        let steady =
-            || Meter::measure(self.flow, &mut Trajectory::new(self.flow, self.law, motion.steady()), 1);
-        self.measures.then(steady)?.ok()
+        self.measures.then(|| Meter::measure_steady(self.flow, self.law, motion))?.ok()
     }
 
     /// Builds the orbit of aperiodic motion.

@@ -4,11 +4,10 @@
 //! and the meter evaluates the exact flow there: integrals by Gauss-Legendre quadrature of order 16 over pieces of at
 //! most one Taylor step, where its error is below rounding, and extremes at the zeros of the rate.
 
-use super::Budget;
 use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, Schedule};
-use crate::model::{Law, MOST_COORDINATES, MOST_GAPS, State};
+use crate::model::{Law, MOST_COORDINATES, MOST_GAPS, NonImpacting, State};
 use crate::reference::machine::{Flight, MachineEvent, Point, Signal};
-use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory, side_of};
+use crate::reference::{Allowance, EventKind, GapEvent, Observer, Stop, Trajectory, side_of};
 
 /// Nodes in `(0, 1)` and weights of the Gauss-Legendre quadrature on `[-1, 1]`; the other half is symmetric.
 const GAUSS: [(f64, f64); 4] = [
@@ -85,29 +84,27 @@ pub struct Displacement {
     pub harmonic: [f64; 2],
 }
 
-/// Measures the motion that continues from a strobe state: over one cycle of `period` forcing periods, or over the observed periods of the
-/// budget if `period` is 0. The motion follows a cycle once before it is measured, so that `strobe` may be rounded. Motion without further
-/// contact is measured in its steady state.
+/// Measures the motion that continues from a strobe state: over one cycle of `period` forcing periods, or over `observed` periods if `period`
+/// is 0. The motion first follows its cycle once, so that `strobe` may be rounded. Motion without further contact is measured in its steady
+/// state.
 ///
 /// Returns `None` if the motion cannot be continued.
 pub fn quantities_after(
     flow: &Flow,
     law: Law,
     strobe: State,
-    period: u32,
-    budget: &Budget,
+    [period, observed]: [u32; 2],
+    allowance: Allowance<'_>,
 ) -> Option<Quantities> {
-    let begin = |state| Trajectory::<0>::new(flow, law, state).allowing(budget.allowance());
-    let mut trajectory = begin(strobe);
-    let steady = flow.non_impacting().filter(|motion| trajectory.is_free() && motion.is_certain(strobe));
-    if let Some(motion) = steady {
-        return Meter::measure(flow, &mut begin(motion.steady()), 1).ok();
+    let mut motion = Trajectory::new(flow, law, strobe).allowing(allowance);
+    let is_certain = |free: &&NonImpacting| motion.is_free() && free.is_certain(strobe);
+    if let Some(free) = flow.non_impacting().filter(is_certain) {
+        return Meter::measure_steady(flow, law, free).ok();
     }
     for _ in 0..period {
-        trajectory.advance_period(&mut ()).ok()?;
+        motion.advance_period(&mut ()).ok()?;
     }
-    let observed = budget.settings.observed_periods.max(1);
-    Meter::measure(flow, &mut trajectory, if period > 0 { period } else { observed }).ok()
+    Meter::measure(flow, &mut motion, if period > 0 { period } else { observed.max(1) }).ok()
 }
 
 /// Approach speeds so far.
@@ -243,6 +240,18 @@ impl<'f> Meter<'f> {
             trajectory.advance_period(&mut meter)?;
         }
         Ok(meter.finish(trajectory.period()))
+    }
+
+    /// Measures a period of contact-free motion in its steady state.
+    ///
+    /// # Errors
+    /// As for [`Meter::measure`].
+    pub(super) fn measure_steady(
+        flow: &'f Flow,
+        law: Law,
+        motion: &NonImpacting,
+    ) -> Result<Quantities, Stop> {
+        Meter::measure(flow, &mut Trajectory::new(flow, law, motion.steady()), 1)
     }
 
     /// Returns the quantities from the beginning to phase 0 of `period`.

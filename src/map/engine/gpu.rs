@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use web_time::Instant;
 
 use super::section::is_on_strobe;
-use super::{Device, EngineError, Preparation, compare_at_sections, drop_unrequested};
+use super::{Device, EngineError, Preparation, compare_at_sections, drop_unrequested, measure_machines};
 use crate::gpu::{
     self, AdapterId, Constants, Features, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables,
     Traffic,
@@ -20,10 +20,7 @@ use crate::gpu::{
 use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};
 use crate::record::Record;
-use crate::record::classify::status;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Oscillator, Side};
-use rattlemap_dynamics::orbit::quantities_after;
 
 /// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
@@ -198,18 +195,13 @@ impl<'p> Gpu<'p> {
             let cell = plan.cell(id);
             (plan.oscillator(cell.flow), plan.law(cell.law))
         };
-        match compare_at_sections(&mut self.device, &mut ended, of, &self.settings).await {
+        match compare_at_sections(&mut self.device, &mut ended, &of, &self.settings).await {
             // These cells have not ended.
             Err(GpuError::Halted) => ended.retain(|(_, record)| !is_on_strobe(record)),
             compared => compared.map_err(|error| self.error(error, ended.len()))?,
         }
-        let on_processor = self.settings.features.machine.is_some() && plan.needs().measures_motion();
-        ended.par_iter_mut().for_each(|(id, record)| {
-            if on_processor {
-                measure_on_processor(plan, &plan.cell(*id), record);
-            }
-            drop_unrequested(record, plan.needs());
-        });
+        measure_machines(&mut ended, of, &self.settings);
+        ended.par_iter_mut().for_each(|(_, record)| drop_unrequested(record, plan.needs()));
         Ok(ended)
     }
 
@@ -447,22 +439,13 @@ fn settings_after(plan: &Plan, survey: &Survey) -> LaneSettings {
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
         multiplier: plan.needs().has_any(&[Quantity::Multiplier]),
-        // Lanes of machines do not measure: the processor does.
-        measures: measures(plan).filter(|_| survey.features.machine.is_none()),
+        measures: measures(plan),
         chatter: survey.chatter,
         features: survey.features,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
         steps_per_period: requested_steps(plan),
         ..default
     }
-}
-
-/// Measures the motion that continues from the last strobe state of a lane: its next cycle, or the observed periods of aperiodic motion.
-fn measure_on_processor(plan: &Plan, cell: &Cell, record: &mut Record) {
-    let Some(strobe) = record.state().filter(|_| !status(record).is_failure()) else { return };
-    let (flow, law) = (Flow::new(&plan.oscillator(cell.flow)), plan.law(cell.law));
-    let quantities = quantities_after(&flow, law, strobe, record.period, plan.budget());
-    record.set_quantities(quantities.as_ref());
 }
 
 /// Returns what lanes measure for the requested quantities.

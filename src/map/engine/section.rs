@@ -1,5 +1,5 @@
-//! Lanes whose cycle has an event at phase 0 run a second time, from their last state, and compare states at a phase far
-//! from events.
+//! What completes the records of lanes. Lanes whose cycle has an event at phase 0 run a second time, from their last state, and compare
+//! states at a phase far from events. The processor measures the motions of machines.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::record::classify::{classify, status};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Oscillator};
-use rattlemap_dynamics::orbit::{Class, Section, Status};
+use rattlemap_dynamics::orbit::{Class, Section, Status, quantities_after};
 use rattlemap_dynamics::reference::Allowance;
 
 /// Largest number of lanes that run a second time together.
@@ -77,6 +77,24 @@ pub(crate) async fn compare_at_sections(
     }
     records.iter_mut().for_each(|(_, record)| record.valid &= !valid::NEAR_STROBE);
     Ok(())
+}
+
+/// Measures the motions in which lanes of machines end, on the processor, if the settings ask for it. `of` returns oscillator and law of
+/// a record's number.
+pub(crate) fn measure_machines(
+    records: &mut [(u32, Record)],
+    of: impl Fn(u32) -> (Oscillator, Law) + Sync,
+    settings: &LaneSettings,
+) {
+    let (Some(measures), Some(_)) = (settings.measures, settings.features.machine) else { return };
+    let allowance = Allowance { events: settings.most_events.into(), ..Allowance::UNLIMITED };
+    records.par_iter_mut().for_each(|(number, record)| {
+        let Some(strobe) = record.state().filter(|_| !status(record).is_failure()) else { return };
+        let (oscillator, law) = of(*number);
+        let periods = [record.period, measures.periods];
+        let quantities = quantities_after(&Flow::new(&oscillator), law, strobe, periods, allowance);
+        record.set_quantities(quantities.as_ref());
+    });
 }
 
 /// Whether an event at phase 0 makes the record uncertain.

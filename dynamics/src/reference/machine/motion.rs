@@ -117,7 +117,8 @@ pub struct Motion<'s> {
 impl<'s> Motion<'s> {
     /// Starts at phase 0 in the state `(x1, v1, x2, v2, ...)`.
     ///
-    /// A gap behind a wall is in contact, and a gap behind a rigid wall is moved onto the wall ([`put_on_walls`](crate::model::Machine::put_on_walls)).
+    /// A gap behind a wall is in contact. A gap behind a rigid wall is moved onto the wall by
+    /// [`put_on_walls`](crate::model::Machine::put_on_walls).
     pub fn new(system: &'s System, state: &[f64]) -> Motion<'s> {
         let stage = system.machine.first_stage();
         let modes = Modes { stage, gaps: [GapMode::Beyond(0); MOST_GAPS], slips: Slips::default() };
@@ -1370,7 +1371,7 @@ impl<'s> Motion<'s> {
             let reverses = before != Slip::Stick && after != Slip::Stick;
             let row = self.system.rate_row(i, &self.domain);
             let point = self.point();
-            // The rate of an element that has just stopped is 0 but for the error of its time.
+            // An element that has just stopped has a small rate, because its time has a rounding error.
             let is_at_rest = stopped == Some(i) || row.dot(&point).abs() <= ROUNDING * row.size(&point);
             self.from_rate[i] = usize::from(after != Slip::Stick && is_at_rest);
             match before {

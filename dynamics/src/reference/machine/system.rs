@@ -8,10 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::domain::{Domain, DomainKey};
 use super::modes::ROUNDING;
 use super::{Numbers, Point, SIZE};
-use crate::model::{Contact, MOST_HARMONICS, Machine, Side, Wall};
-
-/// Displacement, in scales of length, from which no motion is expected to return if energy can grow.
-const ESCAPE: f64 = 1e9;
+use crate::model::{Contact, ESCAPE, MOST_HARMONICS, Machine, Side, Wall};
 
 /// Linear forces in the coordinates of the flow.
 #[derive(Clone, Debug)]

@@ -5,6 +5,7 @@ mod act;
 mod agree;
 mod build;
 mod checks;
+mod cycles;
 mod engine;
 mod joint;
 mod motion;
