@@ -11,6 +11,7 @@ use rattlemap::map::scene::{FileText, Purpose, Scene};
 use rattlemap::record::classify::classify;
 use rattlemap::record::measures::GROUPS;
 use rattlemap::record::valid;
+use rattlemap::validate::{Field, differences};
 use rattlemap_dynamics::model::{GearPair, Law, Machine, NonImpacting, Oscillator, State, state};
 use rattlemap_dynamics::reference::machine::{Motion, System};
 use rayon::prelude::*;
@@ -131,7 +132,7 @@ fn lanes_decide_classes_of_machines_as_the_reference_does() {
     }
 }
 
-/// A mass between mirrored walls. Its cycles are their own mirror images, or in pairs.
+/// A mass between mirrored walls. A cycle is its own mirror image, or one of a pair.
 const MIRRORED: &str = r#"
 name = "mirrored"
 title = "Mass between walls"
@@ -142,7 +143,8 @@ omega = { default = 1.0, meaning = "frequency" }
 [motion]
 coordinates = ["x"]
 mass = [["1"]]
-damping = [["0.1"]]
+damping = [["0.4"]]
+stiffness = [["0.2"]]
 force = ["F"]
 frequency = "omega"
 gap = ["1"]
@@ -165,7 +167,7 @@ parameter = "F"
 values = [1.0, 2.0]
 [[axis]]
 parameter = "omega"
-values = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0]
+values = [1.4, 1.7, 2.0, 2.3, 2.6, 4.0]
 "#;
 
 /// The processor measures the motion in which lanes end.
@@ -186,24 +188,22 @@ fn maps_of_machines_have_the_symmetry_and_the_quantities_of_the_reference() {
             if !is_certain || classify(found) != classify(expected) {
                 continue;
             }
-            if found.valid & valid::SYMMETRIC != 0 {
-                assert_eq!(found.symmetric, expected.symmetric, "cell {id}");
-                symmetric[found.symmetric as usize] += 1;
-            }
-            // Without impacts their energy is a rounding error.
-            for group in GROUPS
-                .iter()
-                .filter(|group| group.name != "impact_energy" || expected.impacts_per_period > 0.0)
-            {
+            for group in &GROUPS {
                 assert_eq!(found.valid & group.bit, expected.valid & group.bit, "cell {id}: {}", group.name);
-                let distance = group.distance(found, expected, 1e-3);
-                assert!(distance < 1e-3, "cell {id}: {} differs by {distance:.1e}", group.name);
+            }
+            let period = plan.oscillator(plan.cell(id as u32).flow).period();
+            let mut differences = differences(found, expected, Precision::F32, period, plan.budget());
+            // Lanes may settle in another time.
+            differences.retain(|one| one.field != Field::Status);
+            assert!(differences.is_empty(), "cell {id}: {differences:?}");
+            if found.valid & valid::SYMMETRIC != 0 {
+                symmetric[found.symmetric as usize] += 1;
             }
             measured += 1;
         }
     }
     assert!(
-        measured >= 14 && symmetric[0] >= 1 && symmetric[1] >= 1,
+        measured >= 17 && symmetric[0] >= 2 && symmetric[1] >= 5,
         "{measured} measured, symmetric: {symmetric:?}"
     );
 }

@@ -348,6 +348,17 @@ fn a_correct_map_of_lanes_passes() {
     }
 }
 
+/// The processor measures machines, also when their lanes are computed again.
+#[test]
+fn a_map_of_a_machine_with_quantities_passes() {
+    let scene = "model = 'viscoelastic-ball'\n[[axis]]\nparameter = 'A'\nvalues = [1.1, 1.2, 1.3]\n[[axis]]\nparameter = 'B'\n\
+                 values = [0.3, 0.4]\n[outputs]\nquantities = ['class', 'symmetric', 'amplitude', 'impact_energy', 'multiplier']\n";
+    let plan = Plan::new(&Scene::parse(scene, "ball.toml", &[], Purpose::Map).unwrap());
+    let found = validate_lanes(&plan, Precision::F32, None);
+    assert_eq!(found.faults(), Vec::<String>::new(), "{:?}", found.mismatches);
+    assert_eq!(found.again, [plan.cell_count(); 2]);
+}
+
 /// The shader skips the contact law at one contact in ten thousand. Lanes reach the same attractors, and most records
 /// are right.
 #[test]
