@@ -64,9 +64,9 @@ const SIDE_RIGHT: u32 = 0u;
 const SIDE_LEFT: u32 = 1u;
 const SIDE_NONE: u32 = 2u;
 
-// Modes of a gap. BEYOND: beyond so many walls whose springs act; on the left the number is subtracted. The others are followed by
-// the side. ONSET: lasting contact that has begun with an impact, the gap in front of its wall. PRESSED: the gap behind it. OPEN: behind a
-// wall that only pushes, without force. STUCK: at rest on a rigid wall.
+// Modes of a gap. BEYOND, plus the number of walls passed on the right, or minus that on the left. For the others, add the side.
+// ONSET: lasting contact that has begun with an impact, the gap in front of its wall. PRESSED: the same, the gap behind it.
+// OPEN: behind a wall that only pushes, without force. STUCK: at rest on a rigid wall.
 const BEYOND: u32 = 4u;
 const ONSET: u32 = 9u;
 const PRESSED: u32 = 11u;
@@ -222,7 +222,7 @@ fn present_domain() -> u32 {
     return domain_of(gap_modes, slips);
 }
 
-// Side of the lasting contact of a mode, or SIDE_NONE.
+// Side of a mode; SIDE_NONE between the walls.
 fn contact_of(mode: u32) -> u32 {
     if mode >= ONSET {
         return (mode + 1u) % 2u;

@@ -168,7 +168,7 @@ fn watch(number_of_watch: u32, domain: u32) -> Watch {
     return found;
 }
 
-// Steps of the grid to the next stop phase or change of the stage, at most to the end of the present one.
+// Share of a grid step until the stage changes or the present step ends.
 fn steps_to_stop() -> Real {
     var stop: Real = 1.0;
     if is_change_next() {
@@ -358,7 +358,7 @@ fn count_notes() {
     note_count = 0u;
 }
 
-// Jump of the rates at an impact: per unit of change of the gap's rate, the gap, and the change per approach speed of neighbours.
+// Impact: changes of the rates per change of the gap's rate; the gap; minus the derivative of the latter change by this rate.
 var<private> kick: array<Real, COORDINATES>;
 var<private> kick_gap: u32;
 var<private> kick_factor: Real;
@@ -717,7 +717,7 @@ fn impact(gap: u32, side: u32) {
         }
         tried_gaps = chosen_gaps;
         tried_slips = chosen_slips;
-        // Gaps that would fly too low rest on, or two walls in a corner would be hit in turn infinitely often.
+        // Gaps with too low a flight stay at rest. Otherwise the impacts of two gaps might alternate for ever.
         var low = 0u;
         let domain = domain_of(tried_gaps, tried_slips);
         for (var other = 0u; other < GAPS; other++) {
@@ -754,8 +754,8 @@ fn impact(gap: u32, side: u32) {
     }
 }
 
-// Computes the changes of all rates by an impulse that changes the gap's rate by 1, and returns the gaps at rest on rigid walls that it lets
-// go, as bits. The others stay at rest in the same impact, because their walls push. Gaps in `kept` rest on in any case.
+// Computes the changes of all rates by an impulse that changes the gap's rate by 1, and returns the gaps at rest that leave their
+// rigid walls, as bits. The others stay at rest, because their walls push. Gaps in `kept` stay at rest in any case.
 fn joint_impact(gap: u32, side: u32, kept: u32) -> u32 {
     var resting: array<u32, 2>;
     var count_of_resting = 0u;

@@ -54,7 +54,7 @@ fn acceleration_row(domain: u32, i: u32) -> u32 {
     return domain + IN_DOMAIN_ACCELERATIONS + i * WIDTH;
 }
 
-// Force with which a rigid wall pushes a gap that rests on it, or a constant if other constraints hold the gap.
+// Force with which a rigid wall pushes a gap that rests on it. It has a meaning only with `has_push`.
 fn push_line(domain: u32, gap: u32) -> Line {
     return row_line(domain + IN_DOMAIN_PUSHES + gap * WIDTH, 1.0);
 }
@@ -195,13 +195,13 @@ fn state_after(share: Real) -> State {
     return q;
 }
 
-// The first derivative of a line that is not zero within rounding, and its order.
+// Lowest derivative of a line that is not zero within rounding, and its order.
 struct Lead {
     order: u32,
     value: Real,
 }
 
-// Returns the first such derivative of order `least` or higher, at a state and at the present phase. Only its sign has a meaning.
+// Returns the lowest such derivative of order `least` or higher, at a state at the present phase. Only its sign has a meaning.
 fn lead(line: Line, domain: u32, q: State, least: u32) -> Lead {
     load_point(q);
     for (var i = 0u; i < shape.width; i++) {

@@ -15,12 +15,12 @@ use rattlemap_dynamics::reference::machine::{StartModes, System};
 /// Largest number of domains in a table.
 pub(super) const MOST_DOMAINS: usize = 4096;
 
-/// Numbers of a flow, of its shape and of a law in the shader.
+/// Sizes of a flow, of its shape and of a law in the shader.
 pub(super) const FLOW: usize = 7 + STATE;
 pub(super) const SHAPE: usize = 31;
 pub(super) const LAW: usize = 24;
 
-/// Numbers of a start beside the state: the packed modes, and the next change of the stage.
+/// Size of a start beside the state: the packed modes, and the next change of the stage.
 pub(super) const MODES: usize = 4;
 
 /// Steps of the grid per turn of the highest harmonic, which turns by less than a radian in one of them.
@@ -135,18 +135,18 @@ impl MachineShape {
         found.map(|(_, place)| place).expect("the place has a name")
     }
 
-    /// Returns the numbers of a domain in the table.
+    /// Returns the size of a domain in the table.
     pub(super) fn domain(&self) -> usize {
         self.place("IN_DOMAIN_HOLDS") + self.elements as usize * self.width()
     }
 
-    /// Returns the numbers of a machine's table.
+    /// Returns the size of a machine's table.
     fn table(&self, domains: usize) -> usize {
         self.place("AT_DOMAINS") + domains * self.domain()
     }
 }
 
-/// Returns the machine of an oscillator. One of at most two coordinates has its contact law apart, so that the law of this machine is 0.
+/// Returns the machine of an oscillator. If the oscillator stores none, its contact law is separate, and the law of the machine is 0.
 fn machine_of(oscillator: &Oscillator) -> Cow<'_, Machine> {
     match &oscillator.machine {
         Some(machine) => Cow::Borrowed(machine),

@@ -236,7 +236,7 @@ impl Machine {
         std::f64::consts::TAU / self.omega
     }
 
-    /// Returns the orders of all harmonics; order 1 without a force.
+    /// Returns the highest order of a harmonic; 1 without a force.
     pub fn highest_order(&self) -> u32 {
         self.drives.iter().map(|drive| drive.order).max().unwrap_or(1)
     }
@@ -288,8 +288,8 @@ impl Machine {
         chosen
     }
 
-    /// Moves each gap that is beyond a rigid wall onto this wall, and returns the state. For each gap, one displacement changes: the one with
-    /// the largest factor in the gap, and of equal ones the first. All velocities stay.
+    /// Moves each gap that is beyond a rigid wall onto this wall, and returns the state. For each gap, one displacement
+    /// changes, which `displacements_of_gaps` chooses. All velocities stay.
     pub fn put_on_walls(&self, start: &[f64]) -> State {
         let limit = |gap: &GapRow, side: Side| match gap.walls[side.index()].last() {
             Some(wall) if wall.contact == Contact::Rigid => wall.at,
@@ -484,9 +484,9 @@ impl Machine {
         if gram.iter().all(|x| x.is_finite()) { gram.symmetric_eigenvalues().min() } else { 0.0 }
     }
 
-    /// Returns the length, > 0, that tolerances on distances are relative to: half the distance of the two walls of a gap, the smallest if
-    /// several gaps have two. Without such a gap it is the largest of the walls' positions and of the deflections `D f` under
-    /// forces, loads, preloads and friction, with `D = (|K| + omega^2 M)^-1`.
+    /// Returns the scale, > 0, of tolerances on distances: half the smallest distance between a gap's first walls. Without a gap with two
+    /// walls, it is the largest of the walls' positions and of the deflections `D f` under forces of order k, and under loads,
+    /// preloads and friction (k = 1), with `D = (|K| + (k omega)^2 M)^-1`.
     pub fn length_scale(&self) -> f64 {
         let half = |gap: &GapRow| {
             let [right, left] = gap.walls.each_ref().map(|walls| walls.first());

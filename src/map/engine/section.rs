@@ -1,5 +1,5 @@
-//! What completes the records of lanes. Lanes whose cycle has an event at phase 0 run a second time, from their last state, and compare
-//! states at a phase far from events. The processor measures the motions of machines.
+//! Completes the records of lanes. A lane with an event at phase 0 runs again from its last state, and its states are compared
+//! at a phase far from events. The processor measures the motions of machines.
 
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use rattlemap_dynamics::reference::Allowance;
 /// Largest number of lanes that run a second time together.
 const BATCH: usize = 4096;
 
-/// Distance from phase 0 within which the strobe is taken after an event, in units of [`rules::on_strobe`]: lanes round
+/// The strobe is the state after an event that is so near to phase 0, in units of [`rules::on_strobe`]. Lanes round
 /// at every step.
 const STROBE_TOLERANCES: f64 = 16.0;
 
@@ -28,8 +28,8 @@ struct SecondRun {
     features: Features,
 }
 
-/// Runs the lanes of these records a second time if an event lies at phase 0, and replaces the records whose period the
-/// second run confirms. `of` returns oscillator and law of a record's number.
+/// Runs the lanes of these records a second time if an event lies at phase 0, and replaces the records for which
+/// `replaces` holds. `of` returns oscillator and law of a record's number.
 ///
 /// # Errors
 /// [`GpuError`] if the device fails or is halted. Then the records of such lanes must not be used.
@@ -102,7 +102,7 @@ pub(crate) fn is_on_strobe(record: &Record) -> bool {
     status(record) == Status::StrobeOnEvent && record.period > 0 || record.valid & valid::NEAR_STROBE != 0
 }
 
-/// Whether a second run that found a cycle replaces a record. If only its flag is set, its period may be right.
+/// Whether a second record with a cycle replaces the first. A first one that only has `NEAR_STROBE` may be right.
 fn replaces(second: &Record, first: &Record) -> bool {
     let is_shorter = first.period > second.period && first.period.is_multiple_of(second.period);
     first.period == 0 || is_shorter || status(first) == Status::StrobeOnEvent

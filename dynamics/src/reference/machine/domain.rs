@@ -318,7 +318,7 @@ impl Domain {
         sum
     }
 
-    /// Returns the matrix that carries tangent vectors over a time of at most the longest step. Row `i` has `2 n` entries.
+    /// Returns the images of the unit vectors after a time of at most the longest step. Each has `2 n` entries.
     pub(super) fn carrier(&self, time: f64) -> Cow<'_, Carrier> {
         if time == self.unit {
             Cow::Borrowed(self.whole.get_or_init(|| self.new_carrier(time)))

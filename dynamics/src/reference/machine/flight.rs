@@ -8,7 +8,7 @@ use super::system::System;
 use crate::model::Side;
 use crate::orbit::{place_of_displacement, place_of_gap};
 
-/// A flight within one domain, of at most one Taylor step.
+/// Part of a flight: one domain, at most one Taylor step.
 pub struct Flight<'a> {
     pub(super) system: &'a System,
     pub(super) domain: &'a Domain,

@@ -28,7 +28,7 @@ pub(super) enum GapMode {
 }
 
 impl GapMode {
-    /// Returns the side of the contact that lasts.
+    /// Returns the side of a mode, if it has one.
     pub(super) fn contact(self) -> Option<Side> {
         match self {
             GapMode::Beyond(0) => None,
@@ -80,7 +80,7 @@ pub(super) struct AtRest {
     pub(super) elements: [bool; MOST_FRICTION],
 }
 
-/// Returns the first derivative of a row that is not zero within rounding, from the derivative `first` on, and its order.
+/// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value.
 pub(super) fn first_derivative(domain: &Domain, row: &Row, point: &Point, first: usize) -> (usize, f64) {
     let mut rate = row.clone();
     for order in 0..first + DERIVATIVES {

@@ -100,7 +100,7 @@ pub struct Motion<'s> {
     has_slid: [bool; MOST_FRICTION],
     tangents: Vec<Numbers>,
     log_scale: f64,
-    /// State and derivative of the velocities' jump at the present event.
+    /// State before the event, and derivative of the velocities' jump.
     before: Numbers,
     reset: Option<DMatrix<f64>>,
     events_in_period: u64,
@@ -117,7 +117,7 @@ pub struct Motion<'s> {
 impl<'s> Motion<'s> {
     /// Starts at phase 0 in the state `(x1, v1, x2, v2, ...)`.
     ///
-    /// A gap behind a wall is in contact. A gap behind a rigid wall is moved onto the wall by
+    /// A gap behind a wall with a force is in contact. A gap behind a rigid wall is moved by
     /// [`put_on_walls`](crate::model::Machine::put_on_walls).
     pub fn new(system: &'s System, state: &[f64]) -> Motion<'s> {
         let stage = system.machine.first_stage();
@@ -663,7 +663,7 @@ impl<'s> Motion<'s> {
         self.at_wall[gap].map_or(0, |(side, order)| if side == direction { order } else { 0 })
     }
 
-    /// Large displacements make all steps short.
+    /// Checks the state at every 1024th step.
     fn check_size(&self) -> Result<(), Stop> {
         if self.steps_in_period.is_multiple_of(1024) { self.check_finite() } else { Ok(()) }
     }
@@ -943,7 +943,7 @@ impl<'s> Motion<'s> {
         first_derivative(&self.domain, &self.force(gap, side), &self.point(), 0).1 > 0.0
     }
 
-    /// Notes whether a flight begins with no force of a pushing wall.
+    /// Notes the order of the root of a force at a flight's start.
     fn start_from_force(&mut self, gap: usize, side: Side) {
         if self.system.pushing(gap, side).is_some() {
             self.refresh();
@@ -960,7 +960,7 @@ impl<'s> Motion<'s> {
         let (kick, Outcome { free, bounced, lasting, pressing }) = loop {
             let (kick, let_go) = self.joint_impact(gap, side, kept);
             let outcome = self.outcome(gap, side, wall, e, &kick, let_go);
-            // Gaps that would fly too low rest on, or two walls in a corner would be hit in turn infinitely often.
+            // Gaps with too low a flight stay at rest. Otherwise the impacts of two gaps might alternate for ever.
             let (modes, y) = outcome.lasting.unwrap_or((outcome.free, outcome.bounced));
             let (domain, point) = (system.domain(modes.key(system)), system.point(&y, &self.phasors));
             let low = (0..system.gaps()).find(|&other| {
@@ -1063,9 +1063,9 @@ impl<'s> Motion<'s> {
         Outcome { free, bounced, lasting, pressing }
     }
 
-    /// Returns the changes of all rates by an impulse that changes the gap's rate by 1, and which gaps at rest on rigid walls it lets go. The
-    /// others stay at rest in the same impact, because their walls push.
-    /// The gaps that are `kept` rest on in any case.
+    /// Returns the changes of all rates by an impulse that changes the gap's rate by 1, and which gaps at rest leave their rigid walls. The
+    /// others stay at rest, because their walls push. The gaps in `kept`
+    /// stay at rest in any case.
     fn joint_impact(&self, gap: usize, side: Side, kept: [bool; MOST_GAPS]) -> (Vec<f64>, [bool; MOST_GAPS]) {
         let (system, n) = (self.system, self.system.n);
         let resting: Vec<(usize, Side)> = (0..system.gaps())

@@ -40,10 +40,9 @@ pub struct StartModes {
     pub slips: [u32; 2],
     /// Stage of the forces.
     pub stage: u32,
-    /// Side of the wall that each gap comes from, and of the wall that it lies on, 0 right, 1 left, 2 none; and the order of the root of the
-    /// distance from the latter.
+    /// Side of the wall that each gap comes from: 0 right, 1 left, 2 none.
     pub origins: [u32; MOST_GAPS],
-    /// See `origins`.
+    /// Direction of the wall that each gap lies on, as in `origins`, and the order of the root of its distance.
     pub walls: [(u32, u32); MOST_GAPS],
     /// Orders of the roots of pushing forces and of sliding rates.
     pub from_force: [u32; MOST_GAPS],
