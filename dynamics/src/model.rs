@@ -19,7 +19,6 @@ pub use machine::{
     Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_GAPS, Machine, Restitution, Spring, Wall,
 };
 pub use non_impacting::NonImpacting;
-pub(crate) use oscillator::ESCAPE;
 pub(crate) use oscillator::is_semidefinite;
 pub use oscillator::{
     Contact, Domain, Friction, HIGHEST_ORDER, Harmonic, Law, MOST_CHANGES, MOST_FRICTION, MOST_HARMONICS,

@@ -120,7 +120,10 @@ impl Names<'_> {
     fn remedy(self, name: &str) -> Option<String> {
         let (what, remedy) = match self.states.iter().position(|state| *state == name) {
             Some(i) if i % 2 == 0 => ("a coordinate", format!("write the factor of {name} in `stiffness`")),
-            Some(_) => ("a velocity", format!("write the factor of {name} in `damping`")),
+            Some(_) => (
+                "a velocity",
+                format!("write the factor of {name} in `damping`, and an approach speed as `speed`"),
+            ),
             None if name == "t" || name == "time" => {
                 let force = "write the amplitude of the harmonic force in `force`, and a stiffness that changes with time \
                              in `stages`";

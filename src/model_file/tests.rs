@@ -1048,8 +1048,8 @@ left = [1, -1, 0], | k = [1, -1, 0], | m.toml:20:13: `motion.gap.k = [1, -1, 0]`
 left = [1, -1, 0], | v2 = [1, -1, 0], | `v2` is already the name of a parameter
 left = [1, -1, 0], | side = [1, -1, 0], | `side` is a column of tables
 left = [1, -1, 0], | left = ["1/0", -1, 0], | m.toml:20:16: `motion.gap.left = ["1/0", -1, 0]` does not fit: at the defaults of three, row of gap 1 = inf: it must be a finite number
-left = [1, -1, 0], | left = [0, -2, 1], | m.toml:20:7: `motion.gap = { ... }` does not fit: at the defaults of three, independence of the rows of the gaps = 0: it must be above 1e-12: no row may be 0 or a sum of multiples of the others, and all walls along one row belong to one gap
-left = [1, -1, 0], | left = [0, 0, 0], | independence of the rows of the gaps = 0: it must be above 1e-12
+left = [1, -1, 0], | left = [0, -2, 1], | m.toml:20:7: `motion.gap = { ... }` does not fit: at the defaults of three, independence of the rows of the gaps 1 to 2 = 0: it must be above 1e-12: no row may be 0 or a sum of multiples of the others, and all walls along one row belong to one gap
+left = [1, -1, 0], | left = [0, 0, 0], | independence of the rows of the gaps 1 to 1 = 0: it must be above 1e-12
 gap = "right"\n | gap = "middle"\n | m.toml:28:7: `contact.0.gap = "middle"` is not known; valid names: left, right
 gap = "right"\n | | m.toml:27:1: `contact.0.gap` is missing; the gaps in [motion] have names: write gap = "left" or gap = "right"
 gap = "right"\n | gap = 1\n | `contact.0.gap = 1` has the wrong type: it must be one of left, right
@@ -1064,7 +1064,7 @@ damping = "c" | damping = "-c" | m.toml:49:11: `contact.2.damping = "-c"` does n
 "left"\nside = "left" | "right"\nside = "right" | m.toml:45:8: `contact.2.side = "right"` does not fit: the wall before it on this side has impacts
 [0, 0, "m"] | [0, "m"] | `friction.0.row = [0, "m"]` is out of range: it must be the row of the sliding rate, row . v - speed: a list of three entries, one for each coordinate
 [0, 0, "m"] | ["1/0", 0, 0] | m.toml:52:7: `friction.0.row = ["1/0", 0, 0]` does not fit: at the defaults of three, row of friction 1 = inf: it must be a finite number
-[0, 0, "m"] | [0, 0, 0] | m.toml:52:7: `friction.0.row = [0, 0, 0]` does not fit: at the defaults of three, independence of the rows of friction = 0: it must be above 1e-12
+[0, 0, "m"] | [0, 0, 0] | m.toml:52:7: `friction.0.row = [0, 0, 0]` does not fit: at the defaults of three, independence of the rows of friction 1 to 1 = 0: it must be above 1e-12
 force = "mu*k" | force = "-mu" | m.toml:53:9: `friction.0.force = "-mu"` does not fit: at the defaults of three, force of friction 1 = -0.2: it must be finite and at least 0
 ["m", 0, 0] | ["-m", 0, 0] | m.toml:14:8: `motion.mass = [["-m", 0, 0], [0, 1, 0.25], [0, 0.25, 1]]` does not fit: at the defaults of three, lowest eigenvalue of the mass matrix = -2: it must be greater than 0
 ["m", 0, 0] | ["m", 1, 0] | `motion.mass = [["m", 1, 0], [0, 1, 0.25], [0, 0.25, 1]]` does not fit: at the defaults of three, difference of opposite entries of mass = 1: it must be 0: the matrix must be symmetric

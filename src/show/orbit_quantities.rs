@@ -31,17 +31,10 @@ fn approaches(orbit: &Orbit, side: Side) -> Option<[f64; 2]> {
     (speeds.count > 0).then_some([speeds.mean, speeds.largest])
 }
 
-/// Returns the impulse of each event on the gap: the jump of its velocity over the compliance of the gap, without
-/// impulses of other gaps that rest on their walls. It is negative at the
-/// right wall.
+/// Returns the impulse of each event on its gap, which is negative at a right wall.
 pub(crate) fn impulses(model: &dyn Model, events: &[Event]) -> Vec<Option<f64>> {
     let oscillator = model.oscillator().ok();
-    let of = |event: &Event| {
-        let oscillator = oscillator.as_ref()?;
-        let [before, after] =
-            [event.before, event.after].map(|state| oscillator.gap_value(event.gap, &state, 1));
-        Some((after - before) / oscillator.gap_mobility(event.gap))
-    };
+    let of = |event: &Event| Some(oscillator.as_ref()?.gap_impulse(event.gap, [&event.before, &event.after]));
     events.iter().map(of).collect()
 }
 

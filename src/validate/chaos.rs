@@ -50,10 +50,13 @@ pub(super) type Differences = [Option<[f64; 2]>; COUNT];
 /// Computes the differences of one cell; none unless all three results are chaotic.
 pub(super) fn differences(cell: &Cell<'_>) -> Option<Differences> {
     let record = &cell.record;
+    if classify(record) != Class::Chaotic {
+        return None;
+    }
     // Large indices, because `explain` uses those from zero.
     let [first, second] = [1 << 16, 1 << 17].map(|k| cell.averages(k, record.periods_run));
     let (first, second) = (first?, second?);
-    if [record, &first, &second].iter().any(|side| classify(side) != Class::Chaotic) {
+    if [&first, &second].iter().any(|side| classify(side) != Class::Chaotic) {
         return None;
     }
     let of = |bit: u32, scale: f64, value: &dyn Fn(&Record) -> f64| {

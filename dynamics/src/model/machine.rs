@@ -11,7 +11,8 @@ use std::cmp::Ordering;
 use nalgebra::{DMatrix, DVector};
 
 use super::oscillator::{
-    MATRIX_TOLERANCE, check_phases, finite, positive, recurs_after_half_a_period, require, schedule_at, turn,
+    ESCAPE, ESCAPE_WITHOUT_SCALE, MATRIX_TOLERANCE, check_phases, finite, positive,
+    recurs_after_half_a_period, require, schedule_at, turn,
 };
 use super::{
     Contact, HIGHEST_ORDER, Law, MOST_CHANGES, MOST_FRICTION, MOST_STAGES, MOST_WALLS, Oscillator,
@@ -261,6 +262,16 @@ impl Machine {
         self.mass.clone().cholesky().map_or(f64::NAN, |factors| row.dot(&factors.solve(row)))
     }
 
+    /// Returns the impulses along the rows of all gaps that change the gaps' rates by given jumps; NaN if there are none.
+    pub(crate) fn impulses(&self, jump: impl Fn(usize) -> f64) -> DVector<f64> {
+        let count = self.gaps.len();
+        let Some(mass) = self.mass.clone().cholesky() else { return DVector::from_element(count, f64::NAN) };
+        let mobility =
+            DMatrix::from_fn(count, count, |i, j| self.gaps[i].row.dot(&mass.solve(&self.gaps[j].row)));
+        let jumps = DVector::from_fn(count, |gap, _| jump(gap));
+        mobility.cholesky().map_or(DVector::from_element(count, f64::NAN), |factors| factors.solve(&jumps))
+    }
+
     /// Returns the stage that holds at phase 0.
     pub fn first_stage(&self) -> usize {
         match self.schedule.first() {
@@ -394,14 +405,17 @@ impl Machine {
             all_finite(|| format!("row of gap {i}"), &gap.row)?;
             Side::BOTH.into_iter().try_for_each(|side| self.validate_walls(i, gap, side))?;
             if let [Some(right), Some(left)] = gap.walls.each_ref().map(|walls| walls.first())
-                && right.at < left.at
+                && (right.at < left.at
+                    || right.at == left.at && !(right.contact.is_elastic() && left.contact.is_elastic()))
             {
                 return Err(OscillatorError::Walls { walls: [right.at, left.at] });
             }
         }
         let rows = |rows: Vec<&DVector<f64>>, what: &'static str, range: &'static str| {
-            let independent = self.independence(&rows);
-            require(independent > MATRIX_TOLERANCE, || what.to_owned(), independent, range)
+            (1..=rows.len()).try_for_each(|count| {
+                let independent = self.independence(&rows[..count]).max(0.0);
+                require(independent > MATRIX_TOLERANCE, || format!("{what} 1 to {count}"), independent, range)
+            })
         };
         rows(
             self.gaps.iter().map(|gap| &gap.row).collect(),
@@ -492,9 +506,20 @@ impl Machine {
             let [right, left] = gap.walls.each_ref().map(|walls| walls.first());
             Some(0.5 * (right?.at - left?.at)).filter(|&half| half > 0.0)
         };
-        if let Some(least) = self.gaps.iter().filter_map(half).min_by(f64::total_cmp) {
-            return least;
+        self.gaps.iter().filter_map(half).min_by(f64::total_cmp).unwrap_or_else(|| self.largest_length())
+    }
+
+    /// Returns the displacement from which no motion is expected to return if energy can grow.
+    pub(crate) fn escape(&self) -> f64 {
+        // Walls may be near each other and far from rest, or much nearer than the motion of other coordinates.
+        match self.length_scale().max(self.largest_length()) {
+            LEAST_LENGTH => ESCAPE_WITHOUT_SCALE,
+            length => ESCAPE * length,
         }
+    }
+
+    /// Returns the largest of the walls' positions and of the deflections by forces.
+    fn largest_length(&self) -> f64 {
         let walls = self.gaps.iter().flat_map(|gap| gap.walls.iter().flatten()).map(|wall| wall.at.abs());
         self.deflections().into_iter().chain(walls).fold(LEAST_LENGTH, f64::max)
     }

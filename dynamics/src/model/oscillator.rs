@@ -98,10 +98,10 @@ const LEAST_LENGTH: f64 = 1e-150;
 const SAME_PHASE: f64 = 1e-12;
 
 /// Displacement, in scales of length, from which no motion is expected to return if energy can grow.
-pub(crate) const ESCAPE: f64 = 1e6;
+pub(super) const ESCAPE: f64 = 1e6;
 
 /// Displacement from which no motion is expected to return if nothing gives a scale of length: no force, no load, and no wall but at 0.
-const ESCAPE_WITHOUT_SCALE: f64 = 1e100;
+pub(super) const ESCAPE_WITHOUT_SCALE: f64 = 1e100;
 
 /// The contact type of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -284,11 +284,13 @@ impl Oscillator {
         self.gap_row(gap).iter().enumerate().map(|(i, factor)| factor * state[2 * i + velocity]).sum()
     }
 
-    /// Returns the change of a gap's rate by a unit impulse along its row.
-    pub fn gap_mobility(&self, gap: usize) -> f64 {
+    /// Returns the impulse `p` of a wall on a gap that changes the velocities between two states: `M (v+ - v-)` is the sum of `p g` over all
+    /// gaps, because walls on which other gaps rest push, too.
+    pub fn gap_impulse(&self, gap: usize, [before, after]: [&State; 2]) -> f64 {
+        let jump = |gap: usize| self.gap_value(gap, after, 1) - self.gap_value(gap, before, 1);
         match &self.machine {
-            Some(machine) => machine.mobility(gap),
-            None => self.mobility(self.gap),
+            Some(machine) => machine.impulses(jump)[gap],
+            None => jump(0) / self.mobility(self.gap),
         }
     }
 

@@ -9,8 +9,11 @@ use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
 /// Rounding error of a sum, relative to the size of its terms.
 pub(super) const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Derivatives that are compared with zero.
-const DERIVATIVES: usize = 4;
+/// Derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the other end.
+const DERIVATIVES: usize = 16;
+
+/// Order of the root of a function that stays zero: all derivatives are zero within rounding.
+pub(super) const STAYS_ZERO: usize = usize::MAX;
 
 /// The mode of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +83,8 @@ pub(super) struct AtRest {
     pub(super) elements: [bool; MOST_FRICTION],
 }
 
-/// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value.
+/// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value; [`STAYS_ZERO`] and 0 if
+/// there is none.
 pub(super) fn first_derivative(domain: &Domain, row: &Row, point: &Point, first: usize) -> (usize, f64) {
     let mut rate = row.clone();
     for order in 0..first + DERIVATIVES {
@@ -92,7 +96,7 @@ pub(super) fn first_derivative(domain: &Domain, row: &Row, point: &Point, first:
         }
         rate = domain.rate_of(&rate);
     }
-    (first + DERIVATIVES, 0.0)
+    (STAYS_ZERO, 0.0)
 }
 
 impl System {

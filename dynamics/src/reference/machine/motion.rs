@@ -1,4 +1,6 @@
 //! The motion of a machine from event to event.
+//!
+//! Observers are trait objects, so that the program has one copy of this code.
 
 use std::sync::Arc;
 
@@ -7,7 +9,7 @@ use nalgebra::DMatrix;
 use super::domain::{Constraint, Constraints, Domain, DomainKey, Path, Row};
 use super::events::{MachineEvent, SlipEvent};
 use super::flight::Flight;
-use super::modes::{AtRest, GapMode, Modes, ROUNDING, first_derivative};
+use super::modes::{AtRest, GapMode, Modes, ROUNDING, STAYS_ZERO, first_derivative};
 use super::polynomial::{Fall, first_fall};
 use super::slip::{Slip, Slips};
 use super::system::{Phasors, System};
@@ -372,7 +374,7 @@ impl<'s> Motion<'s> {
     ///
     /// # Errors
     /// A [`Stop`] if the motion cannot be continued.
-    pub fn advance_period(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
+    pub fn advance_period(&mut self, observer: &mut dyn Observer) -> Result<(), Stop> {
         self.advance_to(self.system.period, observer)?;
         self.set_clock(0.0);
         self.change = 0;
@@ -391,7 +393,7 @@ impl<'s> Motion<'s> {
     ///
     /// # Errors
     /// A [`Stop`] if the motion cannot be continued.
-    pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+    pub fn advance_to(&mut self, until: f64, observer: &mut dyn Observer) -> Result<(), Stop> {
         if self.allowance.is_halted() {
             return Err(Stop::TooStiff);
         }
@@ -561,14 +563,14 @@ impl<'s> Motion<'s> {
     }
 
     /// Takes one step: to the first event, or as far as the series or the goal allow.
-    fn step(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
+    fn step(&mut self, observer: &mut dyn Observer) -> Result<(), Stop> {
         self.work.steps += 1;
         self.steps_in_period += 1;
         if self.work.steps > self.allowance.steps {
             return Err(Stop::TooStiff);
         }
         if self.steps_in_period > STEPS_PER_PERIOD_CAP {
-            return Err(Stop::CapRoot);
+            return Err(Stop::TooStiff);
         }
         let remaining = self.clock.remaining(self.goal);
         let h = self.domain.unit.min(remaining);
@@ -637,7 +639,7 @@ impl<'s> Motion<'s> {
             return first_fall(&distance, order, size);
         }
         let (row, order) = self.function(watch);
-        let order = if self.touches_limit(watch, &row, point) { 1 } else { order };
+        let order = self.order_at_limit(watch, &row, point).unwrap_or(order);
         first_fall(&self.domain.along(&row, path), order, row.size(point))
     }
 
@@ -668,16 +670,16 @@ impl<'s> Motion<'s> {
         if self.steps_in_period.is_multiple_of(1024) { self.check_finite() } else { Ok(()) }
     }
 
-    /// Whether a holding force that has just touched its limit is leaving it.
-    fn touches_limit(&self, watch: Watch, row: &Row, point: &Point) -> bool {
-        matches!(watch, Watch::Slips(..))
-            && row.dot(point).abs() <= ROUNDING * row.size(point)
-            && row.dot(&self.domain.derivative(point)) > 0.0
+    /// Returns the order of the root of a force that holds an element or a gap, if it is at its limit now.
+    fn order_at_limit(&self, watch: Watch, row: &Row, point: &Point) -> Option<usize> {
+        let is_at_limit = matches!(watch, Watch::Slips(..) | Watch::PushEnds(..))
+            && row.dot(point).abs() <= ROUNDING * row.size(point);
+        is_at_limit.then(|| first_derivative(&self.domain, row, point, 0).0)
     }
 
     /// Moves everything to a share of a step.
     fn advance(&mut self, path: &Path, share: f64, time: f64) {
-        self.y = self.domain.state(path, share);
+        let before = std::mem::replace(&mut self.y, self.domain.state(path, share));
         if !self.tangents.is_empty() {
             let (carrier, size) = (self.domain.carrier(time), 2 * self.system.n);
             self.tangents.iter_mut().for_each(|tangent| *tangent = carrier.carry(tangent, size));
@@ -692,8 +694,11 @@ impl<'s> Motion<'s> {
             self.sticking_time += time;
         }
         for gap in 0..self.system.gaps() {
-            if !self.is_kept(gap) {
-                self.at_wall[gap] = None;
+            match self.at_wall[gap] {
+                // The gap stays on the wall until another element changes its modes.
+                Some((_, STAYS_ZERO)) => (self.y[gap], self.y[self.system.n + gap]) = (before[gap], 0.0),
+                _ if self.is_kept(gap) => {}
+                _ => self.at_wall[gap] = None,
             }
         }
         (self.from_force, self.from_rate) = ([0; MOST_GAPS], [0; MOST_FRICTION]);
@@ -722,7 +727,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes the root of a watch at the present state, and lets the tangents jump.
-    fn cross(&mut self, watch: Watch, observer: &mut impl Observer) {
+    fn cross(&mut self, watch: Watch, observer: &mut dyn Observer) {
         let (row, _) = self.function(watch);
         if let Watch::Wall(gap, _) | Watch::OnsetEnds(gap, _) | Watch::Leaves(gap, _) = watch {
             self.put_on_wall(gap, &row);
@@ -791,7 +796,7 @@ impl<'s> Motion<'s> {
         }
     }
 
-    fn act(&mut self, watch: Watch, observer: &mut impl Observer) {
+    fn act(&mut self, watch: Watch, observer: &mut dyn Observer) {
         let mut exempt = AtRest::default();
         match watch {
             Watch::Wall(gap, direction) => {
@@ -825,7 +830,7 @@ impl<'s> Motion<'s> {
             Watch::ForceEnds(gap, side) => {
                 self.end_contact(gap, side, observer);
                 self.modes.gaps[gap] = GapMode::Open(side);
-                self.from_force[gap] = 1;
+                self.note_root_of_force(gap, side);
             }
             Watch::ForceBegins(gap, side) => {
                 self.begin_force(gap, side, observer);
@@ -842,18 +847,29 @@ impl<'s> Motion<'s> {
             }
         }
         self.settle(&exempt, observer);
+        for gap in 0..self.system.gaps() {
+            if let Some((side, STAYS_ZERO)) = self.at_wall[gap] {
+                self.leave(gap, side);
+            }
+        }
     }
 
     /// Begins contact with a wall that only pushes.
-    fn begin_force(&mut self, gap: usize, side: Side, observer: &mut impl Observer) {
+    fn begin_force(&mut self, gap: usize, side: Side, observer: &mut dyn Observer) {
         let count = self.system.walls(gap, side).len();
         self.record(gap, EventKind::MeshStart, side, count - 1, Some(side), observer);
         self.modes.gaps[gap] = GapMode::Beyond(signed(side, count));
-        self.from_force[gap] = 1;
+        self.note_root_of_force(gap, side);
+    }
+
+    /// Notes the order of the root of a pushing wall's force, which is 0 now.
+    fn note_root_of_force(&mut self, gap: usize, side: Side) {
+        self.refresh();
+        self.from_force[gap] = first_derivative(&self.domain, &self.force(gap, side), &self.point(), 1).0;
     }
 
     /// Ends a lasting contact with the last wall of a side.
-    fn end_contact(&mut self, gap: usize, side: Side, observer: &mut impl Observer) {
+    fn end_contact(&mut self, gap: usize, side: Side, observer: &mut dyn Observer) {
         let next = self.before_last(gap, side);
         let last = self.system.walls(gap, side).len() - 1;
         self.record(gap, EventKind::MeshEnd, side, last, next.contact(), observer);
@@ -888,7 +904,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes a gap that reaches a wall in a direction.
-    fn reach(&mut self, gap: usize, direction: Side, observer: &mut impl Observer) {
+    fn reach(&mut self, gap: usize, direction: Side, observer: &mut dyn Observer) {
         let Some((side, number)) = self.wall_ahead(gap, direction) else { return };
         let wall = &self.system.walls(gap, side)[number];
         self.y[gap] = wall.at;
@@ -952,7 +968,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes an impact, after which the gap leaves the wall, or a lasting contact begins.
-    fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut impl Observer) {
+    fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut dyn Observer) {
         let (system, n) = (self.system, self.system.n);
         let (approach, number) = (side.sign() * self.rate(gap), system.walls(gap, side).len() - 1);
         let [e, slope] = self.restitution(side, wall, approach);
@@ -1163,7 +1179,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes a sliding rate that vanishes.
-    fn end_sliding(&mut self, i: usize, observer: &mut impl Observer) {
+    fn end_sliding(&mut self, i: usize, observer: &mut dyn Observer) {
         let mut at_rest = self.at_rest();
         at_rest.elements[i] = true;
         let before = self.modes.slips[i];
@@ -1188,7 +1204,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Processes an element that breaks away.
-    fn begin_sliding(&mut self, i: usize, next: Slip, observer: &mut impl Observer) {
+    fn begin_sliding(&mut self, i: usize, next: Slip, observer: &mut dyn Observer) {
         let kept: Vec<usize> = (0..self.system.gaps()).filter(|&gap| self.is_kept(gap)).collect();
         let before = self.modes;
         self.modes.slips[i] = next;
@@ -1245,7 +1261,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Decides all modes anew that depend on forces, after a jump of forces or rates. `exempt` has just been decided.
-    fn settle(&mut self, exempt: &AtRest, observer: &mut impl Observer) {
+    fn settle(&mut self, exempt: &AtRest, observer: &mut dyn Observer) {
         for _ in 0..MOST_DECISIONS {
             self.refresh();
             let point = self.point();
@@ -1281,7 +1297,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Decides contact onsets and walls that only push anew. Returns whether a mode has changed.
-    fn settle_pushing(&mut self, point: &Point, observer: &mut impl Observer) -> bool {
+    fn settle_pushing(&mut self, point: &Point, observer: &mut dyn Observer) -> bool {
         for gap in 0..self.system.gaps() {
             if self.from_force[gap] > 0 {
                 continue;
@@ -1322,7 +1338,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Enters other modes of elements at rest, and reports the changes: of friction first, if the rate of the element `stopped` vanished.
-    fn change_modes(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut impl Observer) {
+    fn change_modes(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut dyn Observer) {
         if stopped.is_some() {
             self.change_slips(next, stopped, observer);
         }
@@ -1359,7 +1375,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Enters other modes of friction, and reports the changes.
-    fn change_slips(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut impl Observer) {
+    fn change_slips(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut dyn Observer) {
         let before = std::mem::replace(&mut self.modes.slips, next.slips);
         for (i, (before, after)) in
             before.into_iter().zip(next.slips).enumerate().take(self.system.elements.len())
@@ -1384,7 +1400,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Enters a stage: what depends on forces is decided anew.
-    fn enter_stage(&mut self, stage: usize, observer: &mut impl Observer) {
+    fn enter_stage(&mut self, stage: usize, observer: &mut dyn Observer) {
         self.modes.stage = stage;
         self.before = self.y;
         self.refresh();
@@ -1405,7 +1421,7 @@ impl<'s> Motion<'s> {
         side: Side,
         wall: usize,
         meshing: Option<Side>,
-        observer: &mut impl Observer,
+        observer: &mut dyn Observer,
     ) {
         let of_contact = |side: Side| if side == Side::Right { b'1' } else { b'4' };
         let mode = match self.modes.gaps[gap] {
@@ -1441,7 +1457,7 @@ impl<'s> Motion<'s> {
         });
     }
 
-    fn record_slip(&mut self, symbol: Option<u8>, observer: &mut impl Observer) {
+    fn record_slip(&mut self, symbol: Option<u8>, observer: &mut dyn Observer) {
         self.work.events += 1;
         self.events_in_period += 1;
         observer.machine_slip(&SlipEvent {

@@ -38,9 +38,12 @@ pub(super) fn rest(c: &Polynomial) -> f64 {
     sums[0] - c[0].abs() + sums[1] + (sums[2] + sums[3])
 }
 
-/// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. `size` bounds
-/// the terms that cancel in the coefficients.
+/// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. From an order above
+/// [`MOST_ORDER`] on, all are. `size` bounds the terms that cancel in the coefficients.
 pub(super) fn first_fall(polynomial: &Polynomial, order: usize, size: f64) -> Fall {
+    if order > MOST_ORDER {
+        return Fall::None;
+    }
     let c = &polynomial[order..];
     let rest: f64 = c[1..].iter().map(|c| c.abs()).sum();
     let noise = ROUNDING * if order == 0 { rest + size } else { rest };
@@ -60,7 +63,7 @@ pub(super) fn first_fall(polynomial: &Polynomial, order: usize, size: f64) -> Fa
 }
 
 /// Largest order of a root at the start of a step.
-const MOST_ORDER: usize = 6;
+const MOST_ORDER: usize = 18;
 
 /// Columns of the matrices that give the Bernstein coefficients of a polynomial without its first `order` terms:
 /// `b_i = sum_j C(i, j) / C(degree, j) c_j`.

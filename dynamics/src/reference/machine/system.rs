@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::domain::{Domain, DomainKey};
 use super::modes::ROUNDING;
 use super::{Numbers, Point, SIZE};
-use crate::model::{Contact, ESCAPE, MOST_HARMONICS, Machine, Side, Wall};
+use crate::model::{Contact, MOST_HARMONICS, Machine, Side, Wall};
 
 /// Linear forces in the coordinates of the flow.
 #[derive(Clone, Debug)]
@@ -115,7 +115,7 @@ impl System {
         let rates = system.stages.iter().map(|forces| system.rate(&forces.stiffness, &forces.damping));
         system.speed = length * rates.fold(0.0, f64::max);
         if system.can_grow() {
-            system.escape = ESCAPE * length;
+            system.escape = system.machine.escape();
         }
         system
     }

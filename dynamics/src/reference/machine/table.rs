@@ -13,6 +13,9 @@ use crate::model::{Contact, MOST_GAPS, Machine, Side};
 /// Frequency below all others, for equations that do not depend on it.
 const LOWEST_FREQUENCY: f64 = 1e-100;
 
+/// Largest order of a root for which lanes have terms to decide.
+const MOST_ORDER_OF_LANES: usize = 7;
+
 /// The equations of motion of one domain.
 #[derive(Clone, Debug)]
 pub struct Equations {
@@ -199,6 +202,7 @@ impl Motion<'_> {
         let slip =
             |slip: Slip| Slip::ALL.iter().position(|&other| other == slip).expect("all are listed") as u32;
         let (from_force, from_rate) = self.root_orders();
+        let of_lanes = |order: usize| order.min(MOST_ORDER_OF_LANES) as u32;
         StartModes {
             state,
             gaps: modes.gaps.map(gap_code),
@@ -207,9 +211,9 @@ impl Motion<'_> {
             origins: self.origins().map(side),
             walls: self
                 .walls_at()
-                .map(|at| at.map_or((2, 0), |(side, order)| (side_code(side), order as u32))),
-            from_force: from_force.map(|order| order as u32),
-            from_rate: from_rate.map(|order| order as u32),
+                .map(|at| at.map_or((2, 0), |(side, order)| (side_code(side), of_lanes(order)))),
+            from_force: from_force.map(of_lanes),
+            from_rate: from_rate.map(of_lanes),
         }
     }
 }

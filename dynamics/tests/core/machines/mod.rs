@@ -10,4 +10,5 @@ mod engine;
 mod joint;
 mod motion;
 pub(crate) mod random;
+mod rest;
 mod system;
