@@ -400,6 +400,18 @@ fn a_judge_that_exceeds_its_work_reports_a_short_budget() {
     assert_eq!(unexplained(&validate_all(&plan, &wrong, Precision::F64, false)).len(), wrong.len());
 }
 
+#[test]
+fn cells_that_fail_in_their_first_period_are_validated() {
+    let plan = plan_between([0.1, 0.4], [1.0, 2.0], 2, &["F=1e300"]);
+    let records = cpu_records(&plan);
+    assert!(
+        records.iter().all(|record| record.periods_run == 0 && status(record).is_failure()),
+        "{records:?}"
+    );
+    let found = validate_all(&plan, &records, Precision::F64, false);
+    assert_eq!(found.faults(), Vec::<String>::new(), "{:?}", found.mismatches);
+}
+
 /// The map's engine decides the cell after more than the 528 periods that the judging lanes run.
 #[test]
 fn an_undecided_judge_does_not_contradict_a_record() {

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, Machine, Restitution, Spring, Wall,
+    Contact, Drive, DryFriction, Forces, GapRow, Machine, Oscillator, Restitution, Spring, Wall,
+    state as state_of,
 };
 use rattlemap_dynamics::reference::machine::{Motion, System};
 
@@ -144,4 +145,31 @@ fn bounded_motion_with_stages_does_not_escape() {
     decay.stages[0].damping[(0, 0)] = 0.1;
     let state = after_a_period(&with_stages(decay), &[-1.0, 0.0]);
     assert!(state[0].abs() < 1.0, "{state:?}");
+}
+
+/// A body that falls on another one, which rests on the floor, feels the impulse of an impact with a fixed wall; the floor pushes as much.
+#[test]
+fn a_wall_on_which_another_gap_rests_takes_part_in_an_impact() {
+    let walls = || [Vec::new(), vec![wall(0.0, Contact::Rigid, 0.5)]];
+    let mut bodies = machine(DMatrix::zeros(2, 2), 1.0, [0.0; 2], &[1.0, 0.0], walls());
+    bodies.stages[0].load = DVector::from_element(2, -1.0);
+    bodies.gaps.push(GapRow { row: DVector::from_row_slice(&[-1.0, 1.0]), walls: walls() });
+    let system = System::new(&bodies);
+    let mut motion = Motion::new(&system, &[0.0, 0.0, 0.5, 0.0]);
+    let (before, after) = (0.999, 1.001);
+    motion.advance_to(before, &mut ()).unwrap();
+    assert!((motion.state()[3] + before).abs() < 1e-13, "{:?}", motion.state());
+    motion.advance_to(after, &mut ()).unwrap();
+    let state = motion.state();
+    assert!(state[1] == 0.0 && (state[3] - (0.5 - (after - 1.0))).abs() < 1e-13, "{state:?}");
+    let oscillator = Oscillator::of_machine(bodies);
+    let impulse = |gap, speeds: [f64; 2]| {
+        oscillator.gap_impulse(
+            gap,
+            [&state_of(&[0.0, 0.0, 0.0, speeds[0]]), &state_of(&[0.0, 0.0, 0.0, speeds[1]])],
+        )
+    };
+    for gap in [0, 1] {
+        assert!((impulse(gap, [-1.0, 0.5]) - 1.5).abs() < 1e-13, "gap {gap}");
+    }
 }
