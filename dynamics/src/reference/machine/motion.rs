@@ -693,10 +693,10 @@ impl<'s> Motion<'s> {
         if self.system.elements.iter().zip(self.modes.slips).any(|(_, slip)| slip == Slip::Stick) {
             self.sticking_time += time;
         }
-        for gap in 0..self.system.gaps() {
+        for (gap, before) in before.into_iter().enumerate().take(self.system.gaps()) {
             match self.at_wall[gap] {
                 // The gap stays on the wall until another element changes its modes.
-                Some((_, STAYS_ZERO)) => (self.y[gap], self.y[self.system.n + gap]) = (before[gap], 0.0),
+                Some((_, STAYS_ZERO)) => (self.y[gap], self.y[self.system.n + gap]) = (before, 0.0),
                 _ if self.is_kept(gap) => {}
                 _ => self.at_wall[gap] = None,
             }
