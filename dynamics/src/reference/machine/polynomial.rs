@@ -38,8 +38,8 @@ pub(super) fn rest(c: &Polynomial) -> f64 {
     sums[0] - c[0].abs() + sums[1] + (sums[2] + sums[3])
 }
 
-/// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. From an order above
-/// [`MOST_ORDER`] on, all are. `size` bounds the terms that cancel in the coefficients.
+/// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. An `order`
+/// above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients.
 pub(super) fn first_fall(polynomial: &Polynomial, order: usize, size: f64) -> Fall {
     if order > MOST_ORDER {
         return Fall::None;
