@@ -145,11 +145,24 @@ phase() {
 
 docs() { RUSTDOCFLAGS="-D warnings" cargo doc --quiet --workspace --no-deps; }
 
+# Compiles all tests, and notes where the test of the Python package is.
+compile_tests() {
+    cargo test --workspace --tests --benches --no-run --message-format=json-render-diagnostics >"$log"
+    pytest="$(sed -n 's/.*"name":"pytest".*"executable":"\([^"]*\)".*/\1/p' "$log")"
+}
+
+# Runs all tests, those of the Python package beside the others, because they use one processor core.
+#
 # Times of single tests are an unstable option of the test program, which RUSTC_BOOTSTRAP enables. A runner sets it for
 # the test programs alone: if the compiler saw it, build scripts would be run again and everything compiled anew.
 timed_tests() {
+    local timed=(-Zunstable-options --report-time "$@") python=0 rust=0
+    RUSTC_BOOTSTRAP=1 "$pytest" "${timed[@]}" >"$log.python" 2>&1 &
     cargo test --workspace --tests --no-fail-fast --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' \
-        -- -Zunstable-options --report-time "$@" 2>&1 | tee "$log"
+        -- "${timed[@]}" --skip the_package_passes_its 2>&1 | tee "$log" || rust=$?
+    wait $! || python=$?
+    { echo "     Running python/tests/pytest.rs ($pytest)"; cat "$log.python"; } | tee -a "$log"
+    return $((rust + python))
 }
 
 # Prints the ten slowest tests with their binary, from lines such as `test NAME ... ok <1.234s>`.
@@ -209,7 +222,7 @@ export GALLIVM_PERF="${GALLIVM_PERF:-nopt}"
 export MESA_SHADER_CACHE_DIR="${MESA_SHADER_CACHE_DIR:-${CARGO_TARGET_DIR:-$PWD/target}/shader-cache}"
 mkdir -p "$MESA_SHADER_CACHE_DIR"
 log="$(mktemp)"
-trap 'rm -f "$log"' EXIT
+trap 'rm -f "$log" "$log.python"' EXIT
 
 require_tools
 require_vulkan
@@ -221,15 +234,15 @@ phase "format" cargo fmt --all --check
 phase "lints" cargo clippy --workspace --all-targets -- -D warnings
 phase "docs, warnings denied" docs
 phase "dependencies" dependencies
-phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
-phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu,figures --lib
+# This checks the dynamics and the library for a page, too.
+phase "the engine of a web page" cargo check --target "$wasm" -p rattlemap-web
 if $all; then
     phase "each feature alone" each_feature
     phase "types of the page's scripts" page_types
     phase "the program on Windows" cargo check --target "$windows" -p rattlemap
     phase "the program on macOS" cargo check --target "$macos" -p rattlemap
 fi
-phase "compilation of tests" cargo test --workspace --tests --benches --no-run
+phase "compilation of tests" compile_tests
 phase "tests" timed_tests "${ignored[@]}"
 phase "examples in docs" cargo test --workspace --doc
 phase "benchmarks at tiny sizes" cargo test --quiet --workspace --bench reference --bench lane

@@ -31,6 +31,10 @@ Rerun = Callable[..., xr.Dataset]
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "long: takes many seconds; scripts/test.sh --all runs it")
+
+
 @pytest.fixture(scope="session")
 def program() -> Program:
     """Runs a command of the program. The test fails if the exit code is not 0, or if it is 0 with ``fails``."""

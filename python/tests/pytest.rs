@@ -7,6 +7,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 
 /// Returns a path in the folder of the Python package.
 fn source(name: &str) -> PathBuf {
@@ -62,6 +63,21 @@ fn package() -> PathBuf {
 
 #[test]
 fn the_package_passes_its_tests() {
+    pass("not long");
+}
+
+#[test]
+#[ignore = "takes minutes; scripts/test.sh --all"]
+fn the_package_passes_its_long_tests() {
+    pass("long");
+}
+
+/// Both tests use the same environment and the same copy of the package.
+static ENVIRONMENT: Mutex<()> = Mutex::new(());
+
+/// Runs the tests with these marks.
+fn pass(marks: &str) {
+    let _held = ENVIRONMENT.lock().unwrap_or_else(PoisonError::into_inner);
     // Rust's test harness hides the output of print macros of passing tests, but not these lines.
     let mut stderr = io::stderr();
     let python = match python() {
@@ -72,8 +88,18 @@ fn the_package_passes_its_tests() {
         }
     };
     let work = tempfile::tempdir().unwrap();
-    let arguments =
-        ["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "--durations=10", "--durations-min=1"];
+    let arguments = [
+        "-m",
+        "pytest",
+        "-q",
+        "-rs",
+        "-p",
+        "no:cacheprovider",
+        "--durations=10",
+        "--durations-min=1",
+        "-m",
+        marks,
+    ];
     let mut tests = Command::new(python);
     tests.args(arguments).arg(source("tests")).current_dir(work.path()).stdin(Stdio::null());
     tests.env("PYTHONPATH", package()).env("PYTHONDONTWRITEBYTECODE", "1").env("MPLBACKEND", "Agg");

@@ -17,6 +17,7 @@ from conftest import assert_same
 from rattlemap import _native, cluster, scenes
 
 distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.long
 
 #: Attributes that differ between a map of one run and a merged map.
 OF_ONE_RUN = ("commit", "processor", "shards", "elapsed_seconds", "timings")

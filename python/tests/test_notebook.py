@@ -20,6 +20,7 @@ def smaller(source: str) -> str:
     return re.sub(numbers, lambda found: f"{found[1]}, {max(8, int(found[2]) // 3)})", source)
 
 
+@pytest.mark.long
 def test_its_cells_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "__main__"}

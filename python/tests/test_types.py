@@ -7,9 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from conftest import PACKAGE
 
 
+@pytest.mark.long
 def test_strict_mypy_finds_no_error(tmp_path: Path) -> None:
     # A copy, because mypy would check other packages in the same folder, too.
     package = tmp_path / "rattlemap"

@@ -199,7 +199,8 @@ impl BenchOptions {
 ///
 /// Writes tables (cells.csv, cells.npy), figures (map.png and others), an interactive page (report.html) and manifest.json.
 /// While the map is computed, the records of finished cells are stored in records.bin. After Ctrl-C or a crash, --resume
-/// continues from these records. The files are byte for byte those of an uninterrupted run.
+/// continues from these records. Tables, figures and page are byte for byte those of an uninterrupted run; records.bin has the
+/// same records, in another order.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n\n\
     The main map with fewer cells:\n  \

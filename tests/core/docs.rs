@@ -12,6 +12,7 @@ fn texts() -> Vec<PathBuf> {
         "docs/decisions",
         "results",
         "results/gallery",
+        "results/h200",
         "results/reliability",
         "benches",
         "benches/peers",
@@ -96,7 +97,49 @@ fn readme_and_architecture_are_short() {
     }
 }
 
-/// Each row of docs/conformance.md names a test or a command, and each test exists.
+/// Times that README states are those whose commands docs/conformance.md names.
+#[test]
+fn readme_states_the_times_of_conformance() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let [readme, conformance] =
+        ["README.md", "docs/conformance.md"].map(|name| fs::read_to_string(root.join(name)).unwrap());
+    let stated = ["fifteen seconds on two cores", "a thousand values in one second"];
+    let claimed = [
+        "the main map takes fifteen seconds on two cores",
+        "a diagram of a thousand values takes one second",
+    ];
+    for (stated, claimed) in stated.iter().zip(claimed) {
+        assert!(readme.contains(stated) && conformance.contains(claimed), "{stated}");
+    }
+    assert_eq!(readme.matches(" second").count(), stated.len(), "README states another time");
+}
+
+/// Descriptions of the whole program state the largest number of coordinates.
+#[test]
+fn descriptions_state_the_most_coordinates() {
+    assert_eq!(rattlemap_dynamics::model::MOST_COORDINATES, 8, "the texts below say eight");
+    for name in ["README.md", "CITATION.cff", "docs/python.ipynb", "docs/models.md"] {
+        let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+        let says = ["eight coordinates", "eight degrees of freedom"].iter().any(|words| text.contains(words));
+        assert!(says, "{name}");
+    }
+}
+
+/// The website has all documents for users and all pages of results.
+#[test]
+fn the_website_has_every_document() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let summary = fs::read_to_string(root.join("site/SUMMARY.md")).unwrap();
+    for path in texts() {
+        let name = path.strip_prefix(root).unwrap().to_str().unwrap();
+        let is_of_site = (name.starts_with("docs/") && !name.starts_with("docs/decisions/"))
+            || name.starts_with("results/") && name.ends_with("README.md");
+        assert!(!is_of_site || summary.contains(&format!("({name})")), "site/SUMMARY.md has no {name}");
+    }
+}
+
+/// Each row of docs/conformance.md names a test or a command. Each test exists, those marked *long* are the ignored ones, and each row
+/// has a command or a test of the default run.
 #[test]
 fn tests_that_conformance_names_exist() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -109,13 +152,21 @@ fn tests_that_conformance_names_exist() {
         }
         let spans: Vec<&str> = shown_by.split('`').skip(1).step_by(2).collect();
         assert!(!spans.is_empty(), "no test or command in: {row}");
+        let mut is_shown = spans.iter().any(|span| !span.contains(": "));
         for (file, name) in spans.iter().filter_map(|span| span.split_once(": ")) {
             let source = fs::read_to_string(root.join(file))
                 .unwrap_or_else(|error| panic!("{file}: {error}; row: {row}"));
             let has = |keyword| source.contains(&format!("{keyword} {name}("));
             assert!(has("fn") || has("def"), "{file} has no test {name}; row: {row}");
+            let before = source.split(&format!("fn {name}(")).next().unwrap();
+            let is_ignored =
+                before.trim_end().lines().next_back().is_some_and(|line| line.starts_with("#[ignore"));
+            let marked = row.split(&format!("{name}`")).nth(1).is_some_and(|rest| rest.starts_with(" (long"));
+            assert_eq!(is_ignored, marked, "{file}: {name}: ignored, and marked as long in the row: {row}");
+            is_shown |= !is_ignored;
             tests += 1;
         }
+        assert!(is_shown, "only long tests in: {row}");
     }
     assert!(tests > 40, "{tests} tests");
 }

@@ -255,25 +255,25 @@ fn settings<'o>(oscillators: impl Iterator<Item = &'o Oscillator>, settings: Lan
     }
 }
 
-/// Compares lanes with all closed forms. `bars` are the limits of [`worst`].
-fn check_lanes(precision: Precision, bars: [f64; 3]) {
-    // Machines need a shader of their own.
-    let is_machine = |known: &&Known| Features::of(&known.oscillator).machine.is_some();
-    let (machines, plain): (Vec<&Known>, Vec<&Known>) = KNOWN.iter().partition(is_machine);
-    let mut gpu = open(precision);
-    for group in [&machines, &plain] {
-        let cells: Vec<_> =
-            group.iter().map(|known| (known.oscillator.clone(), known.law, start(known))).collect();
-        let settings = settings(cells.iter().map(|cell| &cell.0), LaneSettings::within(&budget()));
-        let records = run(&mut gpu, &cells, &settings);
-        let off = worst(group, &records, precision.name());
-        assert!(off.iter().zip(bars).all(|(off, bar)| *off < bar), "{off:?}");
+/// Limits of [`worst`] for lanes.
+fn bars(precision: Precision) -> [f64; 3] {
+    match precision {
+        Precision::F32 => [1e-6, 2e-6, 1e-5],
+        Precision::F64 => [1e-10; 3],
     }
-    check_borders(&mut gpu, &plain);
-    // Impacts amplify errors of the chain by more than 1e4, so that single precision would show nothing.
-    if precision == Precision::F64 {
-        check_chain(&mut gpu, bars[0]);
-    }
+}
+
+/// Compares lanes of pairs, or of machines, with their closed forms. Returns these.
+fn check_lanes(gpu: &mut Gpu, machines: bool) -> Vec<&'static Known> {
+    let is_asked = |known: &&Known| Features::of(&known.oscillator).machine.is_some() == machines;
+    let group: Vec<&Known> = KNOWN.iter().filter(is_asked).collect();
+    let cells: Vec<_> =
+        group.iter().map(|known| (known.oscillator.clone(), known.law, start(known))).collect();
+    let settings = settings(cells.iter().map(|cell| &cell.0), LaneSettings::within(&budget()));
+    let records = run(gpu, &cells, &settings);
+    let off = worst(&group, &records, gpu.precision().name());
+    assert!(off.iter().zip(bars(gpu.precision())).all(|(off, bar)| *off < bar), "{off:?}");
+    group
 }
 
 /// Small motion of Meissner's equation meets the stops where rest is unstable, and nowhere else. The shader is that of the `plain` cycles.
@@ -310,10 +310,25 @@ fn check_chain(gpu: &mut Gpu, bar: f64) {
 
 #[test]
 fn lanes_in_f32_find_known_cycles() {
-    check_lanes(Precision::F32, [1e-6, 2e-6, 1e-5]);
+    let mut gpu = open(Precision::F32);
+    let pairs = check_lanes(&mut gpu, false);
+    check_borders(&mut gpu, &pairs);
 }
 
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn lanes_in_f64_find_known_cycles() {
-    check_lanes(Precision::F64, [1e-10; 3]);
+    let mut gpu = open(Precision::F64);
+    let pairs = check_lanes(&mut gpu, false);
+    check_borders(&mut gpu, &pairs);
+}
+
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn lanes_find_known_cycles_of_machines() {
+    check_lanes(&mut open(Precision::F32), true);
+    let mut gpu = open(Precision::F64);
+    check_lanes(&mut gpu, true);
+    // Impacts amplify errors of the chain by more than 1e4, so that single precision would show nothing.
+    check_chain(&mut gpu, bars(Precision::F64)[0]);
 }

@@ -247,6 +247,7 @@ fn stages_agree_with_the_reference() {
 }
 
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn everything_together_agrees_with_the_reference() {
     check("everything", &cells_with_everything(), &[IN_F64]);
 }

@@ -172,6 +172,7 @@ values = [1.4, 1.7, 2.0, 2.3, 2.6, 4.0]
 
 /// The processor measures the motion in which lanes end.
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn maps_of_machines_have_the_symmetry_and_the_quantities_of_the_reference() {
     let quantities: Vec<String> = GROUPS.iter().map(|group| format!("{:?}", group.name)).collect();
     let outputs = format!("[outputs]\nquantities = [\"symmetric\", {}]\n", quantities.join(", "));
@@ -210,6 +211,7 @@ fn maps_of_machines_have_the_symmetry_and_the_quantities_of_the_reference() {
 
 /// Lanes decide motion without contact as soon as its energy is too low for one.
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn contact_free_motion_of_machines_ends_early() {
     let slow = |omega: f64| GearPair { omega, r1: 0.02, r2: 0.02, ..GearPair::paper(0.8) };
     let machine = |omega: f64| Machine::of(&slow(omega).oscillator().unwrap(), slow(omega).law());
@@ -234,6 +236,7 @@ fn contact_free_motion_of_machines_ends_early() {
 }
 
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn random_machines_move_as_on_the_reference() {
     compare(Shape { coordinates: 3, gaps: 2, harmonics: 2, stages: 2, friction: 1, walls: 2 }, 64, [30, 200]);
 }

@@ -236,6 +236,7 @@ fn a_walk_through_the_page_shows_what_the_program_computes() {
 
 /// The browser's own software device computes the page's shaders.
 #[test]
+#[ignore = "compiles shaders in a browser; scripts/test.sh --all"]
 fn lanes_of_the_page_are_those_of_the_program() {
     let Some(browser) = chromium() else { return skipped() };
     let folder = tempfile::tempdir().unwrap();

@@ -613,33 +613,3 @@ fn the_scene_of_a_whole_map_gives_equal_records() {
     report.run(&["map", "s.toml", "--quiet", "--out", "o", "--force"]);
     assert_eq!(report.table(), before);
 }
-
-/// A script that a developer runs builds the engine in the page, so that building rattlemap needs only Rust.
-#[test]
-fn the_engine_is_built_from_todays_sources() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let script = include_str!("../../scripts/wasm.sh");
-    let mut found: Vec<String> =
-        between(script, "sources=(", ")").split_whitespace().map(str::to_owned).collect();
-    let mut files = Vec::new();
-    while let Some(path) = found.pop() {
-        if path == "src/show/report" {
-            continue;
-        }
-        if root.join(&path).is_dir() {
-            let entries = fs::read_dir(root.join(&path)).unwrap().map(|entry| entry.unwrap().file_name());
-            found.extend(entries.map(|name| format!("{path}/{}", name.to_str().unwrap())));
-        } else {
-            files.push(path);
-        }
-    }
-    files.sort_unstable();
-    let hex =
-        |bytes: &[u8]| Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<String>();
-    let read = |file: &str| hex(&fs::read(root.join(file)).unwrap());
-    let sources: String = files.iter().map(|file| format!("{}  {file}\n", read(file))).collect();
-    let built = ["src/show/report/engine.wasm.gz", "src/show/report/engine.js"].map(read);
-    let expected = [&[hex(sources.as_bytes())][..], &built].concat().join("\n");
-    let stored = include_str!("../../src/show/report/engine.sha256").trim();
-    assert_eq!(expected, stored, "run scripts/wasm.sh and commit what it makes");
-}

@@ -52,7 +52,7 @@ fn check_plane(side: u32) {
 
 #[test]
 fn the_plane_is_classified_as_the_reference_does() {
-    check_plane(32);
+    check_plane(16);
 }
 
 #[test]

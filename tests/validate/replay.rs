@@ -350,6 +350,7 @@ fn a_correct_map_of_lanes_passes() {
 
 /// The processor measures machines, also when their lanes are computed again.
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn a_map_of_a_machine_with_quantities_passes() {
     let scene = "model = 'viscoelastic-ball'\n[[axis]]\nparameter = 'A'\nvalues = [1.1, 1.2, 1.3]\n[[axis]]\nparameter = 'B'\n\
                  values = [0.3, 0.4]\n[outputs]\nquantities = ['class', 'symmetric', 'amplitude', 'impact_energy', 'multiplier']\n";

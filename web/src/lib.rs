@@ -3,6 +3,8 @@
 //! `scripts/wasm.sh` compiles this crate to WebAssembly. `rattlemap::show::report` puts it into `report.html`, where a worker
 //! calls [`orbit()`] with the command that replays the selected cell.
 
+#[cfg(test)]
+mod committed;
 #[cfg(target_arch = "wasm32")]
 mod lanes;
 mod window;

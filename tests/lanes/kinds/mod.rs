@@ -65,6 +65,7 @@ fn motion_agrees_with_plain_steps() {
 }
 
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn motion_under_forces_with_a_sine_agrees_with_plain_steps() {
     check_against_plain_steps(&cells_with_sine(), [250, 5]);
 }
