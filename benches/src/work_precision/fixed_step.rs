@@ -2,9 +2,9 @@
 
 use super::PERIODS;
 use super::cells::{Latest, Subject};
-use super::outcome::Outcome;
 use super::field::Equations;
 use super::flight::Flight;
+use super::outcome::Outcome;
 use rattlemap_dynamics::flow::Gap;
 
 /// Number of events in one period above which a lane fails.

@@ -13,7 +13,7 @@ use rattlemap_dynamics::orbit::{
 use rayon::prelude::*;
 
 use crate::common::BUDGET;
-use crate::machines::agree::{Found, compare_case};
+use crate::machines::agree::{Found, ONE_GAP, compare_case};
 use crate::machines::cycle::{Cycle, follow, settle};
 use crate::machines::engine::program::OneGap;
 use crate::machines::motion::{Mode, Motion};
@@ -111,7 +111,7 @@ fn compare(case: &Case) -> Result<Compared, String> {
     let (whole, flow) = (case.machine(), Flow::new(&case.oscillator));
     let system = System::new(&whole.machine, ANGLE);
     let mut theirs = OneGap::new(&flow, case.oscillator.degrees, case.law, case.start);
-    let first = compare_case(&whole, 1.0, &mut theirs)?;
+    let first = compare_case(&whole, ONE_GAP, &mut theirs)?;
     let found = |agreement, off: [f64; 2]| Ok(Compared { agreement, first, off });
     let measured = measure(&flow, case.law, case.start, &BUDGET);
     // Friction that creeps by ever smaller slips: rounding decides how far the multiplier is from 1.
@@ -170,9 +170,8 @@ fn check(shape: Shape, seeds: std::ops::Range<u64>, share: f64) {
     assert!(failures.is_empty(), "{} fail:\n{}", failures.len(), failures.join("\n"));
     assert!(f64::from(found[0]) >= share * count as f64 && 20 * found[1] <= count as u32, "{found:?}");
     // Contact onsets need walls with impacts, and hardly occur with friction or in few models.
-    let has_onsets = by_stage[1] > 0 || shape.pushing || shape.friction || count < 200;
-    let has_rests = 10 * by_stage[0] as u64 > count.min(200);
-    assert!(has_rests && has_onsets || !shape.stages, "{by_stage:?}");
+    let has_onsets = by_stage[1] > 0 || shape.pushing || shape.friction;
+    assert!(by_stage[0] > 20 && has_onsets || !shape.stages || count < 200, "{by_stage:?}");
 }
 
 /// Shapes of models, and the share of them that at least settles on the same cycle.

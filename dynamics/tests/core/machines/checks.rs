@@ -252,7 +252,9 @@ fn check_side_by_side(count: usize, seeds: std::ops::Range<u64>, periods: usize,
         let shape = SHAPES[(seed % 5) as usize];
         let random = &mut Random(seed);
         let mut cases: Vec<Case> = (0..count as u64)
-            .map(|i| one_gap::case(1000 * i + seed, Shape { stages: shape.stages && i == 0, ..shape }).machine())
+            .map(|i| {
+                one_gap::case(1000 * i + seed, Shape { stages: shape.stages && i == 0, ..shape }).machine()
+            })
             .collect();
         let omega = cases[0].machine.omega;
         cases.iter_mut().for_each(|case| case.machine.omega = omega);
