@@ -16,8 +16,20 @@ use integrators::machines::system::{ANGLE, System};
 /// Largest difference of states, relative to the size of the motion.
 const AGREEMENT: f64 = 1e-9;
 
-/// Rounding errors may have this multiple of the effect of known errors.
-const NOISES: f64 = 20.0;
+/// What is compared.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// Forcing periods, and the share of them that must be comparable.
+    periods: usize,
+    share: f64,
+    /// Motions in which known errors have a larger effect are not compared further.
+    most_noise: f64,
+    /// Errors of the judge, whose tolerance is larger than rounding, may have this multiple of that effect.
+    noises: f64,
+}
+
+const ONE_GAP: Limits = Limits { periods: 3, share: 0.98, most_noise: 1e-7, noises: 100.0 };
+const MACHINES: Limits = Limits { periods: 6, share: 0.7, most_noise: 1e-9, noises: 20.0 };
 
 type Happening = (EventKind, Side, Option<u8>);
 
@@ -30,9 +42,8 @@ struct Compared {
     by_stage: [usize; 2],
 }
 
-/// Compares the first periods of a motion until known errors have a larger effect than `most_noise`. The order of events at one time has
-/// no meaning for two gaps, so events are compared gap by gap.
-fn compare(case: &Case, periods: usize, most_noise: f64) -> Result<Compared, String> {
+/// Compares the first periods of a motion. The order of events at one time has no meaning for two gaps, so events are compared gap by gap.
+fn compare(case: &Case, limits: Limits) -> Result<Compared, String> {
     let (machine, gaps) = (&case.machine, case.machine.gaps.len());
     let [system, other] = [ANGLE, 0.6 * ANGLE].map(|angle| System::new(machine, angle));
     let start = |system| Motion::new(system, &case.start);
@@ -40,13 +51,13 @@ fn compare(case: &Case, periods: usize, most_noise: f64) -> Result<Compared, Str
     others.extend(ours.shaken());
     let mut judge = Flight::new(machine, &state(&case.start));
     let mut found = Compared::default();
-    for period in 0..periods {
+    for period in 0..limits.periods {
         ours.clear();
         others.iter_mut().for_each(Motion::clear);
         judge.events.clear();
         judge.slips.clear();
         let Some(noise) = ours.advance_period().and_then(|()| ours.noise(&mut others)) else { break };
-        if noise.is_nan() || noise > most_noise || ours.is_crowded {
+        if noise.is_nan() || noise > limits.most_noise || ours.is_crowded {
             break;
         }
         judge.advance(0.0, std::f64::consts::TAU).ok_or(format!("period {period}: it gives up"))?;
@@ -75,7 +86,7 @@ fn compare(case: &Case, periods: usize, most_noise: f64) -> Result<Compared, Str
         let judged = judge.state();
         let off = apart(&ours.state(), &judged[..2 * machine.degrees()], machine.omega);
         if off.is_nan()
-            || off > AGREEMENT + NOISES * noise
+            || off > AGREEMENT + limits.noises * noise
             || judged[2 * machine.degrees()..STATE].iter().any(|x| *x != 0.0)
         {
             return Err(format!("period {period}: off by {off:e} with noise {noise:e}"));
@@ -88,10 +99,10 @@ fn compare(case: &Case, periods: usize, most_noise: f64) -> Result<Compared, Str
     Ok(found)
 }
 
-/// Compares all cases, of which at least this share of `periods` must be comparable. Returns the sums of what agrees.
-fn check(cases: Vec<Case>, periods: usize, most_noise: f64, share: f64) -> Compared {
-    let count = (cases.len() * periods) as f64;
-    let all: Vec<_> = cases.par_iter().map(|case| compare(case, periods, most_noise)).collect();
+/// Compares all cases. Returns the sums of what agrees.
+fn check(cases: Vec<Case>, limits: Limits) -> Compared {
+    let count = (cases.len() * limits.periods) as f64;
+    let all: Vec<_> = cases.par_iter().map(|case| compare(case, limits)).collect();
     let differ: Vec<_> =
         all.iter().enumerate().filter_map(|(i, one)| Some((i, one.as_ref().err()?))).collect();
     differ.iter().take(20).for_each(|(i, why)| println!("case {i}: {why}"));
@@ -102,7 +113,7 @@ fn check(cases: Vec<Case>, periods: usize, most_noise: f64, share: f64) -> Compa
     });
     println!("{found:?} of {count} periods");
     assert!(differ.is_empty(), "{} differ", differ.len());
-    assert!(found.counts[0] as f64 > share * count);
+    assert!(found.counts[0] as f64 > limits.share * count);
     found
 }
 
@@ -127,25 +138,25 @@ fn models(seeds: std::ops::Range<u64>) -> Vec<Case> {
 
 #[test]
 fn the_judge_agrees_with_matrix_exponentials() {
-    check(models(0..60), 3, 1e-7, 0.98);
+    check(models(0..60), ONE_GAP);
 }
 
 #[test]
 #[ignore = "takes 15 s"]
 fn the_judge_agrees_with_matrix_exponentials_on_1200_models() {
-    let found = check(models(0..1200), 3, 1e-7, 0.98);
+    let found = check(models(0..1200), ONE_GAP);
     // Changes of the stage release gaps at rest and end contact onsets.
     assert!(found.by_stage[0] > 10 && found.by_stage[1] > 0, "{:?}", found.by_stage);
 }
 
 #[test]
 fn the_judge_agrees_with_matrix_exponentials_on_machines() {
-    check((0..30).map(any_case).collect(), 6, 1e-9, 0.7);
+    check((0..30).map(any_case).collect(), MACHINES);
 }
 
 #[test]
 #[ignore = "takes 15 s"]
 fn the_judge_agrees_with_matrix_exponentials_on_200_machines() {
-    let found = check((0..200).map(any_case).collect(), 6, 1e-9, 0.7);
+    let found = check((0..200).map(any_case).collect(), MACHINES);
     assert!(found.counts[2] > 100);
 }
