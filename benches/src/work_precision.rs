@@ -22,8 +22,10 @@
 
 pub mod adaptive;
 pub mod cells;
+pub mod field;
 mod figure;
 pub mod fixed_step;
+pub mod flight;
 pub mod lanes;
 pub mod measure;
 pub mod outcome;

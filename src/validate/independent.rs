@@ -1,14 +1,11 @@
 //! Independent judge: an adaptive ODE solver with event location that shares only the description of the oscillator with
-//! the reference. All oscillators are judged as machines; [`flight`] and [`field`] know two coordinates only, and the benchmarks measure
-//! their speed.
+//! the reference. All oscillators are judged as machines.
 //!
 //! The motion is integrated over the whole budget. It is periodic if its strobe states recur and the cycle is stable;
 //! multipliers come from finite differences of neighbouring motions. It is chaotic if a neighbouring motion separates from
 //! it. Otherwise, for instance while a motion approaches its cycle slowly, the judge gives no answer.
 
 pub mod dop853;
-pub mod field;
-pub mod flight;
 pub mod machine;
 #[cfg(test)]
 mod tests;

@@ -9,7 +9,7 @@
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{first_block, followed, multipliers_apart, off_the_integrator};
+use crate::cycle::{first_block, followed, multipliers_apart, off_the_judge};
 use rattlemap_dynamics::model::{REST, State, state};
 use rattlemap_dynamics::reference::EventKind;
 
@@ -47,7 +47,7 @@ fn the_orbit_of_one_bounce_agrees_with_the_closed_form() {
             let found = followed(&oscillator, law, start, 1);
             let off = apart(found.end, start);
             let multipliers = multipliers_apart(first_block(&found.monodromy), theirs);
-            let integrated = off_the_integrator(&oscillator, law, start, 1);
+            let integrated = off_the_judge(&oscillator, law, start, 1);
             println!(
                 "e = {e}, G = {shaking:.4}: state {off:.1e}, multipliers {multipliers:.1e}, DOP853 {integrated:.1e}"
             );
@@ -80,7 +80,7 @@ fn sticking_ends_at_the_acceleration_of_gravity() {
             let off = (shaking * end.t.cos() - 1.0).abs();
             assert!(off < 1e-12 && end.after[..2] == [0.0; 2], "G = {shaking}: {end:?}");
         }
-        assert!(off_the_integrator(&oscillator, law, REST, 3) < 1e-10);
+        assert!(off_the_judge(&oscillator, law, REST, 3) < 1e-10);
         // Sticking removes all perturbations.
         assert!(found.monodromy.iter().all(|&x| x == 0.0));
     }

@@ -17,7 +17,7 @@ use nalgebra::{Complex, Matrix2, Matrix4, Vector2, Vector4};
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{followed, multipliers, off_the_integrator};
+use crate::cycle::{followed, multipliers, off_the_judge};
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State, state};
 use rattlemap_dynamics::reference::EventKind;
 
@@ -282,7 +282,7 @@ fn symmetric_orbits_agree_with_the_closed_form() {
             let apart =
                 theirs.iter().zip(&ours).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
                     / scale;
-            let integrated = off_the_integrator(&oscillator, law, orbit.strobe, 1);
+            let integrated = off_the_judge(&oscillator, law, orbit.strobe, 1);
             let largest = theirs[0][0].hypot(theirs[0][1]);
             println!(
                 "{what}: |mu| = {largest:.3}, state {off:.1e}, instant {time:.1e}, multipliers {apart:.1e}, DOP853 {integrated:.1e}"

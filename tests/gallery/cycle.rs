@@ -1,11 +1,10 @@
-//! Motions computed by the reference and by the independent integrator.
+//! Motions computed by the reference and by the judge of maps.
 
 use nalgebra::{Complex, DMatrix, Matrix4};
 
-use rattlemap::validate::independent::dop853::Solver;
-use rattlemap::validate::independent::flight::Flight;
+use rattlemap::validate::independent::machine::Flight;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Oscillator, State};
+use rattlemap_dynamics::model::{Law, Machine, Oscillator, State};
 use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
@@ -38,14 +37,11 @@ pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods:
     }
 }
 
-/// Returns the distance of the last states of the reference and of the independent integrator. Both must find the same
-/// number of events.
-pub(crate) fn off_the_integrator(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> f64 {
-    let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
-    let mut flight = Flight::new(oscillator, law, start);
-    (0..periods).for_each(|_| {
-        solver.advance(&mut flight, 0.0, oscillator.period()).expect("an ordinary motion");
-    });
+/// Returns the distance of the last states of the reference and of the judge of maps. Both must find the same number of
+/// events.
+pub(crate) fn off_the_judge(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> f64 {
+    let mut flight = Flight::new(&Machine::of(oscillator, law), &start);
+    (0..periods).for_each(|_| flight.advance(0.0, std::f64::consts::TAU).expect("an ordinary motion"));
     let ours = followed(oscillator, law, start, periods);
     assert_eq!(flight.events.len(), ours.events.len(), "{:?} {:?}", flight.events, ours.events);
     apart(flight.state(), ours.end)

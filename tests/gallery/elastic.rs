@@ -3,7 +3,7 @@
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{first_block, followed, off_the_integrator};
+use crate::cycle::{first_block, followed, off_the_judge};
 use rattlemap_dynamics::model::{State, state};
 use rattlemap_dynamics::reference::EventKind;
 
@@ -61,7 +61,7 @@ fn agrees(walled: &Walled, start: [f64; 2], periods: u32, what: &str) {
     let whole = walled.free.c * f64::from(periods) * walled.free.period();
     let shrinks = (-(whole + damping[0] * behind[0] + damping[1] * behind[1]) / walled.free.m).exp();
     let volume = ((a * d - b * c) / shrinks - 1.0).abs();
-    let integrated = off_the_integrator(&oscillator, law, start, periods);
+    let integrated = off_the_judge(&oscillator, law, start, periods);
     println!(
         "{what}: {} events, state {off:.1e}, volume {volume:.1e}, DOP853 {integrated:.1e}",
         events.len()

@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{followed, off_the_integrator};
+use crate::cycle::{followed, off_the_judge};
 use rattlemap_dynamics::reference::EventKind;
 
 /// Two fluctuations per revolution at 900 revolutions per minute.
@@ -56,7 +56,7 @@ fn states_and_events_agree_with_the_closed_form() {
             "{ours:?} {events:?}"
         );
         let off = apart(found.end, state(&[end[0], end[1], 0.0, 0.0]));
-        assert!(off < 1e-12 && off_the_integrator(&oscillator, law, REST, 3) < 1e-10, "{off:e}");
+        assert!(off < 1e-12 && off_the_judge(&oscillator, law, REST, 3) < 1e-10, "{off:e}");
         let released = found.events.iter().find(|event| event.kind == EventKind::MeshEnd).unwrap();
         let phase = (OMEGA * released.t).rem_euclid(TAU);
         assert!((multiple * phase.cos() + 1.0).abs() < 1e-11, "{phase}");

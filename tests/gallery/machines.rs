@@ -16,7 +16,7 @@ use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer};
 use crate::ball::{self, bounce};
 use crate::common::apart;
 use crate::common::closed_form::{self, Linear, Walled};
-use crate::cycle::{eigenvalues, off_the_integrator};
+use crate::cycle::{eigenvalues, off_the_judge};
 use crate::pieces;
 
 /// Returns the machine of a model in `models/`.
@@ -430,7 +430,7 @@ fn turbine_gears_with_three_harmonics_agree_with_the_integrator() {
         let (oscillator, law) = (model.oscillator().unwrap(), model.law());
         // In units of the half backlash and of the time, as the tolerances of the integrator are.
         let start = state(&[1.2e-4, 0.0]);
-        let off = off_the_integrator(&oscillator, law, start, 3);
+        let off = off_the_judge(&oscillator, law, start, 3);
         println!("omega = {omega}, T = {load}: {off:.1e}");
         assert!(off < 1e-9, "{off:e}");
     }

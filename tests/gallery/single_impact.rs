@@ -15,7 +15,7 @@
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{eigenvalues, first_block, followed, multipliers_apart, off_the_integrator};
+use crate::cycle::{eigenvalues, first_block, followed, multipliers_apart, off_the_judge};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{NonImpacting, State, state};
 use rattlemap_dynamics::reference::{EventKind, Trajectory};
@@ -135,7 +135,7 @@ fn states_and_multipliers_agree_with_the_closed_form() {
         assert_eq!(event.kind, EventKind::Impact);
         let speed = (event.after[1] - orbit.leaving).abs();
         let multipliers = multipliers_apart(first_block(&found.monodromy), orbit.monodromy);
-        let integrated = off_the_integrator(&oscillator, law, orbit.strobe, n);
+        let integrated = off_the_judge(&oscillator, law, orbit.strobe, n);
         println!(
             "{stop:?}, n = {n}: state {off:.1e}, speed {speed:.1e}, multipliers {multipliers:.1e}, DOP853 {integrated:.1e}"
         );

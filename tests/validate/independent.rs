@@ -101,9 +101,14 @@ fn integrate(motion: Motion, leg: &Leg, is_sampled: bool) -> Vec<(f64, [f64; 4])
     let samples = is_sampled.then_some(leg.duration / (SAMPLES as f64 - 0.5));
     let integration =
         Integration { tolerance: TOLERANCE, longest: LONGEST_STEP / motion.fastest_rate(), samples };
-    let accelerations = |t: f64, y: &[f64; 4]| motion.accelerations(t, *y);
-    let solution = integration.run(&first(leg.start), 0.0, leg.duration, accelerations, |_, _| false);
-    solution.expect("an ordinary leg")
+    let [x1, v1, x2, v2] = first(leg.start);
+    let rates = |&[x1, v1, x2, v2, t]: &[f64; 5]| {
+        let [a1, a2] = motion.accelerations(t, [x1, v1, x2, v2]);
+        [v1, a1, v2, a2, 1.0]
+    };
+    let solution = integration.run([x1, v1, x2, v2, 0.0], leg.duration, rates, |_, _| false);
+    let samples = solution.expect("an ordinary leg").into_iter();
+    samples.map(|(t, [x1, v1, x2, v2, _])| (t, [x1, v1, x2, v2])).collect()
 }
 
 /// Returns the end of a leg by DOP853.

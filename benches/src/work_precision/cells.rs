@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use super::flight::Flight;
 use super::outcome::Outcome;
 use super::{EVENTS, PERIODS};
-use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST, State, state};
 use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
@@ -166,7 +166,7 @@ impl Latest {
     /// Returns the latest events of a flight.
     pub fn of(flight: &Flight) -> Latest {
         let mut latest = Latest::default();
-        flight.events.iter().for_each(|event| latest.add(event.t));
+        flight.events.iter().for_each(|&t| latest.add(t));
         latest
     }
 

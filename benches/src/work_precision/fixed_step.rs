@@ -2,9 +2,9 @@
 
 use super::PERIODS;
 use super::cells::{Latest, Subject};
+use super::field::Equations;
+use super::flight::Flight;
 use super::outcome::Outcome;
-use rattlemap::validate::independent::field::Equations;
-use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Gap;
 
 /// Number of events in one period above which a lane fails.
@@ -14,8 +14,7 @@ const ENDINGS_PER_PERIOD: u32 = 10_000;
 #[inline(always)]
 fn runge_kutta(field: &Equations, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
     let slope = |y: &Gap, cos: f64| {
-        // The force of a gear pair has no sine.
-        let [a, b] = field.accelerations(y, [cos, 0.0]);
+        let [a, b] = field.accelerations(y, cos);
         [y[1], a, y[3], b]
     };
     let moved = |by: f64, k: &Gap| -> Gap { std::array::from_fn(|i| y[i] + by * k[i]) };
@@ -29,7 +28,7 @@ fn runge_kutta(field: &Equations, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
 /// Integrates a subject with `steps` >= 1 steps per forcing period.
 pub fn integrate(subject: &Subject, steps: u32) -> Outcome {
     let grid = Grid::new(subject.oscillator.omega, steps);
-    let mut flight = Flight::new(&subject.oscillator, subject.law, subject.start);
+    let mut flight = Flight::new(&subject.pair, &subject.start);
     for _ in 0..PERIODS {
         if grid.period(&mut flight).is_none() {
             return Outcome::lost();

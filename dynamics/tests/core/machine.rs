@@ -1,4 +1,4 @@
-//! The engine of machines, on oscillators of two coordinates, against the integrator by matrix exponentials.
+//! The engine of machines, on oscillators of two coordinates, against the engine of such oscillators; mirror images.
 
 use nalgebra::DVector;
 use rattlemap_dynamics::flow::Flow;
@@ -6,149 +6,13 @@ use rattlemap_dynamics::model::{Drive, DryFriction, Law, Machine, Oscillator, RE
 use rattlemap_dynamics::orbit::{
     Class, EVENT_PERIODS, Orbit, Quantities, Settings, Status, analyse_flow, measure,
 };
-use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, System};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
+use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::reference::machine::{Motion, System};
 use rattlemap_dynamics::stability::UNIT;
 use rayon::prelude::*;
 
 use crate::common::BUDGET;
-use crate::independent::motion::{self, ANGLE, Mode, What, distance};
-use crate::independent::random::{Case, Shape, case};
-use crate::independent::{MOST_NOISE, NOISES, PLAIN};
-
-/// Forcing periods that are compared.
-const PERIODS: usize = 6;
-
-/// Largest difference of the states, relative to the size of the motion.
-const STATE_OFF: f64 = 1e-10;
-
-/// Largest difference of the derivatives, relative to the largest entry.
-const DERIVATIVE_OFF: f64 = 1e-7;
-
-/// The events at walls.
-#[derive(Default)]
-struct AtWalls(Vec<MachineEvent>);
-
-impl Observer for AtWalls {
-    fn event(&mut self, _: &GapEvent) {}
-
-    fn machine_event(&mut self, event: &MachineEvent) {
-        self.0.push(*event);
-    }
-}
-
-/// Compares the first periods. Returns the largest differences of states and derivatives.
-fn compare(case: &Case) -> Result<[f64; 2], String> {
-    let o = &case.oscillator;
-    let machine = Machine::of(o, case.law);
-    machine.validate().map_err(|error| error.to_string())?;
-    let (system, exponentials) = (System::new(&machine), motion::System::new(o, ANGLE));
-    let mut ours = motion::Motion::new(&exponentials, case.law, case.start, Mode::Free);
-    let other = motion::System::new(o, 0.7 * ANGLE);
-    ours.carry_tangents();
-    let mut shaken = ours.shaken();
-    shaken.push(motion::Motion::new(&other, case.law, case.start, Mode::Free));
-    shaken.iter_mut().for_each(motion::Motion::carry_tangents);
-    let mut theirs = Motion::new(&system, &case.start);
-    theirs.set_tangents(Motion::unit_tangents(&system));
-    let of = |event: &MachineEvent| match event.kind {
-        EventKind::Impact => (What::Impact, event.side),
-        EventKind::MeshStart => (What::Begins, event.side),
-        EventKind::MeshEnd => (What::Ends, event.side),
-    };
-    let mut worst = [0.0f64; 2];
-    for period in 0..PERIODS {
-        let mut log = AtWalls::default();
-        let ended = theirs.advance_period(&mut log);
-        let events = log.0;
-        ours.events.clear();
-        let noise = ours.advance_period().and_then(|()| ours.noise(&mut shaken));
-        if ended == Err(Stop::CapEvents) || events.len() > 10_000 {
-            break;
-        }
-        ended.map_err(|stop| stop.to_string())?;
-        let Some(noise) = noise else { break };
-        if noise > MOST_NOISE {
-            break;
-        }
-        let state = theirs.state();
-        let off = distance(ours.state(), std::array::from_fn(|i| state[i]), ours.rate());
-        let events: Vec<_> = events.iter().map(of).collect();
-        if ours.events != events {
-            return Err(format!(
-                "events {:?} but {events:?} in period {period}, noise {noise:e}",
-                ours.events
-            ));
-        }
-        if off.is_nan() || off > STATE_OFF + NOISES * noise {
-            return Err(format!("off by {off:e} with noise {noise:e} in period {period}"));
-        }
-        let derivative = theirs.derivative();
-        if let Some(expected) = ours.tangents.filter(|_| !theirs.near_grazing()) {
-            let n = derivative.nrows();
-            let entries = || (0..n * n).map(|k| (k / n, k % n));
-            let apart = |of: &dyn Fn((usize, usize)) -> f64| {
-                entries().map(|at| (of(at) - expected[at]).abs()).fold(0.0, f64::max)
-                    / expected.amax().max(1.0)
-            };
-            let of_shaken = shaken.iter().filter_map(|other| other.tangents);
-            let noise = of_shaken.map(|other| apart(&|at| other[at])).fold(0.0, f64::max);
-            let apart = apart(&|at| derivative[at]);
-            if apart > DERIVATIVE_OFF + NOISES * noise {
-                return Err(format!("derivative off by {apart:e} with noise {noise:e} in period {period}"));
-            }
-            worst[1] = worst[1].max(apart);
-        }
-        worst[0] = worst[0].max(off);
-    }
-    Ok(worst)
-}
-
-fn check(shape: Shape, seeds: std::ops::Range<u64>) {
-    let of = |seed| (seed, compare(&case(seed, shape)));
-    let all: Vec<_> = seeds.into_par_iter().map(of).collect();
-    let failed: Vec<_> = all.iter().filter_map(|(seed, found)| Some((seed, found.as_ref().err()?))).collect();
-    for (seed, error) in failed.iter().take(20) {
-        println!("{seed}: {error}");
-    }
-    let worst = all.iter().filter_map(|(_, found)| found.as_ref().ok());
-    let worst = worst.fold([0.0f64; 2], |[a, b], [c, d]| [a.max(*c), b.max(*d)]);
-    println!("{shape:?}: {worst:?}");
-    assert!(failed.is_empty(), "{} of {} differ", failed.len(), all.len());
-}
-
-#[test]
-fn plain_machines() {
-    check(PLAIN, 0..300);
-}
-
-#[test]
-fn machines_with_stages_and_harmonics() {
-    check(Shape { harmonics: true, stages: true, ..PLAIN }, 0..300);
-}
-
-#[test]
-fn machines_with_further_walls_and_stages() {
-    check(Shape { walls: true, stages: true, ..PLAIN }, 0..300);
-}
-
-#[test]
-fn machines_with_pushing_walls_and_preloads() {
-    check(Shape { pushing: true, walls: true, stages: true, ..PLAIN }, 0..300);
-}
-
-#[test]
-fn machines_with_friction() {
-    check(Shape { friction: true, ..PLAIN }, 0..300);
-}
-
-#[test]
-fn machines_with_friction_and_all_else() {
-    check(
-        Shape { friction: true, pushing: true, walls: true, stages: true, harmonics: true, ..PLAIN },
-        0..300,
-    );
-}
+use crate::independent::random::{PLAIN, Shape, case};
 
 /// Whether all measured quantities agree.
 fn same_quantities(a: &Orbit, b: &Orbit) -> bool {

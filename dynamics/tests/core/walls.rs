@@ -2,7 +2,7 @@
 
 use crate::common::linear::{Linear, with_wall};
 use crate::common::near;
-use crate::independent::random::{Shape, case};
+use crate::independent::random::{PLAIN, Shape, case};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Law, Oscillator, OscillatorError, OuterWall, Side, state};
 use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Settings, Status, analyse_flow};
@@ -72,7 +72,7 @@ fn free_vibration_of_a_two_stage_spring_has_its_closed_form() {
 /// In a cycle the force does as much work as dampers and impacts take.
 #[test]
 fn energy_balances_with_several_walls() {
-    let shape = Shape { walls: true, ..crate::independent::PLAIN };
+    let shape = Shape { walls: true, ..PLAIN };
     let mut cycles = 0;
     for seed in 300..400 {
         let case = case(seed, shape);

@@ -13,7 +13,7 @@ use std::rc::Rc;
 use nalgebra::DVector;
 
 use super::Tally;
-use super::dop853::{Integration, integrate};
+use super::dop853::Integration;
 use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Machine, Side, State};
 use rattlemap_dynamics::reference::EventKind;
 
@@ -191,6 +191,11 @@ impl Flight {
     /// Returns the state `(x1, v1, x2, v2, ...)`.
     pub fn state(&self) -> State {
         self.system.to_state(&self.y)
+    }
+
+    /// Whether an infinite series of impacts was cut off, so that not all impacts are listed.
+    pub fn cuts_series(&self) -> bool {
+        self.tally.series
     }
 
     /// Returns the side of the contact of a gap that lasts.
@@ -495,8 +500,7 @@ fn run_in<const N: usize>(
     let start = std::array::from_fn(|i| if i + 1 == N { t } else { y[i] });
     let settings = Integration { tolerance: TOLERANCE, longest: LONGEST * domain.radian, samples: None };
     let watch = |x: f64, y: &[f64; N]| step(x, &numbers(y));
-    let solution = integrate(start, duration, settings, field, watch)?;
-    solution.last().map(|(_, y)| numbers(y))
+    settings.run(start, duration, field, watch)?.last().map(|(_, y)| numbers(y))
 }
 
 /// Locates the root of a function near `guess`, a time since `t`, and returns it with the state there.

@@ -1,9 +1,8 @@
-//! Integrators by matrix exponentials, from the tests of the reference.
+//! The integrator by matrix exponentials, from the tests of the reference.
 
 #[allow(dead_code, reason = "the tests of the reference use the rest")]
 #[path = "../../../dynamics/tests/core/independent"]
 pub(crate) mod independent {
-    pub(crate) mod motion;
     pub(crate) mod random;
 }
 
@@ -13,5 +12,6 @@ pub(crate) mod machines {
     mod act;
     pub(crate) mod motion;
     pub(crate) mod random;
+    mod roots;
     pub(crate) mod system;
 }

@@ -1,9 +1,10 @@
-//! Random models with harmonics and stages.
+//! Random models of one or two coordinates with one gap.
 
 use rattlemap_dynamics::model::{
-    Contact, Domain, Friction, Harmonic, Law, Oscillator, OuterWall, Side, Stage, State, state,
+    Contact, Domain, Friction, Harmonic, Law, Machine, Oscillator, OuterWall, Side, Stage, State, state,
 };
 
+use super::super::machines::random as machines;
 use crate::common::linear::with_wall;
 
 /// A reproducible sequence of numbers: SplitMix64.
@@ -60,6 +61,19 @@ pub(crate) struct Case {
     /// Between the walls.
     pub(crate) start: State,
 }
+
+impl Case {
+    /// Returns the same model as a machine.
+    pub(crate) fn machine(&self) -> machines::Case {
+        let machine = Machine::of(&self.oscillator, self.law);
+        let start = self.start[..2 * machine.degrees()].to_vec();
+        machines::Case { machine, start }
+    }
+}
+
+/// A model with nothing but a force of one harmonic and at most one wall on a side.
+pub(crate) const PLAIN: Shape =
+    Shape { harmonics: false, stages: false, walls: false, pushing: false, friction: false, wide: false };
 
 type Matrix = [[f64; 2]; 2];
 

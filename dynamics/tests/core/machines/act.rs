@@ -32,15 +32,15 @@ impl Motion<'_> {
         let is_still = self.linear().is_still.clone();
         let (n, system) = (self.system.degrees, self.system);
         let one = Matrix::identity(2 * n, 2 * n);
-        let (mut stops, mut jumps) = (None, false);
+        let (mut cause, mut jumps) = (None, false);
         let saltation: Option<Saltation> = match end {
             End::Rests(i) => {
-                (self.grips[i], stops) = (Grip::Stick, Some(i));
+                (self.grips[i], cause) = (Grip::Stick, Some(i));
                 Some((one, system.slides[i].clone()))
             }
             End::Slips(i, grip) => {
                 let row = self.linear().hold[i].clone();
-                (self.grips[i], self.orders[i]) = (grip, 2);
+                (self.grips[i], self.orders[i], cause) = (grip, 2, Some(i));
                 Some((one, row))
             }
             End::Crosses(i, direction) => {
@@ -79,7 +79,7 @@ impl Motion<'_> {
                 Some((one, row))
             }
         };
-        self.settle(&grips, &stuck, &is_still, stops, jumps);
+        self.settle(&grips, &stuck, &is_still, cause, jumps);
         if let Some((reset, row)) = saltation {
             self.jump(&reset, &row, &before);
         }
@@ -88,8 +88,13 @@ impl Motion<'_> {
     /// The state and the tangents are continuous at a change of the stage.
     pub(super) fn change(&mut self, stage: usize) {
         let (grips, stuck, is_still) = (self.grips.clone(), self.stuck(), self.linear().is_still.clone());
+        let before = self.modes();
         self.stage = stage;
         self.settle(&grips, &stuck, &is_still, None, true);
+        for (before, _) in before.iter().zip(self.modes()).filter(|(before, after)| *before != after) {
+            self.by_stage[0] += usize::from(matches!(before, Mode::Stuck(_)));
+            self.by_stage[1] += usize::from(matches!(before, Mode::Onset(_)));
+        }
     }
 
     /// Returns the sides of rigid walls that gaps are at rest on.
@@ -99,16 +104,17 @@ impl Motion<'_> {
     }
 
     /// Decides about all that is at rest, ends contacts that are not pressed, and records what the elements do then. They did `before`,
-    /// and the sliding rate of `stops` has become 0. `was_stuck` and `was_still` are the gaps that were at rest. Forces of walls that only
-    /// push may have jumped.
+    /// and the element `cause` has come to rest or has begun to slip. `was_stuck` and `was_still` are the gaps that were at rest. Forces of
+    /// walls that only push may have jumped.
     fn settle(
         &mut self,
         before: &[Grip],
         was_stuck: &[Option<Side>],
         was_still: &[bool],
-        stops: Option<usize>,
+        cause: Option<usize>,
         jumps: bool,
     ) {
+        let first = self.symbols.len();
         if jumps {
             (0..self.gaps.len()).for_each(|i| self.push(i));
         }
@@ -139,10 +145,15 @@ impl Motion<'_> {
                 self.record_as(i, What::Ends, side, Some(contact_symbol(side)));
             }
         }
+        let is_of_gap = self.symbols.len() > first;
         for (i, &before) in before.iter().enumerate() {
             let after = self.grips[i];
-            if after != Grip::Stick && after != before && (before == Grip::Stick || stops == Some(i)) {
-                self.slips.push((if before == Grip::Stick { b'7' } else { b'0' }, self.time()));
+            if after != Grip::Stick && after != before && (before == Grip::Stick || cause == Some(i)) {
+                let symbol = if before == Grip::Stick { b'7' } else { b'0' };
+                self.slips.push((symbol, self.time()));
+                // The cause of an event of a gap comes before it.
+                let at = if is_of_gap && cause == Some(i) { first } else { self.symbols.len() };
+                self.symbols.insert(at, symbol);
             }
         }
         self.project();
@@ -501,6 +512,8 @@ impl Motion<'_> {
 
     fn record_as(&mut self, i: usize, what: What, side: Side, symbol: Option<u8>) {
         self.gaps[i].origin = Some(side);
+        let of_gap = if self.gaps.len() > 1 { 8 * (i as u8 + 1) } else { 0 };
+        self.symbols.extend(symbol.map(|symbol| symbol + of_gap));
         let t = self.time();
         let is_crowd = |last: &[Event]| {
             what != What::Ends

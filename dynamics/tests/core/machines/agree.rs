@@ -1,4 +1,4 @@
-//! Compares another program of machines with the integrator by matrix exponentials, on random machines.
+//! Compares motions of the program with the integrator by matrix exponentials, on random machines and models of one gap.
 
 use rattlemap_dynamics::model::{Machine, Side};
 use rayon::prelude::*;
@@ -7,6 +7,7 @@ use super::engine::{Follower, Period};
 use super::motion::{Event, Motion, What};
 use super::random::{Case, any_case, apart};
 use super::system::{ANGLE, System};
+use crate::independent::random::{self as one_gap, PLAIN, Shape};
 
 /// Forcing periods that are compared.
 const PERIODS: usize = 6;
@@ -23,14 +24,21 @@ const TIME_OFF: f64 = 1e-9;
 /// Rounding errors may have this multiple of the effect of known errors.
 const NOISES: f64 = 20.0;
 
-/// Motions in which known errors have a larger effect are not compared further.
-const MOST_NOISE: f64 = 1e-9;
+/// What is compared.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    /// Size of derivatives to which their errors are relative, if they are smaller. They are 0 but for rounding when everything rests.
+    least_derivative: f64,
+    /// Motions in which known errors have a larger effect are not compared further.
+    most_noise: f64,
+}
 
-/// Derivatives in which errors of 1e-13 grow to this effect end a comparison, too.
-const MOST_GROWTH: f64 = MOST_NOISE / 1e-13;
+const MACHINES: Limits = Limits { least_derivative: 1e-6, most_noise: 1e-9 };
+pub(crate) const ONE_GAP: Limits = Limits { least_derivative: 1.0, most_noise: 1e-7 };
 
 /// The integrator with several steps and errors.
 struct Ours<'a> {
+    limits: Limits,
     motion: Motion<'a>,
     /// With other steps.
     other: Motion<'a>,
@@ -51,20 +59,17 @@ impl Follower for Motion<'_> {
     }
 }
 
-/// Returns the largest entry of the derivative. It is 0 but for rounding when everything rests.
-fn size(period: &Period) -> f64 {
-    period.derivative.amax().max(1e-6)
-}
-
 /// Largest differences and numbers of what is compared.
 #[derive(Clone, Copy, Debug, Default)]
-struct Found {
-    state: f64,
+pub(crate) struct Found {
+    pub(crate) state: f64,
     derivative: f64,
     time: f64,
     periods: usize,
     events: usize,
     slips: usize,
+    /// Rests on rigid walls and contact onsets that a change of the stage has ended.
+    pub(crate) by_stage: [usize; 2],
 }
 
 type Happening = (What, Side, Option<u8>);
@@ -76,6 +81,10 @@ fn of_gap(events: &[Event], gap: usize) -> (Vec<Happening>, Vec<f64>) {
 }
 
 impl Ours<'_> {
+    fn size(&self, period: &Period) -> f64 {
+        period.derivative.amax().max(self.limits.least_derivative)
+    }
+
     /// Advances by a period. Returns it with the effects of errors on state and derivative and the events with other steps, or none if
     /// they are too large.
     fn advance(&mut self, omega: f64) -> Option<(Period, Period, [f64; 2])> {
@@ -86,9 +95,11 @@ impl Ours<'_> {
             shaken.advance_period()?;
             noise = noise.max(apart(&ours.state, &shaken.state(), omega));
         }
-        let size = size(&ours);
+        let size = self.size(&ours);
         let of_derivative = (&ours.derivative - &other.derivative).amax() / size;
-        (noise <= MOST_NOISE && size <= MOST_GROWTH && !self.motion.is_crowded).then_some((
+        let most = self.limits.most_noise;
+        // Derivatives in which errors of 1e-13 grow to this effect end a comparison, too.
+        (noise <= most && size <= most / 1e-13 && !self.motion.is_crowded).then_some((
             ours,
             other,
             [noise, of_derivative],
@@ -127,7 +138,7 @@ fn compare(machine: &Machine, mut ours: Ours, theirs: &mut dyn Follower) -> Resu
         if off.is_nan() || off > STATE_OFF + NOISES * noise {
             return Err(period_of(format!("state off by {off:e} with noise {noise:e}")));
         }
-        let size = size(&own);
+        let size = ours.size(&own);
         let of = (&own.derivative - &their.derivative).amax() / size;
         // At rest on a wall, the known derivative is not a number.
         if !of_derivative.is_nan() && (of.is_nan() || of > DERIVATIVE_OFF + NOISES * of_derivative) {
@@ -140,25 +151,31 @@ fn compare(machine: &Machine, mut ours: Ours, theirs: &mut dyn Follower) -> Resu
         found.periods += 1;
         found.events += own.events.len();
         found.slips += own.slips.len();
+        found.by_stage = ours.motion.by_stage;
     }
     Ok(found)
 }
 
 /// Compares motions from a start.
-fn compare_case(case: &Case, theirs: &mut dyn Follower) -> Result<Found, String> {
+pub(crate) fn compare_case(case: &Case, limits: Limits, theirs: &mut dyn Follower) -> Result<Found, String> {
     let [system, other] = [ANGLE, 0.6 * ANGLE].map(|angle| System::new(&case.machine, angle));
     let start = |system| Motion::new(system, &case.start);
     let (mut motion, mut other) = (start(&system), start(&other));
     let shaken = motion.shaken();
     motion.carry_tangents();
     other.carry_tangents();
-    compare(&case.machine, Ours { motion, other, shaken }, theirs)
+    compare(&case.machine, Ours { limits, motion, other, shaken }, theirs)
 }
 
-/// Compares all machines, and prints the first that differ.
-fn check(seeds: std::ops::Range<u64>, share: f64, compare: impl Fn(&Case) -> Result<Found, String> + Sync) {
+/// Compares all cases, and prints the first that differ.
+fn check(
+    seeds: std::ops::Range<u64>,
+    share: f64,
+    case: impl Fn(u64) -> Case + Sync,
+    compare: impl Fn(&Case) -> Result<Found, String> + Sync,
+) {
     let count = (seeds.end - seeds.start) as f64 * PERIODS as f64;
-    let all: Vec<_> = seeds.into_par_iter().map(|seed| (seed, compare(&any_case(seed)))).collect();
+    let all: Vec<_> = seeds.into_par_iter().map(|seed| (seed, compare(&case(seed)))).collect();
     let failures: Vec<_> = all.iter().filter_map(|(seed, one)| Some((seed, one.as_ref().err()?))).collect();
     let found = all.iter().filter_map(|one| one.1.as_ref().ok()).fold(Found::default(), |a, b| Found {
         state: a.state.max(b.state),
@@ -167,11 +184,12 @@ fn check(seeds: std::ops::Range<u64>, share: f64, compare: impl Fn(&Case) -> Res
         periods: a.periods + b.periods,
         events: a.events + b.events,
         slips: a.slips + b.slips,
+        by_stage: [0, 1].map(|i| a.by_stage[i] + b.by_stage[i]),
     });
     println!("{found:?} of {count} periods");
     failures.iter().take(5).for_each(|(seed, error)| println!("seed {seed}: {error}"));
     if let Some((seed, error)) = failures.first() {
-        panic!("{} fail, first seed {seed}: {error}\n{:?}", failures.len(), any_case(**seed));
+        panic!("{} fail, first seed {seed}: {error}\n{:?}", failures.len(), case(**seed));
     }
     assert!(found.periods as f64 > share * count, "too few periods");
 }
@@ -179,11 +197,11 @@ fn check(seeds: std::ops::Range<u64>, share: f64, compare: impl Fn(&Case) -> Res
 /// The comparison accepts the integrator itself with other steps.
 #[test]
 fn the_comparison_accepts_other_steps() {
-    check(0..60, 0.7, |case| {
+    check(0..60, 0.7, any_case, |case| {
         let system = System::new(&case.machine, 0.35 * ANGLE);
         let mut theirs = Motion::new(&system, &case.start);
         theirs.carry_tangents();
-        compare_case(case, &mut theirs)
+        compare_case(case, MACHINES, &mut theirs)
     });
 }
 
@@ -200,7 +218,7 @@ fn the_comparison_finds_errors() {
         let system = System::new(&machine, ANGLE);
         let mut theirs = Motion::new(&system, &case.start);
         theirs.carry_tangents();
-        differ += usize::from(compare_case(&case, &mut theirs).is_err());
+        differ += usize::from(compare_case(&case, MACHINES, &mut theirs).is_err());
     }
     println!("{differ} differ");
     assert!(differ > 30, "{differ}");
@@ -212,20 +230,54 @@ mod program {
     use super::super::engine::program::Engine;
     use super::*;
 
+    fn check_program(seeds: std::ops::Range<u64>, limits: Limits, case: impl Fn(u64) -> Case + Sync) {
+        check(seeds, 0.7, case, |case| {
+            let program = Program::new(&case.machine);
+            compare_case(case, limits, &mut Engine::new(&program, &case.machine, &case.start))
+        });
+    }
+
     #[test]
     fn machines_agree_with_matrix_exponentials() {
-        check(0..300, 0.7, |case| {
-            let program = Program::new(&case.machine);
-            compare_case(case, &mut Engine::new(&program, &case.machine, &case.start))
-        });
+        check_program(0..40, MACHINES, any_case);
+    }
+
+    #[test]
+    #[ignore = "takes 6 s"]
+    fn three_hundred_machines_agree_with_matrix_exponentials() {
+        check_program(0..300, MACHINES, any_case);
     }
 
     #[test]
     #[ignore = "minutes"]
     fn ten_thousand_machines_agree_with_matrix_exponentials() {
-        check(300..10_300, 0.7, |case| {
-            let program = Program::new(&case.machine);
-            compare_case(case, &mut Engine::new(&program, &case.machine, &case.start))
-        });
+        check_program(300..10_300, MACHINES, any_case);
+    }
+
+    const SHAPES: [Shape; 6] = [
+        PLAIN,
+        Shape { harmonics: true, stages: true, ..PLAIN },
+        Shape { walls: true, stages: true, ..PLAIN },
+        Shape { pushing: true, walls: true, stages: true, ..PLAIN },
+        Shape { friction: true, ..PLAIN },
+        Shape { friction: true, pushing: true, walls: true, stages: true, harmonics: true, ..PLAIN },
+    ];
+
+    fn check_one_gap(seeds: std::ops::Range<u64>) {
+        let limits = Limits { most_noise: MACHINES.most_noise, ..ONE_GAP };
+        for shape in SHAPES {
+            check_program(seeds.clone(), limits, |seed| one_gap::case(seed, shape).machine());
+        }
+    }
+
+    #[test]
+    fn machines_with_one_gap_agree_with_matrix_exponentials() {
+        check_one_gap(0..30);
+    }
+
+    #[test]
+    #[ignore = "takes 15 s"]
+    fn three_hundred_machines_of_each_shape_with_one_gap_agree_with_matrix_exponentials() {
+        check_one_gap(0..300);
     }
 }

@@ -8,10 +8,7 @@ use super::build::{in_coordinates, side_by_side};
 use super::motion::{Event, Motion, What};
 use super::random::{Case, any_case, apart};
 use super::system::{ANGLE, System};
-use crate::independent::motion::{
-    Mode as PlainMode, Motion as PlainMotion, System as PlainSystem, What as PlainWhat,
-};
-use crate::independent::random::{self as plain, Random};
+use crate::independent::random::{self as one_gap, PLAIN, Random, Shape};
 
 /// Returns events without their times, gap by gap.
 fn by_gap(events: &[Event], gaps: usize) -> Vec<Vec<(What, Side, Option<u8>)>> {
@@ -218,119 +215,80 @@ fn energy_decreases_without_force() {
     assert!(events > 500);
 }
 
-const PLAIN_SHAPES: [plain::Shape; 5] = {
-    let none = plain::Shape {
-        harmonics: false,
-        stages: false,
-        walls: false,
-        pushing: false,
-        friction: false,
-        wide: false,
-    };
-    [
-        none,
-        plain::Shape { harmonics: true, stages: true, ..none },
-        plain::Shape { walls: true, stages: true, pushing: true, ..none },
-        plain::Shape { friction: true, harmonics: true, ..none },
-        plain::Shape { friction: true, walls: true, stages: true, pushing: true, ..none },
-    ]
-};
+const SHAPES: [Shape; 5] = [
+    PLAIN,
+    Shape { harmonics: true, stages: true, ..PLAIN },
+    Shape { walls: true, stages: true, pushing: true, ..PLAIN },
+    Shape { friction: true, harmonics: true, ..PLAIN },
+    Shape { friction: true, walls: true, stages: true, pushing: true, ..PLAIN },
+];
 
-/// Largest effect of errors of velocities by 1e-12 at events in motions that are compared with those of oscillators.
-const MOST_PLAIN_NOISE: f64 = 1e-9;
+/// Largest effect of errors of velocities at events in motions of machines side by side that are compared.
+const MOST_PART_NOISE: f64 = 1e-9;
 
-/// Compares the part of a motion from a gap on with the motion of an oscillator, over a period. `noise` is the effect of errors.
-fn same_as_plain(
+/// Compares the part of a motion from a gap on with the motion of a machine with this gap alone, over a period. `noise` is the effect of
+/// errors.
+fn same_as_alone(
     ours: &Motion,
     gap: usize,
     state: &[f64],
-    theirs: &PlainMotion,
+    alone: &Motion,
     noise: f64,
 ) -> Result<f64, String> {
-    let n = theirs.system.degrees;
-    let off = apart(state, &theirs.state()[..2 * n], theirs.rate());
+    let off = apart(state, &alone.state(), alone.system.machine.omega);
     if off.is_nan() || off > 1e-10 + NOISES * noise {
         return Err(format!("off by {off:e} with noise {noise:e}"));
     }
-    let what = |what: &PlainWhat| match what {
-        PlainWhat::Impact => What::Impact,
-        PlainWhat::Begins => What::Begins,
-        PlainWhat::Ends => What::Ends,
-    };
-    let events: Vec<_> = theirs.events.iter().map(|(kind, side)| (what(kind), *side)).collect();
-    let own: Vec<_> = ours.events.iter().filter(|event| event.gap == gap).collect();
-    let found: Vec<_> = own.iter().map(|event| (event.what, event.side)).collect();
-    if found != events {
-        return Err(format!("events {found:?} but {events:?}"));
-    }
-    let symbols: Vec<u8> = own.iter().filter_map(|event| event.symbol).collect();
-    let flights: Vec<u8> = theirs.symbols.iter().copied().filter(|symbol| !b"07".contains(symbol)).collect();
-    if symbols != flights {
-        return Err(format!("symbols {symbols:?} but {flights:?}"));
+    let of = |motion: &Motion, gap: usize| by_gap(&motion.events, gap + 1).swap_remove(gap);
+    if of(ours, gap) != of(alone, 0) {
+        return Err(format!("events {:?} but {:?}", of(ours, gap), alone.events));
     }
     Ok(off)
 }
 
-/// Machines of one to three oscillators that do not touch each other, in other coordinates, move like these oscillators.
-fn check_plain(count: usize, seeds: std::ops::Range<u64>, periods: usize, share: f64) {
+/// Two or three machines that do not touch each other, as one machine in other coordinates, move like each of them alone.
+fn check_side_by_side(count: usize, seeds: std::ops::Range<u64>, periods: usize, share: f64) {
     let run = |seed: u64| {
-        let shape = PLAIN_SHAPES[(seed % 5) as usize];
+        let shape = SHAPES[(seed % 5) as usize];
         let random = &mut Random(seed);
-        let mut cases: Vec<_> = (0..count as u64)
-            .map(|i| plain::case(1000 * i + seed, plain::Shape { stages: shape.stages && i == 0, ..shape }))
+        let mut cases: Vec<Case> = (0..count as u64)
+            .map(|i| {
+                one_gap::case(1000 * i + seed, Shape { stages: shape.stages && i == 0, ..shape }).machine()
+            })
             .collect();
-        let omega = cases[0].oscillator.omega;
-        cases.iter_mut().for_each(|case| case.oscillator.omega = omega);
-        let machines: Vec<_> = cases.iter().map(|case| Machine::of(&case.oscillator, case.law)).collect();
+        let omega = cases[0].machine.omega;
+        cases.iter_mut().for_each(|case| case.machine.omega = omega);
+        let machines: Vec<_> = cases.iter().map(|case| case.machine.clone()).collect();
         let all = side_by_side(&machines);
         let n = all.degrees();
-        let t = match count {
-            1 if seed.is_multiple_of(2) => DMatrix::identity(n, n),
-            _ => DMatrix::from_fn(n, n, |i, j| random.even(0.4) + if i == j { 1.0 } else { 0.0 }),
-        };
+        let t = DMatrix::from_fn(n, n, |i, j| random.even(0.4) + if i == j { 1.0 } else { 0.0 });
         let system = System::new(&in_coordinates(&all, &t), ANGLE);
         let inverse = t.clone().try_inverse().expect("coordinates");
-        let (mut x, mut v) = (DVector::zeros(n), DVector::zeros(n));
-        let (mut at, mut places) = (0, Vec::new());
-        for case in &cases {
-            for i in 0..case.oscillator.degrees {
-                (x[at + i], v[at + i]) = (case.start[2 * i], case.start[2 * i + 1]);
-            }
-            places.push(at);
-            at += case.oscillator.degrees;
-        }
-        let (q, rates) = (&inverse * x, &inverse * v);
-        let start: Vec<f64> = (0..2 * n).map(|i| if i % 2 == 0 { q[i / 2] } else { rates[i / 2] }).collect();
-        let mut ours = Motion::new(&system, &start);
-        let systems: Vec<_> = cases.iter().map(|case| PlainSystem::new(&case.oscillator, 0.2)).collect();
-        let mut theirs: Vec<_> = (cases.iter().zip(&systems))
-            .map(|(case, system)| PlainMotion::new(system, case.law, case.start, PlainMode::Free))
-            .collect();
-        let mut shaken: Vec<_> = theirs.iter().map(PlainMotion::shaken).collect();
+        let state: Vec<f64> = cases.iter().flat_map(|case| case.start.clone()).collect();
+        let mut ours = Motion::new(&system, &moved(&inverse, &state));
+        let systems: Vec<_> = machines.iter().map(|machine| System::new(machine, 0.6 * ANGLE)).collect();
+        let mut alone: Vec<_> =
+            cases.iter().zip(&systems).map(|(case, system)| Motion::new(system, &case.start)).collect();
+        let mut shaken: Vec<_> = alone.iter().map(Motion::shaken).collect();
         let (mut worst, mut compared) = (0.0f64, 0);
         'periods: for period in 0..periods {
-            ours.events.clear();
-            ours.slips.clear();
+            ours.clear();
             let is_over = ours.advance_period().is_none();
-            let state = ours.state();
-            let of = |at: usize| DVector::from_fn(n, |i, _| state[2 * i + at]);
-            let (x, v) = (&t * of(0), &t * of(1));
-            let mut slips = 0;
-            for (i, motion) in theirs.iter_mut().enumerate() {
+            let state = moved(&t, &ours.state());
+            let (mut slips, mut at) = (0, 0);
+            for (i, motion) in alone.iter_mut().enumerate() {
                 motion.clear();
                 let Some(noise) = motion.advance_period().and_then(|()| motion.noise(&mut shaken[i])) else {
                     break 'periods;
                 };
-                if is_over || noise > MOST_PLAIN_NOISE {
+                if is_over || noise > MOST_PART_NOISE {
                     break 'periods;
                 }
-                let degrees = cases[i].oscillator.degrees;
-                let own: Vec<f64> = (0..2 * degrees)
-                    .map(|j| if j % 2 == 0 { x[places[i] + j / 2] } else { v[places[i] + j / 2] })
-                    .collect();
-                let off = same_as_plain(&ours, i, &own, motion, noise)
-                    .map_err(|error| format!("{seed}: oscillator {i}, period {period}: {error}"))?;
-                slips += motion.symbols.iter().filter(|symbol| b"07".contains(symbol)).count();
+                let own = &state[at..at + cases[i].start.len()];
+                at += own.len();
+                let off = same_as_alone(&ours, i, own, motion, noise)
+                    .map_err(|error| format!("{seed}: machine {i}, period {period}: {error}"))?;
+                slips += motion.slips.len();
                 worst = worst.max(off);
             }
             if slips != ours.slips.len() {
@@ -351,18 +309,20 @@ fn check_plain(count: usize, seeds: std::ops::Range<u64>, periods: usize, share:
 }
 
 #[test]
-fn machines_of_one_oscillator_move_like_it() {
-    check_plain(1, 0..150, 5, 0.85);
+fn two_machines_side_by_side_move_like_both() {
+    check_side_by_side(2, 0..60, 4, 0.8);
 }
 
 #[test]
-fn machines_of_two_oscillators_move_like_both() {
-    check_plain(2, 0..60, 4, 0.8);
+fn three_machines_side_by_side_move_like_all() {
+    check_side_by_side(3, 0..30, 4, 0.7);
 }
 
-#[test]
-fn machines_of_three_oscillators_move_like_all() {
-    check_plain(3, 0..30, 4, 0.7);
+/// Applies a matrix to displacements and to velocities.
+fn moved(m: &DMatrix<f64>, state: &[f64]) -> Vec<f64> {
+    let of = |at: usize| m * DVector::from_fn(m.ncols(), |i, _| state[2 * i + at]);
+    let (x, v) = (of(0), of(1));
+    x.iter().zip(&v).flat_map(|(x, v)| [*x, *v]).collect()
 }
 
 /// The motion does not depend on the coordinates.
@@ -374,11 +334,6 @@ fn other_coordinates_give_the_same_motion() {
         let random = &mut Random(seed);
         let t = DMatrix::from_fn(n, n, |i, j| random.even(0.8 / n as f64) + if i == j { 1.0 } else { 0.0 });
         let inverse = t.clone().try_inverse().expect("coordinates");
-        let moved = |m: &DMatrix<f64>, state: &[f64]| -> Vec<f64> {
-            let of = |at: usize| m * DVector::from_fn(n, |i, _| state[2 * i + at]);
-            let (x, v) = (of(0), of(1));
-            (0..2 * n).map(|i| if i % 2 == 0 { x[i / 2] } else { v[i / 2] }).collect()
-        };
         let other = in_coordinates(&machine, &t);
         // Without two walls of one gap, the scale of length depends on the coordinates.
         if (machine.length_scale() - other.length_scale()).abs() > 1e-12 * machine.length_scale() {
@@ -440,7 +395,6 @@ fn derivatives_are_limits_of_differences() {
 fn three_thousand_machines_pass_the_checks() {
     check_steps(300..3300);
     check_derivatives(200..1200);
-    check_plain(1, 150..1650, 5, 0.8);
-    check_plain(2, 60..360, 4, 0.8);
-    check_plain(3, 30..130, 4, 0.7);
+    check_side_by_side(2, 60..360, 4, 0.8);
+    check_side_by_side(3, 30..130, 4, 0.7);
 }

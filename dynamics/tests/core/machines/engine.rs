@@ -1,4 +1,4 @@
-//! The program's motions of machines, in the terms of the comparison.
+//! The program's motions, in the terms of the comparison.
 
 use nalgebra::DMatrix;
 
@@ -22,11 +22,13 @@ pub(crate) trait Follower {
     fn advance(&mut self) -> Result<Period, String>;
 }
 
-/// The program's motion of a machine. Names and signatures of the program occur only here.
+/// The program's motions of machines, and of models with one gap. Names and signatures of the program occur only here.
 pub(crate) mod program {
-    use rattlemap_dynamics::model::Machine;
+    use nalgebra::DMatrix;
+    use rattlemap_dynamics::flow::Flow;
+    use rattlemap_dynamics::model::{Law, Machine, Side, State};
     use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, SlipEvent, System};
-    use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer};
+    use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Trajectory};
 
     use super::super::motion::{Event, What};
     use super::{Follower, Period};
@@ -46,19 +48,25 @@ pub(crate) mod program {
         several: bool,
     }
 
-    impl Observer for Record {
-        fn event(&mut self, _: &GapEvent) {}
-
-        fn machine_event(&mut self, event: &MachineEvent) {
-            let what = match event.kind {
+    impl Record {
+        fn add(&mut self, gap: usize, kind: EventKind, side: Side, symbol: Option<u8>, t: f64) {
+            let what = match kind {
                 EventKind::Impact => What::Impact,
                 EventKind::MeshStart => What::Begins,
                 EventKind::MeshEnd => What::Ends,
             };
-            let t = event.period as f64 * self.period + event.t;
-            let of_gap = if self.several { 8 * (event.gap as u8 + 1) } else { 0 };
-            let symbol = event.symbol.map(|symbol| symbol - of_gap);
-            self.events.push(Event { gap: event.gap, what, side: event.side, symbol, t });
+            let of_gap = if self.several { 8 * (gap as u8 + 1) } else { 0 };
+            self.events.push(Event { gap, what, side, symbol: symbol.map(|symbol| symbol - of_gap), t });
+        }
+    }
+
+    impl Observer for Record {
+        fn event(&mut self, e: &GapEvent) {
+            self.add(0, e.kind, e.side, e.symbol, e.period as f64 * self.period + e.t);
+        }
+
+        fn machine_event(&mut self, e: &MachineEvent) {
+            self.add(e.gap, e.kind, e.side, e.symbol, e.period as f64 * self.period + e.t);
         }
 
         fn machine_slip(&mut self, change: &SlipEvent) {
@@ -86,6 +94,38 @@ pub(crate) mod program {
                 slips: record.slips,
                 state: self.motion.state()[..size].to_vec(),
                 derivative: self.motion.derivative(),
+            })
+        }
+    }
+
+    /// The engine of models with one or two coordinates and one gap.
+    pub(crate) struct OneGap<'a> {
+        trajectory: Trajectory<'a, 4>,
+        degrees: usize,
+    }
+
+    impl<'a> OneGap<'a> {
+        pub(crate) fn new(flow: &'a Flow, degrees: usize, law: Law, start: State) -> OneGap<'a> {
+            let columns = std::array::from_fn(|i| {
+                let mut column = [0.0; rattlemap_dynamics::model::STATE];
+                column[i] = 1.0;
+                column
+            });
+            OneGap { trajectory: Trajectory::with_tangents(flow, law, start, columns), degrees }
+        }
+    }
+
+    impl Follower for OneGap<'_> {
+        fn advance(&mut self) -> Result<Period, String> {
+            let mut record = Record { period: self.trajectory.flow().period, ..Record::default() };
+            self.trajectory.advance_period(&mut record).map_err(|stop| stop.to_string())?;
+            let (size, columns) = (2 * self.degrees, self.trajectory.tangents());
+            let scale = self.trajectory.log_scale().exp();
+            Ok(Period {
+                events: record.events,
+                slips: record.slips,
+                state: self.trajectory.state()[..size].to_vec(),
+                derivative: DMatrix::from_fn(size, size, |i, j| columns[j][i] * scale),
             })
         }
     }

@@ -2,13 +2,16 @@
 //! comparison with the program on random machines.
 
 mod act;
-mod agree;
+pub(crate) mod agree;
 mod build;
 mod checks;
+pub(crate) mod cycle;
 mod cycles;
-mod engine;
+pub(crate) mod engine;
+mod friction;
 mod joint;
-mod motion;
+pub(crate) mod motion;
 pub(crate) mod random;
 mod rest;
-mod system;
+mod roots;
+pub(crate) mod system;

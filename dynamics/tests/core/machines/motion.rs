@@ -7,7 +7,8 @@ use std::rc::Rc;
 use nalgebra::DVector;
 use rattlemap_dynamics::model::{Contact, Side};
 
-use super::super::independent::motion::first_fall;
+use super::random::apart;
+use super::roots::first_fall;
 use super::system::{Grip, Key, Linear, Matrix, ROUNDING, Row, System, Vector, exponential, product, value};
 
 /// Relative errors of velocities that stand for those of rounding, which are smaller.
@@ -99,6 +100,16 @@ pub(crate) struct Motion<'a> {
     pub(crate) events: Vec<Event>,
     /// Ends of sticking, `7`, and reversals, `0`, with their times, which the caller may clear.
     pub(crate) slips: Vec<(u8, f64)>,
+    /// Symbols of flights and of slips in order, those of several gaps told apart as in the program's words. The caller may clear them.
+    pub(crate) symbols: Vec<u8>,
+    /// Time in which a gap has been in contact, which the caller may clear.
+    pub(crate) meshing_time: f64,
+    /// Distances that the elements have slid, which the caller may clear.
+    pub(crate) slid: Vec<f64>,
+    /// Elements that never slide, so that neighbouring motions keep their distance along them.
+    pub(crate) for_good: Vec<bool>,
+    /// Rests on rigid walls and contact onsets that a change of the stage has ended.
+    pub(crate) by_stage: [usize; 2],
     /// Whether impacts of several gaps have followed each other at one time but for rounding. Their number then depends on rounding.
     pub(crate) is_crowded: bool,
     /// Number of flights of gaps off walls which impacts of other gaps would have begun, and that are too low.
@@ -159,6 +170,11 @@ impl<'a> Motion<'a> {
             tangents: None,
             events: Vec::new(),
             slips: Vec::new(),
+            symbols: Vec::new(),
+            meshing_time: 0.0,
+            slid: vec![0.0; machine.friction.len()],
+            for_good: vec![false; machine.friction.len()],
+            by_stage: [0; 2],
             corners: 0,
             is_crowded: false,
             shaken: [0.0; 4],
@@ -199,16 +215,23 @@ impl<'a> Motion<'a> {
         Matrix::from_fn(2 * n, 2 * n, |i, j| tangents[(of(i), of(j))])
     }
 
+    /// Clears what the caller reads about a part of the motion.
+    pub(crate) fn clear(&mut self) {
+        (self.events, self.slips, self.symbols) = Default::default();
+        self.meshing_time = 0.0;
+        self.slid.fill(0.0);
+    }
+
     /// Begins to carry unit tangents. A gap at rest on a wall has no neighbours off the wall, and elements that stick have none with a
-    /// rate.
+    /// rate; those that stick for good have none in another place.
     pub(crate) fn carry_tangents(&mut self) {
         let n = self.system.degrees;
         let mut tangents = Matrix::identity(2 * n, 2 * n);
-        for (row, (change, _), is_gap) in self.at_rest() {
+        for (row, (change, _), element) in self.at_rest() {
             let one = Matrix::identity(n, n) - change * row.transpose();
             let mut all = Matrix::identity(2 * n, 2 * n);
             all.view_mut((n, n), (n, n)).copy_from(&one);
-            if is_gap {
+            if element.is_none_or(|i| self.for_good[i]) {
                 all.view_mut((0, 0), (n, n)).copy_from(&one);
             }
             tangents = all * tangents;
@@ -221,6 +244,13 @@ impl<'a> Motion<'a> {
     pub(crate) fn shaken(&self) -> Vec<Motion<'a>> {
         let with = |signs: [f64; 4]| Motion { shaken: signs.map(|sign| SHAKEN * sign), ..self.clone() };
         vec![with([1.0; 4]), with([1.0, 1.0, -1.0, -1.0])]
+    }
+
+    /// Advances the shaken motions. Returns their largest distance from this one.
+    pub(crate) fn noise(&self, shaken: &mut [Motion<'a>]) -> Option<f64> {
+        shaken.iter_mut().try_for_each(Motion::advance_period)?;
+        let off = |other: &Motion| apart(&self.state(), &other.state(), self.system.machine.omega);
+        Some(shaken.iter().map(off).fold(0.0, f64::max))
     }
 
     /// Whether a gap is in contact, or an element sticks.
@@ -343,29 +373,25 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Returns what is at rest: its row, the change of velocities that stops it while those before it hold, and whether it is a gap.
-    fn at_rest(&self) -> Vec<(Vector, super::system::Bond, bool)> {
+    /// Returns what is at rest: its row, the change of velocities that stops it while those before it hold, and the element, or none for a
+    /// gap.
+    fn at_rest(&self) -> Vec<(Vector, super::system::Bond, Option<usize>)> {
         let machine = &self.system.machine;
         let walls = (0..self.gaps.len()).filter(|&i| matches!(self.gaps[i].mode, Mode::Stuck(_)));
         let sticking = (0..self.grips.len()).filter(|&i| self.grips[i] == Grip::Stick);
-        let rows: Vec<(&Vector, bool)> = walls
-            .map(|i| (&machine.gaps[i].row, true))
-            .chain(sticking.map(|i| (&machine.friction[i].row, false)))
+        let rows: Vec<(&Vector, Option<usize>)> = walls
+            .map(|i| (&machine.gaps[i].row, None))
+            .chain(sticking.map(|i| (&machine.friction[i].row, Some(i))))
             .collect();
         let bonds = self.system.bonds(&rows.iter().map(|row| row.0).collect::<Vec<_>>());
-        rows.into_iter().zip(bonds).map(|((row, is_gap), bond)| (row.clone(), bond, is_gap)).collect()
+        rows.into_iter().zip(bonds).map(|((row, element), bond)| (row.clone(), bond, element)).collect()
     }
 
     /// Removes rates of what is at rest.
     pub(super) fn project(&mut self) {
         let (n, machine) = (self.system.degrees, &self.system.machine);
-        let sticking = (0..self.grips.len()).filter(|&i| self.grips[i] == Grip::Stick);
-        let speeds = sticking.map(|i| machine.friction[i].speed);
-        let at_rest = self.at_rest();
-        let walls = at_rest.iter().filter(|one| one.2).count();
-        let speeds: Vec<f64> = std::iter::repeat_n(0.0, walls).chain(speeds).collect();
-        for ((row, (change, _), _), speed) in at_rest.into_iter().zip(speeds) {
-            let rate = row.dot(&self.y.rows(n, n)) - speed;
+        for (row, (change, _), element) in self.at_rest() {
+            let rate = row.dot(&self.y.rows(n, n)) - element.map_or(0.0, |i| machine.friction[i].speed);
             let mut velocities = self.y.rows_mut(n, n);
             velocities -= change * rate;
         }
@@ -403,7 +429,7 @@ impl<'a> Motion<'a> {
 
     /// Integrates to a time within the present stage.
     pub(crate) fn run(&mut self, until: f64) -> Option<()> {
-        let n = self.system.degrees;
+        let (system, n) = (self.system, self.system.degrees);
         let mut events = 0u32;
         let (mut linear, mut flown) = (self.linear(), 0.0);
         while self.t < until {
@@ -418,8 +444,17 @@ impl<'a> Motion<'a> {
                 series.iter().rev().fold(Vector::zeros(self.y.len()), |sum, term| sum * share + term)
             };
             flown += share * h;
+            if self.gaps.iter().any(|gap| gap.contact().is_some()) {
+                self.meshing_time += share * h;
+            }
             if share > 0.0 {
-                self.y = if is_whole && found.is_none() { &linear.step.1 * &self.y } else { at(share) };
+                let to = if is_whole && found.is_none() { &linear.step.1 * &self.y } else { at(share) };
+                let moved = to.rows(0, n) - self.y.rows(0, n);
+                for (i, friction) in system.machine.friction.iter().enumerate() {
+                    let slid = friction.row.dot(&moved) - friction.speed * share * h;
+                    self.slid[i] += self.grips[i].sign() * slid;
+                }
+                self.y = to;
                 self.orders.fill(0);
                 for (gap, is_still) in self.gaps.iter_mut().zip(&linear.is_still) {
                     gap.is_unloaded = false;

@@ -1,16 +1,17 @@
 //! Dry friction in motions by matrix exponentials: closed forms, energy and limits.
 
-use nalgebra::{Matrix2, Vector2};
-use rattlemap_dynamics::model::{Contact, Friction, Law, Oscillator, Side, State, state};
+use nalgebra::{DVector, Matrix2, Vector2};
+use rattlemap_dynamics::model::{Contact, Friction, Law, Machine, Oscillator, Side, State, state};
 use std::f64::consts::PI;
 
 use super::cycle::settle;
-use super::motion::{ANGLE, Grip, Mode, Motion, System, What, distance};
-use super::random::{Case, Shape, case};
+use super::motion::{Mode, Motion, What};
+use super::random::apart;
+use super::system::{ANGLE, Grip, System};
 use crate::common::linear::Linear;
+use crate::independent::random::{Case, PLAIN, Shape, case};
 
-const SHAPE: Shape =
-    Shape { harmonics: false, stages: false, walls: false, pushing: false, friction: true, wide: false };
+const SHAPE: Shape = Shape { friction: true, ..PLAIN };
 
 /// Returns a mass of 1 on a spring without a damper and on a floor with friction.
 fn block(square: f64, force: f64, omega: f64, friction: f64, speed: f64) -> Oscillator {
@@ -18,8 +19,14 @@ fn block(square: f64, force: f64, omega: f64, friction: f64, speed: f64) -> Osci
     Oscillator { friction, ..Linear { gamma: 0.0, square, force, load: 0.0, omega }.oscillator() }
 }
 
-fn start<'a>(system: &'a System, state: State) -> Motion<'a> {
-    Motion::new(system, Law::both(0.0, 0.0), state, Mode::Free)
+/// Returns the system of an oscillator with impacts that take all energy.
+fn system(o: &Oscillator) -> System {
+    System::new(&Machine::of(o, Law::both(0.0, 0.0)), ANGLE)
+}
+
+/// Returns what happened at walls.
+fn events(motion: &Motion) -> Vec<(What, Side)> {
+    motion.events.iter().map(|event| (event.what, event.side)).collect()
 }
 
 /// Den Hartog 1931: with `r = omega / omega_n`, `a = P / k`, `f = F / k`, a turn at `x_m` and phase `phi` of the force,
@@ -50,9 +57,9 @@ fn motion_without_stops_is_that_of_den_hartog() {
         let halves = (-phase / PI).rem_euclid(2.0);
         let sign = if halves < 1.0 { 1.0 } else { -1.0 };
         let expected = x(halves.fract() * PI / omega).map(|x| sign * x);
-        let system = System::new(&block(square, force, omega, friction, 0.0), ANGLE);
-        let cycle = settle(&system, Law::both(0.0, 0.0), state(&[0.5, 0.1]), 1000).unwrap();
-        let off = distance(cycle.strobes[0].0, state(&[expected[0], expected[1], 0.0, 0.0]), omega);
+        let system = system(&block(square, force, omega, friction, 0.0));
+        let cycle = settle(&system, &[0.5, 0.1], 1000).unwrap();
+        let off = apart(&cycle.strobes[0].0, &expected, omega);
         let before = square * turn + friction - force * phase.cos();
         let (sin, cos) = (PI / r).sin_cos();
         let ratio = (before - 2.0 * friction) / before;
@@ -60,7 +67,7 @@ fn motion_without_stops_is_that_of_den_hartog() {
         let radius = half.complex_eigenvalues().map(|m| m.norm_sqr()).max();
         assert!(off < 1e-13, "r = {r}: off by {off:e}");
         assert!((cycle.radius - radius).abs() < 1e-12, "{} but {radius}", cycle.radius);
-        assert_eq!((cycle.word.time_order().as_str(), cycle.strobes.len()), ("00", 1));
+        assert_eq!((cycle.word.unwrap().time_order().as_str(), cycle.strobes.len()), ("00", 1));
     }
 }
 
@@ -69,7 +76,7 @@ fn motion_without_stops_is_that_of_den_hartog() {
 fn swings_shorten_by_twice_the_friction_over_the_stiffness() {
     let (square, friction) = (4.0, 0.52);
     let f = friction / square;
-    let system = System::new(&block(square, 0.0, 1.0, friction, 0.0), ANGLE);
+    let system = system(&block(square, 0.0, 1.0, friction, 0.0));
     for (x, v) in [(1.0f64, 0.0f64), (-0.9, 0.0), (0.1, 0.0), (0.0, 3.0), (0.3, -2.0)] {
         // The first turn is at the end of an arc about the first middle.
         let middle = -f * if v == 0.0 { -x.signum() } else { v.signum() };
@@ -81,12 +88,12 @@ fn swings_shorten_by_twice_the_friction_over_the_stiffness() {
             (turn, turns) = (next, turns + 1);
         }
         let reversals = (if v == 0.0 { turns.max(1) - 1 } else { turns }) as usize;
-        let mut motion = start(&system, state(&[x, v]));
+        let mut motion = Motion::new(&system, &[x, v]);
         let swing = if v == 0.0 { f64::from(turns) * PI / square.sqrt() } else { 20.0 };
         motion.run(swing + 1e-6).unwrap();
         assert_eq!((motion.grips[0], motion.symbols.len()), (Grip::Stick, reversals));
         assert!(motion.symbols.iter().all(|symbol| *symbol == b'0'));
-        let [at, rate, ..] = motion.state();
+        let [at, rate] = motion.state()[..] else { panic!() };
         assert!((at - turn).abs() < 1e-14 && rate == 0.0, "{at} but {turn}; {rate}");
         assert!((motion.slid[0] - length).abs() < 1e-13, "{} but {length}", motion.slid[0]);
         motion.run(40.0).unwrap();
@@ -98,8 +105,8 @@ fn swings_shorten_by_twice_the_friction_over_the_stiffness() {
 fn a_belt_carries_a_block_until_the_spring_is_stronger() {
     let (square, friction, speed) = (4.0f64, 0.6, 0.25);
     let (own, f) = (square.sqrt(), friction / square);
-    let system = System::new(&block(square, 0.0, 0.1, friction, speed), ANGLE);
-    let mut motion = start(&system, state(&[0.0, speed]));
+    let system = system(&block(square, 0.0, 0.1, friction, speed));
+    let mut motion = Motion::new(&system, &[0.0, speed]);
     let slip = f / speed;
     for i in 1..40 {
         let t = 0.09 * f64::from(i);
@@ -109,7 +116,7 @@ fn a_belt_carries_a_block_until_the_spring_is_stronger() {
             true => (Grip::Stick, speed * t, speed),
             false => (Grip::Minus, f + speed / own * sin, speed * cos),
         };
-        let [at, rate, ..] = motion.state();
+        let [at, rate] = motion.state()[..] else { panic!() };
         assert_eq!(
             (motion.grips[0], motion.symbols.as_slice()),
             (grip, if t < slip { &b""[..] } else { b"7" })
@@ -125,13 +132,13 @@ fn friction_holds_a_gap_on_a_rigid_wall() {
     for (friction, slips) in [(0.4f64, true), (1.1, false)] {
         let mut o = block(1e-9, 1.0, omega, friction, 0.0);
         (o.walls[0], o.contacts[0]) = (0.0, Contact::Rigid);
-        let system = System::new(&o, ANGLE);
-        let mut motion = start(&system, state(&[-1e-3, 0.2]));
+        let system = system(&o);
+        let mut motion = Motion::new(&system, &[-1e-3, 0.2]);
         motion.run(0.5 * PI / omega - 1e-6).unwrap();
-        assert_eq!((motion.mode, motion.grips[0]), (Mode::Stuck(Side::Right), Grip::Stick));
+        assert_eq!((motion.modes()[0], motion.grips[0]), (Mode::Stuck(Side::Right), Grip::Stick));
         motion.run(0.5 * PI / omega + 1e-6).unwrap();
-        let rest = (Mode::Free, Grip::Stick, vec![(What::Begins, Side::Right), (What::Ends, Side::Right)]);
-        assert_eq!((motion.mode, motion.grips[0], motion.events.clone()), rest);
+        let rest = (Mode::Plain, Grip::Stick, vec![(What::Begins, Side::Right), (What::Ends, Side::Right)]);
+        assert_eq!((motion.modes()[0], motion.grips[0], events(&motion)), rest);
         let slip = if slips { (-friction).acos() / omega } else { 1.5 * PI / omega };
         motion.run(slip - 1e-9).unwrap();
         assert_eq!((motion.grips[0], motion.symbols.as_slice()), (Grip::Stick, &b"1"[..]));
@@ -148,19 +155,20 @@ fn a_wall_takes_over_from_friction() {
         let mut o = block(1e-9, 1.0, 1.0, 0.4, 0.0);
         (o.walls[0], o.contacts[0]) = (0.0, contact);
         o.meshing[0].stiffness[0][0] = 100.0;
-        let system = System::new(&o.at_phase(1.45 * PI), ANGLE);
-        let mut motion = start(&system, state(&[-1e-3, 0.2]));
+        let system = system(&o.at_phase(1.45 * PI));
+        let mut motion = Motion::new(&system, &[-1e-3, 0.2]);
         let takeover = 0.55 * PI - 0.4f64.acos();
         motion.run(takeover - 1e-9).unwrap();
-        assert_eq!((motion.mode, motion.grips[0]), (Mode::Free, Grip::Stick));
-        assert_eq!((motion.events.as_slice(), motion.symbols.len()), (&[(What::Impact, Side::Right)][..], 0));
+        assert_eq!((motion.modes()[0], motion.grips[0]), (Mode::Plain, Grip::Stick));
+        assert_eq!((events(&motion), motion.symbols.len()), (vec![(What::Impact, Side::Right)], 0));
         motion.run(takeover + 1e-9).unwrap();
         // A gap at rest on a rigid wall has not slid.
         let expected = match contact {
-            Contact::Rigid => (Mode::Stuck(Side::Right), Grip::Stick, &b"2"[..]),
-            _ => (Mode::Sustained(Side::Right), Grip::Plus, &b"72"[..]),
+            Contact::Rigid => (Mode::Stuck(Side::Right), 0, Grip::Stick, &b"2"[..]),
+            _ => (Mode::Plain, 1, Grip::Plus, &b"72"[..]),
         };
-        assert_eq!((motion.mode, motion.grips[0], motion.symbols.as_slice()), expected);
+        let found = (motion.modes()[0], motion.acting(0), motion.grips[0], motion.symbols.as_slice());
+        assert_eq!(found, expected);
     }
 }
 
@@ -173,7 +181,7 @@ fn energy(o: &Oscillator, y: State) -> f64 {
 /// Checks directions, and that the forces which make elements stick are small enough.
 fn check_grips(o: &Oscillator, motion: &Motion) {
     let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
-    let (per_mass, y) = (matrix(o.mass).try_inverse().unwrap(), motion.state());
+    let (per_mass, y) = (matrix(o.mass).try_inverse().unwrap(), state(&motion.state()));
     let (x, v) = (Vector2::new(y[0], y[2]), Vector2::new(y[1], y[3]));
     let mut forces = -matrix(o.free.stiffness) * x;
     let rows: Vec<_> = o.friction.iter().map(|friction| Vector2::from(friction.row)).collect();
@@ -215,13 +223,15 @@ fn friction_does_the_work_that_is_lost() {
         o.friction
             .iter_mut()
             .for_each(|friction| (friction.force, friction.speed) = (0.2 * friction.force, 0.0));
-        let system = System::new(o, ANGLE);
-        let mut motion = Motion::new(&system, law, start, Mode::Free);
+        let o = &oscillator;
+        let whole = Case { oscillator: o.clone(), law, start }.machine();
+        let system = System::new(&whole.machine, ANGLE);
+        let mut motion = Motion::new(&system, &whole.start);
         for i in 1..100 {
             motion.run(0.05 * f64::from(i)).unwrap();
             check_grips(o, &motion);
-            let lost = energy(o, start) - energy(o, motion.state());
-            let work: f64 = o.friction.iter().zip(motion.slid).map(|(one, slid)| one.force * slid).sum();
+            let lost = energy(o, start) - energy(o, state(&motion.state()));
+            let work: f64 = o.friction.iter().zip(&motion.slid).map(|(one, slid)| one.force * slid).sum();
             assert!((lost - work).abs() < 1e-12 * energy(o, start), "{seed}: lost {lost}, work {work}");
         }
         if o.friction.len() == 2 {
@@ -233,6 +243,7 @@ fn friction_does_the_work_that_is_lost() {
     assert!(slips > 20 && rests > 5, "{slips}, {rests}");
 }
 
+/// Friction below 1e-12 of other forces is rounding for the integrator.
 #[test]
 fn small_friction_changes_little() {
     let mut worst = 0.0f64;
@@ -241,18 +252,21 @@ fn small_friction_changes_little() {
         oscillator
             .friction
             .iter_mut()
-            .for_each(|friction| (friction.force, friction.speed) = (1e-11 * friction.force, 0.0));
+            .for_each(|friction| (friction.force, friction.speed) = (1e-10 * friction.force, 0.0));
         let without = Oscillator { friction: Vec::new(), ..oscillator.clone() };
-        let ends = [&oscillator, &without].map(|o| {
-            let system = System::new(o, ANGLE);
-            let mut motion = Motion::new(&system, law, start, Mode::Free);
+        let omega = oscillator.omega;
+        let ends = [oscillator, without].map(|oscillator| {
+            let whole = Case { oscillator, law, start }.machine();
+            let system = System::new(&whole.machine, ANGLE);
+            let mut motion = Motion::new(&system, &whole.start);
             motion.advance_period().and_then(|()| motion.advance_period()).unwrap();
-            (motion.state(), motion.events.clone())
+            (motion.state(), events(&motion))
         });
-        worst = worst.max(distance(ends[0].0, ends[1].0, oscillator.omega));
+        worst = worst.max(apart(&ends[0].0, &ends[1].0, omega));
         assert_eq!(ends[0].1, ends[1].1, "{seed}");
     }
-    assert!(worst < 1e-9, "{worst:e}");
+    println!("off by {worst:e}");
+    assert!(worst < 3e-9, "{worst:e}");
 }
 
 /// Differences of motions from neighbouring starts that slide.
@@ -261,11 +275,12 @@ fn tangents_are_limits_of_differences() {
     let mut found = [0; 3];
     for seed in 0..300 {
         let case = case(seed, Shape { stages: seed % 2 == 0, harmonics: seed % 3 == 0, ..SHAPE });
-        let system = System::new(&case.oscillator, ANGLE);
-        let mut motion = Motion::new(&system, case.law, case.start, Mode::Free);
+        let whole = case.machine();
+        let system = System::new(&whole.machine, ANGLE);
+        let mut motion = Motion::new(&system, &whole.start);
         (0..5).try_for_each(|_| motion.advance_period()).unwrap();
         let count = case.oscillator.friction.len();
-        if motion.mode != Mode::Free || motion.grips[..count].contains(&Grip::Stick) {
+        if motion.acting(0) != 0 || motion.is_at_rest() {
             continue;
         }
         motion.clear();
@@ -273,9 +288,9 @@ fn tangents_are_limits_of_differences() {
         let image = |mut motion: Motion, i: usize, h: f64| {
             let mut y = motion.state();
             y[i] += h;
-            motion.set_state(y);
+            motion.set_state(&y);
             motion.advance_period().unwrap();
-            (motion.vector(), motion.tangents.unwrap(), motion.symbols)
+            (DVector::from_vec(motion.state()), motion.derivative(), motion.symbols)
         };
         let (_, exact, symbols) = image(motion.clone(), 0, 0.0);
         let size = exact.amax().max(1.0);
