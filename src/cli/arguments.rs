@@ -706,8 +706,8 @@ impl Explore {
 
 /// List the models, or describe one of them
 ///
-/// Without a name: one line per built-in model. With a name or a file: equations, contact laws, parameters with defaults
-/// and ranges, symbols of words, classes, statuses, source.
+/// Without a name: one line per built-in model. With a name or a file: equations, walls and their contact laws,
+/// parameters with defaults and ranges, source.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     rattlemap models gear-pair\n  \
