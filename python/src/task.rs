@@ -30,7 +30,8 @@ pub(crate) fn request(
         known.ok_or_else(|| Problem::engine(format!("unknown precision {name:?}; it must be f32 or f64")))
     };
     let on = |text: &str| {
-        text.parse().map_err(|error: AdapterTextError| Problem::engine(format!("the adapter {text:?}: {error}")))
+        text.parse()
+            .map_err(|error: AdapterTextError| Problem::engine(format!("the adapter {text:?}: {error}")))
     };
     let request = EngineRequest {
         kind: engine.parse()?,

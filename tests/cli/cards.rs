@@ -72,7 +72,10 @@ impl Machine {
         let program = assert_cmd::cargo::cargo_bin("rattlemap");
         let mut run = Process::new("sh");
         run.current_dir(path).envs(self.environment()).args(["-c", &job]);
-        run.env("PATH", format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap()));
+        run.env(
+            "PATH",
+            format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap()),
+        );
         if let Some(fault) = fault {
             run.env("VK_LAYER_PATH", path).env("VK_INSTANCE_LAYERS", "VK_LAYER_RATTLEMAP_faults");
             run.env("RATTLEMAP_FAULT", fault);
@@ -147,7 +150,9 @@ fn each_card_computes_a_shard_and_a_lost_card_loses_nothing_else() {
         let said = String::from_utf8_lossy(&lost.stderr);
         assert!(!lost.status.success() && !said.contains("panicked"), "{said}");
         for (shard, adapter) in [(1, 0), (2, 1)] {
-            let go_on = format!("--out out/e_omega.shard-{shard}-of-2 --engine gpu --adapter {adapter} --resume");
+            let go_on = format!(
+                "--out out/e_omega.shard-{shard}-of-2 --engine gpu --shard {shard}/2 --adapter {adapter} --resume"
+            );
             assert!(said.contains(&go_on), "{said}");
         }
         assert!(!machine.file("out/e_omega", "").exists());
