@@ -91,15 +91,6 @@ fn any_number_of_shards_makes_the_same_map() {
     }
 }
 
-#[test]
-fn shards_of_lanes_make_the_map_of_one_run() {
-    let folder = folder();
-    let lanes = "--engine gpu --set axis.0.count=9 --set axis.1.count=7";
-    map(&folder, &format!("{lanes} --quiet --out whole")).success();
-    merged(&folder, 2, &format!("{lanes} --precision f32"));
-    assert_same(&folder);
-}
-
 /// Rows that follow their neighbours, several starts, basins.
 #[test]
 fn cells_that_depend_on_each_other_stay_together() {
