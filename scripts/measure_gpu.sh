@@ -13,7 +13,6 @@
 #     brute       the main map with SIDE x SIDE cells and without early stops
 #     own_flow    as many cells, each with its own flow: meshing stiffness against frequency
 #     adaptive    the adaptive map of the main plane, classes only
-#     cards       the map of brute on all equal cards, if there are several
 #     latency     four lanes, for as many periods as the slowest lane of a map may take
 #     compile     the time from start to files of 2 x 2 cells, with an empty shader cache (cold) and with a filled one (warm)
 #     engines     the main plane on every engine, from 10^3 lanes (`rattlemap bench engines`): utilisation of the device,
@@ -39,7 +38,7 @@ binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
 steps=("${@:4}")
-all=(right main classes brute own_flow adaptive cards latency compile engines again)
+all=(right main classes brute own_flow adaptive latency compile engines again)
 ((${#steps[@]})) || steps=("${all[@]}")
 for step in "${steps[@]}"; do
     [[ " ${all[*]} " == *" $step "* ]] || { echo "error: there is no step $step; the steps are ${all[*]}" >&2; exit 2; }
@@ -107,7 +106,6 @@ if [[ "$adapter" != gpu:* ]]; then
 fi
 WGPU_ADAPTER_NAME="$(sed -n '1s/^gpu: //p' <<<"$adapter")"
 export WGPU_ADAPTER_NAME
-cards="$(grep -cxF -- "gpu: $WGPU_ADAPTER_NAME" "$out/devices.txt")"
 
 precisions=()
 for precision in ${PRECISIONS:-f32 f64}; do
@@ -211,7 +209,6 @@ settings() {
         main) ((side >= 512)) || square "$side" ;;
         classes) square "$side" && sets+=("${classes[@]}") ;;
         brute) square "$side" && sets+=(--set integration.early_stop=false) ;;
-        cards) square "$side" && sets+=(--set integration.early_stop=false --adapter all) ;;
         own_flow)
             square "$side"
             sets+=("${classes[@]}" --set e=0.6 --set axis.0.parameter=k --set axis.0.min=500 --set axis.0.max=2000)
@@ -340,7 +337,6 @@ for step in "${steps[@]}"; do
             for precision in "${precisions[@]}"; do
                 case $step in
                     right | compile) "$step" "$precision" ;;
-                    cards) ((cards < 2)) || { settings cards && timed cards "$precision" 1 "${sets[@]}"; } ;;
                     *) settings "$step" && timed "$step" "$precision" 1 "${sets[@]}" ;;
                 esac
                 summary

@@ -1,48 +1,14 @@
-//! Forcing periods per second of lanes, and of two other variants of their shader. See `README.md`.
+//! Forcing periods per second of lanes. See `README.md`.
 
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use rattlemap::gpu::{AdapterChoice, Features, Gpu, Lane, LaneSettings, Precision, is_hardware};
-use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST};
 use rattlemap_dynamics::reference::machine::{Motion, System};
 
 use rattlemap::cli::bench::spread::Spread;
-use rattlemap_bench::shapes::{CHAINS, Chain, SHAPES, Shape};
-
-/// Returns a variant of the shader.
-type Rewrite = fn(String) -> String;
-
-/// Variants that must give equal results: the shader as it is, one that searches events inside the loop over steps, and one
-/// that leaves constants in storage.
-const VARIANTS: [(&str, Rewrite); 3] = [("as it is", |source| source), ("naive", naive), ("stored", stored)];
-
-/// Searches events at each step.
-fn naive(source: String) -> String {
-    let one_step = replace(
-        &source,
-        "        if iterations >= settings.iterations {\n            verdict = SCAN_BUDGET;",
-        "        if step_count > 0u {\n            verdict = 2u;\n            break;\n        }\n        \
-         if iterations >= settings.iterations {\n            verdict = SCAN_BUDGET;",
-    );
-    replace(
-        &one_step,
-        "        if scan() == SCAN_BUDGET {\n            break;\n        }\n",
-        "        let verdict = scan();\n        if verdict == SCAN_BUDGET {\n            break;\n        }\n        \
-         if verdict == 2u {\n            continue;\n        }\n",
-    )
-}
-
-/// Reads constants from storage, without a copy in the lane.
-fn stored(source: String) -> String {
-    replace(&source, "const KEEP: bool = true;", "const KEEP: bool = false;")
-}
-
-fn replace(text: &str, from: &str, to: &str) -> String {
-    assert!(text.contains(from), "the shader has no {from}");
-    text.replace(from, to)
-}
+use rattlemap_bench::shapes::{CHAINS, Chain};
 
 /// Sizes of one run.
 struct Size {
@@ -50,14 +16,12 @@ struct Size {
     side: u32,
     /// Periods per cell.
     periods: u32,
-    /// Number of runs of each variant. The median is printed.
+    /// Number of runs. The median is printed.
     runs: usize,
     /// Measured precisions.
     precisions: &'static [Precision],
     /// Whether lanes compute exponents, for each measurement.
     exponents: &'static [bool],
-    /// Shapes of oscillators.
-    shapes: &'static [Shape],
     /// Shapes of machines.
     chains: &'static [Chain],
 }
@@ -68,19 +32,11 @@ fn size() -> Size {
     match measured {
         true => {
             let (precisions, exponents) = (&Precision::ALL, &[false, true]);
-            Size { side: 48, periods: 100, runs: 5, precisions, exponents, shapes: &SHAPES, chains: &CHAINS }
+            Size { side: 48, periods: 100, runs: 5, precisions, exponents, chains: &CHAINS }
         }
         false => {
             let (precisions, exponents) = (&[Precision::F32], &[false]);
-            Size {
-                side: 3,
-                periods: 3,
-                runs: 1,
-                precisions,
-                exponents,
-                shapes: &SHAPES[..1],
-                chains: &CHAINS[..1],
-            }
+            Size { side: 3, periods: 3, runs: 1, precisions, exponents, chains: &CHAINS[..1] }
         }
     }
 }
@@ -105,70 +61,20 @@ impl Plane {
         Plane { flows: flows.collect(), laws: laws.collect(), lanes }
     }
 
-    /// Integrates every cell. Returns the seconds and the records.
-    fn run(&self, gpu: &mut Gpu, size: &Size, exponent: bool) -> (f64, Vec<Record>) {
+    /// Integrates every cell. Returns the seconds.
+    fn run(&self, gpu: &mut Gpu, size: &Size, exponent: bool) -> f64 {
         let settings = LaneSettings::only(size.periods);
         let features = self.flows.iter().map(Features::of).fold(settings.features, Features::and);
         let settings = LaneSettings { exponent, features, ..settings };
         let start = Instant::now();
         let run = gpu.run(&self.flows, &self.laws, &self.lanes, &settings);
-        let records = pollster::block_on(run).expect("the device runs the lanes");
-        (start.elapsed().as_secs_f64(), records)
+        pollster::block_on(run).expect("the device runs the lanes");
+        start.elapsed().as_secs_f64()
     }
 }
 
-fn open(precision: Precision, rewrite: Rewrite) -> Gpu {
-    let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).expect("an adapter");
-    gpu.rewrite_shaders(rewrite);
-    gpu
-}
-
-/// Returns the seconds of each variant. They run alternately, so that changes of the machine's speed affect all of them.
-fn seconds(plane: &Plane, size: &Size, gpus: &mut [Gpu], exponent: bool) -> Vec<f64> {
-    for gpu in gpus.iter_mut() {
-        // Compiles the shader.
-        plane.run(gpu, &Size { periods: 1, ..*size }, exponent);
-    }
-    let mut times = vec![Vec::new(); gpus.len()];
-    for _ in 0..size.runs {
-        for (times, gpu) in times.iter_mut().zip(gpus.iter_mut()) {
-            times.push(plane.run(gpu, size, exponent).0);
-        }
-    }
-    times.into_iter().map(|times| Spread::of(times).median).collect()
-}
-
-/// Times lanes by the shape of their oscillators. Shapes run by turns.
-fn by_shape(plane: &Plane, size: &Size) {
-    let shaped = |shape: &Shape| Plane {
-        flows: plane.flows.iter().map(|flow| shape.of(flow)).collect(),
-        laws: plane.laws.clone(),
-        lanes: plane.lanes.clone(),
-    };
-    let planes: Vec<Plane> = size.shapes.iter().map(shaped).collect();
-    let lane_periods = plane.lanes.len() as f64 * f64::from(size.periods);
-    for &precision in size.precisions {
-        println!("{precision:?}, by shape");
-        let mut gpu = open(precision, |source| source);
-        for plane in &planes {
-            // Compiles the shader.
-            plane.run(&mut gpu, &Size { periods: 1, ..*size }, false);
-        }
-        let mut times = vec![Vec::new(); planes.len()];
-        for _ in 0..size.runs {
-            for (times, plane) in times.iter_mut().zip(&planes) {
-                times.push(plane.run(&mut gpu, size, false).0);
-            }
-        }
-        let times: Vec<f64> = times.into_iter().map(|times| Spread::of(times).median).collect();
-        for (time, shape) in times.iter().zip(size.shapes) {
-            let (cost, ratio) = (1e6 * time / lane_periods, time / times[0]);
-            println!(
-                "  {:<34} {cost:8.2} us per lane-period, {ratio:.2} times the time of the first",
-                shape.name()
-            );
-        }
-    }
+fn open(precision: Precision) -> Gpu {
+    pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).expect("an adapter")
 }
 
 /// Returns the processor time of all threads for some work, in seconds. It is less noisy than elapsed time.
@@ -191,7 +97,7 @@ fn on_reference(systems: &[System], periods: u32) -> u64 {
 /// Prints a table of the times of machines by shape, on the reference and on lanes. Both compute the same cells by turns.
 fn of_machines(size: &Size, on_lanes: bool) {
     let precisions = if on_lanes { size.precisions } else { &[] };
-    let mut gpus: Vec<_> = precisions.iter().map(|&precision| open(precision, |source| source)).collect();
+    let mut gpus: Vec<_> = precisions.iter().map(|&precision| open(precision)).collect();
     println!(
         "{0} x {0} cells, {1} periods from rest, median of {2} runs",
         size.side, size.periods, size.runs
@@ -217,7 +123,7 @@ fn of_machines(size: &Size, on_lanes: bool) {
             times[0].push(processor_seconds(|| events = on_reference(&systems, size.periods)));
             for (times, gpu) in times[1..].iter_mut().zip(&mut gpus) {
                 let mut elapsed = 0.0;
-                let of_processor = processor_seconds(|| elapsed = plane.run(gpu, size, false).0);
+                let of_processor = processor_seconds(|| elapsed = plane.run(gpu, size, false));
                 times.push(if is_hardware(gpu.adapter()) { elapsed } else { of_processor });
             }
         }
@@ -240,25 +146,16 @@ fn main() {
         return of_machines(&Size { side, periods, ..size }, !is_given("reference"));
     }
     let plane = Plane::new(size.side);
-    if is_given("shapes") {
-        return by_shape(&plane, &size);
-    }
     let lane_periods = plane.lanes.len() as f64 * f64::from(size.periods);
     println!("{0} x {0} cells, {1} periods from rest, median of {2}", size.side, size.periods, size.runs);
     for &precision in size.precisions {
+        let mut gpu = open(precision);
         for &exponent in size.exponents {
-            println!("{precision:?}, exponent {exponent}");
-            let mut gpus: Vec<_> = VARIANTS.iter().map(|&(_, rewrite)| open(precision, rewrite)).collect();
-            let times = seconds(&plane, &size, &mut gpus, exponent);
-            for (time, (name, _)) in times.iter().zip(VARIANTS) {
-                println!(
-                    "  {name:<9} {:8.0} lane-periods/s, {:.2} times the time of the first",
-                    lane_periods / time,
-                    time / times[0],
-                );
-            }
-            let results: Vec<_> = gpus.iter_mut().map(|gpu| plane.run(gpu, &size, exponent).1).collect();
-            assert!(results.iter().all(|other| *other == results[0]), "the results of the variants differ");
+            // Compiles the shader.
+            plane.run(&mut gpu, &Size { periods: 1, ..size }, exponent);
+            let times = (0..size.runs).map(|_| plane.run(&mut gpu, &size, exponent)).collect();
+            let rate = lane_periods / Spread::of(times).median;
+            println!("{precision:?}, exponent {exponent}: {rate:8.0} lane-periods/s");
         }
     }
 }

@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use rattlemap_bench::shapes::{CHAINS, SHAPES};
+use rattlemap_bench::shapes::CHAINS;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST, State, state};
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
@@ -139,32 +139,6 @@ fn per_period_of_a_map(c: &mut Criterion) {
     group.finish();
 }
 
-/// Times one motion with further harmonics, stages and walls.
-fn per_period_by_shape(c: &mut Criterion) {
-    let size = size();
-    let cells = grid(size.side, [4.5, 12.0]);
-    let mut group = c.benchmark_group("per period, by shape");
-    group.throughput(Throughput::Elements(cells.len() as u64 * size.periods));
-    group.sample_size(10);
-    for shape in SHAPES {
-        let shaped: Vec<_> = cells
-            .iter()
-            .map(|Cell { pair, .. }| {
-                let flow = Flow::new(&shape.of(&pair.oscillator().expect("valid parameters")));
-                Cell { pair: *pair, flow }
-            })
-            .collect();
-        let start = trajectories_of(&shaped, size.transient, []);
-        let work = |trajectories: &mut Vec<Trajectory<'_, 0>>| {
-            trajectories.iter_mut().for_each(|trajectory| advance(trajectory, size.periods));
-        };
-        group.bench_function(shape.name(), |b| {
-            b.iter_batched_ref(|| start.clone(), work, BatchSize::LargeInput)
-        });
-    }
-    group.finish();
-}
-
 /// Times chains of masses on the engine of machines.
 fn per_period_of_machines(c: &mut Criterion) {
     let size = size();
@@ -198,7 +172,7 @@ criterion_group! {
     name = benches;
     // Plots would need fonts of the system.
     config = Criterion::default().without_plots();
-    targets = per_period, per_period_with_tangent, per_event, per_period_of_a_map, per_period_by_shape,
+    targets = per_period, per_period_with_tangent, per_event, per_period_of_a_map,
         per_period_of_machines, flow
 }
 criterion_main!(benches);

@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
-use rattlemap_bench::stress::Part;
 use rattlemap_bench::work_precision::measure::Method;
 
-/// Instruments of rattlemap: numerical stress, run time against error, scale, cost of the host.
+/// Instruments of rattlemap: run time against error, cost of the host.
 ///
 /// Each writes tables (CSV), figures (PNG) and manifest.json to a folder of its own.
 #[derive(Debug, Parser)]
@@ -19,8 +18,6 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Instrument {
     WorkPrecision(WorkPrecision),
-    Stress(Stress),
-    Scale(Scale),
     HostCost(HostCost),
     Machines(Machines),
 }
@@ -53,52 +50,10 @@ pub(crate) struct WorkPrecision {
     pub(crate) peers: Option<PathBuf>,
 }
 
-/// Long runs, impacts, grazing, chatter, stiff meshing, coarse grids and random parameters on every engine
-#[derive(Debug, Args)]
-pub(crate) struct Stress {
-    #[command(flatten)]
-    pub(crate) run: Options,
-
-    /// Part to run; can be repeated [default: all]. fuzz, random parameters, takes longest
-    #[arg(long = "part", value_name = "NAME", value_parser = |text: &str| named(&Part::ALL, text))]
-    pub(crate) parts: Vec<Part>,
-}
-
 fn named<T: Copy>(all: &[(T, &'static str)], text: &str) -> Result<T, String> {
     let found = all.iter().find(|(_, name)| *name == text).map(|(item, _)| *item);
     let names: Vec<&str> = all.iter().map(|(_, name)| *name).collect();
     found.ok_or_else(|| format!("it must be one of {}", names.join(", ")))
-}
-
-/// Seconds, memory and disk space of a large map in merged shards, without its integration
-///
-/// Integrates a small map on the processor and makes the records of the large map from it, with small changes. Writes the
-/// shards and merges them. scale.csv has the seconds and the largest memory of each phase, files.csv the sizes of files.
-/// 10^7 cells take one or two minutes and about 3 GB of disk space.
-#[derive(Debug, Args)]
-pub(crate) struct Scale {
-    #[command(flatten)]
-    pub(crate) run: Options,
-
-    /// Number of cells along the first axis
-    #[arg(long, value_name = "N", default_value_t = 3162, value_parser = clap::value_parser!(u32).range(2..=100_000))]
-    pub(crate) columns: u32,
-
-    /// Number of cells along the second axis
-    #[arg(long, value_name = "N", default_value_t = 3163, value_parser = clap::value_parser!(u32).range(2..=100_000))]
-    pub(crate) rows: u32,
-
-    /// Number of shards
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    pub(crate) shards: u32,
-
-    /// Number of merges
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
-    pub(crate) rounds: u32,
-
-    /// Request every quantity instead of class and exponent
-    #[arg(long)]
-    pub(crate) all: bool,
 }
 
 /// Time that a map costs the host, by phase, and the work that a device receives
@@ -127,15 +82,8 @@ pub(crate) struct HostCost {
     pub(crate) all: bool,
 
     /// Compute lanes on the best graphics device, in f32, instead of the reference on the processor
-    #[arg(long, conflicts_with = "scaling")]
-    pub(crate) gpu: bool,
-
-    /// Measure how maps of cheap and of expensive cells scale with the number of threads instead
-    ///
-    /// Computes both with one thread and with all, and the serial part by Amdahl's law. Simulates 64 cores with the measured
-    /// costs. Writes scaling.csv. The map of expensive cells is the main map with an eighth of the columns and rows.
     #[arg(long)]
-    pub(crate) scaling: bool,
+    pub(crate) gpu: bool,
 }
 
 /// Time of the reference on a chain of masses, whose cells other programs read

@@ -2,6 +2,4 @@
 
 pub(crate) mod host_cost;
 pub(crate) mod machines;
-pub(crate) mod scale;
-pub(crate) mod stress;
 pub(crate) mod work_precision;

@@ -1,6 +1,6 @@
 //! What a map costs the host: time by phase, and the work that a device receives.
 //!
-//! If every motion of the map is contact-free, it ends after one forcing period, so that lanes cost next to nothing and the
+//! Every motion of the map is contact-free and ends after one forcing period, so that lanes cost next to nothing and the
 //! host's work remains.
 
 use std::path::Path;
@@ -19,9 +19,7 @@ use rattlemap::store::folder::Folder;
 use crate::phase::{self, Cost};
 
 /// Amplitude of the force for which the teeth move by a small part of the backlash.
-pub const CONTACT_FREE: f64 = 1e-3;
-/// Amplitude of the force of the main map.
-pub const RATTLING: f64 = 50.0;
+const CONTACT_FREE: f64 = 1e-3;
 
 /// Cells that the engine alone computes at once.
 const BATCH: usize = 1 << 16;
@@ -35,17 +33,15 @@ pub struct HostCost {
     pub phases: Vec<Cost>,
     /// Work that the device has received. None for maps of the processor.
     pub traffic: Option<Traffic>,
-    /// Forcing periods of each cell, in the order in which cells are computed.
-    pub periods: Vec<u32>,
 }
 
-/// Computes and writes a map of `counts` cells under a force of this amplitude, of class and exponent or of `all` quantities.
+/// Computes and writes a map of `counts` cells, of class and exponent or of `all` quantities.
 ///
 /// # Errors
 /// If the engine cannot be opened or fails, a file cannot be written, or a contact-free motion does not end after one
 /// period.
-pub fn run(counts: [u32; 2], force: f64, all: bool, engine: EngineRequest, out: &Path) -> Result<HostCost> {
-    let scene = scene(counts, force, all)?;
+pub fn run(counts: [u32; 2], all: bool, engine: EngineRequest, out: &Path) -> Result<HostCost> {
+    let scene = scene(counts, all)?;
     let job = MapJob::new(&scene, engine);
     let folder = Folder::open(out, true)?;
     let mut phases = Vec::new();
@@ -61,19 +57,18 @@ pub fn run(counts: [u32; 2], force: f64, all: bool, engine: EngineRequest, out: 
     phase::run("write", &mut phases, || map.write())?;
     let cells = map.cells().count();
     let of = |place| map.cells().record(plan.run_at(place) as usize).periods_run;
-    let periods: Vec<u32> = (0..cells).map(of).collect();
-    if force <= CONTACT_FREE && periods.iter().any(|&periods| periods > 2) {
+    if (0..cells).map(of).any(|periods| periods > 2) {
         bail!("a contact-free cell took more than two forcing periods");
     }
-    Ok(HostCost { cells, phases, traffic, periods })
+    Ok(HostCost { cells, phases, traffic })
 }
 
 /// Computes all cells of the same map with the processor's engine alone, and drops their records.
 ///
 /// # Errors
 /// If the engine fails.
-pub fn alone(counts: [u32; 2], force: f64, all: bool) -> Result<Cost> {
-    let scene = scene(counts, force, all)?;
+pub fn alone(counts: [u32; 2], all: bool) -> Result<Cost> {
+    let scene = scene(counts, all)?;
     let plan = Plan::new(&scene);
     let (mut engine, cells) = (Engine::Cpu(Cpu::new(&plan)), plan.cells(0..plan.run_count()));
     let mut compute = || {
@@ -91,10 +86,10 @@ pub fn alone(counts: [u32; 2], force: f64, all: bool) -> Result<Cost> {
     Ok(costs.remove(0))
 }
 
-/// Builds the scene of a map under a force of this amplitude, of class and exponent or of `all` quantities.
-fn scene(counts: [u32; 2], force: f64, all: bool) -> Result<Scene> {
+/// Builds the scene of a map, of class and exponent or of `all` quantities.
+fn scene(counts: [u32; 2], all: bool) -> Result<Scene> {
     use Quantity::{Class, Impacts, Lyapunov, Mesh, Pattern, Symmetric, Word};
-    let model = GearPair { force, ..GearPair::paper(0.5) };
+    let model = GearPair { force: CONTACT_FREE, ..GearPair::paper(0.5) };
     let builder = Scene::builder(model).axis("e", 0.0..=1.0, counts[0]).axis("omega", 1.0..=12.0, counts[1]);
     let everything = [Class, Lyapunov, Impacts, Mesh, Symmetric, Word, Pattern];
     Ok(if all { builder.quantities(&everything) } else { builder }.build()?)

@@ -3,8 +3,6 @@
 pub mod host_cost;
 pub mod machines;
 pub mod phase;
-pub mod scale;
-pub mod scaling;
 pub mod shapes;
 pub mod stress;
 pub mod work_precision;

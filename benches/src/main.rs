@@ -6,7 +6,7 @@ mod commands;
 use std::process::ExitCode;
 
 use arguments::{Cli, Instrument};
-use commands::{host_cost, machines, scale, stress, work_precision};
+use commands::{host_cost, machines, work_precision};
 
 fn main() -> ExitCode {
     let cli = match rattlemap::cli::parsed::<Cli>() {
@@ -15,9 +15,7 @@ fn main() -> ExitCode {
     };
     let result = match cli.instrument {
         Instrument::WorkPrecision(arguments) => work_precision::run(&arguments),
-        Instrument::Stress(arguments) => stress::run(&arguments),
         Instrument::HostCost(arguments) => host_cost::run(&arguments),
-        Instrument::Scale(arguments) => scale::run(&arguments),
         Instrument::Machines(arguments) => machines::run(&arguments),
     };
     result.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)

@@ -18,7 +18,7 @@ from .terms import in_python
 
 Engine = Literal["auto", "cpu", "gpu"]
 Precision = Literal["f32", "f64"]
-#: A graphics adapter: its number in :func:`rattlemap.devices`, a part of its name that no other has, or "all" equal ones.
+#: A graphics adapter: its number in :func:`rattlemap.devices`, or a part of its name that no other has.
 Adapter = int | str
 
 

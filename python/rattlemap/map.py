@@ -53,7 +53,6 @@ def map(  # noqa: A001
         ``"f32"`` or ``"f64"``. By default f32 on a GPU and f64 on the processor.
     adapter
         A graphics adapter: its number in :func:`rattlemap.devices`, or a part of its name that no other adapter has.
-        ``"all"``: all adapters equal to the best one share the cells. The records are the same to the bit.
     quantities
         Some of ``class lyapunov impacts mesh symmetric word pattern impact_speed impact_speed_max impact_energy impact_rate
         contact_force_max contact_force_rms amplitude rms harmonic dissipated multiplier

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::thread;
 
 use rattlemap::gpu::Precision;
-use rattlemap::job::engine_choice::{self, EngineRequest};
+use rattlemap::job::engine_choice::{self, AdapterTextError, EngineRequest};
 use rattlemap::job::map::{MapJob, MapRun};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::Scene;
@@ -29,16 +29,14 @@ pub(crate) fn request(
         let known = Precision::ALL.into_iter().find(|precision| precision.name() == name);
         known.ok_or_else(|| Problem::engine(format!("unknown precision {name:?}; it must be f32 or f64")))
     };
-    if let Some(text) = adapter.filter(|text| text.trim().is_empty()) {
-        return Err(Problem::engine(format!(
-            "the adapter {text:?}: it must be a number or part of a name that `rattlemap devices` lists, or all"
-        )));
-    }
+    let on = |text: &str| {
+        text.parse()
+            .map_err(|error: AdapterTextError| Problem::engine(format!("the adapter {text:?}: {error}")))
+    };
     let request = EngineRequest {
         kind: engine.parse()?,
         precision: precision.map(named).transpose()?,
-        // Parsing never fails: a text that is no number is a name.
-        adapter: adapter.and_then(|text| text.parse().ok()),
+        adapter: adapter.map(on).transpose()?,
     };
     engine_choice::check(&request)?;
     Ok(request)

@@ -161,7 +161,7 @@ pub(crate) struct Engines {
 
     /// Measure this graphics adapter only: its number in `rattlemap devices`, or a unique part of its name, driver or PCI
     /// address [default: all adapters; only the first of several equal cards]
-    #[arg(long, value_name = "N|NAME", value_parser = adapter)]
+    #[arg(long, value_name = "N|NAME")]
     pub(crate) adapter: Option<AdapterRequest>,
 }
 
@@ -436,10 +436,9 @@ pub(crate) struct EngineOptions {
     #[arg(long, value_name = "PRECISION", value_parser = precision)]
     pub(crate) precision: Option<Precision>,
 
-    /// Graphics adapter: its number in `rattlemap devices`, or a unique part of its name, driver or PCI address. `all`
-    /// uses all cards with the model and driver of the first one; their records are identical. This option overrides
-    /// WGPU_ADAPTER_NAME. Example: --adapter 1
-    #[arg(long, value_name = "N|NAME|all", value_parser = adapter)]
+    /// Graphics adapter: its number in `rattlemap devices`, or a unique part of its name, driver or PCI address.
+    /// This option overrides WGPU_ADAPTER_NAME. Example: --adapter 1
+    #[arg(long, value_name = "N|NAME")]
     pub(crate) adapter: Option<AdapterRequest>,
 }
 
@@ -458,13 +457,6 @@ impl EngineOptions {
 fn precision(text: &str) -> Result<Precision, String> {
     let named = Precision::ALL.into_iter().find(|precision| precision.name() == text);
     named.ok_or_else(|| "it must be f32 or f64".to_owned())
-}
-
-fn adapter(text: &str) -> Result<AdapterRequest, String> {
-    let adapter = (!text.trim().is_empty()).then(|| text.parse().ok()).flatten();
-    adapter.ok_or_else(|| {
-        "it must be a number or part of a name that `rattlemap devices` lists, or all".to_owned()
-    })
 }
 
 /// Engines by name.
@@ -715,8 +707,8 @@ impl Explore {
 
 /// List the models, or describe one of them
 ///
-/// Without a name: one line per built-in model. With a name or a file: equations, contact laws, parameters with defaults
-/// and ranges, symbols of words, classes, statuses, source.
+/// Without a name: one line per built-in model. With a name or a file: equations, walls and their contact laws,
+/// parameters with defaults and ranges, source.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     rattlemap models gear-pair\n  \

@@ -37,7 +37,10 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
     let style = ask.run.figure.style()?;
     let adapters = pollster::block_on(gpu::adapters());
     let adapters = match &ask.adapter {
-        Some(wanted) => wanted.among(&adapters).map_err(|error| Failure::Usage(error.into()))?,
+        Some(wanted) => {
+            let adapter = wanted.among(&adapters).map_err(|error| Failure::Usage(error.into()))?;
+            std::slice::from_ref(adapter)
+        }
         None => &adapters,
     };
     let targets = targets(adapters);

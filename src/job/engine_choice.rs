@@ -7,13 +7,10 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use crate::gpu::{self, AdapterChoice, AdapterReport, GpuError, Precision};
-#[cfg(not(target_arch = "wasm32"))]
-use crate::map::engine::Cards;
 use crate::map::engine::{Cpu, Engine, EngineError, Gpu, Prepared};
 use crate::map::plan::Plan;
 
-use adapters::Selection;
-pub use adapters::{AdapterError, AdapterRequest};
+pub use adapters::{AdapterError, AdapterRequest, AdapterTextError};
 
 /// A request for an engine. The default leaves everything to the program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -45,19 +42,11 @@ pub struct ChosenEngine<'p> {
     pub engine: Engine<'p>,
     /// Reason for the choice. Empty if the request left no choice.
     pub reason: String,
-    /// One line for each adapter that was not used because it differs from the first one.
-    pub notes: Vec<String>,
-    /// One line for each adapter that was not used because it could not be opened.
-    pub warnings: Vec<String>,
 }
 
 impl<'p> ChosenEngine<'p> {
-    fn new(engine: Engine<'p>, reason: String) -> ChosenEngine<'p> {
-        ChosenEngine { engine, reason, notes: Vec::new(), warnings: Vec::new() }
-    }
-
     fn cpu(plan: &'p Plan, reason: impl Into<String>) -> ChosenEngine<'p> {
-        ChosenEngine::new(Engine::Cpu(Cpu::new(plan)), reason.into())
+        ChosenEngine { engine: Engine::Cpu(Cpu::new(plan)), reason: reason.into() }
     }
 }
 
@@ -156,32 +145,29 @@ pub async fn open<'p>(plan: &'p Plan, request: &EngineRequest) -> Result<ChosenE
     let selection = adapters::select(&all, request.adapter.as_ref(), &environment, precision);
     match (request.kind, &request.adapter) {
         (EngineKind::Auto, None) if request.precision == Some(Precision::F32) => match selection? {
-            selection if is_hardware(&selection, &all) => {
-                open_gpu(plan, precision, selection, "the CPU engine has no f32").await
+            adapter if gpu::is_hardware(&adapter.info) => {
+                open_gpu(plan, precision, adapter.number, "the CPU engine has no f32").await
             }
             _ => Err(ChoiceError::AutoInF32),
         },
-        (EngineKind::Auto, None) => choose(plan, precision, &all, &environment, selection).await,
-        (EngineKind::Auto, Some(_)) => open_gpu(plan, precision, selection?, "--adapter names it").await,
-        (EngineKind::Gpu | EngineKind::Cpu, _) => open_gpu(plan, precision, selection?, "").await,
+        (EngineKind::Auto, None) => choose(plan, precision, &environment, selection).await,
+        (EngineKind::Auto, Some(_)) => {
+            open_gpu(plan, precision, selection?.number, "--adapter names it").await
+        }
+        (EngineKind::Gpu | EngineKind::Cpu, _) => open_gpu(plan, precision, selection?.number, "").await,
     }
-}
-
-fn is_hardware(selection: &Selection, all: &[AdapterReport]) -> bool {
-    gpu::is_hardware(&all[selection.numbers[0]].info)
 }
 
 /// Chooses the engine of `auto` if neither an adapter nor f32 is requested.
 async fn choose<'p>(
     plan: &'p Plan,
     precision: Precision,
-    all: &[AdapterReport],
     environment: &AdapterChoice,
-    selection: Result<Selection, AdapterError>,
+    selection: Result<&AdapterReport, AdapterError>,
 ) -> Result<ChosenEngine<'p>, ChoiceError> {
     let reason = match selection {
-        Ok(selection) if is_hardware(&selection, all) => {
-            match open_gpu(plan, precision, selection, "a hardware GPU").await {
+        Ok(adapter) if gpu::is_hardware(&adapter.info) => {
+            match open_gpu(plan, precision, adapter.number, "a hardware GPU").await {
                 Ok(chosen) => return Ok(chosen),
                 Err(error) => error.to_string(),
             }
@@ -202,75 +188,19 @@ async fn choose<'p>(
 async fn open_gpu<'p>(
     plan: &'p Plan,
     precision: Precision,
-    selection: Selection,
+    number: usize,
     reason: &str,
 ) -> Result<ChosenEngine<'p>, ChoiceError> {
-    let Selection { numbers, left_out: notes } = selection;
-    #[cfg(not(target_arch = "wasm32"))]
-    if numbers.len() > 1 {
-        let (engine, warnings) = open_cards(plan, precision, &numbers)?;
-        return Ok(ChosenEngine { engine, reason: reason.to_owned(), notes, warnings });
-    }
     #[cfg(not(target_arch = "wasm32"))]
     let (prepared, device) = {
-        let open = || pollster::block_on(open_device(precision, numbers[0]));
+        let open = || pollster::block_on(open_device(precision, number));
         let (prepared, device) = rayon::join(|| Prepared::new(plan), open);
         (prepared, device?)
     };
     #[cfg(target_arch = "wasm32")]
-    let (prepared, device) = (Prepared::new(plan), open_device(precision, numbers[0]).await?);
+    let (prepared, device) = (Prepared::new(plan), open_device(precision, number).await?);
     let engine = Engine::Gpu(Box::new(Gpu::prepared(prepared, device).await?));
-    Ok(ChosenEngine { notes, ..ChosenEngine::new(engine, reason.to_owned()) })
-}
-
-/// Opens several adapters as one engine. Returns one warning for each adapter that cannot be opened.
-///
-/// # Errors
-/// The error of the first adapter if none can be opened.
-#[cfg(not(target_arch = "wasm32"))]
-fn open_cards(
-    plan: &Plan,
-    precision: Precision,
-    numbers: &[usize],
-) -> Result<(Engine<'static>, Vec<String>), ChoiceError> {
-    let prepared = Prepared::new(plan).into_owned();
-    let open = |number: usize| {
-        let prepared = prepared.clone();
-        pollster::block_on(async {
-            let device = open_device(precision, number).await?;
-            let id = device.id();
-            Ok::<_, ChoiceError>((id, Box::new(Gpu::prepared(prepared, device).await?)))
-        })
-    };
-    let opened: Vec<_> = std::thread::scope(|scope| {
-        let open = &open;
-        let spawn = |&number: &usize| {
-            let thread = std::thread::Builder::new().spawn_scoped(scope, move || open(number));
-            // If no thread can be started, this one opens the device.
-            thread.map_err(|_| open(number))
-        };
-        let threads: Vec<_> = numbers.iter().map(spawn).collect();
-        threads.into_iter().map(|thread| thread.map_or_else(Ok, |thread| thread.join())).collect()
-    });
-    let (mut cards, mut warnings, mut first_error) = (Vec::new(), Vec::new(), None);
-    for (number, opened) in numbers.iter().zip(opened) {
-        match opened.unwrap_or_else(|panic| std::panic::resume_unwind(panic)) {
-            Ok(card) => cards.push(card),
-            Err(error) => {
-                warnings.push(format!("adapter {number} is left out: {error}"));
-                first_error.get_or_insert(error);
-            }
-        }
-    }
-    let engine = match (cards.len(), first_error) {
-        (0, Some(error)) => return Err(error),
-        (1, _) => Engine::Gpu(cards.remove(0).1),
-        _ => {
-            let engines = cards.into_iter().map(|(id, gpu)| (id, Engine::Gpu(gpu)));
-            Engine::Cards(Box::new(Cards::new(engines.collect())))
-        }
-    };
-    Ok((engine, warnings))
+    Ok(ChosenEngine { engine, reason: reason.to_owned() })
 }
 
 async fn open_device(precision: Precision, number: usize) -> Result<gpu::Gpu, ChoiceError> {
@@ -286,7 +216,7 @@ mod tests {
         assert!(ChoiceError::CpuInF32.is_usage());
         let request = EngineRequest {
             kind: EngineKind::Cpu,
-            adapter: Some(AdapterRequest::All),
+            adapter: Some(AdapterRequest::Number(0)),
             ..EngineRequest::default()
         };
         assert!(check(&request).is_err_and(|error| error.is_usage()));

@@ -15,7 +15,7 @@ use crate::job::error::JobError;
 use crate::job::observer::Observer;
 use crate::job::processor;
 use crate::job::size::{self, Free};
-use crate::map::engine::{Engine, Loss};
+use crate::map::engine::Engine;
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
 use crate::map::schedule::Refined;
@@ -135,14 +135,8 @@ impl<'a> MapJob<'a> {
         let clock = Instant::now();
         let request = self.engine_request(folder.map(Folder::path));
         let chosen = pollster::block_on(engine_choice::open(plan, &request))?;
-        let ChosenEngine { mut engine, reason, notes, warnings } = chosen;
+        let ChosenEngine { engine, reason } = chosen;
         let opening = clock.elapsed();
-        notes.iter().for_each(|note| observer.note(note));
-        warnings.iter().for_each(|warning| observer.warn(warning));
-        let lost = Arc::clone(&observer);
-        engine.listen(move |Loss { adapter, cells, reason }| {
-            lost.warn(&format!("adapter {adapter} was lost ({reason}); {cells} cells go back to the queue"));
-        });
         Ok(OpenMap { job: self, plan, folder, observer, engine, reason, opening })
     }
 

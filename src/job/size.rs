@@ -93,31 +93,12 @@ impl Size {
         }
     }
 
-    /// Estimates the size of a map that is merged from shards. Nothing is integrated, but flows are needed to compare cycles
-    /// where attractors are counted.
-    pub fn merged(scene: &Scene) -> Size {
+    /// Estimates the size of a map of which all records exist. Nothing is integrated, but `with_flows` are needed to compare cycles.
+    fn computed(scene: &Scene, with_strobes: bool, with_flows: bool) -> Size {
         let whole = Size::of(scene, None);
-        let flows = match whole.runs > whole.cells || scene.is_basin() {
-            true => kept_flows(&Parts::flows(scene.points()), whole.runs),
-            false => 0,
-        };
-        let memory = PROGRAM
-            + whole.runs.saturating_mul(held_run(scene, false))
-            + list_rows(scene)
-            + flows
-            + drawn(scene);
-        Size { cpu_memory: memory, gpu_memory: memory, ..whole }
-    }
-
-    /// Estimates the size of a finished map in memory, with its strobe states.
-    fn finished(scene: &Scene) -> Size {
-        let whole = Size::of(scene, None);
-        let flows = kept_flows(&Parts::flows(scene.points()), whole.runs);
-        let memory = PROGRAM
-            + whole.runs.saturating_mul(held_run(scene, true))
-            + list_rows(scene)
-            + flows
-            + drawn(scene);
+        let flows = if with_flows { kept_flows(&Parts::flows(scene.points()), whole.runs) } else { 0 };
+        let records = whole.runs.saturating_mul(held_run(scene, with_strobes));
+        let memory = PROGRAM + records + list_rows(scene) + flows + drawn(scene);
         Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
@@ -234,7 +215,10 @@ const LARGER_MACHINE: &str = "use a larger machine";
 /// [`JobError`] if the folder cannot be written, or with the needed and the free amount.
 pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
     out.map_or(Ok(()), Folder::check_writable)?;
-    Size::merged(scene).check(scene, EngineKind::Cpu, &Free::for_output(out), LARGER_MACHINE)
+    // Where attractors are counted, cycles are compared.
+    let counts_attractors = scene.run_count() > scene.cell_count() || scene.is_basin();
+    let size = Size::computed(scene, false, counts_attractors);
+    size.check(scene, EngineKind::Cpu, &Free::for_output(out), LARGER_MACHINE)
 }
 
 /// Checks that the records of a finished map fit this machine's memory.
@@ -242,7 +226,8 @@ pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
 /// # Errors
 /// [`JobError::TooLarge`] with the needed and the free amount.
 pub fn check_finished(scene: &Scene) -> Result<(), JobError> {
-    Size::finished(scene).check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
+    let size = Size::computed(scene, true, true);
+    size.check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
 }
 
 /// Bytes on disk: per run for its record, and per cell for all other files. The constants are the largest of measured maps.

@@ -4,8 +4,6 @@
 //! its start and the plan only. It does not depend on other cells under way, on neighbours, or on the number of
 //! threads.
 
-#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-mod cards;
 mod cpu;
 mod fake;
 mod flows;
@@ -21,8 +19,6 @@ use std::time::Duration;
 
 use thiserror::Error;
 
-#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-pub use cards::Cards;
 pub use cpu::Cpu;
 pub use fake::Fake;
 pub(crate) use flows::Flows;
@@ -76,17 +72,6 @@ pub enum EngineError {
     },
 }
 
-impl EngineError {
-    /// Describes the error without the device.
-    pub fn reason(&self) -> String {
-        match self {
-            EngineError::OutOfMemory { cells, .. } => format!("no memory for {cells} cells at a time"),
-            EngineError::NotOnLanes { .. } => self.to_string(),
-            EngineError::Refused { reason, .. } | EngineError::Lost { reason, .. } => reason.clone(),
-        }
-    }
-}
-
 /// Time that it took to prepare an engine on its open device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Preparation {
@@ -96,30 +81,6 @@ pub struct Preparation {
     pub compile: Duration,
 }
 
-/// The work of one of several cards.
-#[cfg(feature = "gpu")]
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CardReport {
-    /// The card.
-    pub adapter: AdapterId,
-    /// Number of cells that it has computed.
-    pub cells: usize,
-    /// Why it was lost, if it was.
-    pub lost: Option<String>,
-}
-
-/// The loss of one of several cards.
-#[cfg(feature = "gpu")]
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Loss {
-    /// The lost card.
-    pub adapter: AdapterId,
-    /// Number of its cells that the other cards compute instead.
-    pub cells: usize,
-    /// The cause.
-    pub reason: String,
-}
-
 /// Computes cells.
 pub enum Engine<'p> {
     /// The event-driven reference on all processor cores, in f64.
@@ -127,9 +88,6 @@ pub enum Engine<'p> {
     /// Lanes in WGSL on a graphics device, in f32 or f64.
     #[cfg(feature = "gpu")]
     Gpu(Box<Gpu<'p>>),
-    /// Lanes in WGSL on several equal cards.
-    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-    Cards(Box<Cards>),
     /// Computes records by a rule and fails on demand, for tests.
     Fake(Fake),
 }
@@ -179,8 +137,6 @@ impl Engine<'_> {
             Engine::Cpu(cpu) => cpu,
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => &**gpu,
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => &**cards,
             Engine::Fake(fake) => fake,
         }
     }
@@ -201,7 +157,7 @@ impl Engine<'_> {
         self.properties().device()
     }
 
-    /// Returns the adapter, if the engine has exactly one.
+    /// Returns the graphics adapter; none if the engine uses none.
     #[cfg(feature = "gpu")]
     pub fn adapter(&self) -> Option<AdapterId> {
         match self {
@@ -210,36 +166,7 @@ impl Engine<'_> {
         }
     }
 
-    /// Returns the number of devices that compute in parallel.
-    pub fn card_count(&self) -> usize {
-        match self {
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.count(),
-            _ => 1,
-        }
-    }
-
-    /// Reports the work of each card so far. Empty unless several cards compute.
-    #[cfg(feature = "gpu")]
-    pub fn cards(&self) -> Vec<CardReport> {
-        match self {
-            #[cfg(not(target_arch = "wasm32"))]
-            Engine::Cards(cards) => cards.reports(),
-            _ => Vec::new(),
-        }
-    }
-
-    /// Calls `listener` during [`Engine::advance`] for each card that is lost and leaves its cells to other cards.
-    #[cfg(feature = "gpu")]
-    #[cfg_attr(target_arch = "wasm32", expect(unused_variables, reason = "there is one card"))]
-    pub fn listen(&mut self, listener: impl Fn(&Loss) + Send + 'static) {
-        #[cfg(not(target_arch = "wasm32"))]
-        if let Engine::Cards(cards) = self {
-            cards.listen(Box::new(listener));
-        }
-    }
-
-    /// Returns the largest number of bytes that the map needs in the memory of all devices; none without a device.
+    /// Returns the largest number of bytes that the map needs in the device's memory; none without a device.
     pub fn device_bytes(&self) -> Option<u64> {
         self.properties().device_bytes()
     }
@@ -270,7 +197,7 @@ impl Engine<'_> {
         self.properties().room()
     }
 
-    /// Returns the time that it took to prepare the engine; zero without lanes, and on several cards.
+    /// Returns the time that it took to prepare the engine; zero without lanes.
     pub fn preparation(&self) -> Preparation {
         self.properties().preparation()
     }
@@ -282,8 +209,6 @@ impl Engine<'_> {
             Engine::Cpu(cpu) => cpu,
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => &mut **gpu,
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => &mut **cards,
             Engine::Fake(fake) => fake,
         };
         engine.stop_on(halt);
@@ -298,8 +223,6 @@ impl Engine<'_> {
             Engine::Cpu(cpu) => cpu.begin(cells),
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.begin(cells).await?,
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.begin(cells)?,
             Engine::Fake(fake) => fake.begin(cells)?,
         }
         Ok(())
@@ -316,8 +239,6 @@ impl Engine<'_> {
             Engine::Cpu(cpu) => Ok(cpu.advance()),
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.advance(until).await,
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.advance(until),
             Engine::Fake(fake) => fake.advance(),
         }
     }

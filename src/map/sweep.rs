@@ -25,7 +25,7 @@ const LARGE: usize = 1 << 16;
 /// Cells per core in an engine's smallest batch.
 const ROUNDS_OF_CORES: usize = 64;
 
-/// Largest number of cells under way per card. It bounds the memory that a fast engine uses.
+/// Largest number of cells under way. It bounds the memory that a fast engine uses.
 pub(crate) const LARGEST_BATCH: usize = 1 << 20;
 
 /// Why a sweep ended early.
@@ -60,15 +60,14 @@ pub async fn run(
     let mut pace = Pace {
         cells: engine.first_batch(),
         least: (engine.least_batch() / ROUNDS_OF_CORES).max(1),
-        most: LARGEST_BATCH * engine.card_count(),
+        most: LARGEST_BATCH,
     };
     let mut under_way = 0;
     let mut unstored = Vec::new();
-    let (mut last_stored, mut last_ended) = (Instant::now(), Instant::now());
+    let mut last_stored = Instant::now();
     while !schedule.is_finished() {
         let next = schedule.next(plan, pace.cells.saturating_sub(under_way).min(engine.room()));
-        // Several cards compute between two calls of `advance`, one engine does not.
-        let clock = if engine.card_count() > 1 { last_ended } else { Instant::now() };
+        let clock = Instant::now();
         let ended = match engine.begin(&next).await {
             Err(EngineError::OutOfMemory { .. }) if pace.halve(under_way + next.len()) => {
                 schedule.return_last();
@@ -82,13 +81,13 @@ pub async fn run(
                 engine.advance(until).await
             }
         };
-        last_ended = Instant::now();
+        let elapsed = clock.elapsed();
         let is_halted = halt.load(Ordering::Relaxed);
         let mut stored = Vec::new();
         let (is_over, failure) = match ended {
             Err(error) => (true, Some(error)),
             Ok(ended) => {
-                pace.adapt(under_way, ended.len(), last_ended - clock);
+                pace.adapt(under_way, ended.len(), elapsed);
                 under_way -= ended.len();
                 schedule.prepare(&ended);
                 ended.iter().for_each(|(id, record)| take(schedule, records, *id, record));

@@ -1,16 +1,16 @@
 //! Writes the equations of motion of a model.
 
-use rattlemap_dynamics::model::{self, Side};
+use rattlemap_dynamics::model::{Contact, Side};
 
+use super::contact::{Wall, WallLaw};
 use super::definition::Definition;
 use super::entry::Entry;
 use super::friction::DryFriction;
 use super::motion::Motion;
 use crate::text::expression::Expression;
 
-/// Returns the equations as lines: free motion, then contact with each wall. `names` are those of each gap and its velocity.
-///
-/// With several gaps, which may be in contact at the same time, the equations come once, with a contact force for each gap.
+/// Returns the equations as lines: gaps, stages, friction, and one equation per coordinate with a contact force for each gap that has
+/// walls. `names` are those of each gap and its velocity.
 pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<String> {
     let motion = &definition.motion;
     let mut lines = Vec::new();
@@ -23,86 +23,58 @@ pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<Strin
         let rate = sliding_rate(friction, motion);
         format!("friction  sticks at {rate} = 0 while |friction force| <= {}", text(&friction.force))
     }));
-    let written = |forces: &[Option<String>]| -> Vec<String> {
-        equations(definition, forces).map(|line| format!("    {line}")).collect()
+    let force = |(gap, [z, _]): (&[Vec<Wall>; 2], &[String; 2])| {
+        let has_walls = gap.iter().any(|walls| !walls.is_empty());
+        has_walls.then(|| if names.len() == 1 { "N".to_owned() } else { format!("N_{z}") })
     };
-    if let [[z, w]] = names {
-        lines.push(format!("free, {}", between(definition, 0, z)));
-        lines.extend(written(&[None]));
-        for Contact { place, force } in contacts(definition, 0, [z, w]) {
-            match force {
-                Some(force) => {
-                    lines.push(format!("behind {place}, with N = {force}"));
-                    lines.extend(written(&[Some("N".to_owned())]));
-                }
-                None => lines.push(place),
-            }
-        }
-        return lines;
-    }
-    let forces: Vec<_> = names.iter().map(|[z, _]| Some(format!("N_{z}"))).collect();
-    lines.push("with a contact force on each gap".to_owned());
-    lines.extend(written(&forces));
-    for (i, [z, w]) in names.iter().enumerate() {
-        lines.push(format!("free, {}: N_{z} = 0", between(definition, i, z)));
-        lines.extend(contacts(definition, i, [z, w]).into_iter().map(
-            |Contact { place, force }| match force {
-                Some(force) => format!("behind {place}: N_{z} = {force}"),
-                None => place,
-            },
-        ));
-    }
+    let forces: Vec<_> = definition.walls.iter().zip(names).map(force).collect();
+    lines.extend(equations(definition, &forces));
     lines
 }
 
-/// Motion in contact with a wall, in words.
-struct Contact {
-    /// The wall; if the gap stays on it, the whole line.
-    place: String,
-    /// The contact force; none if the gap stays on the wall.
-    force: Option<String>,
-}
-
-/// Returns the contacts of a gap with each wall.
-fn contacts(definition: &Definition, gap: usize, [z, w]: [&str; 2]) -> Vec<Contact> {
-    let mut contacts = Vec::new();
-    let of_gap = match definition.motion.gaps.len() {
-        1 => String::new(),
-        _ => format!(" of gap {z}"),
-    };
-    for side in Side::BOTH {
-        let walls = &definition.walls[gap][side.index()];
-        let mut forces = Vec::new();
-        for (nth, wall) in (1..).zip(walls) {
-            let name = wall_name(side, nth, walls.len()) + &of_gap;
-            match (wall.contact(), &wall.spring) {
-                (contact, Some(spring)) => {
-                    let preload = match side {
-                        Side::Right => constant(&spring.preload),
-                        Side::Left => negated(&spring.preload),
-                    };
-                    let own = [
-                        product(&spring.stiffness, &format!("({})", minus(z, &wall.at))),
-                        product(&spring.damping, w),
-                        preload,
-                    ];
-                    match contact {
-                        model::Contact::Pushing => {
+/// Returns a row for each wall: its name, position and law, restitution, the largest rate at which contact is sustained, and the
+/// contact force behind it. What a law does not have is empty.
+pub(super) fn contacts(definition: &Definition, names: &[[String; 2]]) -> Vec<[String; 6]> {
+    let mut rows = Vec::new();
+    for (gap, [z, w]) in definition.walls.iter().zip(names) {
+        for (side, walls) in Side::BOTH.into_iter().zip(gap) {
+            let mut forces = Vec::new();
+            for (nth, wall) in (1..).zip(walls) {
+                let of_gap = if names.len() > 1 { format!(" of {z}") } else { String::new() };
+                let nth = if walls.len() > 1 { format!(" {nth}") } else { String::new() };
+                let (law, restitution, mesh_speed) = match &wall.law {
+                    WallLaw::Impact { restitution, mesh_speed, .. } => {
+                        ("impact", text(restitution), text(mesh_speed))
+                    }
+                    WallLaw::Elastic { pulls: true } => ("elastic", String::new(), String::new()),
+                    WallLaw::Elastic { pulls: false } => {
+                        ("elastic, only pushes", String::new(), String::new())
+                    }
+                };
+                let force = match &wall.spring {
+                    None => format!("keeps {z} = {} while pressed", text(&wall.at)),
+                    Some(spring) => {
+                        let preload = constant(&spring.preload);
+                        let own = [
+                            product(&spring.stiffness, &format!("({})", minus(z, &wall.at))),
+                            product(&spring.damping, w),
+                            if side == Side::Right { preload } else { preload.map(negative) },
+                        ];
+                        if wall.contact() == Contact::Pushing {
                             let larger = if side == Side::Right { "max" } else { "min" };
                             forces.push(Some(format!("{larger}(0, {})", sum(own))));
+                        } else {
+                            forces.extend(own);
                         }
-                        _ => forces.extend(own),
+                        sum(forces.clone())
                     }
-                    contacts.push(Contact { place: name, force: Some(sum(forces.clone())) });
-                }
-                (_, None) => {
-                    let place = format!("on {name}: {z} stays {}, as long as it is pressed", text(&wall.at));
-                    contacts.push(Contact { place, force: None });
-                }
+                };
+                let name = format!("{}{nth}{of_gap}", name(side));
+                rows.push([name, text(&wall.at), law.to_owned(), restitution, mesh_speed, force]);
             }
         }
     }
-    contacts
+    rows
 }
 
 /// Returns the name of a side.
@@ -110,14 +82,6 @@ pub(super) fn name(side: Side) -> &'static str {
     match side {
         Side::Right => "right",
         Side::Left => "left",
-    }
-}
-
-/// Returns the name of the `nth` of several walls on a side.
-pub(crate) fn wall_name(side: Side, nth: usize, count: usize) -> String {
-    match count {
-        1 => format!("the {} wall", name(side)),
-        _ => format!("{} wall {nth}", name(side)),
     }
 }
 
@@ -142,17 +106,6 @@ fn stages(motion: &Motion) -> Vec<String> {
         format!("stages  {begins} of {span}"),
         format!("        [{stages}] lists the values of an entry that changes"),
     ]
-}
-
-/// Returns the range of a gap in free motion.
-fn between(definition: &Definition, gap: usize, z: &str) -> String {
-    let at = |side: Side| definition.walls[gap][side.index()].first().map(|wall| text(&wall.at));
-    match (at(Side::Left), at(Side::Right)) {
-        (Some(left), Some(right)) => format!("{left} < {z} < {right}"),
-        (None, Some(right)) => format!("{z} < {right}"),
-        (Some(left), None) => format!("{z} > {left}"),
-        (None, None) => "everywhere".to_owned(),
-    }
 }
 
 /// Returns the friction whose force is not the number 0.
@@ -182,10 +135,7 @@ fn friction_force(friction: &DryFriction, motion: &Motion, i: usize) -> Option<S
 }
 
 /// Returns one equation per coordinate, with an optional force along the row of each gap.
-fn equations<'d>(
-    definition: &'d Definition,
-    forces: &'d [Option<String>],
-) -> impl Iterator<Item = String> + 'd {
+fn equations(definition: &Definition, forces: &[Option<String>]) -> impl Iterator<Item = String> {
     let motion = &definition.motion;
     let rate = |suffix: &str| -> Vec<String> {
         motion.coordinates.iter().map(|name| format!("{name}{suffix}")).collect()
@@ -263,15 +213,12 @@ fn constant(load: &impl Entry) -> Option<String> {
     }
 }
 
-/// Returns the negative of an entry; none if the entry is 0.
-fn negated(entry: &impl Entry) -> Option<String> {
-    match same(entry) {
-        Some(one) => match one.as_number() {
-            Some(0.0) => None,
-            Some(number) => Some((-number).to_string()),
-            None => Some(format!("-{}", factor(one))),
-        },
-        None => Some(format!("-{}", list(entry))),
+/// Returns the negative of a term.
+fn negative(term: String) -> String {
+    match term.strip_prefix('-') {
+        Some(positive) if is_product(positive) => positive.to_owned(),
+        None if is_product(&term) => format!("-{term}"),
+        _ => format!("-({term})"),
     }
 }
 
@@ -297,7 +244,7 @@ fn minus(name: &str, entry: &Expression) -> String {
 }
 
 /// Returns an entry as a factor, in parentheses if it is a sum.
-pub(crate) fn factor(entry: &Expression) -> String {
+fn factor(entry: &Expression) -> String {
     let text = text(entry);
     match is_product(text.strip_prefix('-').unwrap_or(&text)) {
         true => text,

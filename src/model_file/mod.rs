@@ -26,8 +26,6 @@ pub use builtin::{BUILT_IN, DEFAULT, MODEL_FILE};
 pub use contact::{Wall, WallLaw, WallSpring};
 pub use definition::Definition;
 pub use entry::Staged;
-#[cfg(feature = "job")]
-pub(crate) use equations::{factor, wall_name};
 pub use friction::DryFriction;
 pub use harmonic::HarmonicForce;
 
@@ -70,9 +68,14 @@ impl FileModel {
         &self.definition
     }
 
-    /// Writes the equations of motion as lines: free motion, then contact with each wall.
+    /// Writes the equations of motion as lines, with a contact force for each gap that has walls.
     pub fn equations(&self) -> Vec<String> {
         equations::lines(&self.definition, &self.gap_symbols())
+    }
+
+    /// Writes a row for each wall: name, position, law, restitution, largest rate at which contact is sustained, contact force.
+    pub fn contacts(&self) -> Vec<[String; 6]> {
+        equations::contacts(&self.definition, &self.gap_symbols())
     }
 
     /// Returns the symbols of each gap and its velocity in equations: those of [`gap_names`] for one gap, else its name, and its name with

@@ -226,7 +226,7 @@ fn common_names_are_free_and_the_gap_gets_another_name() {
         ONE_DEGREE.replace("\"x\"", "\"z\"").replace("F = 1.5", "w = 1.5\nn = 2").replace("F*", "w*n*");
     let model = read(&renamed);
     assert_eq!((model.state_names(), gap_names(&model)), (vec!["z", "v"], ["gap", "gap_rate"]));
-    assert_eq!(model.equations()[..3], ["gap   gap = z", "rate  gap_rate = v", "free, gap < s"]);
+    assert_eq!(model.equations()[..2], ["gap   gap = z", "rate  gap_rate = v"]);
     assert_eq!(gap_names(&read(ONE_DEGREE)), ["z", "w"]);
 }
 
@@ -255,9 +255,8 @@ fn a_side_may_have_several_walls() {
     assert!(found.eq([(0.5, Contact::Elastic, 9.0), (0.75, Contact::Impact, 109.0)]), "{right:?}");
     assert_eq!(right[0].meshing[0].load, [2.25, -4.5]);
     assert_eq!(model.law(), Law { restitution: [0.5, 0.0], mesh_speed: [0.05, 0.0] });
-    let lines = model.equations();
-    let has = |text: &str| lines.iter().any(|line| line == text);
-    assert!(has("behind right wall 2, with N = k (z - d) + c w + k (z - 2*d) + c w"), "{lines:#?}");
+    let row = ["right 2", "2*d", "elastic", "", "", "k (z - d) + c w + k (z - 2*d) + c w"];
+    assert_eq!(model.contacts()[1], row);
     let message = |text: &str| FileModel::parse(text, "m.toml").unwrap_err().to_string();
     let error = message(&with(&[wall("d", elastic), wall("d/2", elastic), last.clone()]));
     assert!(
@@ -304,13 +303,9 @@ fn a_wall_may_only_push_and_have_a_preload() {
         let off = (0..2).map(|j| (added(i, j) - push * o.gap[j]).abs()).fold(0.0, f64::max);
         assert!(off < 1e-14, "{:?}", o.meshing[i]);
     }
-    let lines = model.equations();
-    for line in [
-        "behind the right wall, with N = max(0, k (z - d) + c w + c)",
-        "behind the left wall, with N = k (z + d) + c w - 0.25",
-    ] {
-        assert!(lines.iter().any(|known| known == line), "{lines:#?}");
-    }
+    let right = ["right", "d", "elastic, only pushes", "", "", "max(0, k (z - d) + c w + c)"];
+    let left = ["left", "-d", "elastic", "", "", "k (z + d) + c w - 0.25"];
+    assert_eq!(model.contacts(), [right, left]);
     let message = |walls: &[String]| FileModel::parse(&with(walls), "m.toml").unwrap_err().to_string();
     let inner = message(&[wall("right", "pull = false"), wall("right", "").replace("'d'", "'2*d'")]);
     assert!(
@@ -374,35 +369,21 @@ fn equations_are_written_in_usual_notation() {
         [
             "gap   z = x1 - x2",
             "rate  w = v1 - v2",
-            "free, -b < z < b",
-            "    m1 x1'' + r1 x1' + k1 x1 = F cos(omega t)",
-            "    m2 x2'' + r2 x2' + k2 x2 = 0",
-            "behind the right wall, with N = k (z - b) + r w",
-            "    m1 x1'' + r1 x1' + k1 x1 + N = F cos(omega t)",
-            "    m2 x2'' + r2 x2' + k2 x2 - N = 0",
-            "behind the left wall, with N = k (z + b) + r w",
-            "    m1 x1'' + r1 x1' + k1 x1 + N = F cos(omega t)",
-            "    m2 x2'' + r2 x2' + k2 x2 - N = 0",
+            "m1 x1'' + r1 x1' + k1 x1 + N = F cos(omega t)",
+            "m2 x2'' + r2 x2' + k2 x2 - N = 0",
         ]
     );
     assert_eq!(
         read(ONE_DEGREE).equations(),
-        [
-            "gap   z = x",
-            "rate  w = v",
-            "free, z < s",
-            "    x'' + 2*zeta x' + x = F*omega^2 cos(omega t) - 0.5",
-            "on the right wall: z stays s, as long as it is pressed",
-        ]
+        ["gap   z = x", "rate  w = v", "x'' + 2*zeta x' + x + N = F*omega^2 cos(omega t) - 0.5",]
     );
+    assert_eq!(read(ONE_DEGREE).contacts()[0][5], "keeps z = s while pressed");
+    assert_eq!(read(TWO_DEGREES).contacts()[0][5], "100 (z - d)");
     assert_eq!(
-        read(TWO_DEGREES).equations()[3..8],
+        read(TWO_DEGREES).equations()[2..],
         [
-            "    m a'' + 0.5 b'' + c a' - c b' + k a - k b = 0",
-            "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b = 0",
-            "behind the right wall, with N = 100 (z - d)",
-            "    m a'' + 0.5 b'' + c a' - c b' + k a - k b + N = 0",
-            "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - 2 N = 0",
+            "m a'' + 0.5 b'' + c a' - c b' + k a - k b + N = 0",
+            "0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - 2 N = 0",
         ]
     );
 }
@@ -413,7 +394,7 @@ fn a_force_has_a_cosine_and_a_sine() {
     let mut model = read(&ONE_DEGREE.replace(force, &format!("{force}\nforce_sin = [\"-2*F\"]")));
     let at_zero = model.oscillator().unwrap();
     assert_eq!((at_zero.force, at_zero.force_sin), ([6.0, 0.0], [-3.0, 0.0]));
-    let [_, _, _, free, ..] = &model.equations()[..] else { panic!("{:?}", model.equations()) };
+    let [_, _, free] = &model.equations()[..] else { panic!("{:?}", model.equations()) };
     assert!(free.ends_with("= F*omega^2 cos(omega t) - 2*F sin(omega t) - 0.5"), "{free}");
     assert!(model.parameters()[model.index("F").unwrap()].shapes.oscillator());
     // A quarter turn later the cosine has become the negative sine.
@@ -448,8 +429,8 @@ fn harmonics_are_read_in_the_order_of_their_frequencies() {
     let [second, fourth] = &oscillator.harmonics[..] else { panic!("{oscillator:?}") };
     assert_eq!(*second, Harmonic { order: 2, cos: [0.0; 2], sin: [-3.0, 0.0] });
     assert_eq!(*fourth, Harmonic { order: 4, cos: [7.5, 0.0], sin: [-1.0, 0.0] });
-    let line = "    x'' + 2*zeta x' + x = F*omega^2 cos(omega t) - 2*F sin(2 omega t) + F/s cos(4 omega t) - sin(4 omega t) - 0.5";
-    assert_eq!(model.equations()[3], line);
+    let line = "x'' + 2*zeta x' + x + N = F*omega^2 cos(omega t) - 2*F sin(2 omega t) + F/s cos(4 omega t) - sin(4 omega t) - 0.5";
+    assert_eq!(model.equations()[2], line);
     // Half a turn later odd harmonics have the other sign.
     assert!(model.set_start_phase(std::f64::consts::PI));
     let later = model.oscillator().unwrap();
@@ -463,7 +444,7 @@ fn harmonics_are_read_in_the_order_of_their_frequencies() {
 fn frequencies_of_harmonics_are_written_in_usual_notation() {
     let at = |frequency: &str| {
         let text = ONE_DEGREE.replace("\"omega\"\ngap", &format!("\"{frequency}\"\ngap")) + HARMONICS;
-        let line = read(&text).equations()[3].clone();
+        let line = read(&text).equations()[2].clone();
         line.split_once("2*F sin(").unwrap().1.split_once(')').unwrap().0.to_owned()
     };
     assert_eq!(
@@ -567,16 +548,15 @@ fn stages_have_their_own_domains() {
         [(0.0625, 0), (0.125, 1), (0.3125, 0), (0.375, 1), (0.5625, 0), (0.625, 1), (0.8125, 0), (0.875, 1)];
     assert_eq!(repeated.oscillator().unwrap().schedule, phases);
     assert_eq!(
-        model.equations()[2..8],
+        model.equations()[2..],
         [
             "stages  1 from phase 0, 2 from phase eps - 1 of each forcing period",
             "        [stage 1 | stage 2] lists the values of an entry that changes",
-            "free, -1 < z < 0.5",
-            "    x'' + [c | 2*c] x' + [k1 | k2] x - y = 0",
-            "    2 y'' + y' - x + 5 y = [F | -F]",
-            "behind the right wall, with N = [10*k1 | 10*k2] (z - 0.5) + [1 | c] w",
+            "x'' + [c | 2*c] x' + [k1 | k2] x - y + N = 0",
+            "2 y'' + y' - x + 5 y - N = [F | -F]",
         ]
     );
+    assert_eq!(model.contacts()[0][5], "[10*k1 | 10*k2] (z - 0.5) + [1 | c] w");
     let line = &repeated.equations()[2];
     assert_eq!(line, "stages  1 from phase 0.25, 2 from phase eps - 1 of each 1/4 of the forcing period");
 }
@@ -711,8 +691,7 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
             "gap   z = x",
             "rate  w = v",
             "friction  sticks at x' = 0 while |friction force| <= F",
-            "free, everywhere",
-            "    x'' + 2*zeta x' + x + F sgn(x') = F*omega^2 cos(omega t) - 0.5",
+            "x'' + 2*zeta x' + x + F sgn(x') = F*omega^2 cos(omega t) - 0.5",
         ]
     );
 }
@@ -720,23 +699,22 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
 #[test]
 fn friction_is_written_in_usual_notation() {
     assert_eq!(
-        read(&with_friction()).equations()[2..7],
+        read(&with_friction()).equations()[2..],
         [
             "friction  sticks at c/d a' - b' - u = 0 while |friction force| <= mu*k",
             "friction  sticks at a' = 0 while |friction force| <= 0.5",
-            "free, -d < z < d",
-            "    m a'' + 0.5 b'' + c a' - c b' + k a - k b + c/d*mu*k sgn(c/d a' - b' - u) + 0.5 sgn(a') = 0",
-            "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - mu*k sgn(c/d a' - b' - u) = 0",
+            "m a'' + 0.5 b'' + c a' - c b' + k a - k b + c/d*mu*k sgn(c/d a' - b' - u) + 0.5 sgn(a') + N = 0",
+            "0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - mu*k sgn(c/d a' - b' - u) - 2 N = 0",
         ]
     );
     let written = |row: &str, force: &str, speed: &str| {
         let table = format!("[[friction]]\nrow = [{row}, 0]\nforce = {force}\nspeed = {speed}\n");
-        let line = read(&format!("{TWO_DEGREES}{table}")).equations()[4].clone();
+        let line = read(&format!("{TWO_DEGREES}{table}")).equations()[3].clone();
         line.split_once("- k b ").map_or(line.clone(), |(_, rest)| rest.to_owned())
     };
-    assert_eq!(written("1", "\"k + c\"", "1.5"), "+ (k + c) sgn(a' - 1.5) = 0");
-    assert_eq!(written("-2", "2", "\"-c\""), "- 2*2 sgn(-2 a' + c) = 0");
-    assert_eq!(written("-1", "\"-(-c)\"", "\"c - k\""), "+ (-c) sgn(-a' - (c - k)) = 0");
+    assert_eq!(written("1", "\"k + c\"", "1.5"), "+ (k + c) sgn(a' - 1.5) + N = 0");
+    assert_eq!(written("-2", "2", "\"-c\""), "- 2*2 sgn(-2 a' + c) + N = 0");
+    assert_eq!(written("-1", "\"-(-c)\"", "\"c - k\""), "+ (-c) sgn(-a' - (c - k)) + N = 0");
     // A force that is the number 0 is left out.
     let none = read(&format!("{TWO_DEGREES}[[friction]]\nrow = [1, 0]\nforce = 0\n"));
     assert_eq!(none.equations(), read(TWO_DEGREES).equations());
@@ -937,7 +915,7 @@ fn eight_coordinates_are_read() {
     assert_eq!(model.state_names()[14..], ["x8", "v8"]);
     assert_eq!(
         model.equations()[..4],
-        ["gap   z = x7 - x8", "rate  w = v7 - v8", "free, z > -1", "    2 x1'' + 3 x1 = 0"]
+        ["gap   z = x7 - x8", "rate  w = v7 - v8", "2 x1'' + 3 x1 = 0", "2 x2'' + 3 x2 = 0"]
     );
     let short = text.replace("[0, 0, 0, 0, 0, 0, 1, -1]", "[1, -1]");
     let message = FileModel::parse(&short, "m.toml").unwrap_err().to_string();
@@ -1123,15 +1101,21 @@ fn equations_of_several_gaps_have_one_contact_force_for_each() {
             "stages  1 from phase 0.25, 2 from phase 0.5 of each forcing period",
             "        [stage 1 | stage 2] lists the values of an entry that changes",
             "friction  sticks at m q' - e = 0 while |friction force| <= mu*k",
-            "with a contact force on each gap",
-            "    m x'' + c x' - c y' + [k | 2*k] x + N_left = 0",
-            "    y'' + 0.25 q'' - c x' + c y' + 5 y - q - N_left + N_right = sin(4.5 t) + [F | -F]",
-            "    0.25 y'' + q'' + [c | 1] q' - y + 4 q + m*mu*k sgn(m q' - e) - c N_right = F cos(1.5 t)",
-            "free, left > -d: N_left = 0",
-            "on the left wall of gap left: left stays -d, as long as it is pressed",
-            "free, right < d: N_right = 0",
-            "behind right wall 1 of gap right: N_right = [k | k/2] (right - d) + 0.125",
-            "behind right wall 2 of gap right: N_right = [k | k/2] (right - d) + 0.125 + c right'",
+            "m x'' + c x' - c y' + [k | 2*k] x + N_left = 0",
+            "y'' + 0.25 q'' - c x' + c y' + 5 y - q - N_left + N_right = sin(4.5 t) + [F | -F]",
+            "0.25 y'' + q'' + [c | 1] q' - y + 4 q + m*mu*k sgn(m q' - e) - c N_right = F cos(1.5 t)",
+        ]
+    );
+    let contacts = read(THREE).contacts();
+    let of =
+        |columns: [usize; 2]| contacts.iter().map(|row| columns.map(|i| row[i].as_str())).collect::<Vec<_>>();
+    let force = "[k | k/2] (right - d) + 0.125";
+    assert_eq!(
+        of([0, 5]),
+        [
+            ["left of left", "keeps left = -d while pressed"],
+            ["right 1 of right", force],
+            ["right 2 of right", &format!("{force} + c right'")],
         ]
     );
 }

@@ -16,7 +16,7 @@ use crate::store::file_names::{LIST, MANIFEST, RECORDS};
 use crate::store::inventory::{self, FileEntry, has_seal};
 use crate::store::manifest::FORMAT;
 use crate::store::plain_file::read_text;
-use crate::store::record_file::{Damage, Extent, Identity, Order, RecordFile, RecordFileError};
+use crate::store::record_file::{Damage, Extent, Identity, RecordFileError};
 use crate::store::run_records::Work;
 use crate::text::shell::quoted;
 
@@ -118,13 +118,25 @@ pub fn read_manifest(folder: &Path) -> Result<Value, FinishedMapError> {
     }
     let manifest = folder.join(MANIFEST);
     if !manifest.is_file() {
-        return Err(match UnfinishedRun::at(folder) {
-            Some(run) => run.error(),
-            None => FinishedMapError::NoManifest { folder: folder.to_owned() },
-        });
+        return Err(unfinished(folder));
     }
     let text = inventory::text(folder).map_err(|error| unreadable(folder, error))?;
     serde_json::from_str(&text).map_err(|error| unreadable(folder, error))
+}
+
+/// Describes a folder without a manifest: a run that can be resumed, or none.
+fn unfinished(folder: &Path) -> FinishedMapError {
+    let (folder, records) = (folder.to_owned(), folder.join(RECORDS));
+    if !records.is_file() {
+        return FinishedMapError::NoManifest { folder };
+    }
+    let identity = Identity::read(&records).ok().flatten();
+    let shard = identity
+        .as_ref()
+        .and_then(|identity| identity.shard().map(|shard| (shard, identity.engine(), identity.precision())));
+    let run = shard.map_or("the run".to_owned(), |(shard, ..)| format!("shard {shard}"));
+    let command = command(Some(&folder), shard, &[], "--resume");
+    FinishedMapError::Unfinished { folder, run, command }
 }
 
 fn unreadable(folder: &Path, error: impl ToString) -> FinishedMapError {
@@ -377,48 +389,5 @@ impl FinishedMap {
         let last = if is_readable { "--resume" } else { "--force" };
         let StoredManifest { engine, precision, set, shard, .. } = &self.manifest;
         command(Some(&self.folder), shard.map(|shard| (shard, &**engine, &**precision)), set, last)
-    }
-}
-
-/// A folder with records, but without a manifest.
-#[derive(Clone, Debug)]
-pub(crate) struct UnfinishedRun {
-    pub(crate) folder: PathBuf,
-    /// None if the header is unreadable, or if the run ended before it wrote anything.
-    pub(crate) identity: Option<Identity>,
-}
-
-impl UnfinishedRun {
-    /// Looks for an unfinished run in a folder.
-    pub(crate) fn at(folder: &Path) -> Option<UnfinishedRun> {
-        let records = folder.join(RECORDS);
-        (records.is_file() && !folder.join(MANIFEST).is_file()).then(|| UnfinishedRun {
-            folder: folder.to_owned(),
-            identity: Identity::read(&records).ok().flatten(),
-        })
-    }
-
-    /// The shard that the run computes.
-    pub(crate) fn shard(&self) -> Option<Shard> {
-        self.identity.as_ref().and_then(Identity::shard)
-    }
-
-    /// Number of undamaged records.
-    pub(crate) fn count(&self) -> usize {
-        let read = |identity| RecordFile::read(&self.folder.join(RECORDS), identity, Order::Any, |_| true);
-        self.identity.as_ref().and_then(|identity| read(identity).ok()).map_or(0, |extent| extent.count)
-    }
-
-    /// Returns the command that resumes the run with these `--set` arguments.
-    pub(crate) fn command(&self, sets: &[String]) -> String {
-        let shard = self.identity.as_ref().and_then(|identity| {
-            identity.shard().map(|shard| (shard, identity.engine(), identity.precision()))
-        });
-        command(Some(&self.folder), shard, sets, "--resume")
-    }
-
-    fn error(&self) -> FinishedMapError {
-        let run = self.shard().map_or("the run".to_owned(), |shard| format!("shard {shard}"));
-        FinishedMapError::Unfinished { folder: self.folder.clone(), run, command: self.command(&[]) }
     }
 }

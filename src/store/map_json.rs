@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::show::cells::Cells;
 use crate::show::refinement;
-use crate::store::manifest::map::{Run, counts, engine_and_cards};
+use crate::store::manifest::map::{Run, counts, described_engine};
 use crate::store::manifest::{joined, without_nulls};
 
 /// Describes a map whose files were written to a folder in `writing`. `folder` is the path that the user named; `seconds`
@@ -15,7 +15,7 @@ use crate::store::manifest::{joined, without_nulls};
 pub fn object(folder: &Path, files: &[String], cells: &Cells<'_>, run: &Run<'_>, writing: Duration) -> Value {
     joined([
         json!({ "folder": folder.to_string_lossy(), "files": files }),
-        engine_and_cards(run),
+        described_engine(run),
         without_nulls(json!({ "shards": run.shards.map(|shards| shards.count) })),
         json!({ "cells": cells.count(), "runs": cells.runs() }),
         counts(cells),

@@ -40,7 +40,7 @@ use crate::record::{RecordStore, Records};
 use crate::show::cells::{Cells, Survey};
 use crate::show::provenance::Provenance;
 use crate::store::error::OutputError;
-use crate::store::finished_map::{FinishedMap, FinishedMapError, StoredManifest, UnfinishedRun};
+use crate::store::finished_map::{FinishedMap, FinishedMapError, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry, Finding};
 use crate::store::manifest::OWN_COMMIT;
@@ -48,7 +48,6 @@ use crate::store::map::{self, Run, ShardOrigin};
 use crate::store::record_file::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
 use crate::store::run_records::Work;
 use crate::store::{in_memory, map_json, unfinished};
-use crate::text::shell::quoted;
 use rattlemap_dynamics::orbit::Class;
 
 /// Number of records that are written together: the largest batch of a record file.
@@ -93,25 +92,9 @@ impl Parts {
     /// # Errors
     /// [`MergeError`] unless they are all shards of one map, each once and finished.
     pub fn open(folders: &[PathBuf]) -> Result<Parts, MergeError> {
-        let (mut parts, mut begun) = (Vec::new(), Vec::new());
-        for folder in folders {
-            match UnfinishedRun::at(folder) {
-                Some(UnfinishedRun { identity: Some(identity), .. }) if identity.shard().is_none() => {
-                    return Err(MergeError::WholeMap { part: folder.clone() });
-                }
-                Some(run) => {
-                    // An unreadable header has an error of its own.
-                    Identity::read(&folder.join(RECORDS))?;
-                    begun.push(run);
-                }
-                None => parts.push(Part::open(folder)?),
-            }
-        }
-        require_one_run(&parts, &begun)?;
-        let Some(first) = parts.first() else {
-            require_all(&parts, &begun, None)?;
-            return Err(MergeError::Nothing);
-        };
+        let mut parts = folders.iter().map(|folder| Part::open(folder)).collect::<Result<Vec<_>, _>>()?;
+        let first = parts.first().ok_or(MergeError::Nothing)?;
+        require_one_run(&parts)?;
         let scene = first.map.scene()?;
         let runs = scene.run_count();
         if u32::try_from(runs).is_err() {
@@ -120,7 +103,7 @@ impl Parts {
         let plan = Plan::new(&scene);
         let impossible = |reason| MergeError::Impossible { part: first.map.folder().to_owned(), reason };
         first.shard.check(&plan).map_err(impossible)?;
-        require_all(&parts, &begun, Some(&plan))?;
+        require_all(&parts)?;
         let identity = first.identity.clone().of_shard(None);
         if !identity.is_of(&scene) {
             return Err(first.damaged(format!("the scene in its manifest is not that of its {RECORDS}")));
@@ -328,72 +311,42 @@ fn fault(error: RecordFileError, damaged: impl Fn(String) -> MergeError) -> Merg
     }
 }
 
-/// Refuses parts of different runs.
-fn require_one_run(parts: &[Part], begun: &[UnfinishedRun]) -> Result<(), MergeError> {
-    let finished = parts.iter().map(|part| (part.map.folder(), &part.identity));
-    let begun = begun.iter().filter_map(|begun| Some((&*begun.folder, begun.identity.as_ref()?)));
-    let all: Vec<(&Path, &Identity, Shard)> =
-        finished.chain(begun).filter_map(|(at, identity)| Some((at, identity, identity.shard()?))).collect();
-    let Some(&(first, identity, of_first)) = all.first() else { return Ok(()) };
-    let whole = identity.clone().of_shard(None);
-    for (nth, &(part, identity, shard)) in all.iter().enumerate() {
+/// Refuses parts of different runs, and a shard that is named twice.
+fn require_one_run(parts: &[Part]) -> Result<(), MergeError> {
+    let whole = |part: &Part| part.identity.clone().of_shard(None);
+    for (nth, part) in parts.iter().enumerate() {
         let describe = |mine: &str, theirs: &str| format!("is {mine} in the first and {theirs} in the other");
-        let differences = whole.differing(&identity.clone().of_shard(None), describe);
-        let [first, part] = [first, part].map(Path::to_owned);
+        let differences = whole(&parts[0]).differing(&whole(part), describe);
+        let [first, part_at] = [&parts[0], part].map(|part| part.map.folder().to_owned());
         if !differences.is_empty() {
-            return Err(MergeError::OtherRun { first, part, differences });
+            return Err(MergeError::OtherRun { first, part: part_at, differences });
         }
+        let (of_first, shard) = (parts[0].shard, part.shard);
         if shard.count() != of_first.count() {
-            return Err(MergeError::OtherCount { first, of_first, part, shard });
+            return Err(MergeError::OtherCount { first, of_first, part: part_at, shard });
         }
-        if let Some(&(first, ..)) = all[..nth].iter().find(|(_, _, other)| *other == shard) {
-            return Err(MergeError::Twice { shard, first: first.to_owned(), part });
+        if let Some(other) = parts[..nth].iter().find(|other| other.shard == shard) {
+            return Err(MergeError::Twice { shard, first: other.map.folder().to_owned(), part: part_at });
         }
     }
     Ok(())
 }
 
-/// Refuses to merge if shards are missing or unfinished, with the commands that compute them.
-fn require_all(parts: &[Part], begun: &[UnfinishedRun], plan: Option<&Plan>) -> Result<(), MergeError> {
-    let first = parts.first();
-    let present: HashSet<Shard> =
-        parts.iter().map(|part| part.shard).chain(begun.iter().filter_map(UnfinishedRun::shard)).collect();
-    let mut incomplete = Vec::new();
-    if let Some(first) = first {
-        let count = first.shard.count();
-        // No shard is present twice.
-        let missing = count as usize - present.len();
-        let named: Vec<String> = Shard::all(count)
-            .filter(|shard| !present.contains(shard))
-            .take(NAMED_SHARDS)
-            .map(|shard| format!("{shard} (`{}`)", first.map.manifest().shard_command(shard, None)))
-            .collect();
-        let are = if missing == 1 { "is" } else { "are" };
-        if missing > 0 {
-            let others = missing - named.len();
-            let others = if others > 0 { format!(" and {others} more") } else { String::new() };
-            incomplete
-                .push(format!("{missing} of {count} shards {are} missing: {}{others}", named.join(", ")));
-        }
+/// Refuses to merge if shards are missing, with the commands that compute them.
+fn require_all(parts: &[Part]) -> Result<(), MergeError> {
+    let present: HashSet<Shard> = parts.iter().map(|part| part.shard).collect();
+    let (count, manifest) = (parts[0].shard.count(), parts[0].map.manifest());
+    let missing: Vec<Shard> = Shard::all(count).filter(|shard| !present.contains(shard)).collect();
+    if missing.is_empty() {
+        return Ok(());
     }
-    let sets = first.map_or(&[][..], |first| &first.map.manifest().set);
-    for run in begun {
-        let (part, count) = (run.folder.display(), run.count());
-        let of = plan.zip(run.shard()).map(|(plan, shard)| shard.run_count(plan));
-        let of = of.map_or(String::new(), |of| format!(" of {of}"));
-        incomplete.push(match run.shard() {
-            Some(shard) => {
-                let command = run.command(sets);
-                format!("shard {shard} in {part} is unfinished: {count}{of} runs are there (`{command}`)")
-            }
-            None => format!(
-                "{part} is an unfinished run: {count} runs are there (`rattlemap map SCENE --out {} --engine E --shard I/N \
-                 --resume`)",
-                quoted(&part.to_string())
-            ),
-        });
-    }
-    if incomplete.is_empty() { Ok(()) } else { Err(MergeError::Incomplete(incomplete.join("; "))) }
+    let command = |shard: &Shard| format!("{shard} (`{}`)", manifest.shard_command(*shard, None));
+    let named: Vec<String> = missing.iter().take(NAMED_SHARDS).map(command).collect();
+    let are = if missing.len() == 1 { "is" } else { "are" };
+    let others = missing.len() - named.len();
+    let others = if others > 0 { format!(" and {others} more") } else { String::new() };
+    let named = named.join(", ");
+    Err(MergeError::Incomplete(format!("{} of {count} shards {are} missing: {named}{others}", missing.len())))
 }
 
 /// All records of a map, in its folder and in memory.

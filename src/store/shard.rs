@@ -14,7 +14,7 @@ use crate::record::classify::{classify, status};
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry};
-use crate::store::manifest::map::{engine_and_cards, integration, run_and_scene, timings};
+use crate::store::manifest::map::{described_engine, integration, run_and_scene, timings};
 use crate::store::manifest::{self, MANIFEST, joined};
 use crate::store::map::{self, Run};
 use crate::store::map_json::resumed;
@@ -126,7 +126,7 @@ pub fn object(folder: &Path, files: &[String], finished: &FinishedShard<'_>) -> 
     let FinishedShard { shard, run, .. } = *finished;
     joined([
         json!({ "folder": folder.to_string_lossy(), "files": files, "shard": shard }),
-        engine_and_cards(run),
+        described_engine(run),
         counts(finished),
         json!({
             "resumed": resumed(run),

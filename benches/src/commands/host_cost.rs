@@ -5,27 +5,22 @@ use rattlemap::cli::failure::Failure;
 use rattlemap::cli::note;
 use rattlemap::gpu::Traffic;
 use rattlemap::job::engine_choice::{EngineKind, EngineRequest};
-use rattlemap_bench::host_cost::{self, CONTACT_FREE, HostCost, RATTLING};
+use rattlemap_bench::host_cost::{self, HostCost};
 use rattlemap_bench::phase::Cost;
-use rattlemap_bench::scaling::{self, CORES, Scaling};
 use rattlemap_bench::write_rows;
 
 use crate::arguments;
 
 pub(crate) fn run(arguments: &arguments::HostCost) -> Result<(), Failure> {
     let counts = if arguments.run.quick { [40, 30] } else { [arguments.columns, arguments.rows] };
-    if arguments.scaling {
-        return scaling(arguments, counts);
-    }
     let kind = if arguments.gpu { EngineKind::Gpu } else { EngineKind::Cpu };
     let engine = EngineRequest { kind, precision: None, adapter: None };
     let dir = arguments.run.out("host-cost");
     let outer = rattlemap::store::folder::Folder::open(&dir, arguments.run.force)?;
-    let cost =
-        host_cost::run(counts, CONTACT_FREE, arguments.all, engine, &dir.join("map")).context("the map")?;
-    let HostCost { cells, mut phases, traffic, .. } = cost;
+    let cost = host_cost::run(counts, arguments.all, engine, &dir.join("map")).context("the map")?;
+    let HostCost { cells, mut phases, traffic } = cost;
     if kind == EngineKind::Cpu {
-        let lanes = host_cost::alone(counts, CONTACT_FREE, arguments.all).context("the engine alone")?;
+        let lanes = host_cost::alone(counts, arguments.all).context("the engine alone")?;
         let left = |of: fn(&Cost) -> f64| phases.iter().map(of).sum::<f64>() - of(&lanes);
         let [seconds, processor_seconds, thread_seconds] = [
             left(|cost| cost.seconds),
@@ -53,39 +48,6 @@ pub(crate) fn run(arguments: &arguments::HostCost) -> Result<(), Failure> {
             "device: {dispatches} dispatches in {submissions} submissions, {waits} waits; {:.1} MB written, {:.1} MB read",
             written_bytes as f64 / 1e6,
             read_bytes as f64 / 1e6
-        ));
-    }
-    Ok(())
-}
-
-/// Measures how maps scale with the number of threads.
-fn scaling(arguments: &arguments::HostCost, counts: [u32; 2]) -> Result<(), Failure> {
-    let dir = arguments.run.out("host-cost");
-    let folder = rattlemap::store::folder::Folder::open(&dir, arguments.run.force)?;
-    let of = |map, counts, force| scaling::run(map, counts, force, arguments.all, &dir).context(map);
-    let found = [
-        of("cheap", counts, CONTACT_FREE)?,
-        of("expensive", counts.map(|count| (count / 8).max(2)), RATTLING)?,
-    ];
-    folder.replace("scaling.csv", |out| write_rows(out, &found))?;
-    if arguments.run.quiet {
-        return Ok(());
-    }
-    let threads = found[0].threads;
-    note(format_args!("seconds per million cells; {CORES} cores are simulated:"));
-    note(format_args!(
-        "{:<10} {:>10} {:>10} {:>8} {:>10} {:>6}",
-        "cells",
-        "1 thread",
-        format!("{threads} threads"),
-        "serial",
-        format!("{CORES} cores"),
-        "busy"
-    ));
-    for Scaling { map, one, all, serial, simulated, busy, .. } in &found {
-        note(format_args!(
-            "{map:<10} {one:>10.3} {all:>10.3} {serial:>8.3} {simulated:>10.3} {:>5.0}%",
-            100.0 * busy
         ));
     }
     Ok(())

@@ -1,7 +1,5 @@
 //! Items that several parts use: engines, results of the reference, and bounds on the effect of rounding.
 
-use serde::Serialize;
-
 use rattlemap::gpu::Precision;
 use rattlemap::record::distance::{self, farther};
 use rattlemap_dynamics::flow::Flow;
@@ -10,32 +8,17 @@ use rattlemap_dynamics::model::{GearPair, Model, Oscillator, State};
 use rattlemap_dynamics::reference::{Stop, Trajectory, Work};
 
 /// The engine that computed a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-pub enum EngineName {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum EngineName {
     /// Lanes in single precision.
-    #[serde(rename = "lanes f32")]
     LanesF32,
     /// Lanes in double precision.
-    #[serde(rename = "lanes f64")]
     LanesF64,
     /// The event-driven reference, in double precision.
-    #[serde(rename = "reference")]
     Reference,
 }
 
 impl EngineName {
-    /// Every engine, in the order of verdicts and legends.
-    pub const ALL: [EngineName; 3] = [EngineName::LanesF32, EngineName::LanesF64, EngineName::Reference];
-
-    /// Returns the name in tables and legends.
-    pub fn name(self) -> &'static str {
-        match self {
-            EngineName::LanesF32 => "lanes f32",
-            EngineName::LanesF64 => "lanes f64",
-            EngineName::Reference => "reference",
-        }
-    }
-
     /// Returns half a unit in the last place of 1.
     pub(super) fn unit_roundoff(self) -> f64 {
         match self {

@@ -5,33 +5,29 @@
 //! symmetry, exponent or averages differ from the reference's, [`rattlemap::validate`] must explain the difference by a
 //! computation. Wild cells have parameters of any magnitude and run on the reference only.
 
-mod compare;
 mod space;
 
-use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
-use serde::Serialize;
 
-pub use compare::Mismatch;
-
-use super::cells::{EngineName, REST, flow_of, run_reference};
-use super::lanes::{CHUNK, Lanes, Start};
-use super::{Size, Verdict, Watch};
+use super::Checks;
+use super::cells::{REST, flow_of, run_reference};
+use super::lanes::{Lanes, Start};
 use rattlemap::gpu::{GpuError, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
-use rattlemap::map::plan::Needs;
+use rattlemap::map::plan::{Needs, Plan};
+use rattlemap::map::scene::{self, Integration, Quantity, Scene};
 use rattlemap::record::Record;
 use rattlemap::record::classify::{classify, status};
-use rattlemap::validate::{Kind, Rate};
-use rattlemap_dynamics::model::GearPair;
-use rattlemap_dynamics::orbit::{Budget, Settings, Status, measure as measure_cell, status_of};
+use rattlemap::validate::{
+    Draw, Kind, Lanes as ValidationLanes, Rate, Sample, Stratum, Subject, differences, replay,
+};
+use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, measure as measure_cell};
 
 /// Periods of bounded cells. One half is transient.
-pub(super) const SETTINGS: Settings =
-    Settings { transient_periods: 32, observed_periods: 32, max_period: 16 };
+const SETTINGS: Settings = Settings { transient_periods: 32, observed_periods: 32, max_period: 16 };
 
 /// Periods of wild cells.
 const WILD_PERIODS: u32 = 4;
@@ -39,60 +35,41 @@ const WILD_PERIODS: u32 = 4;
 /// Longest allowed time of a wild cell.
 const LONGEST: Duration = Duration::from_secs(120);
 
-/// Number of cells of an engine with one status and class.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Count {
-    /// `bounded` or `wild`.
-    pub kind: &'static str,
-    /// The engine.
-    pub engine: EngineName,
-    /// Name of the status.
-    pub status: &'static str,
-    /// Name of the class; `None` for wild cells, which are not classified.
-    pub class: Option<&'static str>,
-    /// Number of cells.
-    pub cells: usize,
-}
+/// Statuses of lanes that reached a cap.
+const CAPS: [Status; 3] = [Status::CapEvents, Status::CapRoot, Status::TooStiff];
 
-/// Results of all cells.
-#[derive(Clone, Debug, Default)]
-pub struct Rows {
-    /// Numbers of cells by status and class.
-    pub counts: Vec<Count>,
-    /// Lanes that are undecided or stopped by a cap where the reference decides. They claim nothing.
-    pub undecided: usize,
-    /// Explanations of a random choice of the lanes that differ from the reference.
-    pub mismatches: Vec<Mismatch>,
-    /// Number of differing lanes outside this choice.
-    pub unexamined: usize,
-    /// Number of records and wild states with a number that is not finite.
-    pub not_finite: usize,
-    /// Longest time of a wild cell.
-    pub longest: Duration,
-}
-
-/// Computes every cell.
+/// Compares `count` bounded cells on every engine, and runs a tenth as many wild cells: all numbers are finite, wild cells end
+/// in time, and no more differences lack an explanation than validation tolerates.
 ///
 /// # Errors
-/// A [`GpuError`].
-pub fn measure(size: Size, seed: u64, lanes: &mut Lanes, watch: &dyn Watch) -> Result<Rows, GpuError> {
-    let mut cells = space::all_bounded(size.pick(200, 1000, 100_000), seed, watch);
+/// [`GpuError`].
+pub fn check(count: usize, lanes: &mut Lanes) -> Result<Checks, GpuError> {
+    let mut checks = Checks::default();
+    let mut cells = space::all_bounded(count);
     // Lanes with similar numbers of steps run together.
     cells.sort_by_cached_key(|(pair, _)| space::iterations(pair));
-    let mut rows = Rows::default();
-    let counter = Counter::new(watch, "cells on the reference", cells.len());
-    let judges: Vec<Record> = each(&cells, |cell| counter.count(on_reference(cell)));
-    rows.count("bounded", EngineName::Reference, &judges);
-    let most = size.pick(20, 60, usize::MAX);
+    let judges: Vec<Record> = each(&cells, on_reference);
+    checks.require(judges.iter().all(is_finite), "a record of the reference is not finite");
+    let (mut unexplained, mut among) = (Vec::new(), 0);
     for precision in lanes.precisions() {
-        let records = on_lanes(precision, &cells, lanes, watch)?;
-        rows.count("bounded", precision.into(), &records);
-        compare::all(precision, &cells, &judges, &records, (seed, most), watch, &mut rows);
+        let records = lanes.run(precision, &cells, &LaneSettings::within(&budget()))?;
+        checks.require(records.iter().all(is_finite), format!("a record in {precision:?} is not finite"));
+        let different: Vec<usize> =
+            (0..count).filter(|&i| contradicts(precision, &cells[i].0, &records[i], &judges[i])).collect();
+        let explained = |&i: &usize| is_explained(precision, cells[i], records[i]);
+        let explained = each(&different, explained);
+        let left = different.iter().zip(explained).filter(|(_, explained)| !explained);
+        unexplained.extend(left.map(|(&i, _)| (precision, cells[i])));
+        among += count;
     }
-    let wild = space::all_wild(size.pick(20, 100, 1000), seed);
-    let counter = Counter::new(watch, "wild cells", wild.len());
-    rows.count_wild(&each(&wild, |pair| counter.count(run_wild(pair))));
-    Ok(rows)
+    let rate = Rate::new(unexplained.len(), among);
+    checks.require(!rate.is_too_many(), format!("lanes without an explanation: {unexplained:?}"));
+    let wild = space::all_wild(count / 10);
+    for (pair, (is_finite, time)) in wild.iter().zip(each(&wild, run_wild)) {
+        checks.require(is_finite, format!("{pair:?} is not finite"));
+        checks.add(time.as_secs_f64(), LONGEST.as_secs_f64(), format!("seconds of {pair:?}"));
+    }
+    Ok(checks)
 }
 
 /// Computes `of` for each item in parallel. Costs differ a thousandfold, so each task has one item.
@@ -100,46 +77,7 @@ fn each<T: Sync, R: Send>(list: &[T], of: impl Fn(&T) -> R + Send + Sync) -> Vec
     list.par_iter().with_max_len(1).map(of).collect()
 }
 
-fn on_lanes(
-    precision: Precision,
-    cells: &[Start],
-    lanes: &mut Lanes,
-    watch: &dyn Watch,
-) -> Result<Vec<Record>, GpuError> {
-    let work = match precision {
-        Precision::F32 => "lanes in f32",
-        Precision::F64 => "lanes in f64",
-    };
-    let mut records = Vec::with_capacity(cells.len());
-    for chunk in cells.chunks(CHUNK) {
-        records.extend(lanes.run(precision, chunk, &lane_settings())?);
-        watch.progress(work, records.len(), cells.len());
-    }
-    Ok(records)
-}
-
-/// Reports how many items are done.
-struct Counter<'w> {
-    watch: &'w dyn Watch,
-    work: &'static str,
-    done: AtomicUsize,
-    total: usize,
-}
-
-impl Counter<'_> {
-    fn new<'w>(watch: &'w dyn Watch, work: &'static str, total: usize) -> Counter<'w> {
-        Counter { watch, work, done: AtomicUsize::new(0), total }
-    }
-
-    /// Counts one more item and returns its result.
-    fn count<R>(&self, result: R) -> R {
-        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        self.watch.progress(self.work, done, self.total);
-        result
-    }
-}
-
-pub(super) fn budget() -> Budget {
+fn budget() -> Budget {
     Budget {
         settings: SETTINGS,
         early_stop: true,
@@ -151,82 +89,17 @@ pub(super) fn budget() -> Budget {
     }
 }
 
-pub(super) fn lane_settings() -> LaneSettings {
-    LaneSettings::within(&budget())
-}
-
 /// Computes a cell like the CPU engine.
 fn on_reference((pair, start): &Start) -> Record {
     let measurement = measure_cell(&flow_of(pair), pair.law(), *start, &budget());
     measured_record(&measurement, &Needs::EVERYTHING)
 }
 
-/// Returns the status of a wild cell, whether its state is finite, and its time.
-fn run_wild(pair: &GearPair) -> (Status, bool, Duration) {
+/// Returns whether the state of a wild cell is finite, or it ended in a status, and its time.
+fn run_wild(pair: &GearPair) -> (bool, Duration) {
     let clock = Instant::now();
-    let (status, is_finite) = match run_reference(pair, REST, WILD_PERIODS).0 {
-        Ok(state) => (Status::Ok, state.iter().all(|x| x.is_finite())),
-        Err(stop) => (status_of(stop), true),
-    };
-    (status, is_finite, clock.elapsed())
-}
-
-impl Rows {
-    fn count(&mut self, kind: &'static str, engine: EngineName, records: &[Record]) {
-        let mut counts = BTreeMap::new();
-        for record in records {
-            let key = (record.status, classify(record).name());
-            counts.entry(key).or_insert((status(record).name(), 0usize)).1 += 1;
-        }
-        self.counts.extend(counts.into_iter().map(|((_, class), (status, cells))| Count {
-            kind,
-            engine,
-            status,
-            class: Some(class),
-            cells,
-        }));
-        self.not_finite += records.iter().filter(|record| !is_finite(record)).count();
-    }
-
-    fn count_wild(&mut self, ends: &[(Status, bool, Duration)]) {
-        for status in Status::ALL {
-            let cells = ends.iter().filter(|end| end.0 == status).count();
-            let engine = EngineName::Reference;
-            if cells > 0 {
-                self.counts.push(Count { kind: "wild", engine, status: status.name(), class: None, cells });
-            }
-        }
-        self.not_finite += ends.iter().filter(|end| !end.1).count();
-        self.longest = ends.iter().map(|end| end.2).max().unwrap_or_default();
-    }
-
-    /// Returns the number of cells of one kind on one engine.
-    pub fn cells(&self, kind: &str, engine: EngineName) -> usize {
-        let here = self.counts.iter().filter(|count| count.kind == kind && count.engine == engine);
-        here.map(|count| count.cells).sum()
-    }
-
-    /// Lists the numbers of these cells by status.
-    fn statuses(&self, kind: &str, engine: EngineName) -> String {
-        let here = || self.counts.iter().filter(|count| count.kind == kind && count.engine == engine);
-        let names = Status::ALL.into_iter().map(Status::name).filter_map(|status| {
-            let cells: usize = here().filter(|count| count.status == status).map(|count| count.cells).sum();
-            (cells > 0).then(|| format!("{cells} {status}"))
-        });
-        names.collect::<Vec<_>>().join(", ")
-    }
-
-    /// Returns the rate of mismatches without an explanation. If only some of the differing lanes were examined, they stand
-    /// for the same fraction of all lanes.
-    fn rate(&self) -> Rate {
-        let lanes = EngineName::ALL.into_iter().filter(|&engine| engine != EngineName::Reference);
-        let lanes: usize = lanes.map(|engine| self.cells("bounded", engine)).sum();
-        let examined = self.mismatches.len();
-        let all = examined + self.unexamined;
-        let among = if self.unexamined == 0 { lanes } else { lanes * examined / all };
-        let unexplained = self.mismatches.iter().filter(|mismatch| mismatch.kind == Kind::Unexplained);
-        Rate::new(unexplained.count(), among)
-    }
+    let end = run_reference(pair, REST, WILD_PERIODS).0;
+    (end.is_ok_and(|state| state.iter().all(|x| x.is_finite())) || end.is_err(), clock.elapsed())
 }
 
 /// Whether all numbers are finite. Only the exponent of a superstable cycle may be minus infinity.
@@ -237,32 +110,58 @@ fn is_finite(record: &Record) -> bool {
         && numbers.iter().chain(&record.strobe).all(|number| number.is_finite())
 }
 
-/// Requires that all numbers are finite, that wild cells end in time, and that no more mismatches lack an explanation than
-/// validation tolerates.
-pub fn judge(rows: &Rows) -> Verdict {
-    let bounded = rows.cells("bounded", EngineName::Reference);
-    let wild = rows.cells("wild", EngineName::Reference);
-    let (examined, rate) = (rows.mismatches.len(), rows.rate());
-    let (unexplained, share) = (rate.count, rate.text());
-    let ended_in_time = rows.longest < LONGEST && bounded > 0 && wild > 0;
-    let holds = rows.not_finite == 0 && !rate.is_too_many() && ended_in_time;
-    let ended: Vec<String> = EngineName::ALL
-        .into_iter()
-        .filter(|&engine| rows.cells("bounded", engine) > 0)
-        .map(|engine| format!("{} ({})", engine.name(), rows.statuses("bounded", engine)))
-        .collect();
-    Verdict {
-        holds,
-        sentence: format!(
-            "{bounded} random cells on every engine, {}; {} lanes are undecided where the reference decides, {} differ, \
-             {examined} of them examined, {unexplained} without an explanation ({share}); {wild} wild cells on the \
-             reference ({}), the longest in {:.1} s; {} records with a number that is not finite",
-            ended.join(", "),
-            rows.undecided,
-            examined + rows.unexamined,
-            rows.statuses("wild", EngineName::Reference),
-            rows.longest.as_secs_f64(),
-            rows.not_finite
-        ),
+/// Whether a lane differs from the reference. One that is undecided or stopped by a cap claims nothing, and if neither engine
+/// decides, averages over so few periods claim nothing either.
+fn contradicts(precision: Precision, pair: &GearPair, lane: &Record, judge: &Record) -> bool {
+    let [of_lane, of_judge] = [lane, judge].map(classify);
+    let is_open = of_lane == Class::Undecided
+        && (of_judge == Class::Undecided || lane.periods_run >= LaneSettings::within(&budget()).periods);
+    let period = std::f64::consts::TAU / pair.omega;
+    !is_open
+        && !CAPS.contains(&status(lane))
+        && !differences(lane, judge, precision, period, &budget()).is_empty()
+}
+
+/// Validates a lane's record as that of the first cell of a map. Returns whether it is right or its difference is explained.
+fn is_explained(precision: Precision, (pair, start): Start, record: Record) -> bool {
+    let plan = plan(&pair, start);
+    let mut records = vec![Record::default(); plan.cell_count()];
+    records[0] = record;
+    let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
+    let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
+    let sample = Sample { seed: 0, requested: 1, draws, states: Vec::new() };
+    let found = replay(&subject, &sample, &ValidationLanes::default(), &|_| ()).mismatches;
+    found.iter().all(|mismatch| mismatch.kind != Kind::Unexplained)
+}
+
+/// Returns a plan whose first cell is this one. The swept parameters have no upper bound.
+fn plan(pair: &GearPair, start: State) -> Plan {
+    use Quantity::{Class, Impacts, Lyapunov, Mesh, Symmetric, Word};
+    let Settings { transient_periods, observed_periods, max_period } = SETTINGS;
+    let integration =
+        Integration { transient_periods, observed_periods, max_period, ..Integration::default() };
+    let scene = Scene::builder(*pair)
+        .axis("omega", pair.omega..=2.0 * pair.omega + 1.0, 2)
+        .axis("mesh_speed", pair.mesh_speed..=2.0 * pair.mesh_speed + 1.0, 2)
+        .integration(integration)
+        .start(scene::Start::State(start))
+        .quantities(&[Class, Lyapunov, Impacts, Mesh, Symmetric, Word]);
+    Plan::new(&scene.build().expect("a valid cell makes a valid scene"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::model::Model;
+
+    #[test]
+    fn the_first_cell_of_the_plan_is_the_given_cell() {
+        for (pair, start) in space::all_bounded(200) {
+            let plan = plan(&pair, start);
+            let (model, mut of_plan) = (plan.model(0), GearPair::paper(0.0));
+            (0..model.parameters().len()).for_each(|index| of_plan.assign(index, model.value(index)));
+            assert_eq!((of_plan, plan.start(0, &[])), (pair, start));
+            assert_eq!(plan.budget(), &budget());
+        }
     }
 }

@@ -4,26 +4,22 @@
 //! every step the bounds either exclude events or lead to them. Two tests show this: swings that reach behind a wall between
 //! two steps, whose contacts are known in closed form ([`super::grazing`]), and whole motions, whose impacts are compared
 //! with those of the reference.
-//!
-//! For comparison, the table also counts the contacts that N steps would miss if only their ends were checked, as
-//! fixed-step programs do.
 
 use rayon::prelude::*;
-use serde::Serialize;
 
 use super::cells::{
     EngineName, REST, flow_of, oscillator_of, paper, run_reference, sensitivity, state_distance,
 };
 use super::grazing::{contact_speed, swing};
 use super::lanes::{Lanes, Start};
-use super::perturbed::{Perturbed, perturbed};
-use super::{Size, Verdict, Watch, readout};
+use super::{Checks, SEED, readout};
 use rattlemap::gpu::{Constants, GpuError, LaneSettings};
 use rattlemap::map::random::Random;
 use rattlemap::record::classify::status;
-use rattlemap::record::distance::is_within;
 use rattlemap::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::orbit::Status;
+use rattlemap_dynamics::reference::{Stop, Trajectory};
 
 /// Distances that the swings reach behind the wall, in units of half the backlash. The first swing is there for a twelfth
 /// of a period; single precision just resolves the last.
@@ -47,77 +43,20 @@ const FACTOR: f64 = 4.0;
 /// Forcing periods from rest, few enough to predict chaos.
 const PERIODS: u32 = 4;
 
-/// Swings of one depth at one number of steps.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Swings {
-    /// The engine.
-    pub engine: EngineName,
-    /// Requested steps per forcing period.
-    pub steps_asked: u32,
-    /// Fewest steps of a swing.
-    pub steps_least: u32,
-    /// Most steps of a swing.
-    pub steps_most: u32,
-    /// Distance that the swings reach behind the wall, in units of half the backlash.
-    pub depth: f64,
-    /// Number of swings. Each has one contact.
-    pub swings: usize,
-    /// Number of missed contacts.
-    pub missed: usize,
-    /// Number of contacts that `steps_asked` steps would miss if only their ends were checked.
-    pub missed_by_ends: usize,
-}
+/// Swings of each depth.
+const SWINGS: usize = 64;
 
-/// One whole motion at one number of steps.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Motion {
-    /// Restitution.
-    pub e: f64,
-    /// Excitation frequency.
-    pub omega: f64,
-    /// The engine.
-    pub engine: EngineName,
-    /// Requested steps per forcing period.
-    pub steps_asked: u32,
-    /// Steps per forcing period.
-    pub steps: u32,
-    /// Name of the status.
-    pub status: &'static str,
-    /// Impacts over four forcing periods.
-    pub impacts: u64,
-    /// Impacts of the reference.
-    pub impacts_of_reference: u64,
-    /// Fewest impacts of the reference with perturbations at every step.
-    pub impacts_least: u64,
-    /// Most impacts of the reference with perturbations at every step.
-    pub impacts_most: u64,
-    /// Distance from the reference after four forcing periods.
-    pub error: f64,
-    /// Largest error that rounding explains.
-    pub bar: f64,
-}
-
-/// Results of both tests.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Rows {
-    /// Swings that reach behind a wall.
-    pub swings: Vec<Swings>,
-    /// Whole motions.
-    pub motions: Vec<Motion>,
-}
-
-/// Computes swings and motions with every number of steps.
+/// Compares swings and motions with every number of steps: no contact is missed, no motion differs by more than rounding at
+/// every step explains, and no cell takes fewer steps than requested.
 ///
 /// # Errors
-/// A [`GpuError`].
-pub fn measure(size: Size, seed: u64, lanes: &mut Lanes, watch: &dyn Watch) -> Result<Rows, GpuError> {
+/// [`GpuError`].
+pub fn check(lanes: &mut Lanes) -> Result<Checks, GpuError> {
     let powers = |last: u32| (0..=last).map(|k| 1 << k);
-    let mut grids: Vec<u32> = powers(size.pick(3, 12, 14)).collect();
-    let mut rows = Rows::default();
-    measure_swings(&grids, size.pick(8, 64, 1024), seed, lanes, watch, &mut rows.swings)?;
-    grids.push(FINEST);
-    measure_motions(&grids, &MOTIONS[..size.pick(2, 8, 8)], lanes, &mut rows.motions)?;
-    Ok(rows)
+    let mut checks = Checks::default();
+    compare_swings(powers(14), lanes, &mut checks)?;
+    compare_motions(powers(12).chain([FINEST]), lanes, &mut checks)?;
+    Ok(checks)
 }
 
 /// Returns settings for some periods of at least `steps` steps.
@@ -125,49 +64,32 @@ fn settings(steps: u32, periods: u32) -> LaneSettings {
     LaneSettings { steps_per_period: Some(steps), ..LaneSettings::only(periods) }
 }
 
-fn measure_swings(
-    grids: &[u32],
-    per_depth: usize,
-    seed: u64,
+fn compare_swings(
+    grids: impl Iterator<Item = u32> + Clone,
     lanes: &mut Lanes,
-    watch: &dyn Watch,
-    rows: &mut Vec<Swings>,
+    checks: &mut Checks,
 ) -> Result<(), GpuError> {
-    let mut random = Random::new(seed);
+    let mut random = Random::new(SEED);
     let starts: Vec<Start> = DEPTHS
         .iter()
-        .flat_map(|&depth| (0..per_depth).map(|_| swing(depth, &mut random)).collect::<Vec<_>>())
+        .flat_map(|&depth| (0..SWINGS).map(|_| swing(depth, &mut random)).collect::<Vec<_>>())
         .collect();
     lanes.rewrite(readout::first_contact);
-    let precisions = lanes.precisions();
-    let all = grids.len() * precisions.len();
-    for (nth, &precision) in precisions.iter().enumerate() {
-        for (grid, &steps_asked) in grids.iter().enumerate() {
-            watch.progress("grids", nth * grids.len() + grid, all);
-            let records = lanes.run(precision, &starts, &settings(steps_asked, 1))?;
-            let steps_of = lane_steps(&starts, steps_asked);
-            for (i, &depth) in DEPTHS.iter().enumerate() {
-                let here = i * per_depth..(i + 1) * per_depth;
-                let is_missed =
-                    |k: &usize| contact_speed(&starts[*k], &records[*k], Some(steps_asked)).is_none();
-                let steps = || steps_of[here.clone()].iter().copied();
-                rows.push(Swings {
-                    engine: precision.into(),
-                    steps_asked,
-                    steps_least: steps().min().unwrap_or(0),
-                    steps_most: steps().max().unwrap_or(0),
-                    depth,
-                    swings: per_depth,
-                    missed: here.clone().filter(is_missed).count(),
-                    missed_by_ends: here
-                        .filter(|&k| !is_found_at_ends(&starts[k], depth, steps_asked))
-                        .count(),
-                });
-            }
+    for precision in lanes.precisions() {
+        for requested in grids.clone() {
+            let records = lanes.run(precision, &starts, &settings(requested, 1))?;
+            let cells = starts.iter().zip(&records);
+            let missed = cells
+                .filter(|(start, record)| contact_speed(start, record, Some(requested)).is_none())
+                .count();
+            let what = |what: &str| format!("{precision:?}, {requested} steps, {what}");
+            checks.add(missed as f64, 0.0, what("missed contacts"));
+            let has_steps =
+                lane_steps(&starts, requested).iter().all(|steps| (requested..=MOST_STEPS).contains(steps));
+            checks.require(has_steps, what("fewer than requested"));
         }
     }
     lanes.rewrite(readout::whole);
-    watch.progress("grids", all, all);
     Ok(())
 }
 
@@ -177,87 +99,94 @@ fn lane_steps(starts: &[Start], requested: u32) -> Vec<u32> {
     starts.iter().map(|start| constants(start).map_or(0, |constants| constants.steps)).collect()
 }
 
-/// Whether one of the ends of `steps` equal steps is behind the wall. The swing is there while
-/// `cos(omega t - phi) > 1 / (1 + depth)`.
-fn is_found_at_ends((pair, [x1, v1, ..]): &Start, depth: f64, steps: u32) -> bool {
-    let phi = (v1 / pair.omega).atan2(*x1);
-    let half = (depth * (2.0 + depth)).sqrt().atan2(1.0);
-    let step = std::f64::consts::TAU / f64::from(steps);
-    // The first end after the swing passes the wall must precede its return.
-    let first = ((phi - half) / step).ceil() * step;
-    first < phi + half
-}
-
-fn measure_motions(
-    grids: &[u32],
-    motions: &[(f64, f64)],
+fn compare_motions(
+    grids: impl Iterator<Item = u32> + Clone,
     lanes: &mut Lanes,
-    rows: &mut Vec<Motion>,
+    checks: &mut Checks,
 ) -> Result<(), GpuError> {
-    let starts: Vec<Start> = motions.iter().map(|&(e, omega)| (paper(e, omega), REST)).collect();
-    let exact: Vec<_> = starts.par_iter().map(|(pair, start)| run_reference(pair, *start, PERIODS)).collect();
+    let starts = MOTIONS.map(|(e, omega)| (paper(e, omega), REST));
+    let exact = starts.map(|(pair, start)| run_reference(&pair, start, PERIODS).0.expect("an ordinary cell"));
     for precision in lanes.precisions() {
         let engine = EngineName::from(precision);
-        let sensitivities: Vec<f64> =
-            starts.par_iter().map(|(pair, start)| sensitivity(pair, *start, PERIODS, engine)).collect();
-        for &steps_asked in grids {
-            let records = lanes.run(precision, &starts, &settings(steps_asked, PERIODS))?;
-            let steps = lane_steps(&starts, steps_asked);
-            let perturbed: Vec<Perturbed> = (0..starts.len())
-                .into_par_iter()
-                .map(|i| perturbed_by(engine, &starts[i], steps[i]))
+        let sensitivities = starts.map(|(pair, start)| sensitivity(&pair, start, PERIODS, engine));
+        for requested in grids.clone() {
+            let records = lanes.run(precision, &starts, &settings(requested, PERIODS))?;
+            let steps = lane_steps(&starts, requested);
+            let cells = starts.par_iter().zip(&steps);
+            let perturbed: Vec<Perturbed> = cells
+                .map(|(start, &steps)| perturbed(start, steps, engine).expect("an ordinary cell"))
                 .collect();
             for (i, (GearPair { e, omega, .. }, _)) in starts.iter().enumerate() {
-                let (state, work) = &exact[i];
-                let [impacts_least, impacts_most] = perturbed[i].impacts;
-                rows.push(Motion {
-                    e: *e,
-                    omega: *omega,
-                    engine,
-                    steps_asked,
-                    steps: steps[i],
-                    status: status(&records[i]).name(),
-                    impacts: (records[i].impacts_per_period * f64::from(PERIODS)).round() as u64,
-                    impacts_of_reference: work.impacts,
-                    impacts_least,
-                    impacts_most,
-                    error: state_distance(&records[i].strobe, state.as_ref().expect("an ordinary cell")),
-                    bar: FACTOR * sensitivities[i] + SCATTER * perturbed[i].distance,
-                });
+                let what =
+                    |what: &str| format!("{engine:?}, e = {e}, omega = {omega}, {requested} steps, {what}");
+                let impacts = (records[i].impacts_per_period * f64::from(PERIODS)).round() as u64;
+                let [least, most] = perturbed[i].impacts;
+                checks.require(status(&records[i]) == Status::Ok, what(status(&records[i]).name()));
+                checks.require((least..=most).contains(&impacts), what("impacts"));
+                checks.require(steps[i] >= requested, what("fewer than requested"));
+                let bar = FACTOR * sensitivities[i] + SCATTER * perturbed[i].distance;
+                checks.add(state_distance(&records[i].strobe, &exact[i]), bar, what("error"));
             }
         }
     }
     Ok(())
 }
 
-fn perturbed_by(engine: EngineName, start: &Start, steps: u32) -> Perturbed {
-    perturbed(&flow_of(&start.0), start, PERIODS, steps, engine, RUNS).expect("an ordinary cell")
+/// The effect of rounding at every step, measured on perturbed motions of the reference.
+///
+/// A lane rounds its state once per step. A motion of the reference whose state is moved by as much at the same times may
+/// end where the lane ends. A few motions with random moves show how far rounding may separate them, and whether it may add
+/// or remove an impact where chatter ends. The sensitivity to the start does not show this: a motion forgets its start, but
+/// not its latest roundings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Perturbed {
+    /// Largest distance of a perturbed end from the exact one.
+    distance: f64,
+    /// Fewest and most impacts, including the unperturbed motion.
+    impacts: [u64; 2],
 }
 
-/// Requires that no contact is missed at any number of steps, that no motion differs by more than rounding at every step
-/// explains, and that no cell takes fewer steps than requested.
-pub fn judge(rows: &Rows) -> Verdict {
-    let missed: usize = rows.swings.iter().map(|row| row.missed).sum();
-    let by_ends: usize = rows.swings.iter().map(|row| row.missed_by_ends).sum();
-    let swings: usize = rows.swings.iter().map(|row| row.swings).sum();
-    let good = |row: &&Motion| {
-        row.status == "ok"
-            && (row.impacts_least..=row.impacts_most).contains(&row.impacts)
-            && is_within(row.error, row.bar)
-            && row.steps >= row.steps_asked
-    };
-    let bad = rows.motions.iter().filter(|row| !good(row)).count();
-    let steps = || rows.swings.iter().map(|row| row.steps_asked);
-    let finest = rows.motions.iter().map(|row| row.steps_asked).max().unwrap_or(0);
-    let (least, most) = (steps().min().unwrap_or(0), steps().max().unwrap_or(0));
-    let has_steps =
-        rows.swings.iter().all(|row| row.steps_least >= row.steps_asked && row.steps_most <= MOST_STEPS);
-    Verdict {
-        holds: missed == 0 && bad == 0 && has_steps && swings > 0,
-        sentence: format!(
-            "N = {least} to {most} steps per period: {missed} of {swings} contacts missed ({by_ends} if only \
-             ends of steps were checked); {bad} of {} motions, with N up to {finest}, differ from the reference",
-            rows.motions.len()
-        ),
+/// Perturbs motions at each of `steps` equidistant times of a period: each component of the state moves by a uniform random
+/// number of at most one unit roundoff of the engine.
+fn perturbed((pair, start): &Start, steps: u32, engine: EngineName) -> Result<Perturbed, Stop> {
+    let (flow, law) = (flow_of(pair), pair.law());
+    let mut exact = Trajectory::new(&flow, law, *start);
+    (0..PERIODS).try_for_each(|_| exact.advance_period(&mut ()))?;
+    let mut found = Perturbed { distance: 0.0, impacts: [exact.work().impacts; 2] };
+    let unit = engine.unit_roundoff();
+    for run in 0..RUNS {
+        let mut random = Random::new((run << 32) + u64::from(steps));
+        let mut moved = Trajectory::new(&flow, law, *start);
+        for _ in 0..PERIODS {
+            for step in 1..steps {
+                moved.advance_to(flow.period * (f64::from(step) / f64::from(steps)), &mut ())?;
+                moved.perturb(std::array::from_fn(|_| unit * (2.0 * random.unit() - 1.0)));
+            }
+            moved.advance_period(&mut ())?;
+        }
+        let impacts = moved.work().impacts;
+        found.distance = found.distance.max(state_distance(&moved.state(), &exact.state()));
+        found.impacts = [found.impacts[0].min(impacts), found.impacts[1].max(impacts)];
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Errors of a random walk grow with the square root of its steps, and with the unit roundoff.
+    #[test]
+    fn perturbed_motions_scatter_like_a_random_walk() {
+        let cell = (paper(0.9, 11.0), REST);
+        let distance = |steps: u32, engine: EngineName| {
+            let found = perturbed(&cell, steps, engine).unwrap();
+            assert_eq!(found.impacts, [0, 0]);
+            found.distance
+        };
+        let [few, many] = [64, 4096].map(|steps| distance(steps, EngineName::LanesF32));
+        assert!((2.0..32.0).contains(&(many / few)), "{few:e} {many:e}");
+        let double = distance(4096, EngineName::LanesF64);
+        assert!((0.05..20.0).contains(&(many / double / 2f64.powi(29))), "{many:e} {double:e}");
     }
 }

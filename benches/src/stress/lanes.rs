@@ -1,12 +1,12 @@
 //! Runs cells in lanes, in every precision that the device has.
 
 use super::cells::oscillator_of;
-use rattlemap::gpu::{self, AdapterChoice, Gpu, GpuError, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{AdapterChoice, Gpu, GpuError, Lane, LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, State};
 
 /// Largest number of cells in one run of a device. Each has its own flow.
-pub(super) const CHUNK: usize = 4096;
+const CHUNK: usize = 4096;
 /// Above this number of steps per period a run has fewer cells, because each cell has a phasor per step.
 const STEPS_OF_CHUNK: usize = 1024;
 
@@ -34,13 +34,8 @@ impl Lanes {
     }
 
     /// Returns the precisions of the adapter.
-    pub fn precisions(&self) -> Vec<Precision> {
+    pub(super) fn precisions(&self) -> Vec<Precision> {
         self.devices.iter().map(Gpu::precision).collect()
-    }
-
-    /// Returns the name of the adapter.
-    pub fn device(&self) -> String {
-        gpu::describe(self.devices[0].adapter())
     }
 
     /// Makes the following runs use shaders that `rewrite` returns.
@@ -49,6 +44,9 @@ impl Lanes {
     }
 
     /// Returns one record per cell.
+    ///
+    /// # Errors
+    /// [`GpuError`].
     pub(super) fn run(
         &mut self,
         precision: Precision,

@@ -7,87 +7,33 @@
 
 use cpu_time::ThreadTime;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use super::cells::flow_of;
-use super::{Size, Verdict, Watch};
+use super::{Checks, SEED};
 use rattlemap::map::random::Random;
 use rattlemap_dynamics::model::{GearPair, Model, REST, State, state};
-use rattlemap_dynamics::orbit::{Budget, Settings, Status, measure};
+use rattlemap_dynamics::orbit::{Budget, Settings, measure};
 
 /// Longest allowed time of a cell, in times of a typical cell: one to three seconds of a core. The slowest of the first
 /// 1,000 cells is overdamped and takes 1,300 times.
 const LONGEST: f64 = 2_000.0;
 
-/// Number of cells between two reports of progress.
-const BLOCK: usize = 256;
-
-/// Times of the cells with one status.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
-    /// Name of the status, or `all`.
-    pub status: &'static str,
-    /// Number of cells.
-    pub cells: usize,
-    /// Median time in seconds of one core.
-    pub median: f64,
-    /// Time that one cell in 100 exceeds.
-    pub p99: f64,
-    /// Time that one cell in 1,000 exceeds.
-    pub p999: f64,
-    /// Longest time.
-    pub worst: f64,
-    /// Median time of a typical cell: the gear pair of the paper with e = 0.5, without early stops.
-    pub typical: f64,
-}
-
-/// Measures every cell, on all cores.
-pub fn measure_cells(size: Size, seed: u64, watch: &dyn Watch) -> Vec<Row> {
-    let count = size.pick(200, 1_000, 100_000);
-    let numbers: Vec<u64> = (0..count as u64).collect();
-    let mut times: Vec<Times> = Vec::with_capacity(count);
-    for block in numbers.chunks(BLOCK) {
-        times.par_extend(block.par_iter().with_max_len(1).map(|&n| time(seed, n)));
-        watch.progress("cells timed", times.len(), count);
-    }
-    let mut typical: Vec<f64> = times.iter().map(|cell| cell.typical).collect();
+/// Compares the time of each of `count` cells with that of a typical one, on all cores.
+pub fn check(count: usize) -> Checks {
+    let mut checks = Checks::default();
+    let times: Vec<[f64; 2]> = (0..count).into_par_iter().with_max_len(1).map(|n| time(n as u64)).collect();
+    let mut typical: Vec<f64> = times.iter().map(|time| time[1]).collect();
     typical.sort_by(f64::total_cmp);
-    let typical = typical[count / 2];
-    let all = row("all", typical, times.iter().map(|cell| cell.seconds).collect());
-    let by_status = Status::ALL.iter().map(|&status| {
-        let of = |cell: &Times| (cell.status == status).then_some(cell.seconds);
-        row(status.name(), typical, times.iter().filter_map(of).collect())
-    });
-    [all].into_iter().chain(by_status).filter(|row| row.cells > 0).collect()
-}
-
-fn row(status: &'static str, typical: f64, mut seconds: Vec<f64>) -> Row {
-    seconds.sort_by(f64::total_cmp);
-    let quantile = |share: f64| {
-        let place = (share * seconds.len() as f64) as usize;
-        seconds.get(place.min(seconds.len().saturating_sub(1))).copied().unwrap_or(0.0)
-    };
-    Row {
-        status,
-        cells: seconds.len(),
-        median: quantile(0.5),
-        p99: quantile(0.99),
-        p999: quantile(0.999),
-        worst: quantile(1.0),
-        typical,
+    for (n, [seconds, _]) in times.iter().enumerate() {
+        checks.add(*seconds, LONGEST * typical[count / 2], format!("seconds of cell {n}"));
     }
+    checks
 }
 
-/// Times of a cell and of a typical one, in seconds of this machine's core.
-struct Times {
-    status: Status,
-    seconds: f64,
-    typical: f64,
-}
-
-/// Measures the `n`th cell, and a typical one after it.
-fn time(seed: u64, n: u64) -> Times {
-    let mut random = Random::new(seed ^ (n << 20));
+/// Measures the `n`th cell, and after it a typical one: the gear pair of the paper with e = 0.5, without early stops. Returns
+/// both times in seconds of this machine's core.
+fn time(n: u64) -> [f64; 2] {
+    let mut random = Random::new(SEED ^ (n << 20));
     let (pair, start) = cell(&mut random);
     let budget = Budget {
         settings: Settings::default(),
@@ -100,12 +46,13 @@ fn time(seed: u64, n: u64) -> Times {
     };
     let timed = |pair: &GearPair, start, budget: &Budget| {
         let clock = ThreadTime::now();
-        let status = measure(&flow_of(pair), pair.law(), start, budget).status;
-        (status, clock.elapsed().as_secs_f64())
+        std::hint::black_box(measure(&flow_of(pair), pair.law(), start, budget));
+        clock.elapsed().as_secs_f64()
     };
-    let (status, seconds) = timed(&pair, start, &budget);
-    let (_, typical) = timed(&GearPair::paper(0.5), REST, &Budget { early_stop: false, ..budget });
-    Times { status, seconds, typical }
+    [
+        timed(&pair, start, &budget),
+        timed(&GearPair::paper(0.5), REST, &Budget { early_stop: false, ..budget }),
+    ]
 }
 
 /// Draws a random cell.
@@ -123,26 +70,4 @@ fn cell(random: &mut Random) -> (GearPair, State) {
     let start: [f64; 4] =
         std::array::from_fn(|_| if rest { 0.0 } else { size * (2.0 * random.unit() - 1.0) });
     (pair, state(&start))
-}
-
-/// Requires that no cell takes longer than `LONGEST` typical cells.
-pub fn judge(rows: &[Row]) -> Verdict {
-    let Some(all) = rows.first() else {
-        return Verdict { holds: false, sentence: "no cell was timed".into() };
-    };
-    let statuses: Vec<String> = rows[1..].iter().map(|row| format!("{} {}", row.cells, row.status)).collect();
-    Verdict {
-        holds: all.cells > 0 && all.worst <= LONGEST * all.typical,
-        sentence: format!(
-            "{} random cells ({}): median {:.1} ms of a core, one in 100 above {:.0} ms, one in 1,000 above {:.0} ms, \
-             the slowest {:.0} ms; a typical cell takes {:.2} ms",
-            all.cells,
-            statuses.join(", "),
-            1e3 * all.median,
-            1e3 * all.p99,
-            1e3 * all.p999,
-            1e3 * all.worst,
-            1e3 * all.typical
-        ),
-    }
 }

@@ -12,41 +12,6 @@ pub(super) fn rows(path: &std::path::Path) -> Vec<Row> {
 }
 
 #[test]
-fn stress_judges_every_part_and_writes_its_folder() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = |arguments: &[&str]| {
-        let mut command = Command::cargo_bin("rattlemap-bench").unwrap();
-        command.current_dir(folder.path()).args(["stress", "--quick"]).args(arguments).assert()
-    };
-    let message = run(&[]).success().stdout("").get_output().stderr.clone();
-    let message = String::from_utf8(message).unwrap();
-    for part in ["long_runs", "impacts", "grazing", "chatter", "stiffness", "grid", "work", "fuzz"] {
-        let line = message.lines().find(|line| line.starts_with(part));
-        assert!(line.is_some_and(|line| line.contains("holds: ")), "{part}: {message}");
-    }
-    let out = folder.path().join("out/bench/stress");
-    let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
-    let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
-    assert_eq!(manifest["command"], "stress");
-    for file in manifest["files"].as_array().unwrap() {
-        let size = out.join(file["name"].as_str().unwrap()).metadata().unwrap().len();
-        assert!(size > 0, "{file} is empty");
-    }
-
-    // A run of some parts removes the files of the others.
-    let message =
-        run(&["--part", "grazing", "--part", "chatter", "--force"]).success().get_output().stderr.clone();
-    let message = String::from_utf8(message).unwrap();
-    let judged: Vec<&str> = message.lines().filter(|line| line.contains("holds: ")).collect();
-    assert!(judged.len() == 2 && judged[0].starts_with("grazing"), "{message}");
-    let mut names: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    names.sort();
-    assert_eq!(names, ["chatter.csv", "grazing.csv", "grazing.png", "manifest.json"]);
-    let refused = run(&["--part", "grinding", "--force"]).code(2).get_output().clone();
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("long_runs, impacts"), "{refused:?}");
-}
-
-#[test]
 fn work_precision_measures_every_method() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {

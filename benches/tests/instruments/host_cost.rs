@@ -31,17 +31,3 @@ fn every_phase_of_a_map_has_its_cost() {
         }
     }
 }
-
-#[test]
-fn scaling_is_measured_and_simulated() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut command = Command::cargo_bin("rattlemap-bench").unwrap();
-    command.current_dir(folder.path()).args(["host-cost", "--quick", "--scaling"]).assert().success();
-    let maps = rows(&folder.path().join("out/bench/host-cost/scaling.csv"));
-    assert_eq!(maps.iter().map(|row| &*row["map"]).collect::<Vec<_>>(), ["cheap", "expensive"]);
-    for row in &maps {
-        let [one, serial, busy, simulated] =
-            ["one", "serial", "busy", "simulated"].map(|name| row[name].parse::<f64>().unwrap());
-        assert!(0.0 < simulated && serial <= one && 0.0 < busy && busy <= 1.0, "{row:?}");
-    }
-}

@@ -5,5 +5,4 @@
 mod cli;
 mod host_cost;
 mod order;
-mod scale;
 mod stress;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use crate::cli::say::{classes, path, quoted};
-use crate::map::engine::{CardReport, Preparation};
+use crate::cli::say::{classes, path};
+use crate::map::engine::Preparation;
 use crate::map::plan::count_classes;
 use crate::show::cells::Cells;
 use crate::show::refinement;
@@ -25,8 +25,7 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
     let periods = per_second(cells.periods() as f64 * share, run);
     let speed = speed(integrated, unit, run, &format!(", {periods:.0} forcing periods/s{per_step}"));
     format!(
-        "{integrated} {unit}{speed}; files written in {finishing:.3} s\n{}{}{}",
-        cards(&run.cards, unit),
+        "{integrated} {unit}{speed}; files written in {finishing:.3} s\n{}{}",
         refinement::lines(cells).into_iter().map(|line| line + "\n").collect::<String>(),
         classes(count_classes(cells.classes())) + &cells.chaos_ends().map_or(String::new(), chaos_ends),
     )
@@ -79,24 +78,14 @@ pub(super) fn shard(finished: &FinishedShard<'_>, folder: &Path, files: &[String
     let FinishedShard { shard, plan, run, tally, .. } = finished;
     let (count, unit) = (shard.run_count(plan), plan.unit());
     format!(
-        "shard {shard}: {count} of {} {unit}{}\n{}{}\n{}: {}; `rattlemap merge OUT PART...` combines all {} shards",
+        "shard {shard}: {count} of {} {unit}{}\n{}\n{}: {}; `rattlemap merge OUT PART...` combines all {} shards",
         plan.run_count(),
         speed(count, unit, run, ""),
-        cards(&run.cards, unit),
         classes(tally.classes),
         path(folder),
         files.join(", "),
         shard.count()
     )
-}
-
-/// One line per card, if there are several.
-fn cards(cards: &[CardReport], unit: &str) -> String {
-    let line = |CardReport { adapter, cells, lost }: &CardReport| {
-        let lost = lost.as_ref().map_or(String::new(), |reason| format!(", then lost: {reason}"));
-        quoted(format_args!("  adapter {adapter}: {cells} {unit}{lost}")) + "\n"
-    };
-    cards.iter().map(line).collect()
 }
 
 fn three_digits(x: f64) -> String {

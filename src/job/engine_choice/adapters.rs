@@ -1,6 +1,5 @@
-//! Selects the graphics adapters that compute a map.
+//! Selects the graphics adapter that computes a map.
 
-use std::convert::Infallible;
 use std::fmt;
 use std::str::FromStr;
 
@@ -15,19 +14,33 @@ pub enum AdapterRequest {
     Number(usize),
     /// The only adapter whose name, driver or PCI address contains this text; case is ignored.
     Named(String),
-    /// All adapters of the model and driver that would be selected without a request.
+}
+
+/// A text that requests no single adapter.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum AdapterTextError {
+    /// The text is blank.
+    #[error("it must be a number or part of a name that `rattlemap devices` lists")]
+    Blank,
+    /// The text is `all`.
+    #[error(
+        "one process computes on one adapter; compute one shard per adapter and merge them, for two cards: \
+         `rattlemap map SCENE --engine gpu --shard 1/2 --adapter 0`, the same with `--shard 2/2 --adapter 1`, then \
+         `rattlemap merge OUT PART PART`"
+    )]
     All,
 }
 
 impl FromStr for AdapterRequest {
-    type Err = Infallible;
+    type Err = AdapterTextError;
 
-    fn from_str(text: &str) -> Result<AdapterRequest, Infallible> {
-        Ok(match (text, text.parse()) {
-            ("all", _) => AdapterRequest::All,
-            (_, Ok(number)) => AdapterRequest::Number(number),
-            (name, Err(_)) => AdapterRequest::Named(name.to_owned()),
-        })
+    fn from_str(text: &str) -> Result<AdapterRequest, AdapterTextError> {
+        match (text, text.parse()) {
+            ("all", _) => Err(AdapterTextError::All),
+            (blank, _) if blank.trim().is_empty() => Err(AdapterTextError::Blank),
+            (_, Ok(number)) => Ok(AdapterRequest::Number(number)),
+            (name, Err(_)) => Ok(AdapterRequest::Named(name.to_owned())),
+        }
     }
 }
 
@@ -36,18 +49,8 @@ impl fmt::Display for AdapterRequest {
         match self {
             AdapterRequest::Number(number) => write!(f, "{number}"),
             AdapterRequest::Named(name) => f.write_str(name),
-            AdapterRequest::All => f.write_str("all"),
         }
     }
-}
-
-/// Selected adapters.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Selection {
-    /// Numbers of the adapters, at least one.
-    pub(crate) numbers: Vec<usize>,
-    /// One line for each adapter that [`AdapterRequest::All`] does not include, with the reason.
-    pub(crate) left_out: Vec<String>,
 }
 
 /// An error in selecting an adapter.
@@ -105,46 +108,42 @@ pub enum AdapterError {
     None(GpuError),
 }
 
-/// Selects the requested adapters, or without a request the best adapter that the environment allows.
+/// Selects the requested adapter, or without a request the best adapter that the environment allows.
 ///
 /// # Errors
 /// [`AdapterError`].
-pub(crate) fn select(
-    all: &[AdapterReport],
+pub(crate) fn select<'a>(
+    all: &'a [AdapterReport],
     request: Option<&AdapterRequest>,
     environment: &AdapterChoice,
     precision: Precision,
-) -> Result<Selection, AdapterError> {
-    let only = |number| Selection { numbers: vec![number], left_out: Vec::new() };
-    match request {
-        None => best(all, environment, precision).map(|best| only(best.number)),
-        Some(AdapterRequest::All) => best(all, environment, precision).map(|best| equal_to(best, all)),
-        Some(AdapterRequest::Number(number)) => {
-            with(precision, numbered(*number, all)?, all).map(|found| only(found.number))
-        }
-        Some(AdapterRequest::Named(name)) => {
-            with(precision, called(name, all)?, all).map(|found| only(found.number))
-        }
+) -> Result<&'a AdapterReport, AdapterError> {
+    let Some(request) = request else { return best(all, environment, precision) };
+    let found = request.among(all)?;
+    if found.precisions.contains(&precision) {
+        return Ok(found);
     }
+    Err(AdapterError::Lacks {
+        adapter: found.id().to_string(),
+        precision: precision.name(),
+        remedies: remedies(precision, all),
+    })
 }
 
 impl AdapterRequest {
-    /// Returns the adapters of the list that match the request. Precisions are not checked.
+    /// Returns the adapter of the list that matches the request. Precisions are not checked.
     ///
     /// # Errors
     /// [`AdapterError`] if no adapter matches, or if several match a name.
-    pub fn among<'a>(&self, all: &'a [AdapterReport]) -> Result<&'a [AdapterReport], AdapterError> {
+    pub fn among<'a>(&self, all: &'a [AdapterReport]) -> Result<&'a AdapterReport, AdapterError> {
         match self {
-            AdapterRequest::Number(number) => numbered(*number, all).map(std::slice::from_ref),
-            AdapterRequest::Named(name) => called(name, all).map(std::slice::from_ref),
-            AdapterRequest::All => Ok(all),
+            &AdapterRequest::Number(number) => {
+                let found = all.iter().find(|adapter| adapter.number == number);
+                found.ok_or_else(|| AdapterError::NoSuchNumber { number, list: listed(all) })
+            }
+            AdapterRequest::Named(name) => called(name, all),
         }
     }
-}
-
-fn numbered(number: usize, all: &[AdapterReport]) -> Result<&AdapterReport, AdapterError> {
-    let found = all.iter().find(|adapter| adapter.number == number);
-    found.ok_or_else(|| AdapterError::NoSuchNumber { number, list: listed(all) })
 }
 
 /// Returns the first adapter that the environment allows and that has the precision. A software driver is returned only
@@ -183,46 +182,6 @@ fn called<'a>(name: &str, all: &'a [AdapterReport]) -> Result<&'a AdapterReport,
         [first, ref others @ ..] if others.iter().all(|other| is_same_card(first, other)) => Ok(first),
         _ => Err(AdapterError::Ambiguous { name: name.to_owned(), list: listed(found) }),
     }
-}
-
-/// Returns the adapter if it has the precision.
-fn with<'a>(
-    precision: Precision,
-    found: &'a AdapterReport,
-    all: &[AdapterReport],
-) -> Result<&'a AdapterReport, AdapterError> {
-    if found.precisions.contains(&precision) {
-        return Ok(found);
-    }
-    Err(AdapterError::Lacks {
-        adapter: found.id().to_string(),
-        precision: precision.name(),
-        remedies: remedies(precision, all),
-    })
-}
-
-/// Selects all adapters of the model, interface and driver of the first one. Their records are identical.
-fn equal_to(first: &AdapterReport, all: &[AdapterReport]) -> Selection {
-    let model =
-        |adapter: &AdapterReport| (adapter.info.vendor, adapter.info.device, gpu::describe(&adapter.info));
-    let mut selected = vec![first];
-    let mut left_out = Vec::new();
-    for adapter in all {
-        if selected.iter().any(|one| one.number == adapter.number || is_same_card(one, adapter)) {
-            continue;
-        }
-        if model(adapter) == model(first) {
-            selected.push(adapter);
-            continue;
-        }
-        let why = match (is_hardware(first), is_hardware(adapter)) {
-            (true, false) => "it is a software driver",
-            _ if adapter.info.name == first.info.name => "it has another interface or driver",
-            _ => "it is of another model",
-        };
-        left_out.push(format!("adapter {} is left out: {why}", adapter.id()));
-    }
-    Selection { numbers: selected.iter().map(|adapter| adapter.number).collect(), left_out }
 }
 
 /// Whether two adapters are the same card: two interfaces list it, or one lists it twice. Some interfaces do not report
@@ -301,22 +260,15 @@ mod tests {
         rows.iter().enumerate().map(report).collect()
     }
 
-    fn selected(
-        rows: &[Row],
-        request: &str,
-        environment: &str,
-        precision: Precision,
-    ) -> Result<Selection, String> {
+    fn number(rows: &[Row], request: &str, environment: &str, precision: Precision) -> Result<usize, String> {
         let request = (!request.is_empty()).then(|| request.parse().unwrap());
         let environment = match environment {
             "" => AdapterChoice::default(),
             name => AdapterChoice::named(name),
         };
-        select(&machine(rows), request.as_ref(), &environment, precision).map_err(|error| error.to_string())
-    }
-
-    fn number(rows: &[Row], request: &str, environment: &str, precision: Precision) -> Result<usize, String> {
-        selected(rows, request, environment, precision).map(|selection| selection.numbers[0])
+        let all = machine(rows);
+        let selected = select(&all, request.as_ref(), &environment, precision);
+        selected.map(|adapter| adapter.number).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -370,31 +322,12 @@ mod tests {
     }
 
     #[test]
-    fn all_selects_adapters_equal_to_the_first() {
-        let other_interface = (INTEL.0, 7, INTEL.2, wgpu::Backend::Dx12, "", SINGLE);
-        let twice = big("0000:17:00.0");
-        let here = [big("0000:17:00.0"), twice, big("0000:65:00.0"), INTEL, other_interface, SOFTWARE];
-        let all = selected(&here, "all", "", Precision::F64).unwrap();
-        assert_eq!(all.numbers, [0, 2]);
-        assert_eq!(
-            all.left_out,
-            [
-                "adapter 3 (Arc A770, PCI 0000:03:00.0) is left out: it is of another model",
-                "adapter 5 (llvmpipe) is left out: it is a software driver"
-            ]
-        );
-        // The environment determines the first adapter.
-        assert_eq!(selected(&here, "all", "arc", Precision::F32).unwrap().numbers, [3]);
-        // Software drivers have no address.
-        assert_eq!(selected(&[SOFTWARE, SOFTWARE], "all", "", Precision::F32).unwrap().numbers, [0, 1]);
-        assert!(selected(&[INTEL, SOFTWARE], "all", "", Precision::F64).is_err());
-    }
-
-    #[test]
     fn requests_survive_writing_and_reading() {
-        for text in ["all", "12", "RTX 4090", "0000:65:00.0", "-1"] {
+        for text in ["12", "RTX 4090", "0000:65:00.0", "-1"] {
             assert_eq!(text.parse::<AdapterRequest>().unwrap().to_string(), text);
         }
         assert_eq!("007".parse(), Ok(AdapterRequest::Number(7)));
+        assert_eq!("all".parse::<AdapterRequest>(), Err(AdapterTextError::All));
+        assert_eq!(" ".parse::<AdapterRequest>(), Err(AdapterTextError::Blank));
     }
 }

@@ -57,8 +57,7 @@ pub struct Gpu<'p> {
     preparation: Preparation,
 }
 
-/// What lanes need to know of a plan. It can be derived while a device opens, and serves several devices.
-#[derive(Clone)]
+/// What lanes need to know of a plan. It can be derived while a device opens.
 pub struct Prepared<'p> {
     plan: Cow<'p, Plan>,
     /// Constants by flow. None if the flows are too many to be stored.

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::findings::attractors::Attractor;
 use crate::gpu::AdapterId;
-use crate::map::engine::{CardReport, Engine, Preparation};
+use crate::map::engine::{Engine, Preparation};
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
 use crate::map::shard::Shard;
@@ -32,8 +32,6 @@ pub struct Run<'a> {
     pub made: Provenance<'a>,
     /// The graphics adapter, if there was one.
     pub adapter: Option<AdapterId>,
-    /// A report for each card, if there were several.
-    pub cards: Vec<CardReport>,
     /// Description of the host's processor.
     pub processor: &'a str,
     /// Time that numbering and checking the cells took.
@@ -65,7 +63,6 @@ impl<'a> Run<'a> {
             sets,
             made,
             adapter: None,
-            cards: Vec::new(),
             processor,
             planning: Duration::ZERO,
             opening: Duration::ZERO,
@@ -80,11 +77,11 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Adds the adapters and the grid of an engine.
+    /// Adds the adapter and the grid of an engine.
     #[must_use]
     pub fn on(self, engine: &Engine<'_>) -> Run<'a> {
-        let (adapter, cards, lane_grid) = (engine.adapter(), engine.cards(), engine.steps_per_period());
-        Run { adapter, cards, lane_grid, preparation: engine.preparation(), ..self }
+        let (adapter, lane_grid) = (engine.adapter(), engine.steps_per_period());
+        Run { adapter, lane_grid, preparation: engine.preparation(), ..self }
     }
 
     /// Time in which the device was opened.
@@ -143,7 +140,7 @@ pub(crate) fn run_and_scene(
     joined([
         json!(Head::of(command)),
         without_nulls(json!({ "shard": shard })),
-        engine_and_cards(run),
+        described_engine(run),
         json!({
             "processor": run.processor,
             "sources": run.shards.map_or(Identity::own_sources(), |shards| shards.sources),
@@ -161,24 +158,16 @@ pub(crate) fn run_and_scene(
     ])
 }
 
-/// Describes the engine and its graphics adapters.
-pub(crate) fn engine_and_cards(run: &Run<'_>) -> Value {
+/// Describes the engine and its graphics adapter.
+pub(crate) fn described_engine(run: &Run<'_>) -> Value {
     let Provenance { engine, precision, device, .. } = run.made;
     let adapter = run.adapter.as_ref();
-    let cards: Vec<Value> = run.cards.iter().map(card).collect();
     joined([
         json!({ "engine": engine, "precision": precision, "device": device }),
         without_nulls(json!({
             "adapter": adapter.map(|AdapterId { number, pci, .. }| json!({ "number": number, "pci": pci })),
-            "cards": (!cards.is_empty()).then_some(cards),
         })),
     ])
-}
-
-/// Describes one of several cards: its number in `rattlemap devices`, the cells that it computed in this run, and why it
-/// was lost.
-fn card(CardReport { adapter: AdapterId { number, name, pci }, cells, lost }: &CardReport) -> Value {
-    json!({ "number": number, "name": name, "pci": pci, "cells": cells, "lost": lost })
 }
 
 /// Describes the list of cells of a map without axes; `hash` is the SHA-256 of names and values.

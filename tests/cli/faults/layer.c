@@ -1,14 +1,12 @@
 /*
  * A Vulkan layer that makes calls fail, as drivers do when a card resets or loses its connection.
  *
- *     RATTLEMAP_FAULT=CALL:N:RESULT[:DEVICE]   from its Nth call, CALL returns RESULT (a negative VkResult). With DEVICE, only
- *                                              calls on the DEVICE-th device that was created count and fail
- *     RATTLEMAP_CALLS=FILE                     at the end the layer writes lines "CALL COUNT" to FILE
- *     RATTLEMAP_LINGER=SECONDS                 the process lasts so long after its libraries have destroyed their objects. A driver
- *                                              that still works then fails for certain, not by chance
+ *     RATTLEMAP_FAULT=CALL:N:RESULT   from its Nth call, CALL returns RESULT (a negative VkResult)
+ *     RATTLEMAP_CALLS=FILE            at the end the layer writes lines "CALL COUNT" to FILE
+ *     RATTLEMAP_LINGER=SECONDS        the process lasts so long after its libraries have destroyed their objects. A driver that
+ *                                     still works then fails for certain, not by chance
  *
- * After the first result -4 the device stays lost: every call that can report a lost device does so. Without DEVICE this holds
- * for all devices. A call on a device that does not exist (any more) ends the process with a message. The few types that a layer needs are declared here, so no headers have to be installed. Calls are forwarded
+ * After the first result -4 all devices stay lost: every call that can report a lost device does so. A call on a device that does not exist (any more) ends the process with a message. The few types that a layer needs are declared here, so no headers have to be installed. Calls are forwarded
  * with six words, because 64-bit calling conventions pass integers and pointers in equal ways.
  */
 #include <pthread.h>
@@ -94,17 +92,13 @@ static struct device *device_of(void *object, const char *name) {
     abort();
 }
 
-static int counts[CALL_COUNT], counts_on_one[CALL_COUNT];
+static int counts[CALL_COUNT];
 static int is_lost;
 
 /* Returns the result of a failing call; 0 if the call may proceed. Call it under the lock. */
-static int32_t fault(int which, const struct device *device) {
-    int count = ++counts[which], one = 0;
+static int32_t fault(int which) {
+    int count = ++counts[which];
     const char *request = getenv("RATTLEMAP_FAULT"), *colon = request ? strchr(request, ':') : NULL;
-    if (colon && sscanf(colon, ":%*d:%*d:%d", &one) == 1 && which != CreateDevice) {
-        if (one < 1 || one > device_count || &devices[one - 1] != device) return 0;
-        count = ++counts_on_one[which];
-    }
     int32_t result = is_lost && calls[which].reports_loss ? DEVICE_LOST : 0;
     size_t length = colon ? (size_t)(colon - request) : 0;
     int from, code;
@@ -124,8 +118,8 @@ static call driver(const struct device *device, const char *name) {
 #define WRAPPER(name, reports_loss) \
     static int32_t wrapped_##name(void *handle, word a, word b, word c, word d, word e) { \
         pthread_mutex_lock(&lock); \
-        const struct device *found = device_of(handle, "vk" #name), device = *found; \
-        int32_t result = fault(name, found); \
+        const struct device device = *device_of(handle, "vk" #name); \
+        int32_t result = fault(name); \
         pthread_mutex_unlock(&lock); \
         if (result == DEVICE_LOST) driver(&device, "vkDeviceWaitIdle")(device.handle, 0, 0, 0, 0, 0); \
         return result ? result : driver(&device, "vk" #name)(handle, a, b, c, d, e); \
@@ -153,7 +147,7 @@ static int32_t create_device(void *physical, const struct info *create, const vo
     struct info *link = (struct info *)link_of(create, DEVICE_LINK);
     if (!link) return INITIALIZATION_FAILED;
     pthread_mutex_lock(&lock);
-    int32_t result = device_count < MOST_DEVICES ? fault(CreateDevice, NULL) : INITIALIZATION_FAILED;
+    int32_t result = device_count < MOST_DEVICES ? fault(CreateDevice) : INITIALIZATION_FAILED;
     pthread_mutex_unlock(&lock);
     if (result) return result;
     get_function instance = link->link->instance, next = link->link->other;

@@ -48,24 +48,6 @@ fn ends(records: &[u8]) -> Vec<usize> {
 }
 
 #[test]
-fn incomplete_files_are_resumed_to_the_same_bytes() {
-    let folder = folder();
-    let (expected, records, ends) = in_batches(&folder, "");
-    let cut = folder.path().join("cut");
-    // From inside the last batch back to the end of the header.
-    for length in [records.len() - 1, records.len() / 2, ends[0] + 100, ends[0] + 3, ends[0]] {
-        fs::write(cut.join("records.bin"), &records[..length]).unwrap();
-        map(&folder, "--quiet --out cut --resume").success();
-        assert!(bytes(&cut) == expected, "cut to {length} of {} bytes", records.len());
-    }
-    // A finished run only writes its files again.
-    fs::remove_file(cut.join("map.png")).unwrap();
-    let run = map(&folder, "--out cut --resume").success();
-    run.stderr(says(&["320 cells, all by earlier runs; files written in "]));
-    assert!(bytes(&cut) == expected);
-}
-
-#[test]
 fn records_of_another_run_are_refused() {
     let folder = folder();
     map(&folder, &format!("{FEW} --quiet")).success();

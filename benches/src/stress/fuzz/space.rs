@@ -3,7 +3,7 @@
 use super::super::cells::{REST, flow_of};
 use super::super::lanes::Start;
 use super::each;
-use crate::stress::Watch;
+use crate::stress::SEED;
 use rattlemap::gpu::Constants;
 use rattlemap::map::random::Random;
 use rattlemap_dynamics::model::{GearPair, State, state};
@@ -53,22 +53,21 @@ pub(super) fn iterations(pair: &GearPair) -> Option<u64> {
 const BLOCK: usize = 1024;
 
 /// Draws `count` cells of bounded work and their starts.
-pub(super) fn all_bounded(count: usize, seed: u64, watch: &dyn Watch) -> Vec<Start> {
-    let mut random = Random::new(seed);
+pub(super) fn all_bounded(count: usize) -> Vec<Start> {
+    let mut random = Random::new(SEED);
     let mut cells = Vec::with_capacity(count);
     while cells.len() < count {
         let candidates: Vec<Start> = (0..BLOCK).map(|_| candidate(&mut random)).collect();
         let bounded = each(&candidates, is_bounded);
         cells.extend(candidates.into_iter().zip(bounded).filter_map(|(cell, fits)| fits.then_some(cell)));
-        cells.truncate(count);
-        watch.progress("bounded cells", cells.len(), count);
     }
+    cells.truncate(count);
     cells
 }
 
 /// Draws `count` cells of any magnitude.
-pub(super) fn all_wild(count: usize, seed: u64) -> Vec<GearPair> {
-    let mut random = Random::new(!seed);
+pub(super) fn all_wild(count: usize) -> Vec<GearPair> {
+    let mut random = Random::new(!SEED);
     (0..count).map(|_| wild(&mut random)).collect()
 }
 
@@ -162,8 +161,8 @@ mod tests {
 
     #[test]
     fn every_cell_is_valid_and_edges_are_frequent() {
-        let bounded = all_bounded(2000, 1, &());
-        let wild = all_wild(500, 1);
+        let bounded = all_bounded(2000);
+        let wild = all_wild(500);
         let pairs = || bounded.iter().map(|(pair, _)| pair);
         assert!(pairs().chain(&wild).all(|pair| pair.oscillator().is_ok()));
         for (what, count) in [
