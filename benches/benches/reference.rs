@@ -6,11 +6,11 @@ use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use rattlemap_bench::shapes::{CHAINS, SHAPES};
-use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::machine::{Motion, System};
 use rattlemap_dynamics::model::{GearPair, REST, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
-use rattlemap_dynamics::reference::Trajectory;
-use rattlemap_dynamics::reference::machine::{Motion, System};
 
 /// Sizes of one run.
 #[derive(Clone, Copy)]
@@ -43,7 +43,7 @@ fn grid(side: usize, [low, high]: [f64; 2]) -> Vec<Cell> {
     (0..side * side)
         .map(|i| {
             let pair = GearPair { omega: at(i / side, low, high), ..GearPair::paper(at(i % side, 0.0, 1.0)) };
-            Cell { pair, flow: Flow::new(&pair.oscillator().expect("valid parameters")) }
+            Cell { pair, flow: Flow::new(&pair.pair()) }
         })
         .collect()
 }
@@ -150,7 +150,7 @@ fn per_period_by_shape(c: &mut Criterion) {
         let shaped: Vec<_> = cells
             .iter()
             .map(|Cell { pair, .. }| {
-                let flow = Flow::new(&shape.of(&pair.oscillator().expect("valid parameters")));
+                let flow = Flow::new(&shape.of(&pair.pair()));
                 Cell { pair: *pair, flow }
             })
             .collect();
@@ -190,7 +190,7 @@ fn per_period_of_machines(c: &mut Criterion) {
 }
 
 fn flow(c: &mut Criterion) {
-    let oscillator = GearPair::paper(0.5).oscillator().expect("valid parameters");
+    let oscillator = GearPair::paper(0.5).pair();
     c.bench_function("flow of one frequency", |b| b.iter(|| Flow::new(black_box(&oscillator))));
 }
 

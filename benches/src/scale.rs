@@ -23,7 +23,7 @@ use rattlemap::store::map::{Provenance, Run};
 use rattlemap::store::merge::Parts;
 use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
 use rattlemap::store::shard::{self, FinishedShard, Tally};
-use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::motion::Flow;
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    Contact, Drive, Forces, GapRow, Harmonic, Machine, Oscillator, OuterWall, Restitution, Side, Spring,
-    Stage, Wall,
+    Contact, Drive, Forces, GapRow, Harmonic, Oscillator, OuterWall, Pair, Restitution, Side, Spring, Stage,
+    Wall,
 };
 
 /// Numbers of harmonics, stages and walls.
@@ -41,12 +41,12 @@ impl Shape {
     }
 
     /// Adds tiny harmonics, equal stages and walls without force to an oscillator, so that its motion stays nearly the same.
-    pub fn of(self, plain: &Oscillator) -> Oscillator {
+    pub fn of(self, plain: &Pair) -> Pair {
         let tiny = plain.force.map(|force| 1e-9 * force);
         let harmonic = |n: usize| Harmonic { order: n as u32 + 2, cos: tiny, sin: tiny };
         let further = self.stages - 1;
         let change = |stage: usize| (stage as f64 / self.stages as f64, stage);
-        let mut shaped = Oscillator {
+        let mut shaped = Pair {
             harmonics: (0..self.harmonics).map(harmonic).collect(),
             stages: vec![Stage { free: plain.free, meshing: plain.meshing }; further],
             schedule: if further > 0 { (0..self.stages).map(change).collect() } else { Vec::new() },
@@ -59,7 +59,7 @@ impl Shape {
     }
 
     /// Puts elastic walls of stiffness 0 in front of a wall, at equal distances.
-    fn add_walls(self, oscillator: &mut Oscillator, side: usize) {
+    fn add_walls(self, oscillator: &mut Pair, side: usize) {
         let (last, contact) = (oscillator.walls[side], oscillator.contacts[side]);
         let behind_last = vec![oscillator.meshing[side]; self.stages];
         let at = |nth: usize| last * nth as f64 / self.walls as f64;
@@ -124,7 +124,7 @@ impl Chain {
     }
 
     /// Returns machines over restitution in `[0.3, 0.9]` and frequency in `[0.8, 1.6]`, near the resonances.
-    pub fn cells(self, side: usize) -> Vec<Machine> {
+    pub fn cells(self, side: usize) -> Vec<Oscillator> {
         let at = |i: usize, low: f64, high: f64| low + (high - low) * i as f64 / (side - 1) as f64;
         (0..side * side).map(|i| self.machine(at(i % side, 0.3, 0.9), at(i / side, 0.8, 1.6))).collect()
     }
@@ -132,7 +132,7 @@ impl Chain {
     /// Returns equal masses on springs to the ground and to their neighbours, with a force on the first mass. Units are those in
     /// which a mass, its spring to the ground and the force are 1. The last gap of as many gaps as masses is that of the last mass
     /// and the ground.
-    pub fn machine(self, restitution: f64, omega: f64) -> Machine {
+    pub fn machine(self, restitution: f64, omega: f64) -> Oscillator {
         let n = self.coordinates;
         let neighbours = |i: usize| f64::from(u8::from(i > 0)) + f64::from(u8::from(i + 1 < n));
         // A spring of this stiffness between neighbours, and one to the ground.
@@ -158,7 +158,7 @@ impl Chain {
         let wall = |side: Side| Wall {
             at: side.sign() * 0.2,
             contact: Contact::Impact,
-            restitution: Restitution::constant(restitution),
+            restitution: Restitution::Constant(restitution),
             mesh_speed: 0.01,
             springs: vec![Spring { stiffness: 100.0, damping: 1.0, preload: 0.0 }; self.stages],
         };
@@ -167,7 +167,7 @@ impl Chain {
             walls: Side::BOTH.map(|side| vec![wall(side)]),
         };
         let change = |stage: usize| (stage as f64 / self.stages as f64, stage);
-        Machine {
+        Oscillator {
             omega,
             mass: DMatrix::identity(n, n),
             stages: (0..self.stages).map(forces).collect(),

@@ -1,4 +1,4 @@
-//! The motion of a [`Machine`](crate::model::Machine): any number of coordinates and gaps, and dry friction.
+//! The motion of a [`Oscillator`](crate::model::Oscillator): any number of coordinates and gaps, and dry friction.
 //!
 //! # Elements and domains
 //!
@@ -22,20 +22,14 @@
 //! and `f+` before and after all mode changes of the instant, and the gradient `n` of the watch.
 
 mod domain;
-mod events;
 mod flight;
 mod modes;
 mod motion;
 mod polynomial;
-mod slip;
 mod system;
 mod table;
 
-pub use events::{MachineEvent, SlipEvent};
-pub use flight::Flight;
-pub(crate) use flight::Signal;
 pub use motion::{LOWEST_FLIGHT, Motion};
-pub use slip::{Slip, Slips};
 pub use system::System;
 pub use table::{Equations, StartModes};
 

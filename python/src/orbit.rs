@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use rattlemap::flow::Flow;
+use rattlemap::motion::Flow;
 use rattlemap::job;
 use rattlemap::model::{Model as _, REST, State};
 use rattlemap::model_file::FileModel;

@@ -27,15 +27,15 @@ const GPU: [&str; 5] = ["map", "s.toml", "--quiet", "--engine", "gpu"];
 static PROCESSOR: Mutex<()> = Mutex::new(());
 
 /// A machine with two cards.
-struct Machine {
+struct Oscillator {
     folder: TempDir,
     drivers: String,
     _processor: MutexGuard<'static, ()>,
 }
 
-impl Machine {
+impl Oscillator {
     /// Returns none and prints a line if there is no software driver.
-    fn new() -> Option<Machine> {
+    fn new() -> Option<Oscillator> {
         let Some(driver) = software_driver() else {
             // `eprintln!` would be captured.
             let mut stderr = std::io::stderr();
@@ -52,7 +52,7 @@ impl Machine {
         };
         let drivers = ["one.json", "two.json"].map(copy).join(":");
         let processor = PROCESSOR.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(Machine { folder, drivers, _processor: processor })
+        Some(Oscillator { folder, drivers, _processor: processor })
     }
 
     fn environment(&self) -> [(&'static str, &str); 2] {
@@ -132,7 +132,7 @@ fn software_driver() -> Option<PathBuf> {
 
 #[test]
 fn equal_cards_are_selected_by_number() {
-    let Some(machine) = Machine::new() else { return };
+    let Some(machine) = Oscillator::new() else { return };
     machine
         .command(&["devices"])
         .assert()
@@ -173,7 +173,7 @@ fn equal_cards_are_selected_by_number() {
 
 #[test]
 fn all_cards_compute_the_same_map_as_one() {
-    let Some(machine) = Machine::new() else { return };
+    let Some(machine) = Oscillator::new() else { return };
     machine.map("one", &["--adapter", "1"]).assert().success();
     // `auto` takes an adapter that is named.
     let auto = ["map", "s.toml", "--adapter", "all", "--out", "all", "--json"];
@@ -196,7 +196,7 @@ fn all_cards_compute_the_same_map_as_one() {
 
 #[test]
 fn the_cells_of_a_lost_card_go_to_the_other() {
-    let Some(machine) = Machine::new() else { return };
+    let Some(machine) = Oscillator::new() else { return };
     if !build_layer(machine.folder.path()) {
         return;
     }
@@ -235,7 +235,7 @@ fn the_cells_of_a_lost_card_go_to_the_other() {
 #[test]
 #[ignore = "takes minutes; scripts/test.sh --all"]
 fn all_cards_are_measured_against_one() {
-    let Some(machine) = Machine::new() else { return };
+    let Some(machine) = Oscillator::new() else { return };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/measure_gpu.sh");
     let mut run = Process::new(script);
     run.arg(assert_cmd::cargo::cargo_bin("rattlemap")).arg(machine.folder.path().join("measured"));
@@ -251,7 +251,7 @@ fn all_cards_are_measured_against_one() {
 
 #[test]
 fn an_interrupted_map_of_several_cards_can_be_resumed() {
-    let Some(machine) = Machine::new() else { return };
+    let Some(machine) = Oscillator::new() else { return };
     let slow = ["--set", "integration.early_stop=false"];
     let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"));
     run.current_dir(machine.folder.path()).envs(machine.environment()).env_remove("WGPU_ADAPTER_NAME");

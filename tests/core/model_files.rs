@@ -5,8 +5,8 @@ use proptest::test_runner::TestRunner;
 use rattlemap::map::scene::Place;
 use rattlemap::model_file::{BUILT_IN, FileModel};
 use rattlemap::text::printable::line;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Model};
+use rattlemap_dynamics::motion::Flow;
 
 /// Positive numbers of any size, and zero.
 fn number() -> impl Strategy<Value = f64> {
@@ -127,7 +127,7 @@ fn check(text: &str) -> bool {
         Ok(model) => {
             assert!(Flow::validate(&model).is_ok(), "{text}");
             assert_eq!(FileModel::parse(&model.definition().text, "again").as_ref(), Ok(&model));
-            assert_eq!(model.state_names().len(), 2 * model.oscillator().unwrap().degrees);
+            assert_eq!(model.state_names().len(), 2 * model.pair().degrees);
             assert!(!model.equations().is_empty());
             true
         }

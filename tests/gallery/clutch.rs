@@ -105,7 +105,7 @@ pub(crate) fn cycles() -> Vec<Cycle> {
             [("omega", omega), ("F", force)]
                 .into_iter()
                 .for_each(|(name, value)| model.set(name, value).expect("a parameter"));
-            let (oscillator, law) = (model.oscillator().expect("valid parameters"), model.law());
+            let (oscillator, law) = (model.pair(), model.law());
             let [x, v, ..] = followed(&oscillator, law, REST, 1200).end;
             let closes = |&period: &u32| {
                 let [a, b] = run(omega, force, [x, v], period).y;

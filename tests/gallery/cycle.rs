@@ -4,9 +4,9 @@ use nalgebra::{Complex, DMatrix, Matrix4};
 
 use rattlemap::validate::independent::dop853::Solver;
 use rattlemap::validate::independent::flight::Flight;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Oscillator, State};
-use rattlemap_dynamics::reference::{GapEvent, Trajectory};
+use rattlemap_dynamics::model::{Law, Pair, State};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
 use crate::common::apart;
@@ -22,7 +22,7 @@ pub(crate) struct Followed {
 }
 
 /// Computes the reference's motion from a start at phase 0.
-pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> Followed {
+pub(crate) fn followed(oscillator: &Pair, law: Law, start: State, periods: u32) -> Followed {
     let flow = Flow::new(oscillator);
     let mut trajectory = Trajectory::with_tangents(&flow, law, start, UNIT);
     let mut events = Vec::new();
@@ -40,7 +40,7 @@ pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods:
 
 /// Returns the distance of the last states of the reference and of the independent integrator. Both must find the same
 /// number of events.
-pub(crate) fn off_the_integrator(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> f64 {
+pub(crate) fn off_the_integrator(oscillator: &Pair, law: Law, start: State, periods: u32) -> f64 {
     let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
     let mut flight = Flight::new(oscillator, law, start);
     (0..periods).for_each(|_| {

@@ -20,15 +20,15 @@ use rattlemap::gpu::{Features, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Model, Oscillator, State, state};
+use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::model::{Contact, Law, Model, Pair, State, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
-use rattlemap_dynamics::reference::machine::{Motion, System};
 
 /// A stable cycle with a closed form.
 struct Known {
     what: String,
-    oscillator: Oscillator,
+    oscillator: Pair,
     law: Law,
     period: u32,
     /// State at phase 0.
@@ -112,7 +112,7 @@ fn known_cycles() -> Vec<Known> {
     }
     for cycle in machines::cycles() {
         let machines::Cycle { what, machine, strobe, radius, impacts } = cycle;
-        let (oscillator, law) = (Oscillator::of_machine(machine), Law::both(0.0, 0.0));
+        let (oscillator, law) = (Form::Machine(machine), Law::both(0.0, 0.0));
         let unit = oscillator.omega;
         list.push(Known { what, oscillator, law, period: 1, strobe, radius, impacts, stays: false, unit });
     }
@@ -239,8 +239,8 @@ fn the_reference_finds_known_cycles() {
 }
 
 /// Runs a lane for each oscillator with its law and start.
-fn run(gpu: &mut Gpu, cells: &[(Oscillator, Law, State)], settings: &LaneSettings) -> Vec<Record> {
-    let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.0.clone()).collect();
+fn run(gpu: &mut Gpu, cells: &[(Pair, Law, State)], settings: &LaneSettings) -> Vec<Record> {
+    let flows: Vec<Pair> = cells.iter().map(|cell| cell.0.clone()).collect();
     let laws: Vec<Law> = cells.iter().map(|cell| cell.1).collect();
     let lanes: Vec<Lane> =
         (0..).zip(cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.2 }).collect();
@@ -248,7 +248,7 @@ fn run(gpu: &mut Gpu, cells: &[(Oscillator, Law, State)], settings: &LaneSetting
 }
 
 /// Returns settings with the features of all these oscillators.
-fn settings<'o>(oscillators: impl Iterator<Item = &'o Oscillator>, settings: LaneSettings) -> LaneSettings {
+fn settings<'o>(oscillators: impl Iterator<Item = &'o Pair>, settings: LaneSettings) -> LaneSettings {
     LaneSettings {
         features: oscillators.map(Features::of).fold(settings.features, Features::and),
         ..settings
@@ -280,8 +280,7 @@ fn check_lanes(precision: Precision, bars: [f64; 3]) {
 fn check_borders(gpu: &mut Gpu, plain: &[&Known]) {
     let points = meissner::points();
     let small = state(&[0.01]);
-    let cells: Vec<_> =
-        points.iter().map(|point| (point.model.oscillator().unwrap(), point.model.law(), small)).collect();
+    let cells: Vec<_> = points.iter().map(|point| (point.model.pair(), point.model.law(), small)).collect();
     let all = plain.iter().map(|known| &known.oscillator).chain(cells.iter().map(|cell| &cell.0));
     let records = run(gpu, &cells, &settings(all, LaneSettings::within(&budget())));
     for (point, record) in points.iter().zip(&records) {
@@ -296,7 +295,7 @@ const CHAIN_PERIODS: u32 = 8;
 /// Compares the chain of masses with its closed form between impacts.
 fn check_chain(gpu: &mut Gpu, bar: f64) {
     let (machine, start, end, impacts) = machines::chain(CHAIN_PERIODS);
-    let (omega, flow) = (machine.omega, Oscillator::of_machine(machine));
+    let (omega, flow) = (machine.omega, Form::Machine(machine));
     let settings = settings([&flow].into_iter(), LaneSettings::only(CHAIN_PERIODS));
     let [record] = run(gpu, &[(flow, Law::both(0.0, 0.0), start)], &settings)[..] else {
         unreachable!("one lane has one record")

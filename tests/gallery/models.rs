@@ -1,7 +1,7 @@
 //! Cycles of models in `models/` whose equations of motion are linear in pieces. Their equations are written here again.
 
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::model::{Law, Model, Oscillator, state};
+use rattlemap_dynamics::model::{Law, Model, Pair, state};
 
 use crate::common::apart;
 use crate::common::closed_form::Linear;
@@ -12,7 +12,7 @@ use crate::pieces::{self, End, Field, Pieces, rubbing};
 /// A cycle.
 pub(crate) struct Cycle {
     pub(crate) what: String,
-    pub(crate) oscillator: Oscillator,
+    pub(crate) oscillator: Pair,
     pub(crate) law: Law,
     pub(crate) period: u32,
     /// Displacement and velocity at phase 0.
@@ -27,7 +27,7 @@ pub(crate) struct Cycle {
 /// A model, its equations, and the state from which the reference reaches the cycle.
 struct Case {
     what: String,
-    oscillator: Oscillator,
+    oscillator: Pair,
     law: Law,
     pieces: Pieces,
     start: [f64; 2],
@@ -40,7 +40,7 @@ impl Case {
         let values: Vec<_> = values.iter().map(|(name, value)| format!("{name} = {value:.4}")).collect();
         Case {
             what: format!("{name}, {}", values.join(", ")),
-            oscillator: model.oscillator().expect("valid parameters"),
+            oscillator: model.pair(),
             law: model.law(),
             pieces,
             start,
@@ -98,7 +98,7 @@ fn cases() -> Vec<Case> {
         let (sin, cos) = phase.sin_cos();
         let [cos, sin] = [walled.free.force * cos, -walled.free.force * sin];
         let (oscillator, law) = walled.oscillator();
-        let oscillator = Oscillator { force: [cos, 0.0], force_sin: [sin, 0.0], ..oscillator };
+        let oscillator = Pair { force: [cos, 0.0], force_sin: [sin, 0.0], ..oscillator };
         let field = Field { linear: Linear { force: 0.0, ..walled.free }, drives: vec![(1, [cos, sin])] };
         let pieces = pieces::backlash(&[field], &[0.0], 1.0, &[[1.0, 0.0]], true);
         let what = format!("backlash, phase {phase}");

@@ -2,7 +2,7 @@
 //! stops, dry friction and several harmonics. Only the times of events are searched for, by bisection.
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
-use rattlemap_dynamics::model::{Law, Oscillator, state};
+use rattlemap_dynamics::model::{Law, Pair, state};
 
 use crate::common::closed_form::Linear;
 use crate::cycle::followed;
@@ -175,7 +175,7 @@ impl Pieces {
     pub(crate) fn settled(
         &self,
         what: &str,
-        oscillator: &Oscillator,
+        oscillator: &Pair,
         law: Law,
         start: [f64; 2],
     ) -> ([f64; 2], u32, End) {

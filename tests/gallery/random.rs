@@ -19,10 +19,10 @@ use rattlemap::validate::independent::flight::Flight;
 use rattlemap::validate::{
     Draw, Kind, Lanes, Rate, Sample, Stratum, Subject, TOLERATED, differences, replay,
 };
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Model, Oscillator, REST, State};
+use rattlemap_dynamics::model::{Law, Model, Pair, REST, State};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Budget, Class, Measurement, Settings, Status, measure};
-use rattlemap_dynamics::reference::Trajectory;
 
 use crate::common::apart;
 use crate::common::gpu::open;
@@ -32,7 +32,7 @@ const LONGEST_TIME: Duration = Duration::from_secs(60);
 
 pub(crate) struct RandomCell {
     pub(crate) model: FileModel,
-    pub(crate) oscillator: Oscillator,
+    pub(crate) oscillator: Pair,
     pub(crate) law: Law,
     pub(crate) start: State,
 }
@@ -132,7 +132,7 @@ pub(crate) fn random_cell(seed: u64) -> RandomCell {
     if random.unit() < 0.5 {
         (0..2 * degrees).for_each(|i| start[i] = even(random, 2.0));
     }
-    RandomCell { oscillator: model.oscillator().expect("valid"), law: model.law(), model, start }
+    RandomCell { oscillator: model.pair(), law: model.law(), model, start }
 }
 
 pub(crate) const SETTINGS: Settings =
@@ -294,7 +294,7 @@ fn validate(
 /// models, within its interval.
 fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
     let cells: Vec<RandomCell> = seeds.map(|seed| random_cell(u64::from(seed))).filter(is_bounded).collect();
-    let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.oscillator.clone()).collect();
+    let flows: Vec<Pair> = cells.iter().map(|cell| cell.oscillator.clone()).collect();
     let laws: Vec<Law> = cells.iter().map(|cell| cell.law).collect();
     let lanes: Vec<Lane> =
         (0..).zip(&cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.start }).collect();

@@ -10,8 +10,8 @@ use rattlemap::map::plan::Needs;
 use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::{classify, status};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Status, measure};
 use rayon::prelude::*;
 
@@ -46,7 +46,7 @@ fn cell(model: &FileModel, sets: &[(&str, f64)]) -> Cell {
     let mut model = model.clone();
     sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
     // On top of a hill, rounding would choose the side.
-    (model.oscillator().unwrap(), model.law(), state(&[0.5]))
+    (model.pair(), model.law(), state(&[0.5]))
 }
 
 fn reference((oscillator, law, start): &Cell) -> Record {

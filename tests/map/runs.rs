@@ -13,10 +13,10 @@ use rattlemap::map::schedule::Schedule;
 use rattlemap::map::sweep::{self, SweepError};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, RecordStore, Records, valid};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse};
-use rattlemap_dynamics::reference::Trajectory;
 use rayon::prelude::*;
 
 const QUANTITIES: &str =
@@ -63,7 +63,7 @@ fn on_cpu(scene: &Scene) -> Vec<Record> {
 
 /// Whether the motion from rest is still far from `orbit` after `periods`.
 fn is_elsewhere(pair: &GearPair, orbit: &Orbit, periods: u32) -> bool {
-    let flow = Flow::new(&pair.oscillator().unwrap());
+    let flow = Flow::new(&pair.pair());
     let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
     for _ in 0..periods {
         trajectory.advance_period(&mut ()).unwrap();

@@ -18,9 +18,9 @@ use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{Purpose, Scene, Start};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
-use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Class, Status, analyse};
-use rattlemap_dynamics::reference::Trajectory;
 
 /// A map over frequency and restitution; restitution increases through a range in which periods 2 and 3 coexist.
 const SCENE: &str = r#"title = "Hysteresis"
@@ -217,7 +217,7 @@ fn cycle(period: u32, strobe: State) -> Record {
 /// Returns the state of a motion after `periods` periods and `turns` of the next.
 fn later(omega: f64, e: f64, from: State, periods: u32, turns: f64) -> State {
     let pair = rattlemap_dynamics::model::GearPair { omega, ..rattlemap_dynamics::model::GearPair::paper(e) };
-    let flow = Flow::new(&pair.oscillator().unwrap());
+    let flow = Flow::new(&pair.pair());
     let mut trajectory = Trajectory::new(&flow, pair.law(), from);
     for _ in 0..periods {
         trajectory.advance_period(&mut ()).unwrap();

@@ -22,10 +22,10 @@ use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
 use rattlemap::validate::{
     Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, independent, replay, sample,
 };
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Class, Status};
-use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::{StrobeMap, multipliers};
 use rattlemap_dynamics::word::Word;
 
@@ -266,7 +266,7 @@ fn a_multiplier_is_compared_at_the_state_where_it_was_computed() {
     let (e, omega, period, run) = (0.7240704500978473, 2.0978473581213306, 4, 64);
     let plan = plan_at(e, omega, &[]);
     let pair = GearPair { omega, ..GearPair::paper(e) };
-    let flow = Flow::new(&pair.oscillator().unwrap());
+    let flow = Flow::new(&pair.pair());
     let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), REST);
     (0..run - period).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
     let derivative = StrobeMap::Periods(period).apply(&trajectory, trajectory.state()).unwrap().derivative();

@@ -17,8 +17,8 @@ use super::{Size, Verdict};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::record::classify::status;
 use rattlemap_dynamics::model::{GearPair, State, state};
+use rattlemap_dynamics::motion::Stop;
 use rattlemap_dynamics::orbit::{Status, status_of};
-use rattlemap_dynamics::reference::Stop;
 
 /// Duration of the series. The force presses for five units of time.
 const DURATION: f64 = 0.2;
@@ -134,7 +134,7 @@ fn row(case: &Case, engine: EngineName, status: Status, state: Option<State>) ->
 /// than the engine's cap.
 pub fn judge(rows: &[Row]) -> Verdict {
     let cap = |engine: EngineName| match engine {
-        EngineName::Reference => rattlemap_dynamics::reference::EVENTS_PER_PERIOD_CAP,
+        EngineName::Reference => rattlemap_dynamics::motion::EVENTS_PER_PERIOD_CAP,
         EngineName::LanesF32 | EngineName::LanesF64 => u64::from(LaneSettings::default().events_per_period),
     };
     let good = |row: &&Row| match (row.status, row.error) {

@@ -8,8 +8,8 @@
 use super::cells::{EngineName, state_distance};
 use super::lanes::Start;
 use rattlemap::map::random::Random;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::reference::{Stop, Trajectory};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{Stop, Trajectory};
 
 /// Results of the perturbed motions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ pub(super) fn perturbed(
         for _ in 0..periods {
             for step in 1..steps {
                 moved.advance_to(flow.period * (f64::from(step) / f64::from(steps)), &mut ())?;
-                moved.perturb(std::array::from_fn(|_| unit * (2.0 * random.unit() - 1.0)));
+                moved.perturb(|| unit * (2.0 * random.unit() - 1.0));
             }
             moved.advance_period(&mut ())?;
         }

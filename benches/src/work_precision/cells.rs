@@ -5,9 +5,9 @@ use serde::Serialize;
 use super::outcome::Outcome;
 use super::{EVENTS, PERIODS};
 use rattlemap::validate::independent::flight::Flight;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST, State, state};
-use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
+use rattlemap_dynamics::model::{GearPair, Law, Pair, REST, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{GapEvent, Observer, States, Trajectory};
 
 /// Number of variants of a cell, next to each other as in a map. Their restitution grows by [`RESTITUTION_STEP`], or their
 /// distance from grazing by an eighth.
@@ -75,7 +75,7 @@ pub struct Subject {
     /// The parameters.
     pub pair: GearPair,
     /// The oscillator.
-    pub oscillator: Oscillator,
+    pub oscillator: Pair,
     /// The contact law.
     pub law: Law,
     /// State at phase 0, exact in f32.
@@ -127,7 +127,7 @@ fn compliance(pair: &GearPair) -> f64 {
 }
 
 fn subject(cell: u32, kind: Kind, beyond: Option<f64>, pair: GearPair) -> Subject {
-    let oscillator = pair.oscillator().expect("the table is valid");
+    let oscillator = Pair::of(&pair.oscillator().expect("the table is valid")).expect("a pair");
     let flow = Flow::new(&oscillator);
     let law = pair.law();
     let start = match kind {
@@ -180,7 +180,7 @@ impl Latest {
 
 impl Observer for Latest {
     #[inline]
-    fn event(&mut self, event: &GapEvent) {
+    fn event(&mut self, event: &GapEvent, _: States<'_>) {
         self.add(event.t);
     }
 }
@@ -210,8 +210,8 @@ fn amplification(flow: &Flow, law: Law, start: State) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::flow::DomainKind;
-    use rattlemap_dynamics::reference::EventKind::{Impact, MeshEnd, MeshStart};
+    use rattlemap_dynamics::motion::EventKind::{Impact, MeshEnd, MeshStart};
+    use rattlemap_dynamics::pair::DomainKind;
 
     #[test]
     fn cells_have_the_motion_of_their_kind() {

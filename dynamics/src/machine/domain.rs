@@ -6,10 +6,10 @@ use std::sync::OnceLock;
 use nalgebra::{DMatrix, DVector};
 
 use super::polynomial::{ORDER, Polynomial, Weights, combine, rest};
-use super::slip::Slip;
 use super::system::System;
 use super::{Numbers, Point, SIZE, WIDTH};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
+use crate::motion::Slip;
 
 /// Taylor radius: the largest product of a step and the rate of its domain.
 const RADIUS: f64 = 1.6;

@@ -3,13 +3,13 @@
 use super::Point;
 use super::domain::{Domain, Path, Row};
 use super::modes::Modes;
-use super::slip::Slip;
 use super::system::System;
 use crate::model::Side;
-use crate::orbit::{place_of_displacement, place_of_gap};
+use crate::motion::Slip;
+use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, root};
 
 /// Part of a flight: one domain, at most one Taylor step.
-pub struct Flight<'a> {
+pub(super) struct Flight<'a> {
     pub(super) system: &'a System,
     pub(super) domain: &'a Domain,
     pub(super) modes: &'a Modes,
@@ -17,31 +17,69 @@ pub struct Flight<'a> {
     /// The part of the step that the flight takes.
     pub(super) share: f64,
     /// Duration, and time of the start since phase 0.
-    pub(crate) duration: f64,
-    pub(crate) start: f64,
+    pub(super) duration: f64,
+    pub(super) start: f64,
 }
 
 /// A linear function of the motion, and its rate.
-pub(crate) struct Signal {
+struct Signal {
     value: Row,
     rate: Row,
 }
 
 impl Signal {
     /// Returns the value at a point.
-    pub(crate) fn at(&self, point: &Point) -> f64 {
+    fn at(&self, point: &Point) -> f64 {
         self.value.dot(point)
     }
 
     /// Returns the rate at a point.
-    pub(crate) fn rate(&self, point: &Point) -> f64 {
+    fn rate(&self, point: &Point) -> f64 {
         self.rate.dot(point)
     }
 }
 
 impl Flight<'_> {
+    /// Adds the flight to integrals and extremes.
+    pub(super) fn add_to(&self, sums: &mut Sums) {
+        let (displacements, forces) = (self.displacements(), self.contact_forces());
+        let mut before: Option<(f64, Point)> = None;
+        for (share, weight) in nodes().into_iter().chain([(1.0, 0.0)]) {
+            let point = self.at(share);
+            let (sin, cos) = (self.system.machine.omega * (self.start + share * self.duration)).sin_cos();
+            let weight = weight * self.duration;
+            for (place, signal) in &displacements {
+                let moments = &mut sums.displacements[*place];
+                moments.integrate(weight, signal.at(&point), [cos, sin]);
+            }
+            sums.dissipated += weight * self.dissipation(&point);
+            sums.heat += weight * self.heat(&point);
+            for signal in &forces {
+                sums.force.square += weight * signal.at(&point).powi(2);
+                sums.contact_time += weight;
+            }
+            if self.sticks() {
+                sums.sticking_time += weight;
+            }
+            let (start, from) = before.unwrap_or_else(|| (0.0, self.at(0.0)));
+            let include = |moments: &mut Moments, signal: &Signal| {
+                moments.include(signal.at(&from));
+                moments.include(signal.at(&point));
+                if signal.rate(&from) * signal.rate(&point) < 0.0 {
+                    let rate = |share: f64| signal.rate(&self.at(share));
+                    moments.include(signal.at(&self.at(root(start, share, rate))));
+                }
+            };
+            displacements.iter().for_each(|(place, signal)| include(&mut sums.displacements[*place], signal));
+            for signal in &forces {
+                include(&mut sums.force, signal);
+            }
+            before = Some((share, point));
+        }
+    }
+
     /// Returns the point after a share of the flight.
-    pub(crate) fn at(&self, share: f64) -> Point {
+    fn at(&self, share: f64) -> Point {
         self.domain.point(self.path, self.share * share)
     }
 
@@ -50,7 +88,7 @@ impl Flight<'_> {
     }
 
     /// Returns all displacements and gaps, by their places in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
-    pub(crate) fn displacements(&self) -> Vec<(usize, Signal)> {
+    fn displacements(&self) -> Vec<(usize, Signal)> {
         let displacements = (0..self.system.machine().degrees())
             .map(|i| (place_of_displacement(i), self.system.displacement_row(i)));
         let gaps = (0..self.system.gaps()).map(|gap| (place_of_gap(gap), self.domain.unit_row(gap)));
@@ -58,7 +96,7 @@ impl Flight<'_> {
     }
 
     /// Returns the forces of the compliant contacts, positive where they push.
-    pub(crate) fn contact_forces(&self) -> Vec<Signal> {
+    fn contact_forces(&self) -> Vec<Signal> {
         let key = self.modes.key(self.system);
         let engaged = (0..self.system.gaps()).filter(|&gap| key.engaged[gap] != 0);
         engaged
@@ -77,14 +115,14 @@ impl Flight<'_> {
     }
 
     /// Returns the power that all dampers take at a point.
-    pub(crate) fn dissipation(&self, point: &Point) -> f64 {
+    fn dissipation(&self, point: &Point) -> f64 {
         let n = self.system.n;
         let rates = &point[n..2 * n];
         (0..n).map(|i| rates[i] * (0..n).map(|j| self.domain.damping[(i, j)] * rates[j]).sum::<f64>()).sum()
     }
 
     /// Returns the power that dry friction turns into heat at a point.
-    pub(crate) fn heat(&self, point: &Point) -> f64 {
+    fn heat(&self, point: &Point) -> f64 {
         let elements = self.system.elements.iter().enumerate().zip(self.modes.slips);
         let power = |((i, element), slip): ((usize, &super::system::Element), Slip)| {
             element.force * slip.sign() * self.system.rate_row(i, self.domain).dot(point)
@@ -93,7 +131,7 @@ impl Flight<'_> {
     }
 
     /// Whether an element with dry friction sticks.
-    pub(crate) fn sticks(&self) -> bool {
+    fn sticks(&self) -> bool {
         self.system.elements.iter().zip(self.modes.slips).any(|(_, slip)| slip == Slip::Stick)
     }
 }
@@ -124,11 +162,6 @@ impl System {
             walls.iter().map(of_wall).sum::<f64>()
         };
         0.5 * kinetic + (0..self.gaps()).map(of_gap).sum::<f64>()
-    }
-
-    /// Whether the law of restitution applies to a wall.
-    pub(crate) fn has_impacts(&self, gap: usize, side: Side, wall: usize) -> bool {
-        !self.walls(gap, side)[wall].contact.is_elastic()
     }
 
     /// Whether the machine has dry friction.

@@ -1,10 +1,10 @@
 //! Modes of walls and friction, and which of them are consistent with a state.
 
 use super::domain::{Domain, DomainKey, Row};
-use super::slip::{Slip, Slips};
 use super::system::System;
 use super::{Numbers, Point};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
+use crate::motion::{Slip, Slips};
 
 /// Rounding error of a sum, relative to the size of its terms.
 pub(super) const ROUNDING: f64 = 32.0 * f64::EPSILON;

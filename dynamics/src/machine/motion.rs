@@ -7,17 +7,15 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::domain::{Constraint, Constraints, Domain, DomainKey, Path, Row};
-use super::events::{MachineEvent, SlipEvent};
 use super::flight::Flight;
 use super::modes::{AtRest, GapMode, Modes, ROUNDING, STAYS_ZERO, first_derivative};
 use super::polynomial::{Fall, first_fall};
-use super::slip::{Slip, Slips};
 use super::system::{Phasors, System};
 use super::{Numbers, Point, SIZE};
-use crate::model::{Contact, Law, MOST_FRICTION, MOST_GAPS, Side, Wall};
-use crate::reference::{
-    Allowance, Clock, EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, NO_SPEED, Observer,
-    STEPS_PER_PERIOD_CAP, Stop, Work,
+use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
+use crate::motion::{
+    Allowance, Clock, EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, GapEvent, HUGE, NO_SPEED, Observer,
+    STEPS_PER_PERIOD_CAP, Slip, SlipEvent, Slips, Stop, Work,
 };
 use crate::word;
 
@@ -35,9 +33,6 @@ const MOST_DECISIONS: usize = 16;
 
 /// Rounding error of a gap that lies on a wall, relative to the terms of the gap and the wall's position.
 const ON_WALL: f64 = 4.0 * f64::EPSILON;
-
-/// Largest entry of a state that counts as finite.
-const HUGE: f64 = 1e150;
 
 /// What ends the present modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,15 +107,13 @@ pub struct Motion<'s> {
     near_grazing: bool,
     work: Work,
     allowance: Allowance<'s>,
-    /// The law of both walls, if the machine has none of its own.
-    law: Option<Law>,
 }
 
 impl<'s> Motion<'s> {
     /// Starts at phase 0 in the state `(x1, v1, x2, v2, ...)`.
     ///
     /// A gap behind a wall with a force is in contact. A gap behind a rigid wall is moved by
-    /// [`put_on_walls`](crate::model::Machine::put_on_walls).
+    /// [`put_on_walls`](crate::model::Oscillator::put_on_walls).
     pub fn new(system: &'s System, state: &[f64]) -> Motion<'s> {
         let stage = system.machine.first_stage();
         let modes = Modes { stage, gaps: [GapMode::Beyond(0); MOST_GAPS], slips: Slips::default() };
@@ -154,7 +147,6 @@ impl<'s> Motion<'s> {
             near_grazing: false,
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
-            law: None,
         };
         motion.enter();
         motion
@@ -163,7 +155,7 @@ impl<'s> Motion<'s> {
     /// Starts from another state at phase 0, in the modes of this motion and with its remaining allowance. The state alone does not determine
     /// the modes: a gap just in front of a wall may be free or in a contact onset.
     pub fn at(&self, state: &[f64], tangents: Vec<Numbers>) -> Motion<'s> {
-        let mut started = Motion::new(self.system, state).with_law(self.law);
+        let mut started = Motion::new(self.system, state);
         started.allowance = self.allowance();
         started.origin = self.origin;
         for gap in 0..self.system.gaps() {
@@ -310,25 +302,13 @@ impl<'s> Motion<'s> {
         self.work
     }
 
-    /// Applies a law of restitution and mesh speed to both walls of the first gap, instead of the machine's own laws.
-    pub(crate) fn with_law(mut self, law: Option<Law>) -> Self {
-        self.law = law;
-        self
-    }
-
-    /// Returns the coefficient of restitution of a wall, and its derivative, at an approach speed.
-    fn restitution(&self, side: Side, wall: &Wall, speed: f64) -> [f64; 2] {
-        self.law.map_or_else(|| wall.restitution.at(speed), |law| [law.restitution[side.index()], 0.0])
-    }
-
     /// Sets the work that the motion may take from here on.
-    pub fn allowing(mut self, allowance: Allowance<'s>) -> Self {
+    pub fn allow(&mut self, allowance: Allowance<'s>) {
         self.allowance = Allowance {
             steps: allowance.steps.saturating_add(self.work.steps),
             events: allowance.events.saturating_add(self.work.events),
             ..allowance
         };
-        self
     }
 
     pub(crate) fn allowance(&self) -> Allowance<'s> {
@@ -364,9 +344,10 @@ impl<'s> Motion<'s> {
         self.modes == other.modes && self.origin == other.origin && self.at_wall == other.at_wall
     }
 
-    /// Multiplies the first entries of the state by `1 + shares`, to simulate rounding.
-    pub(crate) fn perturb(&mut self, shares: [f64; 4]) {
-        self.y.iter_mut().zip(shares).for_each(|(y, share)| *y += share * *y);
+    /// Multiplies each entry of the state by 1 and a share, to simulate rounding.
+    pub(crate) fn perturb(&mut self, mut share: impl FnMut() -> f64) {
+        let n = self.system.n;
+        self.y[..2 * n].iter_mut().for_each(|y| *y += share() * *y);
         self.system.hold(&self.modes, &mut self.y, false);
     }
 
@@ -580,18 +561,10 @@ impl<'s> Motion<'s> {
         let first = self.first_event(&point, &path);
         let (share, time) = first.map_or((1.0, h), |(share, _)| (share, share * h));
         if share > 0.0 {
-            if observer.measures() {
+            if let Some(sums) = observer.sums() {
                 let (system, start) = (self.system, self.clock.time());
                 let (domain, modes, path) = (&*self.domain, &self.modes, &*path);
-                observer.machine_flight(&Flight {
-                    system,
-                    domain,
-                    modes,
-                    path,
-                    share,
-                    duration: time,
-                    start,
-                });
+                Flight { system, domain, modes, path, share, duration: time, start }.add_to(sums);
             }
             self.advance(&path, share, time);
         }
@@ -736,8 +709,8 @@ impl<'s> Motion<'s> {
         let field = self.domain.derivative(&self.point());
         let energy = self.system.energy(&self.modes, &self.y);
         self.act(watch, observer);
-        if observer.measures() {
-            observer.machine_loss(energy - self.system.energy(&self.modes, &self.y));
+        if let Some(sums) = observer.sums() {
+            sums.lost += energy - self.system.energy(&self.modes, &self.y);
         }
         self.refresh();
         if !self.tangents.is_empty() {
@@ -971,7 +944,7 @@ impl<'s> Motion<'s> {
     fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut dyn Observer) {
         let (system, n) = (self.system, self.system.n);
         let (approach, number) = (side.sign() * self.rate(gap), system.walls(gap, side).len() - 1);
-        let [e, slope] = self.restitution(side, wall, approach);
+        let [e, slope] = wall.restitution.at(approach);
         let mut kept = [false; MOST_GAPS];
         let (kick, Outcome { free, bounced, lasting, pressing }) = loop {
             let (kick, let_go) = self.joint_impact(gap, side, kept);
@@ -1056,7 +1029,7 @@ impl<'s> Motion<'s> {
         let domain = system.domain(free.key(system));
         let row = domain.unit_row(gap);
         let pressing = side.sign() * first_derivative(&domain, &row, &point, 2).1;
-        let mesh_speed = self.law.map_or(wall.mesh_speed, |law| law.mesh_speed[side.index()]);
+        let mesh_speed = wall.mesh_speed;
         let is_slow = leaving <= mesh_speed.max(self.lowest_speed(&domain, gap, &point));
         let mut lasting = None;
         if is_slow && wall.contact == Contact::Rigid {
@@ -1441,26 +1414,31 @@ impl<'s> Motion<'s> {
         self.work.events += 1;
         self.events_in_period += 1;
         let n = self.system.n;
-        observer.machine_event(&MachineEvent {
+        let number = &self.system.walls(gap, side)[wall];
+        let is_on_wall = self.before[gap] == number.at;
+        let of_wall = 1 + u64::from(side == Side::Right) + 2 * u64::from(is_on_wall);
+        let event = GapEvent {
             gap,
             kind,
             side,
-            wall,
             symbol,
             period: self.period,
             t: self.clock.time(),
-            before: self.system.to_state(&self.before),
-            after: self.state(),
-            is_on_wall: self.before[gap] == self.system.walls(gap, side)[wall].at,
-            rates: [self.before[n + gap], self.y[n + gap]],
+            before: [self.before[gap], self.before[n + gap], 0.0, 0.0],
+            after: [self.y[gap], self.y[n + gap], 0.0, 0.0],
             meshing,
-        });
+            has_impact: !number.contact.is_elastic() && kind != EventKind::MeshEnd,
+            code: of_wall + 4 * kind as u64 + 256 * (gap + 4 * wall) as u64,
+            interval: 0,
+            ends_series: false,
+        };
+        observer.event(&event, &|| [self.system.to_state(&self.before), self.state()]);
     }
 
     fn record_slip(&mut self, symbol: Option<u8>, observer: &mut dyn Observer) {
         self.work.events += 1;
         self.events_in_period += 1;
-        observer.machine_slip(&SlipEvent {
+        observer.slip(&SlipEvent {
             slips: self.modes.slips,
             symbol,
             period: self.period,

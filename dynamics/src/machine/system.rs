@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::domain::{Domain, DomainKey};
 use super::modes::ROUNDING;
 use super::{Numbers, Point, SIZE};
-use crate::model::{Contact, MOST_HARMONICS, Machine, Side, Wall};
+use crate::model::{Contact, MOST_HARMONICS, Oscillator, Side, Wall};
 
 /// Linear forces in the coordinates of the flow.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub(super) type Phasors = [[f64; 2]; MOST_HARMONICS + 1];
 /// A machine, prepared for its motions. Domains are shared by all motions.
 #[derive(Clone, Debug)]
 pub struct System {
-    pub(super) machine: Machine,
+    pub(super) machine: Oscillator,
     /// Number of coordinates.
     pub(super) n: usize,
     /// Forcing period.
@@ -60,8 +60,8 @@ pub struct System {
 }
 
 impl System {
-    /// Prepares a machine that [`Machine::validate`] accepts.
-    pub fn new(machine: &Machine) -> System {
+    /// Prepares a machine that [`Oscillator::validate`] accepts.
+    pub fn new(machine: &Oscillator) -> System {
         let (machine, n) = (machine.clone(), machine.degrees());
         let to_flow = coordinates(&machine);
         let from_flow = to_flow.clone().try_inverse().expect("the rows are independent");
@@ -143,7 +143,7 @@ impl System {
     }
 
     /// Returns the machine.
-    pub fn machine(&self) -> &Machine {
+    pub fn machine(&self) -> &Oscillator {
         &self.machine
     }
 
@@ -258,7 +258,7 @@ fn inverse(mass: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. Of displacements with equal factors in a gap,
 /// the lightest is left out: a force on a heavy body that is left out would be computed as a small difference.
-fn coordinates(machine: &Machine) -> DMatrix<f64> {
+fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
     let n = machine.degrees();
     let mass = |i: usize| machine.mass[(i, i)];
     let left_out = machine.displacements_of_gaps(|a, b| mass(a).total_cmp(&mass(b)).then(a.cmp(&b)));

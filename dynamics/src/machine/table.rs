@@ -5,10 +5,10 @@
 use super::domain::{Domain, DomainKey, Row};
 use super::modes::GapMode;
 use super::motion::Motion;
-use super::slip::{Slip, Slips};
 use super::system::System;
 use super::{Numbers, SIZE};
-use crate::model::{Contact, MOST_GAPS, Machine, Side};
+use crate::model::{Contact, MOST_GAPS, Oscillator, Side};
+use crate::motion::{Slip, Slips};
 
 /// Frequency below all others, for equations that do not depend on it.
 const LOWEST_FREQUENCY: f64 = 1e-100;
@@ -218,14 +218,14 @@ impl Motion<'_> {
     }
 }
 
-impl Machine {
+impl Oscillator {
     /// Returns the machine without what does not change the equations of its domains: restitution and mesh speeds are 0, and the frequency
     /// is so low that it does not limit [`Equations::radian`].
-    pub fn without_laws(&self) -> Machine {
+    pub fn without_laws(&self) -> Oscillator {
         let mut machine = self.clone();
         machine.omega = LOWEST_FREQUENCY;
         for wall in machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten()) {
-            wall.restitution = crate::model::Restitution::constant(0.0);
+            wall.restitution = crate::model::Restitution::Constant(0.0);
             wall.mesh_speed = 0.0;
         }
         machine

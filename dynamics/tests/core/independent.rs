@@ -6,15 +6,16 @@ mod friction;
 pub(crate) mod motion;
 pub(crate) mod random;
 
+use rattlemap_dynamics::model::Form;
+use rattlemap_dynamics::motion::States;
 use std::time::{Duration, Instant};
 
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State, state};
+use rattlemap_dynamics::model::{Contact, Law, Side, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, Stop, Trajectory};
 use rattlemap_dynamics::orbit::{
     Budget, Class, EVENT_PERIODS, Measurement, Orbit, Status, analyse_flow, measure,
 };
-use rattlemap_dynamics::reference::machine::MachineEvent;
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
 use rayon::prelude::*;
 
 use crate::common::BUDGET;
@@ -60,24 +61,14 @@ const MOST_PERIODS: usize = 200;
 #[derive(Default)]
 struct AtWalls(Vec<(What, Side)>);
 
-impl AtWalls {
-    fn add(&mut self, kind: EventKind, side: Side) {
-        let what = match kind {
+impl Observer for AtWalls {
+    fn event(&mut self, event: &GapEvent, _: States<'_>) {
+        let what = match event.kind {
             EventKind::Impact => What::Impact,
             EventKind::MeshStart => What::Begins,
             EventKind::MeshEnd => What::Ends,
         };
-        self.0.push((what, side));
-    }
-}
-
-impl Observer for AtWalls {
-    fn event(&mut self, event: &GapEvent) {
-        self.add(event.kind, event.side);
-    }
-
-    fn machine_event(&mut self, event: &MachineEvent) {
-        self.add(event.kind, event.side);
+        self.0.push((what, event.side));
     }
 }
 
@@ -103,7 +94,7 @@ struct Compared {
 
 /// Compares states and events of the first periods. Returns the largest difference, and [`Motion::by_stage`].
 fn first_periods(case: &Case, system: &System) -> Result<(f64, [usize; 2]), String> {
-    let flow = Flow::new(&case.oscillator);
+    let flow = Flow::new(case.oscillator.form(case.law));
     let mut theirs = Trajectory::new(&flow, case.law, case.start);
     let mut ours = Motion::new(system, case.law, case.start, Mode::Free);
     let mut shaken = ours.shaken();
@@ -204,7 +195,7 @@ fn confirms(case: &Case, flow: &Flow, ours: &Cycle) -> bool {
 }
 
 fn compare(case: &Case) -> Result<Compared, String> {
-    let (system, flow) = (System::new(&case.oscillator, ANGLE), Flow::new(&case.oscillator));
+    let (system, flow) = (System::new(&case.oscillator, ANGLE), Flow::new(case.oscillator.form(case.law)));
     let (first, by_stage) = first_periods(case, &system)?;
     let found = |agreement, [at, by]: [f64; 2]| Ok(Compared { agreement, off: [first, at, by], by_stage });
     let measured = measure(&flow, case.law, case.start, &BUDGET);
@@ -337,22 +328,22 @@ const LONGEST_TIME: Duration = Duration::from_secs(2);
 const WIDE: Shape = Shape { harmonics: true, stages: true, wide: true, ..PLAIN };
 
 /// Returns a random model with wide ranges.
-fn wide(shape: Shape) -> impl Fn(u64) -> (Oscillator, Law, State) {
+fn wide(shape: Shape) -> impl Fn(u64) -> (Form, Law, State) {
     move |seed| {
         let case = case(seed, shape);
-        (case.oscillator, case.law, case.start)
+        (case.oscillator.form(case.law), case.law, case.start)
     }
 }
 
 /// Returns a random machine, which has its contact laws itself.
-fn machine(seed: u64) -> (Oscillator, Law, State) {
+fn machine(seed: u64) -> (Form, Law, State) {
     let case = any_case(seed);
-    (Oscillator::of_machine(case.machine), Law::both(0.0, 0.0), state(&case.start))
+    (Form::Machine(case.machine), Law::both(0.0, 0.0), state(&case.start))
 }
 
 /// Measures random models. Every motion must end in time, with finite numbers.
 fn check_ends(
-    model: impl Fn(u64) -> (Oscillator, Law, State) + Sync,
+    model: impl Fn(u64) -> (Form, Law, State) + Sync,
     seeds: std::ops::Range<u64>,
     longest: Duration,
 ) {

@@ -10,7 +10,7 @@ use ode_solvers::{Dop853, SVector, System};
 
 use super::field::Equations;
 use super::flight::{Flight, Sighting};
-use rattlemap_dynamics::flow::Gap;
+use rattlemap_dynamics::pair::Gap;
 
 /// Largest number of endings in one interval.
 const ENDINGS: u32 = 10_000;

@@ -3,8 +3,8 @@
 
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use rattlemap_dynamics::flow::{Gap, Phasor};
-use rattlemap_dynamics::model::{Domain, Harmonic, Oscillator, State, state};
+use rattlemap_dynamics::model::{Domain, Harmonic, Pair, State, state};
+use rattlemap_dynamics::pair::{Gap, Phasor};
 
 /// Conversion between displacements and gap coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub struct Coordinates {
 
 impl Coordinates {
     /// Builds the coordinates of an oscillator. If both displacements have equal shares of the gap, the second is used.
-    pub fn new(oscillator: &Oscillator) -> Coordinates {
+    pub fn new(oscillator: &Pair) -> Coordinates {
         let gap = oscillator.gap;
         let other = usize::from(gap[0].abs() >= gap[1].abs());
         let row = Vector2::from(gap);
@@ -71,7 +71,7 @@ pub struct Equations {
 
 impl Equations {
     /// Builds the equations of one domain.
-    pub fn new(oscillator: &Oscillator, domain: &Domain) -> Equations {
+    pub fn new(oscillator: &Pair, domain: &Domain) -> Equations {
         let Coordinates { gap, other, .. } = Coordinates::new(oscillator);
         // Matrices from displacements to `(z, x)` and back.
         let [own, rest] = if other == 1 { gap } else { [gap[1], gap[0]] };
@@ -174,10 +174,10 @@ mod tests {
     /// Covers a full mass matrix and gaps in which either displacement has the larger share.
     #[test]
     fn any_gap_row_obeys_the_equations_of_motion() {
-        let pair = GearPair::paper(0.5).oscillator().unwrap();
+        let pair = Pair::of(&GearPair::paper(0.5).oscillator().unwrap()).unwrap();
         for gap in [[1.0, -1.0], [0.3, 2.0], [0.0, -1.5], [-2.0, 0.5]] {
             let oscillator =
-                Oscillator { mass: [[2.0, 0.7], [0.7, 1.0]], gap, force_sin: [-20.0, 30.0], ..pair.clone() };
+                Pair { mass: [[2.0, 0.7], [0.7, 1.0]], gap, force_sin: [-20.0, 30.0], ..pair.clone() };
             let coordinates = Coordinates::new(&oscillator);
             let y = state(&[0.3, -1.2, 0.9, 2.1]);
             let q = coordinates.gap(&y);

@@ -5,9 +5,9 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::field::{Coordinates, Equations};
-use rattlemap_dynamics::flow::{Gap, Phasor};
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::model::{Contact, Law, Pair, Side, State};
+use rattlemap_dynamics::motion::EventKind;
+use rattlemap_dynamics::pair::{Gap, Phasor};
 
 /// Largest number of iterations of a root search.
 const ROOT_CAP: u32 = 100;
@@ -131,7 +131,7 @@ struct Interval {
 
 impl Interval {
     /// `nth` is the number of walls in front of the interval, none between the first walls.
-    fn new(oscillator: &Oscillator, coordinates: &Coordinates, side: Side, nth: usize) -> Interval {
+    fn new(oscillator: &Pair, coordinates: &Coordinates, side: Side, nth: usize) -> Interval {
         let of_stage = |stage: usize| {
             let alone = oscillator.in_stage(stage);
             if nth == 0 { alone } else { alone.behind(side, nth) }
@@ -158,7 +158,7 @@ impl Interval {
                 is_pushing.then_some(force)
             })
         };
-        let Oscillator { walls, contacts, .. } = of_stage(0);
+        let Pair { walls, contacts, .. } = of_stage(0);
         let stages = 0..oscillator.stage_count();
         Interval {
             walls,
@@ -172,7 +172,7 @@ impl Interval {
 impl Flight {
     /// Builds a motion from `start` at phase 0. A start beyond a wall is meshing; beyond a rigid wall it is moved to the
     /// wall.
-    pub fn new(oscillator: &Oscillator, law: Law, start: State) -> Flight {
+    pub fn new(oscillator: &Pair, law: Law, start: State) -> Flight {
         let coordinates = Coordinates::new(oscillator);
         let [right, left] = oscillator.outer_walls.each_ref().map(Vec::len);
         let interval = |side| move |nth| Interval::new(oscillator, &coordinates, side, nth);

@@ -10,7 +10,7 @@ use super::machine::{Event, Flight};
 use rattlemap_dynamics::model::{
     Contact, Domain, Harmonic, Law, Machine, Oscillator, REST, Side, Stage, State, state,
 };
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::motion::EventKind;
 
 const NO_WALLS: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 

@@ -2,7 +2,7 @@
 
 use rattlemap::validate::independent::machine::Flight;
 use rattlemap_dynamics::model::{STATE, Side, state};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::motion::EventKind;
 use rayon::prelude::*;
 
 use super::integrators::machines::motion::{Motion, What};

@@ -1,7 +1,8 @@
 //! Dry friction in motions by matrix exponentials: closed forms, energy and limits.
 
+use crate::common::pairs::{Friction, Rubbing};
 use nalgebra::{Matrix2, Vector2};
-use rattlemap_dynamics::model::{Contact, Friction, Law, Oscillator, Side, State, state};
+use rattlemap_dynamics::model::{Contact, Law, Pair, Side, State, state};
 use std::f64::consts::PI;
 
 use super::cycle::settle;
@@ -13,9 +14,9 @@ const SHAPE: Shape =
     Shape { harmonics: false, stages: false, walls: false, pushing: false, friction: true, wide: false };
 
 /// Returns a mass of 1 on a spring without a damper and on a floor with friction.
-fn block(square: f64, force: f64, omega: f64, friction: f64, speed: f64) -> Oscillator {
+fn block(square: f64, force: f64, omega: f64, friction: f64, speed: f64) -> Rubbing {
     let friction = vec![Friction { row: [1.0, 0.0], force: friction, speed }];
-    Oscillator { friction, ..Linear { gamma: 0.0, square, force, load: 0.0, omega }.oscillator() }
+    Rubbing { pair: Linear { gamma: 0.0, square, force, load: 0.0, omega }.oscillator(), friction }
 }
 
 fn start<'a>(system: &'a System, state: State) -> Motion<'a> {
@@ -148,7 +149,7 @@ fn a_wall_takes_over_from_friction() {
         let mut o = block(1e-9, 1.0, 1.0, 0.4, 0.0);
         (o.walls[0], o.contacts[0]) = (0.0, contact);
         o.meshing[0].stiffness[0][0] = 100.0;
-        let system = System::new(&o.at_phase(1.45 * PI), ANGLE);
+        let system = System::new(&Rubbing { pair: o.at_phase(1.45 * PI), ..o }, ANGLE);
         let mut motion = start(&system, state(&[-1e-3, 0.2]));
         let takeover = 0.55 * PI - 0.4f64.acos();
         motion.run(takeover - 1e-9).unwrap();
@@ -165,13 +166,13 @@ fn a_wall_takes_over_from_friction() {
 }
 
 /// Of free motion without dampers.
-fn energy(o: &Oscillator, y: State) -> f64 {
+fn energy(o: &Pair, y: State) -> f64 {
     let form = |m: [[f64; 2]; 2], a: f64, b: f64| m[0][0] * a * a + 2.0 * m[0][1] * a * b + m[1][1] * b * b;
     0.5 * (form(o.mass, y[1], y[3]) + form(o.free.stiffness, y[0], y[2]))
 }
 
 /// Checks directions, and that the forces which make elements stick are small enough.
-fn check_grips(o: &Oscillator, motion: &Motion) {
+fn check_grips(o: &Rubbing, motion: &Motion) {
     let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
     let (per_mass, y) = (matrix(o.mass).try_inverse().unwrap(), motion.state());
     let (x, v) = (Vector2::new(y[0], y[2]), Vector2::new(y[1], y[3]));
@@ -242,7 +243,7 @@ fn small_friction_changes_little() {
             .friction
             .iter_mut()
             .for_each(|friction| (friction.force, friction.speed) = (1e-11 * friction.force, 0.0));
-        let without = Oscillator { friction: Vec::new(), ..oscillator.clone() };
+        let without = Rubbing { friction: Vec::new(), ..oscillator.clone() };
         let ends = [&oscillator, &without].map(|o| {
             let system = System::new(o, ANGLE);
             let mut motion = Motion::new(&system, law, start, Mode::Free);

@@ -3,8 +3,9 @@
 //! The state is extended by a constant 1 and by cosine and sine of each harmonic, so that every domain is `y' = A y`. A step is a
 //! product with a stored exponential. Near a wall, Taylor series of the step are searched for roots between the extrema.
 
+use super::super::common::pairs::{Friction, Rubbing};
 use nalgebra::{Matrix2, Matrix4, RowSVector, RowVector4, SMatrix, SVector, Vector2, Vector4};
-use rattlemap_dynamics::model::{Contact, Domain, Friction, Law, Oscillator, Side, Stage, State, state};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Side, Stage, State, state};
 
 /// Largest number of harmonics, the first one included.
 pub(crate) const HARMONICS: usize = 5;
@@ -165,8 +166,9 @@ pub(crate) struct System {
 }
 
 /// Returns the oscillator between the `nth` wall on a side, from 1, and the next one.
-fn between_walls(o: &Oscillator, side: Side, nth: usize) -> Oscillator {
-    let (i, mut found) = (side.index(), Oscillator { outer_walls: Default::default(), ..o.clone() });
+fn between_walls(o: &Rubbing, side: Side, nth: usize) -> Rubbing {
+    let (i, mut found) = (side.index(), o.clone());
+    found.outer_walls = Default::default();
     let mut walls = vec![(o.walls[i], o.contacts[i])];
     walls.extend(o.outer_walls[i].iter().map(|wall| (wall.at, wall.contact)));
     let stages = o.stages.len() + 1;
@@ -226,7 +228,7 @@ fn bound(mut a: Generator, per_mass: Matrix2<f64>, rows: &[Vector2<f64>]) -> Gen
 
 impl System {
     /// Builds the system with steps of `angle` radians of the fastest rate.
-    pub(crate) fn new(o: &Oscillator, angle: f64) -> System {
+    pub(crate) fn new(o: &Rubbing, angle: f64) -> System {
         let mut harmonics = vec![(1, o.force, o.force_sin)];
         harmonics.extend(o.harmonics.iter().map(|h| (h.order, h.cos, h.sin)));
         let per_mass = matrix(o.mass).try_inverse().expect("a mass matrix");

@@ -1,10 +1,9 @@
 //! Random models with harmonics and stages.
 
-use rattlemap_dynamics::model::{
-    Contact, Domain, Friction, Harmonic, Law, Oscillator, OuterWall, Side, Stage, State, state,
-};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, OuterWall, Pair, Side, Stage, State, state};
 
 use crate::common::linear::with_wall;
+use crate::common::pairs::{Friction, Rubbing};
 
 /// A reproducible sequence of numbers: SplitMix64.
 pub(crate) struct Random(pub(crate) u64);
@@ -55,7 +54,7 @@ pub(crate) struct Shape {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
-    pub(crate) oscillator: Oscillator,
+    pub(crate) oscillator: Rubbing,
     pub(crate) law: Law,
     /// Between the walls.
     pub(crate) start: State,
@@ -119,7 +118,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         1 => [f64::INFINITY, left],
         _ => [right, left],
     };
-    let mut oscillator = Oscillator {
+    let mut oscillator = Pair {
         degrees: 2,
         mass,
         gap,
@@ -134,8 +133,6 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
-        friction: Vec::new(),
-        machine: None,
     };
     if shape.harmonics {
         let count = 1 + random.below(4);
@@ -155,7 +152,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     let first = [behind(random), behind(random)];
     let plain = oscillator.clone();
     let walled = |free: Domain, behind: [[f64; 2]; 2]| {
-        let of_stage = Oscillator { free, meshing: [free; 2], ..plain.clone() };
+        let of_stage = Pair { free, meshing: [free; 2], ..plain.clone() };
         Side::BOTH.into_iter().filter(|side| walls[side.index()].is_finite()).fold(of_stage, |o, side| {
             with_wall(o, side, walls[side.index()], plain.contacts[side.index()], behind[side.index()])
         })
@@ -188,10 +185,14 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     if shape.pushing {
         preload_walls(random, &mut oscillator);
     }
+    let mut oscillator = Rubbing { pair: oscillator, friction: Vec::new() };
     if shape.friction {
         add_friction(random, &mut oscillator);
     }
-    oscillator.validate().unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
+    oscillator
+        .described(Law::both(0.0, 0.0))
+        .validate()
+        .unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
     let restitution = [0; 2].map(|_| if random.chance(0.25) { 0.0 } else { random.between(0.0, 0.9) });
     // Without a mesh speed, impacts can be infinitely many.
     let mesh_speed =
@@ -208,7 +209,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
 }
 
 /// Adds one to three walls behind each wall, or behind one of them. All but the last of a side become elastic.
-fn add_walls(random: &mut Random, o: &mut Oscillator) {
+fn add_walls(random: &mut Random, o: &mut Pair) {
     let only = random.below(3);
     for side in Side::BOTH.into_iter().filter(|side| o.walls[side.index()].is_finite()) {
         let i = side.index();
@@ -225,7 +226,7 @@ fn add_walls(random: &mut Random, o: &mut Oscillator) {
                     random.logarithmic(20.0, 1e3),
                     if random.chance(0.3) { 0.0 } else { random.logarithmic(0.1, 5.0) },
                 ];
-                let inside = Oscillator { free: *free, ..o.clone() };
+                let inside = Pair { free: *free, ..o.clone() };
                 *free = with_wall(inside, side, at, Contact::Elastic, spring).meshing[i];
             }
             let contact = if nth + 1 == count { last } else { Contact::Elastic };
@@ -235,7 +236,7 @@ fn add_walls(random: &mut Random, o: &mut Oscillator) {
 }
 
 /// Makes the last wall of each side elastic. Most walls only push, and most have a preload.
-fn preload_walls(random: &mut Random, o: &mut Oscillator) {
+fn preload_walls(random: &mut Random, o: &mut Pair) {
     for side in Side::BOTH.into_iter().filter(|side| o.walls[side.index()].is_finite()) {
         let (i, gap) = (side.index(), o.gap);
         let contact = if random.chance(0.8) { Contact::Pushing } else { Contact::Elastic };
@@ -264,7 +265,7 @@ fn preload_walls(random: &mut Random, o: &mut Oscillator) {
 }
 
 /// Adds one element with dry friction, or two, and sometimes removes the walls.
-fn add_friction(random: &mut Random, o: &mut Oscillator) {
+fn add_friction(random: &mut Random, o: &mut Rubbing) {
     if random.chance(0.15) {
         o.walls = [f64::INFINITY, f64::NEG_INFINITY];
         o.outer_walls = Default::default();
@@ -295,7 +296,7 @@ fn add_friction(random: &mut Random, o: &mut Oscillator) {
 }
 
 /// Removes the second coordinate.
-fn single(o: &mut Oscillator) {
+fn single(o: &mut Pair) {
     let first = |m: Matrix| [[m[0][0], 0.0], [0.0, 0.0]];
     let Domain { damping, stiffness, load, .. } = o.free;
     o.degrees = 1;

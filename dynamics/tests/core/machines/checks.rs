@@ -1,7 +1,7 @@
 //! Checks of the integrator of machines: other steps, differences, energy, and motions that other programs compute.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Contact, Machine, Side};
+use rattlemap_dynamics::model::{Contact, Oscillator, Side};
 use rayon::prelude::*;
 
 use super::build::{in_coordinates, side_by_side};
@@ -163,7 +163,7 @@ fn check_derivatives(seeds: std::ops::Range<u64>) {
 }
 
 /// Energy of motion, of springs, and of springs behind walls in contact.
-fn energy(machine: &Machine, motion: &Motion, state: &[f64]) -> f64 {
+fn energy(machine: &Oscillator, motion: &Motion, state: &[f64]) -> f64 {
     let n = machine.degrees();
     let [x, v] = [0, 1].map(|at| DVector::from_fn(n, |i, _| state[2 * i + at]));
     let forces = &machine.stages[0];
@@ -281,7 +281,7 @@ fn check_plain(count: usize, seeds: std::ops::Range<u64>, periods: usize, share:
             .collect();
         let omega = cases[0].oscillator.omega;
         cases.iter_mut().for_each(|case| case.oscillator.omega = omega);
-        let machines: Vec<_> = cases.iter().map(|case| Machine::of(&case.oscillator, case.law)).collect();
+        let machines: Vec<_> = cases.iter().map(|case| case.oscillator.described(case.law)).collect();
         let all = side_by_side(&machines);
         let n = all.degrees();
         let t = match count {

@@ -24,9 +24,9 @@ pub(crate) trait Follower {
 
 /// The program's motion of a machine. Names and signatures of the program occur only here.
 pub(crate) mod program {
-    use rattlemap_dynamics::model::Machine;
-    use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, SlipEvent, System};
-    use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer};
+    use rattlemap_dynamics::machine::{Motion, System};
+    use rattlemap_dynamics::model::Oscillator;
+    use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, SlipEvent, States};
 
     use super::super::motion::{Event, What};
     use super::{Follower, Period};
@@ -47,9 +47,7 @@ pub(crate) mod program {
     }
 
     impl Observer for Record {
-        fn event(&mut self, _: &GapEvent) {}
-
-        fn machine_event(&mut self, event: &MachineEvent) {
+        fn event(&mut self, event: &GapEvent, _: States<'_>) {
             let what = match event.kind {
                 EventKind::Impact => What::Impact,
                 EventKind::MeshStart => What::Begins,
@@ -61,14 +59,14 @@ pub(crate) mod program {
             self.events.push(Event { gap: event.gap, what, side: event.side, symbol, t });
         }
 
-        fn machine_slip(&mut self, change: &SlipEvent) {
+        fn slip(&mut self, change: &SlipEvent) {
             let t = change.period as f64 * self.period + change.t;
             self.slips.extend(change.symbol.map(|symbol| (symbol, t)));
         }
     }
 
     impl<'a> Engine<'a> {
-        pub(crate) fn new(system: &'a System, machine: &Machine, start: &[f64]) -> Engine<'a> {
+        pub(crate) fn new(system: &'a System, machine: &Oscillator, start: &[f64]) -> Engine<'a> {
             let mut motion = Motion::new(system, start);
             motion.set_tangents(Motion::unit_tangents(system));
             let several = machine.gaps.len() > 1;

@@ -6,8 +6,8 @@ use super::super::machine::Slip;
 use super::super::{Strobed, follow};
 use super::*;
 use crate::record::{Record, valid};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Friction, REST, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, analyse_flow};
 
 const SETTINGS: Settings = Settings { transient_periods: 150, observed_periods: 20, max_period: 4 };
