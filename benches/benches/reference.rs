@@ -7,7 +7,7 @@ use std::hint::black_box;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use rattlemap_bench::shapes::{CHAINS, SHAPES};
 use rattlemap_dynamics::machine::{Motion, System};
-use rattlemap_dynamics::model::{GearPair, REST, State, state};
+use rattlemap_dynamics::model::{GearPair, Pair, REST, State, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
@@ -21,6 +21,10 @@ struct Size {
     transient: u64,
     /// Timed periods per cell and iteration.
     periods: u64,
+}
+
+fn pair_of(pair: GearPair) -> Pair {
+    Pair::of(&pair.oscillator().expect("valid parameters")).expect("a pair")
 }
 
 /// Returns the full size for measurements, and a tiny one for tests.
@@ -43,7 +47,7 @@ fn grid(side: usize, [low, high]: [f64; 2]) -> Vec<Cell> {
     (0..side * side)
         .map(|i| {
             let pair = GearPair { omega: at(i / side, low, high), ..GearPair::paper(at(i % side, 0.0, 1.0)) };
-            Cell { pair, flow: Flow::new(&pair.pair()) }
+            Cell { pair, flow: Flow::new(&pair.oscillator().expect("valid parameters")) }
         })
         .collect()
 }
@@ -150,7 +154,7 @@ fn per_period_by_shape(c: &mut Criterion) {
         let shaped: Vec<_> = cells
             .iter()
             .map(|Cell { pair, .. }| {
-                let flow = Flow::new(&shape.of(&pair.pair()));
+                let flow = Flow::new(&shape.of(&pair_of(*pair)));
                 Cell { pair: *pair, flow }
             })
             .collect();
@@ -190,7 +194,7 @@ fn per_period_of_machines(c: &mut Criterion) {
 }
 
 fn flow(c: &mut Criterion) {
-    let oscillator = GearPair::paper(0.5).pair();
+    let oscillator = pair_of(GearPair::paper(0.5));
     c.bench_function("flow of one frequency", |b| b.iter(|| Flow::new(black_box(&oscillator))));
 }
 

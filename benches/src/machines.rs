@@ -67,8 +67,7 @@ fn cell(machine: &Oscillator) -> Option<Cell> {
     motion.set_tangents(Motion::unit_tangents(&system));
     let mut events: Vec<GapEvent> = Vec::new();
     (0..PERIODS).try_for_each(|_| motion.advance_period(&mut events)).ok()?;
-    let has_impacts_alone =
-        !events.is_empty() && events.iter().all(|event| event.kind == EventKind::Impact);
+    let has_impacts_alone = !events.is_empty() && events.iter().all(|event| event.kind == EventKind::Impact);
     let numbers = |state: State| state[..2 * machine.degrees()].to_vec();
     (has_impacts_alone && motion.derivative().norm() < MOST_AMPLIFICATION).then(|| Cell {
         omega: machine.omega,

@@ -1,12 +1,12 @@
 //! Shader variants: one source, composed of small files.
 
 use super::Measures;
-use super::pair::PAIRS_PER_HARMONIC;
 use super::features::Features;
 use super::layout::{
     BLOCK, CONTACTS, EXTREMES, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD,
     SPELLED_WORD_LENGTH, SPELLING, SUMS, symbols_per_number,
 };
+use super::pair::PAIRS_PER_HARMONIC;
 use super::precision::Precision;
 use super::rules;
 use super::unroll::unroll;

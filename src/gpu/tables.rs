@@ -251,7 +251,9 @@ fn upload_flows(
     let count = constants.len();
     let (buffer, none) = (buffer(gpu, "flows", (count + further.len()) * size), Flow::zeroed());
     for (n, part) in constants.chunks(FLOWS_AT_A_TIME).enumerate() {
-        let flows = part.iter().map(|constants| constants.as_ref().and_then(Constants::pair).map_or(&none, |c| &c.flow));
+        let flows = part
+            .iter()
+            .map(|constants| constants.as_ref().and_then(Constants::pair).map_or(&none, |c| &c.flow));
         gpu.write(&buffer, (n * FLOWS_AT_A_TIME * size) as u64, &reals(flows, gpu.precision));
     }
     for (n, part) in further.chunks(FLOWS_AT_A_TIME).enumerate() {

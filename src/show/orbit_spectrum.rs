@@ -159,7 +159,7 @@ fn amplitudes(parts: &[&[f64]], window: impl Fn(f64) -> f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::model::{GearPair, Harmonic, REST, Stage};
+    use rattlemap_dynamics::model::{Drive, GearPair, REST};
     use rattlemap_dynamics::orbit::{Settings, analyse};
 
     fn spectrum(pair: &GearPair) -> (Orbit, Spectrum) {
@@ -188,10 +188,10 @@ mod tests {
     #[test]
     fn samples_resolve_the_highest_harmonic_and_each_stage() {
         let plain = GearPair { k: 1.0, ..GearPair::paper(0.5) }.oscillator().unwrap();
-        let highest = Harmonic { order: 64, cos: [1.0; 2], sin: [0.0; 2] };
-        let high = Oscillator { harmonics: vec![highest], ..plain.clone() };
+        let mut high = plain.clone();
+        high.drives.push(Drive { order: 64, ..plain.drives[0].clone() });
         let schedule = Oscillator::repeated(&[0.0, 0.5], 40).unwrap();
-        let stages = vec![Stage { free: plain.free, meshing: plain.meshing }];
+        let stages = vec![plain.stages[0].clone(); 2];
         let staged = Oscillator { stages, schedule, ..plain.clone() };
         assert_eq!([plain, high, staged].map(|o| samples_per_period(&o)), [400, 64 * 20, 80 * 20]);
     }

@@ -276,15 +276,15 @@ fn requested_periods_are_a_limit() {
 /// The time counts from the start, not from the end of the transient.
 #[test]
 fn orbit_prints_the_state_at_a_time() {
-    use rattlemap::motion::Flow;
     use rattlemap::model::{GearPair, state};
+    use rattlemap::motion::Flow;
     use rattlemap::motion::Trajectory;
     let at = |arguments: &[&str]| {
         let fixed = ["orbit", "--start", "0.125,0,-0.25,1.5", "--time"];
         rattlemap(&folder()).args(fixed).args(arguments).assert().success().get_output().stdout.clone()
     };
     let pair = GearPair::paper(0.605);
-    let flow = Flow::new(&pair.pair());
+    let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::new(&flow, pair.law(), state(&[0.125, 0.0, -0.25, 1.5]));
     (0..3).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
     trajectory.advance_to(0.5, &mut ()).unwrap();

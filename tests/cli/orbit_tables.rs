@@ -3,8 +3,8 @@
 use rattlemap_dynamics::model::state;
 use std::fs;
 
-use rattlemap::motion::Flow;
 use rattlemap::model::GearPair;
+use rattlemap::motion::Flow;
 use rattlemap::motion::Trajectory;
 
 use crate::common::{empty, json, rows, run};
@@ -47,7 +47,7 @@ fn a_trajectory_contains_events_and_samples() {
         assert!(numbers(&pair[0])[0] <= numbers(&pair[1])[0]);
     }
     let pair = GearPair::paper(0.06);
-    let flow = Flow::new(&pair.pair());
+    let flow = Flow::new(&pair.oscillator().unwrap());
     let strobe = state(&list(&orbit["strobe"]));
     let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), strobe);
     for row in samples.iter().skip(1).step_by(77) {

@@ -7,7 +7,7 @@ use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::{self, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::record::Record;
-use rattlemap_dynamics::model::{GearPair, Law, Pair, State};
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
 
 use super::REST;
 
@@ -95,8 +95,8 @@ pub(crate) fn engine(plan: &Plan, precision: Precision) -> Engine<'_> {
 }
 
 /// Returns a flow, a law and a lane for each cell and its start.
-pub(crate) fn lanes(cells: &[(GearPair, State)]) -> (Vec<Pair>, Vec<Law>, Vec<Lane>) {
-    let flows = cells.iter().map(|(pair, _)| pair.pair()).collect();
+pub(crate) fn lanes(cells: &[(GearPair, State)]) -> (Vec<Oscillator>, Vec<Law>, Vec<Lane>) {
+    let flows = cells.iter().map(|(pair, _)| pair.oscillator().unwrap()).collect();
     let laws = cells.iter().map(|(pair, _)| pair.law()).collect();
     let lanes = (0..).zip(cells).map(|(i, &(_, start))| Lane { flow: i, law: i, start }).collect();
     (flows, laws, lanes)

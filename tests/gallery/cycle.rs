@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix, Matrix4};
 
 use rattlemap::validate::independent::dop853::Solver;
 use rattlemap::validate::independent::flight::Flight;
-use rattlemap_dynamics::model::{Law, Pair, State};
+use rattlemap_dynamics::model::{Form, Law, Pair, State};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::{GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
@@ -22,7 +22,7 @@ pub(crate) struct Followed {
 }
 
 /// Computes the reference's motion from a start at phase 0.
-pub(crate) fn followed(oscillator: &Pair, law: Law, start: State, periods: u32) -> Followed {
+pub(crate) fn followed(oscillator: impl Into<Form>, law: Law, start: State, periods: u32) -> Followed {
     let flow = Flow::new(oscillator);
     let mut trajectory = Trajectory::with_tangents(&flow, law, start, UNIT);
     let mut events = Vec::new();

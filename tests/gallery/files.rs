@@ -3,6 +3,7 @@
 use crate::ball::ball;
 use crate::clearance;
 use crate::common::closed_form::Walled;
+use crate::common::pairs::AsPair;
 use crate::elastic::{backlash, bilinear, soft};
 use crate::loose_gear;
 use crate::single_impact::{COCO, STOP};

@@ -1,16 +1,18 @@
 //! Machines: two loose gears on a heavy shaft, a chain between impacts in closed form, harmonics and their phase, restitution that depends
 //! on the speed, and the balance of energy.
 
+use crate::common::pairs::AsPair;
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2};
+use rattlemap_dynamics::model::Form;
 
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::machine::{MachineEvent, Motion, SlipEvent, System};
+use rattlemap_dynamics::machine::{Motion, System};
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, Law, Model, Oscillator, Pair, REST, Restitution, Side,
-    Spring, State, Wall, state,
+    Contact, Drive, DryFriction, Forces, GapRow, Law, Model, Oscillator, REST, Restitution, Side, Spring,
+    State, Wall, state,
 };
 use rattlemap_dynamics::motion::Flow;
-use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer};
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, SlipEvent, States};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse_flow};
 
 use crate::ball::{self, bounce};
@@ -23,21 +25,36 @@ use crate::pieces;
 fn machine(name: &str, values: &[(&str, f64)]) -> Oscillator {
     let mut model = FileModel::built_in(name).expect("built in");
     values.iter().for_each(|&(name, value)| model.set(name, value).expect("a parameter"));
-    *model.pair().machine.expect("a machine")
+    model.oscillator().unwrap()
+}
+
+/// An event at a wall, and the states before and after it.
+#[derive(Clone, Copy, Debug)]
+struct AtWall {
+    event: GapEvent,
+    before: State,
+    after: State,
+}
+
+impl std::ops::Deref for AtWall {
+    type Target = GapEvent;
+
+    fn deref(&self) -> &GapEvent {
+        &self.event
+    }
 }
 
 /// Events of a machine.
 #[derive(Default)]
 struct Log {
-    events: Vec<MachineEvent>,
+    events: Vec<AtWall>,
     slips: Vec<SlipEvent>,
 }
 
 impl Observer for Log {
-    fn event(&mut self, _: &GapEvent, _: States<'_>) {}
-
-    fn machine_event(&mut self, event: &MachineEvent) {
-        self.events.push(*event);
+    fn event(&mut self, event: &GapEvent, states: States<'_>) {
+        let [before, after] = states();
+        self.events.push(AtWall { event: *event, before, after });
     }
 
     fn slip(&mut self, event: &SlipEvent) {
@@ -593,7 +610,7 @@ fn dropped(restitution: Restitution) -> Oscillator {
 fn impact_speeds_follow_the_law_of_restitution() {
     let laws = [(0.9, -0.05, 1.0), (1.0, -0.1, 0.2), (0.5, 0.08, 0.5), (0.95, -0.01, 1.7), (0.8, 0.0, 1.0)];
     for (constant, factor, power) in laws {
-        let system = System::new(&dropped(Restitution { constant, factor, power }));
+        let system = System::new(&dropped(Restitution::BySpeed { constant, factor, power }));
         let e = |u: f64| constant + factor * u.powf(power);
         let slope = |u: f64| e(u) + factor * power * u.powf(power);
         for start in [[2.0, 0.0], [0.3, 1.5], [5.0, -3.0]] {
@@ -614,10 +631,13 @@ fn impact_speeds_follow_the_law_of_restitution() {
             assert_eq!(log.events.len(), 4);
             for event in &log.events {
                 assert_eq!(event.kind, EventKind::Impact);
-                assert!((event.rates[0].abs() / u - 1.0).abs() < 1e-12 && (event.t - t).abs() < 1e-12 * end);
+                assert!(
+                    (event.event.before[1].abs() / u - 1.0).abs() < 1e-12
+                        && (event.t - t).abs() < 1e-12 * end
+                );
                 du *= slope(u);
                 u *= e(u);
-                assert!((event.rates[1] / u - 1.0).abs() < 1e-12, "{event:?}");
+                assert!((event.event.after[1] / u - 1.0).abs() < 1e-12, "{event:?}");
                 // At the next impact.
                 dt += du * (2.0 / GRAVITY);
                 t += 2.0 * u / GRAVITY;
@@ -644,7 +664,7 @@ fn impact_speeds_follow_the_law_of_restitution() {
 fn restitution_by_speed_is_limited() {
     // Above 1: no energy is gained. Below 0: the ball stays on the floor.
     for (constant, factor, keeps) in [(0.9, 0.5, true), (0.5, -0.2, false)] {
-        let system = System::new(&dropped(Restitution { constant, factor, power: 1.0 }));
+        let system = System::new(&dropped(Restitution::BySpeed { constant, factor, power: 1.0 }));
         let mut motion = Motion::new(&system, &[2.0, 0.0]);
         motion.set_tangents(Motion::unit_tangents(&system));
         let u = (4.0 * GRAVITY).sqrt();
@@ -709,7 +729,7 @@ fn a_viscoelastic_ball_bounces_once_per_period_in_closed_form() {
         let (trace, det) = (matrix.trace() - sum, matrix.determinant() - product);
         println!("B = {loss}: state {off:.1e}, multipliers {:.1e}", trace.abs().max(det.abs()));
         assert!(off < 1e-12 && trace.abs().max(det.abs()) < 1e-12, "{off:e} {trace:e} {det:e}");
-        assert!((event.rates[0] + approach).abs() < 1e-12);
+        assert!((event.event.before[1] + approach).abs() < 1e-12);
     }
 }
 

@@ -1,6 +1,8 @@
 //! Random models: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written as
 //! a model file and read.
 
+use crate::common::pairs::AsPair;
+use rattlemap_dynamics::model::Form;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
@@ -249,7 +251,14 @@ const MOST_STEPS: f64 = 2000.0;
 /// Whether a lane needs few enough steps.
 fn is_bounded(cell: &RandomCell) -> bool {
     let Some(constants) = Constants::new(&cell.oscillator, None) else { return false };
-    let finest = constants.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
+    let finest = constants
+        .pair()
+        .expect("a pair")
+        .flow
+        .domains
+        .iter()
+        .map(|domain| domain.substeps)
+        .fold(1.0, f64::max);
     f64::from(constants.steps) * finest < MOST_STEPS
 }
 
@@ -282,7 +291,7 @@ fn validate(
         .quantities(&quantities)
         .build();
     let plan = Plan::new(&scene.expect("a valid scene"));
-    assert_eq!(plan.oscillator(plan.cell(0).flow), cell.oscillator);
+    assert_eq!(plan.form(plan.cell(0).flow), Form::Pair(cell.oscillator.clone()));
     let subject = Subject { plan: &plan, records: &[record], precision, is_lane: true };
     let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
     let sample = Sample { seed: 0, requested: 1, draws, states: Vec::new() };

@@ -2,6 +2,7 @@
 //! alone, within the bound that `shaders/pair/chatter.wgsl` states.
 
 use crate::common::gpu::{open, run_from_rest as run};
+use crate::common::pairs::AsPair;
 use crate::common::{REST, apart, flow_of, paper};
 use crate::counting::counting;
 use rattlemap::gpu::{LaneSettings, Precision, follows_chatter};

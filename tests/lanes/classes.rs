@@ -3,6 +3,7 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::gpu::{open, run, run_from_rest};
+use crate::common::pairs::AsPair;
 use crate::common::{REST, paper as pair};
 use crate::kinds;
 use rattlemap::gpu::{LaneSettings, Precision};

@@ -3,12 +3,14 @@
 //! Without an adapter the tests fail: install a software driver (see `scripts/test.sh`).
 
 use crate::common::gpu::{open, run};
+use crate::common::pairs::AsPair;
 use crate::common::table::{Row, rows};
 use crate::common::{REST, apart, flow_of, paper as pair};
 use rattlemap::gpu::{Lane, LaneSettings, Precision};
 use rattlemap::record::distance::{farther, is_within};
 use rattlemap_dynamics::model::{GearPair, Law, Pair, State, state};
 use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::States;
 use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, Trajectory};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
 use rayon::prelude::*;

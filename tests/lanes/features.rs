@@ -4,6 +4,7 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::linear::{Linear, with_preload, with_wall};
+use crate::common::pairs::{AsPair, Friction, Rubbing};
 use crate::common::{BUDGET, apart};
 use crate::kinds::draw::{Numbers, random_cell};
 use crate::kinds::{self, Cell};
@@ -15,7 +16,7 @@ use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
 use rattlemap_dynamics::model::{
-    Contact, Domain, DryFriction, Harmonic, Law, Model, OuterWall, Pair, REST, Side, Stage, state,
+    Contact, Domain, Harmonic, Law, Model, OuterWall, Pair, REST, Side, Stage, state,
 };
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Class, measure};
@@ -440,7 +441,9 @@ fn excluded_features_are_refused() {
     let error = kinds::run(Precision::F32, &cells, &settings(&cells)).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "negative_preload", .. }), "{error}");
     let friction = vec![Friction { row: [1.0, 0.0], force: 0.1, speed: 0.0 }];
-    let cells = [(Pair { friction, ..free.oscillator() }, Law::both(0.5, 0.0), REST)];
-    let error = kinds::run(Precision::F32, &cells, &LaneSettings::only(1)).unwrap_err();
+    let machine = Rubbing { pair: free.oscillator(), friction }.described(Law::both(0.5, 0.0));
+    let (mut gpu, laws) = (crate::common::gpu::open(Precision::F32), [Law::both(0.0, 0.0)]);
+    let lanes = [rattlemap::gpu::Lane { flow: 0, law: 0, start: REST }];
+    let error = pollster::block_on(gpu.run(&[machine], &laws, &lanes, &LaneSettings::only(1))).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "machine", .. }), "{error}");
 }

@@ -3,6 +3,7 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::BUDGET;
+use crate::common::pairs::AsPair;
 use crate::kinds::{self, Cell};
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use rattlemap::gpu::{Gpu, Lane, LaneResult, LaneSettings, Precision};
 use rattlemap::record::Record;
-use rattlemap_dynamics::model::{GearPair, Law, Pair, State, state};
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State, state};
 
 /// Draws a cell of the plane, stiff or soft. Its start may lie beyond a wall.
 fn cell() -> impl Strategy<Value = (GearPair, State)> {
@@ -36,7 +36,7 @@ fn cut() -> impl Strategy<Value = Cut> {
 
 fn records(
     device: &mut Gpu,
-    (flows, laws): (&[Pair], &[Law]),
+    (flows, laws): (&[Oscillator], &[Law]),
     lanes: &[Lane],
     settings: &LaneSettings,
 ) -> Vec<Record> {

@@ -13,7 +13,8 @@ use rattlemap::record::measures::GROUPS;
 use rattlemap::record::valid;
 use rattlemap::validate::{Field, differences};
 use rattlemap_dynamics::machine::{Motion, System};
-use rattlemap_dynamics::model::{GearPair, Law, NonImpacting, Oscillator, Pair, State, state};
+use rattlemap_dynamics::model::Form;
+use rattlemap_dynamics::model::{GearPair, Law, NonImpacting, Oscillator, State, state};
 use rayon::prelude::*;
 
 /// Forcing periods that are compared.
@@ -212,10 +213,10 @@ fn maps_of_machines_have_the_symmetry_and_the_quantities_of_the_reference() {
 #[test]
 fn contact_free_motion_of_machines_ends_early() {
     let slow = |omega: f64| GearPair { omega, r1: 0.02, r2: 0.02, ..GearPair::paper(0.8) };
-    let machine = |omega: f64| described(&slow(omega).pair(), slow(omega).law());
-    let oscillators = [9.0, 11.0].map(|omega| Form::Machine(machine(omega)));
-    let settings = LaneSettings { features: Features::of(&oscillators[0]), ..LaneSettings::default() };
-    let steady = |oscillator: &Pair| NonImpacting::of_machine(oscillator.machine.as_ref().unwrap()).unwrap();
+    let oscillators = [9.0, 11.0].map(|omega| slow(omega).oscillator().unwrap());
+    let forms = oscillators.clone().map(Form::Machine);
+    let settings = LaneSettings { features: Features::of(&forms[0]), ..LaneSettings::default() };
+    let steady = |oscillator: &Oscillator| NonImpacting::of_machine(oscillator).unwrap();
     // From rest, the gears would rattle.
     let lanes = [0, 1].map(|flow| {
         let mut start = steady(&oscillators[flow as usize]).steady();
@@ -223,7 +224,7 @@ fn contact_free_motion_of_machines_ends_early() {
         Lane { flow, law: 0, start }
     });
     let (mut gpu, laws) = (open(Precision::F32), [Law::both(0.0, 0.0)]);
-    let records = pollster::block_on(gpu.run(&oscillators, &laws, &lanes, &settings)).unwrap();
+    let records = pollster::block_on(gpu.run(&forms, &laws, &lanes, &settings)).unwrap();
     for (record, oscillator) in records.iter().zip(&oscillators) {
         let motion = steady(oscillator);
         assert_eq!((record.period, record.status, record.impacts_per_period), (1, 0, 0.0));

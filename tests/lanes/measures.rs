@@ -2,6 +2,7 @@
 
 use crate::common::gpu::open;
 use crate::common::linear::{Linear, with_wall};
+use crate::common::pairs::AsPair;
 use crate::common::{BUDGET, REST, near, paper};
 use rattlemap::gpu::{Features, Lane, LaneResult, LaneSettings, Measures, Precision};
 use rattlemap_dynamics::model::{Contact, Law, Pair, Side, State};

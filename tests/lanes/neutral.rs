@@ -2,6 +2,7 @@
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
+use crate::common::pairs::AsPair;
 use crate::common::{BUDGET, REST, paper};
 use crate::kinds::{self, Cell};
 use rattlemap::gpu::{LaneSettings, Precision};

@@ -31,7 +31,7 @@ fn a_device_stops_when_its_flag_is_set() {
         early_stop: false,
         ..LaneSettings::default()
     };
-    let (flows, laws) = ([pair.pair()], [pair.law()]);
+    let (flows, laws) = ([pair.oscillator().unwrap()], [pair.law()]);
     let lanes: Vec<_> = (0..64).map(|i| (i, Lane { flow: 0, law: 0, start: REST })).collect();
     let tables = pollster::block_on(gpu.load(&flows, &laws, None)).unwrap();
     let mut pool = pollster::block_on(gpu.pool(&settings)).unwrap();

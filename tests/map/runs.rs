@@ -63,7 +63,7 @@ fn on_cpu(scene: &Scene) -> Vec<Record> {
 
 /// Whether the motion from rest is still far from `orbit` after `periods`.
 fn is_elsewhere(pair: &GearPair, orbit: &Orbit, periods: u32) -> bool {
-    let flow = Flow::new(&pair.pair());
+    let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
     for _ in 0..periods {
         trajectory.advance_period(&mut ()).unwrap();

@@ -217,7 +217,7 @@ fn cycle(period: u32, strobe: State) -> Record {
 /// Returns the state of a motion after `periods` periods and `turns` of the next.
 fn later(omega: f64, e: f64, from: State, periods: u32, turns: f64) -> State {
     let pair = rattlemap_dynamics::model::GearPair { omega, ..rattlemap_dynamics::model::GearPair::paper(e) };
-    let flow = Flow::new(&pair.pair());
+    let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::new(&flow, pair.law(), from);
     for _ in 0..periods {
         trajectory.advance_period(&mut ()).unwrap();

@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use integrators::independent::motion::{ANGLE, Mode, Motion, System, What};
 use integrators::independent::random::{Shape, case};
 use rattlemap::validate::independent::machine::Flight;
-use rattlemap_dynamics::model::Oscillator;
 use rattlemap_dynamics::motion::EventKind;
 
 /// Forcing periods of a comparison.
@@ -51,7 +50,7 @@ fn the_judge_agrees_with_matrix_exponentials() {
             let case = case(seed, shape);
             let (oscillator, system) = (&case.oscillator, System::new(&case.oscillator, ANGLE));
             let mut ours = Motion::new(&system, case.law, case.start, Mode::Free);
-            let mut judge = Flight::new(&described(oscillator, case.law), &case.start);
+            let mut judge = Flight::new(&oscillator.described(case.law), &case.start);
             ours.carry_tangents();
             for _ in 0..PERIODS {
                 ours.advance_period()?;

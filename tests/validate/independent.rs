@@ -4,6 +4,7 @@
 //! Orbits are compared leg by leg: from the state after an event (or at a strobe) to the state before the next. So chaos
 //! does not amplify differences of rounding.
 
+use crate::common::pairs::OfPair;
 use crate::common::{Leg, REST, departure, flow_of, legs, paper, sign};
 use rattlemap::validate::independent::dop853::Integration;
 use rattlemap_dynamics::model::{GearPair, State};

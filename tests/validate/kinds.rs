@@ -2,9 +2,10 @@
 //! sticking, full mass matrices and gaps of several coordinates.
 
 use crate::common::closed_form::{Linear, Wall, Walled};
+use crate::common::pairs::{AsPair, described};
 use crate::common::{REST, apart, paper};
 use rattlemap::validate::independent::machine::{Event, Flight};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Pair, Side, State, state};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, Side, State, state};
 use rattlemap_dynamics::motion::EventKind;
 
 /// Time since phase 0 of the first period, kind and wall of each event.

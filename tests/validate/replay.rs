@@ -266,7 +266,7 @@ fn a_multiplier_is_compared_at_the_state_where_it_was_computed() {
     let (e, omega, period, run) = (0.7240704500978473, 2.0978473581213306, 4, 64);
     let plan = plan_at(e, omega, &[]);
     let pair = GearPair { omega, ..GearPair::paper(e) };
-    let flow = Flow::new(&pair.pair());
+    let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), REST);
     (0..run - period).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
     let derivative = StrobeMap::Periods(period).apply(&trajectory, trajectory.state()).unwrap().derivative();

@@ -100,10 +100,13 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
         let finer = lanes.run(precision, &cells, &twice)?;
         for i in 0..cells.len() {
             let status = status(&records[i]);
-            let steps = constants[i].as_ref().zip(constants[i].as_ref().and_then(Constants::pair)).map_or(f64::INFINITY, |(constants, pair)| {
-                let finest = pair.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
-                f64::from(constants.steps) * finest
-            });
+            let steps = constants[i].as_ref().zip(constants[i].as_ref().and_then(Constants::pair)).map_or(
+                f64::INFINITY,
+                |(constants, pair)| {
+                    let finest = pair.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
+                    f64::from(constants.steps) * finest
+                },
+            );
             let exact = exact[i].0.as_ref().ok().filter(|_| status == Status::Ok);
             rows.push(Row {
                 error: exact.map(|exact| state_distance(&records[i].strobe, exact)),

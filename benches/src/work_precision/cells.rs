@@ -223,7 +223,8 @@ mod tests {
                 trajectory.advance_period(&mut events).unwrap();
             }
             // Peers need not implement the rarest rule: a contact force that changes sign during contact onset.
-            let ends_off_the_wall = |e: &GapEvent| e.kind == MeshEnd && e.before[0] != flow.wall(e.side);
+            let ends_off_the_wall =
+                |e: &GapEvent| e.kind == MeshEnd && e.before[0] != flow.pair().unwrap().wall(e.side);
             assert!(!events.iter().any(ends_off_the_wall), "{:?}", subject.pair);
             let count = |kind| events.iter().filter(|event| event.kind == kind).count();
             let at = format!("{:?}", subject.pair);
@@ -244,7 +245,8 @@ mod tests {
             let samples = 10_000;
             let gap = |i: i32| {
                 let tau = flow.period * f64::from(i) / f64::from(samples);
-                let y = flow.propagate(DomainKind::Free, subject.start, 0.0, tau);
+                let start = std::array::from_fn(|i| subject.start[i]);
+                let y = flow.pair().unwrap().propagate(DomainKind::Free, start, 0.0, tau);
                 y[0] - y[2]
             };
             let widest = (0..samples).map(gap).fold(0.0f64, |m, z| m.max(z.abs()));

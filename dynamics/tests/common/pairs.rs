@@ -122,6 +122,14 @@ impl std::ops::DerefMut for Rubbing {
     }
 }
 
+/// Returns the excitation frequency.
+pub(crate) fn omega_of(form: &Form) -> f64 {
+    match form {
+        Form::Pair(pair) => pair.omega,
+        Form::Machine(machine) => machine.omega,
+    }
+}
+
 /// Describes a pair with a law: the other direction of [`Pair::of`].
 pub(crate) fn described(pair: &Pair, law: Law) -> Oscillator {
     let n = pair.degrees;

@@ -209,11 +209,7 @@ impl Common {
 }
 
 /// Returns the domains of contact with the `nth` wall of a side, from 0, in all stages.
-fn behind_nth_wall(
-    oscillator: &Pair,
-    side: Side,
-    nth: usize,
-) -> impl Iterator<Item = &model::Domain> {
+fn behind_nth_wall(oscillator: &Pair, side: Side, nth: usize) -> impl Iterator<Item = &model::Domain> {
     let i = side.index();
     let first = oscillator.stages.iter().map(move |stage| &stage.meshing[i]).chain([&oscillator.meshing[i]]);
     let outer = nth.checked_sub(1).map(|nth| &oscillator.outer_walls[i][nth].meshing);
@@ -222,12 +218,7 @@ fn behind_nth_wall(
 
 /// Derives the constants of an oscillator's first stage, in all intervals between walls. Pages are numbered from `first`. `model` tells
 /// which walls only push.
-fn pages_of_stage(
-    oscillator: &Pair,
-    model: &Pair,
-    common: &Common,
-    first: usize,
-) -> Vec<(Flow, Page)> {
+fn pages_of_stage(oscillator: &Pair, model: &Pair, common: &Common, first: usize) -> Vec<(Flow, Page)> {
     let [right, left] = oscillator.outer_walls.each_ref().map(Vec::len);
     let page = |side: Side, nth: usize| first + nth + if side == Side::Left { right } else { 0 };
     let behind_first = Side::BOTH.map(|side| common.is_passed[side.index()].then(|| page(side, 1)));
@@ -270,11 +261,7 @@ fn pages_of_stage(
 }
 
 /// Derives the constants of an oscillator's first stage, between its first walls.
-fn page_of(
-    oscillator: &Pair,
-    common: &Common,
-    pages_behind: [Option<usize>; 2],
-) -> (Flow, Page) {
+fn page_of(oscillator: &Pair, common: &Common, pages_behind: [Option<usize>; 2]) -> (Flow, Page) {
     let (h, coordinates) = (common.h, Coordinates::new(oscillator));
     let damper = |behind: &model::Domain| coordinates.damper(&oscillator.free, behind).map(|rate| -h * rate);
     let mut domains = common.domains(oscillator);
@@ -283,8 +270,7 @@ fn page_of(
         // A harmonic acts like the first one at a multiple of the frequency.
         let omega = oscillator.omega * f64::from(order);
         let none = Vec::new();
-        let alone =
-            Pair { omega, force: cos, force_sin: sin, harmonics: none, ..oscillator.clone() };
+        let alone = Pair { omega, force: cos, force_sin: sin, harmonics: none, ..oscillator.clone() };
         let waves = common.domains(&alone);
         harmonics.push([f64::from(order), 0.0]);
         harmonics.extend(common.pressing(&alone).map(factors));
@@ -403,13 +389,7 @@ fn rows(oscillator: &Pair, domain: &model::Domain, wall: f64, h: f64) -> [[f64; 
 }
 
 /// Returns the domain of lasting contact. Constants of a missing wall are never read.
-fn behind_wall(
-    oscillator: &Pair,
-    side: usize,
-    wall: f64,
-    free_step: f64,
-    substeps: f64,
-) -> Domain {
+fn behind_wall(oscillator: &Pair, side: usize, wall: f64, free_step: f64, substeps: f64) -> Domain {
     if oscillator.walls[side].is_infinite() {
         return Domain::zeroed();
     }
@@ -419,13 +399,7 @@ fn behind_wall(
     domain(oscillator, &oscillator.meshing[side], wall, free_step, substeps)
 }
 
-fn domain(
-    oscillator: &Pair,
-    domain: &model::Domain,
-    wall: f64,
-    free_step: f64,
-    substeps: f64,
-) -> Domain {
+fn domain(oscillator: &Pair, domain: &model::Domain, wall: f64, free_step: f64, substeps: f64) -> Domain {
     let h = free_step / substeps;
     let angle = oscillator.omega * h;
     let [gap_row, x_row] = rows(oscillator, domain, wall, h);
@@ -607,9 +581,7 @@ mod tests {
     #[test]
     fn steps_are_matrix_exponentials() {
         for oscillator in oscillators() {
-            for Domain { step, gap_row, x_row, angle, .. } in
-                constants(&oscillator).flow.domains
-            {
+            for Domain { step, gap_row, x_row, angle, .. } in constants(&oscillator).flow.domains {
                 let mut generator = SMatrix::<f64, 7, 7>::zeros();
                 for (i, row) in [(1, gap_row), (3, x_row)] {
                     generator[(i - 1, i)] = 1.0;
@@ -634,8 +606,7 @@ mod tests {
             for contact in [Contact::Impact, Contact::Rigid, Contact::Elastic] {
                 let oscillator = Pair { contacts: [contact; 2], ..oscillator.clone() };
                 assert!(oscillator.mirror_symmetric());
-                let Flow { domains: [_, _, left], walls, h, .. } =
-                    constants(&oscillator).flow;
+                let Flow { domains: [_, _, left], walls, h, .. } = constants(&oscillator).flow;
                 let Common { substeps, .. } = Common::new(&oscillator, h);
                 assert_eq!(left, behind_wall(&oscillator, 1, walls[1], h, substeps[1]));
             }

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use rattlemap_dynamics::model::{Contact, Domain, Pair, OuterWall, Side};
+use rattlemap_dynamics::model::{Contact, Domain, OuterWall, Pair, Side};
 
 /// Whether only the reference computes the oscillator: a wall that only pushes has a negative preload, so that contact begins behind it.
 pub(in crate::gpu) fn has_negative_preload(oscillator: &Pair) -> bool {

@@ -97,7 +97,6 @@ pub(crate) fn random_cell(seed: u64) -> (Pair, Law, State) {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
-        friction: Vec::new(),
     };
     let mut start = [0; 4].map(|_| draw.between(-0.4, 0.4));
     if degrees == 1 {

@@ -3,7 +3,7 @@
 //! The state is extended by a constant 1 and by cosine and sine of each harmonic, so that every domain is `y' = A y`. A step is a
 //! product with a stored exponential. Near a wall, Taylor series of the step are searched for roots between the extrema.
 
-use super::super::common::pairs::{Friction, Rubbing};
+use crate::common::pairs::{Friction, Rubbing};
 use nalgebra::{Matrix2, Matrix4, RowSVector, RowVector4, SMatrix, SVector, Vector2, Vector4};
 use rattlemap_dynamics::model::{Contact, Domain, Law, Side, Stage, State, state};
 
