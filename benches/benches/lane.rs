@@ -138,10 +138,16 @@ fn seconds(plane: &Plane, size: &Size, gpus: &mut [Gpu], exponent: bool) -> Vec<
     times.into_iter().map(|times| Spread::of(times).median).collect()
 }
 
+/// Returns a pair in another shape.
+fn shaped_form(shape: &Shape, form: &Form) -> Form {
+    let Form::Pair(pair) = form else { panic!("a pair") };
+    Form::Pair(shape.of(pair))
+}
+
 /// Times lanes by the shape of their oscillators. Shapes run by turns.
 fn by_shape(plane: &Plane, size: &Size) {
     let shaped = |shape: &Shape| Plane {
-        flows: plane.flows.iter().map(|flow| shape.of(flow)).collect(),
+        flows: plane.flows.iter().map(|flow| shaped_form(shape, flow)).collect(),
         laws: plane.laws.clone(),
         lanes: plane.lanes.clone(),
     };

@@ -23,6 +23,7 @@ pub use flow::{Engine, Flow};
 pub use slip::{Slip, Slips};
 pub(crate) use sums::{Contacts, Moments, nodes, root};
 pub use sums::{DISPLACEMENTS, Sums, place_of_displacement, place_of_gap};
+pub(crate) use trajectory::Flights;
 pub use trajectory::Trajectory;
 
 /// Approach speeds below this, relative to the scale of length and the rate of free motion, count as near grazing if

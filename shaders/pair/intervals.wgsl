@@ -1,6 +1,6 @@
 // Several walls on one side: each interval between neighbouring walls has a flow of its own. The springs of the walls that
 // the gap has passed act in its free motion, and the motion changes its flow where it passes a wall. Only the last wall of a
-// side has a domain of contact. The rules are those of the reference (dynamics/src/reference/elastic.rs).
+// side has a domain of contact. The rules are those of the reference (dynamics/src/pair/elastic.rs).
 //
 // `tally.interval` is 0 between the first walls, `2 n` behind the nth right wall, and `2 n + 1` behind the nth left wall. Open contact
 // with a wall that only pushes adds a flag (pushing.wgsl).

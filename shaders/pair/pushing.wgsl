@@ -1,7 +1,7 @@
 // Walls that only push, and walls with a preload. Behind such a wall the motion is in an interval without another wall. Behind a wall
 // that only pushes there are two intervals, for closed and for open contact. In both, the distance to the missing wall is
 // replaced by the force of spring, damper and preload: contact ends where it falls to 0, and begins where it rises above 0. The rules
-// are those of the reference (dynamics/src/reference/pushing.rs).
+// are those of the reference (dynamics/src/pair/pushing.rs).
 
 // Added to `tally.interval` in open contact; the rest is the interval before the wall, with the side.
 const OPEN: u32 = 256u;

@@ -1,5 +1,5 @@
 // Stages: the domains change at given phases of the forcing period. Each stage has a flow of its own, and the lane changes its
-// flow. The rules are those of the reference (dynamics/src/reference/stages.rs).
+// flow. The rules are those of the reference (dynamics/src/pair/stages.rs).
 //
 // Two pairs of numbers describe a change: whole free steps since phase 0 and the fraction of the next step; and the flow
 // that begins. The last change of a period holds up to the first.

@@ -6,6 +6,7 @@ use rattlemap_dynamics::model::{Contact, Model, Parameter, Side};
 use rattlemap_dynamics::orbit::Status;
 use rattlemap_dynamics::word::Word;
 
+use crate::job::model_engine;
 use crate::model_file::{FileModel, Wall, WallLaw, factor, wall_name};
 use crate::show::symbols::with_unit;
 
@@ -31,6 +32,9 @@ pub fn page(model: &FileModel) -> String {
         components(model).join(", "),
         definition.motion.frequency.text()
     );
+    if let Ok(oscillator) = model.oscillator() {
+        let _ = writeln!(text, "    Engine: {}.", model_engine::described(&oscillator));
+    }
     let _ = writeln!(text, "\nContact\n");
     let has_several = definition.walls.len() > 1;
     for (gap, [z, w]) in definition.walls.iter().zip(model.gap_symbols()) {

@@ -84,6 +84,13 @@ fn every_model_has_a_line_and_a_page() {
     ] {
         assert!(page.contains(part), "{part}");
     }
+    for (name, engine) in [
+        ("gear-pair", "Engine: pair, for up to two coordinates and one gap: "),
+        ("friction-oscillator", "Engine: machine, because of dry friction: "),
+        ("two-loose-gears", "Engine: machine, because of more than two coordinates: "),
+    ] {
+        assert!(stdout(&folder, &format!("models {name}")).contains(engine), "{name}");
+    }
     let one_wall = stdout(&folder, "models shaking-table");
     assert!(
         one_wall.contains("5  free, from the left to the left") && !one_wall.contains("2  free"),

@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::{Allowance, Engine, Flow, Observer, Stop, Work};
+use super::{Allowance, Engine, Flow, GapEvent, Observer, Stop, Sums, Work};
 use crate::machine::{Motion, System};
 use crate::model::{Law, REST, Side, State, first_four, state};
-use crate::pair::PairMotion;
+use crate::pair::{PairMeter, PairMotion};
 
 /// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix, which stands for
 /// two for each coordinate of a machine.
@@ -199,11 +199,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         each!(self, motion => motion.passes_wall(time))
     }
 
-    /// Returns the motion of a pair; nothing for a machine.
-    pub(crate) fn pair(&self) -> Option<&PairMotion<'f, N>> {
+    /// Begins to measure flights at phase 0, at the present state.
+    pub(crate) fn flights(&self) -> Flights<'f> {
         match &self.motion {
-            Engines::Pair(motion) => Some(motion),
-            Engines::Machine(_) => None,
+            Engines::Pair(motion) => Flights(Some(PairMeter::new(motion))),
+            Engines::Machine(_) => Flights(None),
         }
     }
 
@@ -301,6 +301,28 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     #[inline]
     pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         each!(mut self, motion => motion.advance_to(until, observer))
+    }
+}
+
+/// Flights that are measured from events, those of a pair. A machine adds its own to an observer's [`Sums`].
+#[derive(Clone, Debug)]
+pub(crate) struct Flights<'f>(Option<PairMeter<'f>>);
+
+impl Flights<'_> {
+    /// Receives an event of the trajectory.
+    pub(crate) fn event(&mut self, event: &GapEvent, sums: &mut Sums) {
+        match &mut self.0 {
+            Some(pair) => pair.event(event, sums),
+            None if event.has_impact => sums.approach(event.side, event.side.sign() * event.before[1]),
+            None => {}
+        }
+    }
+
+    /// Continues the present flight to phase 0 of `period`.
+    pub(crate) fn complete_periods(&mut self, period: u64, sums: &mut Sums) {
+        if let Some(pair) = &mut self.0 {
+            pair.complete_periods(period, sums);
+        }
     }
 }
 

@@ -4,9 +4,9 @@
 
 use crate::model::{Law, NonImpacting, State};
 use crate::motion::{
-    Allowance, Contacts, DISPLACEMENTS, Flow, GapEvent, Moments, Observer, States, Stop, Sums, Trajectory,
+    Allowance, Contacts, DISPLACEMENTS, Flights, Flow, GapEvent, Moments, Observer, States, Stop, Sums,
+    Trajectory,
 };
-use crate::pair::PairMeter;
 
 /// Quantities of one motion over a whole number of forcing periods, in the units of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -110,8 +110,7 @@ pub fn quantities_after(
 pub(super) struct Meter<'f> {
     flow: &'f Flow,
     first_period: u64,
-    /// The flights of a pair; a machine reports its own.
-    flights: Option<PairMeter<'f>>,
+    flights: Flights<'f>,
     sums: Sums,
 }
 
@@ -121,7 +120,7 @@ impl<'f> Meter<'f> {
         Meter {
             flow: trajectory.flow(),
             first_period: trajectory.period(),
-            flights: trajectory.pair().map(PairMeter::new),
+            flights: trajectory.flights(),
             sums: Sums::NONE,
         }
     }
@@ -152,9 +151,7 @@ impl<'f> Meter<'f> {
 
     /// Returns the quantities from the beginning to phase 0 of `period`.
     pub(super) fn finish(mut self, period: u64) -> Quantities {
-        if let Some(flights) = &mut self.flights {
-            flights.complete_periods(period, &mut self.sums);
-        }
+        self.flights.complete_periods(period, &mut self.sums);
         let (sums, time) = (self.sums, (period - self.first_period) as f64 * self.flow.period);
         let [right, left] = sums.contacts;
         Quantities {
@@ -174,11 +171,7 @@ impl<'f> Meter<'f> {
 
 impl Observer for Meter<'_> {
     fn event(&mut self, event: &GapEvent, _: States<'_>) {
-        match &mut self.flights {
-            Some(flights) => flights.event(event, &mut self.sums),
-            None if event.has_impact => self.sums.approach(event.side, event.side.sign() * event.before[1]),
-            None => {}
-        }
+        self.flights.event(event, &mut self.sums);
     }
 
     fn sums(&mut self) -> Option<&mut Sums> {
