@@ -45,7 +45,7 @@
 #![warn(clippy::print_stderr, clippy::print_stdout, reason = "output goes where the caller says")]
 
 pub use rattlemap_dynamics as dynamics;
-pub use rattlemap_dynamics::{certificate, flow, model, orbit, reference, stability, word};
+pub use rattlemap_dynamics::{model, motion, orbit, stability, word};
 
 pub mod record;
 

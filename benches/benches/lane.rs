@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use rattlemap::gpu::{AdapterChoice, Features, Gpu, Lane, LaneSettings, Precision, is_hardware};
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST};
-use rattlemap_dynamics::reference::machine::{Motion, System};
+use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::model::{Form, GearPair, Law, REST};
 
 use rattlemap::cli::bench::spread::Spread;
 use rattlemap_bench::shapes::{CHAINS, Chain};
@@ -43,7 +43,7 @@ fn size() -> Size {
 
 /// Cells over restitution in `[0, 1]` and frequency in `[1, 12]`, from rest.
 struct Plane {
-    flows: Vec<Oscillator>,
+    flows: Vec<Form>,
     laws: Vec<Law>,
     lanes: Vec<Lane>,
 }
@@ -52,7 +52,8 @@ impl Plane {
     fn new(side: u32) -> Plane {
         let at = |i: u32, low: f64, high: f64| low + (high - low) * f64::from(i) / f64::from(side - 1);
         let pair = |e: f64, omega: f64| GearPair { omega, ..GearPair::paper(e) };
-        let flows = (0..side).map(|i| pair(0.0, at(i, 1.0, 12.0)).oscillator().expect("valid parameters"));
+        let flows = (0..side)
+            .map(|i| Form::from(&pair(0.0, at(i, 1.0, 12.0)).oscillator().expect("valid parameters")));
         let laws = (0..side).map(|i| pair(at(i, 0.0, 1.0), 1.0).law());
         // Blocks of 8 x 8 cells, so that neighbours on the device are neighbours in the plane.
         let mut places: Vec<_> = (0..side * side).map(|i| (i / side, i % side)).collect();
@@ -111,7 +112,7 @@ fn of_machines(size: &Size, on_lanes: bool) {
         let machines = chain.cells(size.side as usize);
         let systems: Vec<_> = machines.iter().map(System::new).collect();
         let lanes = (0..machines.len() as u32).map(|flow| Lane { flow, law: 0, start: REST }).collect();
-        let flows = machines.into_iter().map(Oscillator::of_machine).collect();
+        let flows = machines.into_iter().map(Form::Machine).collect();
         let plane = Plane { flows, laws: vec![Law::both(0.0, 0.0)], lanes };
         for gpu in &mut gpus {
             // Compiles the shader.

@@ -6,11 +6,11 @@ use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use rattlemap_bench::shapes::CHAINS;
-use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::machine::{Motion, System};
 use rattlemap_dynamics::model::{GearPair, REST, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
-use rattlemap_dynamics::reference::Trajectory;
-use rattlemap_dynamics::reference::machine::{Motion, System};
 
 /// Sizes of one run.
 #[derive(Clone, Copy)]

@@ -2,9 +2,9 @@
 
 use cpu_time::ThreadTime;
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Machine, REST, Side, State, state};
-use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, System};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer};
+use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::model::{Oscillator, REST, Side, State, state};
+use rattlemap_dynamics::motion::{EventKind, GapEvent};
 use serde::Serialize;
 
 use crate::shapes::Chain;
@@ -32,7 +32,7 @@ pub struct Cell {
     state: Vec<f64>,
     impacts: usize,
     #[serde(skip)]
-    machine: Machine,
+    machine: Oscillator,
 }
 
 /// What all cells share.
@@ -57,37 +57,25 @@ pub struct Report {
     pub cells: Vec<Cell>,
 }
 
-#[derive(Default)]
-struct Events(Vec<MachineEvent>);
-
-impl Observer for Events {
-    fn event(&mut self, _: &GapEvent) {}
-
-    fn machine_event(&mut self, event: &MachineEvent) {
-        self.0.push(*event);
-    }
-}
-
 /// Returns the motion of a machine, if it has impacts, no lasting contact and no chaos.
-fn cell(machine: &Machine) -> Option<Cell> {
+fn cell(machine: &Oscillator) -> Option<Cell> {
     let system = System::new(machine);
     let mut settled = Motion::new(&system, &REST);
     (0..SETTLING_PERIODS).try_for_each(|_| settled.advance_period(&mut ())).ok()?;
     let start = settled.state();
     let mut motion = Motion::new(&system, &start);
     motion.set_tangents(Motion::unit_tangents(&system));
-    let mut events = Events::default();
+    let mut events: Vec<GapEvent> = Vec::new();
     (0..PERIODS).try_for_each(|_| motion.advance_period(&mut events)).ok()?;
-    let has_impacts_alone =
-        !events.0.is_empty() && events.0.iter().all(|event| event.kind == EventKind::Impact);
+    let has_impacts_alone = !events.is_empty() && events.iter().all(|event| event.kind == EventKind::Impact);
     let numbers = |state: State| state[..2 * machine.degrees()].to_vec();
     (has_impacts_alone && motion.derivative().norm() < MOST_AMPLIFICATION).then(|| Cell {
         omega: machine.omega,
-        restitution: machine.gaps[0].walls[0][0].restitution.constant,
+        restitution: machine.gaps[0].walls[0][0].restitution.at(0.0)[0],
         periods: PERIODS,
         start: numbers(start),
         state: numbers(motion.state()),
-        impacts: events.0.len(),
+        impacts: events.len(),
         machine: machine.clone(),
     })
 }

@@ -1,7 +1,9 @@
 //! Machines of different shapes, to compare their costs.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Contact, Drive, Forces, GapRow, Machine, Restitution, Side, Spring, Wall};
+use rattlemap_dynamics::model::{
+    Contact, Drive, Forces, GapRow, Oscillator, Restitution, Side, Spring, Wall,
+};
 
 fn counted(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
@@ -54,7 +56,7 @@ impl Chain {
     }
 
     /// Returns machines over restitution in `[0.3, 0.9]` and frequency in `[0.8, 1.6]`, near the resonances.
-    pub fn cells(self, side: usize) -> Vec<Machine> {
+    pub fn cells(self, side: usize) -> Vec<Oscillator> {
         let at = |i: usize, low: f64, high: f64| low + (high - low) * i as f64 / (side - 1) as f64;
         (0..side * side).map(|i| self.machine(at(i % side, 0.3, 0.9), at(i / side, 0.8, 1.6))).collect()
     }
@@ -62,7 +64,7 @@ impl Chain {
     /// Returns equal masses on springs to the ground and to their neighbours, with a force on the first mass. Units are those in
     /// which a mass, its spring to the ground and the force are 1. The last gap of as many gaps as masses is that of the last mass
     /// and the ground.
-    pub fn machine(self, restitution: f64, omega: f64) -> Machine {
+    pub fn machine(self, restitution: f64, omega: f64) -> Oscillator {
         let n = self.coordinates;
         let neighbours = |i: usize| f64::from(u8::from(i > 0)) + f64::from(u8::from(i + 1 < n));
         // A spring of this stiffness between neighbours, and one to the ground.
@@ -88,7 +90,7 @@ impl Chain {
         let wall = |side: Side| Wall {
             at: side.sign() * 0.2,
             contact: Contact::Impact,
-            restitution: Restitution::constant(restitution),
+            restitution: Restitution::Constant(restitution),
             mesh_speed: 0.01,
             springs: vec![Spring { stiffness: 100.0, damping: 1.0, preload: 0.0 }; self.stages],
         };
@@ -97,7 +99,7 @@ impl Chain {
             walls: Side::BOTH.map(|side| vec![wall(side)]),
         };
         let change = |stage: usize| (stage as f64 / self.stages as f64, stage);
-        Machine {
+        Oscillator {
             omega,
             mass: DMatrix::identity(n, n),
             stages: (0..self.stages).map(forces).collect(),

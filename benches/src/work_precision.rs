@@ -12,7 +12,7 @@
 //! | classical Runge-Kutta, f32 and f64, in WGSL: in one loop as in papers, and in the two phases of lanes | 64 to 8192 per period | device | from a variant of the shader |
 //! | classical Runge-Kutta ([`fixed_step`]) | 64 to 8192 per period | one core | yes |
 //! | DOP853 of `ode_solvers` ([`adaptive`]) | tolerance 1e-4 to 1e-12 | one core | yes |
-//! | reference ([`mod@rattlemap_dynamics::reference`]) | none | one core | its errors are zero by definition |
+//! | reference ([`mod@rattlemap_dynamics::motion`]) | none | one core | its errors are zero by definition |
 //!
 //! The baselines are implemented with care: Newton's method on the integrator itself locates events, a start on a wall
 //! divides out the root there, turning points inside a step are checked, and strobes stay on the grid. In WGSL they share the

@@ -3,9 +3,9 @@
 //! Pure f64: no files, clock, threads or graphics. The modules, in the order in which data flows:
 //!
 //! - [`model`]: the oscillator and its contact law;
-//! - [`flow`]: its motion in closed form;
-//! - [`certificate`]: proof that a step contains no event;
-//! - [`mod@reference`]: the trajectory from event to event;
+//! - [`mod@pair`]: the fast engine, for up to two coordinates with one gap;
+//! - [`mod@machine`]: the general engine;
+//! - [`motion`]: the trajectory from event to event, by either engine;
 //! - [`stability`]: cycles, Floquet multipliers and Lyapunov exponents;
 //! - [`orbit`]: the class of a motion;
 //! - [`word`]: the symbols of a cycle;
@@ -18,9 +18,9 @@ pub mod number;
 
 pub mod model;
 
-pub mod certificate;
-pub mod flow;
-pub mod reference;
+pub mod machine;
+pub mod motion;
+pub mod pair;
 
 pub mod stability;
 pub mod word;

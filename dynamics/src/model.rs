@@ -1,32 +1,35 @@
-//! Models of piecewise-linear oscillators between two walls.
+//! Models of piecewise-linear oscillators between walls.
 //!
 //! A [`Model`] has named parameters. Two models are built in: [`GearPair`], and [`Stops`], which can be solved by
-//! hand. From its parameters a model derives an [`Oscillator`] and a contact [`Law`]. An oscillator is a mass matrix,
-//! three linear domains with harmonic forcing, a gap that is linear in the displacements, and two walls. Flow,
-//! reference and stability use only the oscillator and the law; scenes, maps and files use only the trait.
+//! hand. From its parameters a model derives an [`Oscillator`], the only description of what moves: coordinates, gaps with walls and their
+//! laws, dry friction, stages and harmonics of the force. [`Pair::of`] gives the form of it for the fast engine, if it has one.
 
+mod error;
 mod gear_pair;
-mod machine;
+mod law;
 mod non_impacting;
 mod oscillator;
+mod pair;
 mod parameter;
+mod schedule;
 mod state;
 mod stops;
 mod traits;
 
+pub use error::OscillatorError;
 pub use gear_pair::GearPair;
-pub use machine::{
-    Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_GAPS, Machine, Restitution, Spring, Wall,
-};
+pub use law::{Contact, Law};
 pub use non_impacting::NonImpacting;
-pub(crate) use oscillator::is_semidefinite;
 pub use oscillator::{
-    Contact, Domain, Friction, HIGHEST_ORDER, Harmonic, Law, MOST_CHANGES, MOST_FRICTION, MOST_HARMONICS,
-    MOST_STAGES, MOST_WALLS, Oscillator, OscillatorError, OuterWall, Stage,
+    Drive, DryFriction, Forces, GapRow, HIGHEST_ORDER, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS,
+    MOST_HARMONICS, MOST_WALLS, Oscillator, Restitution, Spring, Wall,
 };
+pub(crate) use pair::is_semidefinite;
+pub use pair::{Domain, Form, Harmonic, OuterWall, Pair, Stage};
 pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};
+pub use schedule::{MOST_CHANGES, MOST_STAGES};
 pub use state::{REST, STATE, State, state};
-pub(crate) use state::{difference, dot, sum};
+pub(crate) use state::{difference, dot, first_four, sum};
 pub use stops::Stops;
 pub use traits::{CloneModel, Model, ModelError};
 

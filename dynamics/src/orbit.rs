@@ -33,10 +33,7 @@ pub use cell::{Measurement, measure, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;
-pub use quantities::{
-    Approaches, DISPLACEMENTS, Displacement, FrictionQuantities, Quantities, place_of_displacement,
-    place_of_gap, quantities_after,
-};
+pub use quantities::{Approaches, Displacement, FrictionQuantities, Quantities, quantities_after};
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};
 pub use resolution::rounding_decides;
@@ -46,7 +43,7 @@ pub use trace::trace;
 use crate::model::{Side, State};
 use crate::word::Word;
 
-pub use crate::reference::EventKind;
+pub use crate::motion::{DISPLACEMENTS, EventKind, place_of_displacement, place_of_gap};
 
 /// One event on a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -21,7 +21,7 @@ use nalgebra::linalg::Schur;
 use nalgebra::{Complex, DMatrix, Matrix4};
 
 use crate::model::{State, state};
-use crate::reference::{Stop, Trajectory, Work};
+use crate::motion::{Stop, Trajectory, Work};
 
 /// The unit vectors of two coordinates. As initial tangent vectors they become the columns of the derivative.
 pub const UNIT: [State; 4] =
@@ -36,7 +36,7 @@ pub enum StrobeMap {
     MirroredHalves(u32),
 }
 
-/// The image of a state and the derivative of the map there. The derivative has [`Flow::state_len`](crate::flow::Flow::state_len) rows and columns.
+/// The image of a state and the derivative of the map there. The derivative has [`Flow::state_len`](crate::motion::Flow::state_len) rows and columns.
 #[derive(Clone, Debug)]
 pub struct Image {
     /// The image.
@@ -49,7 +49,7 @@ pub struct Image {
     pub near_grazing: bool,
     /// Number of elements with dry friction that never slid.
     pub(crate) never_slid: usize,
-    /// [`Flow::rate`](crate::flow::Flow).
+    /// [`Flow::rate`](crate::motion::Flow).
     rate: f64,
 }
 
@@ -108,7 +108,7 @@ impl StrobeMap {
                 let mut half = seed.at(y, UNIT);
                 for turn in 0..p {
                     if turn > 0 {
-                        half = half.mirrored(UNIT);
+                        half = half.mirrored(UNIT).expect("the flow has half-period maps");
                     }
                     let ended = half.advance_to(0.5 * seed.flow().period, &mut ());
                     *work += half.work();
@@ -196,7 +196,7 @@ pub struct Cycle {
     /// Whether the orbit is its own mirror image.
     pub symmetric: bool,
     /// The monodromy matrix, the derivative of the strobe map over one cycle. It has
-    /// [`Flow::state_len`](crate::flow::Flow::state_len) rows; in one degree of freedom those of the second displacement, and its columns, are 0.
+    /// [`Flow::state_len`](crate::motion::Flow::state_len) rows; in one degree of freedom those of the second displacement, and its columns, are 0.
     pub monodromy: DMatrix<f64>,
     /// Floquet multipliers `[re, im]`, largest modulus first; two for each degree of freedom. Where dry friction sticks for ever, the
     /// multiplier 1 along its row is left out.

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use rattlemap::flow::Flow;
 use rattlemap::job;
 use rattlemap::model::{Model as _, REST, State};
 use rattlemap::model_file::FileModel;
+use rattlemap::motion::Flow;
 use rattlemap::orbit::{self as analysis, Settings};
 use rattlemap::store;
 use rattlemap::store::in_memory;

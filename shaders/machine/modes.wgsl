@@ -1,5 +1,5 @@
 // Which modes of walls and friction are consistent with a state. The rules are those of the reference
-// (dynamics/src/reference/machine/modes.rs).
+// (dynamics/src/machine/modes.rs).
 
 // What is decided: gaps that rest on rigid walls, with their sides, and elements without a rate.
 var<private> rest_side: array<u32, GAPS>;

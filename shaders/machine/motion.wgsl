@@ -1,4 +1,4 @@
-// The motion of a machine from event to event, by the rules of the reference (dynamics/src/reference/machine/motion.rs).
+// The motion of a machine from event to event, by the rules of the reference (dynamics/src/machine/motion.rs).
 
 // Order of the root of the distance when the gap leaves a rigid wall: its acceleration is zero, the derivative is not.
 const RELEASE_ORDER: u32 = 3u;

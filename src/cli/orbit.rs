@@ -4,8 +4,8 @@ use std::cell::OnceCell;
 use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
 use super::arguments::{FigureFormat, Orbit};

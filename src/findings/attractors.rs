@@ -21,8 +21,8 @@ use crate::map::plan::Plan;
 use crate::record::classify::classify;
 use crate::record::distance::farther;
 use crate::record::{Record, Records};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, State};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{self, Class, Settings};
 use rattlemap_dynamics::word::Word;
 

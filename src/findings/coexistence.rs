@@ -17,8 +17,8 @@ use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
 use crate::record::{Record, Records};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::Class;
 
 /// Counts the attractors of each cell, by id; returns none if every cell has one start.

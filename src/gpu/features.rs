@@ -1,8 +1,8 @@
 //! Features of oscillators for which shaders have code only if it is needed.
 
 use super::machine::{MODES, MOST_DOMAINS, MachineShape, domain_count};
-use super::pushing::has_negative_preload;
-use rattlemap_dynamics::model::{Contact, Oscillator, Side};
+use super::pair::has_negative_preload;
+use rattlemap_dynamics::model::{Contact, Form, Pair, Side};
 
 /// The features that some oscillators have, or that a shader has code for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -21,7 +21,7 @@ pub struct Features {
     pub pushing: bool,
     /// Walls that only push and have a negative preload. No shader has code for these.
     pub negative_preload: bool,
-    /// Sizes of a [machine](rattlemap_dynamics::model::Machine), or of an oscillator with dry friction, which lanes carry as one.
+    /// Sizes of a machine.
     pub machine: Option<MachineShape>,
     /// More domains of a machine than a table holds.
     pub too_many_domains: bool,
@@ -29,26 +29,28 @@ pub struct Features {
 
 impl Features {
     /// Returns the features of an oscillator.
-    pub fn of(oscillator: &Oscillator) -> Features {
-        let mut walls = oscillator.contacts.iter().zip(oscillator.walls);
-        // Cells of one scene belong to one shader, so that friction of size 0 counts.
-        let is_machine = oscillator.machine.is_some() || !oscillator.friction.is_empty();
-        if is_machine {
-            return Features {
-                machine: Some(MachineShape::of(oscillator)),
-                too_many_domains: domain_count(oscillator) > MOST_DOMAINS,
+    pub fn of(oscillator: impl Into<Form>) -> Features {
+        match oscillator.into() {
+            Form::Pair(pair) => Features::of_pair(&pair),
+            Form::Machine(machine) => Features {
+                machine: Some(MachineShape::of(&machine)),
+                too_many_domains: domain_count(&machine) > MOST_DOMAINS,
                 ..Features::default()
-            };
+            },
         }
-        let pushing = Side::BOTH.into_iter().any(|side| oscillator.is_pushing_or_preloaded(side));
+    }
+
+    fn of_pair(pair: &Pair) -> Features {
+        let mut walls = pair.contacts.iter().zip(pair.walls);
+        let pushing = Side::BOTH.into_iter().any(|side| pair.is_pushing_or_preloaded(side));
         Features {
             kinds: walls.any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite()),
-            sine: oscillator.force_sin != [0.0; 2],
-            harmonics: oscillator.harmonics.len() as u32,
-            stages: !oscillator.schedule.is_empty(),
-            intervals: oscillator.has_outer_walls() || pushing,
+            sine: pair.force_sin != [0.0; 2],
+            harmonics: pair.harmonics.len() as u32,
+            stages: !pair.schedule.is_empty(),
+            intervals: pair.has_outer_walls() || pushing,
             pushing,
-            negative_preload: has_negative_preload(oscillator),
+            negative_preload: has_negative_preload(pair),
             machine: None,
             too_many_domains: false,
         }
@@ -117,7 +119,9 @@ mod tests {
     use super::*;
     use crate::model_file::FileModel;
     use rattlemap_dynamics::model::Model;
+    use rattlemap_dynamics::motion::Flow;
 
+    /// Lanes and reference take the same engine, whatever the values are.
     #[test]
     fn friction_makes_a_machine_of_an_oscillator() {
         let mut model = FileModel::built_in("friction-oscillator").unwrap();
@@ -125,6 +129,8 @@ mod tests {
         assert_eq!(features.machine.map(|shape| (shape.coordinates, shape.elements)), Some((2, 1)));
         assert!(features.needing_reference().is_none());
         model.set("f", 0.0).unwrap();
-        assert_eq!(Features::of(&model.oscillator().unwrap()), features);
+        let without_force = model.oscillator().unwrap();
+        assert_eq!(Features::of(&without_force), features);
+        assert!(Flow::new(&without_force).pair().is_none());
     }
 }

@@ -331,7 +331,7 @@ impl Measured {
     }
 }
 
-/// Sums and extremes that a lane measures; `shaders/measure.wgsl` has their places.
+/// Sums and extremes that a lane measures; `shaders/pair/measure.wgsl` has their places.
 pub(super) const SUMS: usize = 16;
 pub(super) const EXTREMES: usize = 5;
 

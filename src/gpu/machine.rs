@@ -2,15 +2,14 @@
 //!
 //! Lanes look the equations of motion of their domain up in a table. `shaders/machine/layout.wgsl` describes it.
 
-use std::borrow::Cow;
 use std::cell::RefCell;
 use std::sync::Arc;
 
 use nalgebra::Complex;
 
 use crate::record::limits::MOST_STEPS;
-use rattlemap_dynamics::model::{Contact, Law, Machine, NonImpacting, Oscillator, STATE, Side, State, Wall};
-use rattlemap_dynamics::reference::machine::{StartModes, System};
+use rattlemap_dynamics::machine::{StartModes, System};
+use rattlemap_dynamics::model::{Contact, NonImpacting, Oscillator, STATE, Side, State, Wall};
 
 /// Largest number of domains in a table.
 pub(super) const MOST_DOMAINS: usize = 4096;
@@ -50,9 +49,8 @@ pub struct MachineShape {
 }
 
 impl MachineShape {
-    /// Returns the sizes of an oscillator.
-    pub fn of(oscillator: &Oscillator) -> MachineShape {
-        let machine = machine_of(oscillator);
+    /// Returns the sizes of a machine.
+    pub fn of(machine: &Oscillator) -> MachineShape {
         let walls = machine.gaps.iter().flat_map(|gap| &gap.walls).map(Vec::len);
         MachineShape {
             coordinates: machine.degrees().max(2) as u32,
@@ -146,42 +144,22 @@ impl MachineShape {
     }
 }
 
-/// Returns the machine of an oscillator. If the oscillator stores none, its contact law is separate, and the law of the machine is 0.
-fn machine_of(oscillator: &Oscillator) -> Cow<'_, Machine> {
-    match &oscillator.machine {
-        Some(machine) => Cow::Borrowed(machine),
-        None => Cow::Owned(Machine::of(oscillator, Law::both(0.0, 0.0))),
-    }
-}
-
-/// Returns a law of both walls of an oscillator as that of a machine.
-pub(super) fn law_of_walls(law: &Law) -> [f64; LAW] {
-    let mut numbers = [0.0; LAW];
-    for side in 0..2 {
-        numbers[4 * side..][..4].copy_from_slice(&[law.restitution[side], 0.0, 1.0, law.mesh_speed[side]]);
-    }
-    numbers
-}
-
-/// Returns the number of domains of an oscillator.
-pub(super) fn domain_count(oscillator: &Oscillator) -> usize {
-    let machine = machine_of(oscillator);
+/// Returns the number of domains of a machine.
+pub(super) fn domain_count(machine: &Oscillator) -> usize {
     let modes = |walls: &[Vec<Wall>; 2]| walls.iter().map(Vec::len).sum::<usize>() + 1;
     let of_gaps: usize = machine.gaps.iter().map(|gap| modes(&gap.walls)).product();
     machine.stages.len() * of_gaps * 3_usize.pow(machine.friction.len() as u32)
 }
 
-/// Returns the bytes of the table of an oscillator.
-pub(super) fn bytes(oscillator: &Oscillator) -> usize {
-    MachineShape::of(oscillator).table(domain_count(oscillator)) * size_of::<f64>()
+/// Returns the bytes of the table of a machine.
+pub(super) fn bytes(machine: &Oscillator) -> usize {
+    MachineShape::of(machine).table(domain_count(machine)) * size_of::<f64>()
 }
 
 /// Constants of one machine.
 #[derive(Clone, Debug)]
 pub(super) struct MachineConstants {
     system: Box<System>,
-    /// Whether the machine has laws of its own.
-    pub(super) has_laws: bool,
     /// Steps of the grid per forcing period.
     pub(super) steps: u32,
     /// The equations of motion of all domains.
@@ -191,8 +169,8 @@ pub(super) struct MachineConstants {
 /// What machines share that differ in frequency and contact laws alone.
 #[derive(Debug)]
 pub(super) struct MachineTable {
-    machine: Machine,
-    equations: Vec<rattlemap_dynamics::reference::machine::Equations>,
+    machine: Oscillator,
+    equations: Vec<rattlemap_dynamics::machine::Equations>,
 }
 
 thread_local! {
@@ -201,11 +179,9 @@ thread_local! {
 }
 
 impl MachineConstants {
-    /// Derives the constants of an oscillator. Returns `None` if lanes cannot carry it.
-    pub(super) fn new(oscillator: &Oscillator, requested: Option<u32>) -> Option<MachineConstants> {
-        let machine = machine_of(oscillator);
-        let steps = Self::steps(oscillator, requested)?;
-        let system = Box::new(System::new(&machine));
+    /// Derives the constants of a machine for a number of steps.
+    pub(super) fn new(machine: &Oscillator, steps: u32) -> MachineConstants {
+        let system = Box::new(System::new(machine));
         let bare = machine.without_laws();
         let tables = LAST.with_borrow_mut(|last| match last {
             Some(tables) if tables.machine == bare => Arc::clone(tables),
@@ -217,30 +193,24 @@ impl MachineConstants {
                 tables
             }
         });
-        Some(MachineConstants { system, has_laws: oscillator.machine.is_some(), steps, tables })
+        MachineConstants { system, steps, tables }
     }
 
     /// Returns the steps of the grid per forcing period: `requested`, or as many as the harmonics need.
-    pub(super) fn steps(oscillator: &Oscillator, requested: Option<u32>) -> Option<u32> {
-        let needed = STEPS_PER_TURN * machine_of(oscillator).highest_order();
+    pub(super) fn steps(machine: &Oscillator, requested: Option<u32>) -> Option<u32> {
+        let needed = STEPS_PER_TURN * machine.highest_order();
         let steps = requested.unwrap_or(0).max(needed).next_multiple_of(2);
         (steps <= MOST_STEPS).then_some(steps)
     }
 
     /// Returns the forcing period.
-    pub(super) fn period(&self) -> f64 {
+    fn period(&self) -> f64 {
         self.system.period()
     }
 
     /// Returns the number of coordinates.
     pub(super) fn degrees(&self) -> usize {
         self.system.machine().degrees()
-    }
-
-    /// Whether the mirror image of a motion, half a period later, is a motion. It does not compare contact laws that are stored outside the
-    /// machine.
-    pub(super) fn is_mirror_symmetric(&self) -> bool {
-        self.system.machine().mirror_symmetric()
     }
 
     /// Returns what identifies the table.
@@ -358,8 +328,8 @@ impl MachineConstants {
             for side in Side::BOTH {
                 if let Some(wall) = row.walls[side.index()].last() {
                     let at = 4 * (2 * gap + side.index());
-                    let e = wall.restitution;
-                    law[at..at + 4].copy_from_slice(&[e.constant, e.factor, e.power, wall.mesh_speed]);
+                    let [constant, factor, power] = wall.restitution.terms();
+                    law[at..at + 4].copy_from_slice(&[constant, factor, power, wall.mesh_speed]);
                 }
             }
         }
@@ -476,7 +446,7 @@ mod tests {
             let all = frequencies.iter().map(|&omega| {
                 model.set("omega", omega).unwrap();
                 let oscillator = model.oscillator().unwrap();
-                MachineConstants::new(&oscillator, None).unwrap().table(&MachineShape::of(&oscillator))
+                MachineConstants::new(&oscillator, 8).table(&MachineShape::of(&oscillator))
             });
             all.last().unwrap()
         };

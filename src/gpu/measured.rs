@@ -2,31 +2,32 @@
 
 use nalgebra::{Complex, DMatrix, Matrix2, Matrix4};
 
-use super::constants::Constants;
+use super::constants::{Constants, Engine};
 use super::layout::{Measured, SUMS};
 use rattlemap_dynamics::orbit::{Approaches, Displacement, Quantities};
 
 /// Coefficients of gap and x in a displacement.
 type Row = [f64; 2];
 
-/// Returns the quantities of a lane; none if it was not measured. `shaders/measure.wgsl` has the places of the sums.
+/// Returns the quantities of a lane; none if it was not measured. `shaders/pair/measure.wgsl` has the places of the sums.
 pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quantities> {
     let (Measured { totals, highs, lows, .. }, _) = Measured::split(measured);
     let [.., dissipated, force, contact, approach, lost, count, periods]: [f64; SUMS] = *totals;
     if periods < 1.0 {
         return None;
     }
-    let h = constants.flow.h;
+    let pair = constants.pair()?;
+    let h = pair.flow.h;
     let steps = periods * f64::from(constants.steps);
     // A rate of w per step has the energy w^2 in the shader's units.
-    let energy = 1.0 / (2.0 * constants.compliance() * h * h);
+    let energy = 1.0 / (2.0 * pair.compliance() * h * h);
     let force_unit = 2.0 * energy;
     let both = Approaches {
         count: count.round() as u64,
         mean: if count > 0.0 { approach / count / h } else { 0.0 },
         largest: highs[4] / h,
     };
-    let rows = [constants.flow.displacements[0], constants.flow.displacements[1], [1.0, 0.0]];
+    let rows = [pair.flow.displacements[0], pair.flow.displacements[1], [1.0, 0.0]];
     let displacement =
         |i: usize| displacement(rows[i], totals, steps, totals[2 + i], 0.5 * (highs[i] - lows[i]));
     Some(Quantities {
@@ -55,17 +56,20 @@ fn displacement([a, b]: Row, totals: &[f64; SUMS], steps: f64, square: f64, ampl
 /// tangents of a cycle that was read; other cycles are free of contact.
 pub(super) fn multiplier(constants: &Constants, measured: &[f64]) -> [f64; 2] {
     let (measured, columns) = Measured::split(measured);
-    if let Some(machine) = &constants.machine {
-        if measured.has_read == 0.0 {
+    let pair = match &constants.engine {
+        Engine::Pair(pair) => pair,
+        Engine::Machine(machine) if measured.has_read == 0.0 => {
             return largest(machine.contact_free_multiplier().into_iter());
         }
-        // The padding of a single coordinate has no columns.
-        let (dim, n) = (columns.len().isqrt(), 2 * machine.degrees());
-        return largest(
-            DMatrix::from_fn(n, n, |i, j| columns[dim * j + i]).complex_eigenvalues().iter().copied(),
-        );
-    }
-    let (z, x) = (constants.flow.domains[0].gap_row, constants.flow.domains[0].x_row);
+        Engine::Machine(machine) => {
+            // The padding of a single coordinate has no columns.
+            let (dim, n) = (columns.len().isqrt(), 2 * machine.degrees());
+            return largest(
+                DMatrix::from_fn(n, n, |i, j| columns[dim * j + i]).complex_eigenvalues().iter().copied(),
+            );
+        }
+    };
+    let (z, x) = (pair.flow.domains[0].gap_row, pair.flow.domains[0].x_row);
     let generator = [0.0, z[0], 0.0, x[0], 1.0, z[1], 0.0, x[1], 0.0, z[2], 0.0, x[2], 0.0, z[3], 1.0, x[3]];
     let (columns, steps) = match measured.has_read {
         0.0 => (generator, Some(f64::from(constants.steps))),

@@ -5,14 +5,13 @@
 //! the device. In a [`Pool`], lanes can begin and end at any time. The engine uses no files, and several threads only to
 //! compile shaders.
 //!
-//! Lanes are independent of [`rattlemap_dynamics::reference`]: they read the description of the model
+//! Lanes are independent of [`rattlemap_dynamics::motion`]: they read the description of the model
 //! ([`rattlemap_dynamics::model`]) and nothing else. A lane moves from event to event on a fixed grid of steps with
 //! the exact propagator; see `shaders/`.
 
 mod adapter;
 mod averaging;
 pub(crate) mod constants;
-mod coordinates;
 mod device;
 mod dispatch_policy;
 mod error;
@@ -21,10 +20,10 @@ mod guard;
 pub mod layout;
 mod machine;
 mod measured;
+mod pair;
 mod panics;
 mod pool;
 mod precision;
-mod pushing;
 mod reading;
 mod rounds;
 pub(crate) mod rules;
@@ -66,15 +65,15 @@ use panics::{PanicFree, catch_panic};
 use crate::record::Record;
 use crate::record::limits::MOST_STEPS;
 use dispatch_policy::DispatchPolicy;
-use rattlemap_dynamics::model::{Law, Oscillator, State};
+use rattlemap_dynamics::model::{Form, Law, Pair, State};
 use rattlemap_dynamics::orbit::Budget;
 
 /// Default limit of a lane's events, so that their count does not overflow.
 const MOST_EVENTS: u32 = 1 << 31;
 
 /// Whether lanes with this meshing speed follow chatter by short flights.
-pub fn follows_chatter(oscillator: &Oscillator, mesh_speed: f64) -> bool {
-    mesh_speed <= rules::FOLLOWED_MESH_SPEED * constants::speed(oscillator)
+pub fn follows_chatter(pair: &Pair, mesh_speed: f64) -> bool {
+    mesh_speed <= rules::FOLLOWED_MESH_SPEED * pair::speed(pair)
 }
 
 /// Initial value problem of one lane: flow, law, and the state at phase 0.
@@ -361,13 +360,16 @@ impl Gpu {
     ///
     /// # Errors
     /// A [`GpuError`]. A lane that ends early is no error: its record has a status.
-    pub async fn run(
+    pub async fn run<F>(
         &mut self,
-        flows: &[Oscillator],
+        flows: &[F],
         laws: &[Law],
         lanes: &[Lane],
         settings: &LaneSettings,
-    ) -> Result<Vec<Record>, GpuError> {
+    ) -> Result<Vec<Record>, GpuError>
+    where
+        for<'a> Form: From<&'a F>,
+    {
         let constants = flows.iter().map(|flow| {
             let mut constants = Constants::new(flow, settings.steps_per_period)?;
             constants.widen(settings.features);
@@ -388,12 +390,15 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::TooManyFlows`] if they do not fit one buffer, [`GpuError::OutOfMemory`] if
     /// they do not fit the device.
-    pub async fn load(
+    pub async fn load<F>(
         &self,
-        flows: &[Oscillator],
+        flows: &[F],
         laws: &[Law],
         steps_per_period: Option<u32>,
-    ) -> Result<Tables, GpuError> {
+    ) -> Result<Tables, GpuError>
+    where
+        for<'a> Form: From<&'a F>,
+    {
         let constants = flows.iter().map(|flow| Constants::new(flow, steps_per_period)).collect();
         self.load_constants(constants, laws).await
     }

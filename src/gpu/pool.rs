@@ -251,10 +251,10 @@ fn start(constants: &[Option<Constants>], is_even: &[bool], lane: &Lane) -> (Cel
         None => refuse(Status::TooStiff),
         Some(_) if !lane.start.iter().all(|x| x.is_finite()) => refuse(Status::NonFinite),
         Some(constants) => {
-            // The laws of machines that have their own follow those of walls, one for each flow.
-            let has_laws = constants.machine.as_ref().is_some_and(|machine| machine.has_laws);
-            let mirror = constants.mirror_symmetric && (has_laws || is_even[lane.law as usize]);
-            let law_index = if has_laws { is_even.len() as u32 + lane.flow } else { lane.law };
+            // Machines have laws of their own, one for each flow.
+            let is_pair = constants.pair().is_some();
+            let mirror = constants.mirror_symmetric && (!is_pair || is_even[lane.law as usize]);
+            let law_index = if is_pair { lane.law } else { lane.flow };
             (Cell { mirror: u32::from(mirror), law_index, ..cell }, constants.start_numbers(lane.start))
         }
     }

@@ -79,7 +79,7 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
         record.impacts_per_period = f64::from(finding.impacts) / f64::from(finding.counted);
     }
     if is_valid(valid::LYAPUNOV) {
-        let period = constants.period();
+        let period = constants.period;
         (record.lyapunov, record.lyapunov_error) = (reading.growth / period, reading.growth_error / period);
         if reading.growth < SUPERSTABLE_BELOW {
             record.lyapunov = f64::NEG_INFINITY;

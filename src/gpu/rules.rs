@@ -1,13 +1,14 @@
 //! Rules by which lanes judge their motion. The shaders are compiled with these numbers; validation uses them, too.
 
 use super::precision::Precision;
+use rattlemap_dynamics::machine::LOWEST_FLIGHT;
+use rattlemap_dynamics::motion::{GRAZING_SPEED, NO_SPEED};
 use rattlemap_dynamics::orbit::{
     BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW,
     LINEAR_TOLERANCE, NEAR_STROBE_TURNS, NEUTRAL_ORDER, ON_STROBE_TURNS, PLAIN_GROWTH, ROUNDING_OF_AVERAGES,
     SHARED_GROWTH,
 };
-use rattlemap_dynamics::reference::machine::LOWEST_FLIGHT;
-use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
+use rattlemap_dynamics::pair::NO_THRESHOLD;
 use rattlemap_dynamics::stability::CORRELATION_MARGIN;
 
 /// Largest meshing speed at which lanes follow chatter by short flights, relative to half the walls' distance times

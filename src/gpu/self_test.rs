@@ -2,7 +2,7 @@
 
 use super::{Constants, Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
 use crate::record::distance::{apart, farther, is_within};
-use rattlemap_dynamics::model::{GearPair, Machine, Oscillator, REST, State, state};
+use rattlemap_dynamics::model::{Form, GearPair, REST, State, state};
 
 /// Forcing periods from rest to the answers.
 const PERIODS: u32 = 20;
@@ -29,12 +29,10 @@ pub(super) async fn check(
     let pairs = ANSWERS.map(|(e, omega, _)| GearPair { omega, ..GearPair::paper(e) });
     let laws = pairs.map(|pair| pair.law());
     let as_machine = settings.features.machine.is_some();
-    let constants = pairs.iter().zip(laws).map(|(pair, law)| {
-        let mut flow = pair.oscillator().ok()?;
-        if as_machine {
-            flow = Oscillator::of_machine(Machine::of(&flow, law));
-        }
-        let mut constants = Constants::new(&flow, None)?;
+    let constants = pairs.iter().map(|pair| {
+        let oscillator = pair.oscillator().ok()?;
+        let form = if as_machine { Form::Machine(oscillator) } else { Form::from(&oscillator) };
+        let mut constants = Constants::new(form, None)?;
         constants.widen(settings.features);
         Some(constants)
     });

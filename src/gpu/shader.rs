@@ -1,12 +1,12 @@
 //! Shader variants: one source, composed of small files.
 
 use super::Measures;
-use super::constants::PAIRS_PER_HARMONIC;
 use super::features::Features;
 use super::layout::{
     BLOCK, CONTACTS, EXTREMES, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD,
     SPELLED_WORD_LENGTH, SPELLING, SUMS, symbols_per_number,
 };
+use super::pair::PAIRS_PER_HARMONIC;
 use super::precision::Precision;
 use super::rules;
 use super::unroll::unroll;
@@ -66,23 +66,23 @@ const COMMON: &str = concat!(
 
 /// The motion of oscillators with one gap.
 const OSCILLATOR: &str = concat!(
-    include_str!("../../shaders/tables.wgsl"),
-    include_str!("../../shaders/oscillator.wgsl"),
-    include_str!("../../shaders/domain.wgsl"),
-    include_str!("../../shaders/phase.wgsl"),
-    include_str!("../../shaders/harmonics.wgsl"),
-    include_str!("../../shaders/stages.wgsl"),
-    include_str!("../../shaders/intervals.wgsl"),
-    include_str!("../../shaders/pushing.wgsl"),
-    include_str!("../../shaders/contact.wgsl"),
-    include_str!("../../shaders/elastic.wgsl"),
-    include_str!("../../shaders/rigid.wgsl"),
-    include_str!("../../shaders/taylor.wgsl"),
-    include_str!("../../shaders/flight.wgsl"),
-    include_str!("../../shaders/events.wgsl"),
-    include_str!("../../shaders/chatter.wgsl"),
-    include_str!("../../shaders/tangent.wgsl"),
-    include_str!("../../shaders/measure.wgsl"),
+    include_str!("../../shaders/pair/tables.wgsl"),
+    include_str!("../../shaders/pair/oscillator.wgsl"),
+    include_str!("../../shaders/pair/domain.wgsl"),
+    include_str!("../../shaders/pair/phase.wgsl"),
+    include_str!("../../shaders/pair/harmonics.wgsl"),
+    include_str!("../../shaders/pair/stages.wgsl"),
+    include_str!("../../shaders/pair/intervals.wgsl"),
+    include_str!("../../shaders/pair/pushing.wgsl"),
+    include_str!("../../shaders/pair/contact.wgsl"),
+    include_str!("../../shaders/pair/elastic.wgsl"),
+    include_str!("../../shaders/pair/rigid.wgsl"),
+    include_str!("../../shaders/pair/taylor.wgsl"),
+    include_str!("../../shaders/pair/flight.wgsl"),
+    include_str!("../../shaders/pair/events.wgsl"),
+    include_str!("../../shaders/pair/chatter.wgsl"),
+    include_str!("../../shaders/pair/tangent.wgsl"),
+    include_str!("../../shaders/pair/measure.wgsl"),
 );
 
 /// The motion of machines.

@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use bytemuck::Zeroable;
 
-use super::constants::{Change, Constants, PAIRS_PER_HARMONIC, Page, phasors as phasors_of};
+use super::constants::Constants;
 use super::features::Features;
 use super::guard::with_error_scopes;
 use super::layout::{self, Flow, FlowShape, NO_FLOW, contact_code};
 use super::machine::{self, MachineShape};
+use super::pair::{Change, PAIRS_PER_HARMONIC, Page, phasors as phasors_of};
 use super::precision::Precision;
 use super::shader::terms_of;
 use super::transfer::{buffer, reals, upload};
 use super::{Gpu, GpuError};
-use rattlemap_dynamics::model::{Law, Oscillator, Side};
+use rattlemap_dynamics::model::{Form, Law, Side};
 
 /// Flows and laws, uploaded once for any number of runs.
 pub struct Tables {
@@ -46,12 +47,15 @@ pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
 /// Returns the most bytes of memory that the constants of one flow take, and those of all phasors for its steps, which
 /// flows with equal steps share.
-pub(crate) fn bytes(oscillator: &Oscillator, steps: Option<u32>) -> [u64; 2] {
+pub(crate) fn bytes(oscillator: impl Into<Form>, steps: Option<u32>) -> [u64; 2] {
     let phasors = steps.map_or(0, |steps| u64::from(steps) + 1);
-    if Features::of(oscillator).machine.is_some() {
-        let table = size_of::<Constants>() + machine::bytes(oscillator);
-        return [COPIES * table as u64, COPIES * 16 * 8 * phasors];
-    }
+    let oscillator = match oscillator.into() {
+        Form::Pair(pair) => pair,
+        Form::Machine(machine) => {
+            let table = size_of::<Constants>() + machine::bytes(&machine);
+            return [COPIES * table as u64, COPIES * 16 * 8 * phasors];
+        }
+    };
     let pair = size_of::<[f64; 2]>();
     let page = size_of::<Constants>()
         + size_of::<FlowShape>()
@@ -112,7 +116,7 @@ impl Tables {
         let mut features: Vec<(usize, Features)> = Vec::new();
         for (i, constants) in constants.iter().enumerate() {
             // Lanes of a missing flow are refused before they start.
-            let Some(constants) = constants else {
+            let Some((constants, pair)) = constants.as_ref().and_then(|c| Some((c, c.pair()?))) else {
                 shapes.push(FlowShape { steps: 1, ..FlowShape::zeroed() });
                 continue;
             };
@@ -125,25 +129,25 @@ impl Tables {
             let first = flows + further.len() - 1;
             let flow_of = |page: usize| if page == 0 { i as u32 } else { (first + page) as u32 };
             let of_change = |change| pairs_of(change, flow_of(change.page), gpu.precision);
-            pairs.extend(constants.changes.iter().flat_map(of_change));
+            pairs.extend(pair.changes.iter().flat_map(of_change));
             let mut shape = |page: &Page| {
                 let place_of_harmonics = pairs.len() as u32;
                 pairs.extend(&page.harmonics);
                 FlowShape {
                     steps: constants.steps,
                     phasors: place,
-                    must_rest: constants.must_rest.into(),
+                    must_rest: pair.must_rest.into(),
                     degrees: constants.degrees,
                     contacts: page.contacts.map(contact_code),
                     harmonics: place_of_harmonics,
                     harmonic_count: (page.harmonics.len() / PAIRS_PER_HARMONIC) as u32,
                     schedule,
-                    changes: constants.changes.len() as u32,
+                    changes: pair.changes.len() as u32,
                     behind: page.behind.map(|page| page.map_or(NO_FLOW, flow_of)),
                 }
             };
-            shapes.push(shape(&constants.page));
-            further.extend(constants.further.iter().map(|(flow, page)| (*flow, shape(page))));
+            shapes.push(shape(&pair.page));
+            further.extend(pair.further.iter().map(|(flow, page)| (*flow, shape(page))));
             if features.iter().all(|(_, others)| *others != constants.features) {
                 features.push((i, constants.features));
             }
@@ -182,12 +186,12 @@ impl Tables {
     ) -> Result<Tables, GpuError> {
         let count = constants.len();
         let (mut flows, mut shapes, mut table) = (Vec::new(), Vec::new(), Vec::new());
+        // Each machine has a law for each wall.
         let mut of_flows = Vec::new();
         let (mut grids, mut machines) = (HashMap::new(), HashMap::new());
         let mut features: Vec<(usize, Features)> = Vec::new();
         for (i, constants) in constants.iter().enumerate() {
-            let Some((constants, machine)) = constants.as_ref().and_then(|c| Some((c, c.machine.as_ref()?)))
-            else {
+            let Some((constants, machine)) = constants.as_ref().and_then(|c| Some((c, c.machine()?))) else {
                 // Lanes of a missing flow are refused before they start.
                 flows.extend([0.0; machine::FLOW]);
                 shapes.extend([1; machine::SHAPE]);
@@ -212,13 +216,7 @@ impl Tables {
             }
         }
         table.push(0.0);
-        let has_laws = constants.iter().flatten().any(|c| c.machine.as_ref().is_some_and(|m| m.has_laws));
-        // Laws of walls first, then those of machines that have their own.
-        let mut rows: Vec<f64> = laws.iter().flat_map(machine::law_of_walls).collect();
-        if has_laws {
-            rows.extend(of_flows);
-        }
-        let [flows, table, rows] = [flows, table, rows].map(|numbers| reals(&numbers, gpu.precision));
+        let [flows, table, rows] = [flows, table, of_flows].map(|numbers| reals(&numbers, gpu.precision));
         let allowed = gpu.device.limits().max_storage_buffer_binding_size;
         let needed = table.len().max(flows.len()).max(4 * shapes.len()).max(rows.len()) as u64;
         if needed > allowed {
@@ -237,7 +235,7 @@ impl Tables {
     }
 }
 
-/// Returns sizes that suffice for all machines; none if the flows are oscillators.
+/// Returns sizes that suffice for all machines; none if the flows are pairs.
 fn machine_shape(constants: &[Option<Constants>]) -> Option<MachineShape> {
     constants.iter().flatten().filter_map(|constants| constants.features.machine).reduce(MachineShape::and)
 }
@@ -253,7 +251,9 @@ fn upload_flows(
     let count = constants.len();
     let (buffer, none) = (buffer(gpu, "flows", (count + further.len()) * size), Flow::zeroed());
     for (n, part) in constants.chunks(FLOWS_AT_A_TIME).enumerate() {
-        let flows = part.iter().map(|constants| constants.as_ref().map_or(&none, |c| &c.flow));
+        let flows = part
+            .iter()
+            .map(|constants| constants.as_ref().and_then(Constants::pair).map_or(&none, |c| &c.flow));
         gpu.write(&buffer, (n * FLOWS_AT_A_TIME * size) as u64, &reals(flows, gpu.precision));
     }
     for (n, part) in further.chunks(FLOWS_AT_A_TIME).enumerate() {

@@ -7,6 +7,7 @@ use crate::job::engine_choice::EngineKind;
 use crate::job::error::JobError;
 use crate::job::forecast::Forecast;
 use crate::job::map::{MapJob, OpenMap};
+use crate::job::model_engine;
 use crate::job::observer::Observer;
 use crate::job::size::{Free, Size};
 use crate::map::plan::Plan;
@@ -33,6 +34,8 @@ pub struct DryRun {
     pub device: String,
     /// Reason for the choice of the engine. Empty if the request left no choice.
     pub reason: String,
+    /// The engine's code for the model, why, and what its motion costs.
+    pub model: String,
     /// Memory of the host, in bytes.
     pub host_memory: u64,
     /// Largest memory on graphics devices, in bytes. None for the CPU engine.
@@ -95,6 +98,7 @@ impl DryRun {
             precision: engine.precision(),
             device: engine.device(),
             reason,
+            model: model_engine::described(&plan.oscillator(0)),
             host_memory: size.memory(kind),
             device_memory: engine.device_bytes(),
             disk: size.disk,

@@ -13,6 +13,7 @@ mod finished;
 pub mod forecast;
 pub mod map;
 pub mod model_choice;
+pub mod model_engine;
 pub mod models;
 pub mod observer;
 pub mod processor;

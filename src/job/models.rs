@@ -2,6 +2,7 @@
 
 use rattlemap_dynamics::model::Model;
 
+use crate::job::model_engine;
 use crate::model_file::{FileModel, Wall};
 use crate::show::symbols::with_unit;
 
@@ -26,6 +27,9 @@ pub fn page(model: &FileModel) -> String {
     let state: Vec<String> = state.map(|(i, name)| with_unit(name, units.component(i).as_deref())).collect();
     let frequency = definition.motion.frequency.text();
     text += &format!("    state {}; forcing period 2 pi over {frequency}\n", state.join(", "));
+    if let Ok(oscillator) = model.oscillator() {
+        text += &format!("    Engine: {}.\n", model_engine::described(&oscillator));
+    }
     text += "\nWalls\n\n";
     match &model.contacts()[..] {
         [] => text += "    none\n",

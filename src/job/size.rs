@@ -378,8 +378,8 @@ mod tests {
     use crate::map::scene::{FileText, Purpose};
     use crate::record::measures;
     use crate::record::{RecordStore, RecordsMut};
-    use rattlemap_dynamics::flow::Flow;
     use rattlemap_dynamics::model::state;
+    use rattlemap_dynamics::motion::Flow;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2], sets: &[&str]) -> Scene {
         let [columns, rows] = counts;

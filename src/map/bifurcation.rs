@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use crate::map::scene::Start;
 use crate::record::measures::{MEASURES, Measured};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{MOST_COORDINATES, Model, ModelError, Oscillator, REST, Side, State};
 use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Settings, Status};
 use rattlemap_dynamics::word::Word;
@@ -101,7 +100,7 @@ pub struct SectionPoint {
 pub fn fixed(cells: &[(f64, Box<dyn Model>)]) -> Option<usize> {
     let is_alone = |oscillator: &Oscillator, i: usize| {
         let mut others = oscillator.gap_row(0).into_iter().enumerate().filter(|(j, _)| *j != i);
-        oscillator.gap_count() == 1 && others.all(|(_, factor)| factor == 0.0)
+        oscillator.gaps.len() == 1 && others.all(|(_, factor)| factor == 0.0)
     };
     let fixes = |i: usize| {
         cells.iter().all(|(_, model)| model.oscillator().is_ok_and(|oscillator| is_alone(&oscillator, i)))
@@ -130,7 +129,7 @@ pub fn run_until(
     progress: &(dyn Fn(usize) + Sync),
     halt: &AtomicBool,
 ) -> Result<Option<Vec<Column>>, ModelError> {
-    cells.iter().try_for_each(|(_, model)| Flow::validate(&**model).map(|_| ()))?;
+    cells.iter().try_for_each(|(_, model)| model.oscillator().map(|_| ()))?;
     let has_strobes = fixed(cells).is_some();
     let run = Run { cells, settings, progress, done: AtomicUsize::new(0), halt, has_strobes };
     match start {

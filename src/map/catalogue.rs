@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use crate::map::cycle::{CYCLE_TOLERANCE, StrobeCycle, distance};
 use crate::record::classify::classify;
 use crate::record::{Record, Records};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, NonImpacting, State};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::Class;
 
 /// Relative distance within which a state belongs to a cycle without further search. Settled lanes in single precision

@@ -1,9 +1,9 @@
 //! A cycle given by its states at phase 0 and half a period later, computed by the reference.
 
 use crate::record::distance::{apart, farther};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, STATE, State};
-use rattlemap_dynamics::reference::{Stop, Trajectory};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{Stop, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 /// Relative distance within which a state belongs to a cycle. Engines confirm a period at this distance if the motion

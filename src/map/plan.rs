@@ -26,8 +26,7 @@ pub(crate) use start::followed;
 use crate::map::scene::{Axis, Points, Quantity, Refine, Scene, Start, Steps};
 use crate::record::measures::Group;
 use crate::record::{Record, Records};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, State};
+use rattlemap_dynamics::model::{Form, Law, Model, ModelError, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Class};
 use start::Starts;
 
@@ -122,7 +121,7 @@ pub fn check_line(scene: &Scene) -> Result<(), NoMotion> {
 }
 
 fn checked(points: &Points, cell: usize) -> Result<(), NoMotion> {
-    let verdict = Flow::validate(&*points.model(cell));
+    let verdict = points.model(cell).oscillator();
     verdict.map(|_| ()).map_err(|reason| NoMotion { cell: points.named(cell), reason })
 }
 
@@ -354,7 +353,7 @@ impl Plan {
         let flows = 0..self.flow_count() as u32;
         flows
             .into_par_iter()
-            .any(|flow| crate::gpu::Features::of(&self.oscillator(flow)).needing_reference().is_some())
+            .any(|flow| crate::gpu::Features::of(self.form(flow)).needing_reference().is_some())
     }
 
     /// Returns the number of distinct flows.
@@ -381,6 +380,14 @@ impl Plan {
             Ok(oscillator) => oscillator,
             Err(error) => panic!("the plan was not checked: {error}"),
         }
+    }
+
+    /// Returns the oscillator of flow `index` in the form that its engine takes.
+    ///
+    /// # Panics
+    /// As [`Plan::oscillator`].
+    pub fn form(&self, index: u32) -> Form {
+        Form::from(&self.oscillator(index))
     }
 
     /// Returns the contact law `index`.

@@ -43,7 +43,6 @@ use crate::text::section::{self, Section};
 use derived::Derived;
 use figure::Figure;
 use parameters::ParameterSources;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, Parameter, ParameterError};
 use rattlemap_dynamics::orbit;
 
@@ -238,7 +237,7 @@ impl Scene {
         let [columns, rows] = self.points.counts();
         for cell in [0, columns - 1, columns * (rows - 1), columns * rows - 1] {
             let model = self.points.model(cell);
-            if let Err(error) = Flow::validate(&*model) {
+            if let Err(error) = model.oscillator() {
                 let named = self.points.named(cell);
                 // If the value is derived, the error belongs to its expression.
                 let derives = match &error {
@@ -423,7 +422,7 @@ pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>,
     let sources = ParameterSources { axes: &[], list: None, derived: &Derived::default() };
     let mut cell = parameters::read(&root, model, sources)?;
     start::read_phase(&root.section("start", &["phase"])?, &mut *cell)?;
-    Flow::validate(&*cell).map_err(|error| {
+    cell.oscillator().map_err(|error| {
         // The defaults have a motion, so the error is in the arguments.
         let error = root.no_motion("", &error);
         match sets {

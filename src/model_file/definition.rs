@@ -1,14 +1,14 @@
 //! The contents of a model file, and the oscillator and contact law that it defines.
 
+use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, MOST_FRICTION, ModelError, Oscillator, OscillatorError, OuterWall,
-    Parameter, Shapes, Side, Stage,
+    self, Drive, Forces, GapRow, Law, MOST_FRICTION, Model, ModelError, Oscillator, OscillatorError,
+    Parameter, Restitution, Shapes, Side, Spring,
 };
 
-use super::contact::{self, Wall, WallLaw};
+use super::contact::{self, Wall, WallLaw, WallSpring};
 use super::entry::{Names, Staged};
 use super::friction::{self, DryFriction};
-use super::harmonic::HarmonicForce;
 use super::motion::{self, Motion};
 use super::{FileModel, parameters};
 use crate::text::document::{self, Node, Value};
@@ -56,6 +56,8 @@ pub struct Definition {
     pub walls: Vec<[Vec<Wall>; 2]>,
     /// Dry friction.
     pub friction: Vec<DryFriction>,
+    /// Whether the oscillator is a pair, whose law is not part of it.
+    is_pair: bool,
 }
 
 /// Definitions are equal if their texts are.
@@ -95,12 +97,14 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
         motion,
         walls,
         friction,
+        is_pair: false,
     };
+    definition.is_pair = definition.is_pair();
     let shapes: Vec<Shapes> = (0..written.len()).map(|index| definition.shaped_by(index)).collect();
     definition.parameters =
         written.into_iter().zip(shapes).map(|(written, shapes)| written.into_parameter(shapes)).collect();
     let model = FileModel::new(definition);
-    match rattlemap_dynamics::flow::Flow::validate(&model) {
+    match model.oscillator() {
         Ok(_) => Ok(model),
         Err(error) => Err(no_motion(&root, &model.definition, &error)),
     }
@@ -197,10 +201,7 @@ enum Table {
 fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str) {
     let ModelError::Oscillator(error) = error else { return (Table::Motion, "") };
     let quantity = match error {
-        OscillatorError::OutOfRange { quantity, .. }
-        | OscillatorError::NotSymmetric { quantity, .. }
-        | OscillatorError::NotAlongGap { quantity, .. } => quantity.as_str(),
-        OscillatorError::NotDefinite { .. } => "mass",
+        OscillatorError::OutOfRange { quantity, .. } => quantity.as_str(),
         OscillatorError::Walls { walls } => return (Table::Wall(definition.gap_between(*walls), None), "at"),
     };
     if let Some((what, nth)) = quantity.rsplit_once("of friction") {
@@ -259,8 +260,13 @@ impl Definition {
             || walls().flat_map(Wall::shaping_oscillator).any(uses)
             || self.friction.iter().flat_map(DryFriction::entries).any(uses);
         let law = walls().flat_map(Wall::shaping_law).any(uses);
-        // A machine has its own contact laws.
-        if self.is_machine() { Shapes::new(oscillator || law, false) } else { Shapes::new(oscillator, law) }
+        // The laws of a machine are part of it.
+        if self.is_pair { Shapes::new(oscillator, law) } else { Shapes::new(oscillator || law, false) }
+    }
+
+    /// Whether the oscillator is a pair, which no value decides.
+    fn is_pair(&self) -> bool {
+        self.oscillator(&self.defaults).is_ok_and(|oscillator| oscillator.needs_machine().is_none())
     }
 
     /// Returns the index of the gap whose first walls have these positions at the defaults; 0 if there is none.
@@ -272,107 +278,57 @@ impl Definition {
 
     /// Builds the oscillator for values of the parameters. The caller validates it.
     pub(super) fn oscillator(&self, values: &[f64]) -> Result<Oscillator, OscillatorError> {
-        if self.is_machine() {
-            return self.machine(values).map(Oscillator::of_machine);
-        }
-        let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
-        let motion = &self.motion;
-        let gap = vector(&motion.gaps[0].row, of);
-        let mut mass = matrix(&motion.mass, of);
-        if motion.degrees() == 1 {
-            // The second displacement does not exist; its mass must not be 0.
-            mass[1][1] = 1.0;
-        }
-        let (mut walls, mut contacts) = ([f64::INFINITY, f64::NEG_INFINITY], [Contact::Rigid; 2]);
-        for side in Side::BOTH {
-            let Some(wall) = self.wall(side) else { continue };
-            let at = of(&wall.at);
-            // An infinite position means that there is no wall.
-            if !at.is_finite() {
-                let name = if side == Side::Right { "right" } else { "left" };
-                let quantity = format!("position of the {name} wall");
-                return Err(OscillatorError::OutOfRange {
-                    quantity,
-                    value: at,
-                    requirement: "a finite number",
+        let (motion, values) = (&self.motion, Values(values));
+        let stages = motion.stages.len().max(1);
+        let forces = |stage: usize| Forces {
+            damping: values.matrix(&motion.damping, |entry| entry.in_stage(stage)),
+            stiffness: values.matrix(&motion.stiffness, |entry| entry.in_stage(stage)),
+            load: values.vector(motion.load.iter().map(|entry| entry.in_stage(stage))),
+        };
+        let drive = |order: u32, cos: &[Expression], sin: &[Expression]| Drive {
+            order,
+            cos: values.vector(cos.iter()),
+            sin: values.vector(sin.iter()),
+        };
+        let first = drive(1, &motion.force, &motion.force_sin);
+        let acts = first.cos.iter().chain(&first.sin).any(|&factor| factor != 0.0);
+        let further = motion.harmonics.iter().map(|h| drive(h.order, &h.cos, &h.sin));
+        let gap = |nth: usize| {
+            let side = |side: Side| {
+                let walls = (1..).zip(&self.walls[nth][side.index()]);
+                let built = walls.map(|(i, wall)| {
+                    let word = ["right", "left"][side.index()];
+                    let of_gap = match motion.gaps.len() {
+                        1 => String::new(),
+                        _ => format!(" of gap {}", nth + 1),
+                    };
+                    values.wall(wall, stages, &format!("{word} wall {i}{of_gap}"))
                 });
-            }
-            walls[side.index()] = at;
-            contacts[side.index()] = wall.contact();
-        }
-        let outer = |side: Side| {
-            let further = self.walls[0][side.index()].iter().skip(1);
-            further
-                .map(|wall| OuterWall { at: of(&wall.at), contact: wall.contact(), meshing: Vec::new() })
-                .collect()
-        };
-        let mut outer_walls: [Vec<OuterWall>; 2] = Side::BOTH.map(outer);
-        let mut stage = |stage: usize| {
-            let of = |entry: &Staged| of(entry.in_stage(stage));
-            let free = Domain {
-                damping: matrix(&motion.damping, of),
-                stiffness: matrix(&motion.stiffness, of),
-                load: vector(&motion.load, of),
-                preload: 0.0,
+                built.collect::<Result<Vec<_>, _>>()
             };
-            let behind = |before: Domain, wall: &Wall, side: Side, at: f64| match &wall.spring {
-                Some(spring) => {
-                    let (stiffness, preload) = (of(&spring.stiffness), of(&spring.preload));
-                    // A missing preload must not change the sign of a zero.
-                    let push = if preload == 0.0 { 0.0 } else { side.sign() * preload };
-                    let constant = stiffness * at - push;
-                    with_spring(before, gap, [stiffness, of(&spring.damping), constant], preload)
-                }
-                None => before,
-            };
-            let meshing = Side::BOTH.map(|side| {
-                let mut domain = free;
-                let own = &self.walls[0][side.index()];
-                if let Some(wall) = own.first() {
-                    domain = behind(free, wall, side, walls[side.index()]);
-                }
-                let first = domain;
-                for (wall, outer) in own.iter().skip(1).zip(&mut outer_walls[side.index()]) {
-                    domain = behind(domain, wall, side, outer.at);
-                    outer.meshing.push(domain);
-                }
-                first
-            });
-            Stage { free, meshing }
+            Ok(GapRow {
+                row: values.vector(motion.gaps[nth].row.iter()),
+                walls: [side(Side::Right)?, side(Side::Left)?],
+            })
         };
-        let harmonic = |harmonic: &HarmonicForce| Harmonic {
-            order: harmonic.order,
-            cos: vector(&harmonic.cos, of),
-            sin: vector(&harmonic.sin, of),
-        };
-        let phases: Vec<f64> = motion.stages.iter().map(of).collect();
-        let Stage { free, meshing } = stage(0);
-        let stages = (1..motion.stages.len()).map(stage).collect();
+        let phases: Vec<f64> = motion.stages.iter().map(|phase| values.of(phase)).collect();
         Ok(Oscillator {
-            degrees: motion.degrees(),
-            mass,
-            gap,
-            walls,
-            contacts,
-            omega: of(&motion.frequency),
-            force: vector(&motion.force, of),
-            force_sin: vector(&motion.force_sin, of),
-            free,
-            meshing,
-            harmonics: motion.harmonics.iter().map(harmonic).collect(),
-            stages,
+            omega: values.of(&motion.frequency),
+            mass: values.matrix(&motion.mass, |entry| entry),
+            stages: (0..stages).map(forces).collect(),
             schedule: Oscillator::repeated(&phases, motion.repeat)?,
-            outer_walls,
-            friction: self.friction.iter().map(|friction| friction.evaluated(of)).collect(),
-            machine: None,
+            drives: acts.then_some(first).into_iter().chain(further).collect(),
+            gaps: (0..motion.gaps.len()).map(gap).collect::<Result<_, OscillatorError>>()?,
+            friction: self.friction.iter().map(|own| own.evaluated(|entry| values.of(entry))).collect(),
         })
     }
 
-    /// Builds the contact law for values of the parameters. A machine has laws of its own.
+    /// Returns the law of a pair for values of the parameters, and 0 for a machine. It may be asked for millions of cells, so that it does
+    /// not build the oscillator.
     pub(super) fn law(&self, values: &[f64]) -> Law {
         let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
         let mut law = Law::both(0.0, 0.0);
-        if self.is_machine() {
+        if !self.is_pair {
             return law;
         }
         for (i, wall) in self.walls[0].iter().enumerate() {
@@ -386,43 +342,63 @@ impl Definition {
     }
 }
 
-/// Adds the force `stiffness z + damping w - constant` along the gap row.
-fn with_spring(
-    free: Domain,
-    gap: [f64; 2],
-    [stiffness, damping, constant]: [f64; 3],
-    preload: f64,
-) -> Domain {
-    let along = |matrix: [[f64; 2]; 2], k: f64| {
-        // The product of the gap entries comes first, so that the matrix is exactly symmetric.
-        let entry = |i: usize, j: usize| plus(matrix[i][j], k * (gap[i] * gap[j]));
-        [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
-    };
-    Domain {
-        damping: along(free.damping, damping),
-        stiffness: along(free.stiffness, stiffness),
-        load: [plus(free.load[0], constant * gap[0]), plus(free.load[1], constant * gap[1])],
-        preload,
-    }
-}
+/// Values of the parameters.
+struct Values<'a>(&'a [f64]);
 
-/// Adds two numbers. If `a` is 0, `b` keeps its sign, even if it is 0.
-fn plus(a: f64, b: f64) -> f64 {
-    if a == 0.0 { b } else { a + b }
-}
-
-fn matrix<T>(rows: &[Vec<T>], of: impl Fn(&T) -> f64) -> [[f64; 2]; 2] {
-    let mut matrix = [[0.0; 2]; 2];
-    for (row, entries) in matrix.iter_mut().zip(rows) {
-        *row = vector(entries, &of);
+impl Values<'_> {
+    fn of(&self, entry: &Expression) -> f64 {
+        entry.evaluate(&|index| self.0[index])
     }
-    matrix
-}
 
-fn vector<T>(entries: &[T], of: impl Fn(&T) -> f64) -> [f64; 2] {
-    let mut vector = [0.0; 2];
-    for (number, entry) in vector.iter_mut().zip(entries) {
-        *number = of(entry);
+    fn vector<'e>(&self, entries: impl ExactSizeIterator<Item = &'e Expression>) -> DVector<f64> {
+        DVector::from_iterator(entries.len(), entries.map(|entry| self.of(entry)))
     }
-    vector
+
+    fn matrix<'e, T: 'e>(&self, rows: &'e [Vec<T>], entry: impl Fn(&'e T) -> &'e Expression) -> DMatrix<f64> {
+        let entries = rows.iter().flatten().map(|value| self.of(entry(value)));
+        DMatrix::from_row_iterator(rows.len(), rows.len(), entries)
+    }
+
+    fn spring(&self, spring: &WallSpring, stage: usize) -> Spring {
+        let of = |entry: &Staged| self.of(entry.in_stage(stage));
+        Spring {
+            stiffness: of(&spring.stiffness),
+            damping: of(&spring.damping),
+            preload: of(&spring.preload),
+        }
+    }
+
+    /// Returns restitution; none if it has not the form of [`Restitution`].
+    fn restitution(&self, law: &WallLaw) -> Option<Restitution> {
+        match law {
+            WallLaw::Elastic { .. } => Some(Restitution::Constant(0.0)),
+            WallLaw::Impact { restitution, by_speed: false, .. } => {
+                Some(Restitution::Constant(self.of(restitution)))
+            }
+            WallLaw::Impact { restitution, by_speed: true, .. } => {
+                let law = restitution.power_law(self.0.len(), &|index| self.0[index])?;
+                Some(Restitution::BySpeed { constant: law.constant, factor: law.factor, power: law.power })
+            }
+        }
+    }
+
+    /// Builds a wall. `place` names it in messages.
+    fn wall(&self, wall: &Wall, stages: usize, place: &str) -> Result<model::Wall, OscillatorError> {
+        let restitution = self.restitution(&wall.law).ok_or_else(|| OscillatorError::OutOfRange {
+            quantity: format!("restitution of {place}"),
+            value: f64::NAN,
+            requirement: "c + f*speed^p, where c, f and p do not contain speed",
+        })?;
+        let spring = |stage| wall.spring.as_ref().map_or(Spring::default(), |own| self.spring(own, stage));
+        Ok(model::Wall {
+            at: self.of(&wall.at),
+            contact: wall.contact(),
+            restitution,
+            mesh_speed: match &wall.law {
+                WallLaw::Impact { mesh_speed, .. } => self.of(mesh_speed),
+                WallLaw::Elastic { .. } => 0.0,
+            },
+            springs: (0..stages).map(spring).collect(),
+        })
+    }
 }

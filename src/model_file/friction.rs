@@ -1,7 +1,7 @@
 //! `[[friction]]`: dry friction.
 
 use nalgebra::DVector;
-use rattlemap_dynamics::model::{self, Friction, MOST_FRICTION};
+use rattlemap_dynamics::model::{self, MOST_FRICTION};
 
 use super::entry::{Entry, Names};
 use crate::text::error::SceneError;
@@ -28,15 +28,8 @@ impl DryFriction {
         self.row.iter().chain([&self.force, &self.speed])
     }
 
-    /// Returns the friction of one or two coordinates for values of the parameters, which `of` inserts.
-    pub(super) fn evaluated(&self, of: impl Fn(&Expression) -> f64) -> Friction {
-        let mut row = [0.0; 2];
-        row.iter_mut().zip(&self.row).for_each(|(factor, entry)| *factor = of(entry));
-        Friction { row, force: of(&self.force), speed: of(&self.speed) }
-    }
-
-    /// Returns the friction of a machine.
-    pub(super) fn of_machine(&self, of: impl Fn(&Expression) -> f64) -> model::DryFriction {
+    /// Returns the friction for values of the parameters, which `of` inserts.
+    pub(super) fn evaluated(&self, of: impl Fn(&Expression) -> f64) -> model::DryFriction {
         let row = DVector::from_iterator(self.row.len(), self.row.iter().map(&of));
         model::DryFriction { row, force: of(&self.force), speed: of(&self.speed) }
     }

@@ -12,7 +12,6 @@ mod entry;
 mod equations;
 mod friction;
 mod harmonic;
-mod machine;
 mod motion;
 mod parameters;
 #[cfg(test)]

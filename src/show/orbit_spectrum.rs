@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use rattlemap_dynamics::model::{GapRow, Model, ModelError, Oscillator, Side};
+use rattlemap_dynamics::model::{GapRow, Model, ModelError, Oscillator};
 use rattlemap_dynamics::orbit::{Class, Orbit, trace};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
@@ -22,30 +22,14 @@ const WINDOW_SAMPLES: usize = 1 << 19;
 /// Returns the samples per forcing period that figures need: 400, or 20 for each oscillation of the teeth in meshing, each
 /// oscillation of the highest harmonic and each stage if that is more.
 pub fn samples_per_period(oscillator: &Oscillator) -> usize {
-    if let Some(machine) = &oscillator.machine {
-        let ringing = |(i, gap): (usize, &GapRow)| {
-            let stiffest = gap.walls.iter().flatten().flat_map(|wall| &wall.springs);
-            let stiffest = stiffest.map(|spring| spring.stiffness).fold(0.0, f64::max);
-            (stiffest * machine.mobility(i)).sqrt() / machine.omega
-        };
-        let rates = machine.gaps.iter().enumerate().map(ringing);
-        let forced = [f64::from(machine.highest_order()), machine.schedule.len() as f64];
-        return per_period(rates.chain(forced));
-    }
-    let ringing = |stage: usize| {
-        let stage = oscillator.in_stage(stage);
-        let stiffness = Side::BOTH.map(|side| stage.wall_stiffness_and_damping(side)[0]);
-        let stiffness = stiffness.into_iter().fold(0.0, f64::max);
-        (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega
+    let ringing = |(i, gap): (usize, &GapRow)| {
+        let stiffest = gap.walls.iter().flatten().flat_map(|wall| &wall.springs);
+        let stiffest = stiffest.map(|spring| spring.stiffness).fold(0.0, f64::max);
+        (stiffest * oscillator.mobility(i)).sqrt() / oscillator.omega
     };
-    let ringing = (0..oscillator.stage_count()).map(ringing);
+    let rates = oscillator.gaps.iter().enumerate().map(ringing);
     let forced = [f64::from(oscillator.highest_order()), oscillator.schedule.len() as f64];
-    per_period(ringing.chain(forced))
-}
-
-/// Returns the samples per forcing period for rates in multiples of the forcing frequency.
-fn per_period(rates: impl Iterator<Item = f64>) -> usize {
-    (20.0 * rates.fold(0.0, f64::max)).clamp(400.0, 50_000.0) as usize
+    (20.0 * rates.chain(forced).fold(0.0, f64::max)).clamp(400.0, 50_000.0) as usize
 }
 
 /// Amplitudes at one frequency.
@@ -109,7 +93,7 @@ impl Spectrum {
                 }
             }
         };
-        let gaps: Vec<Vec<[f64; 2]>> = (0..oscillator.gap_count()).map(of_gap).collect();
+        let gaps: Vec<Vec<[f64; 2]>> = (0..oscillator.gaps.len()).map(of_gap).collect();
         let line =
             |k: usize| Line { frequency: frequency(k), amplitudes: gaps.iter().map(|gap| gap[k]).collect() };
         let last = (wanted / 10).min(per_period / 4) * span as usize;
@@ -175,7 +159,7 @@ fn amplitudes(parts: &[&[f64]], window: impl Fn(f64) -> f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::model::{GearPair, Harmonic, REST, Stage};
+    use rattlemap_dynamics::model::{Drive, GearPair, REST};
     use rattlemap_dynamics::orbit::{Settings, analyse};
 
     fn spectrum(pair: &GearPair) -> (Orbit, Spectrum) {
@@ -204,10 +188,10 @@ mod tests {
     #[test]
     fn samples_resolve_the_highest_harmonic_and_each_stage() {
         let plain = GearPair { k: 1.0, ..GearPair::paper(0.5) }.oscillator().unwrap();
-        let highest = Harmonic { order: 64, cos: [1.0; 2], sin: [0.0; 2] };
-        let high = Oscillator { harmonics: vec![highest], ..plain.clone() };
+        let mut high = plain.clone();
+        high.drives.push(Drive { order: 64, ..plain.drives[0].clone() });
         let schedule = Oscillator::repeated(&[0.0, 0.5], 40).unwrap();
-        let stages = vec![Stage { free: plain.free, meshing: plain.meshing }];
+        let stages = vec![plain.stages[0].clone(); 2];
         let staged = Oscillator { stages, schedule, ..plain.clone() };
         assert_eq!([plain, high, staged].map(|o| samples_per_period(&o)), [400, 64 * 20, 80 * 20]);
     }

@@ -134,7 +134,7 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
 
 /// Whether the mirror image of every motion, shifted by half a forcing period, is a motion of the same model.
 pub(crate) fn has_mirror_images(model: &dyn Model) -> bool {
-    model.law().is_symmetric() && model.oscillator().is_ok_and(|oscillator| oscillator.mirror_symmetric())
+    model.oscillator().is_ok_and(|oscillator| oscillator.mirror_symmetric())
 }
 
 fn parameters(model: &dyn Model) -> String {

@@ -34,7 +34,7 @@ impl WallLabels {
 
     /// Returns the labels of the only gap. With several gaps the labels have no positions, because walls of a side differ between gaps.
     pub(crate) fn of_all(model: &dyn Model) -> WallLabels {
-        let count = model.oscillator().map_or(1, |oscillator| oscillator.gap_count());
+        let count = model.oscillator().map_or(1, |oscillator| oscillator.gaps.len());
         if count == 1 {
             return WallLabels::of(model, 0);
         }
@@ -61,9 +61,9 @@ impl WallLabels {
         let Ok(oscillator) = model.oscillator() else {
             return WallLabels::new(gap.to_owned(), [None, None]);
         };
-        let alone = [[1.0, 0.0], [0.0, 1.0]].iter().position(|row| *row == oscillator.gap);
-        let names = model.state_names();
-        let at = oscillator.walls.map(|wall| wall.is_finite().then(|| number(wall)));
+        let (row, names) = (&oscillator.gaps[0].row, model.state_names());
+        let alone = (0..row.len()).find(|&i| (0..row.len()).all(|j| row[j] == f64::from(u8::from(i == j))));
+        let at = oscillator.gaps[0].walls.each_ref().map(|walls| walls.first().map(|wall| number(wall.at)));
         let alone = alone.and_then(|i| names.get(2 * i)).map(|name| symbol(name));
         WallLabels::new(alone.unwrap_or_else(|| gap.to_owned()), at)
     }

@@ -19,8 +19,8 @@ use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::{self, Head, MANIFEST, joined};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, State};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, History, Orbit, Settings, Stopped, history, trace};
 
 const JSON: &str = "orbit.json";

@@ -2,8 +2,6 @@
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::DMatrix;
-
 use super::Subject;
 use super::compare::{Answer, Bars, Labels};
 use super::finite::not_finite;
@@ -15,11 +13,10 @@ use crate::map::random::Random;
 use crate::record::Record;
 use crate::record::classify::{classify, status};
 use crate::record::distance::{self, farther};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Machine, Model, Oscillator, State, Wall};
+use rattlemap_dynamics::model::{Law, Model, Oscillator, State, Wall};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{Allowance, Trajectory};
 use rattlemap_dynamics::orbit::{self, Budget, Class, Status, measure_until};
-use rattlemap_dynamics::reference::machine::Motion;
-use rattlemap_dynamics::reference::{Allowance, Trajectory};
 use rattlemap_dynamics::stability::{UNIT, multipliers};
 
 /// Returns the smallest relative difference of a state or parameter that an engine of this precision resolves: several
@@ -72,7 +69,7 @@ impl<'a> Cell<'a> {
     pub(super) fn new(subject: &Subject<'a>, id: u32, halt: &'a AtomicBool) -> Cell<'a> {
         let plan = subject.plan;
         let cell = plan.cell(id);
-        let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
+        let flow = Box::new(Flow::new(plan.form(cell.flow)));
         let budget = *plan.budget();
         Cell {
             record: subject.records.record(id as usize),
@@ -157,24 +154,17 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// Returns the meshing speeds of all walls with impacts; for an oscillator of one gap, of both sides.
+    /// Returns the meshing speeds of all walls with impacts.
     pub(super) fn mesh_speeds(&self) -> Vec<f64> {
-        match &self.flow.machine {
-            Some(system) => impact_walls(&mut system.machine().clone()).map(|wall| wall.mesh_speed).collect(),
-            None => self.law.mesh_speed.to_vec(),
-        }
+        let Ok(mut oscillator) = self.model.oscillator() else { return Vec::new() };
+        impact_walls(&mut oscillator).map(|wall| wall.mesh_speed).collect()
     }
 
     /// Computes the cell with this multiple of all meshing speeds.
     pub(super) fn with_mesh_speeds(&self, factor: f64) -> Answer {
-        if let Some(system) = &self.flow.machine {
-            let mut machine = system.machine().clone();
-            impact_walls(&mut machine).for_each(|wall| wall.mesh_speed *= factor);
-            let flow = Box::new(Flow::new(&Oscillator::of_machine(machine)));
-            return self.reached(&flow, self.law, self.start);
-        }
-        let law = Law { mesh_speed: self.law.mesh_speed.map(|speed| factor * speed), ..self.law };
-        self.reached(&self.flow, law, self.start)
+        let Ok(mut oscillator) = self.model.oscillator() else { return Answer::new(Record::default(), None) };
+        impact_walls(&mut oscillator).for_each(|wall| wall.mesh_speed *= factor);
+        self.reached(&Flow::new(&oscillator), oscillator.law(), self.start)
     }
 
     /// Computes the cell from another start.
@@ -259,31 +249,11 @@ impl<'a> Cell<'a> {
 
     /// Returns logarithms of the largest multiplier over `period` periods, for motions perturbed after each period.
     pub(super) fn multipliers_from(&self, state: State, period: u32) -> Vec<f64> {
-        let log_radius = |columns: &[State], log_scale: f64| {
-            let size = columns.len();
-            let [re, im] = *multipliers(&DMatrix::from_fn(size, size, |i, j| columns[j][i]))?.first()?;
-            Some(re.hypot(im).ln() + log_scale)
+        let log_radius = |end: Trajectory<'_, 4>| {
+            let [re, im] = *multipliers(&end.unit_images())?.first()?;
+            Some(re.hypot(im).ln() + end.log_scale())
         };
-        let Some(system) = &self.flow.machine else {
-            let ends = self.perturbed_motions(state, period, UNIT);
-            return ends.filter_map(|end| log_radius(&end.tangents(), end.log_scale())).collect();
-        };
-        // A trajectory has a fixed number of tangents, so the machine's own motion is followed.
-        let log_radius_of = |k: u64| {
-            let mut random = Random::new(self.seed ^ k);
-            let mut motion = Motion::new(system, &state).allowing(Allowance::UNLIMITED.until(self.halt));
-            motion.set_tangents(Motion::unit_tangents(system));
-            let mut log_scale = 0.0;
-            for _ in 0..period {
-                motion.advance_period(&mut ()).ok()?;
-                log_scale += motion.log_scale();
-                let perturbed =
-                    motion.state().map(|x| x * (1.0 + self.resolution * (2.0 * random.unit() - 1.0)));
-                motion = motion.at(&perturbed, motion.tangents());
-            }
-            log_radius(&motion.tangents(), log_scale)
-        };
-        (0..TURNS).filter_map(log_radius_of).collect()
+        self.perturbed_motions(state, period, UNIT).filter_map(log_radius).collect()
     }
 
     /// Follows a few motions from a state, each perturbed after each period.
@@ -300,7 +270,7 @@ impl<'a> Cell<'a> {
             let mut trajectory = begun.carrying(tangents);
             for _ in 0..periods {
                 trajectory.advance_period(&mut ()).ok()?;
-                trajectory.perturb(shares(&mut random, self.resolution));
+                trajectory.perturb(|| share(&mut random, self.resolution));
             }
             Some(trajectory)
         })
@@ -336,12 +306,9 @@ impl<'a> Cell<'a> {
             let share = self.resolution * units[1].max(*speed) / speed.max(f64::MIN_POSITIVE);
             *speed *= 1.0 + share.min(MOST_OF_MESH_SPEED) * draw;
         };
-        let mut law = model.law();
-        law.mesh_speed.iter_mut().for_each(perturb);
         let mut oscillator = model.oscillator().ok()?;
-        if let Some(machine) = &mut oscillator.machine {
-            impact_walls(machine).for_each(|wall| perturb(&mut wall.mesh_speed));
-        }
+        impact_walls(&mut oscillator).for_each(|wall| perturb(&mut wall.mesh_speed));
+        let law = oscillator.law();
         let units = self.units(&self.start);
         let mut start = self.start;
         for (i, x) in start.iter_mut().enumerate().take(self.model.state_names().len()) {
@@ -359,21 +326,21 @@ impl Perturbed<'_> {
             .allowing(Allowance::UNLIMITED.until(self.halt));
         for _ in 0..periods {
             trajectory.advance_period(&mut ()).ok()?;
-            trajectory.perturb(shares(&mut self.random, self.resolution));
+            trajectory.perturb(|| share(&mut self.random, self.resolution));
         }
         Some(trajectory.state())
     }
 }
 
-/// Returns the walls of a machine that have a law of impact.
-fn impact_walls(machine: &mut Machine) -> impl Iterator<Item = &mut Wall> {
-    let walls = machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten());
+/// Returns the walls that have a law of impact.
+fn impact_walls(oscillator: &mut Oscillator) -> impl Iterator<Item = &mut Wall> {
+    let walls = oscillator.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten());
     walls.filter(|wall| !wall.contact.is_elastic())
 }
 
-/// Draws the relative changes of a state by rounding over one period.
-fn shares(random: &mut Random, resolution: f64) -> [f64; 4] {
-    std::array::from_fn(|_| resolution * (2.0 * random.unit() - 1.0))
+/// Draws a relative change by rounding over one period.
+fn share(random: &mut Random, resolution: f64) -> f64 {
+    resolution * (2.0 * random.unit() - 1.0)
 }
 
 fn answer(flow: &Flow, law: Law, start: State, budget: &Budget, halt: &AtomicBool) -> Answer {

@@ -20,7 +20,7 @@ use crate::record::classify::CHAOS_ERRORS;
 use crate::record::distance::{self, farther};
 use crate::record::{Record, Records, valid};
 use machine::Flight;
-use rattlemap_dynamics::model::{Law, MOST_FRICTION, Machine, Oscillator, State};
+use rattlemap_dynamics::model::{MOST_FRICTION, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Status};
 use rattlemap_dynamics::stability::{multipliers, standard_error};
 use rattlemap_dynamics::word::Word;
@@ -69,12 +69,8 @@ struct Tally {
 }
 
 impl Strobed<'_> {
-    fn new<'a>(oscillator: &Oscillator, law: Law, start: State, halt: &'a AtomicBool) -> Strobed<'a> {
-        let flight = match &oscillator.machine {
-            Some(machine) => Flight::new(machine, &start),
-            None => Flight::new(&Machine::of(oscillator, law), &start),
-        };
-        Strobed { flight, period: oscillator.period(), from: 0.0, halt }
+    fn new<'a>(oscillator: &Oscillator, start: State, halt: &'a AtomicBool) -> Strobed<'a> {
+        Strobed { flight: Flight::new(oscillator, &start), period: oscillator.period(), from: 0.0, halt }
     }
 
     /// Advances by one forcing period; none if the solver fails or is halted.
@@ -127,9 +123,8 @@ pub fn record(plan: &Plan, id: u32, records: &dyn Records) -> Option<Record> {
 
 /// Like [`record`], but returns `None` once `halt` is set.
 pub(super) fn record_until(plan: &Plan, id: u32, records: &dyn Records, halt: &AtomicBool) -> Option<Record> {
-    let cell = plan.cell(id);
-    let (oscillator, start) = (plan.oscillator(cell.flow), plan.start(id, records));
-    follow(Strobed::new(&oscillator, plan.law(cell.law), start, halt), plan.budget())
+    let (oscillator, start) = (plan.model(id).oscillator().ok()?, plan.start(id, records));
+    follow(Strobed::new(&oscillator, start, halt), plan.budget())
 }
 
 fn follow(mut motion: Strobed<'_>, budget: &Budget) -> Option<Record> {

@@ -133,7 +133,7 @@ pub async fn run_lanes(
             start: plan.start(cell.id, records),
         })
         .collect();
-    let flows: Vec<_> = flows.iter().map(|&flow| plan.oscillator(flow)).collect();
+    let flows: Vec<_> = flows.iter().map(|&flow| plan.form(flow)).collect();
     let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
     let settings = &LaneSettings {
         features: flows.iter().map(Features::of).fold(settings.features, Features::and),

@@ -10,9 +10,8 @@ use crate::record::classify::{classify, status};
 use crate::record::distance::apart;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::motion::{Allowance, GapEvent, Observer, States, Trajectory};
 use rattlemap_dynamics::orbit::{Class, Status};
-use rattlemap_dynamics::reference::machine::MachineEvent;
-use rattlemap_dynamics::reference::{Allowance, GapEvent, Observer, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 /// Returns the record with the exponent of the cycle itself, if the reference confirms the record's exponent at the
@@ -78,11 +77,7 @@ pub(super) fn meets_strobe(cell: &Cell<'_>, state: State, period: u32) -> bool {
 struct Times(Vec<f64>);
 
 impl Observer for Times {
-    fn event(&mut self, event: &GapEvent) {
-        self.0.push(event.t);
-    }
-
-    fn machine_event(&mut self, event: &MachineEvent) {
+    fn event(&mut self, event: &GapEvent, _: States<'_>) {
         self.0.push(event.t);
     }
 }

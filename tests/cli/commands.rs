@@ -276,9 +276,9 @@ fn requested_periods_are_a_limit() {
 /// The time counts from the start, not from the end of the transient.
 #[test]
 fn orbit_prints_the_state_at_a_time() {
-    use rattlemap::flow::Flow;
     use rattlemap::model::{GearPair, state};
-    use rattlemap::reference::Trajectory;
+    use rattlemap::motion::Flow;
+    use rattlemap::motion::Trajectory;
     let at = |arguments: &[&str]| {
         let fixed = ["orbit", "--start", "0.125,0,-0.25,1.5", "--time"];
         rattlemap(&folder()).args(fixed).args(arguments).assert().success().get_output().stdout.clone()

@@ -77,6 +77,13 @@ fn every_model_has_a_line_and_a_page() {
     for part in ["F cos(omega t)", walls, "mesh_speed is a choice", "Rattling Vibration in Gear Systems"] {
         assert!(page.contains(part), "{part} is not in\n{page}");
     }
+    for (name, engine) in [
+        ("gear-pair", "Engine: pair, for up to two coordinates and one gap: "),
+        ("friction-oscillator", "Engine: machine, because of dry friction: "),
+        ("two-loose-gears", "Engine: machine, because of more than two coordinates: "),
+    ] {
+        assert!(stdout(&folder, &format!("models {name}")).contains(engine), "{name}");
+    }
 }
 
 #[test]

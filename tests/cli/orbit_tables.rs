@@ -3,9 +3,9 @@
 use rattlemap_dynamics::model::state;
 use std::fs;
 
-use rattlemap::flow::Flow;
 use rattlemap::model::GearPair;
-use rattlemap::reference::Trajectory;
+use rattlemap::motion::Flow;
+use rattlemap::motion::Trajectory;
 
 use crate::common::{empty, json, rows, run};
 

@@ -1,8 +1,8 @@
 //! One coordinate between walls in closed form: `m x'' + c x' + k x = F cos(omega t) + load` from event to event.
 //! Only the times of events are searched for, by bisection. Written from the equations of motion, for tests alone.
 
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::model::{Contact, Domain, Law, Pair};
+use rattlemap_dynamics::motion::EventKind;
 
 /// A linear oscillator under `force cos(omega t) + load`.
 #[derive(Clone, Copy, Debug)]
@@ -108,7 +108,7 @@ const PLACES: usize = 4000;
 
 impl Walled {
     /// Returns the oscillator and its law for the library.
-    pub(crate) fn oscillator(&self) -> (Oscillator, Law) {
+    pub(crate) fn oscillator(&self) -> (Pair, Law) {
         let at = |i: usize| self.walls[i].map_or(SIGNS[i] * f64::INFINITY, |wall| wall.at());
         let contact = |i: usize| match self.walls[i] {
             Some(Wall::Elastic { .. }) => Contact::Elastic,
@@ -118,7 +118,7 @@ impl Walled {
             Some(Wall::Rigid { e, .. }) => e,
             _ => 0.0,
         };
-        let oscillator = Oscillator {
+        let oscillator = Pair {
             degrees: 1,
             mass: [[self.free.m, 0.0], [0.0, 1.0]],
             gap: [1.0, 0.0],
@@ -131,12 +131,9 @@ impl Walled {
             stages: Vec::new(),
             schedule: Vec::new(),
             outer_walls: Default::default(),
-            friction: Vec::new(),
-            machine: None,
             free: self.free.domain(),
             meshing: [self.behind(0).domain(), self.behind(1).domain()],
         };
-        oscillator.validate().expect("a valid oscillator");
         (oscillator, Law { restitution: [restitution(0), restitution(1)], mesh_speed: [0.0; 2] })
     }
 

@@ -67,6 +67,39 @@ fn no_layer_names_a_layer_above_its_own() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Returns the code of a module of `dynamics` and of the files in its folder.
+fn module(name: &str) -> String {
+    let file = root().join(format!("dynamics/src/{name}.rs"));
+    let folder = root().join("dynamics/src").join(name);
+    let parts = if folder.is_dir() { sources(&folder) } else { Vec::new() };
+    parts.iter().chain([&file]).map(|source| code(source)).collect::<Vec<_>>().join("\n")
+}
+
+/// The engines stand side by side, below what classifies motion, and one file knows both.
+#[test]
+fn the_engines_of_dynamics_do_not_know_each_other() {
+    let above = ["orbit", "stability", "motion::Trajectory", "motion::Flow"];
+    for (engine, other) in [("pair", "machine"), ("machine", "pair")] {
+        let code = module(engine);
+        for name in above.iter().chain([&other]) {
+            assert!(!code.contains(&format!("crate::{name}")), "{engine} names {name}");
+        }
+    }
+    for below in ["allowance", "clock", "event", "slip", "sums"] {
+        let code = module(&format!("motion/{below}"));
+        assert!(
+            !["pair", "machine"].iter().any(|engine| code.contains(&format!("crate::{engine}"))),
+            "{below}"
+        );
+    }
+    for above in ["orbit", "stability", "word"] {
+        assert!(
+            !["pair", "machine"].iter().any(|engine| module(above).contains(&format!("crate::{engine}"))),
+            "{above}"
+        );
+    }
+}
+
 #[test]
 fn an_upward_import_is_found() {
     let gpu = LAYERS.iter().position(|layer| *layer == "gpu").unwrap();

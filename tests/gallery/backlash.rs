@@ -3,8 +3,8 @@
 use crate::common::apart;
 use crate::common::closed_form::Linear;
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, State, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow, state_at};
 
 fn backlash(values: &[(&str, f64)]) -> FileModel {

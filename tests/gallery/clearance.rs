@@ -18,8 +18,8 @@ use nalgebra::{Complex, Matrix2, Matrix4, Vector2, Vector4};
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
 use crate::cycle::{followed, multipliers, off_the_judge};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State, state};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, State, state};
+use rattlemap_dynamics::motion::EventKind;
 
 const MU: f64 = 0.05;
 const ZETA: f64 = 0.02;
@@ -28,7 +28,7 @@ const PHI: f64 = 0.952;
 const DELTA: f64 = 1.0;
 const E: f64 = 0.9;
 
-pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
+pub(crate) fn pair(omega: f64) -> (Pair, Law) {
     let (c, k) = (2.0 * XI * MU, PHI * PHI * MU);
     let domain = Domain {
         damping: [[2.0 * ZETA + c, -c], [-c, c]],
@@ -36,7 +36,7 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
         load: [0.0; 2],
         preload: 0.0,
     };
-    let oscillator = Oscillator {
+    let oscillator = Pair {
         degrees: 2,
         mass: [[1.0, 0.0], [0.0, MU]],
         gap: [1.0, -1.0],
@@ -49,12 +49,9 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
-        friction: Vec::new(),
-        machine: None,
         free: domain,
         meshing: [domain; 2],
     };
-    oscillator.validate().unwrap();
     (oscillator, Law::both(E, 0.0))
 }
 
@@ -96,7 +93,7 @@ pub(crate) const SINK: Damper = Damper {
 };
 
 impl Damper {
-    pub(crate) fn pair(&self) -> (Oscillator, Law) {
+    pub(crate) fn pair(&self) -> (Pair, Law) {
         let first = |value: f64| [[value, 0.0], [0.0; 2]];
         let domain = Domain {
             damping: first(self.damping),
@@ -104,7 +101,7 @@ impl Damper {
             load: [0.0; 2],
             preload: 0.0,
         };
-        let oscillator = Oscillator {
+        let oscillator = Pair {
             degrees: 2,
             mass: [[self.mass, 0.0], [0.0, self.free_mass]],
             gap: [1.0, -1.0],
@@ -117,18 +114,15 @@ impl Damper {
             stages: Vec::new(),
             schedule: Vec::new(),
             outer_walls: Default::default(),
-            friction: Vec::new(),
-            machine: None,
             free: domain,
             meshing: [domain; 2],
         };
-        oscillator.validate().unwrap();
         (oscillator, Law::both(self.e, 0.0))
     }
 }
 
 /// A ball that moves by up to `d` from the middle of a container at `cos(t)`.
-pub(crate) fn container(d: f64, e: f64) -> (Oscillator, Law) {
+pub(crate) fn container(d: f64, e: f64) -> (Pair, Law) {
     let free = Linear { m: 1.0, c: 0.0, k: 0.0, force: 1.0, omega: 1.0, load: 0.0 };
     Walled { free, walls: [Some(Wall::Rigid { at: d, e }), Some(Wall::Rigid { at: -d, e })] }.oscillator()
 }
@@ -155,7 +149,7 @@ struct Motion {
     steady: [Vector4<f64>; 2],
 }
 
-fn motion(o: &Oscillator, e: f64) -> Motion {
+fn motion(o: &Pair, e: f64) -> Motion {
     let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
     let mass = matrix(o.mass);
     let inverse = mass.try_inverse().unwrap();
@@ -187,7 +181,7 @@ fn motion(o: &Oscillator, e: f64) -> Motion {
 }
 
 /// Returns the symmetric orbits that approach the right wall at the impact.
-pub(crate) fn symmetric((oscillator, law): &(Oscillator, Law)) -> Vec<Symmetric> {
+pub(crate) fn symmetric((oscillator, law): &(Pair, Law)) -> Vec<Symmetric> {
     let Motion { gap, generator, impact, steady } = motion(oscillator, law.restitution[0]);
     let (omega, delta) = (oscillator.omega, oscillator.walls[0]);
     let half = PI / omega;
@@ -239,12 +233,12 @@ pub(crate) fn symmetric((oscillator, law): &(Oscillator, Law)) -> Vec<Symmetric>
 }
 
 /// Returns the rate at which the gap closes on the right.
-fn closing(oscillator: &Oscillator, y: &Vector4<f64>) -> f64 {
+fn closing(oscillator: &Pair, y: &Vector4<f64>) -> f64 {
     oscillator.gap[0] * y[1] + oscillator.gap[1] * y[3]
 }
 
 /// Returns models with symmetric orbits of two impacts.
-pub(crate) fn clearances() -> Vec<(String, (Oscillator, Law))> {
+pub(crate) fn clearances() -> Vec<(String, (Pair, Law))> {
     let two_masses = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.5, 1.8]
         .map(|omega| (format!("two masses, omega = {omega}"), pair(omega)));
     let dampers = [(10.0, 0.05), (10.2, 0.045), (10.5, 0.05)].map(|(hertz, clearance)| {

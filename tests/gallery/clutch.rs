@@ -1,6 +1,7 @@
 //! A clutch disc with two spring stages and stops: cycles in closed form, from piece to piece of the spring's characteristic.
 
 use nalgebra::Matrix2;
+use rattlemap_dynamics::model::Form;
 
 use crate::common::apart;
 use crate::common::closed_form::Linear;
@@ -105,7 +106,7 @@ pub(crate) fn cycles() -> Vec<Cycle> {
             [("omega", omega), ("F", force)]
                 .into_iter()
                 .for_each(|(name, value)| model.set(name, value).expect("a parameter"));
-            let (oscillator, law) = (model.oscillator().expect("valid parameters"), model.law());
+            let (oscillator, law) = (Form::from(&model.oscillator().unwrap()), model.law());
             let [x, v, ..] = followed(&oscillator, law, REST, 1200).end;
             let closes = |&period: &u32| {
                 let [a, b] = run(omega, force, [x, v], period).y;
@@ -124,9 +125,10 @@ pub(crate) fn cycles() -> Vec<Cycle> {
 #[test]
 fn motion_from_rest_agrees_with_closed_forms() {
     for cycle in cycles() {
-        let omega = cycle.oscillator.omega;
-        let found = followed(&cycle.oscillator, cycle.law, REST, 3);
-        let [x, v] = run(omega, cycle.oscillator.force[0], [0.0; 2], 3).y;
+        let Form::Pair(pair) = &cycle.oscillator else { panic!("{}", cycle.what) };
+        let omega = pair.omega;
+        let found = followed(pair, cycle.law, REST, 3);
+        let [x, v] = run(omega, pair.force[0], [0.0; 2], 3).y;
         let off = apart(found.end, state(&[x, v]));
         assert!(off < 1e-12, "omega = {omega}: {off:e}");
     }

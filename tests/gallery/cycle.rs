@@ -3,12 +3,12 @@
 use nalgebra::{Complex, DMatrix, Matrix4};
 
 use rattlemap::validate::independent::machine::Flight;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Machine, Oscillator, State};
-use rattlemap_dynamics::reference::{GapEvent, Trajectory};
+use rattlemap_dynamics::model::{Form, Law, Pair, State};
+use rattlemap_dynamics::motion::{Flow, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
 use crate::common::apart;
+use crate::common::pairs::described;
 
 /// A motion over some periods.
 pub(crate) struct Followed {
@@ -21,7 +21,7 @@ pub(crate) struct Followed {
 }
 
 /// Computes the reference's motion from a start at phase 0.
-pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> Followed {
+pub(crate) fn followed(oscillator: impl Into<Form>, law: Law, start: State, periods: u32) -> Followed {
     let flow = Flow::new(oscillator);
     let mut trajectory = Trajectory::with_tangents(&flow, law, start, UNIT);
     let mut events = Vec::new();
@@ -39,8 +39,8 @@ pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods:
 
 /// Returns the distance of the last states of the reference and of the judge of maps. Both must find the same number of
 /// events.
-pub(crate) fn off_the_judge(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> f64 {
-    let mut flight = Flight::new(&Machine::of(oscillator, law), &start);
+pub(crate) fn off_the_judge(oscillator: &Pair, law: Law, start: State, periods: u32) -> f64 {
+    let mut flight = Flight::new(&described(oscillator, law), &start);
     (0..periods).for_each(|_| flight.advance(0.0, std::f64::consts::TAU).expect("an ordinary motion"));
     let ours = followed(oscillator, law, start, periods);
     assert_eq!(flight.events.len(), ours.events.len(), "{:?} {:?}", flight.events, ours.events);

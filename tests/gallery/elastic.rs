@@ -5,7 +5,7 @@ use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
 use crate::cycle::{first_block, followed, off_the_judge};
 use rattlemap_dynamics::model::{State, state};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::motion::EventKind;
 
 /// Builds the bilinear oscillator with stiffness 1 for negative and 4 for positive displacements.
 pub(crate) fn bilinear(omega: f64, force: f64) -> Walled {

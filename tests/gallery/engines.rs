@@ -1,5 +1,9 @@
 //! Motions with closed forms, computed by the reference and by lanes in f32 and f64.
 
+use std::f64::consts::TAU;
+
+use crate::common::pairs::{AsPair, omega_of};
+use rattlemap_dynamics::model::Form;
 use std::sync::LazyLock;
 
 use nalgebra::Matrix4;
@@ -20,15 +24,15 @@ use rattlemap::gpu::{Features, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Model, Oscillator, State, state};
+use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::model::{Contact, Law, Model, State, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
-use rattlemap_dynamics::reference::machine::{Motion, System};
 
 /// A stable cycle with a closed form.
 struct Known {
     what: String,
-    oscillator: Oscillator,
+    oscillator: Form,
     law: Law,
     period: u32,
     /// State at phase 0.
@@ -53,7 +57,7 @@ fn known_cycles() -> Vec<Known> {
         let what = format!("one stop, omega = {}, n = {period}", stop.omega);
         list.push(Known {
             what,
-            oscillator,
+            oscillator: Form::Pair(oscillator),
             law,
             period,
             strobe: orbit.strobe,
@@ -72,7 +76,7 @@ fn known_cycles() -> Vec<Known> {
             let (radius, what) = (eigenvalues(matrix)[0].norm(), format!("ball, e = {e}, G = {shaking:.3}"));
             list.push(Known {
                 what,
-                oscillator,
+                oscillator: Form::Pair(oscillator),
                 law,
                 period: 1,
                 strobe,
@@ -91,7 +95,7 @@ fn known_cycles() -> Vec<Known> {
             if orbit.is_free_between && radius < 1.0 {
                 list.push(Known {
                     what: what.clone(),
-                    oscillator: oscillator.clone(),
+                    oscillator: Form::Pair(oscillator.clone()),
                     law,
                     period: 1,
                     strobe: orbit.strobe,
@@ -106,14 +110,14 @@ fn known_cycles() -> Vec<Known> {
     let of_clutch = clutch::cycles().into_iter().map(|cycle| (cycle, true));
     for (cycle, is_bare) in models::cycles().into_iter().map(|cycle| (cycle, false)).chain(of_clutch) {
         let models::Cycle { what, oscillator, law, period, strobe, radius, impacts, stays } = cycle;
-        let unit = if is_bare { 1.0 } else { oscillator.omega };
+        let unit = if is_bare { 1.0 } else { omega_of(&oscillator) };
         let (strobe, impacts) = (state(&strobe), f64::from(impacts));
         list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays, unit });
     }
     for cycle in machines::cycles() {
         let machines::Cycle { what, machine, strobe, radius, impacts } = cycle;
-        let (oscillator, law) = (Oscillator::of_machine(machine), Law::both(0.0, 0.0));
-        let unit = oscillator.omega;
+        let (oscillator, law) = (Form::Machine(machine), Law::both(0.0, 0.0));
+        let unit = omega_of(&oscillator);
         list.push(Known { what, oscillator, law, period: 1, strobe, radius, impacts, stays: false, unit });
     }
     let settling = [
@@ -137,6 +141,7 @@ fn known_cycles() -> Vec<Known> {
         let damped = (-0.5 * walled.free.c / walled.free.m * f64::from(period) * walled.free.period()).exp();
         let radius = if is_stuck { 0.0 } else { damped * law.restitution[0].powi(impacts) };
         let (what, strobe, impacts) = (what.to_owned(), state(&[x, v]), f64::from(impacts));
+        let oscillator = Form::Pair(oscillator);
         list.push(Known { what, oscillator, law, period, strobe, radius, impacts, stays, unit: 1.0 });
     }
     list
@@ -179,7 +184,7 @@ fn distance(a: &State, b: &State, unit: f64) -> f64 {
 
 /// Returns the states of a cycle at phase 0.
 fn images(known: &Known) -> Vec<State> {
-    let Some(machine) = &known.oscillator.machine else {
+    let Form::Machine(machine) = &known.oscillator else {
         let at = |n: u32| followed(&known.oscillator, known.law, known.strobe, n).end;
         return (0..known.period).map(at).collect();
     };
@@ -203,7 +208,7 @@ fn off(known: &Known, record: &Record) -> [f64; 2] {
     let apart = |at: State| distance(&record.strobe, &at, known.unit);
     let near = images(known).into_iter().map(apart).fold(f64::INFINITY, f64::min);
     let size = distance(&known.strobe, &state(&[]), known.unit);
-    let span = f64::from(known.period) * known.oscillator.period();
+    let span = f64::from(known.period) * TAU / omega_of(&known.oscillator);
     // A cycle at rest has no size.
     let error = if near == 0.0 { 0.0 } else { near / size };
     if known.radius == 0.0 {
@@ -239,8 +244,8 @@ fn the_reference_finds_known_cycles() {
 }
 
 /// Runs a lane for each oscillator with its law and start.
-fn run(gpu: &mut Gpu, cells: &[(Oscillator, Law, State)], settings: &LaneSettings) -> Vec<Record> {
-    let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.0.clone()).collect();
+fn run(gpu: &mut Gpu, cells: &[(Form, Law, State)], settings: &LaneSettings) -> Vec<Record> {
+    let flows: Vec<Form> = cells.iter().map(|cell| cell.0.clone()).collect();
     let laws: Vec<Law> = cells.iter().map(|cell| cell.1).collect();
     let lanes: Vec<Lane> =
         (0..).zip(cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.2 }).collect();
@@ -248,7 +253,7 @@ fn run(gpu: &mut Gpu, cells: &[(Oscillator, Law, State)], settings: &LaneSetting
 }
 
 /// Returns settings with the features of all these oscillators.
-fn settings<'o>(oscillators: impl Iterator<Item = &'o Oscillator>, settings: LaneSettings) -> LaneSettings {
+fn settings<'o>(oscillators: impl Iterator<Item = &'o Form>, settings: LaneSettings) -> LaneSettings {
     LaneSettings {
         features: oscillators.map(Features::of).fold(settings.features, Features::and),
         ..settings
@@ -281,7 +286,7 @@ fn check_borders(gpu: &mut Gpu, plain: &[&Known]) {
     let points = meissner::points();
     let small = state(&[0.01]);
     let cells: Vec<_> =
-        points.iter().map(|point| (point.model.oscillator().unwrap(), point.model.law(), small)).collect();
+        points.iter().map(|point| (Form::Pair(point.model.pair()), point.model.law(), small)).collect();
     let all = plain.iter().map(|known| &known.oscillator).chain(cells.iter().map(|cell| &cell.0));
     let records = run(gpu, &cells, &settings(all, LaneSettings::within(&budget())));
     for (point, record) in points.iter().zip(&records) {
@@ -296,7 +301,7 @@ const CHAIN_PERIODS: u32 = 8;
 /// Compares the chain of masses with its closed form between impacts.
 fn check_chain(gpu: &mut Gpu, bar: f64) {
     let (machine, start, end, impacts) = machines::chain(CHAIN_PERIODS);
-    let (omega, flow) = (machine.omega, Oscillator::of_machine(machine));
+    let (omega, flow) = (machine.omega, Form::Machine(machine));
     let settings = settings([&flow].into_iter(), LaneSettings::only(CHAIN_PERIODS));
     let [record] = run(gpu, &[(flow, Law::both(0.0, 0.0), start)], &settings)[..] else {
         unreachable!("one lane has one record")

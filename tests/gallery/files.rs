@@ -3,11 +3,12 @@
 use crate::ball::ball;
 use crate::clearance;
 use crate::common::closed_form::Walled;
+use crate::common::pairs::AsPair;
 use crate::elastic::{backlash, bilinear, soft};
 use crate::loose_gear;
 use crate::single_impact::{COCO, STOP};
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::model::{Contact, Domain, Law, Model, Oscillator};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Model, Pair};
 
 fn numbers(domain: &Domain) -> Vec<f64> {
     [domain.damping.as_flattened(), domain.stiffness.as_flattened(), &domain.load].concat()
@@ -18,11 +19,11 @@ fn is_near(ours: &[f64], theirs: &[f64]) -> bool {
     ours.len() == theirs.len() && ours.iter().zip(theirs).all(near)
 }
 
-fn agrees(name: &str, sets: &[(&str, f64)], (ours, law): (Oscillator, Law)) {
+fn agrees(name: &str, sets: &[(&str, f64)], (ours, law): (Pair, Law)) {
     let mut model = FileModel::built_in(name).expect("built in");
     sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
-    let theirs = model.oscillator().unwrap();
-    let flat = |o: &Oscillator| {
+    let theirs = model.pair();
+    let flat = |o: &Pair| {
         [o.mass.as_flattened(), &o.gap, &o.walls, &[o.omega], &o.force, &numbers(&o.free)].concat()
     };
     assert!(is_near(&flat(&ours), &flat(&theirs)), "{name}: {ours:#?} {theirs:#?}");

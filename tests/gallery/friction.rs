@@ -1,8 +1,8 @@
 //! Dry friction: Den Hartog's border of stops, the border of rattle of a gear that sticks to its shaft, and a closed valve.
 
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, REST, State};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse_flow};
 
 fn motion(name: &str, values: &[(&str, f64)], start: State) -> Orbit {

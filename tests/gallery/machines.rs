@@ -1,17 +1,19 @@
 //! Machines: two loose gears on a heavy shaft, a chain between impacts in closed form, harmonics and their phase, restitution that depends
 //! on the speed, and the balance of energy.
 
+use crate::common::pairs::AsPair;
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2};
+use rattlemap_dynamics::model::Form;
 
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::machine::{Motion, System};
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, Law, Machine, Model, Oscillator, REST, Restitution, Side,
-    Spring, State, Wall, state,
+    Contact, Drive, DryFriction, Forces, GapRow, Law, Model, Oscillator, REST, Restitution, Side, Spring,
+    State, Wall, state,
 };
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, SlipEvent, States};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse_flow};
-use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, SlipEvent, System};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer};
 
 use crate::ball::{self, bounce};
 use crate::common::apart;
@@ -20,27 +22,42 @@ use crate::cycle::{eigenvalues, off_the_judge};
 use crate::pieces;
 
 /// Returns the machine of a model in `models/`.
-fn machine(name: &str, values: &[(&str, f64)]) -> Machine {
+fn machine(name: &str, values: &[(&str, f64)]) -> Oscillator {
     let mut model = FileModel::built_in(name).expect("built in");
     values.iter().for_each(|&(name, value)| model.set(name, value).expect("a parameter"));
-    *model.oscillator().expect("valid parameters").machine.expect("a machine")
+    model.oscillator().unwrap()
+}
+
+/// An event at a wall, and the states before and after it.
+#[derive(Clone, Copy, Debug)]
+struct AtWall {
+    event: GapEvent,
+    before: State,
+    after: State,
+}
+
+impl std::ops::Deref for AtWall {
+    type Target = GapEvent;
+
+    fn deref(&self) -> &GapEvent {
+        &self.event
+    }
 }
 
 /// Events of a machine.
 #[derive(Default)]
 struct Log {
-    events: Vec<MachineEvent>,
+    events: Vec<AtWall>,
     slips: Vec<SlipEvent>,
 }
 
 impl Observer for Log {
-    fn event(&mut self, _: &GapEvent) {}
-
-    fn machine_event(&mut self, event: &MachineEvent) {
-        self.events.push(*event);
+    fn event(&mut self, event: &GapEvent, states: States<'_>) {
+        let [before, after] = states();
+        self.events.push(AtWall { event: *event, before, after });
     }
 
-    fn machine_slip(&mut self, event: &SlipEvent) {
+    fn slip(&mut self, event: &SlipEvent) {
         self.slips.push(*event);
     }
 }
@@ -75,14 +92,14 @@ const GEARS: Gears = Gears {
 
 impl Gears {
     /// Returns the whole machine, with a shaft of a given mass.
-    fn together(&self, shaft: f64) -> Machine {
+    fn together(&self, shaft: f64) -> Oscillator {
         let drive = self.swing * (STIFFNESS - self.omega * self.omega) / STIFFNESS;
         // The drive of the file is A sin(omega t).
         self.with(shaft, &[("A", drive), ("c", 0.0)]).at_phase(1.5 * std::f64::consts::PI)
     }
 
     /// Returns the machine with a shaft of a given mass, and further values.
-    fn with(&self, shaft: f64, values: &[(&str, f64)]) -> Machine {
+    fn with(&self, shaft: f64, values: &[(&str, f64)]) -> Oscillator {
         let [m1, m2] = self.mass;
         let [drag1, drag2] = self.drag;
         let [b1, b2] = self.backlash;
@@ -130,7 +147,7 @@ impl Gears {
 /// A stable cycle of a machine, of one forcing period.
 pub(crate) struct Cycle {
     pub(crate) what: String,
-    pub(crate) machine: Machine,
+    pub(crate) machine: Oscillator,
     pub(crate) strobe: State,
     /// Modulus of the largest multiplier.
     pub(crate) radius: f64,
@@ -351,7 +368,7 @@ impl Chain {
 const PLACES: usize = 4000;
 
 /// Returns a chain, the state at the start, and state and number of impacts after so many periods.
-pub(crate) fn chain(periods: u32) -> (Machine, State, State, u32) {
+pub(crate) fn chain(periods: u32) -> (Oscillator, State, State, u32) {
     let start = std::array::from_fn(|i| 0.1 * (1.0 + 3.7 * i as f64).sin() * if i < 14 { 1.0 } else { 0.01 });
     let (end, impacts) = Chain::new().run(&start, periods);
     (machine("absorber-chain", &CHAIN), start, end, impacts)
@@ -427,7 +444,7 @@ fn turbine_gears_with_three_harmonics_agree_with_the_integrator() {
     for (omega, load) in [(2e4, 3800.0), (4e4, 800.0), (6e4, 300.0), (9e4, 100.0)] {
         let mut model = FileModel::built_in("turbine-gears").unwrap();
         [("omega", omega), ("T", load)].into_iter().for_each(|(name, value)| model.set(name, value).unwrap());
-        let (oscillator, law) = (model.oscillator().unwrap(), model.law());
+        let (oscillator, law) = (model.pair(), model.law());
         // In units of the half backlash and of the time, as the tolerances of the integrator are.
         let start = state(&[1.2e-4, 0.0]);
         let off = off_the_judge(&oscillator, law, start, 3);
@@ -437,7 +454,7 @@ fn turbine_gears_with_three_harmonics_agree_with_the_integrator() {
 }
 
 /// Three masses in a row with a stop, three harmonics with cosine and sine, and two stages. `phase` is the phase of the force at the start.
-fn row_of_three(phase: f64) -> Machine {
+fn row_of_three(phase: f64) -> Oscillator {
     let matrix = |entries: [f64; 9]| DMatrix::from_row_slice(3, 3, &entries);
     let stage = |k: f64| Forces {
         damping: matrix([0.1, -0.05, 0.0, -0.05, 0.1, -0.05, 0.0, -0.05, 0.1]),
@@ -461,7 +478,7 @@ fn row_of_three(phase: f64) -> Machine {
     let wall = |at: f64, e: f64| Wall {
         at,
         contact: Contact::Rigid,
-        restitution: Restitution::constant(e),
+        restitution: Restitution::Constant(e),
         mesh_speed: 0.0,
         springs: vec![Spring::default(); 2],
     };
@@ -469,7 +486,7 @@ fn row_of_three(phase: f64) -> Machine {
         row: DVector::from_row_slice(&row),
         walls: [vec![wall(right, 0.6)], vec![wall(-0.4, 0.5)]],
     };
-    Machine {
+    Oscillator {
         omega: 1.3,
         mass: DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.5, 0.8])),
         stages: vec![stage(1.0), stage(0.6)],
@@ -528,11 +545,11 @@ fn another_phase_of_all_harmonics_is_another_instant_of_the_same_motion() {
 /// Multipliers of the cycle do not depend on the phase at which it is cut.
 #[test]
 fn cycles_have_the_same_multipliers_at_every_phase() {
-    let orbit = |machine: Machine, start: State| -> Orbit {
-        let flow = Flow::new(&Oscillator::of_machine(machine));
+    let orbit = |machine: Oscillator, start: State| -> Orbit {
+        let flow = Flow::new(&Form::Machine(machine));
         analyse_flow(&flow, Law::both(0.0, 0.0), start, &Settings::default(), 8)
     };
-    let at = |phase: f64| Machine { omega: 2.1, ..row_of_three(phase) };
+    let at = |phase: f64| Oscillator { omega: 2.1, ..row_of_three(phase) };
     let first = orbit(at(0.0), REST);
     let Class::Periodic { period } = first.class else { panic!("{:?} {:?}", first.class, first.status) };
     let phase = 1.9;
@@ -562,7 +579,7 @@ fn cycles_have_the_same_multipliers_at_every_phase() {
 const GRAVITY: f64 = 9.81;
 
 /// A ball over a floor at 0.
-fn dropped(restitution: Restitution) -> Machine {
+fn dropped(restitution: Restitution) -> Oscillator {
     let one = |value: f64| DMatrix::from_element(1, 1, value);
     let wall = Wall {
         at: 0.0,
@@ -571,7 +588,7 @@ fn dropped(restitution: Restitution) -> Machine {
         mesh_speed: 0.0,
         springs: vec![Spring::default()],
     };
-    let machine = Machine {
+    let machine = Oscillator {
         omega: 1.0,
         mass: one(0.7),
         stages: vec![Forces {
@@ -584,7 +601,6 @@ fn dropped(restitution: Restitution) -> Machine {
         gaps: vec![GapRow { row: DVector::from_element(1, 1.0), walls: [Vec::new(), vec![wall]] }],
         friction: Vec::new(),
     };
-    machine.validate().expect("a valid machine");
     machine
 }
 
@@ -594,7 +610,7 @@ fn dropped(restitution: Restitution) -> Machine {
 fn impact_speeds_follow_the_law_of_restitution() {
     let laws = [(0.9, -0.05, 1.0), (1.0, -0.1, 0.2), (0.5, 0.08, 0.5), (0.95, -0.01, 1.7), (0.8, 0.0, 1.0)];
     for (constant, factor, power) in laws {
-        let system = System::new(&dropped(Restitution { constant, factor, power }));
+        let system = System::new(&dropped(Restitution::BySpeed { constant, factor, power }));
         let e = |u: f64| constant + factor * u.powf(power);
         let slope = |u: f64| e(u) + factor * power * u.powf(power);
         for start in [[2.0, 0.0], [0.3, 1.5], [5.0, -3.0]] {
@@ -615,10 +631,13 @@ fn impact_speeds_follow_the_law_of_restitution() {
             assert_eq!(log.events.len(), 4);
             for event in &log.events {
                 assert_eq!(event.kind, EventKind::Impact);
-                assert!((event.rates[0].abs() / u - 1.0).abs() < 1e-12 && (event.t - t).abs() < 1e-12 * end);
+                assert!(
+                    (event.event.before[1].abs() / u - 1.0).abs() < 1e-12
+                        && (event.t - t).abs() < 1e-12 * end
+                );
                 du *= slope(u);
                 u *= e(u);
-                assert!((event.rates[1] / u - 1.0).abs() < 1e-12, "{event:?}");
+                assert!((event.event.after[1] / u - 1.0).abs() < 1e-12, "{event:?}");
                 // At the next impact.
                 dt += du * (2.0 / GRAVITY);
                 t += 2.0 * u / GRAVITY;
@@ -645,7 +664,7 @@ fn impact_speeds_follow_the_law_of_restitution() {
 fn restitution_by_speed_is_limited() {
     // Above 1: no energy is gained. Below 0: the ball stays on the floor.
     for (constant, factor, keeps) in [(0.9, 0.5, true), (0.5, -0.2, false)] {
-        let system = System::new(&dropped(Restitution { constant, factor, power: 1.0 }));
+        let system = System::new(&dropped(Restitution::BySpeed { constant, factor, power: 1.0 }));
         let mut motion = Motion::new(&system, &[2.0, 0.0]);
         motion.set_tangents(Motion::unit_tangents(&system));
         let u = (4.0 * GRAVITY).sqrt();
@@ -710,7 +729,7 @@ fn a_viscoelastic_ball_bounces_once_per_period_in_closed_form() {
         let (trace, det) = (matrix.trace() - sum, matrix.determinant() - product);
         println!("B = {loss}: state {off:.1e}, multipliers {:.1e}", trace.abs().max(det.abs()));
         assert!(off < 1e-12 && trace.abs().max(det.abs()) < 1e-12, "{off:e} {trace:e} {det:e}");
-        assert!((event.rates[0] + approach).abs() < 1e-12);
+        assert!((event.event.before[1] + approach).abs() < 1e-12);
     }
 }
 
@@ -738,8 +757,7 @@ fn the_work_of_the_force_is_what_dampers_friction_and_impacts_take() {
         let mut machine = machine("two-loose-gears", &[("omega", omega), ("A", swing), ("e", 0.6)]);
         machine.friction =
             vec![DryFriction { row: DVector::from_vec(vec![0.0, 1.0, 0.0]), force: friction, speed: 0.0 }];
-        machine.validate().unwrap();
-        let flow = Flow::new(&Oscillator::of_machine(machine.clone()));
+        let flow = Flow::new(&Form::Machine(machine.clone()));
         let orbit = analyse_flow(&flow, Law::both(0.0, 0.0), REST, &SHORT, 8);
         let Class::Periodic { period } = orbit.class else { panic!("{:?} {:?}", orbit.class, orbit.status) };
         let of = orbit.quantities.expect("measured");

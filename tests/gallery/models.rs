@@ -1,7 +1,9 @@
 //! Cycles of models in `models/` whose equations of motion are linear in pieces. Their equations are written here again.
 
+use crate::common::pairs::omega_of;
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::model::{Law, Model, Oscillator, state};
+use rattlemap_dynamics::model::Form;
+use rattlemap_dynamics::model::{Law, Model, Pair, state};
 
 use crate::common::apart;
 use crate::common::closed_form::Linear;
@@ -12,7 +14,7 @@ use crate::pieces::{self, End, Field, Pieces, rubbing};
 /// A cycle.
 pub(crate) struct Cycle {
     pub(crate) what: String,
-    pub(crate) oscillator: Oscillator,
+    pub(crate) oscillator: Form,
     pub(crate) law: Law,
     pub(crate) period: u32,
     /// Displacement and velocity at phase 0.
@@ -27,7 +29,7 @@ pub(crate) struct Cycle {
 /// A model, its equations, and the state from which the reference reaches the cycle.
 struct Case {
     what: String,
-    oscillator: Oscillator,
+    oscillator: Form,
     law: Law,
     pieces: Pieces,
     start: [f64; 2],
@@ -40,7 +42,7 @@ impl Case {
         let values: Vec<_> = values.iter().map(|(name, value)| format!("{name} = {value:.4}")).collect();
         Case {
             what: format!("{name}, {}", values.join(", ")),
-            oscillator: model.oscillator().expect("valid parameters"),
+            oscillator: Form::from(&model.oscillator().unwrap()),
             law: model.law(),
             pieces,
             start,
@@ -98,7 +100,7 @@ fn cases() -> Vec<Case> {
         let (sin, cos) = phase.sin_cos();
         let [cos, sin] = [walled.free.force * cos, -walled.free.force * sin];
         let (oscillator, law) = walled.oscillator();
-        let oscillator = Oscillator { force: [cos, 0.0], force_sin: [sin, 0.0], ..oscillator };
+        let oscillator = Form::Pair(Pair { force: [cos, 0.0], force_sin: [sin, 0.0], ..oscillator });
         let field = Field { linear: Linear { force: 0.0, ..walled.free }, drives: vec![(1, [cos, sin])] };
         let pieces = pieces::backlash(&[field], &[0.0], 1.0, &[[1.0, 0.0]], true);
         let what = format!("backlash, phase {phase}");
@@ -142,13 +144,12 @@ pub(crate) fn cycles() -> Vec<Cycle> {
 #[test]
 fn motion_from_the_start_agrees_with_closed_forms() {
     for Case { what, oscillator, law, pieces, start } in cases() {
+        let omega = omega_of(&oscillator);
         let found = followed(&oscillator, law, state(&start), 3).end;
         let end = pieces.run(start, 3);
-        let size = end.y[0].abs().max(end.y[1].abs() / oscillator.omega);
-        let off = apart([found[0], found[1] / oscillator.omega, 0.0, 0.0], {
-            [end.y[0], end.y[1] / oscillator.omega, 0.0, 0.0]
-        });
-        let (m, omega) = (end.tangent, oscillator.omega);
+        let size = end.y[0].abs().max(end.y[1].abs() / omega);
+        let off = apart([found[0], found[1] / omega, 0.0, 0.0], { [end.y[0], end.y[1] / omega, 0.0, 0.0] });
+        let m = end.tangent;
         // Contacts amplify rounding errors.
         let growth =
             [m.m11, m.m12 * omega, m.m21 / omega, m.m22].map(f64::abs).into_iter().fold(10.0, f64::max);

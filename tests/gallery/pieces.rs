@@ -2,7 +2,8 @@
 //! stops, dry friction and several harmonics. Only the times of events are searched for, by bisection.
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
-use rattlemap_dynamics::model::{Law, Oscillator, state};
+use rattlemap_dynamics::model::Form;
+use rattlemap_dynamics::model::{Law, state};
 
 use crate::common::closed_form::Linear;
 use crate::cycle::followed;
@@ -175,7 +176,7 @@ impl Pieces {
     pub(crate) fn settled(
         &self,
         what: &str,
-        oscillator: &Oscillator,
+        oscillator: impl Into<Form>,
         law: Law,
         start: [f64; 2],
     ) -> ([f64; 2], u32, End) {

@@ -1,6 +1,8 @@
 //! Random models: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written as
 //! a model file and read.
 
+use crate::common::pairs::AsPair;
+use rattlemap_dynamics::model::Form;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
@@ -18,10 +20,10 @@ use rattlemap::validate::independent::machine::Flight;
 use rattlemap::validate::{
     Draw, Kind, Lanes, Rate, Sample, Stratum, Subject, TOLERATED, differences, replay,
 };
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Machine, Model, Oscillator, REST, State};
+use rattlemap_dynamics::model::{Law, Model, Pair, REST, State};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Budget, Class, Measurement, Settings, Status, measure};
-use rattlemap_dynamics::reference::Trajectory;
 
 use crate::common::apart;
 use crate::common::gpu::open;
@@ -31,7 +33,7 @@ const LONGEST_TIME: Duration = Duration::from_secs(60);
 
 pub(crate) struct RandomCell {
     pub(crate) model: FileModel,
-    pub(crate) oscillator: Oscillator,
+    pub(crate) oscillator: Pair,
     pub(crate) law: Law,
     pub(crate) start: State,
 }
@@ -131,7 +133,7 @@ pub(crate) fn random_cell(seed: u64) -> RandomCell {
     if random.unit() < 0.5 {
         (0..2 * degrees).for_each(|i| start[i] = even(random, 2.0));
     }
-    RandomCell { oscillator: model.oscillator().expect("valid"), law: model.law(), model, start }
+    RandomCell { oscillator: model.pair(), law: model.law(), model, start }
 }
 
 pub(crate) const SETTINGS: Settings =
@@ -215,7 +217,7 @@ fn check_judge(seeds: std::ops::Range<u32>) {
             if events.len() > 20 {
                 return None;
             }
-            let mut flight = Flight::new(&Machine::of(&cell.oscillator, cell.law), &cell.start);
+            let mut flight = Flight::new(&cell.model.oscillator().expect("valid"), &cell.start);
             flight.advance(0.0, std::f64::consts::TAU)?;
             let state = trajectory.state();
             let scale = state.iter().fold(cell.oscillator.length_scale(), |m, x| m.max(x.abs()));
@@ -247,7 +249,14 @@ const MOST_STEPS: f64 = 2000.0;
 /// Whether a lane needs few enough steps.
 fn is_bounded(cell: &RandomCell) -> bool {
     let Some(constants) = Constants::new(&cell.oscillator, None) else { return false };
-    let finest = constants.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
+    let finest = constants
+        .pair()
+        .expect("a pair")
+        .flow
+        .domains
+        .iter()
+        .map(|domain| domain.substeps)
+        .fold(1.0, f64::max);
     f64::from(constants.steps) * finest < MOST_STEPS
 }
 
@@ -280,7 +289,7 @@ fn validate(
         .quantities(&quantities)
         .build();
     let plan = Plan::new(&scene.expect("a valid scene"));
-    assert_eq!(plan.oscillator(plan.cell(0).flow), cell.oscillator);
+    assert_eq!(plan.form(plan.cell(0).flow), Form::Pair(cell.oscillator.clone()));
     let subject = Subject { plan: &plan, records: &[record], precision, is_lane: true };
     let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
     let sample = Sample { seed: 0, requested: 1, draws, states: Vec::new() };
@@ -292,7 +301,7 @@ fn validate(
 /// models, within its interval.
 fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
     let cells: Vec<RandomCell> = seeds.map(|seed| random_cell(u64::from(seed))).filter(is_bounded).collect();
-    let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.oscillator.clone()).collect();
+    let flows: Vec<Pair> = cells.iter().map(|cell| cell.oscillator.clone()).collect();
     let laws: Vec<Law> = cells.iter().map(|cell| cell.law).collect();
     let lanes: Vec<Lane> =
         (0..).zip(&cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.start }).collect();

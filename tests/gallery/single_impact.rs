@@ -16,9 +16,9 @@
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
 use crate::cycle::{eigenvalues, first_block, followed, multipliers_apart, off_the_judge};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{NonImpacting, State, state};
-use rattlemap_dynamics::reference::{EventKind, Trajectory};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EventKind, Trajectory};
 
 /// A forced oscillator with one stop.
 #[derive(Clone, Copy, Debug)]

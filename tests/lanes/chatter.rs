@@ -1,15 +1,16 @@
 //! Chatter on lanes: short flights are followed with short series, impact by impact. The results differ by rounding
-//! alone, within the bound that `shaders/chatter.wgsl` states.
+//! alone, within the bound that `shaders/pair/chatter.wgsl` states.
 
 use crate::common::gpu::{open, run_from_rest as run};
+use crate::common::pairs::AsPair;
 use crate::common::{REST, apart, flow_of, paper};
 use crate::counting::counting;
 use rattlemap::gpu::{LaneSettings, Precision, follows_chatter};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, Spelling, WORD_SYMBOLS};
 use rattlemap_dynamics::model::{GearPair, Model, State};
+use rattlemap_dynamics::motion::{Stop, Trajectory};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
-use rattlemap_dynamics::reference::{Stop, Trajectory};
 use rayon::prelude::*;
 
 /// Forcing periods from rest, so few that chaos has not yet amplified rounding.
@@ -87,7 +88,7 @@ fn chatter_agrees_with_the_reference() {
             assert_eq!(counted, impacts, "{at}: impacts");
             let error = apart(record.strobe, end);
             assert!(error <= bars[i], "{at}: off by {error:.2e}, rounding may make {:.2e}", bars[i]);
-            if follows_chatter(&pair.oscillator().unwrap(), mesh_speed) {
+            if follows_chatter(&pair.pair(), mesh_speed) {
                 errors[0].push(error / bars[i]);
                 errors[1].push(apart(ordinary[i].strobe, end) / bars[i]);
             }

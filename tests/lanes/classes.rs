@@ -3,6 +3,7 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::gpu::{open, run, run_from_rest};
+use crate::common::pairs::AsPair;
 use crate::common::{REST, paper as pair};
 use crate::kinds;
 use rattlemap::gpu::{LaneSettings, Precision};
@@ -85,7 +86,7 @@ fn a_cycle_below_the_resolution_has_that_status() {
 #[test]
 fn classes_do_not_depend_on_the_units_of_length_and_time() {
     let pairs = (0..24 * 24).map(|n| pair(f64::from(n % 24) / 23.0, 1.0 + 11.0 * f64::from(n / 24) / 23.0));
-    let plane: Vec<_> = pairs.map(|pair| (pair.oscillator().unwrap(), pair.law(), REST)).collect();
+    let plane: Vec<_> = pairs.map(|pair| (pair.pair(), pair.law(), REST)).collect();
     // Whether lanes follow chatter depends on speeds, too.
     let settings = LaneSettings::default();
     for precision in Precision::ALL {

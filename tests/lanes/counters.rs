@@ -12,7 +12,7 @@ use crate::common::{REST, flow_of, paper, work_since};
 use crate::counting::{LOOPS, counting};
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap_dynamics::model::GearPair;
-use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::motion::Trajectory;
 
 /// Stable cycles of every kind: description, restitution, frequency, meshing speed.
 const CELLS: [(&str, f64, f64, f64); 8] = [

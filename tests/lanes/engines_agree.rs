@@ -3,14 +3,16 @@
 //! Without an adapter the tests fail: install a software driver (see `scripts/test.sh`).
 
 use crate::common::gpu::{open, run};
+use crate::common::pairs::AsPair;
 use crate::common::table::{Row, rows};
 use crate::common::{REST, apart, flow_of, paper as pair};
 use rattlemap::gpu::{Lane, LaneSettings, Precision};
 use rattlemap::record::distance::{farther, is_within};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State, state};
+use rattlemap_dynamics::model::{GearPair, Law, Pair, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::States;
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, Trajectory};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Trajectory};
 use rayon::prelude::*;
 
 /// Returns the strobe states of the reference after `periods` and after one more.
@@ -152,7 +154,7 @@ fn every_kind_of_motion_agrees() {
 struct Impacts(u32);
 
 impl Observer for Impacts {
-    fn event(&mut self, happening: &GapEvent) {
+    fn event(&mut self, happening: &GapEvent, _: States<'_>) {
         self.0 += u32::from(happening.kind == EventKind::Impact);
     }
 }
@@ -307,11 +309,11 @@ fn one_wall_agrees_with_the_reference() {
     let pairs: Vec<GearPair> = [(0.2, 2.2), (0.5, 3.1), (0.3, 4.4), (0.6, 5.2), (0.0, 6.1), (0.4, 7.3)]
         .map(|(e, omega)| pair(e, omega))
         .to_vec();
-    let oscillators: Vec<Oscillator> = pairs
+    let oscillators: Vec<Pair> = pairs
         .iter()
         .map(|pair| {
-            let pair = pair.oscillator().unwrap();
-            Oscillator { walls: [pair.walls[0], f64::NEG_INFINITY], ..pair.clone() }
+            let pair = pair.pair();
+            Pair { walls: [pair.walls[0], f64::NEG_INFINITY], ..pair.clone() }
         })
         .collect();
     let laws: Vec<Law> = pairs.iter().map(GearPair::law).collect();

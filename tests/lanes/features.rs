@@ -4,6 +4,7 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::linear::{Linear, with_preload, with_wall};
+use crate::common::pairs::{AsPair, Friction, Rubbing};
 use crate::common::{BUDGET, apart};
 use crate::kinds::draw::{Numbers, random_cell};
 use crate::kinds::{self, Cell};
@@ -14,10 +15,10 @@ use rattlemap::map::plan::Needs;
 use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{
-    Contact, Domain, Friction, Harmonic, Law, Model, Oscillator, OuterWall, REST, Side, Stage, state,
+    Contact, Domain, Harmonic, Law, Model, OuterWall, Pair, REST, Side, Stage, state,
 };
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Class, measure};
 use rayon::prelude::*;
 
@@ -44,7 +45,6 @@ fn with_harmonics(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
         let harmonic = Harmonic { order, cos: factors(), sin: factors() };
         oscillator.harmonics.push(harmonic);
     }
-    oscillator.validate().unwrap();
     (oscillator, law, start)
 }
 
@@ -65,7 +65,7 @@ fn changed(domain: &Domain, gap: [f64; 2], stiffness: f64, damping: f64, load: [
 fn with_stages(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
     let mut draw = Numbers(seed ^ 0x57a6e);
     let count = draw.one_of(&[1, 2]);
-    let Oscillator { free, meshing, gap, walls, contacts, .. } = oscillator.clone();
+    let Pair { free, meshing, gap, walls, contacts, .. } = oscillator.clone();
     for _ in 0..count {
         let (k, c) = (draw.between(0.0, 4.0), draw.between(0.0, 0.3));
         let pull = draw.between(-1.0, 1.0);
@@ -86,7 +86,6 @@ fn with_stages(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
     let stages: Vec<usize> = (0..=count).collect();
     oscillator.schedule = phases.into_iter().map(|phase| (phase, draw.one_of(&stages))).collect();
     assert_eq!(meshing, oscillator.meshing);
-    oscillator.validate().unwrap();
     (oscillator, law, start)
 }
 
@@ -123,7 +122,6 @@ fn with_walls(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
             at += sign * draw.between(0.05, 0.3);
         }
     }
-    oscillator.validate().unwrap();
     (oscillator, law, start)
 }
 
@@ -153,7 +151,6 @@ fn with_pushing(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
             _ => {}
         }
     }
-    oscillator.validate().unwrap();
     (oscillator, law, start)
 }
 
@@ -172,7 +169,7 @@ fn chattering_clutches() -> impl Iterator<Item = Cell> {
         [("omega", omega), ("F", force)]
             .into_iter()
             .for_each(|(name, value)| model.set(name, value).unwrap());
-        (model.oscillator().unwrap(), model.law(), REST)
+        (model.pair(), model.law(), REST)
     })
 }
 
@@ -276,9 +273,9 @@ fn walls_that_only_push_agree_with_the_reference() {
 fn equal_stages_give_the_motion_without_stages() {
     let cells: Vec<Cell> = (0..24).map(random_cell).collect();
     let staged = cells.iter().map(|(oscillator, law, start)| {
-        let Oscillator { free, meshing, .. } = *oscillator;
+        let Pair { free, meshing, .. } = *oscillator;
         let schedule = vec![(0.123, 1), (0.5, 0), (0.877, 1)];
-        let staged = Oscillator { stages: vec![Stage { free, meshing }], schedule, ..oscillator.clone() };
+        let staged = Pair { stages: vec![Stage { free, meshing }], schedule, ..oscillator.clone() };
         (staged, *law, *start)
     });
     let staged: Vec<Cell> = staged.collect();
@@ -303,10 +300,10 @@ fn equal_stages_give_the_motion_without_stages() {
 fn a_force_of_second_order_has_twice_the_frequency() {
     let cells: Vec<Cell> = (0..24).map(random_cell).collect();
     let slower = cells.iter().map(|(oscillator, law, start)| {
-        let Oscillator { force, force_sin, omega, .. } = *oscillator;
+        let Pair { force, force_sin, omega, .. } = *oscillator;
         let second = Harmonic { order: 2, cos: force, sin: force_sin };
         let (force, force_sin, omega) = ([0.0; 2], [0.0; 2], 0.5 * omega);
-        let slower = Oscillator { force, force_sin, omega, harmonics: vec![second], ..oscillator.clone() };
+        let slower = Pair { force, force_sin, omega, harmonics: vec![second], ..oscillator.clone() };
         (slower, *law, *start)
     });
     let slower: Vec<Cell> = slower.collect();
@@ -342,7 +339,7 @@ fn pressed_and_released() -> Vec<Cell> {
     let [pressed, pulled] = [domain(4.0), domain(-4.0)];
     let of = |i: u32| {
         let released = 0.3 + 0.02 * f64::from(i);
-        let oscillator = Oscillator {
+        let oscillator = Pair {
             mass: [[1.0, 0.0], [0.0, 1.0]],
             gap: [1.0, 0.0],
             walls: [0.5, f64::NEG_INFINITY],
@@ -356,7 +353,6 @@ fn pressed_and_released() -> Vec<Cell> {
             schedule: vec![(0.0, 0), (released, 1)],
             ..oscillator.clone()
         };
-        oscillator.validate().unwrap();
         (oscillator, Law::both(0.2, 0.0), REST)
     };
     (0..12).map(of).collect()
@@ -391,7 +387,7 @@ fn decaying_motion_with_stages_is_decided() {
             [("delta", delta), ("epsilon", epsilon)]
                 .into_iter()
                 .for_each(|(name, value)| model.set(name, value).unwrap());
-            (model.oscillator().unwrap(), model.law(), state(&[0.01]))
+            (model.pair(), model.law(), state(&[0.01]))
         })
         .collect();
     let expected: Vec<Record> = cells.par_iter().map(reference).collect();
@@ -446,7 +442,9 @@ fn excluded_features_are_refused() {
     let error = kinds::run(Precision::F32, &cells, &settings(&cells)).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "negative_preload", .. }), "{error}");
     let friction = vec![Friction { row: [1.0, 0.0], force: 0.1, speed: 0.0 }];
-    let cells = [(Oscillator { friction, ..free.oscillator() }, Law::both(0.5, 0.0), REST)];
-    let error = kinds::run(Precision::F32, &cells, &LaneSettings::only(1)).unwrap_err();
+    let machine = Rubbing { pair: free.oscillator(), friction }.described(Law::both(0.5, 0.0));
+    let (mut gpu, laws) = (crate::common::gpu::open(Precision::F32), [Law::both(0.0, 0.0)]);
+    let lanes = [rattlemap::gpu::Lane { flow: 0, law: 0, start: REST }];
+    let error = pollster::block_on(gpu.run(&[machine], &laws, &lanes, &LaneSettings::only(1))).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "machine", .. }), "{error}");
 }

@@ -3,6 +3,7 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::BUDGET;
+use crate::common::pairs::AsPair;
 use crate::kinds::{self, Cell};
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
@@ -10,8 +11,8 @@ use rattlemap::map::plan::Needs;
 use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::{classify, status};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Status, measure};
 use rayon::prelude::*;
 
@@ -46,7 +47,7 @@ fn cell(model: &FileModel, sets: &[(&str, f64)]) -> Cell {
     let mut model = model.clone();
     sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
     // On top of a hill, rounding would choose the side.
-    (model.oscillator().unwrap(), model.law(), state(&[0.5]))
+    (model.pair(), model.law(), state(&[0.5]))
 }
 
 fn reference((oscillator, law, start): &Cell) -> Record {

@@ -12,8 +12,9 @@ use rattlemap::record::classify::classify;
 use rattlemap::record::measures::GROUPS;
 use rattlemap::record::valid;
 use rattlemap::validate::{Field, differences};
-use rattlemap_dynamics::model::{GearPair, Law, Machine, NonImpacting, Oscillator, State, state};
-use rattlemap_dynamics::reference::machine::{Motion, System};
+use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::model::Form;
+use rattlemap_dynamics::model::{GearPair, Law, NonImpacting, Oscillator, State, state};
 use rayon::prelude::*;
 
 /// Forcing periods that are compared.
@@ -48,7 +49,7 @@ fn distance(a: &State, b: &State, omega: f64) -> f64 {
 }
 
 /// Returns the reference's motion, if it does not depend on rounding.
-fn reference(machine: &Machine, start: &State) -> Option<End> {
+fn reference(machine: &Oscillator, start: &State) -> Option<End> {
     let system = System::new(machine);
     let (end, impacts) = run(&system, start)?;
     let size = distance(&end, &state(&[]), machine.omega).max(distance(start, &state(&[]), machine.omega));
@@ -71,7 +72,7 @@ fn reference(machine: &Machine, start: &State) -> Option<End> {
 /// Compares lanes with the reference on random machines of a shape. At least so many machines and impacts must be compared.
 fn compare(shape: Shape, seeds: u64, least: [u64; 2]) {
     let cases: Vec<_> = (0..seeds).map(|seed| case(seed, shape)).collect();
-    let oscillators: Vec<_> = cases.iter().map(|case| Oscillator::of_machine(case.machine.clone())).collect();
+    let oscillators: Vec<_> = cases.iter().map(|case| Form::Machine(case.machine.clone())).collect();
     let starts: Vec<State> = cases.iter().map(|case| state(&case.start)).collect();
     let sizes =
         oscillators.iter().map(|o| Features::of(o).machine.unwrap()).reduce(MachineShape::and).unwrap();
@@ -214,11 +215,10 @@ fn maps_of_machines_have_the_symmetry_and_the_quantities_of_the_reference() {
 #[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn contact_free_motion_of_machines_ends_early() {
     let slow = |omega: f64| GearPair { omega, r1: 0.02, r2: 0.02, ..GearPair::paper(0.8) };
-    let machine = |omega: f64| Machine::of(&slow(omega).oscillator().unwrap(), slow(omega).law());
-    let oscillators = [9.0, 11.0].map(|omega| Oscillator::of_machine(machine(omega)));
-    let settings = LaneSettings { features: Features::of(&oscillators[0]), ..LaneSettings::default() };
-    let steady =
-        |oscillator: &Oscillator| NonImpacting::of_machine(oscillator.machine.as_ref().unwrap()).unwrap();
+    let oscillators = [9.0, 11.0].map(|omega| slow(omega).oscillator().unwrap());
+    let forms = oscillators.clone().map(Form::Machine);
+    let settings = LaneSettings { features: Features::of(&forms[0]), ..LaneSettings::default() };
+    let steady = |oscillator: &Oscillator| NonImpacting::of_machine(oscillator).unwrap();
     // From rest, the gears would rattle.
     let lanes = [0, 1].map(|flow| {
         let mut start = steady(&oscillators[flow as usize]).steady();
@@ -226,7 +226,7 @@ fn contact_free_motion_of_machines_ends_early() {
         Lane { flow, law: 0, start }
     });
     let (mut gpu, laws) = (open(Precision::F32), [Law::both(0.0, 0.0)]);
-    let records = pollster::block_on(gpu.run(&oscillators, &laws, &lanes, &settings)).unwrap();
+    let records = pollster::block_on(gpu.run(&forms, &laws, &lanes, &settings)).unwrap();
     for (record, oscillator) in records.iter().zip(&oscillators) {
         let motion = steady(oscillator);
         assert_eq!((record.period, record.status, record.impacts_per_period), (1, 0, 0.0));

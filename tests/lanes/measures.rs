@@ -2,16 +2,17 @@
 
 use crate::common::gpu::open;
 use crate::common::linear::{Linear, with_wall};
+use crate::common::pairs::AsPair;
 use crate::common::{BUDGET, REST, near, paper};
 use rattlemap::gpu::{Features, Lane, LaneResult, LaneSettings, Measures, Precision};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Law, Pair, Side, State};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Quantities, measure};
 
 /// Everything that lanes measure.
 pub(super) const MEASURES: Measures = Measures { periods: 128, extremes: true, moments: true };
 
-pub(super) type Case = (Oscillator, Law, State);
+pub(super) type Case = (Pair, Law, State);
 
 /// Runs one lane per case. Returns quantities, multiplier and period of each.
 pub(super) fn lanes(
@@ -20,7 +21,7 @@ pub(super) fn lanes(
     measures: Option<Measures>,
 ) -> Vec<(Option<Quantities>, Option<[f64; 2]>, u32)> {
     let mut gpu = open(precision);
-    let flows: Vec<Oscillator> = cases.iter().map(|case| case.0.clone()).collect();
+    let flows: Vec<Pair> = cases.iter().map(|case| case.0.clone()).collect();
     let laws: Vec<Law> = cases.iter().map(|case| case.1).collect();
     let default = LaneSettings::default();
     let features = flows.iter().map(Features::of).fold(default.features, Features::and);
@@ -48,7 +49,7 @@ pub(super) fn lanes(
 fn cases() -> Vec<Case> {
     let pair = |e, omega| {
         let pair = paper(e, omega);
-        (pair.oscillator().unwrap(), pair.law(), REST)
+        (pair.pair(), pair.law(), REST)
     };
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 2.1 };
     let table = Linear { gamma: 0.0, square: 0.0, force: 1.2, load: 1.0, omega: 1.0 };

@@ -2,6 +2,7 @@
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
+use crate::common::pairs::AsPair;
 use crate::common::{BUDGET, REST, paper};
 use crate::kinds::{self, Cell};
 use rattlemap::gpu::{LaneSettings, Precision};
@@ -9,21 +10,21 @@ use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::model_file::FileModel;
 use rattlemap::record::classify::{classify, status};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Model, State, Stops, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Status, measure};
 
 /// Returns a cell of the oscillator `x'' + x = 0.1 cos(omega t)`, which does not reach its walls.
 fn undamped(omega: f64, start: State) -> Cell {
     let model = Stops { k: 1.0, force: 0.1, omega, ..Stops::with_restitution(0.5) };
-    (model.oscillator().unwrap(), model.law(), start)
+    (model.pair(), model.law(), start)
 }
 
 /// Returns a cell of a model of the gallery, from rest.
 fn gallery(name: &str, sets: [(&str, f64); 2]) -> Cell {
     let mut model = FileModel::built_in(name).unwrap();
     sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
-    (model.oscillator().unwrap(), model.law(), REST)
+    (model.pair(), model.law(), REST)
 }
 
 #[test]
@@ -31,7 +32,7 @@ fn every_engine_names_neutral_and_quasi_periodic_motion() {
     let free = GearPair { r2: 0.0, k2: 0.0, ..paper(0.8, 11.0) };
     let one = Class::Periodic { period: 1 };
     let cases = [
-        ("a free body at rest", (free.oscillator().unwrap(), free.law(), REST), one, Status::Neutral),
+        ("a free body at rest", (free.pair(), free.law(), REST), one, Status::Neutral),
         ("a ball at rest", gallery("energy-sink", [("omega", 0.99), ("d", 0.5)]), one, Status::Neutral),
         ("steady motion", undamped(7f64.sqrt(), state(&[-0.1 / 6.0])), one, Status::Neutral),
         ("repeats", undamped(5.0 / 3.0, REST), Class::Periodic { period: 5 }, Status::Neutral),

@@ -5,8 +5,8 @@ use rattlemap::job;
 use rattlemap::job::Processor;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Quantity, Scene, SceneBuilder};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Settings, analyse};
 
 const EVERYTHING: [Quantity; 6] = [

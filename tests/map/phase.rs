@@ -12,8 +12,8 @@ use rattlemap::map::scene::{Quantity, Scene, SceneBuilder};
 use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model as _, State, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{self, Class, Settings};
 
 /// Rattling wheel of de Souza and Caldas (2001). The published force is `-0.048 cos t + 0.48 sin t`.
@@ -60,7 +60,7 @@ fn model(text: &str) -> FileModel {
 /// Returns the same motion under a cosine alone, and the phase at which it is the published one at t = 0.
 fn under_cosine(text: &str) -> (FileModel, f64) {
     let published = model(text).oscillator().unwrap();
-    let (a, b) = (published.force[0], published.force_sin[0]);
+    let (a, b) = (published.drives[0].cos[0], published.drives[0].sin[0]);
     let is_force = |line: &&str| line.starts_with("motion.force");
     let rest: Vec<&str> = text.lines().filter(|line| !is_force(line)).collect();
     let cosine = model(
@@ -95,11 +95,8 @@ fn cycles_of_the_cosine_are_carried_to_the_published_section() {
         let (published, (cosine, phase)) = (model(text), under_cosine(text));
         let mut turned = cosine.clone();
         assert!(turned.set_start_phase(phase));
-        let (force, other) = (published.oscillator().unwrap(), turned.oscillator().unwrap());
-        assert!(
-            (force.force[0] - other.force[0]).abs() < 1e-14
-                && (force.force_sin[0] - other.force_sin[0]).abs() < 1e-14
-        );
+        let [force, other] = [&published, &turned].map(|model| model.oscillator().unwrap().drives.remove(0));
+        assert!((force.cos[0] - other.cos[0]).abs() < 1e-14 && (force.sin[0] - other.sin[0]).abs() < 1e-14);
         let flow = Flow::of(&cosine).unwrap();
         for &known in cycles {
             let there = orbit::analyse(&cosine, known, &Settings::default()).unwrap();

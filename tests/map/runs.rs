@@ -13,10 +13,10 @@ use rattlemap::map::schedule::Schedule;
 use rattlemap::map::sweep::{self, SweepError};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, RecordStore, Records, valid};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse};
-use rattlemap_dynamics::reference::Trajectory;
 use rayon::prelude::*;
 
 const QUANTITIES: &str =

@@ -18,9 +18,9 @@ use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{Purpose, Scene, Start};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
-use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Class, Status, analyse};
-use rattlemap_dynamics::reference::Trajectory;
 
 /// A map over frequency and restitution; restitution increases through a range in which periods 2 and 3 coexist.
 const SCENE: &str = r#"title = "Hysteresis"

@@ -5,7 +5,7 @@ mod integrators;
 
 use rattlemap::validate::independent::machine::Flight;
 use rattlemap_dynamics::model::{STATE, Side, state};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::motion::EventKind;
 use rayon::prelude::*;
 
 use integrators::independent::random::{self as one_gap, PLAIN, Shape};

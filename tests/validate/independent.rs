@@ -4,11 +4,12 @@
 //! Orbits are compared leg by leg: from the state after an event (or at a strobe) to the state before the next. So chaos
 //! does not amplify differences of rounding.
 
+use crate::common::pairs::OfPair;
 use crate::common::{Leg, REST, departure, flow_of, legs, paper, sign};
 use rattlemap::validate::independent::dop853::Integration;
-use rattlemap_dynamics::flow::DomainKind;
 use rattlemap_dynamics::model::{GearPair, State};
-use rattlemap_dynamics::reference::{EventKind, GapEvent};
+use rattlemap_dynamics::motion::{EventKind, GapEvent};
+use rattlemap_dynamics::pair::DomainKind;
 
 /// Relative and absolute tolerance of DOP853. At `1e-13` its error estimate is mere rounding and the step collapses, so a
 /// cap on the step provides the last digits.

@@ -2,17 +2,18 @@
 //! sticking, full mass matrices and gaps of several coordinates.
 
 use crate::common::closed_form::{Linear, Wall, Walled};
+use crate::common::pairs::{AsPair, described};
 use crate::common::{REST, apart, paper};
 use rattlemap::validate::independent::machine::{Event, Flight};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Machine, Oscillator, Side, State, state};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, Side, State, state};
+use rattlemap_dynamics::motion::EventKind;
 
 /// Time since phase 0 of the first period, kind and wall of each event.
 type Events = Vec<(f64, EventKind, usize)>;
 
 /// Integrates some periods with the integrator that judges maps.
-fn run(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> (State, Events) {
-    let mut flight = Flight::new(&Machine::of(oscillator, law), &start);
+fn run(oscillator: &Pair, law: Law, start: State, periods: u32) -> (State, Events) {
+    let mut flight = Flight::new(&described(oscillator, law), &start);
     let mut events = Vec::new();
     for n in 0..periods {
         flight.advance(0.0, std::f64::consts::TAU).expect("an ordinary motion");
@@ -89,7 +90,7 @@ fn a_ball_bounces_infinitely_often_in_finite_time() {
 }
 
 /// Returns the oscillator in coordinates `u` with `x = T u`. The gap, its walls and its events do not change.
-fn in_coordinates(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
+fn in_coordinates(o: &Pair, t: [[f64; 2]; 2]) -> Pair {
     let [[a, b], [c, d]] = t;
     let congruent = |m: [[f64; 2]; 2]| {
         let of = |u: [f64; 2], v: [f64; 2]| {
@@ -105,7 +106,7 @@ fn in_coordinates(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
         load: covariant(domain.load),
         preload: 0.0,
     };
-    Oscillator {
+    Pair {
         mass: congruent(o.mass),
         gap: covariant(o.gap),
         force: covariant(o.force),
@@ -128,7 +129,7 @@ fn motions_do_not_depend_on_the_coordinates() {
         (0.0, [Contact::Elastic; 2], "backlash without impact"),
     ] {
         let pair = paper(e, 5.6);
-        let oscillator = Oscillator { contacts, ..pair.oscillator().unwrap() };
+        let oscillator = Pair { contacts, ..pair.pair() };
         let (end, events) = run(&oscillator, pair.law(), REST, 3);
         assert!(events.len() > 5, "{what}: {events:?}");
         for t in matrices {
@@ -143,13 +144,13 @@ fn motions_do_not_depend_on_the_coordinates() {
 
 #[test]
 fn a_start_behind_a_rigid_wall_begins_on_the_wall() {
-    let oscillator = Oscillator { contacts: [Contact::Rigid; 2], ..paper(0.0, 5.6).oscillator().unwrap() };
-    let start = |oscillator: &Oscillator| {
-        Flight::new(&Machine::of(oscillator, Law::both(0.0, 0.0)), &state(&[0.9, 0.0, 0.1]))
+    let oscillator = Pair { contacts: [Contact::Rigid; 2], ..paper(0.0, 5.6).pair() };
+    let start = |oscillator: &Pair| {
+        Flight::new(&described(oscillator, Law::both(0.0, 0.0)), &state(&[0.9, 0.0, 0.1]))
     };
     let flight = start(&oscillator);
     let off = apart(flight.state(), state(&[0.6, 0.0, 0.1]));
     assert!(off < 1e-15 && flight.contact(0).is_none(), "{:?}", flight.state());
-    let soft = Oscillator { contacts: [Contact::Elastic; 2], ..oscillator.clone() };
+    let soft = Pair { contacts: [Contact::Elastic; 2], ..oscillator.clone() };
     assert_eq!(start(&soft).contact(0), Some(Side::Right));
 }

@@ -22,10 +22,10 @@ use rattlemap::store::record_file::{Identity, RECORDS, RecordFile};
 use rattlemap::validate::{
     Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, independent, replay, sample,
 };
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Class, Status};
-use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::{StrobeMap, multipliers};
 use rattlemap_dynamics::word::Word;
 

@@ -10,8 +10,8 @@ use rattlemap::map::plan::Plan;
 use rattlemap::record::classify::{classify, status};
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::Kind;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Measurement, Status, measure};
 
 /// Measures the first cell of a plan on the reference.

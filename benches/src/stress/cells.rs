@@ -2,10 +2,10 @@
 
 use rattlemap::gpu::Precision;
 use rattlemap::record::distance::{self, farther};
-use rattlemap_dynamics::flow::Flow;
 pub(super) use rattlemap_dynamics::model::REST;
-use rattlemap_dynamics::model::{GearPair, Model, Oscillator, State};
-use rattlemap_dynamics::reference::{Stop, Trajectory, Work};
+use rattlemap_dynamics::model::{GearPair, Model, Pair, State};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{Stop, Trajectory, Work};
 
 /// The engine that computed a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,8 +43,8 @@ pub(super) fn paper(e: f64, omega: f64) -> GearPair {
 }
 
 /// Returns the oscillator of a cell. All cells of these tests are valid.
-pub(super) fn oscillator_of(pair: &GearPair) -> Oscillator {
-    pair.oscillator().expect("a valid cell")
+pub(super) fn oscillator_of(pair: &GearPair) -> Pair {
+    Pair::of(&pair.oscillator().expect("a valid cell")).expect("a pair")
 }
 
 /// Returns the flow of a cell.

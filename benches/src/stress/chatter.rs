@@ -16,8 +16,8 @@ use super::lanes::{Lanes, Start};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::record::classify::status;
 use rattlemap_dynamics::model::{GearPair, State, state};
+use rattlemap_dynamics::motion::{EVENTS_PER_PERIOD_CAP, Stop};
 use rattlemap_dynamics::orbit::{Status, status_of};
-use rattlemap_dynamics::reference::{EVENTS_PER_PERIOD_CAP, Stop};
 
 /// One minus the restitutions.
 const BELOW_ONE: [f64; 6] = [0.5, 0.1, 1e-2, 1e-3, 1e-4, 0.0];

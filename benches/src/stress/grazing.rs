@@ -21,7 +21,7 @@ use rattlemap::map::random::Random;
 use rattlemap::record::Record;
 use rattlemap::record::distance::farther;
 use rattlemap_dynamics::model::{GearPair, Side, state};
-use rattlemap_dynamics::reference::{GapEvent, Trajectory};
+use rattlemap_dynamics::motion::{GapEvent, Trajectory};
 
 /// Allowed error of the gap in unit roundoffs: about a dozen steps precede the contact, and each rounds eight times.
 const ROUNDINGS: f64 = 96.0;

@@ -18,8 +18,8 @@ use rattlemap::map::random::Random;
 use rattlemap::record::classify::status;
 use rattlemap::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::motion::{Stop, Trajectory};
 use rattlemap_dynamics::orbit::Status;
-use rattlemap_dynamics::reference::{Stop, Trajectory};
 
 /// Distances that the swings reach behind the wall, in units of half the backlash. The first swing is there for a twelfth
 /// of a period; single precision just resolves the last.
@@ -160,7 +160,7 @@ fn perturbed((pair, start): &Start, steps: u32, engine: EngineName) -> Result<Pe
         for _ in 0..PERIODS {
             for step in 1..steps {
                 moved.advance_to(flow.period * (f64::from(step) / f64::from(steps)), &mut ())?;
-                moved.perturb(std::array::from_fn(|_| unit * (2.0 * random.unit() - 1.0)));
+                moved.perturb(|| unit * (2.0 * random.unit() - 1.0));
             }
             moved.advance_period(&mut ())?;
         }

@@ -16,9 +16,9 @@ use super::{Checks, SEED};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::map::random::Random;
 use rattlemap::record::distance::farther;
-use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{GearPair, State, state};
-use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
+use rattlemap_dynamics::motion::{GapEvent, Observer, States, Trajectory};
+use rattlemap_dynamics::pair::Gap;
 
 /// Restitutions and masses of the two gears.
 const RESTITUTIONS: [f64; 7] = [0.0, 0.06, 0.3, 0.605, 0.9, 0.999, 1.0];
@@ -74,7 +74,7 @@ impl Worst<'_> {
 }
 
 impl Observer for Worst<'_> {
-    fn event(&mut self, event: &GapEvent) {
+    fn event(&mut self, event: &GapEvent, _: States<'_>) {
         let rates = |q: &Gap| [q[1], q[3]];
         // The end of meshing does not change the state.
         if event.before[1] != event.after[1] {

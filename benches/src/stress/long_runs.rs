@@ -14,8 +14,8 @@ use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::record::classify::status;
 use rattlemap::record::distance::farther;
 use rattlemap_dynamics::model::{GearPair, REST, State};
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::Status;
-use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::{Cycle, StrobeMap, refine};
 
 /// Restitution and frequency of the cells. Their cycles last one or two forcing periods.

@@ -62,7 +62,8 @@ pub fn check(lanes: &mut Lanes) -> Result<Checks, GpuError> {
             let conditioning = coarse[i] * engine.unit_roundoff() / EngineName::LanesF32.unit_roundoff();
             let Some(exact) = exact[i].filter(|_| conditioning < UNPREDICTABLE) else { continue };
             // Steps of a lane that meshes all the time.
-            let finest = constants[i].flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
+            let domains = &constants[i].pair().expect("a pair").flow.domains;
+            let finest = domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
             let steps = f64::from(constants[i].steps) * finest * f64::from(PERIODS);
             let rounding = bar(conditioning, steps);
             let distance = |from| state_distance(&records[i].strobe, from);

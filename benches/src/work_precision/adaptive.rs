@@ -12,7 +12,7 @@ use super::field::Equations;
 use super::flight::{Flight, Sighting};
 use super::outcome::Outcome;
 use rattlemap::validate::independent::dop853::Integration;
-use rattlemap_dynamics::flow::Gap;
+use rattlemap_dynamics::pair::Gap;
 
 /// Largest number of endings in one period.
 const ENDINGS: u32 = 10_000;

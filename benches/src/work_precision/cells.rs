@@ -5,9 +5,9 @@ use serde::Serialize;
 use super::flight::Flight;
 use super::outcome::Outcome;
 use super::{EVENTS, PERIODS};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, Law, Oscillator, REST, State, state};
-use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
+use rattlemap_dynamics::model::{GearPair, Law, Pair, REST, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{GapEvent, Observer, States, Trajectory};
 
 /// Number of variants of a cell, next to each other as in a map. Their restitution grows by [`RESTITUTION_STEP`], or their
 /// distance from grazing by an eighth.
@@ -75,7 +75,7 @@ pub struct Subject {
     /// The parameters.
     pub pair: GearPair,
     /// The oscillator.
-    pub oscillator: Oscillator,
+    pub oscillator: Pair,
     /// The contact law.
     pub law: Law,
     /// State at phase 0, exact in f32.
@@ -127,7 +127,7 @@ fn compliance(pair: &GearPair) -> f64 {
 }
 
 fn subject(cell: u32, kind: Kind, beyond: Option<f64>, pair: GearPair) -> Subject {
-    let oscillator = pair.oscillator().expect("the table is valid");
+    let oscillator = Pair::of(&pair.oscillator().expect("the table is valid")).expect("a pair");
     let flow = Flow::new(&oscillator);
     let law = pair.law();
     let start = match kind {
@@ -180,7 +180,7 @@ impl Latest {
 
 impl Observer for Latest {
     #[inline]
-    fn event(&mut self, event: &GapEvent) {
+    fn event(&mut self, event: &GapEvent, _: States<'_>) {
         self.add(event.t);
     }
 }
@@ -210,8 +210,8 @@ fn amplification(flow: &Flow, law: Law, start: State) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::flow::DomainKind;
-    use rattlemap_dynamics::reference::EventKind::{Impact, MeshEnd, MeshStart};
+    use rattlemap_dynamics::motion::EventKind::{Impact, MeshEnd, MeshStart};
+    use rattlemap_dynamics::pair::DomainKind;
 
     #[test]
     fn cells_have_the_motion_of_their_kind() {
@@ -223,7 +223,8 @@ mod tests {
                 trajectory.advance_period(&mut events).unwrap();
             }
             // Peers need not implement the rarest rule: a contact force that changes sign during contact onset.
-            let ends_off_the_wall = |e: &GapEvent| e.kind == MeshEnd && e.before[0] != flow.wall(e.side);
+            let ends_off_the_wall =
+                |e: &GapEvent| e.kind == MeshEnd && e.before[0] != flow.pair().unwrap().wall(e.side);
             assert!(!events.iter().any(ends_off_the_wall), "{:?}", subject.pair);
             let count = |kind| events.iter().filter(|event| event.kind == kind).count();
             let at = format!("{:?}", subject.pair);
@@ -244,7 +245,8 @@ mod tests {
             let samples = 10_000;
             let gap = |i: i32| {
                 let tau = flow.period * f64::from(i) / f64::from(samples);
-                let y = flow.propagate(DomainKind::Free, subject.start, 0.0, tau);
+                let start = std::array::from_fn(|i| subject.start[i]);
+                let y = flow.pair().unwrap().propagate(DomainKind::Free, start, 0.0, tau);
                 y[0] - y[2]
             };
             let widest = (0..samples).map(gap).fold(0.0f64, |m, z| m.max(z.abs()));

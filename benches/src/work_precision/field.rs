@@ -1,8 +1,8 @@
 //! Equations of motion of a gear pair in gap coordinates `(z, w, x, v)`: the gap `x1 - x2` and its rate, and displacement and velocity of
 //! gear 2. In these coordinates a gap can be set exactly to a wall.
 
-use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{GearPair, Side, State, state};
+use rattlemap_dynamics::pair::Gap;
 
 /// Converts a state `(x1, v1, x2, v2)` to gap coordinates.
 pub fn to_gap(y: &State) -> Gap {

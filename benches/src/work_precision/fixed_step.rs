@@ -5,7 +5,7 @@ use super::cells::{Latest, Subject};
 use super::field::Equations;
 use super::flight::Flight;
 use super::outcome::Outcome;
-use rattlemap_dynamics::flow::Gap;
+use rattlemap_dynamics::pair::Gap;
 
 /// Number of events in one period above which a lane fails.
 const ENDINGS_PER_PERIOD: u32 = 10_000;

@@ -1,8 +1,8 @@
 //! Flights and contacts of a gear pair for an integrator with time steps: finds where a step meets a wall and applies the contact law.
 
 use super::field::{Equations, to_gap, to_state};
-use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{GearPair, Side, State};
+use rattlemap_dynamics::pair::Gap;
 
 /// Largest number of iterations of a root search.
 const ROOT_CAP: u32 = 100;

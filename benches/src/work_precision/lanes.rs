@@ -9,7 +9,7 @@ use rattlemap::gpu::{
     AdapterChoice, Features, Gpu, GpuError, Lane, LaneSettings, Precision, Tables, describe, is_hardware,
 };
 use rattlemap::record::{Record, valid};
-use rattlemap_dynamics::model::{Law, Oscillator};
+use rattlemap_dynamics::model::{Law, Pair};
 
 /// The integrator of lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub enum Form {
 /// A device that integrates subjects.
 pub struct Device {
     gpu: Gpu,
-    flows: Vec<Oscillator>,
+    flows: Vec<Pair>,
     laws: Vec<Law>,
     lanes: Vec<Lane>,
     /// Number of copies of each subject.
@@ -49,7 +49,7 @@ impl Device {
             Form::RungeKutta => shaders::runge_kutta,
             Form::RungeKuttaPhased => shaders::runge_kutta_phased,
         });
-        let (mut flows, mut laws): (Vec<Oscillator>, Vec<Law>) = (Vec::new(), Vec::new());
+        let (mut flows, mut laws): (Vec<Pair>, Vec<Law>) = (Vec::new(), Vec::new());
         let lanes: Vec<Lane> = subjects
             .iter()
             .map(|subject| Lane {

@@ -10,8 +10,8 @@ use super::points::Point;
 use super::{PERIODS, adaptive, fixed_step};
 use rattlemap::cli::bench::spread::Spread;
 use rattlemap::gpu::{GpuError, Precision, Tables};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
+use rattlemap_dynamics::motion::Flow;
 
 /// An integrator and its precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

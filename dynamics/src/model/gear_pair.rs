@@ -1,7 +1,12 @@
 //! The gear pair with backlash: Table 1 and equations (11) to (13), (22) of the paper.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::parameter::{model, model_methods};
-use super::{Contact, Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
+use super::{
+    Contact, Drive, Forces, GapRow, Law, Model, ModelError, Oscillator, Parameter, Range, Restitution,
+    Shapes, Spring, Wall,
+};
 
 model! {
     /// A pair of gears on damped elastic supports, meshing through a backlash `2b`.
@@ -40,38 +45,37 @@ impl GearPair {
     /// [`ModelError`] if a parameter is out of its range, or a matrix entry overflows.
     pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
-        let free = Domain {
-            damping: [[self.r1, 0.0], [0.0, self.r2]],
-            stiffness: [[self.k1, 0.0], [0.0, self.k2]],
-            load: [0.0, 0.0],
-            preload: 0.0,
+        let spring = Spring { stiffness: self.k, damping: self.r, preload: 0.0 };
+        let wall = |at: f64| Wall {
+            at,
+            contact: Contact::Impact,
+            restitution: Restitution::Constant(self.e),
+            mesh_speed: self.mesh_speed,
+            springs: vec![spring],
         };
-        let meshing = |sign: f64| Domain {
-            damping: [[self.r1 + self.r, -self.r], [-self.r, self.r2 + self.r]],
-            stiffness: [[self.k1 + self.k, -self.k], [-self.k, self.k2 + self.k]],
-            load: [sign * self.k * self.b, -sign * self.k * self.b],
-            preload: 0.0,
-        };
+        let of = |first: f64, second: f64| DVector::from_vec(vec![first, second]);
+        let diagonal = |first: f64, second: f64| DMatrix::from_diagonal(&of(first, second));
         let oscillator = Oscillator {
-            degrees: 2,
-            mass: [[self.m1, 0.0], [0.0, self.m2]],
-            gap: [1.0, -1.0],
-            walls: [self.b, -self.b],
-            contacts: [Contact::Impact; 2],
             omega: self.omega,
-            force: [self.force, 0.0],
-            force_sin: [0.0; 2],
-            harmonics: Vec::new(),
-            stages: Vec::new(),
+            mass: diagonal(self.m1, self.m2),
+            stages: vec![Forces {
+                damping: diagonal(self.r1, self.r2),
+                stiffness: diagonal(self.k1, self.k2),
+                load: of(0.0, 0.0),
+            }],
             schedule: Vec::new(),
-            outer_walls: Default::default(),
+            drives: vec![Drive { order: 1, cos: of(self.force, 0.0), sin: of(0.0, 0.0) }],
+            gaps: vec![GapRow { row: of(1.0, -1.0), walls: [vec![wall(self.b)], vec![wall(-self.b)]] }],
             friction: Vec::new(),
-            machine: None,
-            free,
-            meshing: [meshing(1.0), meshing(-1.0)],
         };
         oscillator.validate()?;
         Ok(oscillator)
+    }
+
+    /// Returns the form for the fast engine.
+    #[cfg(test)]
+    pub(crate) fn pair(&self) -> super::Pair {
+        super::Pair::of(&self.oscillator().unwrap()).unwrap()
     }
 }
 

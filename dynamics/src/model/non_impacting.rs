@@ -12,7 +12,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
-use super::{Drive, Harmonic, Machine, Oscillator, REST, Side, State, is_semidefinite, state};
+use super::{Drive, Harmonic, Oscillator, Pair, REST, Side, State, is_semidefinite, state};
 
 /// Margin for rounding: of the distance to a wall, relative to twice the scale of length, and of the decay rate,
 /// relative to the excitation frequency.
@@ -38,14 +38,14 @@ pub struct NonImpacting {
 impl NonImpacting {
     /// Computes the contact-free steady motion. Returns none if it touches a wall or is not stable, or if the oscillator has
     /// stages.
-    pub fn new(oscillator: &Oscillator) -> Option<NonImpacting> {
+    pub fn new(oscillator: &Pair) -> Option<NonImpacting> {
         if oscillator.degrees == 1 {
             return NonImpacting::of_two_degrees(&with_copy(oscillator, 1));
         }
         NonImpacting::of_two_degrees(oscillator)
     }
 
-    fn of_two_degrees(oscillator: &Oscillator) -> Option<NonImpacting> {
+    fn of_two_degrees(oscillator: &Pair) -> Option<NonImpacting> {
         if !oscillator.schedule.is_empty() {
             return None;
         }
@@ -53,7 +53,7 @@ impl NonImpacting {
         if !is_semidefinite(oscillator.free.dissipation()) {
             return None;
         }
-        let Oscillator { omega, walls, mass, .. } = *oscillator;
+        let Pair { omega, walls, mass, .. } = *oscillator;
         let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
         let (stiffness, damping) = (matrix(oscillator.free.stiffness), matrix(oscillator.free.damping));
         let gap = Vector2::from(oscillator.gap);
@@ -96,7 +96,7 @@ impl NonImpacting {
 
     /// Computes the contact-free steady motion of a machine. Returns none if it touches a wall or is not stable, or if the machine
     /// has stages or dry friction. Bodies that nothing moves between the walls must then be at rest.
-    pub fn of_machine(machine: &Machine) -> Option<NonImpacting> {
+    pub fn of_machine(machine: &Oscillator) -> Option<NonImpacting> {
         if !machine.schedule.is_empty() || machine.friction.iter().any(|friction| friction.force > 0.0) {
             return None;
         }
@@ -121,7 +121,7 @@ impl NonImpacting {
     }
 
     /// Computes the contact-free steady motion of some coordinates of a machine while the others stay at 0.
-    fn of_coordinates(machine: &Machine, moving: &[usize]) -> Option<NonImpacting> {
+    fn of_coordinates(machine: &Oscillator, moving: &[usize]) -> Option<NonImpacting> {
         let (n, forces) = (moving.len(), &machine.stages[0]);
         let matrix = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| m[(moving[i], moving[j])]);
         let vector = |v: &DVector<f64>| DVector::from_fn(n, |i, _| v[moving[i]]);
@@ -174,9 +174,9 @@ impl NonImpacting {
 
     /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
     /// the walls, stays at rest. The one at rest may be undamped; then the motion is neutral.
-    pub fn with_one_at_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
+    pub fn with_one_at_rest(oscillator: &Pair) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
-            let Oscillator { gap, free, mass, .. } = *oscillator;
+            let Pair { gap, free, mass, .. } = *oscillator;
             let moving = 1 - resting;
             let is_coupled =
                 [free.stiffness, free.damping, mass].iter().any(|m| m[0][1] != 0.0 || m[1][0] != 0.0);
@@ -252,7 +252,7 @@ impl NonImpacting {
 }
 
 /// Replaces the degree of freedom `resting` by a copy of the other that does not enter the gap.
-fn with_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
+fn with_copy(oscillator: &Pair, resting: usize) -> Pair {
     let (mut copied, moving) = (oscillator.clone(), 1 - resting);
     let share = copied.mass[resting][resting] / copied.mass[moving][moving];
     let free = &mut copied.free;
@@ -263,7 +263,7 @@ fn with_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
 }
 
 /// Whether nothing moves a coordinate at rest between the walls.
-fn is_left_alone(machine: &Machine, i: usize) -> bool {
+fn is_left_alone(machine: &Oscillator, i: usize) -> bool {
     let forces = &machine.stages[0];
     let matrices = [&machine.mass, &forces.damping, &forces.stiffness];
     let is_alone = |j: usize| i == j || matrices.iter().all(|m| m[(i, j)] == 0.0 && m[(j, i)] == 0.0);
@@ -291,9 +291,9 @@ fn slowest(eigenvalues: &[Complex<f64>]) -> Complex<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::Flow;
-    use crate::model::{GearPair, sum};
-    use crate::reference::Trajectory;
+    use crate::model::{Form, GearPair, sum};
+    use crate::motion::Flow;
+    use crate::motion::Trajectory;
 
     fn pair(omega: f64) -> GearPair {
         GearPair { omega, ..GearPair::paper(0.8) }
@@ -303,7 +303,7 @@ mod tests {
     fn the_gear_pair_has_non_impacting_motion_above_a_frequency() {
         // The supports are not coupled, and the force acts on gear 1 alone. The decay rates r / (2 m) are 0.15 for
         // gear 1 and 0.3 for gear 2.
-        let motion = NonImpacting::new(&pair(11.0).oscillator().unwrap()).unwrap();
+        let motion = NonImpacting::new(&pair(11.0).pair()).unwrap();
         assert!((motion.exponent() + 0.15).abs() < 1e-12);
         let p = Complex::from(50.0) / Complex::new(30.0 - 2.0 * 121.0, 0.6 * 11.0);
         for (ours, theirs) in motion.steady().into_iter().zip([p.re, -11.0 * p.im, 0.0, 0.0]) {
@@ -311,25 +311,22 @@ mod tests {
         }
         let swings = |omega: f64| 50.0 / (30.0 - 2.0 * omega * omega).hypot(0.6 * omega);
         for omega in [8.0, 8.05, 8.07, 9.0] {
-            let there = NonImpacting::new(&pair(omega).oscillator().unwrap()).is_some();
+            let there = NonImpacting::new(&pair(omega).pair()).is_some();
             assert_eq!(there, swings(omega) < 0.5, "omega = {omega}");
         }
         let rigid = GearPair { k2: 0.0, ..pair(11.0) };
-        assert!(NonImpacting::new(&rigid.oscillator().unwrap()).is_none());
+        assert!(NonImpacting::new(&rigid.pair()).is_none());
         let undamped = GearPair { r1: 0.0, ..pair(11.0) };
-        assert!(NonImpacting::new(&undamped.oscillator().unwrap()).is_none());
-        assert!(
-            NonImpacting::with_one_at_rest(&undamped.oscillator().unwrap()).is_none(),
-            "the force moves gear 1"
-        );
+        assert!(NonImpacting::new(&undamped.pair()).is_none());
+        assert!(NonImpacting::with_one_at_rest(&undamped.pair()).is_none(), "the force moves gear 1");
     }
 
     /// No force acts on gear 2 between the walls, so it stays at rest with or without damping and support.
     #[test]
     fn the_gear_at_rest_may_be_undamped() {
-        let whole = NonImpacting::new(&pair(11.0).oscillator().unwrap()).unwrap();
+        let whole = NonImpacting::new(&pair(11.0).pair()).unwrap();
         for (r2, k2) in [(0.0, 20.0), (0.6, 0.0), (0.0, 0.0)] {
-            let oscillator = GearPair { r2, k2, ..pair(11.0) }.oscillator().unwrap();
+            let oscillator = GearPair { r2, k2, ..pair(11.0) }.pair();
             assert!(NonImpacting::new(&oscillator).is_none());
             let motion = NonImpacting::with_one_at_rest(&oscillator).unwrap();
             let off = std::array::from_fn::<_, 4, _>(|i| (motion.steady()[i] - whole.steady()[i]).abs());
@@ -349,7 +346,7 @@ mod tests {
         let mut certain = 0;
         for step in 0..200u32 {
             let pair = pair(8.1 + 0.02 * f64::from(step));
-            let oscillator = pair.oscillator().unwrap();
+            let oscillator = pair.pair();
             let motion = NonImpacting::new(&oscillator).unwrap();
             let flow = Flow::new(&oscillator);
             let angle = f64::from(step);
@@ -374,9 +371,9 @@ mod tests {
     fn a_machine_has_the_contact_free_motion_of_its_oscillator() {
         for omega in [8.1, 9.0, 11.0] {
             let pair = pair(omega);
-            let oscillator = pair.oscillator().unwrap();
+            let oscillator = pair.pair();
             let one = NonImpacting::new(&oscillator).unwrap();
-            let other = NonImpacting::of_machine(&Machine::of(&oscillator, pair.law())).unwrap();
+            let other = NonImpacting::of_machine(&pair.oscillator().unwrap()).unwrap();
             let off = (0..4).map(|i| (one.steady[i] - other.steady[i]).abs()).fold(0.0, f64::max);
             assert!(off < 1e-13 && (one.reach / other.reach - 1.0).abs() < 1e-12, "{omega}: {off:e}");
             assert!((one.exponent() / other.exponent() - 1.0).abs() < 1e-12);
@@ -386,16 +383,13 @@ mod tests {
                 assert_eq!(one.is_certain(start), other.is_certain(start));
             }
         }
-        assert!(
-            NonImpacting::of_machine(&Machine::of(&pair(7.0).oscillator().unwrap(), pair(7.0).law()))
-                .is_none()
-        );
+        assert!(NonImpacting::of_machine(&pair(7.0).oscillator().unwrap()).is_none());
     }
 
     /// A ball in the slot of an oscillator: nothing moves the ball until the slot hits it.
     #[test]
     fn a_body_that_nothing_moves_must_be_at_rest() {
-        let mut machine = Machine::of(&pair(11.0).oscillator().unwrap(), pair(11.0).law());
+        let mut machine = pair(11.0).oscillator().unwrap();
         let forces = &mut machine.stages[0];
         (forces.stiffness[(1, 1)], forces.damping[(1, 1)]) = (0.0, 0.0);
         let motion = NonImpacting::of_machine(&machine).unwrap();
@@ -403,7 +397,7 @@ mod tests {
         let [x1, v1, ..] = motion.steady();
         assert!(motion.is_certain(motion.steady()) && motion.is_certain(state(&[x1, v1, 1e-14])));
         assert!(!motion.is_certain(state(&[x1, v1, 0.0, 1e-9])));
-        let flow = Flow::new(&Oscillator::of_machine(machine));
+        let flow = Flow::new(Form::Machine(machine));
         let mut trajectory = Trajectory::<0>::new(&flow, pair(11.0).law(), motion.steady());
         for _ in 0..200 {
             trajectory.advance_period(&mut ()).unwrap();

@@ -26,6 +26,12 @@ pub const fn state(values: &[f64]) -> State {
     state
 }
 
+/// Returns the first four numbers of a state, which a pair has.
+#[inline]
+pub(crate) fn first_four(y: &State) -> [f64; 4] {
+    [y[0], y[1], y[2], y[3]]
+}
+
 /// Returns `a - b`.
 #[inline]
 pub(crate) fn difference<const N: usize>(a: &[f64; N], b: &[f64; N]) -> [f64; N] {

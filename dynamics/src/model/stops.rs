@@ -1,7 +1,12 @@
 //! An oscillator of one degree of freedom between stops, which can be solved by hand.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::parameter::{model, model_methods};
-use super::{Contact, Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
+use super::{
+    Contact, Drive, Forces, GapRow, Law, Model, ModelError, Oscillator, Parameter, Range, Restitution,
+    Shapes, Spring, Wall,
+};
 
 model! {
     /// `m x'' + r x' + k x = F cos(omega t)` between elastic stops at `x = +b` and `x = -b`.
@@ -23,36 +28,29 @@ model! {
 }
 
 impl Stops {
-    /// Implements [`Model::oscillator`]. The second degree of freedom is a unit mass without forces.
+    /// Implements [`Model::oscillator`].
     ///
     /// # Errors
     /// [`ModelError`] if a parameter is out of its range, or a matrix entry overflows.
     pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
-        let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
-        let stop = |sign: f64| Domain {
-            damping: first(self.r + self.stop_damping),
-            stiffness: first(self.k + self.stop_stiffness),
-            load: [sign * self.stop_stiffness * self.b, 0.0],
-            preload: 0.0,
+        let spring = Spring { stiffness: self.stop_stiffness, damping: self.stop_damping, preload: 0.0 };
+        let wall = |at: f64| Wall {
+            at,
+            contact: Contact::Impact,
+            restitution: Restitution::Constant(self.e),
+            mesh_speed: self.mesh_speed,
+            springs: vec![spring],
         };
+        let (row, matrix) = (|x: f64| DVector::from_element(1, x), |x: f64| DMatrix::from_element(1, 1, x));
         let oscillator = Oscillator {
-            degrees: 1,
-            mass: [[self.m, 0.0], [0.0, 1.0]],
-            gap: [1.0, 0.0],
-            walls: [self.b, -self.b],
-            contacts: [Contact::Impact; 2],
             omega: self.omega,
-            force: [self.force, 0.0],
-            force_sin: [0.0; 2],
-            harmonics: Vec::new(),
-            stages: Vec::new(),
+            mass: matrix(self.m),
+            stages: vec![Forces { damping: matrix(self.r), stiffness: matrix(self.k), load: row(0.0) }],
             schedule: Vec::new(),
-            outer_walls: Default::default(),
+            drives: vec![Drive { order: 1, cos: row(self.force), sin: row(0.0) }],
+            gaps: vec![GapRow { row: row(1.0), walls: [vec![wall(self.b)], vec![wall(-self.b)]] }],
             friction: Vec::new(),
-            machine: None,
-            free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0], preload: 0.0 },
-            meshing: [stop(1.0), stop(-1.0)],
         };
         oscillator.validate()?;
         Ok(oscillator)

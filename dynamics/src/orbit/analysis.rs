@@ -10,9 +10,9 @@ use super::recurrence::{Candidate, Metric, RECURRENCE_DISTANCE, candidates, rest
 use super::regularity::is_regular;
 use super::resolution::{is_below_resolution, too_few_events};
 use super::{Class, Orbit, Section, Settings, Status};
-use crate::flow::Flow;
 use crate::model::{Law, Model, ModelError, NonImpacting, State};
-use crate::reference::{Allowance, Stop, Trajectory};
+use crate::motion::Flow;
+use crate::motion::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap, norm};
 use crate::word::Word;
 
@@ -400,8 +400,8 @@ impl Analysis<'_> {
     /// symmetric; for these the half-period map is tried first, because it is more reliable.
     pub(super) fn maps(&self, period: u32) -> Vec<StrobeMap> {
         let whole = StrobeMap::Periods(period);
-        // The mirror image of a machine's modes is not known, so that `smallest` tests the symmetry of its cycles.
-        if period % 2 == 1 && self.flow.mirror_symmetric(&self.law) && self.flow.machine.is_none() {
+        // `smallest` tests the symmetry of other cycles.
+        if period % 2 == 1 && self.flow.is_half_symmetric(&self.law) {
             vec![StrobeMap::MirroredHalves(period), whole]
         } else {
             vec![whole]
@@ -418,7 +418,7 @@ impl Analysis<'_> {
     ) -> Option<Cycle> {
         let mut cycle = self.with_smallest_period(newton, seed, cycle, metric)?;
         let may_be_symmetric = cycle.period % 2 == 1 && self.flow.mirror_symmetric(&self.law);
-        if may_be_symmetric && self.flow.machine.is_some() {
+        if may_be_symmetric && !self.flow.is_half_symmetric(&self.law) {
             let mut half = seed.at(cycle.state, []);
             let middle = (0..cycle.period / 2).try_for_each(|_| half.advance_period(&mut ()));
             middle.and_then(|()| half.advance_to(0.5 * self.flow.period, &mut ())).ok()?;
@@ -592,8 +592,7 @@ impl Analysis<'_> {
     /// Measures the observed periods that follow a trajectory; none if they are not requested or it cannot be
     /// continued.
     pub(super) fn quantities(&self, trajectory: &Trajectory<'_>) -> Option<Quantities> {
-        let measure =
-            || Meter::measure(self.flow, &mut trajectory.clone(), self.settings.observed_periods.max(1));
+        let measure = || Meter::measure(&mut trajectory.clone(), self.settings.observed_periods.max(1));
         self.measures.then(measure)?.ok()
     }
 

@@ -120,8 +120,8 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
-    use crate::flow::Flow;
     use crate::model::{GearPair, REST, state};
+    use crate::motion::Flow;
 
     fn metric() -> Metric {
         Metric::of(&[REST], &Flow::new(&GearPair::paper(0.5).oscillator().unwrap()))

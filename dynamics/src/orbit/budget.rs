@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::analysis::TANGENT_PERIODS;
-use crate::reference::Allowance;
+use crate::motion::Allowance;
 
 /// Period from which a reported exponent accumulates; a shorter transient makes it earlier.
 const EXPONENT_FROM: u32 = 100;

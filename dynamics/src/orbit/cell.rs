@@ -19,9 +19,9 @@ use super::regularity::is_regular;
 use super::resolution::too_few_events;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
 use super::{Budget, Orbit, Section, Status};
-use crate::flow::Flow;
 use crate::model::{Law, State};
-use crate::reference::{Allowance, Stop, Trajectory};
+use crate::motion::Flow;
+use crate::motion::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton};
 use crate::word::Word;
 

@@ -6,9 +6,9 @@ use super::analysis::ALLOWANCE;
 use super::reading::EventLog;
 use super::trace::{sample, sample_period};
 use super::{Event, Sample, status_of};
-use crate::flow::Flow;
 use crate::model::{Law, Side, State};
-use crate::reference::{Allowance, Stop, Trajectory};
+use crate::motion::Flow;
+use crate::motion::{Allowance, Stop, Trajectory};
 
 /// Largest number of events in a window. They take about 200 MB.
 const MOST_EVENTS: u64 = 1_000_000;

@@ -4,9 +4,9 @@ use std::sync::atomic::AtomicBool;
 
 use super::analysis::ALLOWANCE;
 use super::reading::EventLog;
-use crate::flow::Flow;
 use crate::model::{Law, Side, State};
-use crate::reference::{Stop, Trajectory};
+use crate::motion::Flow;
+use crate::motion::{Stop, Trajectory};
 
 /// Forcing periods that take about a minute if the motion is not stiff.
 pub const LONGEST_TIME: f64 = 3e7;

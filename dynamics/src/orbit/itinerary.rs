@@ -3,10 +3,7 @@
 //! The strobe map is smooth as long as the sequence of events does not change. So the itinerary identifies a branch
 //! of the strobe map.
 
-use crate::flow::Flow;
-use crate::model::Side;
-use crate::reference::machine::{MachineEvent, SlipEvent};
-use crate::reference::{GapEvent, Observer};
+use crate::motion::{Flow, GapEvent, Observer, SlipEvent, States};
 
 /// Largest distance from phase 0, in turns, of an event that a slow approach may still move to the other side.
 pub const NEAR_STROBE_TURNS: f64 = 1e-3;
@@ -18,7 +15,6 @@ pub(super) struct Itinerary(u64);
 /// Computes the itinerary of a period.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Recorder {
-    walls: [f64; 2],
     period: f64,
     pub(super) itinerary: Itinerary,
     /// Whether an event lies near phase 0, so that rounding or a slow approach may move it to the other side.
@@ -27,12 +23,7 @@ pub(super) struct Recorder {
 
 impl Recorder {
     pub(super) fn new(flow: &Flow) -> Recorder {
-        Recorder {
-            walls: flow.walls,
-            period: flow.period,
-            itinerary: Itinerary::default(),
-            is_near_strobe: false,
-        }
+        Recorder { period: flow.period, itinerary: Itinerary::default(), is_near_strobe: false }
     }
 
     #[inline]
@@ -46,22 +37,11 @@ impl Recorder {
 
 impl Observer for Recorder {
     #[inline]
-    fn event(&mut self, event: &GapEvent) {
-        let wall = self.walls[usize::from(event.side == Side::Left)];
-        // If meshing ends before the gap reaches the wall, the branch is another one.
-        let is_on_wall = event.before[0] == wall;
-        let code =
-            1 + u64::from(event.side == Side::Right) + 2 * u64::from(is_on_wall) + 4 * event.kind as u64;
-        self.add(code, event.t);
+    fn event(&mut self, event: &GapEvent, _: States<'_>) {
+        self.add(event.code, event.t);
     }
 
-    fn machine_event(&mut self, event: &MachineEvent) {
-        let of_wall = 1 + u64::from(event.side == Side::Right) + 2 * u64::from(event.is_on_wall);
-        let code = of_wall + 4 * event.kind as u64 + 256 * (event.gap + 4 * event.wall) as u64;
-        self.add(code, event.t);
-    }
-
-    fn machine_slip(&mut self, event: &SlipEvent) {
+    fn slip(&mut self, event: &SlipEvent) {
         let modes = event.slips.iter().fold(1, |code, &slip| 3 * code + slip as u64);
         self.add(16 * modes, event.t);
     }

@@ -3,10 +3,8 @@
 use super::Event;
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::{Meter, Quantities};
-use crate::flow::{DomainKind, Flow};
 use crate::model::{Side, State};
-use crate::reference::machine::{Flight, MachineEvent, SlipEvent};
-use crate::reference::{EventKind, GapEvent, Observer, Stop, Trajectory};
+use crate::motion::{EventKind, Flow, GapEvent, Observer, SlipEvent, States, Stop, Sums, Trajectory};
 use crate::word::Word;
 
 /// Largest distance from phase 0, in turns, of an event that lies on the strobe.
@@ -52,7 +50,7 @@ impl Reading {
             symbols: Vec::new(),
             start,
             recorders: vec![Recorder::new(flow); periods as usize],
-            meter: measures.then(|| Meter::new(flow, &first)),
+            meter: measures.then(|| Meter::new(&first)),
             times: Vec::new(),
         };
         for _ in 0..periods {
@@ -71,7 +69,9 @@ impl Reading {
             closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),
             // Rounding may put an event at phase 0 outside the cycle.
-            on_strobe: [&first, &*trajectory].into_iter().any(|end| passes_wall(flow, end))
+            on_strobe: [&first, &*trajectory]
+                .into_iter()
+                .any(|end| end.passes_wall(ON_STROBE_TURNS * flow.period))
                 || times.iter().any(|t| {
                     let turns = t / flow.period;
                     turns < ON_STROBE_TURNS || 1.0 - turns < ON_STROBE_TURNS
@@ -95,38 +95,22 @@ struct Log<'f> {
 }
 
 impl Observer for Log<'_> {
-    fn event(&mut self, event: &GapEvent) {
-        self.recorders[(event.period - self.start) as usize].event(event);
-        self.meter.iter_mut().for_each(|meter| meter.event(event));
+    fn event(&mut self, event: &GapEvent, states: States<'_>) {
+        self.recorders[(event.period - self.start) as usize].event(event, states);
+        self.meter.iter_mut().for_each(|meter| meter.event(event, states));
         self.symbols.extend(event.symbol);
         self.times.push(event.t);
-        self.events.event(event);
+        self.events.event(event, states);
     }
 
-    fn measures(&self) -> bool {
-        self.meter.is_some()
-    }
-
-    fn machine_flight(&mut self, flight: &Flight<'_>) {
-        self.meter.iter_mut().for_each(|meter| meter.machine_flight(flight));
-    }
-
-    fn machine_loss(&mut self, energy: f64) {
-        self.meter.iter_mut().for_each(|meter| meter.machine_loss(energy));
-    }
-
-    fn machine_event(&mut self, event: &MachineEvent) {
-        self.meter.iter_mut().for_each(|meter| meter.machine_event(event));
-        self.recorders[(event.period - self.start) as usize].machine_event(event);
+    fn slip(&mut self, event: &SlipEvent) {
+        self.recorders[(event.period - self.start) as usize].slip(event);
         self.symbols.extend(event.symbol);
         self.times.push(event.t);
-        self.events.machine_event(event);
     }
 
-    fn machine_slip(&mut self, event: &SlipEvent) {
-        self.recorders[(event.period - self.start) as usize].machine_slip(event);
-        self.symbols.extend(event.symbol);
-        self.times.push(event.t);
+    fn sums(&mut self) -> Option<&mut Sums> {
+        self.meter.as_mut().and_then(Meter::sums)
     }
 }
 
@@ -143,44 +127,16 @@ impl<'f> EventLog<'f> {
     pub(super) fn new(flow: &'f Flow, start: u64) -> EventLog<'f> {
         EventLog { flow, start, events: Vec::new() }
     }
-
-    fn push(
-        &mut self,
-        kind: EventKind,
-        side: Side,
-        (period, t): (u64, f64),
-        states: [State; 2],
-        meshing: Option<Side>,
-    ) {
-        // An event at the end of a period, by rounding, is at phase 0 of the next one.
-        let within = if t < self.flow.period { t } else { 0.0 };
-        let [before, after] = if kind == EventKind::MeshEnd { [states[0]; 2] } else { states };
-        let t = (period - self.start) as f64 * self.flow.period + t;
-        self.events.push(Event { kind, gap: 0, side, t, t_mod_period: within, before, after, meshing });
-    }
 }
 
 impl Observer for EventLog<'_> {
-    fn event(&mut self, event: &GapEvent) {
-        let states = [event.before, event.after].map(|q| self.flow.to_state(q));
-        self.push(event.kind, event.side, (event.period, event.t), states, event.meshing_after());
+    fn event(&mut self, event: &GapEvent, states: States<'_>) {
+        let GapEvent { gap, kind, side, t, meshing, .. } = *event;
+        // An event at the end of a period, by rounding, is at phase 0 of the next one.
+        let t_mod_period = if t < self.flow.period { t } else { 0.0 };
+        let [before, after] = states();
+        let after = if kind == EventKind::MeshEnd { before } else { after };
+        let t = (event.period - self.start) as f64 * self.flow.period + t;
+        self.events.push(Event { kind, gap, side, t, t_mod_period, before, after, meshing });
     }
-
-    fn machine_event(&mut self, event: &MachineEvent) {
-        let states = [event.before, event.after];
-        self.push(event.kind, event.side, (event.period, event.t), states, event.meshing);
-        self.events.iter_mut().last().expect("it was just added").gap = event.gap;
-    }
-}
-
-/// Whether free motion is at a wall within `ON_STROBE_TURNS` of the present time.
-fn passes_wall(flow: &Flow, trajectory: &Trajectory<'_, 0>) -> bool {
-    if let Some(passes) = trajectory.machine_passes_wall(ON_STROBE_TURNS * flow.period) {
-        return passes;
-    }
-    let q = flow.to_gap(trajectory.state());
-    let reach = ON_STROBE_TURNS * flow.period * q[1].abs();
-    let between = trajectory.walls();
-    let is_near = |side: Side| (q[0] - between[side.index()]).abs() < reach;
-    trajectory.domain() == DomainKind::Free && Side::BOTH.into_iter().any(is_near)
 }

@@ -1,7 +1,7 @@
 //! Recurrence of strobe states: candidates for the period of a motion.
 
-use crate::flow::Flow;
 use crate::model::State;
+use crate::motion::Flow;
 
 /// Largest distance of a recurrence, relative to the size of the motion.
 pub(super) const RECURRENCE_DISTANCE: f64 = 3e-2;

@@ -67,8 +67,8 @@ fn averages(strobes: &[State], centre: &State, metric: &Metric) -> ([f64; MOST_C
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::Flow;
     use crate::model::{GearPair, state};
+    use crate::motion::Flow;
 
     fn regular(state: impl FnMut(usize) -> State, count: usize) -> bool {
         let strobes: Vec<State> = (0..count).map(state).collect();

@@ -5,9 +5,9 @@ use nalgebra::DMatrix;
 use super::analysis::Analysis;
 use super::recurrence::Metric;
 use super::{Event, Settings};
-use crate::flow::Flow;
 use crate::model::{Law, STATE, State};
-use crate::reference::{Allowance, Stop, Trajectory};
+use crate::motion::Flow;
+use crate::motion::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, StrobeMap, UNIT, refine, times};
 
 /// Rounding error of the motion between two events, in units of the machine epsilon times the size of the motion.

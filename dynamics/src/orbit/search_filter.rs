@@ -87,8 +87,8 @@ impl SearchHistory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::Flow;
     use crate::model::{GearPair, REST, state};
+    use crate::motion::Flow;
 
     /// Returns the strobe states of a motion with one multiplier, near a cycle at the origin.
     fn powers(multiplier: f64, start: f64) -> Vec<State> {
@@ -125,7 +125,7 @@ mod tests {
         let (map, mut history) = (StrobeMap::Periods(1), SearchHistory::default());
         let pair = GearPair::paper(0.5);
         let flow = Flow::new(&pair.oscillator().unwrap());
-        let seed = crate::reference::Trajectory::new(&flow, pair.law(), REST);
+        let seed = crate::motion::Trajectory::new(&flow, pair.law(), REST);
         let mut cycle = crate::stability::refine(&seed, map).unwrap();
         cycle.state = REST;
         history.add_unstable(map, &cycle);
@@ -157,7 +157,7 @@ mod tests {
             let pair = GearPair::paper(0.5);
             let flow = Flow::new(&pair.oscillator().unwrap());
             let mut carrier =
-                crate::reference::Trajectory::new(&flow, pair.law(), REST).carrying([state(&[0.5; 4])]);
+                crate::motion::Trajectory::new(&flow, pair.law(), REST).carrying([state(&[0.5; 4])]);
             for _ in 0..6 {
                 let [u] = carrier.tangents();
                 carrier.set_tangents([u.map(|x| factor * x)]);
@@ -178,7 +178,7 @@ mod tests {
     fn a_turning_tangent_does_not_escape() {
         let pair = GearPair::paper(0.5);
         let flow = Flow::new(&pair.oscillator().unwrap());
-        let fresh = crate::reference::Trajectory::new(&flow, pair.law(), REST);
+        let fresh = crate::motion::Trajectory::new(&flow, pair.law(), REST);
         let (radius, ratio) = (0.9, 100.0);
         let (mut apparent, mut count) = (0, 0);
         for angle in [0.3, 0.7, 1.1, 1.5] {

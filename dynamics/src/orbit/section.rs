@@ -8,9 +8,9 @@ use super::Event;
 use super::instant::after_events;
 use super::quantities::Quantities;
 use super::reading::{EventLog, ON_STROBE_TURNS};
-use crate::flow::Flow;
 use crate::model::{Law, Side, State};
-use crate::reference::{Allowance, Trajectory};
+use crate::motion::Flow;
+use crate::motion::{Allowance, Trajectory};
 
 /// Least distance of half a turn from events, in turns, at which states are compared there. Half a turn adds no sine to
 /// the force.
@@ -43,7 +43,8 @@ impl Section {
         periods: u32,
         allowance: Allowance<'_>,
     ) -> Option<Section> {
-        let mut trajectory = Trajectory::<0>::new(flow, law, in_front(flow, strobe)).allowing(allowance);
+        let mut trajectory =
+            Trajectory::<0>::new(flow, law, flow.in_front(strobe, ON_WALL, IN_FRONT)).allowing(allowance);
         let mut log = EventLog::new(flow, 0);
         for _ in 0..periods {
             trajectory.advance_period(&mut log).ok()?;
@@ -103,21 +104,4 @@ impl Section {
     fn time_to_strobe(&self) -> f64 {
         (1.0 - self.turns) * self.flow.period
     }
-}
-
-/// Moves a gap that lies behind a wall by rounding to its front: behind it would be a lasting contact.
-fn in_front(flow: &Flow, y: State) -> State {
-    if flow.machine.is_some() {
-        return y;
-    }
-    let mut q = flow.to_gap(y);
-    for side in Side::BOTH {
-        let (wall, sign) = (flow.wall(side), side.sign());
-        let unit = wall.abs().max(flow.length);
-        if (0.0..ON_WALL * unit).contains(&(sign * (q[0] - wall))) {
-            q[0] = wall - sign * IN_FRONT * unit;
-            return flow.to_state(q);
-        }
-    }
-    y
 }

@@ -1,8 +1,8 @@
 //! Tests of whole cells: the reported class is that of the motion which the start reaches.
 
 use super::{Budget, Class, Measurement, Settings, Status, analyse, measure};
-use crate::flow::Flow;
 use crate::model::{GearPair, REST};
+use crate::motion::Flow;
 
 fn budget(early_stop: bool, transient_periods: u32) -> Budget {
     Budget {

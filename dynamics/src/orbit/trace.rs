@@ -2,9 +2,9 @@
 
 use super::Sample;
 use super::instant::at_present;
-use crate::flow::Flow;
 use crate::model::{Model, ModelError, Side, State};
-use crate::reference::{Stop, Trajectory};
+use crate::motion::Flow;
+use crate::motion::{Stop, Trajectory};
 
 /// Samples a trajectory evenly over `periods` forcing periods, including the first and the last instant. It starts
 /// from `start` at phase 0, in lasting contact with the wall `meshing` or in free motion. If the trajectory cannot be

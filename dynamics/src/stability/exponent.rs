@@ -1,7 +1,7 @@
 //! The largest Lyapunov exponent as an average over time, with its standard error.
 
 use crate::model::State;
-use crate::reference::Trajectory;
+use crate::motion::Trajectory;
 
 /// Number of blocks whose means give the standard error.
 const BLOCKS: usize = 16;

@@ -8,7 +8,7 @@ use nalgebra::{
 use super::unit_circle::lies_within_unit_circle;
 use super::{Cycle, Image, StrobeMap, multipliers};
 use crate::model::{State, difference, state, sum};
-use crate::reference::{Trajectory, Work};
+use crate::motion::{Trajectory, Work};
 
 /// Limits of one Newton search.
 #[derive(Clone, Copy, Debug)]
@@ -264,8 +264,8 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::Flow;
     use crate::model::{GearPair, REST};
+    use crate::motion::Flow;
 
     fn seed_of<'f>(flow: &'f Flow, pair: &GearPair, periods: u32) -> Trajectory<'f> {
         let mut seed = Trajectory::new(flow, pair.law(), REST);

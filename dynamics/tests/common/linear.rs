@@ -1,6 +1,6 @@
 //! Linear motion of one degree of freedom in closed form, and oscillators with walls.
 
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Oscillator, Side, Stage};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Pair, Side, Stage};
 
 /// `x'' + 2 gamma x' + square x = force cos(omega t) + load`, not critically damped.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +49,7 @@ impl Linear {
     }
 
     /// Returns the oscillator of one degree of freedom and unit mass, without walls.
-    pub(crate) fn oscillator(&self) -> Oscillator {
+    pub(crate) fn oscillator(&self) -> Pair {
         let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
         let free = Domain {
             damping: first(2.0 * self.gamma),
@@ -57,7 +57,7 @@ impl Linear {
             load: [self.load, 0.0],
             preload: 0.0,
         };
-        Oscillator {
+        Pair {
             degrees: 1,
             mass: [[1.0, 0.0], [0.0, 1.0]],
             gap: [1.0, 0.0],
@@ -70,8 +70,6 @@ impl Linear {
             stages: Vec::new(),
             schedule: Vec::new(),
             outer_walls: Default::default(),
-            friction: Vec::new(),
-            machine: None,
             free,
             meshing: [free; 2],
         }
@@ -96,14 +94,14 @@ pub(crate) fn invariants_of(multipliers: &[[f64; 2]]) -> [f64; 2] {
 
 /// Returns an oscillator with other domains and forces, in all stages and harmonics.
 pub(crate) fn transformed(
-    o: &Oscillator,
+    o: &Pair,
     domain: impl Fn(&Domain) -> Domain,
     force: impl Fn([f64; 2]) -> [f64; 2],
-) -> Oscillator {
+) -> Pair {
     let both = |meshing: &[Domain; 2]| [domain(&meshing[0]), domain(&meshing[1])];
     let stage = |stage: &Stage| Stage { free: domain(&stage.free), meshing: both(&stage.meshing) };
     let harmonic = |h: &Harmonic| Harmonic { cos: force(h.cos), sin: force(h.sin), ..*h };
-    Oscillator {
+    Pair {
         force: force(o.force),
         force_sin: force(o.force_sin),
         free: domain(&o.free),
@@ -116,12 +114,12 @@ pub(crate) fn transformed(
 
 /// Adds a wall to an oscillator, with a spring and a damper along the gap row behind it.
 pub(crate) fn with_wall(
-    oscillator: Oscillator,
+    oscillator: Pair,
     side: Side,
     at: f64,
     contact: Contact,
     [stiffness, damping]: [f64; 2],
-) -> Oscillator {
+) -> Pair {
     let ([g0, g1], free) = (oscillator.gap, oscillator.free);
     let along = [[g0 * g0, g0 * g1], [g0 * g1, g1 * g1]];
     let plus = |matrix: [[f64; 2]; 2], added: f64| -> [[f64; 2]; 2] {
@@ -141,7 +139,7 @@ pub(crate) fn with_wall(
 }
 
 /// Adds a preload to the first elastic wall on a side, in the first stage.
-pub(crate) fn with_preload(mut oscillator: Oscillator, side: Side, preload: f64) -> Oscillator {
+pub(crate) fn with_preload(mut oscillator: Pair, side: Side, preload: f64) -> Pair {
     let (gap, domain) = (oscillator.gap, &mut oscillator.meshing[usize::from(side == Side::Left)]);
     domain.preload = preload;
     (0..2).for_each(|i| domain.load[i] -= side.sign() * preload * gap[i]);

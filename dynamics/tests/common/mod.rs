@@ -1,13 +1,15 @@
 //! Fixtures for tests of one motion, shared by the tests of the reference and of the lanes.
 #![allow(dead_code, reason = "every test binary compiles this module and uses a part of it")]
 
-use rattlemap_dynamics::flow::{DomainKind, Flow};
+use pairs::{AsPair, OfPair};
 pub(crate) use rattlemap_dynamics::model::REST;
 use rattlemap_dynamics::model::{GearPair, Law, Side, State};
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Stop, Trajectory, Work};
 use rattlemap_dynamics::orbit::{Budget, Settings};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory, Work};
+use rattlemap_dynamics::{motion::Flow, pair::DomainKind};
 
 pub(crate) mod linear;
+pub(crate) mod pairs;
 pub(crate) mod table;
 
 /// The default budget of a map, with early stops and exponents.
@@ -33,7 +35,7 @@ pub(crate) fn paper(e: f64, omega: f64) -> GearPair {
 
 /// Returns the flow of a valid pair.
 pub(crate) fn flow_of(pair: &GearPair) -> Flow {
-    Flow::new(&pair.oscillator().expect("valid parameters"))
+    Flow::new(&pair.pair())
 }
 
 /// Returns the difference of two counters of work.

@@ -3,8 +3,8 @@
 use crate::common::table::{LYAPUNOV_DECIMALS, MESH_DECIMALS, Row, STROBE_DECIMALS, prints, rows};
 use crate::common::{REST, apart, flow_of};
 use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Orbit, Settings, analyse};
-use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::StrobeMap;
 use rayon::prelude::*;
 

@@ -2,10 +2,10 @@
 
 use crate::common::linear::{Linear, invariants, invariants_of, product, with_wall};
 use crate::common::{BUDGET, REST, near};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State, state};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, Side, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{GapEvent, Trajectory};
 use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow, measure};
-use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
 /// Any law: elastic walls ignore it.
 const LAW: Law = Law { restitution: [0.5; 2], mesh_speed: [0.01; 2] };
@@ -17,7 +17,7 @@ const UNITS: [State; 2] = [state(&[1.0]), state(&[0.0, 1.0])];
 struct Bilinear {
     free: Linear,
     behind: Linear,
-    oscillator: Oscillator,
+    oscillator: Pair,
 }
 
 fn bilinear(free: Linear, at: f64, stiffness: f64, damping: f64) -> Bilinear {
@@ -49,7 +49,6 @@ fn a_bilinear_oscillator_agrees_with_two_linear_flights() {
     ] {
         let free = Linear { gamma, square, force: 1.0, load, omega };
         let Bilinear { free, behind, oscillator } = bilinear(free, at, stiffness, damping);
-        oscillator.validate().expect("an elastic wall");
         let flow = Flow::new(&oscillator);
         let orbit = analyse_flow(&flow, LAW, REST, &Settings::default(), 8);
         let case = format!("gamma {gamma}, square {square}, omega {omega}: {orbit:?}");
@@ -157,7 +156,7 @@ fn linear(gamma: f64, square: f64) -> Linear {
     Linear { gamma, square, force: 0.0, load: 0.0, omega: 1.0 }
 }
 
-fn check_not_chaotic(oscillator: &Oscillator, law: Law, start: State) {
+fn check_not_chaotic(oscillator: &Pair, law: Law, start: State) {
     let flow = Flow::new(oscillator);
     let found = measure(&flow, law, start, &BUDGET);
     let is_chaotic = found.period.is_none() && !found.is_quasi_periodic && found.status == Status::Ok;
@@ -182,7 +181,6 @@ fn growth_that_contacts_do_not_share_is_not_chaos() {
     let mut pair = linear(0.05, 1.0).oscillator();
     (pair.degrees, pair.walls, pair.force) = (2, [0.5, -0.5], [2.0, 0.0]);
     pair.free.stiffness[1][1] = -0.2;
-    pair.validate().unwrap();
     let beside_a_hill = (pair, Law::both(0.7, 0.0), REST);
     // Rest behind a wall, where the hill is steeper than the contact's spring.
     let hill = Linear { load: -1.0, ..linear(0.0, -2.0) };
@@ -212,7 +210,6 @@ fn a_narrow_clearance_is_no_escape() {
             ..pair.free
         };
         pair.meshing = [behind(1.0), behind(-1.0)];
-        pair.validate().unwrap();
         let found = measure(&Flow::new(&pair), Law::both(0.0, 0.0), REST, &BUDGET);
         assert!(found.status != Status::Escape && found.period == Some(1), "{clearance}: {found:?}");
     }

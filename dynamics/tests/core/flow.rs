@@ -1,10 +1,11 @@
 //! The exact flow against closed forms and against the matrix exponential of nalgebra.
 
+use crate::common::pairs::OfPair;
 use crate::common::{REST, departure, flow_of, max_or_nan, paper};
 use nalgebra::{SMatrix, SVector};
-use rattlemap_dynamics::flow::DomainKind;
 use rattlemap_dynamics::model::{GearPair, Side, State, state};
-use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::motion::Trajectory;
+use rattlemap_dynamics::pair::DomainKind;
 
 /// Rounding error of a matrix exponential per radian of the fastest rate. Every doubling of the time doubles the
 /// error and adds that of a product.

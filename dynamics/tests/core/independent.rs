@@ -5,8 +5,8 @@ pub(crate) mod random;
 
 use std::time::{Duration, Instant};
 
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Oscillator, State, state};
+use rattlemap_dynamics::model::{Form, Law, State, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{
     Budget, Class, EVENT_PERIODS, Measurement, Orbit, Status, analyse_flow, measure,
 };
@@ -108,7 +108,7 @@ fn confirms(case: &Case, flow: &Flow, ours: &Cycle) -> bool {
 }
 
 fn compare(case: &Case) -> Result<Compared, String> {
-    let (whole, flow) = (case.machine(), Flow::new(&case.oscillator));
+    let (whole, flow) = (case.machine(), Flow::new(case.oscillator.form(case.law)));
     let system = System::new(&whole.machine, ANGLE);
     let mut theirs = OneGap::new(&flow, case.oscillator.degrees, case.law, case.start);
     let first = compare_case(&whole, ONE_GAP, &mut theirs)?;
@@ -216,22 +216,22 @@ const LONGEST_TIME: Duration = Duration::from_secs(2);
 const WIDE: Shape = Shape { harmonics: true, stages: true, wide: true, ..PLAIN };
 
 /// Returns a random model with wide ranges.
-fn wide(shape: Shape) -> impl Fn(u64) -> (Oscillator, Law, State) {
+fn wide(shape: Shape) -> impl Fn(u64) -> (Form, Law, State) {
     move |seed| {
         let case = case(seed, shape);
-        (case.oscillator, case.law, case.start)
+        (case.oscillator.form(case.law), case.law, case.start)
     }
 }
 
 /// Returns a random machine, which has its contact laws itself.
-fn machine(seed: u64) -> (Oscillator, Law, State) {
+fn machine(seed: u64) -> (Form, Law, State) {
     let case = any_case(seed);
-    (Oscillator::of_machine(case.machine), Law::both(0.0, 0.0), state(&case.start))
+    (Form::Machine(case.machine), Law::both(0.0, 0.0), state(&case.start))
 }
 
 /// Measures random models. Every motion must end in time, with finite numbers.
 fn check_ends(
-    model: impl Fn(u64) -> (Oscillator, Law, State) + Sync,
+    model: impl Fn(u64) -> (Form, Law, State) + Sync,
     seeds: std::ops::Range<u64>,
     longest: Duration,
 ) {

@@ -3,8 +3,8 @@
 use std::sync::atomic::AtomicBool;
 
 use crate::common::linear::{Linear, with_wall};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Law, Side, State, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{history, state_at};
 
 /// Returns the flow of a ball with the acceleration 2 towards a wall at 0. The forcing has no amplitude.

@@ -1,13 +1,13 @@
 //! The engine of machines, on oscillators of two coordinates, against the engine of such oscillators; mirror images.
 
 use nalgebra::DVector;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Drive, DryFriction, Law, Machine, Oscillator, REST};
+use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::model::{Drive, DryFriction, Form, Law, Oscillator, REST, Restitution};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{
     Class, EVENT_PERIODS, Orbit, Quantities, Settings, Status, analyse_flow, measure,
 };
-use rattlemap_dynamics::reference::Trajectory;
-use rattlemap_dynamics::reference::machine::{Motion, System};
 use rattlemap_dynamics::stability::UNIT;
 use rayon::prelude::*;
 
@@ -33,8 +33,8 @@ fn machines_have_the_classes_of_their_oscillators() {
     let of = |seed: u64| {
         let shape = Shape { stages: seed % 2 == 1, friction: seed.is_multiple_of(3), ..PLAIN };
         let case = case(seed, shape);
-        let machine = Oscillator::of_machine(Machine::of(&case.oscillator, case.law));
-        let [flow, whole] = [&case.oscillator, &machine].map(Flow::new);
+        let machine = Form::Machine(case.oscillator.described(case.law));
+        let [flow, whole] = [case.oscillator.form(case.law), machine].map(Flow::new);
         let settings = Settings { transient_periods: 200, observed_periods: 64, max_period: 16 };
         let [expected, found] =
             [&flow, &whole].map(|flow| analyse_flow(flow, case.law, case.start, &settings, EVENT_PERIODS));
@@ -70,9 +70,9 @@ fn machines_have_the_classes_of_their_oscillators() {
 }
 
 /// The gear pair as a machine, with a stage that begins at phase 0.1 and recurs, mirrored, after half a period.
-fn mirrored_pair(e: f64) -> Machine {
+fn mirrored_pair(e: f64) -> Oscillator {
     let pair = crate::common::paper(e, 5.6);
-    let mut machine = Machine::of(&pair.oscillator().unwrap(), pair.law());
+    let mut machine = pair.oscillator().unwrap();
     let mut other = machine.stages[0].clone();
     machine.stages[0].load[0] = 0.1;
     other.load[0] = -0.1;
@@ -84,7 +84,7 @@ fn mirrored_pair(e: f64) -> Machine {
 }
 
 /// A change of a machine.
-type Change = fn(&mut Machine);
+type Change = fn(&mut Oscillator);
 
 /// Changes after which the mirror image of a motion is no motion.
 const UNSYMMETRIC: [Change; 7] = [
@@ -92,7 +92,7 @@ const UNSYMMETRIC: [Change; 7] = [
     |machine| machine.stages[1].stiffness[(0, 0)] *= 1.1,
     |machine| machine.schedule[1].0 = 0.65,
     |machine| machine.gaps[0].walls[0][0].at *= 1.1,
-    |machine| machine.gaps[0].walls[1][0].restitution.constant *= 0.9,
+    |machine| machine.gaps[0].walls[1][0].restitution = Restitution::Constant(0.7),
     |machine| {
         let second = Drive { order: 2, ..machine.drives[0].clone() };
         machine.drives.push(second);
@@ -105,7 +105,7 @@ const UNSYMMETRIC: [Change; 7] = [
 
 #[test]
 fn the_mirror_image_of_a_motion_is_a_motion_of_a_symmetric_machine() {
-    let off = |machine: &Machine| {
+    let off = |machine: &Oscillator| {
         let [system, later] = [machine, &machine.at_phase(std::f64::consts::PI)].map(System::new);
         let y = [0.3, 1.0, 0.1, -2.0];
         let mut motion = Motion::new(&system, &y);
@@ -132,11 +132,11 @@ fn a_cycle_of_a_machine_is_symmetric_up_to_the_pitchfork() {
         [(0.3, None, true), (0.541, None, true), (0.543, None, false), (0.3, Some(UNSYMMETRIC[4]), false)]
     {
         let pair = crate::common::paper(e, 5.6);
-        let mut machine = Machine::of(&pair.oscillator().unwrap(), pair.law());
+        let mut machine = pair.oscillator().unwrap();
         if let Some(change) = change {
             change(&mut machine);
         }
-        let flow = Flow::new(&Oscillator::of_machine(machine));
+        let flow = Flow::new(&Form::Machine(machine));
         let law = Law::both(0.0, 0.0);
         let orbit = analyse_flow(&flow, law, REST, &Settings::default(), EVENT_PERIODS);
         let measured = measure(&flow, law, REST, &BUDGET);
@@ -152,7 +152,7 @@ fn time_of_a_period_as_a_machine() {
     for (e, omega) in [(0.06, 5.6), (0.605, 5.6), (0.72, 1.5), (0.9, 3.0)] {
         let pair = crate::common::paper(e, omega);
         let (oscillator, law) = (pair.oscillator().unwrap(), pair.law());
-        let (flow, system) = (Flow::new(&oscillator), System::new(&Machine::of(&oscillator, law)));
+        let (flow, system) = (Flow::new(&oscillator), System::new(&oscillator));
         let mut times = [[f64::INFINITY; 2]; 2];
         for _ in 0..5 {
             for tangents in [false, true] {

@@ -1,14 +1,15 @@
 //! Classification of oscillators with one wall, against closed forms, and the effect of units.
 
 use crate::common::linear::{Linear, transformed, with_wall};
+use crate::common::pairs::AsPair;
 use crate::common::{BUDGET, near};
 use crate::single_stop::{Family, Impacting};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, REST, Side, State, state};
+use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Pair, REST, Side, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{GapEvent, Trajectory};
 use rattlemap_dynamics::orbit::{
     Budget, Class, EventKind, Measurement, Orbit, Settings, Status, analyse_flow, measure,
 };
-use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
 /// `x'' + 2 gamma x' + x = cos(omega t)` with a wall at `sigma`, and a second, damped body that touches nothing.
 #[derive(Clone, Copy, Debug)]
@@ -24,14 +25,14 @@ impl ImpactOscillator {
         Family::new(self.gamma, self.omega, self.e, 1)
     }
 
-    fn oscillator(&self) -> Oscillator {
+    fn oscillator(&self) -> Pair {
         let single = self.family().linear.oscillator();
         let free = Domain {
             damping: [[2.0 * self.gamma, 0.0], [0.0, 1.0]],
             stiffness: [[1.0, 0.0], [0.0, 4.0]],
             ..single.free
         };
-        let plain = Oscillator { degrees: 2, free, meshing: [free; 2], ..single.clone() };
+        let plain = Pair { degrees: 2, free, meshing: [free; 2], ..single.clone() };
         with_wall(plain, Side::Right, self.sigma, Contact::Impact, [1000.0, 1.0])
     }
 
@@ -98,7 +99,7 @@ fn an_oscillator_with_a_left_wall_is_the_mirror_image_of_one_with_a_right_wall()
     for case in cases() {
         let right = case.oscillator();
         let mirrored = |d: &Domain| Domain { load: d.load.map(|x| -x), ..*d };
-        let left = Oscillator {
+        let left = Pair {
             walls: [f64::INFINITY, -case.sigma],
             contacts: [Contact::Impact; 2],
             force: right.force.map(|x| -x),
@@ -109,7 +110,7 @@ fn an_oscillator_with_a_left_wall_is_the_mirror_image_of_one_with_a_right_wall()
         assert_eq!(left.length_scale(), right.length_scale());
         let (_, [x, v]) = case.orbit();
         let start = state(&[x - 0.01, v + 0.02, 0.3, -0.2]);
-        let run = |oscillator: &Oscillator, start: State| {
+        let run = |oscillator: &Pair, start: State| {
             let flow = Flow::new(oscillator);
             analyse_flow(&flow, case.law(), start, &Settings::default(), 8)
         };
@@ -125,7 +126,7 @@ fn an_oscillator_with_a_left_wall_is_the_mirror_image_of_one_with_a_right_wall()
 fn a_wall_out_of_reach_does_not_change_the_motion() {
     let case = ImpactOscillator { gamma: 0.05, omega: 1.5, sigma: 5.0, e: 0.8 };
     let near_wall = case.oscillator();
-    let no_wall = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], ..near_wall.clone() };
+    let no_wall = Pair { walls: [f64::INFINITY, f64::NEG_INFINITY], ..near_wall.clone() };
     let orbits: Vec<Orbit> = [near_wall, no_wall]
         .iter()
         .map(|oscillator| {
@@ -190,12 +191,12 @@ fn a_ball_comes_to_rest_on_a_floor_at_any_position() {
 
 /// Transforms an oscillator, its law and a start so that lengths are multiplied by `length` and rates by `rate`.
 pub(crate) fn in_units(
-    oscillator: &Oscillator,
+    oscillator: &Pair,
     law: Law,
     start: State,
     length: f64,
     rate: f64,
-) -> (Oscillator, Law, State) {
+) -> (Pair, Law, State) {
     let force = length * rate * rate;
     let domain = |d: &Domain| Domain {
         damping: d.damping.map(|row| row.map(|c| rate * c)),
@@ -203,7 +204,7 @@ pub(crate) fn in_units(
         load: d.load.map(|f| force * f),
         preload: 0.0,
     };
-    let scaled = Oscillator {
+    let scaled = Pair {
         walls: oscillator.walls.map(|wall| length * wall),
         omega: rate * oscillator.omega,
         ..transformed(oscillator, domain, |f| f.map(|f| force * f))
@@ -215,13 +216,13 @@ pub(crate) fn in_units(
 }
 
 /// Returns gear pairs over restitution and frequency, and impact oscillators that start from rest.
-fn gear_pairs_and_impact_oscillators() -> Vec<(Oscillator, Law, State)> {
+fn gear_pairs_and_impact_oscillators() -> Vec<(Pair, Law, State)> {
     let mut list = Vec::new();
     for j in 0..9 {
         for i in 0..9 {
             let omega = 1.1 + 1.3 * f64::from(j);
             let pair = GearPair { omega, ..GearPair::paper(0.03 + 0.12 * f64::from(i)) };
-            list.push((pair.oscillator().unwrap(), pair.law(), REST));
+            list.push((pair.pair(), pair.law(), REST));
         }
     }
     for i in 0..24 {
@@ -232,7 +233,7 @@ fn gear_pairs_and_impact_oscillators() -> Vec<(Oscillator, Law, State)> {
     list
 }
 
-fn measured((oscillator, law, start): &(Oscillator, Law, State)) -> Measurement {
+fn measured((oscillator, law, start): &(Pair, Law, State)) -> Measurement {
     let budget = Budget { undecided_periods: 1024, ..BUDGET };
     measure(&Flow::new(oscillator), *law, *start, &budget)
 }

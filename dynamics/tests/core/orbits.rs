@@ -2,10 +2,10 @@
 
 use crate::common::{BUDGET, REST, flow_of, paper as cell};
 use rattlemap_dynamics::model::{GearPair, Model, State, Stops, state};
+use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{
     Class, EVENT_PERIODS, LONGEST_WINDOW, Orbit, Settings, Status, analyse, analyse_until, measure,
 };
-use rattlemap_dynamics::reference::Trajectory;
 
 fn orbit(pair: &GearPair) -> Orbit {
     analyse(pair, REST, &Settings::default()).unwrap()

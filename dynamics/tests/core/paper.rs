@@ -1,9 +1,10 @@
 //! The published results of the paper, to their printed digits (omega = 5.6, Table 1, from rest).
 
+use crate::common::pairs::OfPair;
 use crate::common::{BUDGET, REST, apart, events, flow_of, paper};
 use rattlemap_dynamics::model::{GearPair, Side, State};
+use rattlemap_dynamics::motion::{GapEvent, Trajectory};
 use rattlemap_dynamics::orbit::{Class, EventKind, Orbit, Settings, Status, analyse, measure};
-use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 fn orbit(e: f64) -> Orbit {

@@ -1,11 +1,12 @@
 //! Invariants of the motion of all gear pairs.
 
+use crate::common::pairs::{AsPair, OfPair};
 use crate::common::{departure, domain_after, mirrored_symbol, negated, paper, sign, size};
 use proptest::prelude::*;
-use rattlemap_dynamics::flow::{DomainKind, Flow};
 use rattlemap_dynamics::model::{GearPair, REST, Side, State, state};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Stop, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
+use rattlemap_dynamics::{motion::Flow, pair::DomainKind};
 use rayon::prelude::*;
 
 /// Largest number of events for which two computations of one motion are compared. After more events, a difference by
@@ -64,7 +65,7 @@ fn starts() -> impl Strategy<Value = State> {
 }
 
 fn flow_of(pair: &GearPair) -> Flow {
-    Flow::new(&pair.oscillator().expect("the ranges are valid"))
+    Flow::new(&pair.pair())
 }
 
 /// Returns the events of some periods, or those before the cap on events. No other stop may occur.

@@ -2,14 +2,15 @@
 
 use crate::common::linear::{Linear, with_preload, with_wall};
 use crate::common::near;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, REST, Side, state};
+use crate::common::pairs::described;
+use rattlemap_dynamics::model::{Contact, Law, Pair, REST, Side, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Stop, Trajectory};
 use rattlemap_dynamics::orbit::{Class, Settings, analyse_flow};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
 
 const LAW: Law = Law { restitution: [0.5; 2], mesh_speed: [0.01; 2] };
 
-fn both_walls(free: Linear, at: f64, contact: Contact, spring: [f64; 2]) -> Oscillator {
+fn both_walls(free: Linear, at: f64, contact: Contact, spring: [f64; 2]) -> Pair {
     Side::BOTH
         .into_iter()
         .fold(free.oscillator(), |o, side| with_wall(o, side, side.sign() * at, contact, spring))
@@ -41,7 +42,6 @@ fn a_constant_force_returns_the_mass_with_its_speed() {
     for contact in [Contact::Elastic, Contact::Pushing] {
         let walled = both_walls(still, 0.5, contact, [0.0, 0.0]);
         let oscillator = Side::BOTH.into_iter().fold(walled, |o, side| with_preload(o, side, 4.0));
-        oscillator.validate().unwrap();
         let flow = Flow::new(&oscillator);
         let mut events: Vec<GapEvent> = Vec::new();
         let units = [state(&[1.0]), state(&[0.0, 1.0])];
@@ -114,13 +114,14 @@ fn a_spring_alone_never_pulls() {
 fn preloads_of_other_walls_are_refused() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
     let message = |contact: Contact, preload: f64| {
-        let oscillator = with_wall(free.oscillator(), Side::Right, 0.2, contact, [8.0, 0.0]);
-        with_preload(oscillator, Side::Right, preload).validate().map_err(|error| error.to_string())
+        let pair = with_wall(free.oscillator(), Side::Right, 0.2, contact, [8.0, 0.0]);
+        let mut oscillator = described(&pair, Law::both(0.0, 0.0));
+        oscillator.gaps[0].walls[0][0].springs[0].preload = preload;
+        oscillator.validate().map_err(|error| error.to_string())
     };
     assert_eq!(message(Contact::Elastic, 1.0), Ok(()));
-    let not_elastic =
-        "preload in contact with the right wall = 1: it must be 0, because the wall is not elastic";
+    let not_elastic = "preload of right wall 1 = 1: it must be 0, because the wall is not elastic";
     assert_eq!(message(Contact::Impact, 1.0), Err(not_elastic.to_owned()));
-    let not_a_number = "preload in contact with the right wall = NaN: it must be a finite number";
+    let not_a_number = "preload of right wall 1 = NaN: it must be a finite number";
     assert_eq!(message(Contact::Pushing, f64::NAN), Err(not_a_number.to_owned()));
 }

@@ -1,9 +1,10 @@
 //! Measured quantities: energy balance, closed forms, and dense samples of the same motion.
 
 use crate::common::linear::{Linear, with_preload, with_wall};
+use crate::common::pairs::OfPair;
 use crate::common::{BUDGET, REST, near, paper};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, Side, State, state};
+use rattlemap_dynamics::model::{Contact, GearPair, Law, Pair, Side, State, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{
     Budget, Class, EventKind, Orbit, Quantities, Settings, analyse, analyse_flow, measure, trace,
 };
@@ -141,11 +142,9 @@ fn a_bouncing_ball_has_the_impulses_of_its_cycle() {
 fn compliant_and_rigid_contacts_close_the_balance() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 2.1 };
     let elastic = with_wall(free.oscillator(), Side::Right, 0.1, Contact::Elastic, [24.0, 1.5]);
-    let pushing = Oscillator { contacts: [Contact::Pushing; 2], ..elastic.clone() };
-    let loose =
-        Oscillator { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, -0.2) };
-    let tight =
-        Oscillator { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, 0.1) };
+    let pushing = Pair { contacts: [Contact::Pushing; 2], ..elastic.clone() };
+    let loose = Pair { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, -0.2) };
+    let tight = Pair { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, 0.1) };
     let table = Linear { gamma: 0.0, square: 0.0, force: 1.2, load: 1.0, omega: 1.0 };
     let rigid = with_wall(table.oscillator(), Side::Right, 0.0, Contact::Rigid, [0.0, 0.0]);
     for (oscillator, law, start) in [
@@ -169,7 +168,7 @@ fn compliant_and_rigid_contacts_close_the_balance() {
             let samples = 100_000;
             let orbit_samples = {
                 let mut trajectory =
-                    rattlemap_dynamics::reference::Trajectory::<0>::new(&flow, law, orbit.strobe);
+                    rattlemap_dynamics::motion::Trajectory::<0>::new(&flow, law, orbit.strobe);
                 (1..=samples)
                     .filter_map(|i| {
                         trajectory

@@ -9,8 +9,8 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::linear::{Linear, with_wall};
 use crate::common::{BUDGET, near};
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Law, REST, Side, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse_flow, measure, state_at};
 
 fn flow(sigma: f64) -> Flow {

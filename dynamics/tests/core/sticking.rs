@@ -1,16 +1,17 @@
 //! Rigid walls: a pressed gap that has come to rest sticks until the load pulls it off.
 
 use crate::common::linear::{Linear, with_wall};
+use crate::common::pairs::{AsPair, OfPair};
 use crate::common::{BUDGET, apart, differences, events, near};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, REST, Side, State, state};
+use rattlemap_dynamics::model::{Contact, GearPair, Law, Pair, REST, Side, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse_flow, measure};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
 /// Returns a ball of weight 1 on a vibrating table with the acceleration `gamma cos(omega t)`. In the frame of the
 /// table, which is the right wall at 0, the ball's acceleration is `z'' = 1 + gamma cos(omega t)` towards the wall.
-fn ball(gamma: f64, omega: f64) -> Oscillator {
+fn ball(gamma: f64, omega: f64) -> Pair {
     let free = Linear { gamma: 0.0, square: 0.0, force: gamma, load: 1.0, omega };
     with_wall(free.oscillator(), Side::Right, 0.0, Contact::Rigid, [0.0, 0.0])
 }
@@ -135,8 +136,8 @@ fn an_impact_at_the_mesh_speed_sticks() {
 }
 
 /// Returns the gear pair between rigid walls.
-fn rigid(pair: &GearPair) -> Oscillator {
-    Oscillator { contacts: [Contact::Rigid; 2], ..pair.oscillator().expect("valid") }
+fn rigid(pair: &GearPair) -> Pair {
+    Pair { contacts: [Contact::Rigid; 2], ..pair.pair() }
 }
 
 /// Sticking gears obey `(m1 + m2) x2'' + (r1 + r2) x2' + (k1 + k2) x2 = F cos - k1 wall`. They part when their

@@ -2,9 +2,10 @@
 
 use crate::common::events;
 use crate::common::linear::{Linear, with_wall};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, Stops, state};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
+use crate::common::pairs::AsPair;
+use rattlemap_dynamics::model::{Contact, Law, Pair, Side, Stops, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Trajectory};
 
 fn stops(e: f64) -> Stops {
     Stops { m: 1.5, force: 0.0, mesh_speed: 0.0, ..Stops::with_restitution(e) }
@@ -22,7 +23,7 @@ fn close(got: f64, want: f64, relative: f64) -> bool {
 #[test]
 fn an_elastic_free_particle_bounces_with_an_exact_period() {
     let stops = stops(1.0);
-    let flow = Flow::new(&stops.oscillator().expect("valid"));
+    let flow = Flow::new(&stops.pair());
     let speed = 0.7;
     let events = events(&flow, stops.law(), state(&[0.0, speed]), 200);
     assert_eq!(events.len(), ((200.0 * flow.period * speed / stops.b - 1.0) / 2.0) as usize + 1);
@@ -40,7 +41,7 @@ fn an_elastic_free_particle_bounces_with_an_exact_period() {
 fn an_inelastic_free_particle_slows_down_geometrically() {
     for e in [0.2, 0.5, 0.9, 0.999] {
         let stops = stops(e);
-        let flow = Flow::new(&stops.oscillator().expect("valid"));
+        let flow = Flow::new(&stops.pair());
         let events = events(&flow, stops.law(), state(&[0.0, 40.0]), 100);
         assert!(events.len() >= 5, "e = {e}: {} impacts", events.len());
         let (mut t, mut speed) = (stops.b / 40.0, 40.0);
@@ -61,7 +62,7 @@ fn a_harmonic_oscillator_between_stops_agrees_with_the_closed_form() {
     for e in [1.0, 0.99, 0.8] {
         let stops = Stops { k: 6.0, m: 1.5, ..stops(e) };
         let w = (stops.k / stops.m).sqrt();
-        let flow = Flow::new(&stops.oscillator().expect("valid"));
+        let flow = Flow::new(&stops.pair());
         let start = 30.0;
         let events = events(&flow, stops.law(), state(&[0.0, start]), 30);
         let mut t = (w * stops.b / start).asin() / w;
@@ -86,7 +87,7 @@ fn a_harmonic_oscillator_between_stops_agrees_with_the_closed_form() {
 fn a_harmonic_oscillator_reaches_the_wall_at_the_right_speed() {
     let stops = Stops { k: 6.0, m: 1.5, ..stops(0.5) };
     let (w, b) = ((stops.k / stops.m).sqrt(), stops.b);
-    let flow = Flow::new(&stops.oscillator().expect("valid"));
+    let flow = Flow::new(&stops.pair());
     for beyond in [1e-3, 1e-6, 1e-9, 1e-12] {
         let miss = events(&flow, stops.law(), state(&[0.0, w * b * (1.0 - beyond)]), 3);
         assert!(miss.is_empty(), "an impact at {beyond:e} below the speed: {miss:?}");
@@ -101,7 +102,7 @@ fn a_harmonic_oscillator_reaches_the_wall_at_the_right_speed() {
 
 /// Returns a ball under gravity `g` towards the right wall, whose free flights are parabolas. Behind the walls at 0.5
 /// and -0.5 there are springs and dampers.
-fn ball(g: f64, damping: f64) -> Oscillator {
+fn ball(g: f64, damping: f64) -> Pair {
     let free = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: g, omega: 1.0 };
     let right = with_wall(free.oscillator(), Side::Right, 0.5, Contact::Impact, [1e4, damping]);
     with_wall(right, Side::Left, -0.5, Contact::Impact, [1e4, damping])
@@ -194,7 +195,7 @@ fn infinite_chatter_stops_at_the_requested_time() {
 #[test]
 fn a_step_may_end_at_the_requested_time() {
     let stops = Stops { m: 1.0, k: 1.0, omega: 0.05, ..stops(0.5) };
-    let flow = Flow::new(&stops.oscillator().expect("valid"));
+    let flow = Flow::new(&stops.pair());
     for goal in [1.25, 2.5, 3.75, 5.0, 8.75, 10.0, 18.75, 28.75, 38.75, 48.75] {
         let mut trajectory = Trajectory::new(&flow, stops.law(), state(&[0.1]));
         trajectory.advance_to(goal, &mut ()).expect("an ordinary cell");

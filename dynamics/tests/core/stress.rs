@@ -1,13 +1,14 @@
 //! Extreme parameters: every motion stays finite or ends with a [`Stop`], and the work is bounded.
 
+use crate::common::pairs::AsPair;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::common::{BUDGET, REST, apart, flow_of, negated, paper, sign, strobe, work_since};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, Side, State, state};
+use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Pair, Side, State, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EVENTS_PER_PERIOD_CAP, GapEvent, Stop, Trajectory, Work};
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse, measure, measure_until};
-use rattlemap_dynamics::reference::{EVENTS_PER_PERIOD_CAP, GapEvent, Stop, Trajectory, Work};
 use rayon::prelude::*;
 
 /// Returns the largest allowed number of steps in a period: several per radian of the fastest oscillation of teeth
@@ -102,7 +103,7 @@ fn an_escape_within_a_long_period_takes_bounded_work() {
         load: [0.0, 1.0],
         preload: 0.0,
     };
-    let oscillator = Oscillator {
+    let oscillator = Pair {
         degrees: 2,
         mass: [[1.0, 0.0], [0.0, 1.0]],
         gap: [0.0, 1.0],
@@ -112,7 +113,7 @@ fn an_escape_within_a_long_period_takes_bounded_work() {
         force: [7.0, 8.0],
         free,
         meshing: [free; 2],
-        ..paper(0.5, 1.0).oscillator().unwrap()
+        ..paper(0.5, 1.0).pair()
     };
     let flow = Flow::new(&oscillator);
     let mut trajectory = Trajectory::new(&flow, Law::both(0.5, 0.0), state(&[0.0, 0.0, 0.1]));

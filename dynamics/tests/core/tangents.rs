@@ -5,9 +5,9 @@
 
 use crate::common::{REST, flow_of, paper, strobe};
 use nalgebra::Matrix4;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, State};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
 fn matrix(columns: [State; 4]) -> Matrix4<f64> {

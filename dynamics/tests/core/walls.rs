@@ -2,23 +2,24 @@
 
 use crate::common::linear::{Linear, with_wall};
 use crate::common::near;
+use crate::common::pairs::described;
 use crate::independent::random::{PLAIN, Shape, case};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Law, Oscillator, OscillatorError, OuterWall, Side, state};
+use rattlemap_dynamics::model::{Contact, Law, OscillatorError, OuterWall, Pair, Side, state};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::motion::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Settings, Status, analyse_flow};
-use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 
 /// Adds a wall behind the outermost one of a side, with a spring along the gap.
-fn add(o: &mut Oscillator, side: Side, at: f64, contact: Contact, stiffness: f64) {
+fn add(o: &mut Pair, side: Side, at: f64, contact: Contact, stiffness: f64) {
     let i = side.index();
     let inside = o.outer_walls[i].last().map_or(o.meshing[i], |wall| wall.meshing[0]);
     let behind =
-        with_wall(Oscillator { free: inside, ..o.clone() }, side, at, contact, [stiffness, 0.0]).meshing[i];
+        with_wall(Pair { free: inside, ..o.clone() }, side, at, contact, [stiffness, 0.0]).meshing[i];
     o.outer_walls[i].push(OuterWall { at, contact, meshing: vec![behind] });
 }
 
 /// A unit mass that moves freely between springs of stiffness 4 at 1 and -1, and more springs of 12 at 2 and -2.
-fn two_stages(omega: f64) -> Oscillator {
+fn two_stages(omega: f64) -> Pair {
     let mut o = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: 0.0, omega }.oscillator();
     for side in Side::BOTH {
         o = with_wall(o, side, side.sign(), Contact::Elastic, [4.0, 0.0]);
@@ -36,7 +37,6 @@ fn free_vibration_of_a_two_stage_spring_has_its_closed_form() {
     let quarter = 1.0 / v + (2.0 / v).asin() / 2.0 + (second / 4.0).atan2(0.25) / 4.0;
     let peak = 1.75 + 0.25f64.hypot(second / 4.0);
     let o = two_stages(std::f64::consts::TAU / (4.0 * quarter));
-    o.validate().unwrap();
     let (flow, law) = (Flow::new(&o), Law::both(1.0, 0.0));
     let start = state(&[0.0, v]);
     let mut trajectory = Trajectory::<0>::new(&flow, law, start);
@@ -76,7 +76,7 @@ fn energy_balances_with_several_walls() {
     let mut cycles = 0;
     for seed in 300..400 {
         let case = case(seed, shape);
-        let flow = Flow::new(&case.oscillator);
+        let flow = Flow::new(&case.oscillator.pair);
         let orbit = analyse_flow(&flow, case.law, case.start, &Settings::default(), EVENT_PERIODS);
         let (Class::Periodic { .. }, Status::Ok) = (orbit.class, orbit.status) else { continue };
         let of = orbit.quantities.unwrap();
@@ -128,10 +128,15 @@ fn a_wall_without_a_spring_changes_no_motion() {
 
 #[test]
 fn walls_in_a_wrong_order_are_refused() {
-    let message = |change: &dyn Fn(&mut Oscillator)| {
+    let message = |change: &dyn Fn(&mut Pair)| {
         let mut o = two_stages(1.0);
         change(&mut o);
-        o.validate().err().as_ref().map(OscillatorError::to_string).unwrap_or_default()
+        described(&o, Law::both(0.0, 0.0))
+            .validate()
+            .err()
+            .as_ref()
+            .map(OscillatorError::to_string)
+            .unwrap_or_default()
     };
     assert_eq!(message(&|_| ()), "");
     let near = message(&|o| o.outer_walls[0][0].at = 0.5);
@@ -140,6 +145,4 @@ fn walls_in_a_wrong_order_are_refused() {
     assert!(rigid.starts_with("left wall 1 = -1: it must be elastic"), "{rigid}");
     let many = message(&|o| (3..7).for_each(|at| add(o, Side::Right, f64::from(at), Contact::Elastic, 1.0)));
     assert!(many.contains("at most 4"), "{many}");
-    let jump = message(&|o| o.outer_walls[0][0].meshing[0].load[0] += 1.0);
-    assert!(jump.contains("contact with right wall 2"), "{jump}");
 }

@@ -54,6 +54,7 @@ fn text(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> String {
     [
         format!("cells    {grid}{}{starts}{shard}{stored}", plan.cell_count()),
         format!("engine   {} ({}) on {device}{reason}", dry.engine, dry.precision),
+        format!("model    {}", dry.model),
         format!("memory   about {}{on_device}{}", bytes(dry.host_memory), free(dry.free.memory)),
         format!("disk     about {}{} for {}", bytes(dry.disk), free(dry.free.disk), path(out)),
         format!("time     {}", time(&dry.forecast, dry.is_adaptive)),

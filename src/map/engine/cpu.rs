@@ -11,7 +11,7 @@ use super::flows::Flows;
 use super::{Device, measured_record};
 use crate::map::plan::{Cell, Plan};
 use crate::record::Record;
-use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::measure_until;
 
 /// Time after which a batch begins no more cells and returns those that have ended.

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use crate::map::plan::Plan;
-use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::motion::Flow;
 
 /// The flows of a plan, for use by several threads.
 pub(crate) struct Flows<'p> {
@@ -20,7 +20,7 @@ impl<'p> Flows<'p> {
 
     /// Calls `function` with a flow, given by its index in the plan.
     pub(crate) fn with<T>(&self, index: u32, function: impl FnOnce(&Flow) -> T) -> T {
-        let solve = || Box::new(Flow::new(&self.plan.oscillator(index)));
+        let solve = || Box::new(Flow::new(self.plan.form(index)));
         match self.stored.get(index as usize) {
             Some(stored) => function(stored.get_or_init(solve)),
             None => function(&solve()),

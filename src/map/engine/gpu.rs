@@ -20,7 +20,7 @@ use crate::gpu::{
 use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};
 use crate::record::Record;
-use rattlemap_dynamics::model::{Oscillator, Side};
+use rattlemap_dynamics::model::{Form, Pair, Side};
 
 /// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
@@ -73,7 +73,7 @@ impl<'p> Prepared<'p> {
         let clock = Instant::now();
         // Each oscillator is derived once: if the flows are stored, together with its constants.
         let (constants, survey) = if plan.stores_flows() {
-            let derived = survey_flows(plan, Constants::new);
+            let derived = survey_flows(plan, |form: &Form, steps| Constants::new(form, steps));
             let (constants, surveys): (Vec<_>, Vec<_>) = derived.unzip();
             (Some(constants), surveys.into_iter().fold(Survey::default(), Survey::and))
         } else {
@@ -192,7 +192,7 @@ impl<'p> Gpu<'p> {
         let plan = &*self.plan;
         let of = |id| {
             let cell = plan.cell(id);
-            (plan.oscillator(cell.flow), plan.law(cell.law))
+            (plan.form(cell.flow), plan.law(cell.law))
         };
         match compare_at_sections(&mut self.device, &mut ended, &of, &self.settings).await {
             // These cells have not ended.
@@ -234,18 +234,18 @@ impl<'p> Gpu<'p> {
         let candidates = &self.waiting[self.waiting.len().saturating_sub(self.most_waiting)..];
         let (flows, laws, mut lanes) = renumbered(candidates);
         let plan: &Plan = &self.plan;
-        let mut oscillators: Vec<_> = flows.into_par_iter().map(|flow| plan.oscillator(flow)).collect();
+        let mut forms: Vec<_> = flows.into_par_iter().map(|flow| plan.form(flow)).collect();
         let mut known = HashSet::new();
         let bytes = |lane: &Lane| {
-            let oscillator = &oscillators[lane.flow as usize];
-            let steps = Constants::steps(oscillator, steps);
-            let [flow, phasors] = gpu::table_bytes(oscillator, steps);
+            let form = &forms[lane.flow as usize];
+            let steps = Constants::steps(form, steps);
+            let [flow, phasors] = gpu::table_bytes(form, steps);
             if known.insert(steps) { flow + phasors } else { flow }
         };
         lanes.truncate(fitting(lanes.iter().map(bytes), self.most_waiting));
-        oscillators.truncate(lanes.iter().map(|lane| lane.flow as usize + 1).max()?);
+        forms.truncate(lanes.iter().map(|lane| lane.flow as usize + 1).max()?);
         let cells = self.waiting.split_off(self.waiting.len() - lanes.len());
-        let constants = Deriving::new(oscillators, steps, std::mem::take(&mut self.constants));
+        let constants = Deriving::new(forms, steps, std::mem::take(&mut self.constants));
         Some(Chunk { cells, laws, lanes, constants })
     }
 
@@ -347,9 +347,9 @@ enum Deriving {
 
 impl Deriving {
     /// Derives the constants of oscillators into `memory`.
-    fn new(oscillators: Vec<Oscillator>, steps: Option<u32>, mut memory: Vec<Option<Constants>>) -> Deriving {
-        let flows = Arc::new(oscillators);
-        let derive = move |flows: &[Oscillator], memory: &mut Vec<Option<Constants>>| {
+    fn new(forms: Vec<Form>, steps: Option<u32>, mut memory: Vec<Option<Constants>>) -> Deriving {
+        let flows = Arc::new(forms);
+        let derive = move |flows: &[Form], memory: &mut Vec<Option<Constants>>| {
             flows.par_iter().map(|flow| Constants::new(flow, steps)).collect_into_vec(memory);
         };
         // A worker of the pool that waited for the thread might be the one that the thread waits for.
@@ -502,22 +502,26 @@ fn survey(plan: &Plan) -> Survey {
 /// free steps per forcing period.
 fn survey_flows<T: Send>(
     plan: &Plan,
-    of: impl Fn(&Oscillator, Option<u32>) -> T + Sync + Send,
+    of: impl Fn(&Form, Option<u32>) -> T + Sync + Send,
 ) -> impl IndexedParallelIterator<Item = (T, Survey)> {
     let laws = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed);
     let least =
         laws.fold([f64::INFINITY; 2], |least, speeds| [0, 1].map(|side| speeds[side].min(least[side])));
     let steps = requested_steps(plan);
     (0..plan.flow_count() as u32).into_par_iter().map(move |flow| {
-        let oscillator = plan.oscillator(flow);
-        let chatter = Side::BOTH.into_iter().any(|side| {
-            let (wall, contact) = oscillator.last_wall(side);
+        let form = plan.form(flow);
+        let follows_chatter = |pair: &Pair, side: Side| {
+            let (wall, contact) = pair.last_wall(side);
             let bounces = wall.is_finite() && !contact.is_elastic();
-            bounces && gpu::follows_chatter(&oscillator, least[side.index()])
-        });
-        let steps_used = Constants::steps(&oscillator, steps).map(|n| [n; 2]);
-        let survey = Survey { chatter, features: Features::of(&oscillator), steps: steps_used };
-        (of(&oscillator, steps), survey)
+            bounces && gpu::follows_chatter(pair, least[side.index()])
+        };
+        let chatter = match &form {
+            Form::Pair(pair) => Side::BOTH.into_iter().any(|side| follows_chatter(pair, side)),
+            Form::Machine(_) => false,
+        };
+        let steps_used = Constants::steps(&form, steps).map(|n| [n; 2]);
+        let survey = Survey { chatter, features: Features::of(&form), steps: steps_used };
+        (of(&form, steps), survey)
     })
 }
 

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use crate::gpu::{Features, Gpu, GpuError, Lane, LaneSettings, rules};
 use crate::record::classify::{classify, status};
 use crate::record::{Record, valid};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, Oscillator};
+use rattlemap_dynamics::model::{Form, Law};
+use rattlemap_dynamics::motion::Allowance;
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Section, Status, quantities_after};
-use rattlemap_dynamics::reference::Allowance;
 
 /// Largest number of lanes that run a second time together.
 const BATCH: usize = 4096;
@@ -36,7 +36,7 @@ struct SecondRun {
 pub(crate) async fn compare_at_sections(
     gpu: &mut Gpu,
     records: &mut [(u32, Record)],
-    of: impl Fn(u32) -> (Oscillator, Law) + Sync,
+    of: impl Fn(u32) -> (Form, Law) + Sync,
     settings: &LaneSettings,
 ) -> Result<(), GpuError> {
     let section = |(place, (number, record)): (usize, &(u32, Record))| {
@@ -44,7 +44,7 @@ pub(crate) async fn compare_at_sections(
         let period = if record.period > 0 { record.period } else { 2 };
         let flow = Flow::new(&oscillator);
         let section = Section::of(&flow, law, record.strobe, period, Allowance::UNLIMITED)?;
-        let features = settings.features.and(Features::of(&section.flow.oscillator));
+        let features = settings.features.and(Features::of(section.flow.form()));
         Some(SecondRun { place, section, law, features })
     };
     let mut runs: Vec<_> = records.par_iter().enumerate().filter_map(section).collect();
@@ -55,7 +55,7 @@ pub(crate) async fn compare_at_sections(
     for early_stop in [settings.early_stop, false] {
         let mut open = Vec::new();
         for batch in runs.chunk_by(|a, b| a.features == b.features).flat_map(|alike| alike.chunks(BATCH)) {
-            let flows: Vec<_> = batch.iter().map(|run| run.section.flow.oscillator.clone()).collect();
+            let flows: Vec<_> = batch.iter().map(|run| run.section.flow.form()).collect();
             let laws: Vec<_> = batch.iter().map(|run| run.law).collect();
             let lanes = (0..).zip(batch).map(|(i, run)| Lane { flow: i, law: i, start: run.section.start });
             let settings = LaneSettings { features: batch[0].features, early_stop, ..*settings };
@@ -83,7 +83,7 @@ pub(crate) async fn compare_at_sections(
 /// a record's number.
 pub(crate) fn measure_machines(
     records: &mut [(u32, Record)],
-    of: impl Fn(u32) -> (Oscillator, Law) + Sync,
+    of: impl Fn(u32) -> (Form, Law) + Sync,
     settings: &LaneSettings,
 ) {
     let (Some(measures), Some(_)) = (settings.measures, settings.features.machine) else { return };

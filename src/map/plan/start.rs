@@ -4,8 +4,8 @@ use crate::map::random::Random;
 use crate::map::scene::{Draw, Start};
 use crate::record::classify::status;
 use crate::record::{Record, valid};
-use rattlemap_dynamics::model::{Machine, Oscillator, REST, Side, State, state};
-use rattlemap_dynamics::reference::machine::System;
+use rattlemap_dynamics::machine::System;
+use rattlemap_dynamics::model::{GapRow, Oscillator, REST, Restitution, Side, State, state};
 
 /// Range of random starts: displacements are within this many scales of length of the middle, velocities within this
 /// many times the corresponding velocity. The attractors of the paper's plane are inside.
@@ -52,36 +52,46 @@ impl Starts {
     /// Returns the random start `nth`, from 1. With the scale of length `l`, the gap is uniform between the walls, or
     /// within `2 l` of a single wall; the second displacement is within `4 l`, both velocities within `4 l omega`.
     pub(super) fn random(&self, nth: usize, oscillator: &Oscillator) -> State {
-        if let Some(machine) = &oscillator.machine {
-            return self.random_of_machine(nth, machine);
+        if !is_of_four_numbers(oscillator) {
+            return self.random_of_all(nth, oscillator);
         }
         let [gap, v1, x2, v2] = self.draws[nth - 1];
         let length = oscillator.length_scale();
-        let (z, x2) = (between(oscillator.walls, length, gap), START_RANGE * length * x2);
+        let (z, x2) = (between(first_walls(&oscillator.gaps[0]), length, gap), START_RANGE * length * x2);
         let speed = START_RANGE * length * oscillator.omega;
-        let [g1, g2] = oscillator.gap;
+        let [g1, g2, ..] = oscillator.gap_row(0);
         state(&[(z - g2 * x2) / g1, speed * v1, x2, speed * v2])
     }
 
-    /// Returns a random start of a machine: all gaps lie between their first walls.
-    fn random_of_machine(&self, nth: usize, machine: &Machine) -> State {
-        let (draws, length, n) = (&self.further[nth - 1], machine.length_scale(), machine.degrees());
+    /// Returns a random start of any number of coordinates: all gaps lie between their first walls.
+    fn random_of_all(&self, nth: usize, oscillator: &Oscillator) -> State {
+        let (draws, length, n) = (&self.further[nth - 1], oscillator.length_scale(), oscillator.degrees());
         let (positions, rates) = draws.split_at(n);
         let mut placed: Vec<f64> = positions.iter().map(|x| START_RANGE * length * x).collect();
-        for ((gap, share), z) in machine.gaps.iter().zip(positions).zip(&mut placed) {
-            let first = |side: Side| gap.walls[side.index()].first().map(|wall| wall.at);
-            let walls =
-                [first(Side::Right).unwrap_or(f64::INFINITY), first(Side::Left).unwrap_or(f64::NEG_INFINITY)];
-            *z = between(walls, length, *share);
+        for ((gap, share), z) in oscillator.gaps.iter().zip(positions).zip(&mut placed) {
+            *z = between(first_walls(gap), length, *share);
         }
-        let displacements = System::new(machine).displacements(&placed);
-        let speed = START_RANGE * length * machine.omega;
+        let displacements = System::new(oscillator).displacements(&placed);
+        let speed = START_RANGE * length * oscillator.omega;
         let mut start = REST;
         for (i, (x, v)) in displacements.iter().zip(rates).enumerate() {
             (start[2 * i], start[2 * i + 1]) = (*x, speed * v);
         }
         start
     }
+}
+
+/// Whether four numbers describe a random start. Models with restitution by speed were added later, with the second sequence.
+fn is_of_four_numbers(oscillator: &Oscillator) -> bool {
+    let mut walls = oscillator.gaps.iter().flat_map(|gap| gap.walls.iter().flatten());
+    oscillator.degrees() <= 2
+        && oscillator.gaps.len() == 1
+        && !walls.any(|wall| matches!(wall.restitution, Restitution::BySpeed { .. }))
+}
+
+/// Returns the positions of the first walls of a gap, infinite without a wall.
+fn first_walls(gap: &GapRow) -> [f64; 2] {
+    Side::BOTH.map(|side| gap.walls[side.index()].first().map_or(side.sign() * f64::INFINITY, |wall| wall.at))
 }
 
 /// Distinguishes the second sequence of random numbers from the first.
@@ -125,7 +135,14 @@ mod tests {
             ([f64::INFINITY, 0.25], [0.25, 4.25]),
             ([f64::INFINITY, f64::NEG_INFINITY], [-2.0, 2.0]),
         ] {
-            let oscillator = Oscillator { walls, force: [64.0, 0.0], omega: 1.0, ..pair.clone() };
+            let mut oscillator = Oscillator { omega: 1.0, ..pair.clone() };
+            oscillator.drives[0].cos[0] = 64.0;
+            for (own, at) in oscillator.gaps[0].walls.iter_mut().zip(walls) {
+                own.retain_mut(|wall| {
+                    wall.at = at;
+                    at.is_finite()
+                });
+            }
             for nth in 1..200 {
                 let y = starts.random(nth, &oscillator);
                 let gap = y[0] - y[2];
@@ -140,7 +157,7 @@ mod tests {
         let oscillator = FileModel::built_in("two-loose-gears").unwrap().oscillator().unwrap();
         for nth in 1..100 {
             let y = starts.random(nth, &oscillator);
-            for (i, gap) in oscillator.machine.as_ref().unwrap().gaps.iter().enumerate() {
+            for (i, gap) in oscillator.gaps.iter().enumerate() {
                 let [right, left] = gap.walls.each_ref().map(|walls| walls[0].at);
                 let z = oscillator.gap_value(i, &y, 0);
                 assert!(left < z && z < right && y[1] != 0.0 && y[5] != 0.0, "{y:?}");

@@ -6,8 +6,8 @@ use super::label::Label;
 use crate::map::catalogue::{Catalogue, Outcome};
 use crate::map::plan::Plan;
 use crate::record::Record;
-use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
+use rattlemap_dynamics::motion::Flow;
 
 /// Kind of a start that leads to the first cycle of the catalogue. Further cycles have the following numbers.
 const FIRST_CYCLE: u32 = 4;

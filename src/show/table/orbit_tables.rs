@@ -38,8 +38,8 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
     let mut moments = Vec::with_capacity(samples.len() + 2 * events.len());
     let gaps = PlotGap::all(model, &oscillator);
     let mut contacts = contacts_at_start(&gaps, &oscillator, events, samples);
-    let is_machine = oscillator.machine.is_some();
-    if !is_machine {
+    let starts_in_contact = oscillator.tells_contact_at_start();
+    if starts_in_contact {
         contacts[0] = history.meshing;
     }
     let mut add = |t, phase, state: &State, contacts: &[Option<Side>], event| {
@@ -67,8 +67,8 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
         }
         if sample.t > last {
             let phase = (i % samples_per_period) as f64 / *samples_per_period as f64;
-            // Samples tell the contact of the first gap. Before it moves, a machine has not decided on gaps at rest.
-            if i > 0 || !is_machine {
+            // Samples tell the contact of the first gap.
+            if i > 0 || starts_in_contact {
                 contacts[0] = sample.meshing;
             }
             add(sample.t, phase, &sample.state, &contacts, None);

@@ -14,8 +14,8 @@ use nalgebra::DVector;
 
 use super::Tally;
 use super::dop853::Integration;
-use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Machine, Side, State};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Oscillator, Side, State};
+use rattlemap_dynamics::motion::EventKind;
 
 use system::{Constraints, Domain, Key, Numbers, Point, Row, Slide, System, affine, dot, size};
 
@@ -170,7 +170,7 @@ pub struct Flight {
 
 impl Flight {
     /// Builds a motion that starts at phase 0. A gap beyond a rigid wall is moved to this wall.
-    pub fn new(machine: &Machine, start: &State) -> Flight {
+    pub fn new(machine: &Oscillator, start: &State) -> Flight {
         let system = Rc::new(System::new(machine, start));
         let gap = Gap { level: 0, mode: Mode::Plain, on_wall: None, from_force: 0, origin: None };
         let mut flight = Flight {

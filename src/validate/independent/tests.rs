@@ -1,23 +1,26 @@
 //! Harmonics and stages in the integrator, against closed forms.
 
 mod friction;
+#[path = "../../../dynamics/tests/common/pairs.rs"]
+mod pairs;
 
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::machine::{Event, Flight};
+use pairs::described;
 use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, Machine, Oscillator, REST, Side, Stage, State, state,
+    Contact, Domain, Harmonic, Law, Oscillator, Pair, REST, Side, Stage, State, state,
 };
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::motion::EventKind;
 
 const NO_WALLS: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 /// A mass of 1 without springs, under a constant load. Springs behind walls have no stiffness.
-fn mass(load: f64, walls: [f64; 2], contact: Contact) -> Oscillator {
+fn mass(load: f64, walls: [f64; 2], contact: Contact) -> Pair {
     let free = domain(0.0, load);
-    Oscillator {
+    Pair {
         degrees: 1,
         mass: [[1.0, 0.0], [0.0, 1.0]],
         gap: [1.0, 0.0],
@@ -32,8 +35,6 @@ fn mass(load: f64, walls: [f64; 2], contact: Contact) -> Oscillator {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
-        friction: Vec::new(),
-        machine: None,
     }
 }
 
@@ -51,9 +52,9 @@ fn stage(stiffness: f64, load: f64) -> Stage {
 }
 
 /// Integrates some periods and a part of the next. Returns the state, and the events of the last one.
-fn run(oscillator: &Oscillator, law: Law, start: State, turns: f64) -> (State, Vec<Event>) {
+fn run(oscillator: &Oscillator, start: State, turns: f64) -> (State, Vec<Event>) {
     oscillator.validate().unwrap();
-    let mut flight = Flight::new(&Machine::of(oscillator, law), &start);
+    let mut flight = Flight::new(oscillator, &start);
     let mut left = turns;
     loop {
         flight.events.clear();
@@ -80,7 +81,7 @@ fn the_response_to_three_harmonics_is_that_of_the_closed_form() {
         preload: 0.0,
     };
     let further = |order, cos, sin| Harmonic { order, cos, sin };
-    let oscillator = Oscillator {
+    let oscillator = Pair {
         degrees: 2,
         mass: [[2.0, 0.3], [0.3, 1.0]],
         gap: [1.0, -1.0],
@@ -108,7 +109,7 @@ fn the_response_to_three_harmonics_is_that_of_the_closed_form() {
         y
     };
     for turns in [0.13, 0.5, 1.0, 3.77] {
-        let (y, _) = run(&oscillator, Law::both(0.5, 0.0), steady(0.0), turns);
+        let (y, _) = run(&described(&oscillator, Law::both(0.5, 0.0)), steady(0.0), turns);
         assert_near(&y, &steady(turns * oscillator.period()), 1e-10, "three harmonics");
     }
 }
@@ -133,7 +134,7 @@ fn a_stiffness_that_alternates_is_integrated_piece_by_piece() {
         (&[(0.3, 1)], 2, &[(11.0, 1.0)]),
     ];
     for (schedule, repeat, pieces) in cases {
-        let oscillator = Oscillator {
+        let oscillator = Pair {
             free: domain(3.0, 0.0),
             stages: vec![stage(11.0, 0.0)],
             schedule: schedule.to_vec(),
@@ -142,7 +143,7 @@ fn a_stiffness_that_alternates_is_integrated_piece_by_piece() {
         let pass = |y: [f64; 2], &(k, turns): &(f64, f64)| oscillated(y, k, turns * oscillator.period());
         let exact = (0..repeat).fold([0.2, 0.7], |y, _| pieces.iter().fold(y, pass));
         let turns = f64::from(repeat) * pieces.iter().map(|(_, turns)| turns).sum::<f64>();
-        let (y, _) = run(&oscillator, Law::both(0.5, 0.0), state(&[0.2, 0.7]), turns);
+        let (y, _) = run(&described(&oscillator, Law::both(0.5, 0.0)), state(&[0.2, 0.7]), turns);
         assert_near(&y[..2], &exact, 1e-10, &format!("{schedule:?}"));
     }
 }
@@ -167,8 +168,8 @@ fn a_stage_releases_a_mass_at_rest() {
         (0.0, vec![(EventKind::MeshStart, 0.3 + falls), (EventKind::MeshEnd, 1.0)]),
     ] {
         let schedule = vec![(lifts, 1), (lifts + 0.3, 0)];
-        let oscillator = Oscillator { stages: vec![stage(0.0, 2.0)], schedule, ..floor.clone() };
-        let (y, events) = run(&oscillator, Law::both(0.0, 0.0), REST, 3.0);
+        let oscillator = Pair { stages: vec![stage(0.0, 2.0)], schedule, ..floor.clone() };
+        let (y, events) = run(&described(&oscillator, Law::both(0.0, 0.0)), REST, 3.0);
         check_events(&events, &expected);
         assert_eq!(y[..2], [0.0; 2]);
     }
@@ -178,13 +179,13 @@ fn a_stage_releases_a_mass_at_rest() {
 #[test]
 fn derivatives_of_the_force_decide_about_rest() {
     for (force_sin, stays) in [(-1.0, true), (1.0, false)] {
-        let oscillator = Oscillator {
+        let oscillator = Pair {
             force_sin: [force_sin, 0.0],
             stages: vec![stage(0.0, 0.0)],
             schedule: vec![(0.0, 1), (0.4, 0)],
             ..mass(-20.0, [f64::INFINITY, 0.0], Contact::Rigid)
         };
-        let (_, events) = run(&oscillator, Law::both(0.0, 0.0), REST, 2.0);
+        let (_, events) = run(&described(&oscillator, Law::both(0.0, 0.0)), REST, 2.0);
         let expected: &[_] = if stays { &[] } else { &[(EventKind::MeshEnd, 1.0)] };
         let at_end: Vec<_> = events.into_iter().filter(|event| event.t > 0.99 * TAU).collect();
         check_events(&at_end, expected);
@@ -197,17 +198,17 @@ fn derivatives_of_the_force_decide_about_rest() {
 fn a_stage_ends_a_contact_onset() {
     let floor = mass(-1.0, [f64::INFINITY, 0.0], Contact::Impact);
     let schedule = vec![(0.0, 0), (0.25, 1), (0.9, 0)];
-    let oscillator = Oscillator { stages: vec![stage(0.0, 3.0)], schedule, ..floor };
+    let oscillator = Pair { stages: vec![stage(0.0, 3.0)], schedule, ..floor };
     let period = oscillator.period();
     let (fall, onset, rise, last) = (0.2 * period, 0.05 * period, 0.65 * period, 0.1 * period);
     let (v, h) = (fall, 0.5 * fall * fall);
-    let (y, events) = run(&oscillator, Law::both(0.5, 10.0), state(&[h]), 1.0);
+    let (y, events) = run(&described(&oscillator, Law::both(0.5, 10.0)), state(&[h]), 1.0);
     check_events(&events, &[(EventKind::MeshStart, 0.2), (EventKind::MeshEnd, 0.25)]);
     let moved = |[x, v]: [f64; 2], load: f64, t: f64| [x + v * t + 0.5 * load * t * t, v + load * t];
     let exact = moved(moved(moved([0.0, 0.5 * v], -1.0, onset), 3.0, rise), -1.0, last);
     assert_near(&y[..2], &exact, 1e-11, "after the onset");
     // In a stage that presses the mass, the onset goes on.
-    let pressed = Oscillator { stages: vec![stage(0.0, -3.0)], ..oscillator };
-    let (_, events) = run(&pressed, Law::both(0.5, 10.0), state(&[h]), 0.3);
+    let pressed = Pair { stages: vec![stage(0.0, -3.0)], ..oscillator };
+    let (_, events) = run(&described(&pressed, Law::both(0.5, 10.0)), state(&[h]), 0.3);
     check_events(&events, &[(EventKind::MeshStart, 0.2)]);
 }

@@ -25,7 +25,12 @@ fn a_dry_run_predicts_and_writes_nothing() {
     assert!(number("/memory_bytes/host") < number("/memory_bytes/free"), "{object}");
     assert!(number("/disk_bytes/needed") < number("/disk_bytes/free"), "{object}");
     let text = map(&folder, "--dry-run --set refine.minimum_grid=4").success();
-    let parts = ["cells    20 x 16 = 320\n", "time     at most about ", "nothing was written"];
+    let parts = [
+        "cells    20 x 16 = 320\n",
+        "model    pair, for up to",
+        "time     at most about ",
+        "nothing was written",
+    ];
     text.stderr("").stdout(says(&parts));
     assert_eq!(names(folder.path()), ["s.toml"]);
 }

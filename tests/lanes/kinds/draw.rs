@@ -1,6 +1,6 @@
 //! Random oscillators of every kind, by seed.
 
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State, state};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, State, state};
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
 pub(crate) struct Numbers(pub(crate) u64);
@@ -31,7 +31,7 @@ impl Numbers {
 
 /// Returns an oscillator with its law and a start. It has one or two displacements; one wall or two, each of any kind
 /// with a law of its own; loads; full mass matrices; gap rows of which either entry may be the larger.
-pub(crate) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
+pub(crate) fn random_cell(seed: u64) -> (Pair, Law, State) {
     let mut draw = Numbers(seed);
     let degrees = draw.one_of(&[1, 2, 2]);
     let first = |m: [[f64; 2]; 2]| if degrees == 1 { [[m[0][0], 0.0], [0.0, 0.0]] } else { m };
@@ -82,7 +82,7 @@ pub(crate) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
     };
     let omega = draw.between(0.6, 4.0);
     let force_sin = [0.0; 2];
-    let oscillator = Oscillator {
+    let oscillator = Pair {
         degrees,
         mass,
         gap,
@@ -97,10 +97,7 @@ pub(crate) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
-        friction: Vec::new(),
-        machine: None,
     };
-    oscillator.validate().expect("a valid oscillator");
     let mut start = [0; 4].map(|_| draw.between(-0.4, 0.4));
     if degrees == 1 {
         start[2..].fill(0.0);

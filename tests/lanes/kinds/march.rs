@@ -2,7 +2,7 @@
 //! independent of lanes.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State, state};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, State, state};
 
 /// Steps per period. A crossing of a wall and back within one step is missed.
 const STEPS: u32 = 1000;
@@ -24,7 +24,7 @@ enum Mode {
 }
 
 pub(super) struct March {
-    oscillator: Oscillator,
+    oscillator: Pair,
     law: Law,
     inverse_mass: Matrix2<f64>,
     gap: Vector2<f64>,
@@ -40,7 +40,7 @@ pub(super) struct March {
 const SIGN: [f64; 2] = [1.0, -1.0];
 
 impl March {
-    pub(super) fn new(oscillator: &Oscillator, law: Law, start: State) -> March {
+    pub(super) fn new(oscillator: &Pair, law: Law, start: State) -> March {
         let [[a, b], [c, d]] = oscillator.mass;
         let [x1, v1, x2, v2, ..] = start;
         let mut march = March {

@@ -13,14 +13,14 @@ use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State, state};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, State, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, measure};
 use rayon::prelude::*;
 
 const SEEDS: u64 = 64;
 
-pub(super) type Cell = (Oscillator, Law, State);
+pub(super) type Cell = (Pair, Law, State);
 
 fn cells() -> Vec<Cell> {
     (0..SEEDS).map(random_cell).collect()
@@ -31,7 +31,7 @@ fn cells_with_sine() -> Vec<Cell> {
     let with_sine = |(oscillator, law, start): Cell| {
         let size = oscillator.force[0];
         let second = if oscillator.degrees == 1 { 0.0 } else { -0.5 * size };
-        (Oscillator { force_sin: [0.8 * size, second], ..oscillator.clone() }, law, start)
+        (Pair { force_sin: [0.8 * size, second], ..oscillator.clone() }, law, start)
     };
     cells().into_iter().step_by(2).map(with_sine).collect()
 }
@@ -237,7 +237,7 @@ pub(super) fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) 
         load: domain.load.map(|load| load * size * rate * rate),
         preload: 0.0,
     };
-    let other = Oscillator {
+    let other = Pair {
         walls: oscillator.walls.map(|wall| wall * size),
         omega: oscillator.omega * rate,
         force: oscillator.force.map(|force| force * size * rate * rate),

@@ -7,7 +7,7 @@ use crate::stress::SEED;
 use rattlemap::gpu::Constants;
 use rattlemap::map::random::Random;
 use rattlemap_dynamics::model::{GearPair, State, state};
-use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::motion::Trajectory;
 
 /// Limit of bounded cells: steps per forcing period on the finest grid they need, and steps and root iterations of the
 /// reference in each of the first periods. If the backlash is tiny compared to the motion, a period may have a million
@@ -45,7 +45,7 @@ fn restitution(random: &mut Random) -> f64 {
 /// cell.
 pub(super) fn iterations(pair: &GearPair) -> Option<u64> {
     let constants = Constants::new(&pair.oscillator().ok()?, None)?;
-    let finest = constants.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
+    let finest = constants.pair()?.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
     Some((f64::from(constants.steps) * finest) as u64)
 }
 

@@ -1,11 +1,10 @@
 //! Random models of one or two coordinates with one gap.
 
-use rattlemap_dynamics::model::{
-    Contact, Domain, Friction, Harmonic, Law, Machine, Oscillator, OuterWall, Side, Stage, State, state,
-};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, OuterWall, Pair, Side, Stage, State, state};
 
 use super::super::machines::random as machines;
 use crate::common::linear::with_wall;
+use crate::common::pairs::{Friction, Rubbing};
 
 /// A reproducible sequence of numbers: SplitMix64.
 pub(crate) struct Random(pub(crate) u64);
@@ -56,7 +55,7 @@ pub(crate) struct Shape {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
-    pub(crate) oscillator: Oscillator,
+    pub(crate) oscillator: Rubbing,
     pub(crate) law: Law,
     /// Between the walls.
     pub(crate) start: State,
@@ -65,7 +64,7 @@ pub(crate) struct Case {
 impl Case {
     /// Returns the same model as a machine.
     pub(crate) fn machine(&self) -> machines::Case {
-        let machine = Machine::of(&self.oscillator, self.law);
+        let machine = self.oscillator.described(self.law);
         let start = self.start[..2 * machine.degrees()].to_vec();
         machines::Case { machine, start }
     }
@@ -133,7 +132,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         1 => [f64::INFINITY, left],
         _ => [right, left],
     };
-    let mut oscillator = Oscillator {
+    let mut oscillator = Pair {
         degrees: 2,
         mass,
         gap,
@@ -148,8 +147,6 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         stages: Vec::new(),
         schedule: Vec::new(),
         outer_walls: Default::default(),
-        friction: Vec::new(),
-        machine: None,
     };
     if shape.harmonics {
         let count = 1 + random.below(4);
@@ -169,7 +166,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     let first = [behind(random), behind(random)];
     let plain = oscillator.clone();
     let walled = |free: Domain, behind: [[f64; 2]; 2]| {
-        let of_stage = Oscillator { free, meshing: [free; 2], ..plain.clone() };
+        let of_stage = Pair { free, meshing: [free; 2], ..plain.clone() };
         Side::BOTH.into_iter().filter(|side| walls[side.index()].is_finite()).fold(of_stage, |o, side| {
             with_wall(o, side, walls[side.index()], plain.contacts[side.index()], behind[side.index()])
         })
@@ -202,10 +199,14 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     if shape.pushing {
         preload_walls(random, &mut oscillator);
     }
+    let mut oscillator = Rubbing { pair: oscillator, friction: Vec::new() };
     if shape.friction {
         add_friction(random, &mut oscillator);
     }
-    oscillator.validate().unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
+    oscillator
+        .described(Law::both(0.0, 0.0))
+        .validate()
+        .unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
     let restitution = [0; 2].map(|_| if random.chance(0.25) { 0.0 } else { random.between(0.0, 0.9) });
     // Without a mesh speed, impacts can be infinitely many.
     let mesh_speed =
@@ -222,7 +223,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
 }
 
 /// Adds one to three walls behind each wall, or behind one of them. All but the last of a side become elastic.
-fn add_walls(random: &mut Random, o: &mut Oscillator) {
+fn add_walls(random: &mut Random, o: &mut Pair) {
     let only = random.below(3);
     for side in Side::BOTH.into_iter().filter(|side| o.walls[side.index()].is_finite()) {
         let i = side.index();
@@ -239,7 +240,7 @@ fn add_walls(random: &mut Random, o: &mut Oscillator) {
                     random.logarithmic(20.0, 1e3),
                     if random.chance(0.3) { 0.0 } else { random.logarithmic(0.1, 5.0) },
                 ];
-                let inside = Oscillator { free: *free, ..o.clone() };
+                let inside = Pair { free: *free, ..o.clone() };
                 *free = with_wall(inside, side, at, Contact::Elastic, spring).meshing[i];
             }
             let contact = if nth + 1 == count { last } else { Contact::Elastic };
@@ -249,7 +250,7 @@ fn add_walls(random: &mut Random, o: &mut Oscillator) {
 }
 
 /// Makes the last wall of each side elastic. Most walls only push, and most have a preload.
-fn preload_walls(random: &mut Random, o: &mut Oscillator) {
+fn preload_walls(random: &mut Random, o: &mut Pair) {
     for side in Side::BOTH.into_iter().filter(|side| o.walls[side.index()].is_finite()) {
         let (i, gap) = (side.index(), o.gap);
         let contact = if random.chance(0.8) { Contact::Pushing } else { Contact::Elastic };
@@ -278,7 +279,7 @@ fn preload_walls(random: &mut Random, o: &mut Oscillator) {
 }
 
 /// Adds one element with dry friction, or two, and sometimes removes the walls.
-fn add_friction(random: &mut Random, o: &mut Oscillator) {
+fn add_friction(random: &mut Random, o: &mut Rubbing) {
     if random.chance(0.15) {
         o.walls = [f64::INFINITY, f64::NEG_INFINITY];
         o.outer_walls = Default::default();
@@ -309,7 +310,7 @@ fn add_friction(random: &mut Random, o: &mut Oscillator) {
 }
 
 /// Removes the second coordinate.
-fn single(o: &mut Oscillator) {
+fn single(o: &mut Pair) {
     let first = |m: Matrix| [[m[0][0], 0.0], [0.0, 0.0]];
     let Domain { damping, stiffness, load, .. } = o.free;
     o.degrees = 1;

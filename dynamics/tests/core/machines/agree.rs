@@ -1,6 +1,7 @@
 //! Compares motions of the program with the integrator by matrix exponentials, on random machines and models of one gap.
 
-use rattlemap_dynamics::model::{Machine, Side};
+use rattlemap_dynamics::model::Restitution;
+use rattlemap_dynamics::model::{Oscillator, Side};
 use rayon::prelude::*;
 
 use super::engine::{Follower, Period};
@@ -107,7 +108,7 @@ impl Ours<'_> {
     }
 }
 
-fn compare(machine: &Machine, mut ours: Ours, theirs: &mut dyn Follower) -> Result<Found, String> {
+fn compare(machine: &Oscillator, mut ours: Ours, theirs: &mut dyn Follower) -> Result<Found, String> {
     let mut found = Found::default();
     for period in 0..PERIODS {
         let Some((own, other, [noise, of_derivative])) = ours.advance(machine.omega) else { break };
@@ -213,7 +214,8 @@ fn the_comparison_finds_errors() {
         let case = any_case(seed);
         let mut machine = case.machine.clone();
         for wall in machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten()) {
-            wall.restitution.constant += 1e-7;
+            let (Restitution::Constant(e) | Restitution::BySpeed { constant: e, .. }) = &mut wall.restitution;
+            *e += 1e-7;
         }
         let system = System::new(&machine, ANGLE);
         let mut theirs = Motion::new(&system, &case.start);
@@ -225,7 +227,7 @@ fn the_comparison_finds_errors() {
 }
 
 mod program {
-    use rattlemap_dynamics::reference::machine::System as Program;
+    use rattlemap_dynamics::machine::System as Program;
 
     use super::super::engine::program::Engine;
     use super::*;

@@ -1,19 +1,19 @@
 //! Machines from oscillators, and machines from machines.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Drive, DryFriction, Forces, GapRow, Machine};
+use rattlemap_dynamics::model::{Drive, DryFriction, Forces, GapRow, Oscillator};
 
 /// Returns the machine of machines side by side that do not touch each other. It has the frequency and the schedule of the first one, and
 /// all others have one stage.
-pub(crate) fn side_by_side(machines: &[Machine]) -> Machine {
-    let n: usize = machines.iter().map(Machine::degrees).sum();
+pub(crate) fn side_by_side(machines: &[Oscillator]) -> Oscillator {
+    let n: usize = machines.iter().map(Oscillator::degrees).sum();
     let stages = machines[0].stages.len();
     let (mut at, mut offsets) = (0, Vec::new());
     for machine in machines {
         offsets.push(at);
         at += machine.degrees();
     }
-    let matrix = |of: &dyn Fn(&Machine) -> DMatrix<f64>| {
+    let matrix = |of: &dyn Fn(&Oscillator) -> DMatrix<f64>| {
         let mut all = DMatrix::zeros(n, n);
         for (machine, &at) in machines.iter().zip(&offsets) {
             all.view_mut((at, at), (machine.degrees(), machine.degrees())).copy_from(&of(machine));
@@ -26,7 +26,7 @@ pub(crate) fn side_by_side(machines: &[Machine]) -> Machine {
         all
     };
     let forces = |stage: usize| {
-        let of = |machine: &Machine| machine.stages[stage.min(machine.stages.len() - 1)].clone();
+        let of = |machine: &Oscillator| machine.stages[stage.min(machine.stages.len() - 1)].clone();
         Forces {
             damping: matrix(&|machine| of(machine).damping),
             stiffness: matrix(&|machine| of(machine).stiffness),
@@ -57,7 +57,7 @@ pub(crate) fn side_by_side(machines: &[Machine]) -> Machine {
         friction.extend(moved);
     }
     drives.sort_by_key(|drive| drive.order);
-    Machine {
+    Oscillator {
         omega: machines[0].omega,
         mass: matrix(&|machine| machine.mass.clone()),
         stages: (0..stages).map(forces).collect(),
@@ -69,7 +69,7 @@ pub(crate) fn side_by_side(machines: &[Machine]) -> Machine {
 }
 
 /// Returns the machine in coordinates `q` with `x = t q`.
-pub(crate) fn in_coordinates(machine: &Machine, t: &DMatrix<f64>) -> Machine {
+pub(crate) fn in_coordinates(machine: &Oscillator, t: &DMatrix<f64>) -> Oscillator {
     let square = |m: &DMatrix<f64>| {
         let all = t.transpose() * m * t;
         // Rounding must not make a symmetric matrix unsymmetric.
@@ -77,7 +77,7 @@ pub(crate) fn in_coordinates(machine: &Machine, t: &DMatrix<f64>) -> Machine {
         if is_symmetric { (&all + all.transpose()) * 0.5 } else { all }
     };
     let vector = |v: &DVector<f64>| t.transpose() * v;
-    Machine {
+    Oscillator {
         omega: machine.omega,
         mass: square(&machine.mass),
         stages: (machine.stages.iter())

@@ -1,7 +1,7 @@
 //! Checks of the integrator of machines: other steps, differences, energy, and motions that other programs compute.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Contact, Machine, Side};
+use rattlemap_dynamics::model::{Contact, Oscillator, Side};
 use rayon::prelude::*;
 
 use super::build::{in_coordinates, side_by_side};
@@ -160,7 +160,7 @@ fn check_derivatives(seeds: std::ops::Range<u64>) {
 }
 
 /// Energy of motion, of springs, and of springs behind walls in contact.
-fn energy(machine: &Machine, motion: &Motion, state: &[f64]) -> f64 {
+fn energy(machine: &Oscillator, motion: &Motion, state: &[f64]) -> f64 {
     let n = machine.degrees();
     let [x, v] = [0, 1].map(|at| DVector::from_fn(n, |i, _| state[2 * i + at]));
     let forces = &machine.stages[0];

@@ -1,8 +1,9 @@
 //! Cycles of random machines, against the integrator by matrix exponentials: class, period, strobe state, multipliers and word.
 
 use nalgebra::DVector;
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Contact, GapRow, Law, Machine, Oscillator, state};
+use rattlemap_dynamics::model::Form;
+use rattlemap_dynamics::model::{Contact, GapRow, Law, Oscillator, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Orbit, Status, analyse_flow};
 use rayon::prelude::*;
 
@@ -40,7 +41,7 @@ enum Agreement {
 
 /// Whether an element with dry friction acts along a gap with a rigid wall: at rest, their forces are statically indeterminate, and whether the
 /// gap counts as in contact is a convention.
-fn has_friction_at_wall(machine: &Machine) -> bool {
+fn has_friction_at_wall(machine: &Oscillator) -> bool {
     let is_parallel =
         |a: &DVector<f64>, b: &DVector<f64>| (a.normalize().dot(&b.normalize()).abs() - 1.0).abs() < 1e-9;
     let is_rigid = |gap: &GapRow| gap.walls.iter().flatten().any(|wall| wall.contact == Contact::Rigid);
@@ -53,7 +54,7 @@ fn has_friction_at_wall(machine: &Machine) -> bool {
 
 fn compare(case: &Case) -> Result<Agreement, String> {
     let machine = &case.machine;
-    let flow = Flow::new(&Oscillator::of_machine(machine.clone()));
+    let flow = Flow::new(&Form::Machine(machine.clone()));
     let orbit = analyse_flow(&flow, Law::both(0.0, 0.0), state(&case.start), &BUDGET.settings, EVENT_PERIODS);
     let (Class::Periodic { period }, Status::Ok | Status::Slow) = (orbit.class, orbit.status) else {
         return Ok(Agreement::NotCompared);

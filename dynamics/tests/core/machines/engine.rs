@@ -25,10 +25,9 @@ pub(crate) trait Follower {
 /// The program's motions of machines, and of models with one gap. Names and signatures of the program occur only here.
 pub(crate) mod program {
     use nalgebra::DMatrix;
-    use rattlemap_dynamics::flow::Flow;
-    use rattlemap_dynamics::model::{Law, Machine, Side, State};
-    use rattlemap_dynamics::reference::machine::{MachineEvent, Motion, SlipEvent, System};
-    use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Trajectory};
+    use rattlemap_dynamics::machine::{Motion, System};
+    use rattlemap_dynamics::model::{Law, Oscillator, Side, State};
+    use rattlemap_dynamics::motion::{EventKind, Flow, GapEvent, Observer, SlipEvent, States, Trajectory};
 
     use super::super::motion::{Event, What};
     use super::{Follower, Period};
@@ -61,22 +60,18 @@ pub(crate) mod program {
     }
 
     impl Observer for Record {
-        fn event(&mut self, e: &GapEvent) {
-            self.add(0, e.kind, e.side, e.symbol, e.period as f64 * self.period + e.t);
-        }
-
-        fn machine_event(&mut self, e: &MachineEvent) {
+        fn event(&mut self, e: &GapEvent, _: States<'_>) {
             self.add(e.gap, e.kind, e.side, e.symbol, e.period as f64 * self.period + e.t);
         }
 
-        fn machine_slip(&mut self, change: &SlipEvent) {
+        fn slip(&mut self, change: &SlipEvent) {
             let t = change.period as f64 * self.period + change.t;
             self.slips.extend(change.symbol.map(|symbol| (symbol, t)));
         }
     }
 
     impl<'a> Engine<'a> {
-        pub(crate) fn new(system: &'a System, machine: &Machine, start: &[f64]) -> Engine<'a> {
+        pub(crate) fn new(system: &'a System, machine: &Oscillator, start: &[f64]) -> Engine<'a> {
             let mut motion = Motion::new(system, start);
             motion.set_tangents(Motion::unit_tangents(system));
             let several = machine.gaps.len() > 1;

@@ -1,7 +1,7 @@
 //! Dry friction in motions by matrix exponentials: closed forms, energy and limits.
 
 use nalgebra::{DVector, Matrix2, Vector2};
-use rattlemap_dynamics::model::{Contact, Friction, Law, Machine, Oscillator, Side, State, state};
+use rattlemap_dynamics::model::{Contact, Law, Side, State, state};
 use std::f64::consts::PI;
 
 use super::cycle::settle;
@@ -9,19 +9,20 @@ use super::motion::{Mode, Motion, What};
 use super::random::apart;
 use super::system::{ANGLE, Grip, System};
 use crate::common::linear::Linear;
+use crate::common::pairs::{Friction, Rubbing};
 use crate::independent::random::{Case, PLAIN, Shape, case};
 
 const SHAPE: Shape = Shape { friction: true, ..PLAIN };
 
 /// Returns a mass of 1 on a spring without a damper and on a floor with friction.
-fn block(square: f64, force: f64, omega: f64, friction: f64, speed: f64) -> Oscillator {
+fn block(square: f64, force: f64, omega: f64, friction: f64, speed: f64) -> Rubbing {
     let friction = vec![Friction { row: [1.0, 0.0], force: friction, speed }];
-    Oscillator { friction, ..Linear { gamma: 0.0, square, force, load: 0.0, omega }.oscillator() }
+    Rubbing { pair: Linear { gamma: 0.0, square, force, load: 0.0, omega }.oscillator(), friction }
 }
 
 /// Returns the system of an oscillator with impacts that take all energy.
-fn system(o: &Oscillator) -> System {
-    System::new(&Machine::of(o, Law::both(0.0, 0.0)), ANGLE)
+fn system(o: &Rubbing) -> System {
+    System::new(&o.described(Law::both(0.0, 0.0)), ANGLE)
 }
 
 /// Returns what happened at walls.
@@ -155,7 +156,7 @@ fn a_wall_takes_over_from_friction() {
         let mut o = block(1e-9, 1.0, 1.0, 0.4, 0.0);
         (o.walls[0], o.contacts[0]) = (0.0, contact);
         o.meshing[0].stiffness[0][0] = 100.0;
-        let system = system(&o.at_phase(1.45 * PI));
+        let system = system(&Rubbing { pair: o.pair.at_phase(1.45 * PI), friction: o.friction.clone() });
         let mut motion = Motion::new(&system, &[-1e-3, 0.2]);
         let takeover = 0.55 * PI - 0.4f64.acos();
         motion.run(takeover - 1e-9).unwrap();
@@ -173,13 +174,13 @@ fn a_wall_takes_over_from_friction() {
 }
 
 /// Of free motion without dampers.
-fn energy(o: &Oscillator, y: State) -> f64 {
+fn energy(o: &Rubbing, y: State) -> f64 {
     let form = |m: [[f64; 2]; 2], a: f64, b: f64| m[0][0] * a * a + 2.0 * m[0][1] * a * b + m[1][1] * b * b;
     0.5 * (form(o.mass, y[1], y[3]) + form(o.free.stiffness, y[0], y[2]))
 }
 
 /// Checks directions, and that the forces which make elements stick are small enough.
-fn check_grips(o: &Oscillator, motion: &Motion) {
+fn check_grips(o: &Rubbing, motion: &Motion) {
     let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
     let (per_mass, y) = (matrix(o.mass).try_inverse().unwrap(), state(&motion.state()));
     let (x, v) = (Vector2::new(y[0], y[2]), Vector2::new(y[1], y[3]));
@@ -253,7 +254,7 @@ fn small_friction_changes_little() {
             .friction
             .iter_mut()
             .for_each(|friction| (friction.force, friction.speed) = (1e-10 * friction.force, 0.0));
-        let without = Oscillator { friction: Vec::new(), ..oscillator.clone() };
+        let without = Rubbing { friction: Vec::new(), ..oscillator.clone() };
         let omega = oscillator.omega;
         let ends = [oscillator, without].map(|oscillator| {
             let whole = Case { oscillator, law, start }.machine();

@@ -1,19 +1,19 @@
 //! Impacts while other gaps rest on rigid walls, by hand.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Contact, Forces, GapRow, Machine, Restitution, Side, Spring, Wall};
+use rattlemap_dynamics::model::{Contact, Forces, GapRow, Oscillator, Restitution, Side, Spring, Wall};
 
 use super::motion::{Mode, Motion, What};
 use super::system::{ANGLE, System};
 
 fn wall(at: f64, e: f64) -> Wall {
-    let restitution = Restitution::constant(e);
+    let restitution = Restitution::Constant(e);
     Wall { at, contact: Contact::Rigid, restitution, mesh_speed: 0.0, springs: vec![Spring::default()] }
 }
 
 /// Returns masses of 1 without springs under constant loads. The last one has a plastic wall at 0 on its right. A mass meets the next one
 /// at a distance of 0, and of 1 where it moves away, with a restitution of 0.5.
-fn row_of_masses(loads: &[f64]) -> Machine {
+fn row_of_masses(loads: &[f64]) -> Oscillator {
     let n = loads.len();
     let gap = |i: usize| {
         let mut row = DVector::zeros(n);
@@ -26,7 +26,7 @@ fn row_of_masses(loads: &[f64]) -> Machine {
     };
     let none = DMatrix::zeros(n, n);
     let forces = Forces { damping: none.clone(), stiffness: none, load: DVector::from_row_slice(loads) };
-    Machine {
+    Oscillator {
         omega: 1.0,
         mass: DMatrix::identity(n, n),
         stages: vec![forces],

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, Machine, Restitution, Side, Spring, Wall,
+    Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Side, Spring, Wall,
 };
 
 use super::super::independent::random::Random;
@@ -23,7 +23,7 @@ pub(crate) struct Shape {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
-    pub(crate) machine: Machine,
+    pub(crate) machine: Oscillator,
     /// `(x1, v1, x2, v2, ...)`, with all gaps between their walls.
     pub(crate) start: Vec<f64>,
 }
@@ -72,7 +72,7 @@ fn row(random: &mut Random, n: usize) -> Vector {
 }
 
 /// Returns the mean and the amplitude of a gap in motion without walls.
-fn reach(machine: &Machine, row: &Vector) -> [f64; 2] {
+fn reach(machine: &Oscillator, row: &Vector) -> [f64; 2] {
     let (n, forces) = (machine.degrees(), &machine.stages[0]);
     let solved = |m: Matrix, f: Vector| m.lu().solve(&f).unwrap_or_else(|| Vector::zeros(f.len()));
     let mean = row.dot(&solved(forces.stiffness.clone(), forces.load.clone()));
@@ -91,7 +91,7 @@ fn reach(machine: &Machine, row: &Vector) -> [f64; 2] {
 }
 
 /// Returns the walls on a side, the first one at a distance from the middle. All but the last are elastic.
-fn walls(random: &mut Random, machine: &Machine, count: usize, at: f64, s: f64, speed: f64) -> Vec<Wall> {
+fn walls(random: &mut Random, machine: &Oscillator, count: usize, at: f64, s: f64, speed: f64) -> Vec<Wall> {
     let mut walls = Vec::new();
     let mut at = at;
     for nth in 0..count {
@@ -117,13 +117,13 @@ fn walls(random: &mut Random, machine: &Machine, count: usize, at: f64, s: f64, 
         let springs =
             (0..machine.stages.len()).map(|i| if i == 0 { spring } else { of_stage(random) }).collect();
         let restitution = match random.below(8) {
-            0 | 1 => Restitution::constant(0.0),
-            2 => Restitution {
+            0 | 1 => Restitution::Constant(0.0),
+            2 => Restitution::BySpeed {
                 constant: random.between(0.5, 0.95),
                 factor: -random.between(0.02, 0.2) / speed.max(0.1),
                 power: [0.2, 0.5, 1.0, 2.0][random.below(4)],
             },
-            _ => Restitution::constant(random.between(0.05, 0.9)),
+            _ => Restitution::Constant(random.between(0.05, 0.9)),
         };
         let mesh_speed = if random.chance(0.4) { 0.0 } else { speed * random.logarithmic(1e-3, 0.3) };
         walls.push(Wall { at, contact, restitution, mesh_speed, springs });
@@ -189,7 +189,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     let drives = orders.into_iter().map(drive).collect();
     let omega = random.logarithmic(0.8, 5.0);
     let mut machine =
-        Machine { omega, mass, stages, schedule, drives, gaps: Vec::new(), friction: Vec::new() };
+        Oscillator { omega, mass, stages, schedule, drives, gaps: Vec::new(), friction: Vec::new() };
     let mut rows: Vec<Vector> = Vec::new();
     while rows.len() < shape.gaps {
         rows.push(row(random, n));
@@ -222,7 +222,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
 }
 
 /// Adds elements along gap rows, or along rows that are independent of all gap rows.
-fn add_friction(random: &mut Random, machine: &mut Machine, most: usize, gaps: &[Vector], speed: f64) {
+fn add_friction(random: &mut Random, machine: &mut Oscillator, most: usize, gaps: &[Vector], speed: f64) {
     let n = machine.degrees();
     let force = machine.drives.iter().map(|drive| drive.cos.amax()).fold(0.0, f64::max);
     let mut all = gaps.to_vec();

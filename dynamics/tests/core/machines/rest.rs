@@ -1,15 +1,14 @@
 //! Motions in which a function of time is exactly zero for a while, or has a root of high order.
 
 use nalgebra::{DMatrix, DVector};
+use rattlemap_dynamics::machine::{Motion, System};
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, Machine, Oscillator, Restitution, Spring, Wall,
-    state as state_of,
+    Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Spring, Wall, state as state_of,
 };
-use rattlemap_dynamics::reference::machine::{Motion, System};
 
 fn wall(at: f64, contact: Contact, e: f64) -> Wall {
     let spring = Spring { stiffness: 10.0, damping: 0.0, preload: 0.0 };
-    Wall { at, contact, restitution: Restitution::constant(e), mesh_speed: 0.0, springs: vec![spring] }
+    Wall { at, contact, restitution: Restitution::Constant(e), mesh_speed: 0.0, springs: vec![spring] }
 }
 
 /// Returns a machine of unit masses with a force on the first one.
@@ -19,11 +18,11 @@ fn machine(
     force: [f64; 2],
     gap: &[f64],
     walls: [Vec<Wall>; 2],
-) -> Machine {
+) -> Oscillator {
     let n = stiffness.nrows();
     let at_first = |f: f64| DVector::from_fn(n, |i, _| if i == 0 { f } else { 0.0 });
     let [cos, sin] = force.map(at_first);
-    Machine {
+    Oscillator {
         omega,
         mass: DMatrix::identity(n, n),
         stages: vec![Forces { damping: DMatrix::zeros(n, n), stiffness, load: DVector::zeros(n) }],
@@ -34,7 +33,7 @@ fn machine(
     }
 }
 
-fn after_a_period(machine: &Machine, start: &[f64]) -> Vec<f64> {
+fn after_a_period(machine: &Oscillator, start: &[f64]) -> Vec<f64> {
     let system = System::new(machine);
     let mut motion = Motion::new(&system, start);
     motion.advance_period(&mut ()).expect("it can be continued");
@@ -126,7 +125,7 @@ fn friction_holds_a_force_at_its_limit() {
 /// Motion that is large against a narrow clearance has not escaped, nor has decay towards a wall at 0, though stages could do work.
 #[test]
 fn bounded_motion_with_stages_does_not_escape() {
-    let with_stages = |mut machine: Machine| {
+    let with_stages = |mut machine: Oscillator| {
         let mut second = machine.stages[0].clone();
         second.stiffness *= 1.1;
         machine.stages.push(second);
@@ -162,7 +161,7 @@ fn a_wall_on_which_another_gap_rests_takes_part_in_an_impact() {
     motion.advance_to(after, &mut ()).unwrap();
     let state = motion.state();
     assert!(state[1] == 0.0 && (state[3] - (0.5 - (after - 1.0))).abs() < 1e-13, "{state:?}");
-    let oscillator = Oscillator::of_machine(bodies);
+    let oscillator = bodies;
     let impulse = |gap, speeds: [f64; 2]| {
         oscillator.gap_impulse(
             gap,

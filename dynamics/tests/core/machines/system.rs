@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use rattlemap_dynamics::model::{Contact, Machine, Side};
+use rattlemap_dynamics::model::{Contact, Oscillator, Side};
 
 /// A step, in radians of the fastest rate.
 pub(crate) const ANGLE: f64 = 0.6;
@@ -133,7 +133,7 @@ pub(crate) type Bond = (Vector, f64);
 
 /// A machine with its domains.
 pub(crate) struct System {
-    pub(crate) machine: Machine,
+    pub(crate) machine: Oscillator,
     pub(crate) degrees: usize,
     pub(crate) period: f64,
     /// The length that the limit of short flights is relative to.
@@ -150,7 +150,7 @@ pub(crate) struct System {
 
 impl System {
     /// Builds the system with steps of `angle` radians of the fastest rate.
-    pub(crate) fn new(machine: &Machine, angle: f64) -> System {
+    pub(crate) fn new(machine: &Oscillator, angle: f64) -> System {
         let mut machine = machine.clone();
         machine.friction.retain(|friction| friction.force > 0.0);
         let degrees = machine.degrees();

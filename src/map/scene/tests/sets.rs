@@ -67,7 +67,8 @@ fn the_start_phase_turns_the_force_of_every_cell() {
     let (plain, turned) = (parse(GOOD, &[]).unwrap(), parse(GOOD, &["start.phase=0.5*pi"]).unwrap());
     for i in 0..4 {
         let [plain, turned] = [&plain, &turned].map(|scene| scene.cell(&[i]).oscillator().unwrap());
-        assert!(turned.force[0].abs() < 1e-14 && (turned.force_sin[0] + plain.force[0]).abs() < 1e-14);
+        let [plain, turned] = [&plain.drives[0], &turned.drives[0]];
+        assert!(turned.cos[0].abs() < 1e-14 && (turned.sin[0] + plain.cos[0]).abs() < 1e-14);
     }
     let more: Vec<_> =
         turned.identity().into_iter().filter(|entry| !plain.identity().contains(entry)).collect();

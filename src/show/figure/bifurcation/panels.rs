@@ -109,7 +109,7 @@ impl Gaps {
     fn of(model: &dyn Model) -> Gaps {
         let oscillator = model.oscillator().ok();
         let rows =
-            |oscillator: Oscillator| (0..oscillator.gap_count()).map(|gap| oscillator.gap_row(gap)).collect();
+            |oscillator: Oscillator| (0..oscillator.gaps.len()).map(|gap| oscillator.gap_row(gap)).collect();
         Gaps { rows: oscillator.map_or(Vec::new(), rows), names: several_gaps(model) }
     }
 

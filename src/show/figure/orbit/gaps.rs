@@ -33,7 +33,7 @@ impl PlotGap {
             let length = if half > 0.0 { half } else { oscillator.length_scale() };
             PlotGap { index, labels: WallLabels::of(model, index), walls, length }
         };
-        (0..oscillator.gap_count()).map(of).collect()
+        (0..oscillator.gaps.len()).map(of).collect()
     }
 
     /// Returns the position of the first wall of a side; infinite without a wall.
@@ -79,7 +79,7 @@ impl PlotGap {
         trace: &[Sample],
     ) -> Option<Side> {
         let start = trace.first()?;
-        if self.index == 0 && (start.meshing.is_some() || oscillator.machine.is_none()) {
+        if self.index == 0 && (start.meshing.is_some() || oscillator.tells_contact_at_start()) {
             return start.meshing;
         }
         let first = events.iter().find(|event| event.gap == self.index);
@@ -112,11 +112,5 @@ pub(crate) fn contacts_at_start(
 
 /// Returns the positions and the contact laws of the walls on a side of a gap.
 fn walls(oscillator: &Oscillator, gap: usize, side: Side) -> Vec<(f64, Contact)> {
-    let i = side.index();
-    if let Some(machine) = &oscillator.machine {
-        return machine.gaps[gap].walls[i].iter().map(|wall| (wall.at, wall.contact)).collect();
-    }
-    let first = (oscillator.walls[i], oscillator.contacts[i]);
-    let outer = oscillator.outer_walls[i].iter().map(|wall| (wall.at, wall.contact));
-    std::iter::once(first).chain(outer).filter(|(at, _)| at.is_finite()).collect()
+    oscillator.gaps[gap].walls[side.index()].iter().map(|wall| (wall.at, wall.contact)).collect()
 }

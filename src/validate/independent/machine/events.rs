@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::system::{Constraints, Domain, Key, Numbers, Point, ROUNDING, Slide, affine, dot, size};
 use super::{Ending, Event, Flight, Gap, Mode, Slip, side_of, signed};
 use rattlemap_dynamics::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
-use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::motion::EventKind;
 use rattlemap_dynamics::word;
 
 /// Height of a flight, in scales of length, that ends a series of impacts.

@@ -12,7 +12,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use rattlemap_dynamics::model::{
     Contact, Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, MOST_HARMONICS,
-    Machine, REST, Restitution, Side, Spring, State, Wall,
+    Oscillator, REST, Restitution, Side, Spring, State, Wall,
 };
 
 /// Largest number of entries of a point.
@@ -220,7 +220,7 @@ impl Constraints {
 #[derive(Debug)]
 pub(super) struct System {
     /// The machine without units, in the coordinates `d`.
-    pub(super) machine: Machine,
+    pub(super) machine: Oscillator,
     pub(super) n: usize,
     /// Displacements over `units[0]` are these combinations of coordinates.
     from_coordinates: DMatrix<f64>,
@@ -236,7 +236,7 @@ pub(super) struct System {
 }
 
 impl System {
-    pub(super) fn new(machine: &Machine, start: &State) -> System {
+    pub(super) fn new(machine: &Oscillator, start: &State) -> System {
         let to_coordinates = coordinates(machine);
         let from_coordinates = to_coordinates.clone().try_inverse().expect("the rows are independent");
         // A machine without walls and loads has no length, so its start gives one.
@@ -409,7 +409,7 @@ impl System {
 
 /// Returns the rows of the coordinates: the gaps, and displacements that complete them. For each gap the displacement is left out that has
 /// the largest part in the mobility of what is left of its row.
-fn coordinates(machine: &Machine) -> DMatrix<f64> {
+fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
     let n = machine.degrees();
     let mut rest: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
     let mut left_out = Vec::new();
@@ -432,7 +432,7 @@ fn coordinates(machine: &Machine) -> DMatrix<f64> {
 
 /// Returns a machine in units of displacement and velocity, and in other coordinates. Forces are those along the coordinates, over the unit
 /// of displacement.
-fn transformed(machine: &Machine, [length, speed]: [f64; 2], from: &DMatrix<f64>) -> Machine {
+fn transformed(machine: &Oscillator, [length, speed]: [f64; 2], from: &DMatrix<f64>) -> Oscillator {
     let (back, omega) = (from.transpose(), machine.omega);
     let matrix = |m: &DMatrix<f64>, factor: f64| &back * m * from * factor;
     let vector = |v: &DVector<f64>| &back * v / length;
@@ -447,19 +447,22 @@ fn transformed(machine: &Machine, [length, speed]: [f64; 2], from: &DMatrix<f64>
             damping: damping * omega,
             preload: preload / length,
         };
-        let Restitution { constant, factor, power } = wall.restitution;
-        // A constant coefficient may have any power.
-        let factor = if factor == 0.0 { 0.0 } else { factor * speed.powf(power) };
+        let restitution = match wall.restitution {
+            Restitution::BySpeed { constant, factor, power } => {
+                Restitution::BySpeed { constant, factor: factor * speed.powf(power), power }
+            }
+            constant => constant,
+        };
         Wall {
             at: wall.at / length,
-            restitution: Restitution { constant, factor, power },
+            restitution,
             mesh_speed: wall.mesh_speed / speed,
             springs: wall.springs.iter().map(spring).collect(),
             ..wall.clone()
         }
     };
     let mass = matrix(&machine.mass, omega * omega);
-    Machine {
+    Oscillator {
         omega: 1.0,
         mass: 0.5 * (&mass + mass.transpose()),
         stages: machine.stages.iter().map(forces).collect(),

@@ -4,10 +4,11 @@ use std::f64::consts::PI;
 
 use super::super::machine::Slip;
 use super::super::{Strobed, follow};
+use super::pairs::{Friction, Rubbing};
 use super::*;
 use crate::record::{Record, valid};
-use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Friction, REST, state};
+use rattlemap_dynamics::model::{REST, state};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, analyse_flow};
 
 const SETTINGS: Settings = Settings { transient_periods: 150, observed_periods: 20, max_period: 4 };
@@ -20,19 +21,16 @@ fn element(row: [f64; 2], force: f64, speed: f64) -> Friction {
 }
 
 /// A single mass of 1 on a spring, on rough ground.
-fn block(stiffness: f64, friction: f64, speed: f64) -> Oscillator {
-    Oscillator {
-        free: domain(stiffness, 0.0),
-        friction: vec![element([1.0, 0.0], friction, speed)],
-        ..mass(0.0, NO_WALLS, Contact::Rigid)
-    }
+fn block(stiffness: f64, friction: f64, speed: f64) -> Rubbing {
+    let pair = Pair { free: domain(stiffness, 0.0), ..mass(0.0, NO_WALLS, Contact::Rigid) };
+    Rubbing { pair, friction: vec![element([1.0, 0.0], friction, speed)] }
 }
 
 /// Integrates within the first period. Times of the result are in the oscillator's units.
-fn motion(oscillator: &Oscillator, law: Law, start: State, until: f64) -> Flight {
+fn motion(oscillator: &Oscillator, start: State, until: f64) -> Flight {
     assert!(until <= oscillator.period());
     oscillator.validate().unwrap();
-    let mut flight = Flight::new(&Machine::of(oscillator, law), &start);
+    let mut flight = Flight::new(oscillator, &start);
     flight.advance(0.0, until * oscillator.omega).unwrap();
     flight.events.iter_mut().for_each(|event| event.t /= oscillator.omega);
     flight.slips.iter_mut().for_each(|slip| slip.t /= oscillator.omega);
@@ -50,7 +48,7 @@ fn kinds(flight: &Flight) -> Vec<(EventKind, Side)> {
     flight.events.iter().map(|ended| (ended.kind, ended.side)).collect()
 }
 
-fn record_of(oscillator: &Oscillator, law: Law, start: State) -> Option<Record> {
+fn record_of(oscillator: &Oscillator, start: State) -> Option<Record> {
     let budget = Budget {
         settings: SETTINGS,
         early_stop: false,
@@ -61,22 +59,24 @@ fn record_of(oscillator: &Oscillator, law: Law, start: State) -> Option<Record> 
         quantities: false,
     };
     let halt = std::sync::atomic::AtomicBool::new(false);
-    follow(Strobed::new(oscillator, law, start, &halt), &budget)
+    follow(Strobed::new(oscillator, start, &halt), &budget)
 }
 
 /// Half swings are shorter by `2 f / k`, until a turn at which the spring does not overcome friction.
 #[test]
 fn half_swings_become_shorter_and_end_for_ever() {
-    let oscillator = Oscillator { omega: 0.3, ..block(4.0, 0.48, 0.0) };
-    let flight = motion(&oscillator, Law::both(0.5, 0.0), state(&[1.0]), 20.0);
+    let mut oscillator = block(4.0, 0.48, 0.0);
+    oscillator.omega = 0.3;
+    let flight = motion(&oscillator.described(Law::both(0.5, 0.0)), state(&[1.0]), 20.0);
     let turns: Vec<_> = [Some(b'0'), Some(b'0'), Some(b'0'), None].into_iter().zip(1..).collect();
     let turns: Vec<_> = turns.into_iter().map(|(symbol, n)| (symbol, 0.5 * PI * f64::from(n))).collect();
     check_slips(&flight.slips, &turns, "half swings");
     assert_near(&flight.state(), &[0.04, 0.0, 0.0, 0.0], 1e-10, "rest");
     assert_eq!(flight.state()[1], 0.0);
     // A force below the friction does not move it: a cycle without multipliers and events.
-    let pushed = Oscillator { omega: 1.0, force: [0.2, 0.0], ..oscillator };
-    let record = record_of(&pushed, Law::both(0.5, 0.0), state(&[1.0])).unwrap();
+    let mut pushed = oscillator;
+    (pushed.omega, pushed.force) = (1.0, [0.2, 0.0]);
+    let record = record_of(&pushed.described(Law::both(0.5, 0.0)), state(&[1.0])).unwrap();
     assert_eq!((record.period, record.valid & valid::LYAPUNOV), (1, 0));
     assert_eq!(record.strobe[1], 0.0);
 }
@@ -91,12 +91,12 @@ fn steady_motion_without_stops_has_den_hartogs_amplitude() {
         let u = turn.sin() / (r * (1.0 + turn.cos()));
         let amplitude = (v * v - share * share * u * u).sqrt();
         let (sin, cos) = (-share * u / v, amplitude / v);
-        let oscillator =
-            Oscillator { omega: r, force: [cos, 0.0], force_sin: [-sin, 0.0], ..block(1.0, share, 0.0) };
+        let mut oscillator = block(1.0, share, 0.0);
+        (oscillator.omega, oscillator.force, oscillator.force_sin) = (r, [cos, 0.0], [-sin, 0.0]);
         let law = Law::both(0.5, 0.0);
-        let flight = motion(&oscillator, law, state(&[amplitude]), 0.9 * oscillator.period());
+        let flight = motion(&oscillator.described(law), state(&[amplitude]), 0.9 * oscillator.period());
         check_slips(&flight.slips, &[(Some(b'0'), PI / r)], "one turn");
-        let (y, _) = run(&oscillator, law, state(&[amplitude]), 7.5);
+        let (y, _) = run(&oscillator.described(law), state(&[amplitude]), 7.5);
         assert_near(&y[..2], &[-amplitude, 0.0], 1e-9, "half a turn later");
     }
 }
@@ -104,16 +104,17 @@ fn steady_motion_without_stops_has_den_hartogs_amplitude() {
 /// A belt carries the block until the spring overcomes friction.
 #[test]
 fn a_belt_carries_a_block_until_it_slips() {
-    let oscillator = Oscillator { omega: 0.5, ..block(4.0, 2.0, 0.5) };
+    let mut oscillator = block(4.0, 2.0, 0.5);
+    oscillator.omega = 0.5;
     let sticks = 0.5 * 0.25f64.asin();
     let x = 0.5 - (2.0 * sticks).cos();
     let slips = sticks + (0.5 - x) / 0.5;
-    let flight = motion(&oscillator, Law::both(0.5, 0.0), state(&[-0.5]), slips + 1.0);
+    let flight = motion(&oscillator.described(Law::both(0.5, 0.0)), state(&[-0.5]), slips + 1.0);
     check_slips(&flight.slips, &[(None, sticks), (Some(b'7'), slips)], "belt");
     let exact = [0.5 + 0.25 * 2f64.sin(), 0.5 * 2f64.cos()];
     assert_near(&flight.state()[..2], &exact, 1e-10, "after the slip");
     // The start can be on the belt.
-    let flight = motion(&oscillator, Law::both(0.5, 0.0), state(&[-0.5, 0.5]), 1.0);
+    let flight = motion(&oscillator.described(Law::both(0.5, 0.0)), state(&[-0.5, 0.5]), 1.0);
     assert_near(&flight.state(), &[0.0, 0.5, 0.0, 0.0], 1e-13, "on the belt");
 }
 
@@ -121,8 +122,9 @@ fn a_belt_carries_a_block_until_it_slips() {
 #[test]
 fn an_impact_reverses_sliding() {
     let floor = mass(0.0, [f64::INFINITY, 0.0], Contact::Impact);
-    let oscillator = Oscillator { omega: 0.5, friction: vec![element([-2.0, 0.0], 0.25, 0.0)], ..floor };
-    let flight = motion(&oscillator, Law::both(0.8, 0.0), state(&[1.0, -2.0]), 8.0);
+    let pair = Pair { omega: 0.5, ..floor };
+    let oscillator = Rubbing { pair, friction: vec![element([-2.0, 0.0], 0.25, 0.0)] };
+    let flight = motion(&oscillator.described(Law::both(0.8, 0.0)), state(&[1.0, -2.0]), 8.0);
     let (falls, speed) = (2.0 * (2.0 - 3f64.sqrt()), 0.8 * 3f64.sqrt());
     assert_eq!(kinds(&flight), [(EventKind::Impact, Side::Left)]);
     check_slips(&flight.slips, &[(None, falls), (None, falls + 2.0 * speed)], "floor");
@@ -132,14 +134,16 @@ fn an_impact_reverses_sliding() {
 /// A mass hits another one that sticks to the ground.
 #[test]
 fn an_impact_sets_a_mass_sliding() {
-    let oscillator = Oscillator {
-        degrees: 2,
-        gap: [1.0, -1.0],
-        omega: 1.0,
+    let oscillator = Rubbing {
+        pair: Pair {
+            degrees: 2,
+            gap: [1.0, -1.0],
+            omega: 1.0,
+            ..mass(0.0, [0.0, f64::NEG_INFINITY], Contact::Impact)
+        },
         friction: vec![element([0.0, 1.0], 0.3, 0.0)],
-        ..mass(0.0, [0.0, f64::NEG_INFINITY], Contact::Impact)
     };
-    let flight = motion(&oscillator, Law::both(0.5, 0.0), state(&[-1.0, 1.0]), 4.0);
+    let flight = motion(&oscillator.described(Law::both(0.5, 0.0)), state(&[-1.0, 1.0]), 4.0);
     assert_eq!(kinds(&flight), [(EventKind::Impact, Side::Right)]);
     check_slips(&flight.slips, &[(Some(b'7'), 1.0), (None, 3.5)], "hit");
     assert_eq!(flight.slips[0].after, 1);
@@ -150,14 +154,12 @@ fn an_impact_sets_a_mass_sliding() {
 #[test]
 fn a_rigid_wall_lets_go_before_friction() {
     let floor = mass(-1.0, [f64::INFINITY, 0.0], Contact::Rigid);
-    let loaded = |force: f64| Oscillator {
-        omega: 1.0,
-        force_sin: [force, 0.0],
+    let loaded = |force: f64| Rubbing {
+        pair: Pair { omega: 1.0, force_sin: [force, 0.0], ..floor.clone() },
         friction: vec![element([3.0, 0.0], 0.5 / 3.0, 0.0)],
-        ..floor.clone()
     };
     let law = Law::both(0.5, 0.0);
-    let flight = motion(&loaded(3.0), law, REST, 1.5);
+    let flight = motion(&loaded(3.0).described(law), REST, 1.5);
     let (lets_go, slips) = ((1.0 / 3.0f64).asin(), 0.5f64.asin());
     assert_eq!(kinds(&flight), [(EventKind::MeshStart, Side::Left), (EventKind::MeshEnd, Side::Left)]);
     assert!((flight.events[1].t - lets_go).abs() < 1e-12);
@@ -167,7 +169,7 @@ fn a_rigid_wall_lets_go_before_friction() {
     let x = 3.0 * (slips.cos() * dt - (1.5f64.sin() - slips.sin())) - 0.75 * dt * dt;
     assert_near(&flight.state()[..2], &[x, v], 1e-11, "lifted");
     // Friction holds the smaller force, and gives the load back to the wall at its limit.
-    let flight = motion(&loaded(1.2), law, REST, TAU);
+    let flight = motion(&loaded(1.2).described(law), REST, TAU);
     let kinds = kinds(&flight);
     assert_eq!(kinds[1..], [(EventKind::MeshEnd, Side::Left), (EventKind::MeshStart, Side::Left)]);
     assert!((flight.events[2].t - (PI - (0.5 / 1.2f64).asin())).abs() < 1e-11, "{:?}", flight.events);
@@ -178,15 +180,17 @@ fn a_rigid_wall_lets_go_before_friction() {
 /// A mass lies on another one that lies on the ground. Both begin to slide together, and then separately.
 #[test]
 fn masses_on_each_other_slide_one_after_the_other() {
-    let oscillator = Oscillator {
-        degrees: 2,
-        gap: [0.3, 1.0],
-        omega: 1.0,
-        force_sin: [2.0, 0.0],
+    let oscillator = Rubbing {
+        pair: Pair {
+            degrees: 2,
+            gap: [0.3, 1.0],
+            omega: 1.0,
+            force_sin: [2.0, 0.0],
+            ..mass(0.0, NO_WALLS, Contact::Rigid)
+        },
         friction: vec![element([1.0, 0.0], 0.5, 0.0), element([2.0, -2.0], 0.15, 0.0)],
-        ..mass(0.0, NO_WALLS, Contact::Rigid)
     };
-    let flight = motion(&oscillator, Law::both(0.0, 0.0), REST, 1.2);
+    let flight = motion(&oscillator.described(Law::both(0.0, 0.0)), REST, 1.2);
     let (both, one) = (0.25f64.asin(), 0.55f64.asin());
     check_slips(&flight.slips, &[(Some(b'7'), both), (Some(b'7'), one)], "stack");
     let v = 0.5 * (2.0 * (both.cos() - one.cos()) - 0.5 * (one - both));
@@ -199,14 +203,16 @@ fn masses_on_each_other_slide_one_after_the_other() {
 /// A stage moves a block that sticks.
 #[test]
 fn a_stage_overcomes_friction() {
-    let oscillator = Oscillator {
-        stages: vec![stage(0.0, -2.0)],
-        schedule: vec![(0.0, 0), (0.25, 1)],
+    let oscillator = Rubbing {
+        pair: Pair {
+            stages: vec![stage(0.0, -2.0)],
+            schedule: vec![(0.0, 0), (0.25, 1)],
+            ..mass(1.0, NO_WALLS, Contact::Rigid)
+        },
         friction: vec![element([1.0, 0.0], 1.5, 0.0)],
-        ..mass(1.0, NO_WALLS, Contact::Rigid)
     };
     let (begins, t) = (0.25 * oscillator.period(), 0.6 * oscillator.period());
-    let flight = motion(&oscillator, Law::both(0.5, 0.0), state(&[0.3]), t);
+    let flight = motion(&oscillator.described(Law::both(0.5, 0.0)), state(&[0.3]), t);
     check_slips(&flight.slips, &[(Some(b'7'), begins)], "stage");
     let dt = t - begins;
     assert_near(&flight.state()[..2], &[0.3 - 0.25 * dt * dt, -0.5 * dt], 1e-12, "stage");
@@ -243,21 +249,23 @@ fn cycles_are_those_of_the_reference() {
         if n % 3 != 1 && n % 5 == 0 {
             friction.push(element([0.3, 1.2], 0.2 + even(0.19), [0.0, 0.4][n % 2]));
         }
-        let oscillator = Oscillator {
-            degrees: 2,
-            gap,
-            omega: 1.8 + even(1.0),
-            force: [even(3.0), even(2.0)],
-            free,
-            meshing: [behind; 2],
+        let oscillator = Rubbing {
+            pair: Pair {
+                degrees: 2,
+                gap,
+                omega: 1.8 + even(1.0),
+                force: [even(3.0), even(2.0)],
+                free,
+                meshing: [behind; 2],
+                ..mass(0.0, [wall, f64::NEG_INFINITY], contact)
+            },
             friction,
-            ..mass(0.0, [wall, f64::NEG_INFINITY], contact)
         };
-        oscillator.validate().unwrap();
         let law = Law::both(0.6, 0.05);
+        oscillator.described(law).validate().unwrap();
         let start = state(&[0.1 * wall, 0.2, 0.0, 0.1]);
-        let record = record_of(&oscillator, law, start).unwrap();
-        let orbit = analyse_flow(&Flow::new(&oscillator), law, start, &SETTINGS, 0);
+        let record = record_of(&oscillator.described(law), start).unwrap();
+        let orbit = analyse_flow(&Flow::new(oscillator.form(law)), law, start, &SETTINGS, 0);
         assert_eq!(orbit.class, Class::Periodic { period: record.period }, "{n}");
         assert_eq!(record.word().as_ref(), Some(&orbit.word), "{n}");
         let off = record.lyapunov - orbit.lyapunov;

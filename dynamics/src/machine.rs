@@ -1,0 +1,48 @@
+//! The motion of a [`Oscillator`](crate::model::Oscillator): any number of coordinates and gaps, and dry friction.
+//!
+//! # Elements and domains
+//!
+//! Each wall and each element with dry friction has a few modes. A combination of all modes and a stage is a *domain*, in which the
+//! equations of motion are linear. Domains are built when they are first met. The coordinates are the gaps and as many displacements as
+//! are missing, so that a contact puts its gap exactly on the wall.
+//!
+//! ```text
+//! a = (d, w, cos and sin of each harmonic, 1),   d' = w,   w' = row of accelerations . a
+//! ```
+//!
+//! # Steps and events
+//!
+//! A step is a Taylor polynomial of order 23 from the present state, over at most 1.6 radians of the fastest rate, so that its remainder is
+//! below rounding. Whatever ends a mode is the root of a linear function of `a` (a *watch*), which on a step is a polynomial, too.
+//! Its Bernstein coefficients show that it has no root, or isolate the first one. So no event is missed, at any step length.
+//!
+//! # Tangents
+//!
+//! An event multiplies tangent vectors by `S = R + (f+ - R f-) n^T / (n . f-)`, with the derivative `R` of the jump, the vector fields `f-`
+//! and `f+` before and after all mode changes of the instant, and the gradient `n` of the watch.
+
+mod domain;
+mod flight;
+mod modes;
+mod motion;
+mod polynomial;
+mod system;
+mod table;
+
+pub use motion::{LOWEST_FLIGHT, Motion};
+pub use system::System;
+pub use table::{Equations, StartModes};
+
+use crate::model::{MOST_HARMONICS, STATE, State};
+
+/// Numbers of a state.
+pub(crate) const SIZE: usize = STATE;
+
+/// Entries of `a`: the state, a pair for each harmonic, and 1.
+pub(crate) const WIDTH: usize = SIZE + 2 * (MOST_HARMONICS + 1) + 1;
+
+/// A state in the coordinates of the model, `(x1, v1, x2, v2, ...)`, or in those of the flow, `(d1 .. dn, w1 .. wn)`; further numbers are 0.
+pub(crate) type Numbers = State;
+
+/// The state, the phasors and 1, in the coordinates of the flow.
+pub(crate) type Point = [f64; WIDTH];

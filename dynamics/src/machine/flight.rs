@@ -1,0 +1,171 @@
+//! What is measured on a flight of a machine.
+
+use super::Point;
+use super::domain::{Domain, Path, Row};
+use super::modes::Modes;
+use super::system::System;
+use crate::model::Side;
+use crate::motion::Slip;
+use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, root};
+
+/// Part of a flight: one domain, at most one Taylor step.
+pub(super) struct Flight<'a> {
+    pub(super) system: &'a System,
+    pub(super) domain: &'a Domain,
+    pub(super) modes: &'a Modes,
+    pub(super) path: &'a Path,
+    /// The part of the step that the flight takes.
+    pub(super) share: f64,
+    /// Duration, and time of the start since phase 0.
+    pub(super) duration: f64,
+    pub(super) start: f64,
+}
+
+/// A linear function of the motion, and its rate.
+struct Signal {
+    value: Row,
+    rate: Row,
+}
+
+impl Signal {
+    /// Returns the value at a point.
+    fn at(&self, point: &Point) -> f64 {
+        self.value.dot(point)
+    }
+
+    /// Returns the rate at a point.
+    fn rate(&self, point: &Point) -> f64 {
+        self.rate.dot(point)
+    }
+}
+
+impl Flight<'_> {
+    /// Adds the flight to integrals and extremes.
+    pub(super) fn add_to(&self, sums: &mut Sums) {
+        let (displacements, forces) = (self.displacements(), self.contact_forces());
+        let mut before: Option<(f64, Point)> = None;
+        for (share, weight) in nodes().into_iter().chain([(1.0, 0.0)]) {
+            let point = self.at(share);
+            let (sin, cos) = (self.system.machine.omega * (self.start + share * self.duration)).sin_cos();
+            let weight = weight * self.duration;
+            for (place, signal) in &displacements {
+                let moments = &mut sums.displacements[*place];
+                moments.integrate(weight, signal.at(&point), [cos, sin]);
+            }
+            sums.dissipated += weight * self.dissipation(&point);
+            sums.heat += weight * self.heat(&point);
+            for signal in &forces {
+                sums.force.square += weight * signal.at(&point).powi(2);
+                sums.contact_time += weight;
+            }
+            if self.sticks() {
+                sums.sticking_time += weight;
+            }
+            let (start, from) = before.unwrap_or_else(|| (0.0, self.at(0.0)));
+            let include = |moments: &mut Moments, signal: &Signal| {
+                moments.include(signal.at(&from));
+                moments.include(signal.at(&point));
+                if signal.rate(&from) * signal.rate(&point) < 0.0 {
+                    let rate = |share: f64| signal.rate(&self.at(share));
+                    moments.include(signal.at(&self.at(root(start, share, rate))));
+                }
+            };
+            displacements.iter().for_each(|(place, signal)| include(&mut sums.displacements[*place], signal));
+            for signal in &forces {
+                include(&mut sums.force, signal);
+            }
+            before = Some((share, point));
+        }
+    }
+
+    /// Returns the point after a share of the flight.
+    fn at(&self, share: f64) -> Point {
+        self.domain.point(self.path, self.share * share)
+    }
+
+    fn signal(&self, value: Row) -> Signal {
+        Signal { rate: self.domain.rate_of(&value), value }
+    }
+
+    /// Returns all displacements and gaps, by their places in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
+    fn displacements(&self) -> Vec<(usize, Signal)> {
+        let displacements = (0..self.system.machine().degrees())
+            .map(|i| (place_of_displacement(i), self.system.displacement_row(i)));
+        let gaps = (0..self.system.gaps()).map(|gap| (place_of_gap(gap), self.domain.unit_row(gap)));
+        displacements.chain(gaps).map(|(place, row)| (place, self.signal(row))).collect()
+    }
+
+    /// Returns the forces of the compliant contacts, positive where they push.
+    fn contact_forces(&self) -> Vec<Signal> {
+        let key = self.modes.key(self.system);
+        let engaged = (0..self.system.gaps()).filter(|&gap| key.engaged[gap] != 0);
+        engaged
+            .map(|gap| {
+                let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
+                let (sign, mut row) = (side.sign(), self.domain.unit_row(gap).scaled(0.0));
+                for wall in &self.system.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())] {
+                    let spring = wall.springs[self.modes.stage];
+                    row.0[gap] += sign * spring.stiffness;
+                    row.0[self.system.n + gap] += sign * spring.damping;
+                    row = row.plus(spring.preload - sign * spring.stiffness * wall.at, self.system.width());
+                }
+                self.signal(row)
+            })
+            .collect()
+    }
+
+    /// Returns the power that all dampers take at a point.
+    fn dissipation(&self, point: &Point) -> f64 {
+        let n = self.system.n;
+        let rates = &point[n..2 * n];
+        (0..n).map(|i| rates[i] * (0..n).map(|j| self.domain.damping[(i, j)] * rates[j]).sum::<f64>()).sum()
+    }
+
+    /// Returns the power that dry friction turns into heat at a point.
+    fn heat(&self, point: &Point) -> f64 {
+        let elements = self.system.elements.iter().enumerate().zip(self.modes.slips);
+        let power = |((i, element), slip): ((usize, &super::system::Element), Slip)| {
+            element.force * slip.sign() * self.system.rate_row(i, self.domain).dot(point)
+        };
+        elements.map(power).sum()
+    }
+
+    /// Whether an element with dry friction sticks.
+    fn sticks(&self) -> bool {
+        self.system.elements.iter().zip(self.modes.slips).any(|(_, slip)| slip == Slip::Stick)
+    }
+}
+
+impl System {
+    /// Returns the row of a displacement; 0 for one that the machine does not have.
+    fn displacement_row(&self, i: usize) -> Row {
+        let mut row = [0.0; super::WIDTH];
+        if i < self.n {
+            (0..self.n).for_each(|j| row[j] = self.from_flow[(i, j)]);
+        }
+        Row(row)
+    }
+
+    /// Returns the part of the energy that events change: kinetic energy, and that of the springs and preloads of contacts.
+    pub(super) fn energy(&self, modes: &Modes, y: &[f64]) -> f64 {
+        let (n, key) = (self.n, modes.key(self));
+        let rates = &y[n..2 * n];
+        let kinetic: f64 =
+            (0..n).map(|i| rates[i] * (0..n).map(|j| self.mass[(i, j)] * rates[j]).sum::<f64>()).sum();
+        let of_gap = |gap: usize| {
+            let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
+            let walls = &self.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())];
+            let of_wall = |wall: &crate::model::Wall| {
+                let (spring, depth) = (wall.springs[modes.stage], y[gap] - wall.at);
+                0.5 * spring.stiffness * depth * depth + spring.preload * side.sign() * depth
+            };
+            walls.iter().map(of_wall).sum::<f64>()
+        };
+        0.5 * kinetic + (0..self.gaps()).map(of_gap).sum::<f64>()
+    }
+
+    /// Whether the machine has dry friction.
+    pub(crate) fn has_friction(&self) -> bool {
+        !self.elements.is_empty()
+    }
+}

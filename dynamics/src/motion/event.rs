@@ -1,0 +1,146 @@
+//! Events of a trajectory, reasons for its end, and counters of its work.
+
+use std::ops::AddAssign;
+
+use super::{Slips, Sums};
+use crate::model::{Side, State};
+
+/// Largest number of events in one forcing period.
+pub const EVENTS_PER_PERIOD_CAP: u64 = 1_000_000;
+
+/// Largest number of steps in one forcing period, including those that are halved: some tenths of a second.
+pub const STEPS_PER_PERIOD_CAP: u64 = 20_000_000;
+
+/// The reason why a trajectory cannot be continued.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Stop {
+    /// More than [`EVENTS_PER_PERIOD_CAP`] events in one period, or more events than the
+    /// [`Allowance`](super::Allowance).
+    #[error(
+        "more than {EVENTS_PER_PERIOD_CAP} events in one forcing period, or more events than one cell may take"
+    )]
+    CapEvents,
+    /// A root that does not converge, or more than [`STEPS_PER_PERIOD_CAP`] steps in one period.
+    #[error("more than {STEPS_PER_PERIOD_CAP} steps in one forcing period, or a root that does not converge")]
+    CapRoot,
+    /// More steps in total than the [`Allowance`](super::Allowance).
+    #[error("too stiff: more steps than one cell may take")]
+    TooStiff,
+    /// The state is not finite.
+    #[error("the state is not finite")]
+    NonFinite,
+    /// A displacement exceeds [`Flow::escape`](super::Flow::escape).
+    #[error("the motion grows without bound")]
+    Escape,
+}
+
+/// The kind of an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum EventKind {
+    /// A contact after which motion stays free.
+    Impact,
+    /// A contact after which the teeth mesh.
+    MeshStart,
+    /// Meshing ends and free motion follows.
+    MeshEnd,
+}
+
+/// An event at a wall of a gap.
+#[derive(Clone, Copy, Debug)]
+pub struct GapEvent {
+    /// Index of the gap, 0 if there is one.
+    pub gap: usize,
+    /// What happened.
+    pub kind: EventKind,
+    /// The side of the wall.
+    pub side: Side,
+    /// Symbol of the flight of this gap that ends here: `b'1'..=b'6'` if there is one gap, else [`of_gap`](crate::word::of_gap). None for the
+    /// first flight, which comes from no wall.
+    pub symbol: Option<u8>,
+    /// Number of completed forcing periods.
+    pub period: u64,
+    /// Time since the last phase 0, in `[0, T]`.
+    pub t: f64,
+    /// The gap and its rate just before the event, and of a pair the other displacement and its velocity.
+    pub before: [f64; 4],
+    /// The same just after the event.
+    pub after: [f64; 4],
+    /// The side of the contact of this gap that lasts after the event, if one does.
+    pub meshing: Option<Side>,
+    /// Whether the law of restitution applied.
+    pub has_impact: bool,
+    /// A number for the kind, the wall, and whether the gap was on it, which distinguishes itineraries.
+    pub(crate) code: u64,
+    /// The interval of a pair between walls after the event.
+    pub(crate) interval: i32,
+    /// Whether the event ends an infinite series of impacts, which the trajectory replaced by its limit.
+    pub(crate) ends_series: bool,
+}
+
+/// A change of the mode of dry friction.
+#[derive(Clone, Copy, Debug)]
+pub struct SlipEvent {
+    /// Modes after the event.
+    pub slips: Slips,
+    /// Symbol `b'7'` if a phase of sticking ends, and `b'0'` if sliding reverses without sticking.
+    pub symbol: Option<u8>,
+    /// Number of completed forcing periods.
+    pub period: u64,
+    /// Time since the last phase 0, in `[0, T]`.
+    pub t: f64,
+    /// State, `(x1, v1, x2, v2, ...)`.
+    pub at: State,
+}
+
+/// Returns the states just before and just after an event. They are computed only if an observer asks.
+pub type States<'a> = &'a dyn Fn() -> [State; 2];
+
+/// Receives the events of a motion, in order of time. `()` ignores them, a vector stores those at walls.
+pub trait Observer {
+    /// Receives one event at a wall.
+    fn event(&mut self, event: &GapEvent, states: States<'_>);
+
+    /// Receives one change of a friction mode.
+    fn slip(&mut self, _: &SlipEvent) {}
+
+    /// Returns the integrals and extremes to which a machine adds its flights and losses of energy; none if they are not requested. Those of
+    /// a pair follow from its events.
+    fn sums(&mut self) -> Option<&mut Sums> {
+        None
+    }
+}
+
+impl Observer for () {
+    #[inline]
+    fn event(&mut self, _: &GapEvent, _: States<'_>) {}
+}
+
+impl Observer for Vec<GapEvent> {
+    fn event(&mut self, event: &GapEvent, _: States<'_>) {
+        self.push(*event);
+    }
+}
+/// Counters of the work of a trajectory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Trial steps, including those that were halved.
+    pub steps: u64,
+    /// Steps that were halved.
+    pub halvings: u64,
+    /// Events: impacts, starts and ends of meshing, changes of friction modes.
+    pub events: u64,
+    /// Impacts alone.
+    pub impacts: u64,
+    /// Iterations of root searches on Taylor polynomials.
+    pub root_iterations: u64,
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Work) {
+        self.steps += other.steps;
+        self.halvings += other.halvings;
+        self.events += other.events;
+        self.impacts += other.impacts;
+        self.root_iterations += other.root_iterations;
+    }
+}

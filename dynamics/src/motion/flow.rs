@@ -1,0 +1,163 @@
+//! An oscillator, prepared for its motions.
+
+use crate::machine::System;
+use crate::model::{Form, Law, Model, ModelError, NonImpacting, Oscillator, Pair, State, first_four, state};
+use crate::pair::PairFlow;
+use crate::pair::flow::power_of_two;
+
+/// What the engine of an oscillator prepares.
+#[derive(Clone, Debug)]
+pub enum Engine {
+    /// The exact flow of a pair.
+    Pair(Box<PairFlow>),
+    /// The equations of motion of a machine.
+    Machine(Box<System>),
+}
+
+/// The flow of one oscillator.
+///
+/// That of a pair does not depend on the contact law, so cells that differ only in restitution or meshing speed share one flow.
+#[derive(Clone, Debug)]
+pub struct Flow {
+    /// Forcing period `2 pi / omega`.
+    pub period: f64,
+    /// Excitation frequency.
+    pub omega: f64,
+    /// Scale of length, [`Oscillator::length_scale`].
+    pub length: f64,
+    /// Displacement beyond which the motion has escaped: infinite if energy grows by the force alone.
+    pub escape: f64,
+    /// The largest power of two up to `omega`. Velocities divided by it are comparable with displacements, and the
+    /// division is exact.
+    pub(crate) rate: f64,
+    pub(crate) degrees: usize,
+    symmetric: bool,
+    non_impacting: Option<NonImpacting>,
+    engine: Engine,
+}
+
+impl Flow {
+    /// Computes the flow of a model.
+    ///
+    /// # Errors
+    /// [`ModelError`] if a parameter, the oscillator or the contact law is not valid.
+    pub fn of(model: &dyn Model) -> Result<Flow, ModelError> {
+        model.oscillator().map(|oscillator| Flow::new(&oscillator))
+    }
+
+    /// Computes the flow of an oscillator that [`Oscillator::validate`] accepts.
+    pub fn new(oscillator: impl Into<Form>) -> Flow {
+        match oscillator.into() {
+            Form::Pair(pair) => Flow::of_pair(&pair),
+            Form::Machine(machine) => Flow::of_machine(&machine),
+        }
+    }
+
+    fn of_pair(pair: &Pair) -> Flow {
+        let flow = Box::new(PairFlow::new(pair));
+        Flow {
+            period: flow.period,
+            omega: pair.omega,
+            length: flow.length,
+            escape: flow.escape,
+            rate: flow.rate,
+            degrees: pair.degrees,
+            symmetric: pair.mirror_symmetric(),
+            non_impacting: NonImpacting::new(pair).or_else(|| NonImpacting::with_one_at_rest(pair)),
+            engine: Engine::Pair(flow),
+        }
+    }
+
+    fn of_machine(machine: &Oscillator) -> Flow {
+        let system = Box::new(System::new(machine));
+        let (length, _, escape) = system.units();
+        Flow {
+            period: machine.period(),
+            omega: machine.omega,
+            length,
+            escape,
+            rate: power_of_two(machine.omega),
+            degrees: machine.degrees(),
+            symmetric: machine.mirror_symmetric(),
+            non_impacting: NonImpacting::of_machine(machine),
+            engine: Engine::Machine(system),
+        }
+    }
+
+    /// Returns what the engine has prepared.
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// Returns the exact flow of a pair; nothing for a machine.
+    pub fn pair(&self) -> Option<&PairFlow> {
+        match &self.engine {
+            Engine::Pair(flow) => Some(flow),
+            Engine::Machine(_) => None,
+        }
+    }
+
+    /// Returns the oscillator in the form that its engine takes.
+    pub fn form(&self) -> Form {
+        match &self.engine {
+            Engine::Pair(flow) => Form::Pair(flow.oscillator.clone()),
+            Engine::Machine(system) => Form::Machine(system.machine().clone()),
+        }
+    }
+
+    /// Returns the flow whose phase 0 is this phase of the forcing, in turns.
+    pub fn at_phase(&self, turns: f64) -> Flow {
+        let phase = turns * std::f64::consts::TAU;
+        match &self.engine {
+            Engine::Pair(flow) => Flow::of_pair(&flow.oscillator.at_phase(phase)),
+            Engine::Machine(system) => Flow::of_machine(&system.machine().at_phase(phase)),
+        }
+    }
+
+    /// Returns the memory that the flow occupies, in bytes, without the domains of a machine, which are built when they are met.
+    pub fn bytes(&self) -> usize {
+        size_of::<Flow>()
+            + match &self.engine {
+                Engine::Pair(flow) => flow.bytes(),
+                Engine::Machine(_) => size_of::<System>(),
+            }
+    }
+
+    /// Whether `(y, t) -> (-y, t + T/2)` maps solutions to solutions: both walls and their laws are alike. A machine ignores `law`.
+    pub fn mirror_symmetric(&self, law: &Law) -> bool {
+        self.symmetric && (self.pair().is_none() || law.is_symmetric())
+    }
+
+    /// Whether half a forcing period and a reflection map states to states, [`Trajectory::mirrored`](super::Trajectory). The mirror image of a
+    /// machine's modes is not known.
+    pub(crate) fn is_half_symmetric(&self, law: &Law) -> bool {
+        self.pair().is_some() && self.mirror_symmetric(law)
+    }
+
+    /// Returns the stable steady motion that touches no wall, if there is one. It may require that coordinates are at rest.
+    pub fn non_impacting(&self) -> Option<&NonImpacting> {
+        self.non_impacting.as_ref()
+    }
+
+    /// Whether the oscillator has dry friction.
+    pub(crate) fn has_friction(&self) -> bool {
+        match &self.engine {
+            Engine::Pair(_) => false,
+            Engine::Machine(system) => system.has_friction(),
+        }
+    }
+
+    /// Returns the number of entries of a state that can differ from 0: two for each coordinate, and four at least.
+    pub fn state_len(&self) -> usize {
+        2 * self.degrees.max(2)
+    }
+
+    /// Moves a gap of a pair that lies behind a wall by less than `rounding` to its front: behind it would be a lasting contact. Both
+    /// distances are relative to the wall's position or the scale of length.
+    pub(crate) fn in_front(&self, y: State, rounding: f64, distance: f64) -> State {
+        match &self.engine {
+            Engine::Pair(flow) => state(&flow.in_front(first_four(&y), rounding, distance)),
+            Engine::Machine(_) => y,
+        }
+    }
+}

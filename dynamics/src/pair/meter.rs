@@ -1,0 +1,246 @@
+//! Measures the motion of a pair from its events: between two events it is one flight in one linear domain, on which the exact flow is
+//! evaluated.
+
+use super::{DomainKind, Gap, LinearFlow, PairFlow, PairMotion, Phasor, Schedule, side_of};
+use crate::motion::{EventKind, GapEvent, Sums, nodes, root};
+
+/// The present flight of a motion that is measured.
+#[derive(Clone, Debug)]
+pub(crate) struct PairMeter<'f> {
+    /// The flow of the present stage and interval.
+    flow: &'f PairFlow,
+    /// The flow of the present stage, in all intervals.
+    stage: &'f PairFlow,
+    /// The present interval between walls.
+    interval: i32,
+    schedule: Schedule<'f>,
+    /// Domain, state and time since phase 0 at the beginning of the present flight.
+    kind: DomainKind,
+    q: Gap,
+    t: f64,
+    period: u64,
+}
+
+impl<'f> PairMeter<'f> {
+    /// Begins at phase 0, at the present state of a motion.
+    pub(crate) fn new<const N: usize>(motion: &PairMotion<'f, N>) -> PairMeter<'f> {
+        let (schedule, stage) = Schedule::new(motion.schedule.whole);
+        let interval = motion.interval();
+        let flow = stage.interval(interval);
+        PairMeter {
+            flow,
+            stage,
+            interval,
+            schedule,
+            kind: motion.domain(),
+            q: flow.to_gap(motion.state()),
+            t: 0.0,
+            period: motion.period(),
+        }
+    }
+
+    /// Continues the present flight to phase 0 of `period`.
+    pub(crate) fn complete_periods(&mut self, period: u64, sums: &mut Sums) {
+        while self.period < period {
+            self.fly_to(self.flow.period, sums);
+            self.t = 0.0;
+            let first = self.schedule.restart();
+            self.enter_stage(first);
+            self.period += 1;
+        }
+    }
+
+    /// Measures the present flight up to a time since phase 0. Changes of the stage at that time are still to come.
+    fn fly_to(&mut self, until: f64, sums: &mut Sums) {
+        while let Some(change) = self.schedule.next_change().filter(|&change| change < until) {
+            if change > self.t {
+                self.q = self.fly(change - self.t, sums);
+                self.t = change;
+            }
+            let next = self.schedule.change();
+            self.enter_stage(next);
+        }
+        if until > self.t {
+            self.q = self.fly(until - self.t, sums);
+        }
+        self.t = until;
+    }
+
+    fn enter_stage(&mut self, stage: &'f PairFlow) {
+        (self.stage, self.flow) = (stage, stage.interval(self.interval));
+    }
+
+    /// Measures the present flight over a time within one stage, and returns its end.
+    fn fly(&self, duration: f64, sums: &mut Sums) -> Gap {
+        let (flow, kind) = (self.flow, self.kind);
+        let linear = flow.domain(kind);
+        let pieces = (duration * linear.per_unit).ceil().max(1.0);
+        let piece = duration / pieces;
+        let mut q = self.q;
+        for i in 0..pieces as u64 {
+            let (sin, cos) = (flow.omega * (self.t + i as f64 * piece)).sin_cos();
+            q = self.fly_piece(&Piece { linear, q, phasor: [cos, sin], length: piece }, sums);
+        }
+        q
+    }
+
+    /// Measures a piece of at most one Taylor step, and returns its end.
+    fn fly_piece(&self, piece: &Piece<'_>, sums: &mut Sums) -> Gap {
+        let mut before = (0.0, piece.q, piece.phasor);
+        self.include(&before.1, sums);
+        for (share, weight) in nodes() {
+            let (q, phasor) = piece.at(share);
+            self.integrate(weight * piece.length, &q, phasor, sums);
+            self.find_extremes(piece, &before, &(share, q, phasor), sums);
+            before = (share, q, phasor);
+        }
+        let (end, phasor) = piece.at(1.0);
+        self.include(&end, sums);
+        self.find_extremes(piece, &before, &(1.0, end, phasor), sums);
+        end
+    }
+
+    fn integrate(&self, weight: f64, q: &Gap, phasor: Phasor, sums: &mut Sums) {
+        let [x1, v1, x2, v2] = self.flow.displacements(*q);
+        for (moments, value) in sums.displacements.iter_mut().zip([x1, x2, q[0]]) {
+            moments.integrate(weight, value, phasor);
+        }
+        let [[c1, c], [_, c2]] = self.flow.dissipation(self.kind);
+        sums.dissipated += weight * (c1 * v1 * v1 + 2.0 * c * v1 * v2 + c2 * v2 * v2);
+        if let Some(force) = self.compliant_force(q) {
+            sums.force.square += weight * force * force;
+            sums.contact_time += weight;
+        }
+    }
+
+    /// Includes a state in the extremes.
+    fn include(&self, q: &Gap, sums: &mut Sums) {
+        let [x1, _, x2, _] = self.flow.displacements(*q);
+        for (moments, value) in sums.displacements.iter_mut().zip([x1, x2, q[0]]) {
+            moments.include(value);
+        }
+        if let Some(force) = self.compliant_force(q) {
+            sums.force.include(force);
+        }
+    }
+
+    /// Includes the extremes between two instants of a piece.
+    fn find_extremes(&self, piece: &Piece<'_>, from: &Instant, to: &Instant, sums: &mut Sums) {
+        for which in 0..4 {
+            let rate = |(_, q, phasor): &Instant| self.rate(which, piece.linear, q, phasor);
+            if rate(from) * rate(to) < 0.0 {
+                let extreme = piece.root(from.0, to.0, rate);
+                self.include(&extreme, sums);
+            }
+        }
+    }
+
+    /// Returns the rate of a displacement, of the gap, or of the contact force.
+    fn rate(&self, which: usize, linear: &LinearFlow, q: &Gap, phasor: &Phasor) -> f64 {
+        match which {
+            0 | 1 => self.flow.displacements(*q)[2 * which + 1],
+            2 => q[1],
+            _ => self
+                .flow
+                .contact_force(self.kind)
+                .map_or(0.0, |force| force.rate(q, linear.acceleration(q, phasor))),
+        }
+    }
+
+    /// Returns the force of the compliant contacts, positive if it presses.
+    fn compliant_force(&self, q: &Gap) -> Option<f64> {
+        let side = match self.kind {
+            DomainKind::Meshing(side) => side,
+            DomainKind::Free => side_of(self.interval),
+        };
+        self.flow.contact_force(self.kind).map(|force| side.sign() * force.at(q))
+    }
+
+    /// Returns the energy of a wall's spring and preload at an event.
+    fn stored(&self, event: &GapEvent) -> f64 {
+        let (side, flow) = (event.side, self.flow);
+        let depth = event.before[0] - flow.wall(side);
+        let of_spring = 0.5 * flow.wall_force(side)[0] * depth * depth;
+        match flow.oscillator.preload(side) {
+            0.0 => of_spring,
+            preload => of_spring + preload * depth.abs(),
+        }
+    }
+
+    /// Counts the energy that a contact takes at an instant.
+    fn contact(&self, event: &GapEvent, sums: &mut Sums) {
+        let (side, flow) = (event.side, self.flow);
+        let kinetic = |w: f64| 0.5 * w * w / flow.compliance();
+        if event.kind == EventKind::MeshEnd {
+            sums.lost += self.stored(event);
+        } else if flow.contacts[side.index()].is_elastic() {
+            sums.lost -= self.stored(event);
+        } else {
+            if event.ends_series {
+                // The series has taken the energy with which the gap left the wall.
+                sums.lost += kinetic(self.q[1]);
+                return;
+            }
+            let approach = side.sign() * event.before[1];
+            sums.lost += kinetic(approach) - kinetic(event.after[1]);
+            sums.approach(side, approach);
+        }
+    }
+
+    /// Receives an event.
+    pub(crate) fn event(&mut self, event: &GapEvent, sums: &mut Sums) {
+        self.complete_periods(event.period, sums);
+        let duration = event.t - self.t;
+        if event.ends_series {
+            // The gap stays closed during the series. The error of the midpoint rule is of third order in its short
+            // duration.
+            let (begin, end) = (self.q, event.after);
+            let middle = [end[0], end[1], 0.5 * (begin[2] + end[2]), 0.5 * (begin[3] + end[3])];
+            let (sin, cos) = (self.flow.omega * (self.t + 0.5 * duration)).sin_cos();
+            self.integrate(duration, &middle, [cos, sin], sums);
+        } else {
+            self.fly_to(event.t, sums);
+        }
+        if event.interval == self.interval {
+            self.contact(event, sums);
+        }
+        self.kind = match event.kind {
+            EventKind::MeshStart if event.interval == self.interval => DomainKind::Meshing(event.side),
+            _ => DomainKind::Free,
+        };
+        self.interval = event.interval;
+        self.flow = self.stage.interval(self.interval);
+        self.q = event.after;
+        self.t = event.t;
+        self.include(&event.after, sums);
+    }
+}
+
+/// Time as a share of a piece, state and phasor.
+type Instant = (f64, Gap, Phasor);
+
+/// A part of a flight, at most one Taylor step long.
+struct Piece<'f> {
+    linear: &'f LinearFlow,
+    q: Gap,
+    phasor: Phasor,
+    length: f64,
+}
+
+impl Piece<'_> {
+    fn at(&self, share: f64) -> (Gap, Phasor) {
+        let u = share * self.length * self.linear.per_unit;
+        let expansion = self.linear.grid.expansion(&self.q, &self.phasor, u);
+        let v = u - expansion.start;
+        (expansion.state(v), expansion.phasor(self.linear.turn * v))
+    }
+
+    /// Returns the state at a zero of `rate` between two instants at which it has opposite signs.
+    fn root(&self, a: f64, b: f64, rate: impl Fn(&Instant) -> f64) -> Gap {
+        let of = |share| {
+            let (q, phasor) = self.at(share);
+            rate(&(share, q, phasor))
+        };
+        self.at(root(a, b, of)).0
+    }
+}
