@@ -85,6 +85,11 @@ pub trait Observer {
     /// Receives one event at a wall. Events come in order of time.
     fn event(&mut self, event: &GapEvent);
 
+    /// Whether events of machines at walls are to be reported.
+    fn sees_events(&self) -> bool {
+        true
+    }
+
     /// Receives one event of a machine at a wall.
     fn machine_event(&mut self, _: &MachineEvent) {}
 
@@ -106,6 +111,10 @@ pub trait Observer {
 impl Observer for () {
     #[inline]
     fn event(&mut self, _: &GapEvent) {}
+
+    fn sees_events(&self) -> bool {
+        false
+    }
 }
 
 impl Observer for Vec<GapEvent> {

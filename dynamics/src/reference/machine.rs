@@ -22,21 +22,26 @@
 //! and `f+` before and after all mode changes of the instant, and the gradient `n` of the watch.
 
 mod domain;
+mod domains;
 mod events;
 mod flight;
+mod impact;
 mod modes;
 mod motion;
 mod polynomial;
 mod slip;
 mod system;
 mod table;
+mod watch;
 
+pub use domains::System;
 pub use events::{MachineEvent, SlipEvent};
 pub use flight::Flight;
 pub(crate) use flight::Signal;
-pub use motion::{LOWEST_FLIGHT, Motion};
+pub use impact::LOWEST_FLIGHT;
+pub use motion::Motion;
 pub use slip::{Slip, Slips};
-pub use system::System;
+pub use system::Frame;
 pub use table::{Equations, StartModes};
 
 use crate::model::{MOST_HARMONICS, STATE, State};
@@ -44,8 +49,11 @@ use crate::model::{MOST_HARMONICS, STATE, State};
 /// Numbers of a state.
 pub(crate) const SIZE: usize = STATE;
 
-/// Entries of `a`: the state, a pair for each harmonic, and 1.
-pub(crate) const WIDTH: usize = SIZE + 2 * (MOST_HARMONICS + 1) + 1;
+/// Entries of `a`: the state, a pair for each harmonic, and 1; a multiple of four, for products of registers.
+pub(crate) const WIDTH: usize = (SIZE + 2 * (MOST_HARMONICS + 1) + 1).next_multiple_of(4);
+
+/// Rounding error of a sum, relative to the size of its terms.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// A state in the coordinates of the model, `(x1, v1, x2, v2, ...)`, or in those of the flow, `(d1 .. dn, w1 .. wn)`; further numbers are 0.
 pub(crate) type Numbers = State;

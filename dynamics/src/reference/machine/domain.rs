@@ -1,18 +1,24 @@
 //! The linear equations of motion of one combination of modes.
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
+use wide::f64x4;
 
-use super::polynomial::{ORDER, Polynomial, Weights, combine, rest};
+use super::polynomial::{ORDER, Polynomial, Weights, combine, rest, stretched};
 use super::slip::Slip;
-use super::system::System;
-use super::{Numbers, Point, SIZE, WIDTH};
+use super::system::{Element, Frame};
+use super::{Numbers, Point, ROUNDING, SIZE, WIDTH};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 
 /// Taylor radius: the largest product of a step and the rate of its domain.
 const RADIUS: f64 = 1.6;
+
+/// Derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the other end.
+const DERIVATIVES: usize = 16;
+
+/// Order of the root of a function that stays zero: all derivatives are zero within rounding.
+pub(super) const STAYS_ZERO: usize = usize::MAX;
 
 /// A mobility below this share of the unconstrained one is rounding: other constraints already hold the row.
 const NO_MOBILITY: f64 = 1e-12;
@@ -42,14 +48,35 @@ impl DomainKey {
 #[derive(Clone, Debug)]
 pub(super) struct Row(pub(super) Point);
 
+/// Registers of a point.
+const REGISTERS: usize = WIDTH / 4;
+
+fn registers(point: &Point) -> [f64x4; REGISTERS] {
+    std::array::from_fn(|i| f64x4::new(point.as_chunks().0[i]))
+}
+
 impl Row {
+    pub(super) const ZERO: Row = Row([0.0; WIDTH]);
+
     pub(super) fn dot(&self, point: &Point) -> f64 {
-        self.0.iter().zip(point).map(|(a, b)| a * b).sum()
+        self.value_and_size(point)[0]
     }
 
-    /// Returns the sum of the sizes of all terms, which rounding is relative to.
-    pub(super) fn size(&self, point: &Point) -> f64 {
-        self.0.iter().zip(point).map(|(a, b)| (a * b).abs()).sum()
+    /// Returns the value at a point, and the sum of the sizes of all terms, which rounding is relative to.
+    pub(super) fn value_and_size(&self, point: &Point) -> [f64; 2] {
+        let (row, point) = (registers(&self.0), registers(point));
+        let mut sums = [f64x4::ZERO; 2];
+        for i in 0..REGISTERS {
+            let term = row[i] * point[i];
+            sums = [sums[0] + term, sums[1] + term.abs()];
+        }
+        sums.map(f64x4::reduce_add)
+    }
+
+    /// Whether a value at a point is 0 within rounding.
+    pub(super) fn vanishes(&self, point: &Point) -> bool {
+        let [value, size] = self.value_and_size(point);
+        value.abs() <= ROUNDING * size
     }
 
     pub(super) fn scaled(&self, factor: f64) -> Row {
@@ -63,18 +90,14 @@ impl Row {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Coefficients of a coordinate on the longest step: for each entry of the point at its start, a polynomial of the share.
-type Table = Box<[Polynomial]>;
-
 /// A step of a domain. The coordinates are polynomials of the share of the step.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
+    /// The start.
     point: Point,
+    /// The coordinates that have been expanded, which are the first ones.
     pub(super) coordinates: [Polynomial; MOST_COORDINATES],
+    expanded: usize,
     /// Bounds on the changes of the coordinates.
     pub(super) changes: [f64; MOST_COORDINATES],
     /// Duration.
@@ -100,8 +123,9 @@ pub(super) struct Domain {
     pub(super) pushes: [Option<Row>; MOST_GAPS],
     /// Rows of the forces that hold sticking elements. None if other constraints hold the element.
     pub(super) holds: [Option<Row>; MOST_FRICTION],
-    tables: OnceLock<Vec<Table>>,
-    /// Carries tangent vectors over the longest step.
+    /// For each coordinate and each entry of the point at the start of the longest step, a polynomial of the share.
+    tables: OnceLock<Vec<Polynomial>>,
+    /// Carries points over the longest step.
     whole: OnceLock<Carrier>,
 }
 
@@ -110,6 +134,7 @@ impl Default for Path {
         Path {
             point: [0.0; WIDTH],
             coordinates: [[0.0; ORDER + 1]; MOST_COORDINATES],
+            expanded: 0,
             changes: [0.0; MOST_COORDINATES],
             h: 0.0,
         }
@@ -117,7 +142,7 @@ impl Default for Path {
 }
 
 impl Domain {
-    pub(super) fn new(system: &System, key: DomainKey) -> Domain {
+    pub(super) fn new(system: &Frame, key: DomainKey) -> Domain {
         let (n, width) = (system.n, system.width());
         let forces = &system.stages[key.stage];
         let (mut stiffness, mut damping) = (forces.stiffness.clone(), forces.damping.clone());
@@ -155,9 +180,7 @@ impl Domain {
             }
         }
         let row = |matrix: &DMatrix<f64>, i: usize| {
-            let mut row = [0.0; WIDTH];
-            (0..width).for_each(|j| row[j] = matrix[(i, j)]);
-            Row(row)
+            Row(std::array::from_fn(|j| if j < width { matrix[(i, j)] } else { 0.0 }))
         };
         let mut pushes = [const { None }; MOST_GAPS];
         let mut holds = [const { None }; MOST_FRICTION];
@@ -199,9 +222,7 @@ impl Domain {
         let n = self.n;
         let mut rate = [0.0; WIDTH];
         rate[..n].copy_from_slice(&point[n..2 * n]);
-        for (rate, row) in rate[n..].iter_mut().zip(&self.accelerations) {
-            *rate = dot(&row.0[..self.width], &point[..self.width]);
-        }
+        rate[n..].iter_mut().zip(&self.accelerations).for_each(|(rate, row)| *rate = row.dot(point));
         for (k, omega) in self.rates.iter().enumerate() {
             let at = 2 * (n + k);
             (rate[at], rate[at + 1]) = (-omega * point[at + 1], omega * point[at]);
@@ -212,13 +233,16 @@ impl Domain {
     /// Returns the time derivative of a functional along the motion, as a functional.
     pub(super) fn rate_of(&self, row: &Row) -> Row {
         let n = self.n;
-        let mut rate = [0.0; WIDTH];
-        rate[n..2 * n].copy_from_slice(&row.0[..n]);
-        for (acceleration, &factor) in
-            self.accelerations.iter().zip(&row.0[n..]).filter(|(_, factor)| **factor != 0.0)
-        {
-            rate.iter_mut().zip(&acceleration.0).for_each(|(rate, x)| *rate += factor * x);
+        let mut sums = [f64x4::ZERO; REGISTERS];
+        for (acceleration, &factor) in self.accelerations.iter().zip(&row.0[n..]) {
+            if factor != 0.0 {
+                let (terms, factor) = (registers(&acceleration.0), f64x4::splat(factor));
+                (0..REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
+            }
         }
+        let mut rate = [0.0; WIDTH];
+        rate.as_chunks_mut().0.iter_mut().zip(sums).for_each(|(rate, sum)| *rate = sum.to_array());
+        rate[n..2 * n].iter_mut().zip(&row.0).for_each(|(rate, x)| *rate += x);
         for (k, omega) in self.rates.iter().enumerate() {
             let at = 2 * (n + k);
             rate[at] += omega * row.0[at + 1];
@@ -227,58 +251,84 @@ impl Domain {
         Row(rate)
     }
 
+    /// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value; [`STAYS_ZERO`] and
+    /// 0 if there is none.
+    pub(super) fn first_derivative(&self, row: &Row, point: &Point, first: usize) -> (usize, f64) {
+        let value = |row: &Row| {
+            let [value, size] = row.value_and_size(point);
+            (value.abs() > ROUNDING * size).then_some(value)
+        };
+        if first == 0
+            && let Some(value) = value(row)
+        {
+            return (0, value);
+        }
+        let mut rate = self.rate_of(row);
+        for order in 1..first + DERIVATIVES {
+            if order >= first
+                && let Some(value) = value(&rate)
+            {
+                return (order, value);
+            }
+            rate = self.rate_of(&rate);
+        }
+        (STAYS_ZERO, 0.0)
+    }
+
+    /// Returns the lowest order, at least 2, of a derivative of a coordinate that is not 0 within rounding, and its value, as
+    /// [`Domain::first_derivative`].
+    pub(super) fn departure(&self, coordinate: usize, point: &Point) -> (usize, f64) {
+        let (order, value) = self.first_derivative(&self.accelerations[coordinate], point, 0);
+        (order.saturating_add(2), value)
+    }
+
     /// Returns the coefficients of all coordinates on the longest step.
-    fn new_tables(&self) -> Vec<Table> {
-        let table = |i: usize| {
-            let mut table = vec![[0.0; ORDER + 1]; self.width].into_boxed_slice();
+    fn new_tables(&self) -> Vec<Polynomial> {
+        let mut tables = vec![[0.0; ORDER + 1]; self.n * self.width];
+        for (i, table) in tables.chunks_exact_mut(self.width).enumerate() {
             let mut row = self.unit_row(i);
             for k in 0..=ORDER {
                 table.iter_mut().zip(&row.0).for_each(|(column, x)| column[k] = *x);
                 row = self.rate_of(&row).scaled(self.unit / (k + 1) as f64);
             }
-            table
-        };
-        (0..self.n).map(table).collect()
-    }
-
-    fn tables(&self) -> &[Table] {
-        self.tables.get_or_init(|| self.new_tables())
-    }
-
-    /// Follows the motion from a point over a time `h` of at most the longest step.
-    pub(super) fn follow(&self, point: &Point, h: f64, path: &mut Path) {
-        (path.point, path.h) = (*point, h);
-        let part = h / self.unit;
-        for ((coordinate, change), table) in
-            path.coordinates.iter_mut().zip(&mut path.changes).zip(self.tables())
-        {
-            *coordinate = combine(table, &point[..self.width]);
-            if h < self.unit {
-                let mut power = 1.0;
-                for c in coordinate.iter_mut() {
-                    *c *= power;
-                    power *= part;
-                }
-            }
-            *change = rest(coordinate);
         }
+        tables
     }
 
-    /// Returns the state at a share of a step.
-    pub(super) fn state(&self, path: &Path, share: f64) -> Numbers {
+    /// Returns the coefficients of each coordinate on the longest step.
+    fn tables(&self) -> impl Iterator<Item = &[Polynomial]> {
+        self.tables.get_or_init(|| self.new_tables()).chunks_exact(self.width)
+    }
+
+    /// Begins a step over a time `h` of at most the longest step.
+    pub(super) fn begin(&self, point: &Point, h: f64, path: &mut Path) {
+        (path.point, path.h, path.expanded) = (*point, h, 0);
+    }
+
+    /// Expands the first coordinates on a step, as far as that has not been done.
+    pub(super) fn expand(&self, path: &mut Path, count: usize) {
+        let part = path.h / self.unit;
+        for (i, table) in self.tables().enumerate().take(count).skip(path.expanded) {
+            let whole = combine(table, &path.point[..self.width]);
+            path.coordinates[i] = if path.h < self.unit { stretched(&whole, part) } else { whole };
+            path.changes[i] = rest(&path.coordinates[i]);
+        }
+        path.expanded = path.expanded.max(count);
+    }
+
+    /// Sets a state to that at a share of a step, all of whose coordinates are expanded.
+    pub(super) fn set_state(&self, y: &mut [f64], path: &Path, share: f64) {
         let weights = Weights::at(share);
-        let mut y = [0.0; SIZE];
         for (i, coordinate) in path.coordinates.iter().enumerate().take(self.n) {
             let [value, slope] = weights.of(coordinate);
             (y[i], y[self.n + i]) = (value, slope / path.h);
         }
-        y
     }
 
     /// Returns the whole point at a share of a step.
     pub(super) fn point(&self, path: &Path, share: f64) -> Point {
         let mut point = [0.0; WIDTH];
-        point[..SIZE].copy_from_slice(&self.state(path, share));
+        self.set_state(&mut point, path, share);
         for (k, omega) in self.rates.iter().enumerate() {
             let at = 2 * (self.n + k);
             let ([cos, sin], (sin_turn, cos_turn)) =
@@ -318,44 +368,43 @@ impl Domain {
         sum
     }
 
-    /// Returns the images of the unit vectors after a time of at most the longest step. Each has `2 n` entries.
-    pub(super) fn carrier(&self, time: f64) -> Cow<'_, Carrier> {
-        if time == self.unit {
-            Cow::Borrowed(self.whole.get_or_init(|| self.new_carrier(time)))
-        } else {
-            Cow::Owned(self.new_carrier(time))
-        }
+    /// Returns what carries points over the longest step.
+    pub(super) fn whole(&self) -> &Carrier {
+        self.whole.get_or_init(|| {
+            let mut carrier = Carrier::default();
+            self.set_carrier(&mut carrier, self.unit, self.width);
+            carrier
+        })
     }
 
-    fn new_carrier(&self, time: f64) -> Carrier {
+    /// Sets a carrier to the images of the first unit vectors after a time of at most the longest step.
+    pub(super) fn set_carrier(&self, carrier: &mut Carrier, time: f64, count: usize) {
         let (n, weights) = (self.n, Weights::at(time / self.unit));
-        let mut carrier = Carrier([[0.0; SIZE]; SIZE]);
-        for (i, table) in self.tables().iter().enumerate() {
-            for (j, column) in table[..2 * n].iter().enumerate() {
+        carrier.0.clear();
+        carrier.0.resize(count, [0.0; SIZE]);
+        for (i, table) in self.tables().enumerate() {
+            for (image, column) in carrier.0.iter_mut().zip(table) {
                 let [value, slope] = weights.of(column);
-                (carrier.0[j][i], carrier.0[j][n + i]) = (value, slope / self.unit);
+                (image[i], image[n + i]) = (value, slope / self.unit);
             }
         }
-        carrier
     }
 }
 
-/// Carries tangent vectors along a flight: the images of the unit vectors.
-#[derive(Clone, Debug)]
-pub(super) struct Carrier([Numbers; SIZE]);
+/// Carries points or tangent vectors along a flight: the images of unit vectors.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Carrier(Vec<Numbers>);
 
 impl Carrier {
-    /// Returns the image of a tangent vector with `size` entries.
-    pub(super) fn carry(&self, tangent: &Numbers, size: usize) -> Numbers {
-        const PART: usize = 4;
+    /// Returns the state that follows from a point, or from a tangent vector, where the state has `size` entries.
+    pub(super) fn carry(&self, from: &[f64], size: usize) -> Numbers {
         let mut image = [0.0; SIZE];
-        for part in 0..size.div_ceil(PART) {
-            let mut sums = [0.0; PART];
-            for (column, x) in self.0.iter().zip(&tangent[..size]) {
-                let terms = &column[part * PART..][..PART];
-                (0..PART).for_each(|i| sums[i] += x * terms[i]);
+        for (part, image) in image.as_chunks_mut::<4>().0[..size.div_ceil(4)].iter_mut().enumerate() {
+            let mut sum = f64x4::ZERO;
+            for (column, &x) in self.0.iter().zip(from) {
+                sum = f64x4::new(column.as_chunks().0[part]).mul_add(f64x4::splat(x), sum);
             }
-            image[part * PART..][..PART].copy_from_slice(&sums);
+            *image = sum.to_array();
         }
         image
     }
@@ -384,7 +433,7 @@ pub(super) struct Constraints {
 
 impl Constraints {
     /// Collects the constraints of a domain. A row that those before it hold is left out.
-    pub(super) fn new(system: &System, key: DomainKey) -> Constraints {
+    pub(super) fn new(system: &Frame, key: DomainKey) -> Constraints {
         let n = system.n;
         let held = (0..system.gaps()).filter_map(|gap| Some((gap, key.held[gap]?)));
         let of_walls = held.map(|(gap, side)| {
@@ -392,7 +441,7 @@ impl Constraints {
             row[gap] = 1.0;
             (Constraint::Wall(gap, side), row)
         });
-        let sticks = |&(i, _): &(usize, &super::system::Element)| key.slips[i] == Slip::Stick;
+        let sticks = |&(i, _): &(usize, &Element)| key.slips[i] == Slip::Stick;
         let of_elements = system.elements.iter().enumerate().filter(sticks);
         let of_elements = of_elements.map(|(i, element)| (Constraint::Element(i), element.row.clone()));
         Constraints::of(&system.mobility, of_walls.chain(of_elements))

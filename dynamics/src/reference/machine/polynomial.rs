@@ -1,10 +1,16 @@
 //! The first root of a polynomial on a step.
 //!
 //! In Bernstein form, the number of roots in an interval is at most the number of sign changes of the coefficients, and one sign change
-//! means exactly one root (Descartes' rule). Other intervals are halved by de Casteljau's algorithm.
+//! means exactly one root (Descartes' rule). Other intervals are halved by de Casteljau's algorithm. A root at the start is divided out: the
+//! Bernstein coefficients of the quotient have the signs of the later ones of the polynomial.
+
+use wide::{CmpGt, f64x4};
 
 /// Order of the Taylor polynomial of a step. There are four times a whole number of coefficients, for products of registers.
 pub(super) const ORDER: usize = 23;
+
+/// Number of registers that hold the coefficients of a polynomial.
+const REGISTERS: usize = (ORDER + 1) / 4;
 
 /// Coefficients of a polynomial in powers of the share of the step.
 pub(super) type Polynomial = [f64; ORDER + 1];
@@ -14,6 +20,9 @@ const MOST_HALVINGS: u32 = 48;
 
 /// Largest number of steps of the final root search.
 const ROOT_CAP: u32 = 200;
+
+/// Largest order of a root at the start of a step.
+const MOST_ORDER: usize = 18;
 
 /// Rounding error of a coefficient, relative to the sum of all.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -29,78 +38,145 @@ pub(super) enum Fall {
     At(f64),
 }
 
+/// Returns the coefficients in registers.
+fn registers(c: &Polynomial) -> [f64x4; REGISTERS] {
+    std::array::from_fn(|i| f64x4::new(c.as_chunks().0[i]))
+}
+
+fn from_registers(registers: [f64x4; REGISTERS]) -> Polynomial {
+    let mut c = [0.0; ORDER + 1];
+    c.as_chunks_mut().0.iter_mut().zip(registers).for_each(|(c, register)| *c = register.to_array());
+    c
+}
+
 /// Returns the sum of the sizes of all coefficients but the first.
 pub(super) fn rest(c: &Polynomial) -> f64 {
-    let mut sums = [0.0; 4];
-    for c in c.chunks_exact(4) {
-        (0..4).for_each(|i| sums[i] += c[i].abs());
+    let later = registers(c).map(f64x4::abs);
+    let first = later[0] * f64x4::new([0.0, 1.0, 1.0, 1.0]);
+    (first + later[1] + (later[2] + later[3]) + (later[4] + later[5])).reduce_add()
+}
+
+/// Returns the sum of polynomials with given factors.
+pub(super) fn combine(polynomials: &[Polynomial], factors: &[f64]) -> Polynomial {
+    let mut sums = [f64x4::ZERO; REGISTERS];
+    for (polynomial, &factor) in polynomials.iter().zip(factors) {
+        let (terms, factor) = (registers(polynomial), f64x4::splat(factor));
+        (0..REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
     }
-    sums[0] - c[0].abs() + sums[1] + (sums[2] + sums[3])
+    from_registers(sums)
+}
+
+/// Returns a polynomial of the share of a longer step as one of the share of a step that is this `part` of it.
+pub(super) fn stretched(c: &Polynomial, part: f64) -> Polynomial {
+    let (square, fourth) = (part * part, f64x4::splat((part * part) * (part * part)));
+    let mut powers = f64x4::new([1.0, part, square, part * square]);
+    from_registers(registers(c).map(|c| {
+        let stretched = c * powers;
+        powers *= fourth;
+        stretched
+    }))
+}
+
+/// Columns of the triangular matrix that gives Bernstein coefficients: `b_i = sum_j C(i, j) / C(ORDER, j) c_j`.
+static BERNSTEIN: [Polynomial; ORDER + 1] = {
+    let mut columns = [[0.0; ORDER + 1]; ORDER + 1];
+    let mut i = 0;
+    while i <= ORDER {
+        let (mut j, mut entry) = (0, 1.0);
+        while j <= i {
+            columns[j][i] = entry;
+            entry *= (i - j) as f64 / (ORDER - j) as f64;
+            j += 1;
+        }
+        i += 1;
+    }
+    columns
+};
+
+/// Returns the Bernstein coefficients of a polynomial without its first `order` terms.
+pub(super) fn bernstein(c: &Polynomial, order: usize) -> Polynomial {
+    let mut later = *c;
+    later[..order].fill(0.0);
+    let mut sums = [f64x4::ZERO; REGISTERS];
+    // The matrix is triangular: a column begins in the register of its number.
+    for first in 0..REGISTERS {
+        for column in 4 * first..4 * first + 4 {
+            let (terms, factor) = (registers(&BERNSTEIN[column]), f64x4::splat(later[column]));
+            (first..REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
+        }
+    }
+    from_registers(sums)
 }
 
 /// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. An `order`
 /// above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients.
-pub(super) fn first_fall(polynomial: &Polynomial, order: usize, size: f64) -> Fall {
+pub(super) fn first_fall(c: &Polynomial, order: usize, size: f64) -> Fall {
     if order > MOST_ORDER {
         return Fall::None;
     }
-    let c = &polynomial[order..];
-    let rest: f64 = c[1..].iter().map(|c| c.abs()).sum();
-    let noise = ROUNDING * if order == 0 { rest + size } else { rest };
-    if c[0] > rest + noise {
+    let later: f64 = c[order + 1..].iter().map(|c| c.abs()).sum();
+    let noise = ROUNDING * if order == 0 { later + size } else { later };
+    if c[order] > later + noise {
         return Fall::None;
     }
-    if c[0] <= 0.0 {
+    fall(c, &bernstein(c, order), order, noise)
+}
+
+/// Finds the first root of `start - sign (x - x(0))`, where `x` has the coefficients `c`, the sum `rest` of their sizes without the first, and
+/// the Bernstein coefficients `b` without the first term. If the order of a root at the start is 1, `start` is 0.
+pub(super) fn first_fall_of_distance(
+    [c, b]: [&Polynomial; 2],
+    [start, sign]: [f64; 2],
+    order: usize,
+    [rest, size]: [f64; 2],
+) -> Fall {
+    let from = |x: &Polynomial| {
+        let start = f64x4::splat(start);
+        from_registers(registers(x).map(|x| start - x * sign))
+    };
+    let mut distance = from_registers(registers(c).map(|c| c * -sign));
+    distance[0] = start;
+    if order > 1 {
+        return first_fall(&distance, order, size);
+    }
+    let noise = ROUNDING * if order == 0 { rest + size } else { rest };
+    fall(&distance, &from(b), order, noise)
+}
+
+/// Finds the first root of a polynomial, divided by `u^order`, with its Bernstein coefficients.
+fn fall(c: &Polynomial, b: &Polynomial, order: usize, noise: f64) -> Fall {
+    if c[order] <= 0.0 {
         return Fall::At(0.0);
     }
+    let (size, degree) = (ORDER + 1 - order, ORDER - order);
+    let all = (1 << size) - 1;
+    let signs = registers(b).map(|b| b.cmp_gt(f64x4::ZERO).move_mask() as u32);
+    let positive = (0..REGISTERS).fold(0, |positive, i| positive | signs[i] << (4 * i)) >> order;
+    if positive == all {
+        return Fall::None;
+    }
+    // Bernstein coefficients of the quotient.
+    let quotient =
+        |i: usize| (0..order).fold(b[order + i], |b, k| b * ((ORDER - k) as f64 / (order + i - k) as f64));
+    let changes = ((positive ^ positive >> 1) & all >> 1).count_ones();
+    if changes == 1 && positive & 1 == 1 {
+        let i = positive.trailing_ones() as usize;
+        let guess = polygon(i, [quotient(i - 1), quotient(i)], degree);
+        return Fall::At(root(&c[order..], [0.0, 1.0], guess));
+    }
+    let mut quotients = [0.0; ORDER + 1];
+    (0..size).for_each(|i| quotients[i] = quotient(i));
     let mut touches = false;
-    let b = combine(&BERNSTEIN[order], c);
-    match isolate(&b[..c.len()], [0.0, 1.0], noise, 0, &mut touches) {
-        Some((bracket, guess)) => Fall::At(root(c, bracket, guess)),
+    match isolate(&quotients[..size], [0.0, 1.0], noise, 0, &mut touches) {
+        Some((bracket, guess)) => Fall::At(root(&c[order..], bracket, guess)),
         None if touches => Fall::Touches,
         None => Fall::None,
     }
 }
 
-/// Largest order of a root at the start of a step.
-const MOST_ORDER: usize = 18;
-
-/// Columns of the matrices that give the Bernstein coefficients of a polynomial without its first `order` terms:
-/// `b_i = sum_j C(i, j) / C(degree, j) c_j`.
-static BERNSTEIN: [[Polynomial; ORDER + 1]; MOST_ORDER + 1] = {
-    let mut all = [[[0.0; ORDER + 1]; ORDER + 1]; MOST_ORDER + 1];
-    let mut order = 0;
-    while order <= MOST_ORDER {
-        let degree = ORDER - order;
-        let mut i = 0;
-        while i <= degree {
-            let (mut j, mut entry) = (0, 1.0);
-            while j <= i {
-                all[order][j][i] = entry;
-                entry *= (i - j) as f64 / (degree - j) as f64;
-                j += 1;
-            }
-            i += 1;
-        }
-        order += 1;
-    }
-    all
-};
-
-/// Returns the sum of polynomials with given factors.
-pub(super) fn combine(polynomials: &[Polynomial], factors: &[f64]) -> Polynomial {
-    const PART: usize = 8;
-    let mut sum = [0.0; ORDER + 1];
-    // The sums of one part stay in registers.
-    for part in 0..(ORDER + 1) / PART {
-        let mut sums = [0.0; PART];
-        for (polynomial, factor) in polynomials.iter().zip(factors) {
-            let terms = &polynomial[part * PART..][..PART];
-            (0..PART).for_each(|i| sums[i] += factor * terms[i]);
-        }
-        sum[part * PART..][..PART].copy_from_slice(&sums);
-    }
-    sum
+/// Returns where the polygon of the Bernstein coefficients, which is near the function, meets zero in front of the coefficient `i`.
+fn polygon(i: usize, [before, after]: [f64; 2], degree: usize) -> f64 {
+    (i as f64 - after / (after - before)) / degree as f64
 }
 
 /// Returns an interval with the first root only, and a guess of the root.
@@ -117,10 +193,8 @@ fn isolate(
     }
     let changes = b.windows(2).filter(|pair| (pair[0] > 0.0) != (pair[1] > 0.0)).count();
     if changes == 1 && b[0] > 0.0 {
-        // Where the polygon of the coefficients, which is near the function, meets zero.
         let i = b.iter().position(|&b| b <= 0.0).unwrap_or(degree);
-        let place = (i as f64 - b[i] / (b[i] - b[i - 1])) / degree as f64;
-        return Some(([lo, hi], lo + (hi - lo) * place));
+        return Some(([lo, hi], lo + (hi - lo) * polygon(i, [b[i - 1], b[i]], degree)));
     }
     let size = b.iter().fold(0.0f64, |size, b| size.max(b.abs()));
     if depth == MOST_HALVINGS || size <= noise {
@@ -148,44 +222,57 @@ fn halves(b: &[f64]) -> [Polynomial; 2] {
 }
 
 /// Powers of a share, and their derivatives, to evaluate several polynomials there. The first one of each is left out.
-pub(super) struct Weights([Polynomial; 2]);
+pub(super) struct Weights([[f64x4; REGISTERS]; 2]);
 
 impl Weights {
-    pub(super) fn at(share: f64) -> Weights {
-        let mut weights = [[0.0; ORDER + 1]; 2];
-        let [values, slopes] = &mut weights;
-        let mut power = 1.0;
-        for (k, (value, slope)) in values.iter_mut().zip(slopes).enumerate().skip(1) {
-            *slope = if k == 1 { 0.0 } else { k as f64 * power };
-            power *= share;
-            *value = power;
+    pub(super) fn at(u: f64) -> Weights {
+        let (square, fourth) = (u * u, f64x4::splat((u * u) * (u * u)));
+        let powers = f64x4::new([1.0, u, square, u * square]);
+        let (mut values, mut slopes) = ([powers; REGISTERS], [f64x4::ZERO; REGISTERS]);
+        values[0] = powers * f64x4::new([0.0, 1.0, 1.0, 1.0]);
+        slopes[0] = f64x4::new([0.0, 0.0, 2.0 * u, 3.0 * square]);
+        let (mut value, mut slope) = (powers, powers * (u * square));
+        for i in 1..REGISTERS {
+            let k = 4.0 * i as f64;
+            value *= fourth;
+            values[i] = value;
+            slopes[i] = slope * f64x4::new([k, k + 1.0, k + 2.0, k + 3.0]);
+            slope *= fourth;
         }
-        Weights(weights)
+        Weights([values, slopes])
     }
 
     /// Returns value and slope. Four sums run side by side, each from its smallest term on, and the largest term comes last.
     pub(super) fn of(&self, c: &Polynomial) -> [f64; 2] {
+        let terms = registers(c);
         let later = self.0.each_ref().map(|weights| {
-            let mut sums = [0.0; 4];
-            for (c, weights) in c.chunks_exact(4).zip(weights.chunks_exact(4)).rev() {
-                (0..4).for_each(|i| sums[i] += c[i] * weights[i]);
-            }
-            sums[3] + sums[2] + sums[0] + sums[1]
+            let sums = (0..REGISTERS).rev().fold(f64x4::ZERO, |sums, i| terms[i].mul_add(weights[i], sums));
+            sums.reduce_add()
         });
         [c[0] + later[0], c[1] + later[1]]
     }
 }
 
-/// Returns value and slope.
-fn value(c: &[f64], u: f64) -> [f64; 2] {
-    c.iter().rev().fold([0.0, 0.0], |[value, slope], c| [value * u + c, slope * u + value])
+/// Returns value and slope of a polynomial: four polynomials of the fourth power, side by side.
+fn value(c: &[f64x4; REGISTERS], u: f64) -> [f64; 2] {
+    let (square, fourth) = (u * u, f64x4::splat((u * u) * (u * u)));
+    let (mut values, mut slopes) = (c[REGISTERS - 1], f64x4::ZERO);
+    for c in c.iter().rev().skip(1) {
+        slopes = slopes.mul_add(fourth, values);
+        values = values.mul_add(fourth, *c);
+    }
+    let powers = f64x4::new([1.0, u, square, u * square]);
+    let slope = values * f64x4::new([0.0, 1.0, 2.0 * u, 3.0 * square]) + slopes * powers * (4.0 * u * square);
+    [(values * powers).reduce_add(), slope.reduce_add()]
 }
 
 /// Finds the only root in an interval by Newton's method, or by bisection where that leaves the interval.
 fn root(c: &[f64], [mut lo, mut hi]: [f64; 2], guess: f64) -> f64 {
-    let mut u = guess;
+    let (mut padded, mut u) = ([0.0; ORDER + 1], guess);
+    padded[..c.len()].copy_from_slice(c);
+    let c = registers(&padded);
     for _ in 0..ROOT_CAP {
-        let [value, slope] = value(c, u);
+        let [value, slope] = value(&c, u);
         if value > 0.0 {
             lo = u;
         } else {
