@@ -377,34 +377,35 @@ impl Domain {
         })
     }
 
-    /// Sets a carrier to the images of the first unit vectors after a time of at most the longest step.
+    /// Sets a carrier to the changes of the first unit vectors over a time of at most the longest step.
     pub(super) fn set_carrier(&self, carrier: &mut Carrier, time: f64, count: usize) {
         let (n, weights) = (self.n, Weights::at(time / self.unit));
         carrier.0.clear();
         carrier.0.resize(count, [0.0; SIZE]);
         for (i, table) in self.tables().enumerate() {
-            for (image, column) in carrier.0.iter_mut().zip(table) {
-                let [value, slope] = weights.of(column);
-                (image[i], image[n + i]) = (value, slope / self.unit);
+            for (change, column) in carrier.0.iter_mut().zip(table) {
+                let [value, slope] = weights.later(column);
+                (change[i], change[n + i]) = (value, slope / self.unit);
             }
         }
     }
 }
 
-/// Carries points or tangent vectors along a flight: the images of unit vectors.
+/// Carries points or tangent vectors along a flight: the changes of unit vectors.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Carrier(Vec<Numbers>);
 
 impl Carrier {
-    /// Returns the state that follows from a point, or from a tangent vector, where the state has `size` entries.
+    /// Returns the state, with `size` entries, that follows from a point or from a tangent vector. Further entries have no meaning.
     pub(super) fn carry(&self, from: &[f64], size: usize) -> Numbers {
         let mut image = [0.0; SIZE];
-        for (part, image) in image.as_chunks_mut::<4>().0[..size.div_ceil(4)].iter_mut().enumerate() {
-            let mut sum = f64x4::ZERO;
+        let parts = image.as_chunks_mut::<4>().0.iter_mut().zip(from.as_chunks().0).take(size.div_ceil(4));
+        for (part, (image, &start)) in parts.enumerate() {
+            let mut change = f64x4::ZERO;
             for (column, &x) in self.0.iter().zip(from) {
-                sum = f64x4::new(column.as_chunks().0[part]).mul_add(f64x4::splat(x), sum);
+                change = f64x4::new(column.as_chunks().0[part]).mul_add(f64x4::splat(x), change);
             }
-            *image = sum.to_array();
+            *image = (f64x4::new(start) + change).to_array();
         }
         image
     }

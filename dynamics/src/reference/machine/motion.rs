@@ -316,7 +316,7 @@ impl<'s> Motion<'s> {
         let (system, domain, n) = (self.system, self.domain, self.system.n);
         let before = self.point;
         if time == domain.unit {
-            let end = domain.whole().carry(&before[..system.width()], 2 * n);
+            let end = domain.whole().carry(&before, 2 * n);
             self.point[..2 * n].copy_from_slice(&end[..2 * n]);
         } else {
             domain.expand(path, n);

@@ -60,8 +60,8 @@ pub(super) fn rest(c: &Polynomial) -> f64 {
 pub(super) fn combine(polynomials: &[Polynomial], factors: &[f64]) -> Polynomial {
     let mut sums = [f64x4::ZERO; REGISTERS];
     for (polynomial, &factor) in polynomials.iter().zip(factors) {
-        let (terms, factor) = (registers(polynomial), f64x4::splat(factor));
-        (0..REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
+        let (terms, factor) = (polynomial.as_chunks().0, f64x4::splat(factor));
+        (0..REGISTERS).for_each(|i| sums[i] = f64x4::new(terms[i]).mul_add(factor, sums[i]));
     }
     from_registers(sums)
 }
@@ -93,18 +93,29 @@ static BERNSTEIN: [Polynomial; ORDER + 1] = {
     columns
 };
 
-/// Returns the Bernstein coefficients of a polynomial without its first `order` terms.
-pub(super) fn bernstein(c: &Polynomial, order: usize) -> Polynomial {
-    let mut later = *c;
-    later[..order].fill(0.0);
-    let mut sums = [f64x4::ZERO; REGISTERS];
-    // The matrix is triangular: a column begins in the register of its number.
-    for first in 0..REGISTERS {
-        for column in 4 * first..4 * first + 4 {
-            let (terms, factor) = (registers(&BERNSTEIN[column]), f64x4::splat(later[column]));
-            (first..REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
+/// Adds the terms of four columns to Bernstein coefficients. The matrix is triangular: a column begins in the register of its number.
+#[inline(always)]
+fn add_columns<const FIRST: usize>(sums: &mut [f64x4; REGISTERS], c: &Polynomial) {
+    for column in 4 * FIRST..4 * FIRST + 4 {
+        let factor = f64x4::splat(c[column]);
+        for (i, sum) in sums.iter_mut().enumerate() {
+            if i >= FIRST {
+                *sum = f64x4::new(BERNSTEIN[column].as_chunks().0[i]).mul_add(factor, *sum);
+            }
         }
     }
+}
+
+/// Returns the Bernstein coefficients of a polynomial without its first `order` terms.
+pub(super) fn bernstein(c: &Polynomial, order: usize) -> Polynomial {
+    let (mut later, mut sums) = (*c, [f64x4::ZERO; REGISTERS]);
+    later[..order].fill(0.0);
+    add_columns::<0>(&mut sums, &later);
+    add_columns::<1>(&mut sums, &later);
+    add_columns::<2>(&mut sums, &later);
+    add_columns::<3>(&mut sums, &later);
+    add_columns::<4>(&mut sums, &later);
+    add_columns::<5>(&mut sums, &later);
     from_registers(sums)
 }
 
@@ -242,14 +253,19 @@ impl Weights {
         Weights([values, slopes])
     }
 
-    /// Returns value and slope. Four sums run side by side, each from its smallest term on, and the largest term comes last.
+    /// Returns value and slope of a polynomial. The largest term comes last.
     pub(super) fn of(&self, c: &Polynomial) -> [f64; 2] {
+        let [value, slope] = self.later(c);
+        [c[0] + value, c[1] + slope]
+    }
+
+    /// Returns value and slope without their first terms. Four sums run side by side, each from its smallest term on.
+    pub(super) fn later(&self, c: &Polynomial) -> [f64; 2] {
         let terms = registers(c);
-        let later = self.0.each_ref().map(|weights| {
+        self.0.each_ref().map(|weights| {
             let sums = (0..REGISTERS).rev().fold(f64x4::ZERO, |sums, i| terms[i].mul_add(weights[i], sums));
             sums.reduce_add()
-        });
-        [c[0] + later[0], c[1] + later[1]]
+        })
     }
 }
 

@@ -47,7 +47,7 @@ impl Motion<'_> {
         }
         let (domain, size) = (self.domain, 2 * self.system.n);
         let carry = |tangents: &mut [Numbers], carrier: &Carrier| {
-            tangents.iter_mut().for_each(|tangent| *tangent = carrier.carry(&tangent[..size], size));
+            tangents.iter_mut().for_each(|tangent| *tangent = carrier.carry(tangent, size));
         };
         if time == domain.unit {
             carry(&mut self.tangents, domain.whole());
