@@ -24,7 +24,7 @@ pub(super) const STAYS_ZERO: usize = usize::MAX;
 const NO_MOBILITY: f64 = 1e-12;
 
 /// What the linear equations depend on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DomainKey {
     pub(super) stage: usize,
     /// For each gap the number of walls whose springs act: positive on the right, negative on the left.
@@ -32,16 +32,6 @@ pub(super) struct DomainKey {
     /// The rigid wall that each gap rests on.
     pub(super) held: [Option<Side>; MOST_GAPS],
     pub(super) slips: [Slip; MOST_FRICTION],
-}
-
-impl DomainKey {
-    /// Returns a number that no other domain has.
-    pub(super) fn code(&self) -> u32 {
-        let engaged = self.engaged.iter().map(|engaged| (9, (engaged + 4) as u32));
-        let held = self.held.iter().map(|held| (3, held.map_or(0, |side| 1 + side.index() as u32)));
-        let slips = self.slips.iter().map(|&slip| (3, slip as u32));
-        engaged.chain(held).chain(slips).fold(self.stage as u32, |code, (count, digit)| count * code + digit)
-    }
 }
 
 /// A linear functional of a [`Point`].
@@ -64,12 +54,8 @@ impl Row {
 
     /// Returns the value at a point, and the sum of the sizes of all terms, which rounding is relative to.
     pub(super) fn value_and_size(&self, point: &Point) -> [f64; 2] {
-        let (row, point) = (registers(&self.0), registers(point));
-        let mut sums = [f64x4::ZERO; 2];
-        for i in 0..REGISTERS {
-            let term = row[i] * point[i];
-            sums = [sums[0] + term, sums[1] + term.abs()];
-        }
+        let terms = registers(&self.0).into_iter().zip(registers(point)).map(|(row, point)| row * point);
+        let sums = terms.fold([f64x4::ZERO; 2], |[sum, size], term| [sum + term, size + term.abs()]);
         sums.map(f64x4::reduce_add)
     }
 
@@ -413,7 +399,7 @@ impl Carrier {
 
 /// What a row of constraints holds.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Constraint {
+enum Constraint {
     /// A gap on a rigid wall.
     Wall(usize, Side),
     /// A sticking element.
@@ -421,39 +407,28 @@ pub(super) enum Constraint {
 }
 
 /// Constraints on rates: each holds a row of `w` still.
-pub(super) struct Constraints {
-    pub(super) kinds: Vec<Constraint>,
+struct Constraints {
+    kinds: Vec<Constraint>,
     /// The rows, and their products with the mobility.
     rows: DMatrix<f64>,
     moves: DMatrix<f64>,
     /// Inverse of `rows mobility rows^T`.
     inverse: DMatrix<f64>,
     /// Changes of `w` by unit impulses, in the directions that are still free.
-    pub(super) mobility: DMatrix<f64>,
+    mobility: DMatrix<f64>,
 }
 
 impl Constraints {
     /// Collects the constraints of a domain. A row that those before it hold is left out.
-    pub(super) fn new(system: &Frame, key: DomainKey) -> Constraints {
-        let n = system.n;
-        let held = (0..system.gaps()).filter_map(|gap| Some((gap, key.held[gap]?)));
-        let of_walls = held.map(|(gap, side)| {
-            let mut row = DVector::zeros(n);
-            row[gap] = 1.0;
-            (Constraint::Wall(gap, side), row)
-        });
+    fn new(system: &Frame, key: DomainKey) -> Constraints {
+        let (n, mobility) = (system.n, &system.mobility);
+        let unit = |gap: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == gap)));
+        let on_wall = |gap: usize| Some((Constraint::Wall(gap, key.held[gap]?), unit(gap)));
         let sticks = |&(i, _): &(usize, &Element)| key.slips[i] == Slip::Stick;
-        let of_elements = system.elements.iter().enumerate().filter(sticks);
-        let of_elements = of_elements.map(|(i, element)| (Constraint::Element(i), element.row.clone()));
-        Constraints::of(&system.mobility, of_walls.chain(of_elements))
-    }
-
-    pub(super) fn of(
-        mobility: &DMatrix<f64>,
-        rows: impl IntoIterator<Item = (Constraint, DVector<f64>)>,
-    ) -> Constraints {
+        let of_element = |(i, element): (usize, &Element)| (Constraint::Element(i), element.row.clone());
+        let of_elements = system.elements.iter().enumerate().filter(sticks).map(of_element);
         let (mut left, mut kinds, mut kept) = (mobility.clone(), Vec::new(), Vec::new());
-        for (kind, row) in rows {
+        for (kind, row) in (0..system.gaps()).filter_map(on_wall).chain(of_elements) {
             let along = &left * &row;
             let free = along.dot(&row);
             if free > NO_MOBILITY * (mobility * &row).dot(&row) {
@@ -462,7 +437,6 @@ impl Constraints {
                 kept.push(row);
             }
         }
-        let n = mobility.nrows();
         let rows = DMatrix::from_fn(kept.len(), n, |i, j| kept[i][j]);
         let moves = mobility * rows.transpose();
         let inverse =

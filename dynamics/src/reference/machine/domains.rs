@@ -3,21 +3,19 @@
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
-use super::domain::Domain;
+use super::domain::{Domain, DomainKey};
 use super::modes::{AtRest, GapMode, Modes, signed};
 use super::slip::Slip;
 use super::system::Frame;
 use super::{Point, ROUNDING};
-use crate::model::Machine;
-
-/// Lists of domains. A motion searches one of them.
-const LISTS: usize = 16;
+use crate::model::{MOST_STAGES, Machine};
 
 /// A machine, prepared for its motions. They share the domains that they have met.
 #[derive(Clone, Debug)]
 pub struct System {
     frame: Frame,
-    domains: Arc<[Domains; LISTS]>,
+    /// A list for each stage.
+    domains: Arc<[Domains; MOST_STAGES]>,
 }
 
 /// A list of domains, which grows at its end. To search it takes no lock.
@@ -25,7 +23,7 @@ type Domains = OnceLock<Box<Met>>;
 
 #[derive(Debug)]
 struct Met {
-    code: u32,
+    key: DomainKey,
     domain: Domain,
     next: Domains,
 }
@@ -47,12 +45,11 @@ impl System {
     /// Returns the domain of a combination of modes, and builds it if it is the first time.
     pub(super) fn domain(&self, modes: &Modes) -> &Domain {
         let key = modes.key(self);
-        let code = key.code();
-        let mut place = &self.domains[code as usize % LISTS];
+        let mut place = &self.domains[key.stage];
         loop {
-            let build = || Box::new(Met { code, domain: Domain::new(self, key), next: OnceLock::new() });
+            let build = || Box::new(Met { key, domain: Domain::new(self, key), next: OnceLock::new() });
             let met = place.get_or_init(build);
-            if met.code == code {
+            if met.key == key {
                 return &met.domain;
             }
             place = &met.next;

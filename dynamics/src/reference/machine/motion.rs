@@ -273,7 +273,7 @@ impl<'s> Motion<'s> {
         if self.work.steps > self.allowance.steps || self.steps_in_period > STEPS_PER_PERIOD_CAP {
             return Err(Stop::TooStiff);
         }
-        let (system, domain, remaining) = (self.system, self.domain, self.clock.remaining(self.goal));
+        let (system, domain, remaining) = (self.system, self.refresh(), self.clock.remaining(self.goal));
         let h = domain.unit.min(remaining);
         let (mut path, mut watches) =
             (self.path.take().unwrap_or_default(), std::mem::take(&mut self.watches));
@@ -359,7 +359,6 @@ impl<'s> Motion<'s> {
         if let Some(before) = before {
             observer.machine_loss(before - energy(self));
         }
-        self.refresh();
         if let Some((row, field)) = linearised {
             self.saltate(watch, &row, &field);
         }

@@ -34,11 +34,10 @@ impl Motion<'_> {
                 self.roots.at_wall[gap] = None;
             }
             Watch::Leaves(gap, side) if self.modes.gaps[gap] == GapMode::Open(side) => {
+                self.modes.gaps[gap] = self.system.before_last(gap, side);
                 if side.sign() * self.rate(gap) < 0.0 {
-                    self.modes.gaps[gap] = self.system.before_last(gap, side);
                     self.leave(gap, side);
                 } else {
-                    self.modes.gaps[gap] = self.system.before_last(gap, side);
                     self.reach(gap, side, observer);
                 }
             }
@@ -49,11 +48,9 @@ impl Motion<'_> {
             Watch::ForceEnds(gap, side) => {
                 self.end_contact(gap, side, observer);
                 self.modes.gaps[gap] = GapMode::Open(side);
-                self.note_root_of_force(gap, side);
+                self.roots.from_force[gap] = self.derivative_of_force(gap, side, 1).0;
             }
-            Watch::ForceBegins(gap, side) => {
-                self.begin_force(gap, side, observer);
-            }
+            Watch::ForceBegins(gap, side) => self.begin_force(gap, side, observer),
             Watch::PushEnds(gap, side) => {
                 self.end_contact(gap, side, observer);
                 self.roots.at_wall[gap] = Some((side, RELEASE_ORDER));
@@ -73,16 +70,11 @@ impl Motion<'_> {
         }
     }
 
-    /// Begins contact with a wall that only pushes.
+    /// Begins contact with a wall that only pushes, whose force is 0 now.
     pub(super) fn begin_force(&mut self, gap: usize, side: Side, observer: &mut dyn Observer) {
         let count = self.system.walls(gap, side).len();
         self.record(gap, EventKind::MeshStart, side, count - 1, Some(side), observer);
         self.modes.gaps[gap] = GapMode::Beyond(signed(side, count));
-        self.note_root_of_force(gap, side);
-    }
-
-    /// Notes the order of the root of a pushing wall's force, which is 0 now.
-    fn note_root_of_force(&mut self, gap: usize, side: Side) {
         self.roots.from_force[gap] = self.derivative_of_force(gap, side, 1).0;
     }
 

@@ -80,7 +80,6 @@ impl<'s> Motion<'s> {
         started.has_slid = self.modes.slips.map(|slip| slip != Slip::Stick);
         started.roots.from_rate = [0; MOST_FRICTION];
         system.hold(&started.modes, &mut started.point, false);
-        started.refresh();
         started.set_tangents(tangents);
         started
     }
@@ -149,6 +148,5 @@ impl<'s> Motion<'s> {
                 self.leave(gap, side);
             }
         }
-        self.refresh();
     }
 }

@@ -77,7 +77,7 @@ impl Motion<'_> {
         };
         let rate = row.dot(field);
         let least = if watch.is_distance() { NO_SPEED * self.system.speed } else { 0.0 };
-        let next = self.domain.derivative(&self.point);
+        let next = self.refresh().derivative(&self.point);
         let carried = jump(field);
         let mut change: Numbers = std::array::from_fn(|i| if i < 2 * n { next[i] - carried[i] } else { 0.0 });
         if rate.abs() <= least {
