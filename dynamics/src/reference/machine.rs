@@ -21,6 +21,7 @@
 //! An event multiplies tangent vectors by `S = R + (f+ - R f-) n^T / (n . f-)`, with the derivative `R` of the jump, the vector fields `f-`
 //! and `f+` before and after all mode changes of the instant, and the gradient `n` of the watch.
 
+mod constraints;
 mod domain;
 mod domains;
 mod events;

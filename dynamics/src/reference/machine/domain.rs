@@ -2,12 +2,13 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use wide::f64x4;
 
+use super::constraints::{Constraint, Constraints, NO_MOBILITY};
 use super::polynomial::{ORDER, Polynomial, Weights, combine, rest, stretched};
 use super::slip::Slip;
-use super::system::{Element, Frame};
+use super::system::Frame;
 use super::{Numbers, Point, ROUNDING, SIZE, WIDTH};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 
@@ -19,9 +20,6 @@ const DERIVATIVES: usize = 16;
 
 /// Order of the root of a function that stays zero: all derivatives are zero within rounding.
 pub(super) const STAYS_ZERO: usize = usize::MAX;
-
-/// A mobility below this share of the unconstrained one is rounding: other constraints already hold the row.
-const NO_MOBILITY: f64 = 1e-12;
 
 /// What the linear equations depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,7 +152,7 @@ impl Domain {
             rows.set_column(2 * (n + k) + 1, sin);
         }
         rows.set_column(width - 1, &load);
-        let constraints = Constraints::new(system, key);
+        let constraints = Constraints::new(system, &key.held, &key.slips);
         let free = &system.mobility * rows;
         let multipliers = &constraints.inverse * (&constraints.rows * &free);
         let mut bound = &free - &constraints.moves * &multipliers;
@@ -394,53 +392,5 @@ impl Carrier {
             *image = (f64x4::new(start) + change).to_array();
         }
         image
-    }
-}
-
-/// What a row of constraints holds.
-#[derive(Clone, Copy, Debug)]
-enum Constraint {
-    /// A gap on a rigid wall.
-    Wall(usize, Side),
-    /// A sticking element.
-    Element(usize),
-}
-
-/// Constraints on rates: each holds a row of `w` still.
-struct Constraints {
-    kinds: Vec<Constraint>,
-    /// The rows, and their products with the mobility.
-    rows: DMatrix<f64>,
-    moves: DMatrix<f64>,
-    /// Inverse of `rows mobility rows^T`.
-    inverse: DMatrix<f64>,
-    /// Changes of `w` by unit impulses, in the directions that are still free.
-    mobility: DMatrix<f64>,
-}
-
-impl Constraints {
-    /// Collects the constraints of a domain. A row that those before it hold is left out.
-    fn new(system: &Frame, key: DomainKey) -> Constraints {
-        let (n, mobility) = (system.n, &system.mobility);
-        let unit = |gap: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == gap)));
-        let on_wall = |gap: usize| Some((Constraint::Wall(gap, key.held[gap]?), unit(gap)));
-        let sticks = |&(i, _): &(usize, &Element)| key.slips[i] == Slip::Stick;
-        let of_element = |(i, element): (usize, &Element)| (Constraint::Element(i), element.row.clone());
-        let of_elements = system.elements.iter().enumerate().filter(sticks).map(of_element);
-        let (mut left, mut kinds, mut kept) = (mobility.clone(), Vec::new(), Vec::new());
-        for (kind, row) in (0..system.gaps()).filter_map(on_wall).chain(of_elements) {
-            let along = &left * &row;
-            let free = along.dot(&row);
-            if free > NO_MOBILITY * (mobility * &row).dot(&row) {
-                left -= &along * along.transpose() / free;
-                kinds.push(kind);
-                kept.push(row);
-            }
-        }
-        let rows = DMatrix::from_fn(kept.len(), n, |i, j| kept[i][j]);
-        let moves = mobility * rows.transpose();
-        let inverse =
-            (&rows * &moves).try_inverse().unwrap_or_else(|| DMatrix::zeros(kept.len(), kept.len()));
-        Constraints { kinds, rows, moves, inverse, mobility: left }
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
 use super::domain::{Domain, DomainKey};
-use super::modes::{AtRest, GapMode, Modes, signed};
+use super::modes::{AtRest, GapMode, Modes};
 use super::slip::Slip;
 use super::system::Frame;
 use super::{Point, ROUNDING};
@@ -93,7 +93,7 @@ impl System {
                 }
                 for (gap, side) in gaps() {
                     let is_held = number % 2 == 0;
-                    let free = GapMode::Beyond(signed(side, self.passable(gap, side)));
+                    let free = self.before_last(gap, side);
                     tried.gaps[gap] = if is_held { GapMode::Stuck(side) } else { free };
                     number /= 2;
                 }

@@ -70,6 +70,7 @@ impl<'s> Motion<'s> {
     pub fn system(&self) -> &'s System {
         self.system
     }
+
     /// Returns the number of completed forcing periods.
     pub fn period(&self) -> u64 {
         self.period
@@ -133,6 +134,7 @@ impl<'s> Motion<'s> {
         self.law = law;
         self
     }
+
     /// Sets the work that the motion may take from here on.
     pub fn allowing(mut self, allowance: Allowance<'s>) -> Self {
         self.allowance = Allowance {

@@ -119,66 +119,45 @@ pub(super) fn bernstein(c: &Polynomial, order: usize) -> Polynomial {
     from_registers(sums)
 }
 
+/// Returns the coefficients of `start - sign x`, in powers or in Bernstein form, from those of a polynomial `x` with or without its first term.
+pub(super) fn distance(x: &Polynomial, [start, sign]: [f64; 2], is_bernstein: bool) -> Polynomial {
+    let start_of_all = f64x4::splat(if is_bernstein { start } else { 0.0 });
+    let mut distance = from_registers(registers(x).map(|x| start_of_all - x * sign));
+    distance[0] = start;
+    distance
+}
+
 /// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. An `order`
-/// above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients.
-pub(super) fn first_fall(c: &Polynomial, order: usize, size: f64) -> Fall {
+/// above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients. The Bernstein
+/// coefficients `b` are computed if they are not known, or if the order is above 1.
+pub(super) fn first_fall(c: &Polynomial, b: Option<Polynomial>, order: usize, size: f64) -> Fall {
     if order > MOST_ORDER {
         return Fall::None;
     }
-    let later: f64 = c[order + 1..].iter().map(|c| c.abs()).sum();
-    let noise = ROUNDING * if order == 0 { later + size } else { later };
-    if c[order] > later + noise {
-        return Fall::None;
-    }
-    fall(c, &bernstein(c, order), order, noise)
-}
-
-/// Finds the first root of `start - sign (x - x(0))`, where `x` has the coefficients `c`, the sum `rest` of their sizes without the first, and
-/// the Bernstein coefficients `b` without the first term. If the order of a root at the start is 1, `start` is 0.
-pub(super) fn first_fall_of_distance(
-    [c, b]: [&Polynomial; 2],
-    [start, sign]: [f64; 2],
-    order: usize,
-    [rest, size]: [f64; 2],
-) -> Fall {
-    let from = |x: &Polynomial| {
-        let start = f64x4::splat(start);
-        from_registers(registers(x).map(|x| start - x * sign))
-    };
-    let mut distance = from_registers(registers(c).map(|c| c * -sign));
-    distance[0] = start;
-    if order > 1 {
-        return first_fall(&distance, order, size);
-    }
-    let noise = ROUNDING * if order == 0 { rest + size } else { rest };
-    fall(&distance, &from(b), order, noise)
-}
-
-/// Finds the first root of a polynomial, divided by `u^order`, with its Bernstein coefficients.
-fn fall(c: &Polynomial, b: &Polynomial, order: usize, noise: f64) -> Fall {
     if c[order] <= 0.0 {
         return Fall::At(0.0);
     }
-    let (size, degree) = (ORDER + 1 - order, ORDER - order);
-    let all = (1 << size) - 1;
-    let signs = registers(b).map(|b| b.cmp_gt(f64x4::ZERO).move_mask() as u32);
+    let b = b.filter(|_| order <= 1).unwrap_or_else(|| bernstein(c, order));
+    let (count, degree) = (ORDER + 1 - order, ORDER - order);
+    let signs = registers(&b).map(|b| b.cmp_gt(f64x4::ZERO).move_mask() as u32);
     let positive = (0..REGISTERS).fold(0, |positive, i| positive | signs[i] << (4 * i)) >> order;
+    let all = (1 << count) - 1;
     if positive == all {
         return Fall::None;
     }
+    let noise = ROUNDING * if order == 0 { rest(c) + size } else { rest(c) };
     // Bernstein coefficients of the quotient.
     let quotient =
         |i: usize| (0..order).fold(b[order + i], |b, k| b * ((ORDER - k) as f64 / (order + i - k) as f64));
-    let changes = ((positive ^ positive >> 1) & all >> 1).count_ones();
-    if changes == 1 && positive & 1 == 1 {
-        let i = positive.trailing_ones() as usize;
-        let guess = polygon(i, [quotient(i - 1), quotient(i)], degree);
-        return Fall::At(root(&c[order..], [0.0, 1.0], guess));
-    }
-    let mut quotients = [0.0; ORDER + 1];
-    (0..size).for_each(|i| quotients[i] = quotient(i));
     let mut touches = false;
-    match isolate(&quotients[..size], [0.0, 1.0], noise, 0, &mut touches) {
+    let isolated = if ((positive ^ positive >> 1) & all >> 1).count_ones() == 1 && positive & 1 == 1 {
+        let i = positive.trailing_ones() as usize;
+        Some(([0.0, 1.0], polygon(i, [quotient(i - 1), quotient(i)], degree)))
+    } else {
+        let quotients: Polynomial = std::array::from_fn(|i| if i < count { quotient(i) } else { 0.0 });
+        isolate(&quotients[..count], [0.0, 1.0], noise, 0, &mut touches)
+    };
+    match isolated {
         Some((bracket, guess)) => Fall::At(root(&c[order..], bracket, guess)),
         None if touches => Fall::Touches,
         None => Fall::None,
@@ -269,26 +248,12 @@ impl Weights {
     }
 }
 
-/// Returns value and slope of a polynomial: four polynomials of the fourth power, side by side.
-fn value(c: &[f64x4; REGISTERS], u: f64) -> [f64; 2] {
-    let (square, fourth) = (u * u, f64x4::splat((u * u) * (u * u)));
-    let (mut values, mut slopes) = (c[REGISTERS - 1], f64x4::ZERO);
-    for c in c.iter().rev().skip(1) {
-        slopes = slopes.mul_add(fourth, values);
-        values = values.mul_add(fourth, *c);
-    }
-    let powers = f64x4::new([1.0, u, square, u * square]);
-    let slope = values * f64x4::new([0.0, 1.0, 2.0 * u, 3.0 * square]) + slopes * powers * (4.0 * u * square);
-    [(values * powers).reduce_add(), slope.reduce_add()]
-}
-
 /// Finds the only root in an interval by Newton's method, or by bisection where that leaves the interval.
 fn root(c: &[f64], [mut lo, mut hi]: [f64; 2], guess: f64) -> f64 {
     let (mut padded, mut u) = ([0.0; ORDER + 1], guess);
     padded[..c.len()].copy_from_slice(c);
-    let c = registers(&padded);
     for _ in 0..ROOT_CAP {
-        let [value, slope] = value(&c, u);
+        let [value, slope] = Weights::at(u).of(&padded);
         if value > 0.0 {
             lo = u;
         } else {
@@ -324,7 +289,7 @@ mod tests {
         let cases: [&[f64]; 5] =
             [&[0.3], &[1e-9, 0.5], &[0.5, 0.5 + 1e-6], &[0.2, 0.3, 0.4, 0.9], &[0.999_999]];
         for roots in cases {
-            let Fall::At(found) = first_fall(&with_roots(roots), 0, 0.0) else {
+            let Fall::At(found) = first_fall(&with_roots(roots), None, 0, 0.0) else {
                 panic!("no root of {roots:?}")
             };
             let error = (found - roots[0]).abs() / roots[0];
@@ -332,7 +297,7 @@ mod tests {
             assert!(error < conditioned, "{roots:?}: {found}, {error:e}");
         }
         for roots in [&[1.1][..], &[2.0, 3.0], &[]] {
-            assert_eq!(first_fall(&with_roots(roots), 0, 0.0), Fall::None);
+            assert_eq!(first_fall(&with_roots(roots), None, 0, 0.0), Fall::None);
         }
     }
 
@@ -342,18 +307,18 @@ mod tests {
         for lift in [1e-3, 1e-9, 1e-13] {
             let mut c = with_roots(&[0.4, 0.4]);
             c[0] += lift;
-            assert_eq!(first_fall(&c, 0, 0.0), Fall::None, "{lift:e}");
+            assert_eq!(first_fall(&c, None, 0, 0.0), Fall::None, "{lift:e}");
         }
-        assert_eq!(first_fall(&with_roots(&[0.4, 0.4]), 0, 0.0), Fall::Touches);
+        assert_eq!(first_fall(&with_roots(&[0.4, 0.4]), None, 0, 0.0), Fall::Touches);
     }
 
     #[test]
     fn a_root_at_the_start_is_divided_out() {
         let mut c = [0.0; ORDER + 1];
         (c[1], c[2]) = (1e-20, -1e-20 / 0.25);
-        let Fall::At(found) = first_fall(&c, 1, 1.0) else { panic!("no root") };
+        let Fall::At(found) = first_fall(&c, None, 1, 1.0) else { panic!("no root") };
         assert!((found - 0.25).abs() < 1e-15);
         (c[1], c[2]) = (-1.0, 3.0);
-        assert_eq!(first_fall(&c, 1, 0.0), Fall::At(0.0));
+        assert_eq!(first_fall(&c, None, 1, 0.0), Fall::At(0.0));
     }
 }

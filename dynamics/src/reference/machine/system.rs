@@ -171,12 +171,6 @@ impl Frame {
         &self.machine.gaps[gap].walls[side.index()]
     }
 
-    /// Returns the number of walls of a side behind which motion continues.
-    pub(super) fn passable(&self, gap: usize, side: Side) -> usize {
-        let walls = self.walls(gap, side);
-        walls.iter().filter(|wall| wall.contact.is_elastic()).count()
-    }
-
     /// Returns the last wall of a side on which there is one.
     pub(super) fn last_wall(&self, gap: usize, side: Side) -> &Wall {
         self.walls(gap, side).last().expect("there is a wall on this side")

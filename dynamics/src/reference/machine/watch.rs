@@ -2,7 +2,7 @@
 
 use super::domain::{Domain, Path, Row};
 use super::modes::{GapMode, Modes};
-use super::polynomial::{Fall, Polynomial, bernstein, first_fall, first_fall_of_distance};
+use super::polynomial::{Fall, Polynomial, bernstein, distance, first_fall};
 use super::slip::Slip;
 use super::system::Frame;
 use super::{Point, ROUNDING};
@@ -198,7 +198,7 @@ impl<'a> Moment<'a> {
         let Some((gap, at, direction)) = self.distance(watch) else {
             let row = self.function(watch);
             let [_, size] = row.value_and_size(self.point);
-            return first_fall(&self.domain.along(&row, path), self.order(watch, &row), size);
+            return first_fall(&self.domain.along(&row, path), None, self.order(watch, &row), size);
         };
         let order = match self.roots.at_wall[gap] {
             Some((side, order)) if side == direction => order,
@@ -206,8 +206,8 @@ impl<'a> Moment<'a> {
         };
         let (sign, change) = (direction.sign(), path.changes[gap]);
         let size = at.abs() + self.point[gap].abs();
-        let distance = sign * (at - self.point[gap]);
-        if order == 0 && distance > change + ROUNDING * (change + size) {
+        let start = if order == 0 { sign * (at - self.point[gap]) } else { 0.0 };
+        if order == 0 && start > change + ROUNDING * (change + size) {
             return Fall::None;
         }
         let coordinate = &path.coordinates[gap];
@@ -215,8 +215,9 @@ impl<'a> Moment<'a> {
             Some(known) if known.0 == gap => known,
             _ => latest.insert((gap, bernstein(coordinate, 1))),
         };
-        let start = if order == 0 { distance } else { 0.0 };
-        first_fall_of_distance([coordinate, coefficients], [start, sign], order, [change, size])
+        let [c, b] = [(coordinate, false), (&*coefficients, true)]
+            .map(|(of, is_bernstein)| distance(of, [start, sign], is_bernstein));
+        first_fall(&c, Some(b), order, size)
     }
 
     /// Whether it does not matter that a function touches zero within rounding. At an elastic wall without a preload the linearisation is
