@@ -119,14 +119,6 @@ pub(super) fn bernstein(c: &Polynomial, order: usize) -> Polynomial {
     from_registers(sums)
 }
 
-/// Returns the coefficients of `start - sign x`, in powers or in Bernstein form, from those of a polynomial `x` with or without its first term.
-pub(super) fn distance(x: &Polynomial, [start, sign]: [f64; 2], is_bernstein: bool) -> Polynomial {
-    let start_of_all = f64x4::splat(if is_bernstein { start } else { 0.0 });
-    let mut distance = from_registers(registers(x).map(|x| start_of_all - x * sign));
-    distance[0] = start;
-    distance
-}
-
 /// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. An `order`
 /// above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients. The Bernstein
 /// coefficients `b` are computed if they are not known, or if the order is above 1.

@@ -2,7 +2,7 @@
 
 use super::domain::{Domain, Path, Row};
 use super::modes::{GapMode, Modes};
-use super::polynomial::{Fall, Polynomial, bernstein, distance, first_fall};
+use super::polynomial::{Fall, Polynomial, bernstein, first_fall};
 use super::slip::Slip;
 use super::system::Frame;
 use super::{Point, ROUNDING};
@@ -215,8 +215,8 @@ impl<'a> Moment<'a> {
             Some(known) if known.0 == gap => known,
             _ => latest.insert((gap, bernstein(coordinate, 1))),
         };
-        let [c, b] = [(coordinate, false), (&*coefficients, true)]
-            .map(|(of, is_bernstein)| distance(of, [start, sign], is_bernstein));
+        let (mut c, b) = (coordinate.map(|c| -sign * c), coefficients.map(|b| start - sign * b));
+        c[0] = start;
         first_fall(&c, Some(b), order, size)
     }
 
