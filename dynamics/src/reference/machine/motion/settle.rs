@@ -132,12 +132,13 @@ impl Motion<'_> {
             let (domain, pushed) = (self.domain, self.system.pushed(&self.modes, gap));
             let mode = self.modes.gaps[gap];
             match mode {
-                GapMode::Onset(side) if !self.moment().is_kept(gap) => {
-                    if side.sign() * domain.departure(gap, &self.point).1 <= 0.0 {
-                        self.end_contact(gap, side, observer);
-                        self.roots.at_wall[gap] = self.roots.at_wall[gap].map(|_| (side, 1));
-                        return true;
-                    }
+                GapMode::Onset(side)
+                    if !self.moment().is_kept(gap)
+                        && side.sign() * domain.departure(gap, &self.point).1 <= 0.0 =>
+                {
+                    self.end_contact(gap, side, observer);
+                    self.roots.at_wall[gap] = self.roots.at_wall[gap].map(|_| (side, 1));
+                    return true;
                 }
                 GapMode::Open(side) if self.derivative_of_force(gap, side, 0).1 > 0.0 => {
                     self.begin_force(gap, side, observer);
