@@ -1,4 +1,4 @@
-//! The motion of a [`Oscillator`](crate::model::Oscillator): any number of coordinates and gaps, and dry friction.
+//! The motion of a [`Oscillator`](crate::model::Oscillator) as a machine: any number of coordinates and gaps, and dry friction.
 //!
 //! # Elements and domains
 //!
@@ -21,16 +21,22 @@
 //! An event multiplies tangent vectors by `S = R + (f+ - R f-) n^T / (n . f-)`, with the derivative `R` of the jump, the vector fields `f-`
 //! and `f+` before and after all mode changes of the instant, and the gradient `n` of the watch.
 
+mod constraints;
 mod domain;
+mod domains;
 mod flight;
+mod impact;
 mod modes;
 mod motion;
 mod polynomial;
 mod system;
 mod table;
+mod watch;
 
-pub use motion::{LOWEST_FLIGHT, Motion};
-pub use system::System;
+pub use domains::System;
+pub use impact::LOWEST_FLIGHT;
+pub use motion::Motion;
+pub use system::Frame;
 pub use table::{Equations, StartModes};
 
 use crate::model::{MOST_HARMONICS, STATE, State};
@@ -38,8 +44,11 @@ use crate::model::{MOST_HARMONICS, STATE, State};
 /// Numbers of a state.
 pub(crate) const SIZE: usize = STATE;
 
-/// Entries of `a`: the state, a pair for each harmonic, and 1.
-pub(crate) const WIDTH: usize = SIZE + 2 * (MOST_HARMONICS + 1) + 1;
+/// Entries of `a`: the state, a pair for each harmonic, and 1; a multiple of four, for products of registers.
+pub(crate) const WIDTH: usize = (SIZE + 2 * (MOST_HARMONICS + 1) + 1).next_multiple_of(4);
+
+/// Rounding error of a sum, relative to the size of its terms.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// A state in the coordinates of the model, `(x1, v1, x2, v2, ...)`, or in those of the flow, `(d1 .. dn, w1 .. wn)`; further numbers are 0.
 pub(crate) type Numbers = State;

@@ -1,24 +1,28 @@
 //! The linear equations of motion of one combination of modes.
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
+use wide::f64x4;
 
-use super::polynomial::{ORDER, Polynomial, Weights, combine, rest};
-use super::system::System;
-use super::{Numbers, Point, SIZE, WIDTH};
+use super::constraints::{Constraint, Constraints, NO_MOBILITY};
+use super::polynomial::{ORDER, Polynomial, Weights, combine, rest, stretched};
+use super::system::Frame;
+use super::{Numbers, Point, ROUNDING, SIZE, WIDTH};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
 
 /// Taylor radius: the largest product of a step and the rate of its domain.
 const RADIUS: f64 = 1.6;
 
-/// A mobility below this share of the unconstrained one is rounding: other constraints already hold the row.
-const NO_MOBILITY: f64 = 1e-12;
+/// Derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the other end.
+const DERIVATIVES: usize = 16;
+
+/// Order of the root of a function that stays zero: all derivatives are zero within rounding.
+pub(super) const STAYS_ZERO: usize = usize::MAX;
 
 /// What the linear equations depend on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DomainKey {
     pub(super) stage: usize,
     /// For each gap the number of walls whose springs act: positive on the right, negative on the left.
@@ -28,28 +32,35 @@ pub(super) struct DomainKey {
     pub(super) slips: [Slip; MOST_FRICTION],
 }
 
-impl DomainKey {
-    /// Returns a number that no other domain has.
-    pub(super) fn code(&self) -> u32 {
-        let engaged = self.engaged.iter().map(|engaged| (9, (engaged + 4) as u32));
-        let held = self.held.iter().map(|held| (3, held.map_or(0, |side| 1 + side.index() as u32)));
-        let slips = self.slips.iter().map(|&slip| (3, slip as u32));
-        engaged.chain(held).chain(slips).fold(self.stage as u32, |code, (count, digit)| count * code + digit)
-    }
-}
-
 /// A linear functional of a [`Point`].
 #[derive(Clone, Debug)]
 pub(super) struct Row(pub(super) Point);
 
+/// Registers of a point.
+const REGISTERS: usize = WIDTH / 4;
+
+fn registers(point: &Point) -> [f64x4; REGISTERS] {
+    std::array::from_fn(|i| f64x4::new(point.as_chunks().0[i]))
+}
+
 impl Row {
+    pub(super) const ZERO: Row = Row([0.0; WIDTH]);
+
     pub(super) fn dot(&self, point: &Point) -> f64 {
-        self.0.iter().zip(point).map(|(a, b)| a * b).sum()
+        self.value_and_size(point)[0]
     }
 
-    /// Returns the sum of the sizes of all terms, which rounding is relative to.
-    pub(super) fn size(&self, point: &Point) -> f64 {
-        self.0.iter().zip(point).map(|(a, b)| (a * b).abs()).sum()
+    /// Returns the value at a point, and the sum of the sizes of all terms, which rounding is relative to.
+    pub(super) fn value_and_size(&self, point: &Point) -> [f64; 2] {
+        let terms = registers(&self.0).into_iter().zip(registers(point)).map(|(row, point)| row * point);
+        let sums = terms.fold([f64x4::ZERO; 2], |[sum, size], term| [sum + term, size + term.abs()]);
+        sums.map(f64x4::reduce_add)
+    }
+
+    /// Whether a value at a point is 0 within rounding.
+    pub(super) fn vanishes(&self, point: &Point) -> bool {
+        let [value, size] = self.value_and_size(point);
+        value.abs() <= ROUNDING * size
     }
 
     pub(super) fn scaled(&self, factor: f64) -> Row {
@@ -63,18 +74,14 @@ impl Row {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Coefficients of a coordinate on the longest step: for each entry of the point at its start, a polynomial of the share.
-type Table = Box<[Polynomial]>;
-
 /// A step of a domain. The coordinates are polynomials of the share of the step.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
+    /// The start.
     point: Point,
+    /// The coordinates that have been expanded, which are the first ones.
     pub(super) coordinates: [Polynomial; MOST_COORDINATES],
+    expanded: usize,
     /// Bounds on the changes of the coordinates.
     pub(super) changes: [f64; MOST_COORDINATES],
     /// Duration.
@@ -100,8 +107,9 @@ pub(super) struct Domain {
     pub(super) pushes: [Option<Row>; MOST_GAPS],
     /// Rows of the forces that hold sticking elements. None if other constraints hold the element.
     pub(super) holds: [Option<Row>; MOST_FRICTION],
-    tables: OnceLock<Vec<Table>>,
-    /// Carries tangent vectors over the longest step.
+    /// For each coordinate and each entry of the point at the start of the longest step, a polynomial of the share.
+    tables: OnceLock<Vec<Polynomial>>,
+    /// Carries points over the longest step.
     whole: OnceLock<Carrier>,
 }
 
@@ -110,6 +118,7 @@ impl Default for Path {
         Path {
             point: [0.0; WIDTH],
             coordinates: [[0.0; ORDER + 1]; MOST_COORDINATES],
+            expanded: 0,
             changes: [0.0; MOST_COORDINATES],
             h: 0.0,
         }
@@ -117,7 +126,7 @@ impl Default for Path {
 }
 
 impl Domain {
-    pub(super) fn new(system: &System, key: DomainKey) -> Domain {
+    pub(super) fn new(system: &Frame, key: DomainKey) -> Domain {
         let (n, width) = (system.n, system.width());
         let forces = &system.stages[key.stage];
         let (mut stiffness, mut damping) = (forces.stiffness.clone(), forces.damping.clone());
@@ -143,7 +152,7 @@ impl Domain {
             rows.set_column(2 * (n + k) + 1, sin);
         }
         rows.set_column(width - 1, &load);
-        let constraints = Constraints::new(system, key);
+        let constraints = Constraints::new(system, &key.held, &key.slips);
         let free = &system.mobility * rows;
         let multipliers = &constraints.inverse * (&constraints.rows * &free);
         let mut bound = &free - &constraints.moves * &multipliers;
@@ -155,9 +164,7 @@ impl Domain {
             }
         }
         let row = |matrix: &DMatrix<f64>, i: usize| {
-            let mut row = [0.0; WIDTH];
-            (0..width).for_each(|j| row[j] = matrix[(i, j)]);
-            Row(row)
+            Row(std::array::from_fn(|j| if j < width { matrix[(i, j)] } else { 0.0 }))
         };
         let mut pushes = [const { None }; MOST_GAPS];
         let mut holds = [const { None }; MOST_FRICTION];
@@ -199,9 +206,7 @@ impl Domain {
         let n = self.n;
         let mut rate = [0.0; WIDTH];
         rate[..n].copy_from_slice(&point[n..2 * n]);
-        for (rate, row) in rate[n..].iter_mut().zip(&self.accelerations) {
-            *rate = dot(&row.0[..self.width], &point[..self.width]);
-        }
+        rate[n..].iter_mut().zip(&self.accelerations).for_each(|(rate, row)| *rate = row.dot(point));
         for (k, omega) in self.rates.iter().enumerate() {
             let at = 2 * (n + k);
             (rate[at], rate[at + 1]) = (-omega * point[at + 1], omega * point[at]);
@@ -212,13 +217,16 @@ impl Domain {
     /// Returns the time derivative of a functional along the motion, as a functional.
     pub(super) fn rate_of(&self, row: &Row) -> Row {
         let n = self.n;
-        let mut rate = [0.0; WIDTH];
-        rate[n..2 * n].copy_from_slice(&row.0[..n]);
-        for (acceleration, &factor) in
-            self.accelerations.iter().zip(&row.0[n..]).filter(|(_, factor)| **factor != 0.0)
-        {
-            rate.iter_mut().zip(&acceleration.0).for_each(|(rate, x)| *rate += factor * x);
+        let mut sums = [f64x4::ZERO; REGISTERS];
+        for (acceleration, &factor) in self.accelerations.iter().zip(&row.0[n..]) {
+            if factor != 0.0 {
+                let (terms, factor) = (registers(&acceleration.0), f64x4::splat(factor));
+                (0..REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
+            }
         }
+        let mut rate = [0.0; WIDTH];
+        rate.as_chunks_mut().0.iter_mut().zip(sums).for_each(|(rate, sum)| *rate = sum.to_array());
+        rate[n..2 * n].iter_mut().zip(&row.0).for_each(|(rate, x)| *rate += x);
         for (k, omega) in self.rates.iter().enumerate() {
             let at = 2 * (n + k);
             rate[at] += omega * row.0[at + 1];
@@ -227,58 +235,84 @@ impl Domain {
         Row(rate)
     }
 
+    /// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value; [`STAYS_ZERO`] and
+    /// 0 if there is none.
+    pub(super) fn first_derivative(&self, row: &Row, point: &Point, first: usize) -> (usize, f64) {
+        let value = |row: &Row| {
+            let [value, size] = row.value_and_size(point);
+            (value.abs() > ROUNDING * size).then_some(value)
+        };
+        if first == 0
+            && let Some(value) = value(row)
+        {
+            return (0, value);
+        }
+        let mut rate = self.rate_of(row);
+        for order in 1..first + DERIVATIVES {
+            if order >= first
+                && let Some(value) = value(&rate)
+            {
+                return (order, value);
+            }
+            rate = self.rate_of(&rate);
+        }
+        (STAYS_ZERO, 0.0)
+    }
+
+    /// Returns the lowest order, at least 2, of a derivative of a coordinate that is not 0 within rounding, and its value, as
+    /// [`Domain::first_derivative`].
+    pub(super) fn departure(&self, coordinate: usize, point: &Point) -> (usize, f64) {
+        let (order, value) = self.first_derivative(&self.accelerations[coordinate], point, 0);
+        (order.saturating_add(2), value)
+    }
+
     /// Returns the coefficients of all coordinates on the longest step.
-    fn new_tables(&self) -> Vec<Table> {
-        let table = |i: usize| {
-            let mut table = vec![[0.0; ORDER + 1]; self.width].into_boxed_slice();
+    fn new_tables(&self) -> Vec<Polynomial> {
+        let mut tables = vec![[0.0; ORDER + 1]; self.n * self.width];
+        for (i, table) in tables.chunks_exact_mut(self.width).enumerate() {
             let mut row = self.unit_row(i);
             for k in 0..=ORDER {
                 table.iter_mut().zip(&row.0).for_each(|(column, x)| column[k] = *x);
                 row = self.rate_of(&row).scaled(self.unit / (k + 1) as f64);
             }
-            table
-        };
-        (0..self.n).map(table).collect()
-    }
-
-    fn tables(&self) -> &[Table] {
-        self.tables.get_or_init(|| self.new_tables())
-    }
-
-    /// Follows the motion from a point over a time `h` of at most the longest step.
-    pub(super) fn follow(&self, point: &Point, h: f64, path: &mut Path) {
-        (path.point, path.h) = (*point, h);
-        let part = h / self.unit;
-        for ((coordinate, change), table) in
-            path.coordinates.iter_mut().zip(&mut path.changes).zip(self.tables())
-        {
-            *coordinate = combine(table, &point[..self.width]);
-            if h < self.unit {
-                let mut power = 1.0;
-                for c in coordinate.iter_mut() {
-                    *c *= power;
-                    power *= part;
-                }
-            }
-            *change = rest(coordinate);
         }
+        tables
     }
 
-    /// Returns the state at a share of a step.
-    pub(super) fn state(&self, path: &Path, share: f64) -> Numbers {
+    /// Returns the coefficients of each coordinate on the longest step.
+    fn tables(&self) -> impl Iterator<Item = &[Polynomial]> {
+        self.tables.get_or_init(|| self.new_tables()).chunks_exact(self.width)
+    }
+
+    /// Begins a step over a time `h` of at most the longest step.
+    pub(super) fn begin(&self, point: &Point, h: f64, path: &mut Path) {
+        (path.point, path.h, path.expanded) = (*point, h, 0);
+    }
+
+    /// Expands the first coordinates on a step, as far as that has not been done.
+    pub(super) fn expand(&self, path: &mut Path, count: usize) {
+        let part = path.h / self.unit;
+        for (i, table) in self.tables().enumerate().take(count).skip(path.expanded) {
+            let whole = combine(table, &path.point[..self.width]);
+            path.coordinates[i] = if path.h < self.unit { stretched(&whole, part) } else { whole };
+            path.changes[i] = rest(&path.coordinates[i]);
+        }
+        path.expanded = path.expanded.max(count);
+    }
+
+    /// Sets a state to that at a share of a step, all of whose coordinates are expanded.
+    pub(super) fn set_state(&self, y: &mut [f64], path: &Path, share: f64) {
         let weights = Weights::at(share);
-        let mut y = [0.0; SIZE];
         for (i, coordinate) in path.coordinates.iter().enumerate().take(self.n) {
             let [value, slope] = weights.of(coordinate);
             (y[i], y[self.n + i]) = (value, slope / path.h);
         }
-        y
     }
 
     /// Returns the whole point at a share of a step.
     pub(super) fn point(&self, path: &Path, share: f64) -> Point {
         let mut point = [0.0; WIDTH];
-        point[..SIZE].copy_from_slice(&self.state(path, share));
+        self.set_state(&mut point, path, share);
         for (k, omega) in self.rates.iter().enumerate() {
             let at = 2 * (self.n + k);
             let ([cos, sin], (sin_turn, cos_turn)) =
@@ -318,105 +352,45 @@ impl Domain {
         sum
     }
 
-    /// Returns the images of the unit vectors after a time of at most the longest step. Each has `2 n` entries.
-    pub(super) fn carrier(&self, time: f64) -> Cow<'_, Carrier> {
-        if time == self.unit {
-            Cow::Borrowed(self.whole.get_or_init(|| self.new_carrier(time)))
-        } else {
-            Cow::Owned(self.new_carrier(time))
-        }
+    /// Returns what carries points over the longest step.
+    pub(super) fn whole(&self) -> &Carrier {
+        self.whole.get_or_init(|| {
+            let mut carrier = Carrier::default();
+            self.set_carrier(&mut carrier, self.unit, self.width);
+            carrier
+        })
     }
 
-    fn new_carrier(&self, time: f64) -> Carrier {
+    /// Sets a carrier to the changes of the first unit vectors over a time of at most the longest step.
+    pub(super) fn set_carrier(&self, carrier: &mut Carrier, time: f64, count: usize) {
         let (n, weights) = (self.n, Weights::at(time / self.unit));
-        let mut carrier = Carrier([[0.0; SIZE]; SIZE]);
-        for (i, table) in self.tables().iter().enumerate() {
-            for (j, column) in table[..2 * n].iter().enumerate() {
-                let [value, slope] = weights.of(column);
-                (carrier.0[j][i], carrier.0[j][n + i]) = (value, slope / self.unit);
+        carrier.0.clear();
+        carrier.0.resize(count, [0.0; SIZE]);
+        for (i, table) in self.tables().enumerate() {
+            for (change, column) in carrier.0.iter_mut().zip(table) {
+                let [value, slope] = weights.later(column);
+                (change[i], change[n + i]) = (value, slope / self.unit);
             }
         }
-        carrier
     }
 }
 
-/// Carries tangent vectors along a flight: the images of the unit vectors.
-#[derive(Clone, Debug)]
-pub(super) struct Carrier([Numbers; SIZE]);
+/// Carries points or tangent vectors along a flight: the changes of unit vectors.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Carrier(Vec<Numbers>);
 
 impl Carrier {
-    /// Returns the image of a tangent vector with `size` entries.
-    pub(super) fn carry(&self, tangent: &Numbers, size: usize) -> Numbers {
-        const PART: usize = 4;
+    /// Returns the state, with `size` entries, that follows from a point or from a tangent vector. Further entries have no meaning.
+    pub(super) fn carry(&self, from: &[f64], size: usize) -> Numbers {
         let mut image = [0.0; SIZE];
-        for part in 0..size.div_ceil(PART) {
-            let mut sums = [0.0; PART];
-            for (column, x) in self.0.iter().zip(&tangent[..size]) {
-                let terms = &column[part * PART..][..PART];
-                (0..PART).for_each(|i| sums[i] += x * terms[i]);
+        let parts = image.as_chunks_mut::<4>().0.iter_mut().zip(from.as_chunks().0).take(size.div_ceil(4));
+        for (part, (image, &start)) in parts.enumerate() {
+            let mut change = f64x4::ZERO;
+            for (column, &x) in self.0.iter().zip(from) {
+                change = f64x4::new(column.as_chunks().0[part]).mul_add(f64x4::splat(x), change);
             }
-            image[part * PART..][..PART].copy_from_slice(&sums);
+            *image = (f64x4::new(start) + change).to_array();
         }
         image
-    }
-}
-
-/// What a row of constraints holds.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Constraint {
-    /// A gap on a rigid wall.
-    Wall(usize, Side),
-    /// A sticking element.
-    Element(usize),
-}
-
-/// Constraints on rates: each holds a row of `w` still.
-pub(super) struct Constraints {
-    pub(super) kinds: Vec<Constraint>,
-    /// The rows, and their products with the mobility.
-    rows: DMatrix<f64>,
-    moves: DMatrix<f64>,
-    /// Inverse of `rows mobility rows^T`.
-    inverse: DMatrix<f64>,
-    /// Changes of `w` by unit impulses, in the directions that are still free.
-    pub(super) mobility: DMatrix<f64>,
-}
-
-impl Constraints {
-    /// Collects the constraints of a domain. A row that those before it hold is left out.
-    pub(super) fn new(system: &System, key: DomainKey) -> Constraints {
-        let n = system.n;
-        let held = (0..system.gaps()).filter_map(|gap| Some((gap, key.held[gap]?)));
-        let of_walls = held.map(|(gap, side)| {
-            let mut row = DVector::zeros(n);
-            row[gap] = 1.0;
-            (Constraint::Wall(gap, side), row)
-        });
-        let sticks = |&(i, _): &(usize, &super::system::Element)| key.slips[i] == Slip::Stick;
-        let of_elements = system.elements.iter().enumerate().filter(sticks);
-        let of_elements = of_elements.map(|(i, element)| (Constraint::Element(i), element.row.clone()));
-        Constraints::of(&system.mobility, of_walls.chain(of_elements))
-    }
-
-    pub(super) fn of(
-        mobility: &DMatrix<f64>,
-        rows: impl IntoIterator<Item = (Constraint, DVector<f64>)>,
-    ) -> Constraints {
-        let (mut left, mut kinds, mut kept) = (mobility.clone(), Vec::new(), Vec::new());
-        for (kind, row) in rows {
-            let along = &left * &row;
-            let free = along.dot(&row);
-            if free > NO_MOBILITY * (mobility * &row).dot(&row) {
-                left -= &along * along.transpose() / free;
-                kinds.push(kind);
-                kept.push(row);
-            }
-        }
-        let n = mobility.nrows();
-        let rows = DMatrix::from_fn(kept.len(), n, |i, j| kept[i][j]);
-        let moves = mobility * rows.transpose();
-        let inverse =
-            (&rows * &moves).try_inverse().unwrap_or_else(|| DMatrix::zeros(kept.len(), kept.len()));
-        Constraints { kinds, rows, moves, inverse, mobility: left }
     }
 }

@@ -3,14 +3,14 @@
 use super::Point;
 use super::domain::{Domain, Path, Row};
 use super::modes::Modes;
-use super::system::System;
+use super::system::{Element, Frame};
 use crate::model::Side;
 use crate::motion::Slip;
 use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, root};
 
 /// Part of a flight: one domain, at most one Taylor step.
 pub(super) struct Flight<'a> {
-    pub(super) system: &'a System,
+    pub(super) system: &'a Frame,
     pub(super) domain: &'a Domain,
     pub(super) modes: &'a Modes,
     pub(super) path: &'a Path,
@@ -102,7 +102,7 @@ impl Flight<'_> {
         engaged
             .map(|gap| {
                 let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
-                let (sign, mut row) = (side.sign(), self.domain.unit_row(gap).scaled(0.0));
+                let (sign, mut row) = (side.sign(), Row::ZERO);
                 for wall in &self.system.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())] {
                     let spring = wall.springs[self.modes.stage];
                     row.0[gap] += sign * spring.stiffness;
@@ -124,8 +124,8 @@ impl Flight<'_> {
     /// Returns the power that dry friction turns into heat at a point.
     fn heat(&self, point: &Point) -> f64 {
         let elements = self.system.elements.iter().enumerate().zip(self.modes.slips);
-        let power = |((i, element), slip): ((usize, &super::system::Element), Slip)| {
-            element.force * slip.sign() * self.system.rate_row(i, self.domain).dot(point)
+        let power = |((i, element), slip): ((usize, &Element), Slip)| {
+            element.force * slip.sign() * self.system.rate_row(i).dot(point)
         };
         elements.map(power).sum()
     }
@@ -136,7 +136,7 @@ impl Flight<'_> {
     }
 }
 
-impl System {
+impl Frame {
     /// Returns the row of a displacement; 0 for one that the machine does not have.
     fn displacement_row(&self, i: usize) -> Row {
         let mut row = [0.0; super::WIDTH];

@@ -1,19 +1,9 @@
-//! Modes of walls and friction, and which of them are consistent with a state.
+//! Modes of walls and friction.
 
-use super::domain::{Domain, DomainKey, Row};
-use super::system::System;
-use super::{Numbers, Point};
+use super::domain::{DomainKey, Row};
+use super::system::Frame;
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{Slip, Slips};
-
-/// Rounding error of a sum, relative to the size of its terms.
-pub(super) const ROUNDING: f64 = 32.0 * f64::EPSILON;
-
-/// Derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the other end.
-const DERIVATIVES: usize = 16;
-
-/// Order of the root of a function that stays zero: all derivatives are zero within rounding.
-pub(super) const STAYS_ZERO: usize = usize::MAX;
 
 /// The mode of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +32,11 @@ impl GapMode {
             }
         }
     }
+
+    /// Returns the side of the rigid wall on which the gap rests.
+    pub(super) fn rest(self) -> Option<Side> {
+        if let GapMode::Stuck(side) = self { Some(side) } else { None }
+    }
 }
 
 /// All modes of a machine.
@@ -53,7 +48,7 @@ pub(super) struct Modes {
 }
 
 impl Modes {
-    pub(super) fn key(&self, system: &System) -> DomainKey {
+    pub(super) fn key(&self, system: &Frame) -> DomainKey {
         let mut key = DomainKey {
             stage: self.stage,
             engaged: [0; MOST_GAPS],
@@ -61,19 +56,21 @@ impl Modes {
             slips: self.slips,
         };
         for gap in 0..system.gaps() {
-            let count = |side: Side| system.walls(gap, side).len() as i8;
-            let signed = |side: Side, count: i8| if side == Side::Right { count } else { -count };
+            let count = |side: Side| system.walls(gap, side).len();
             key.engaged[gap] = match self.gaps[gap] {
                 GapMode::Beyond(count) => count,
                 GapMode::Onset(side) | GapMode::Pressed(side) => signed(side, count(side)),
                 GapMode::Open(side) | GapMode::Stuck(side) => signed(side, count(side) - 1),
             };
-            if let GapMode::Stuck(side) = self.gaps[gap] {
-                key.held[gap] = Some(side);
-            }
+            key.held[gap] = self.gaps[gap].rest();
         }
         key
     }
+}
+
+/// Returns the number of passed walls with the sign of their side.
+pub(super) fn signed(side: Side, count: usize) -> i8 {
+    if side == Side::Right { count as i8 } else { -(count as i8) }
 }
 
 /// What may change in a decision on elements at rest: gaps that rest on rigid walls, with their sides, and elements without a rate.
@@ -83,82 +80,54 @@ pub(super) struct AtRest {
     pub(super) elements: [bool; MOST_FRICTION],
 }
 
-/// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value; [`STAYS_ZERO`] and 0 if
-/// there is none.
-pub(super) fn first_derivative(domain: &Domain, row: &Row, point: &Point, first: usize) -> (usize, f64) {
-    let mut rate = row.clone();
-    for order in 0..first + DERIVATIVES {
-        if order >= first {
-            let value = rate.dot(point);
-            if value.abs() > ROUNDING * rate.size(point) {
-                return (order, value);
-            }
-        }
-        rate = domain.rate_of(&rate);
+impl Frame {
+    /// Returns the mode of a gap in front of the last wall of a side.
+    pub(super) fn before_last(&self, gap: usize, side: Side) -> GapMode {
+        GapMode::Beyond(signed(side, self.walls(gap, side).len() - 1))
     }
-    (STAYS_ZERO, 0.0)
-}
 
-impl System {
+    /// Returns side and number of the wall that lies in a direction from a gap.
+    pub(super) fn wall_ahead(&self, modes: &Modes, gap: usize, direction: Side) -> Option<(Side, usize)> {
+        let GapMode::Beyond(passed) = modes.gaps[gap] else { return None };
+        let number = usize::from(passed.unsigned_abs());
+        if passed == 0 || (passed > 0) == (direction == Side::Right) {
+            (number < self.walls(gap, direction).len()).then_some((direction, number))
+        } else {
+            Some((direction.mirrored(), number - 1))
+        }
+    }
+
+    /// Returns the side of a gap that has passed the last wall of a side, if this wall only pushes.
+    pub(super) fn pushed(&self, modes: &Modes, gap: usize) -> Option<Side> {
+        let GapMode::Beyond(passed) = modes.gaps[gap] else { return None };
+        let side = if passed > 0 { Side::Right } else { Side::Left };
+        let is_last = passed != 0 && self.walls(gap, side).len() == usize::from(passed.unsigned_abs());
+        (is_last && self.pushing(gap, side).is_some()).then_some(side)
+    }
+
+    /// Returns the row of the force of a wall that only pushes.
+    pub(super) fn force(&self, stage: usize, gap: usize, side: Side) -> Row {
+        let (wall, sign) = (self.last_wall(gap, side), side.sign());
+        let spring = wall.springs[stage];
+        let mut row = Row::ZERO;
+        row.0[gap] = sign * spring.stiffness;
+        row.0[self.n + gap] = sign * spring.damping;
+        row.plus(spring.preload - sign * spring.stiffness * wall.at, self.width())
+    }
+
     /// Returns the row of an element's sliding rate.
-    pub(super) fn rate_row(&self, i: usize, domain: &Domain) -> Row {
-        let mut row = domain.unit_row(0).scaled(0.0);
+    pub(super) fn rate_row(&self, i: usize) -> Row {
+        let mut row = Row::ZERO;
         (0..self.n).for_each(|j| row.0[self.n + j] = self.elements[i].row[j]);
         row.plus(-self.elements[i].speed, self.width())
     }
 
-    /// Whether the modes of the elements at rest fit the forces at a point.
-    pub(super) fn is_consistent(&self, modes: &Modes, at_rest: &AtRest, point: &Point) -> bool {
-        if *at_rest == AtRest::default() {
-            return true;
-        }
-        let domain = self.domain(modes.key(self));
-        let gaps = (0..self.gaps()).all(|gap| {
-            let Some(side) = at_rest.gaps[gap] else { return true };
-            match &domain.pushes[gap] {
-                Some(push) => first_derivative(&domain, push, point, 0).1 > 0.0,
-                // The gap leaves the wall, or friction holds it there.
-                None => side.sign() * first_derivative(&domain, &domain.unit_row(gap), point, 2).1 <= 0.0,
-            }
-        });
-        gaps && (0..self.elements.len()).filter(|&i| at_rest.elements[i]).all(|i| match modes.slips[i] {
-            Slip::Stick => domain.holds[i].as_ref().is_none_or(|hold| {
-                hold.dot(point).abs() <= self.elements[i].force + ROUNDING * hold.size(point)
-            }),
-            slip => slip.sign() * first_derivative(&domain, &self.rate_row(i, &domain), point, 1).1 > 0.0,
-        })
-    }
-
-    /// Returns the first consistent combination of modes: walls hold before they let go, elements stick before they slide.
-    pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &Point) -> Option<Modes> {
-        let resting: Vec<usize> = (0..self.gaps()).filter(|&gap| at_rest.gaps[gap].is_some()).collect();
-        let sticking: Vec<usize> = (0..self.elements.len()).filter(|&i| at_rest.elements[i]).collect();
-        let slips = 3usize.pow(sticking.len() as u32);
-        let all = (0..1 << resting.len()).flat_map(|gaps| (0..slips).map(move |slips| (gaps, slips)));
-        all.map(|(gaps, mut slips)| {
-            let mut tried = *modes;
-            for (bit, &gap) in resting.iter().enumerate() {
-                let side = at_rest.gaps[gap].expect("it is at rest");
-                let before = self.passable(gap, side) as i8;
-                let is_held = gaps >> bit & 1 == 0;
-                let free = GapMode::Beyond(if side == Side::Right { before } else { -before });
-                tried.gaps[gap] = if is_held { GapMode::Stuck(side) } else { free };
-            }
-            for &i in sticking.iter().rev() {
-                tried.slips[i] = Slip::ALL[slips % 3];
-                slips /= 3;
-            }
-            tried
-        })
-        .find(|tried| self.is_consistent(tried, at_rest, point))
-    }
-
     /// Sets the rates of sticking elements, and of gaps at rest, to their values without rounding errors.
-    pub(super) fn hold(&self, modes: &Modes, y: &mut Numbers, is_tangent: bool) {
+    pub(super) fn hold(&self, modes: &Modes, y: &mut [f64], is_tangent: bool) {
         let n = self.n;
-        let is_stuck = |j: usize| j < self.gaps() && matches!(modes.gaps[j], GapMode::Stuck(_));
+        let is_stuck = |j: usize| modes.gaps.get(j).is_some_and(|mode| mode.rest().is_some());
         (0..n).filter(|&j| is_stuck(j)).for_each(|j| y[n + j] = 0.0);
-        let mut pivots = Vec::new();
+        let mut pivots = [None; MOST_FRICTION];
         // The second pass completes the first where rows share coordinates.
         for pass in 0..2 {
             let sticking = self.elements.iter().zip(modes.slips).filter(|(_, slip)| *slip == Slip::Stick);
@@ -166,7 +135,7 @@ impl System {
                 if pass == 0 {
                     let free = (0..n)
                         .filter(|&j| !is_stuck(j) && element.row[j] != 0.0 && !pivots.contains(&Some(j)));
-                    pivots.push(free.max_by(|&a, &b| element.row[a].abs().total_cmp(&element.row[b].abs())));
+                    pivots[nth] = free.max_by(|&a, &b| element.row[a].abs().total_cmp(&element.row[b].abs()));
                 }
                 let Some(j) = pivots[nth] else { continue };
                 let others: f64 = (0..n).filter(|&k| k != j).map(|k| element.row[k] * y[n + k]).sum();

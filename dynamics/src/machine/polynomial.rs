@@ -1,10 +1,16 @@
 //! The first root of a polynomial on a step.
 //!
 //! In Bernstein form, the number of roots in an interval is at most the number of sign changes of the coefficients, and one sign change
-//! means exactly one root (Descartes' rule). Other intervals are halved by de Casteljau's algorithm.
+//! means exactly one root (Descartes' rule). Other intervals are halved by de Casteljau's algorithm. A root at the start is divided out: the
+//! Bernstein coefficients of the quotient have the signs of the later ones of the polynomial.
+
+use wide::{CmpGt, f64x4};
 
 /// Order of the Taylor polynomial of a step. There are four times a whole number of coefficients, for products of registers.
 pub(super) const ORDER: usize = 23;
+
+/// Number of registers that hold the coefficients of a polynomial.
+const REGISTERS: usize = (ORDER + 1) / 4;
 
 /// Coefficients of a polynomial in powers of the share of the step.
 pub(super) type Polynomial = [f64; ORDER + 1];
@@ -14,6 +20,9 @@ const MOST_HALVINGS: u32 = 48;
 
 /// Largest number of steps of the final root search.
 const ROOT_CAP: u32 = 200;
+
+/// Largest order of a root at the start of a step.
+const MOST_ORDER: usize = 18;
 
 /// Rounding error of a coefficient, relative to the sum of all.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -29,78 +38,127 @@ pub(super) enum Fall {
     At(f64),
 }
 
+/// Returns the coefficients in registers.
+fn registers(c: &Polynomial) -> [f64x4; REGISTERS] {
+    std::array::from_fn(|i| f64x4::new(c.as_chunks().0[i]))
+}
+
+fn from_registers(registers: [f64x4; REGISTERS]) -> Polynomial {
+    let mut c = [0.0; ORDER + 1];
+    c.as_chunks_mut().0.iter_mut().zip(registers).for_each(|(c, register)| *c = register.to_array());
+    c
+}
+
 /// Returns the sum of the sizes of all coefficients but the first.
 pub(super) fn rest(c: &Polynomial) -> f64 {
-    let mut sums = [0.0; 4];
-    for c in c.chunks_exact(4) {
-        (0..4).for_each(|i| sums[i] += c[i].abs());
+    let later = registers(c).map(f64x4::abs);
+    let first = later[0] * f64x4::new([0.0, 1.0, 1.0, 1.0]);
+    (first + later[1] + (later[2] + later[3]) + (later[4] + later[5])).reduce_add()
+}
+
+/// Returns the sum of polynomials with given factors.
+pub(super) fn combine(polynomials: &[Polynomial], factors: &[f64]) -> Polynomial {
+    let mut sums = [f64x4::ZERO; REGISTERS];
+    for (polynomial, &factor) in polynomials.iter().zip(factors) {
+        let (terms, factor) = (polynomial.as_chunks().0, f64x4::splat(factor));
+        (0..REGISTERS).for_each(|i| sums[i] = f64x4::new(terms[i]).mul_add(factor, sums[i]));
     }
-    sums[0] - c[0].abs() + sums[1] + (sums[2] + sums[3])
+    from_registers(sums)
+}
+
+/// Returns a polynomial of the share of a longer step as one of the share of a step that is this `part` of it.
+pub(super) fn stretched(c: &Polynomial, part: f64) -> Polynomial {
+    let (square, fourth) = (part * part, f64x4::splat((part * part) * (part * part)));
+    let mut powers = f64x4::new([1.0, part, square, part * square]);
+    from_registers(registers(c).map(|c| {
+        let stretched = c * powers;
+        powers *= fourth;
+        stretched
+    }))
+}
+
+/// Columns of the triangular matrix that gives Bernstein coefficients: `b_i = sum_j C(i, j) / C(ORDER, j) c_j`.
+static BERNSTEIN: [Polynomial; ORDER + 1] = {
+    let mut columns = [[0.0; ORDER + 1]; ORDER + 1];
+    let mut i = 0;
+    while i <= ORDER {
+        let (mut j, mut entry) = (0, 1.0);
+        while j <= i {
+            columns[j][i] = entry;
+            entry *= (i - j) as f64 / (ORDER - j) as f64;
+            j += 1;
+        }
+        i += 1;
+    }
+    columns
+};
+
+/// Adds the terms of four columns to Bernstein coefficients. The matrix is triangular: a column begins in the register of its number.
+#[inline(always)]
+fn add_columns<const FIRST: usize>(sums: &mut [f64x4; REGISTERS], c: &Polynomial) {
+    for column in 4 * FIRST..4 * FIRST + 4 {
+        let factor = f64x4::splat(c[column]);
+        for (i, sum) in sums.iter_mut().enumerate() {
+            if i >= FIRST {
+                *sum = f64x4::new(BERNSTEIN[column].as_chunks().0[i]).mul_add(factor, *sum);
+            }
+        }
+    }
+}
+
+/// Returns the Bernstein coefficients of a polynomial without its first `order` terms.
+pub(super) fn bernstein(c: &Polynomial, order: usize) -> Polynomial {
+    let (mut later, mut sums) = (*c, [f64x4::ZERO; REGISTERS]);
+    later[..order].fill(0.0);
+    add_columns::<0>(&mut sums, &later);
+    add_columns::<1>(&mut sums, &later);
+    add_columns::<2>(&mut sums, &later);
+    add_columns::<3>(&mut sums, &later);
+    add_columns::<4>(&mut sums, &later);
+    add_columns::<5>(&mut sums, &later);
+    from_registers(sums)
 }
 
 /// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. An `order`
-/// above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients.
-pub(super) fn first_fall(polynomial: &Polynomial, order: usize, size: f64) -> Fall {
+/// above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients. The Bernstein
+/// coefficients `b` are computed if they are not known, or if the order is above 1.
+pub(super) fn first_fall(c: &Polynomial, b: Option<Polynomial>, order: usize, size: f64) -> Fall {
     if order > MOST_ORDER {
         return Fall::None;
     }
-    let c = &polynomial[order..];
-    let rest: f64 = c[1..].iter().map(|c| c.abs()).sum();
-    let noise = ROUNDING * if order == 0 { rest + size } else { rest };
-    if c[0] > rest + noise {
-        return Fall::None;
-    }
-    if c[0] <= 0.0 {
+    if c[order] <= 0.0 {
         return Fall::At(0.0);
     }
+    let b = b.filter(|_| order <= 1).unwrap_or_else(|| bernstein(c, order));
+    let (count, degree) = (ORDER + 1 - order, ORDER - order);
+    let signs = registers(&b).map(|b| b.cmp_gt(f64x4::ZERO).move_mask() as u32);
+    let positive = (0..REGISTERS).fold(0, |positive, i| positive | signs[i] << (4 * i)) >> order;
+    let all = (1 << count) - 1;
+    if positive == all {
+        return Fall::None;
+    }
+    let noise = ROUNDING * if order == 0 { rest(c) + size } else { rest(c) };
+    // Bernstein coefficients of the quotient.
+    let quotient =
+        |i: usize| (0..order).fold(b[order + i], |b, k| b * ((ORDER - k) as f64 / (order + i - k) as f64));
     let mut touches = false;
-    let b = combine(&BERNSTEIN[order], c);
-    match isolate(&b[..c.len()], [0.0, 1.0], noise, 0, &mut touches) {
-        Some((bracket, guess)) => Fall::At(root(c, bracket, guess)),
+    let isolated = if ((positive ^ positive >> 1) & all >> 1).count_ones() == 1 && positive & 1 == 1 {
+        let i = positive.trailing_ones() as usize;
+        Some(([0.0, 1.0], polygon(i, [quotient(i - 1), quotient(i)], degree)))
+    } else {
+        let quotients: Polynomial = std::array::from_fn(|i| if i < count { quotient(i) } else { 0.0 });
+        isolate(&quotients[..count], [0.0, 1.0], noise, 0, &mut touches)
+    };
+    match isolated {
+        Some((bracket, guess)) => Fall::At(root(&c[order..], bracket, guess)),
         None if touches => Fall::Touches,
         None => Fall::None,
     }
 }
 
-/// Largest order of a root at the start of a step.
-const MOST_ORDER: usize = 18;
-
-/// Columns of the matrices that give the Bernstein coefficients of a polynomial without its first `order` terms:
-/// `b_i = sum_j C(i, j) / C(degree, j) c_j`.
-static BERNSTEIN: [[Polynomial; ORDER + 1]; MOST_ORDER + 1] = {
-    let mut all = [[[0.0; ORDER + 1]; ORDER + 1]; MOST_ORDER + 1];
-    let mut order = 0;
-    while order <= MOST_ORDER {
-        let degree = ORDER - order;
-        let mut i = 0;
-        while i <= degree {
-            let (mut j, mut entry) = (0, 1.0);
-            while j <= i {
-                all[order][j][i] = entry;
-                entry *= (i - j) as f64 / (degree - j) as f64;
-                j += 1;
-            }
-            i += 1;
-        }
-        order += 1;
-    }
-    all
-};
-
-/// Returns the sum of polynomials with given factors.
-pub(super) fn combine(polynomials: &[Polynomial], factors: &[f64]) -> Polynomial {
-    const PART: usize = 8;
-    let mut sum = [0.0; ORDER + 1];
-    // The sums of one part stay in registers.
-    for part in 0..(ORDER + 1) / PART {
-        let mut sums = [0.0; PART];
-        for (polynomial, factor) in polynomials.iter().zip(factors) {
-            let terms = &polynomial[part * PART..][..PART];
-            (0..PART).for_each(|i| sums[i] += factor * terms[i]);
-        }
-        sum[part * PART..][..PART].copy_from_slice(&sums);
-    }
-    sum
+/// Returns where the polygon of the Bernstein coefficients, which is near the function, meets zero in front of the coefficient `i`.
+fn polygon(i: usize, [before, after]: [f64; 2], degree: usize) -> f64 {
+    (i as f64 - after / (after - before)) / degree as f64
 }
 
 /// Returns an interval with the first root only, and a guess of the root.
@@ -117,10 +175,8 @@ fn isolate(
     }
     let changes = b.windows(2).filter(|pair| (pair[0] > 0.0) != (pair[1] > 0.0)).count();
     if changes == 1 && b[0] > 0.0 {
-        // Where the polygon of the coefficients, which is near the function, meets zero.
         let i = b.iter().position(|&b| b <= 0.0).unwrap_or(degree);
-        let place = (i as f64 - b[i] / (b[i] - b[i - 1])) / degree as f64;
-        return Some(([lo, hi], lo + (hi - lo) * place));
+        return Some(([lo, hi], lo + (hi - lo) * polygon(i, [b[i - 1], b[i]], degree)));
     }
     let size = b.iter().fold(0.0f64, |size, b| size.max(b.abs()));
     if depth == MOST_HALVINGS || size <= noise {
@@ -148,44 +204,48 @@ fn halves(b: &[f64]) -> [Polynomial; 2] {
 }
 
 /// Powers of a share, and their derivatives, to evaluate several polynomials there. The first one of each is left out.
-pub(super) struct Weights([Polynomial; 2]);
+pub(super) struct Weights([[f64x4; REGISTERS]; 2]);
 
 impl Weights {
-    pub(super) fn at(share: f64) -> Weights {
-        let mut weights = [[0.0; ORDER + 1]; 2];
-        let [values, slopes] = &mut weights;
-        let mut power = 1.0;
-        for (k, (value, slope)) in values.iter_mut().zip(slopes).enumerate().skip(1) {
-            *slope = if k == 1 { 0.0 } else { k as f64 * power };
-            power *= share;
-            *value = power;
+    pub(super) fn at(u: f64) -> Weights {
+        let (square, fourth) = (u * u, f64x4::splat((u * u) * (u * u)));
+        let powers = f64x4::new([1.0, u, square, u * square]);
+        let (mut values, mut slopes) = ([powers; REGISTERS], [f64x4::ZERO; REGISTERS]);
+        values[0] = powers * f64x4::new([0.0, 1.0, 1.0, 1.0]);
+        slopes[0] = f64x4::new([0.0, 0.0, 2.0 * u, 3.0 * square]);
+        let (mut value, mut slope) = (powers, powers * (u * square));
+        for i in 1..REGISTERS {
+            let k = 4.0 * i as f64;
+            value *= fourth;
+            values[i] = value;
+            slopes[i] = slope * f64x4::new([k, k + 1.0, k + 2.0, k + 3.0]);
+            slope *= fourth;
         }
-        Weights(weights)
+        Weights([values, slopes])
     }
 
-    /// Returns value and slope. Four sums run side by side, each from its smallest term on, and the largest term comes last.
+    /// Returns value and slope of a polynomial. The largest term comes last.
     pub(super) fn of(&self, c: &Polynomial) -> [f64; 2] {
-        let later = self.0.each_ref().map(|weights| {
-            let mut sums = [0.0; 4];
-            for (c, weights) in c.chunks_exact(4).zip(weights.chunks_exact(4)).rev() {
-                (0..4).for_each(|i| sums[i] += c[i] * weights[i]);
-            }
-            sums[3] + sums[2] + sums[0] + sums[1]
-        });
-        [c[0] + later[0], c[1] + later[1]]
+        let [value, slope] = self.later(c);
+        [c[0] + value, c[1] + slope]
     }
-}
 
-/// Returns value and slope.
-fn value(c: &[f64], u: f64) -> [f64; 2] {
-    c.iter().rev().fold([0.0, 0.0], |[value, slope], c| [value * u + c, slope * u + value])
+    /// Returns value and slope without their first terms. Four sums run side by side, each from its smallest term on.
+    pub(super) fn later(&self, c: &Polynomial) -> [f64; 2] {
+        let terms = registers(c);
+        self.0.each_ref().map(|weights| {
+            let sums = (0..REGISTERS).rev().fold(f64x4::ZERO, |sums, i| terms[i].mul_add(weights[i], sums));
+            sums.reduce_add()
+        })
+    }
 }
 
 /// Finds the only root in an interval by Newton's method, or by bisection where that leaves the interval.
 fn root(c: &[f64], [mut lo, mut hi]: [f64; 2], guess: f64) -> f64 {
-    let mut u = guess;
+    let (mut padded, mut u) = ([0.0; ORDER + 1], guess);
+    padded[..c.len()].copy_from_slice(c);
     for _ in 0..ROOT_CAP {
-        let [value, slope] = value(c, u);
+        let [value, slope] = Weights::at(u).of(&padded);
         if value > 0.0 {
             lo = u;
         } else {
@@ -221,7 +281,7 @@ mod tests {
         let cases: [&[f64]; 5] =
             [&[0.3], &[1e-9, 0.5], &[0.5, 0.5 + 1e-6], &[0.2, 0.3, 0.4, 0.9], &[0.999_999]];
         for roots in cases {
-            let Fall::At(found) = first_fall(&with_roots(roots), 0, 0.0) else {
+            let Fall::At(found) = first_fall(&with_roots(roots), None, 0, 0.0) else {
                 panic!("no root of {roots:?}")
             };
             let error = (found - roots[0]).abs() / roots[0];
@@ -229,7 +289,7 @@ mod tests {
             assert!(error < conditioned, "{roots:?}: {found}, {error:e}");
         }
         for roots in [&[1.1][..], &[2.0, 3.0], &[]] {
-            assert_eq!(first_fall(&with_roots(roots), 0, 0.0), Fall::None);
+            assert_eq!(first_fall(&with_roots(roots), None, 0, 0.0), Fall::None);
         }
     }
 
@@ -239,18 +299,18 @@ mod tests {
         for lift in [1e-3, 1e-9, 1e-13] {
             let mut c = with_roots(&[0.4, 0.4]);
             c[0] += lift;
-            assert_eq!(first_fall(&c, 0, 0.0), Fall::None, "{lift:e}");
+            assert_eq!(first_fall(&c, None, 0, 0.0), Fall::None, "{lift:e}");
         }
-        assert_eq!(first_fall(&with_roots(&[0.4, 0.4]), 0, 0.0), Fall::Touches);
+        assert_eq!(first_fall(&with_roots(&[0.4, 0.4]), None, 0, 0.0), Fall::Touches);
     }
 
     #[test]
     fn a_root_at_the_start_is_divided_out() {
         let mut c = [0.0; ORDER + 1];
         (c[1], c[2]) = (1e-20, -1e-20 / 0.25);
-        let Fall::At(found) = first_fall(&c, 1, 1.0) else { panic!("no root") };
+        let Fall::At(found) = first_fall(&c, None, 1, 1.0) else { panic!("no root") };
         assert!((found - 0.25).abs() < 1e-15);
         (c[1], c[2]) = (-1.0, 3.0);
-        assert_eq!(first_fall(&c, 1, 0.0), Fall::At(0.0));
+        assert_eq!(first_fall(&c, None, 1, 0.0), Fall::At(0.0));
     }
 }

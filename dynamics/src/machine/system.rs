@@ -1,14 +1,9 @@
-//! A machine in the coordinates of its flow, with the domains that motions have met.
-
-use std::collections::BTreeMap;
-use std::sync::{Arc, RwLock};
+//! A machine in the coordinates of its flow.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::domain::{Domain, DomainKey};
-use super::modes::ROUNDING;
-use super::{Numbers, Point, SIZE};
-use crate::model::{Contact, MOST_HARMONICS, Oscillator, Side, Wall};
+use super::{Numbers, Point, ROUNDING, SIZE};
+use crate::model::{Contact, Oscillator, Side, Wall};
 
 /// Linear forces in the coordinates of the flow.
 #[derive(Clone, Debug)]
@@ -26,12 +21,17 @@ pub(super) struct Element {
     pub(super) speed: f64,
 }
 
-/// Cosine and sine of each harmonic.
-pub(super) type Phasors = [[f64; 2]; MOST_HARMONICS + 1];
+impl Element {
+    /// Returns the sliding rate at rates of the coordinates, and the sum of the sizes of its terms, which rounding is relative to.
+    pub(super) fn rate_and_size(&self, rates: &[f64]) -> [f64; 2] {
+        let terms = self.row.iter().zip(rates).map(|(row, rate)| row * rate);
+        terms.fold([-self.speed, self.speed.abs()], |[sum, size], x| [sum + x, size + x.abs()])
+    }
+}
 
-/// A machine, prepared for its motions. Domains are shared by all motions.
+/// A machine in the coordinates of its flow.
 #[derive(Clone, Debug)]
-pub struct System {
+pub struct Frame {
     pub(super) machine: Oscillator,
     /// Number of coordinates.
     pub(super) n: usize,
@@ -48,7 +48,9 @@ pub struct System {
     pub(super) mass: DMatrix<f64>,
     /// Inverse of the mass matrix, and the inverse of its Cholesky factor.
     pub(super) mobility: DMatrix<f64>,
-    pub(super) mass_scale: DMatrix<f64>,
+    mass_scale: DMatrix<f64>,
+    /// For each gap, the changes of all rates by an impulse that changes the gap's rate by 1.
+    pub(super) kicks: Vec<Numbers>,
     pub(super) stages: Vec<StageForces>,
     /// Orders of the harmonics, and their cosines and sines as columns.
     pub(super) orders: Vec<f64>,
@@ -56,12 +58,11 @@ pub struct System {
     pub(super) elements: Vec<Element>,
     /// Changes of the stage: time since phase 0, and stage.
     pub(super) schedule: Vec<(f64, usize)>,
-    domains: Arc<RwLock<BTreeMap<u32, Arc<Domain>>>>,
 }
 
-impl System {
+impl Frame {
     /// Prepares a machine that [`Oscillator::validate`] accepts.
-    pub fn new(machine: &Oscillator) -> System {
+    pub(super) fn new(machine: &Oscillator) -> Frame {
         let (machine, n) = (machine.clone(), machine.degrees());
         let to_flow = coordinates(&machine);
         let from_flow = to_flow.clone().try_inverse().expect("the rows are independent");
@@ -93,7 +94,12 @@ impl System {
             .collect();
         let period = machine.period();
         let length = machine.length_scale();
-        let mut system = System {
+        let kick = |gap: usize| {
+            let mut kick = [0.0; SIZE];
+            (0..n).for_each(|i| kick[i] = mobility[(i, gap)] / mobility[(gap, gap)]);
+            kick
+        };
+        let mut frame = Frame {
             n,
             period,
             length,
@@ -101,6 +107,7 @@ impl System {
             escape: f64::INFINITY,
             orders: machine.drives.iter().map(|drive| f64::from(drive.order)).collect(),
             drives: machine.drives.iter().map(|drive| [&back * &drive.cos, &back * &drive.sin]).collect(),
+            kicks: (0..machine.gaps.len()).map(kick).collect(),
             schedule: machine.schedule.iter().map(|&(turns, stage)| (turns * period, stage)).collect(),
             to_flow,
             from_flow,
@@ -109,15 +116,14 @@ impl System {
             mass_scale,
             stages,
             elements,
-            domains: Arc::default(),
             machine,
         };
-        let rates = system.stages.iter().map(|forces| system.rate(&forces.stiffness, &forces.damping));
-        system.speed = length * rates.fold(0.0, f64::max);
-        if system.can_grow() {
-            system.escape = system.machine.escape();
+        let rates = frame.stages.iter().map(|forces| frame.rate(&forces.stiffness, &forces.damping));
+        frame.speed = length * rates.fold(0.0, f64::max);
+        if frame.can_grow() {
+            frame.escape = frame.machine.escape();
         }
-        system
+        frame
     }
 
     /// Whether energy can grow without the force.
@@ -165,10 +171,9 @@ impl System {
         &self.machine.gaps[gap].walls[side.index()]
     }
 
-    /// Returns the number of walls of a side behind which motion continues.
-    pub(super) fn passable(&self, gap: usize, side: Side) -> usize {
-        let walls = self.walls(gap, side);
-        walls.iter().filter(|wall| wall.contact.is_elastic()).count()
+    /// Returns the last wall of a side on which there is one.
+    pub(super) fn last_wall(&self, gap: usize, side: Side) -> &Wall {
+        self.walls(gap, side).last().expect("there is a wall on this side")
     }
 
     /// Returns the last wall of a side if it only pushes, and its force differs from that of a wall that may pull.
@@ -176,15 +181,6 @@ impl System {
         let last = self.walls(gap, side).last()?;
         let differs = last.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
         (last.contact == Contact::Pushing && differs).then_some(last)
-    }
-
-    /// Returns the domain of a combination of modes, and builds it if it is the first time.
-    pub(super) fn domain(&self, key: DomainKey) -> Arc<Domain> {
-        if let Some(domain) = self.domains.read().expect("no builder panics").get(&key.code()) {
-            return Arc::clone(domain);
-        }
-        let domain = Arc::new(Domain::new(self, key));
-        self.domains.write().expect("no builder panics").entry(key.code()).or_insert(domain).clone()
     }
 
     /// Converts a state `(x1, v1, ...)` to `(d1 .. dn, w1 .. wn)`.
@@ -225,25 +221,22 @@ impl System {
         2 * self.n + 2 * self.orders.len() + 1
     }
 
-    /// Returns cosine and sine of all harmonics at a time since phase 0.
-    pub(super) fn phasors(&self, t: f64) -> Phasors {
-        let mut phasors = [[0.0; 2]; MOST_HARMONICS + 1];
+    /// Completes a state to a point, at a time since phase 0.
+    pub(super) fn point(&self, y: &[f64], t: f64) -> Point {
+        let mut point = [0.0; super::WIDTH];
+        point[..2 * self.n].copy_from_slice(&y[..2 * self.n]);
+        point[self.width() - 1] = 1.0;
+        self.set_phasors(&mut point, t);
+        point
+    }
+
+    /// Sets cosine and sine of all harmonics of a point, at a time since phase 0.
+    pub(super) fn set_phasors(&self, point: &mut Point, t: f64) {
+        let (phasors, _) = point[2 * self.n..].as_chunks_mut();
         for (phasor, order) in phasors.iter_mut().zip(&self.orders) {
             let (sin, cos) = (order * self.machine.omega * t).sin_cos();
             *phasor = [cos, sin];
         }
-        phasors
-    }
-
-    /// Completes a state to a point.
-    pub(super) fn point(&self, y: &[f64], phasors: &Phasors) -> Point {
-        let mut point = [0.0; super::WIDTH];
-        let states = 2 * self.n;
-        point[..states].copy_from_slice(&y[..states]);
-        let (phases, _) = point[states..].as_chunks_mut();
-        phases.iter_mut().zip(phasors).take(self.orders.len()).for_each(|(phase, phasor)| *phase = *phasor);
-        point[self.width() - 1] = 1.0;
-        point
     }
 }
 

@@ -3,9 +3,10 @@
 //! A point is listed as `(d1, w1, d2, w2, ..., cos and sin of each harmonic, 1)`.
 
 use super::domain::{Domain, DomainKey, Row};
+use super::domains::System;
 use super::modes::GapMode;
 use super::motion::Motion;
-use super::system::System;
+use super::system::{Element, Frame};
 use super::{Numbers, SIZE};
 use crate::model::{Contact, MOST_GAPS, Oscillator, Side};
 use crate::motion::{Slip, Slips};
@@ -67,7 +68,7 @@ fn gap_code(mode: GapMode) -> u32 {
     }
 }
 
-impl System {
+impl Frame {
     /// Returns the modes of a gap that domains distinguish: the walls whose springs act, from the left to the right, then rest on a rigid wall
     /// on the right and on the left.
     fn modes_of_gap(&self, gap: usize) -> Vec<(i8, Option<Side>)> {
@@ -134,7 +135,7 @@ impl System {
 
     /// Returns the row of the sliding rate of each element with friction, and its friction force.
     pub fn sliding_rates(&self) -> Vec<(Vec<f64>, f64)> {
-        let row = |element: &super::system::Element| {
+        let row = |element: &Element| {
             let mut point = [0.0; super::WIDTH];
             (0..self.n).for_each(|j| point[self.n + j] = element.row[j]);
             point[self.width() - 1] = -element.speed;
@@ -160,7 +161,7 @@ impl System {
     }
 
     /// Lists displacements and rates in turn.
-    fn in_turn(&self, y: &Numbers) -> Numbers {
+    fn in_turn(&self, y: &[f64]) -> Numbers {
         let mut listed = [0.0; SIZE];
         for i in 0..self.n {
             (listed[2 * i], listed[2 * i + 1]) = (y[i], y[self.n + i]);
@@ -171,11 +172,6 @@ impl System {
     /// Whether a wall only pushes, and its force differs from that of a wall that may pull.
     pub fn is_pushing(&self, gap: usize, side: Side) -> bool {
         self.pushing(gap, side).is_some()
-    }
-
-    /// Returns the modes and the state of a start, for the state `(x1, v1, ...)`.
-    pub fn start(&self, state: &[f64]) -> StartModes {
-        Motion::new(self, state).start_modes()
     }
 
     /// Converts a state `(d1, w1, ...)` of the flow's coordinates to `(x1, v1, ...)`.
@@ -193,27 +189,32 @@ impl System {
     }
 }
 
+impl System {
+    /// Returns the modes and the state of a start, for the state `(x1, v1, ...)`.
+    pub fn start(&self, state: &[f64]) -> StartModes {
+        Motion::new(self, state).start_modes()
+    }
+}
+
 impl Motion<'_> {
     fn start_modes(&self) -> StartModes {
-        let (system, y) = (self.system(), self.flow_state());
+        let system = self.system();
         let side = |side: Option<Side>| side.map_or(2, side_code);
-        let modes = self.modes();
-        let state = system.in_turn(y);
         let slip =
             |slip: Slip| Slip::ALL.iter().position(|&other| other == slip).expect("all are listed") as u32;
-        let (from_force, from_rate) = self.root_orders();
         let of_lanes = |order: usize| order.min(MOST_ORDER_OF_LANES) as u32;
         StartModes {
-            state,
-            gaps: modes.gaps.map(gap_code),
-            slips: modes.slips.map(slip),
-            stage: modes.stage as u32,
-            origins: self.origins().map(side),
+            state: system.in_turn(&self.point),
+            gaps: self.modes.gaps.map(gap_code),
+            slips: self.modes.slips.map(slip),
+            stage: self.modes.stage as u32,
+            origins: self.origin.map(side),
             walls: self
-                .walls_at()
+                .roots
+                .at_wall
                 .map(|at| at.map_or((2, 0), |(side, order)| (side_code(side), of_lanes(order)))),
-            from_force: from_force.map(of_lanes),
-            from_rate: from_rate.map(of_lanes),
+            from_force: self.roots.from_force.map(of_lanes),
+            from_rate: self.roots.from_rate.map(of_lanes),
         }
     }
 }

@@ -100,6 +100,11 @@ pub trait Observer {
     /// Receives one event at a wall.
     fn event(&mut self, event: &GapEvent, states: States<'_>);
 
+    /// Whether the events of machines at walls are to be reported.
+    fn sees_events(&self) -> bool {
+        true
+    }
+
     /// Receives one change of a friction mode.
     fn slip(&mut self, _: &SlipEvent) {}
 
@@ -113,6 +118,10 @@ pub trait Observer {
 impl Observer for () {
     #[inline]
     fn event(&mut self, _: &GapEvent, _: States<'_>) {}
+
+    fn sees_events(&self) -> bool {
+        false
+    }
 }
 
 impl Observer for Vec<GapEvent> {

@@ -1,0 +1,104 @@
+//! A machine with the domains that its motions have met.
+
+use std::ops::Deref;
+use std::sync::{Arc, OnceLock};
+
+use super::domain::{Domain, DomainKey};
+use super::modes::{AtRest, GapMode, Modes};
+use super::system::Frame;
+use super::{Point, ROUNDING};
+use crate::model::{MOST_STAGES, Oscillator};
+use crate::motion::Slip;
+
+/// A machine, prepared for its motions. They share the domains that they have met.
+#[derive(Clone, Debug)]
+pub struct System {
+    frame: Frame,
+    /// A list for each stage.
+    domains: Arc<[Domains; MOST_STAGES]>,
+}
+
+/// A list of domains, which grows at its end. To search it takes no lock.
+type Domains = OnceLock<Box<Met>>;
+
+#[derive(Debug)]
+struct Met {
+    key: DomainKey,
+    domain: Domain,
+    next: Domains,
+}
+
+impl Deref for System {
+    type Target = Frame;
+
+    fn deref(&self) -> &Frame {
+        &self.frame
+    }
+}
+
+impl System {
+    /// Prepares a machine that [`Oscillator::validate`] accepts.
+    pub fn new(machine: &Oscillator) -> System {
+        System { frame: Frame::new(machine), domains: Arc::default() }
+    }
+
+    /// Returns the domain of a combination of modes, and builds it if it is the first time.
+    pub(super) fn domain(&self, modes: &Modes) -> &Domain {
+        let key = modes.key(self);
+        let mut place = &self.domains[key.stage];
+        loop {
+            let build = || Box::new(Met { key, domain: Domain::new(self, key), next: OnceLock::new() });
+            let met = place.get_or_init(build);
+            if met.key == key {
+                return &met.domain;
+            }
+            place = &met.next;
+        }
+    }
+
+    /// Whether the modes of the elements at rest fit the forces at a point.
+    pub(super) fn is_consistent(&self, modes: &Modes, at_rest: &AtRest, point: &Point) -> bool {
+        if *at_rest == AtRest::default() {
+            return true;
+        }
+        let domain = self.domain(modes);
+        let gaps = (0..self.gaps()).all(|gap| {
+            let Some(side) = at_rest.gaps[gap] else { return true };
+            match &domain.pushes[gap] {
+                Some(push) => domain.first_derivative(push, point, 0).1 > 0.0,
+                // The gap leaves the wall, or friction holds it there.
+                None => side.sign() * domain.departure(gap, point).1 <= 0.0,
+            }
+        });
+        gaps && (0..self.elements.len()).filter(|&i| at_rest.elements[i]).all(|i| match modes.slips[i] {
+            Slip::Stick => domain.holds[i].as_ref().is_none_or(|hold| {
+                let [value, size] = hold.value_and_size(point);
+                value.abs() <= self.elements[i].force + ROUNDING * size
+            }),
+            slip => slip.sign() * domain.first_derivative(&self.rate_row(i), point, 1).1 > 0.0,
+        })
+    }
+
+    /// Returns the first consistent combination of modes: walls hold before they let go, elements stick before they slide.
+    pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &Point) -> Option<Modes> {
+        let gaps = || (0..self.gaps()).filter_map(|gap| Some((gap, at_rest.gaps[gap]?)));
+        let elements = || (0..self.elements.len()).filter(|&i| at_rest.elements[i]);
+        let combinations = Slip::ALL.len().pow(elements().count() as u32) << gaps().count();
+        (0..combinations)
+            .map(|mut number| {
+                let mut tried = *modes;
+                for i in elements().rev() {
+                    tried.slips[i] = Slip::ALL[number % Slip::ALL.len()];
+                    number /= Slip::ALL.len();
+                }
+                for (gap, side) in gaps() {
+                    let is_held = number % 2 == 0;
+                    let free = self.before_last(gap, side);
+                    tried.gaps[gap] = if is_held { GapMode::Stuck(side) } else { free };
+                    number /= 2;
+                }
+                tried
+            })
+            .find(|tried| self.is_consistent(tried, at_rest, point))
+    }
+}

@@ -1,0 +1,198 @@
+//! What an impact leads to: the jump of all rates, and the modes after it.
+
+use super::domain::Domain;
+use super::domains::System;
+use super::modes::{AtRest, GapMode, Modes};
+use super::{Numbers, Point, ROUNDING, SIZE};
+use crate::model::{Contact, MOST_GAPS, Side, Wall};
+use crate::motion::Slip;
+
+/// Height of a flight, relative to the scale of length, that is not followed in a series of impacts.
+pub const LOWEST_FLIGHT: f64 = 1e-13;
+
+/// An impact of a gap on the last wall of a side.
+pub(super) struct Impact<'a> {
+    pub(super) system: &'a System,
+    /// Modes and point before the impact.
+    pub(super) modes: &'a Modes,
+    pub(super) point: &'a Point,
+    pub(super) gap: usize,
+    pub(super) side: Side,
+    pub(super) wall: &'a Wall,
+    /// Speed towards the wall.
+    pub(super) approach: f64,
+}
+
+/// What an impact leads to.
+pub(super) struct Outcome {
+    /// Modes and point after the impact.
+    pub(super) modes: Modes,
+    pub(super) point: Point,
+    /// Whether contact lasts.
+    pub(super) lasts: bool,
+    /// Acceleration towards the wall, in free motion after the impact, or its first derivative that is not 0.
+    pub(super) pressing: f64,
+    /// Derivatives of the jumps of all rates by the gap's rate before the impact.
+    pub(super) jump: Numbers,
+}
+
+/// Changes of all rates by an impulse that changes the gap's rate by 1, and which gaps at rest leave their rigid walls.
+type Kick = (Numbers, [bool; MOST_GAPS]);
+
+impl Impact<'_> {
+    /// Returns the leaving speed of a flight that is not followed in a series of impacts.
+    fn lowest_speed(&self, domain: &Domain, gap: usize, point: &Point) -> f64 {
+        let pressing = domain.accelerations[gap].dot(point).abs();
+        (2.0 * LOWEST_FLIGHT * self.system.length * pressing).sqrt()
+    }
+
+    /// Returns what the impact leads to. Gaps with too low a flight stay at rest. Otherwise the impacts of two gaps might alternate for ever.
+    pub(super) fn outcome(&self) -> Outcome {
+        let (system, n) = (self.system, self.system.n);
+        let mut kept = [false; MOST_GAPS];
+        loop {
+            let kick = self.joint_impact(kept);
+            let outcome = self.outcome_of(&kick);
+            let low = (0..system.gaps()).filter(|&other| kick.1[other]).find(|&other| {
+                let GapMode::Stuck(side) = self.modes.gaps[other] else { return false };
+                let (domain, point) = (system.domain(&outcome.modes), &outcome.point);
+                side.sign() * domain.departure(other, point).1 > 0.0
+                    && -side.sign() * point[n + other] <= self.lowest_speed(domain, other, point)
+            });
+            match low {
+                Some(other) => kept[other] = true,
+                None => return outcome,
+            }
+        }
+    }
+
+    /// Returns what the impact leads to, given the changes of all rates, and which gaps at rest it lets go.
+    fn outcome_of(&self, (kick, let_go): &Kick) -> Outcome {
+        let (system, n, gap, side) = (self.system, self.system.n, self.gap, self.side);
+        let [e, slope] = self.wall.restitution.at(self.approach);
+        let leaving = e * self.approach;
+        let after = |change: f64, rate: f64| {
+            let mut point = *self.point;
+            (0..n).for_each(|i| point[n + i] += kick[i] * change);
+            point[n + gap] = rate;
+            point
+        };
+        let mut modes = *self.modes;
+        for other in (0..system.gaps()).filter(|&other| let_go[other]) {
+            let GapMode::Stuck(side) = modes.gaps[other] else { continue };
+            modes.gaps[other] = system.before_last(other, side);
+        }
+        let bounced = after(-side.sign() * (1.0 + e) * self.approach, -side.sign() * leaving);
+        let (free, _) = self.slide_after_jump(&modes, kick, &bounced, None);
+        let domain = system.domain(&free);
+        let pressing = side.sign() * domain.departure(gap, &bounced).1;
+        let is_slow = leaving <= self.wall.mesh_speed.max(self.lowest_speed(domain, gap, &bounced));
+        let outcome = |modes, point, lasts, factor: f64| Outcome {
+            modes,
+            point,
+            lasts,
+            pressing,
+            jump: kick.map(|kick| kick * factor),
+        };
+        let factor = 1.0 + e + slope * self.approach;
+        if is_slow && self.wall.contact == Contact::Rigid {
+            let stopped = after(-side.sign() * self.approach, 0.0);
+            modes.gaps[gap] = GapMode::Stuck(side);
+            let (held, fits) = self.slide_after_jump(&modes, kick, &stopped, Some(side));
+            if fits && held.gaps[gap] == GapMode::Stuck(side) {
+                return outcome(held, stopped, true, 1.0);
+            }
+        } else if is_slow && pressing > 0.0 {
+            let mut meshing = free;
+            meshing.gaps[gap] = if leaving > 0.0 { GapMode::Onset(side) } else { GapMode::Pressed(side) };
+            if side.sign() * system.domain(&meshing).departure(gap, &bounced).1 > 0.0 {
+                return outcome(meshing, bounced, true, factor);
+            }
+        }
+        outcome(free, bounced, false, factor)
+    }
+
+    /// Returns the kick while other gaps rest on rigid walls. Those stay at rest whose walls push, and those in `kept`.
+    fn joint_impact(&self, kept: [bool; MOST_GAPS]) -> Kick {
+        let none = [false; MOST_GAPS];
+        let mut resting = self.modes.gaps.map(GapMode::rest);
+        resting[self.gap] = None;
+        if resting == [None; MOST_GAPS] {
+            return (self.system.kicks[self.gap], none);
+        }
+        let own = |gap: usize| self.system.mobility[(gap, gap)];
+        let choices = (0..1 << MOST_GAPS).map(|bits| std::array::from_fn(|other| bits >> other & 1 == 1));
+        let is_possible = |let_go: &[bool; MOST_GAPS]| {
+            resting.iter().zip(let_go).all(|(side, &let_go)| side.is_some() || !let_go)
+        };
+        for let_go in choices.filter(is_possible) {
+            let (kick, pushes) = self.kick(|other| resting[other].is_some() && !let_go[other]);
+            let fits = |other: usize| {
+                let Some(at) = resting[other] else { return true };
+                let sign = -self.side.sign() * at.sign();
+                let least = -ROUNDING * (own(self.gap) / own(other)).sqrt();
+                match let_go[other] {
+                    true => !kept[other] && sign * kick[other] <= 0.0,
+                    false => kept[other] || sign * pushes[other] >= least,
+                }
+            };
+            if (0..self.system.gaps()).all(fits) {
+                return (kick, let_go);
+            }
+        }
+        (self.kick(|other| resting[other].is_some()).0, none)
+    }
+
+    /// Returns the changes of all rates by an impulse that changes the gap's rate by 1, while walls hold other gaps, and the impulses of these
+    /// walls relative to that on the gap. At most two gaps are held.
+    fn kick(&self, is_held: impl Fn(usize) -> bool) -> (Numbers, [f64; MOST_GAPS]) {
+        let (gap, m) = (self.gap, |i, j| self.system.mobility[(i, j)]);
+        let mut pushes = [0.0; MOST_GAPS];
+        let mut held = (0..MOST_GAPS).filter(|&other| is_held(other));
+        match [held.next(), held.next()] {
+            [Some(a), Some(b)] => {
+                let (share, next) = (m(a, b) / m(a, a), m(b, gap) - m(a, b) * (m(a, gap) / m(a, a)));
+                pushes[b] = next / (m(b, b) - m(a, b) * share);
+                pushes[a] = m(a, gap) / m(a, a) - share * pushes[b];
+            }
+            [Some(a), None] => pushes[a] = m(a, gap) / m(a, a),
+            _ => {}
+        }
+        let mut kick = [0.0; SIZE];
+        for i in (0..self.system.n).filter(|&i| i >= MOST_GAPS || !is_held(i)) {
+            let held = (0..self.system.gaps()).filter(|&other| is_held(other));
+            kick[i] = m(i, gap) - held.map(|other| m(i, other) * pushes[other]).sum::<f64>();
+        }
+        (kick.map(|change| change / kick[gap]), pushes)
+    }
+
+    /// Chooses modes of friction, and of other gaps at rest, after a jump of the rates to those of a point; `stopped` is the side of the gap
+    /// if it stops. Returns whether there is a consistent choice.
+    fn slide_after_jump(
+        &self,
+        modes: &Modes,
+        kick: &Numbers,
+        point: &Point,
+        stopped: Option<Side>,
+    ) -> (Modes, bool) {
+        let (system, n) = (self.system, self.system.n);
+        let (mut modes, jumps) = (*modes, point != self.point);
+        let mut at_rest = AtRest { gaps: modes.gaps.map(GapMode::rest), ..AtRest::default() };
+        at_rest.gaps[self.gap] = stopped.or(at_rest.gaps[self.gap]);
+        for (i, element) in system.elements.iter().enumerate() {
+            let moves = element.row.iter().zip(kick).map(|(row, kick)| row * kick);
+            let (moved, size) = moves.fold((0.0, 0.0), |(sum, size), x: f64| (sum + x, size + x.abs()));
+            if jumps && moved.abs() > 1e-12 * size {
+                let [rate, size] = element.rate_and_size(&point[n..]);
+                at_rest.elements[i] = rate.abs() <= ROUNDING * size;
+                modes.slips[i] = if at_rest.elements[i] { Slip::Stick } else { Slip::of(rate) };
+            } else {
+                at_rest.elements[i] = modes.slips[i] == Slip::Stick;
+            }
+        }
+        match system.consistent(&modes, &at_rest, point) {
+            Some(chosen) => (chosen, true),
+            None => (modes, false),
+        }
+    }
+}

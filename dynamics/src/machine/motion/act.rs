@@ -1,0 +1,263 @@
+//! What happens at the root of a watch: contacts, impacts, and their reports.
+
+use super::Motion;
+use crate::machine::domain::STAYS_ZERO;
+use crate::machine::impact::{Impact, Outcome};
+use crate::machine::modes::{AtRest, GapMode, signed};
+use crate::machine::watch::Watch;
+use crate::model::{Side, Wall};
+use crate::motion::{
+    EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, GapEvent, NO_SPEED, Observer, SlipEvent,
+};
+use crate::word;
+
+/// Order of the root of the distance when the gap leaves a rigid wall: its acceleration is zero, the derivative is not.
+pub(super) const RELEASE_ORDER: usize = 3;
+
+impl Motion<'_> {
+    /// Processes the root of a watch.
+    pub(super) fn act(&mut self, watch: Watch, observer: &mut dyn Observer) {
+        let mut exempt = AtRest::default();
+        match watch {
+            Watch::Wall(gap, direction) => {
+                if let GapMode::Onset(side) = self.modes.gaps[gap] {
+                    self.end_contact(gap, side, observer);
+                }
+                self.reach(gap, direction, observer);
+            }
+            Watch::OnsetEnds(gap, side) => {
+                self.modes.gaps[gap] = GapMode::Pressed(side);
+                self.roots.at_wall[gap] = Some((side.mirrored(), 1));
+                return;
+            }
+            Watch::PressingEnds(gap, side) => {
+                self.end_contact(gap, side, observer);
+                self.roots.at_wall[gap] = None;
+            }
+            Watch::Leaves(gap, side) if self.modes.gaps[gap] == GapMode::Open(side) => {
+                self.modes.gaps[gap] = self.system.before_last(gap, side);
+                if side.sign() * self.rate(gap) < 0.0 {
+                    self.leave(gap, side);
+                } else {
+                    self.reach(gap, side, observer);
+                }
+            }
+            Watch::Leaves(gap, side) => {
+                self.end_contact(gap, side, observer);
+                self.leave(gap, side);
+            }
+            Watch::ForceEnds(gap, side) => {
+                self.end_contact(gap, side, observer);
+                self.modes.gaps[gap] = GapMode::Open(side);
+                self.roots.from_force[gap] = self.derivative_of_force(gap, side, 1).0;
+            }
+            Watch::ForceBegins(gap, side) => self.begin_force(gap, side, observer),
+            Watch::PushEnds(gap, side) => {
+                self.end_contact(gap, side, observer);
+                self.roots.at_wall[gap] = Some((side, RELEASE_ORDER));
+                exempt.gaps[gap] = Some(side);
+            }
+            Watch::RateVanishes(i) => self.end_sliding(i, observer),
+            Watch::Slips(i, next) => {
+                self.begin_sliding(i, next, observer);
+                exempt.elements[i] = true;
+            }
+        }
+        self.settle(&exempt, observer);
+        for gap in 0..self.system.gaps() {
+            if let Some((side, STAYS_ZERO)) = self.roots.at_wall[gap] {
+                self.leave(gap, side);
+            }
+        }
+    }
+
+    /// Begins contact with a wall that only pushes, whose force is 0 now.
+    pub(super) fn begin_force(&mut self, gap: usize, side: Side, observer: &mut dyn Observer) {
+        let count = self.system.walls(gap, side).len();
+        self.record(gap, EventKind::MeshStart, side, count - 1, Some(side), observer);
+        self.modes.gaps[gap] = GapMode::Beyond(signed(side, count));
+        self.roots.from_force[gap] = self.derivative_of_force(gap, side, 1).0;
+    }
+
+    /// Returns order and value of the first derivative of a pushing wall's force that is not 0, as `Domain::first_derivative`.
+    pub(super) fn derivative_of_force(&mut self, gap: usize, side: Side, first: usize) -> (usize, f64) {
+        let force = self.system.force(self.modes.stage, gap, side);
+        self.refresh().first_derivative(&force, &self.point, first)
+    }
+
+    /// Ends a lasting contact with the last wall of a side.
+    pub(super) fn end_contact(&mut self, gap: usize, side: Side, observer: &mut dyn Observer) {
+        let next = self.system.before_last(gap, side);
+        let last = self.system.walls(gap, side).len() - 1;
+        self.record(gap, EventKind::MeshEnd, side, last, next.contact(), observer);
+        self.modes.gaps[gap] = next;
+    }
+
+    /// Notes that a gap lies on the wall in a direction, and does not pass it.
+    pub(super) fn leave(&mut self, gap: usize, direction: Side) {
+        let order = if self.rate(gap) != 0.0 { 1 } else { self.refresh().departure(gap, &self.point).0 };
+        self.roots.at_wall[gap] = Some((direction, order));
+    }
+
+    /// Whether a gap at rest begins to move in a direction.
+    pub(super) fn heads(&mut self, gap: usize, direction: Side) -> bool {
+        direction.sign() * self.refresh().departure(gap, &self.point).1 > 0.0
+    }
+
+    /// Processes a gap that reaches a wall in a direction.
+    fn reach(&mut self, gap: usize, direction: Side, observer: &mut dyn Observer) {
+        let Some((side, number)) = self.system.wall_ahead(&self.modes, gap, direction) else { return };
+        let wall = &self.system.walls(gap, side)[number];
+        self.point[gap] = wall.at;
+        let closing = direction.sign() * self.rate(gap);
+        if closing < 0.0 || closing == 0.0 && !self.heads(gap, direction) {
+            self.leave(gap, direction);
+            return;
+        }
+        let is_tiny = 0.0 < closing && closing < NO_SPEED * self.system.speed;
+        let pressing =
+            |motion: &mut Self| direction.sign() * motion.refresh().accelerations[gap].dot(&motion.point);
+        if is_tiny && !wall.contact.is_elastic() && pressing(self) <= 0.0 {
+            // Impacts of two gaps in turn end here: both leave their walls from rest.
+            self.point[self.system.n + gap] = 0.0;
+            self.near_grazing = true;
+            self.count_event();
+            self.leave(gap, direction);
+            return;
+        }
+        let GapMode::Beyond(passed) = self.modes.gaps[gap] else { return };
+        let step = if direction == Side::Right { 1 } else { -1 };
+        if side != direction {
+            let next = GapMode::Beyond(passed + step);
+            self.record(gap, EventKind::MeshEnd, side, number, next.contact(), observer);
+            self.modes.gaps[gap] = next;
+            self.leave(gap, side);
+        } else if wall.contact.is_elastic() {
+            let is_last = number + 1 == self.system.walls(gap, side).len();
+            if is_last
+                && self.system.pushing(gap, side).is_some()
+                && self.derivative_of_force(gap, side, 0).1 <= 0.0
+            {
+                self.modes.gaps[gap] = GapMode::Open(side);
+                self.leave(gap, side.mirrored());
+                self.start_from_force(gap, side);
+                return;
+            }
+            self.record(gap, EventKind::MeshStart, side, number, Some(side), observer);
+            self.modes.gaps[gap] = GapMode::Beyond(passed + step);
+            let spring = wall.springs[self.modes.stage];
+            if closing == 0.0 && spring.preload != 0.0 && !self.heads(gap, side) {
+                // Rest on the wall under a load below the preload is an infinite series of contacts.
+                self.events_in_period = EVENTS_PER_PERIOD_CAP;
+            }
+            self.near_grazing |= spring.preload != 0.0 && closing < GRAZING_SPEED * self.system.speed;
+            self.leave(gap, side.mirrored());
+            self.start_from_force(gap, side);
+        } else {
+            self.impact(gap, side, wall, observer);
+        }
+    }
+
+    /// Notes the order of the root of a force at a flight's start.
+    pub(super) fn start_from_force(&mut self, gap: usize, side: Side) {
+        if self.system.pushing(gap, side).is_some() {
+            self.roots.from_force[gap] = self.derivative_of_force(gap, side, 0).0;
+        }
+    }
+
+    /// Processes an impact, after which the gap leaves the wall, or a lasting contact begins.
+    fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut dyn Observer) {
+        let (system, approach) = (self.system, side.sign() * self.rate(gap));
+        let (modes, point) = (&self.modes, &self.point);
+        let impact = Impact { system, modes, point, gap, side, wall, approach };
+        let Outcome { modes: next, point, lasts, pressing, jump } = impact.outcome();
+        if !lasts && pressing <= 0.0 && approach < GRAZING_SPEED * system.speed {
+            self.near_grazing = true;
+        }
+        self.jumps.push((gap, jump));
+        self.point = point;
+        let (kind, meshing) = if lasts {
+            (EventKind::MeshStart, Some(side))
+        } else {
+            self.work.impacts += 1;
+            (EventKind::Impact, system.before_last(gap, side).contact())
+        };
+        self.record(gap, kind, side, system.walls(gap, side).len() - 1, meshing, observer);
+        self.modes.gaps[gap] = next.gaps[gap];
+        self.change_modes(&next, None, observer);
+        match next.gaps[gap] {
+            GapMode::Stuck(_) => self.roots.at_wall[gap] = None,
+            GapMode::Pressed(_) => self.leave(gap, side.mirrored()),
+            _ => self.leave(gap, side),
+        }
+        self.before = self.point;
+    }
+
+    pub(super) fn count_event(&mut self) {
+        self.work.events += 1;
+        self.events_in_period += 1;
+    }
+
+    /// Counts and reports an event at a wall. The modes are those before it.
+    pub(super) fn record(
+        &mut self,
+        gap: usize,
+        kind: EventKind,
+        side: Side,
+        wall: usize,
+        meshing: Option<Side>,
+        observer: &mut dyn Observer,
+    ) {
+        let origin = self.origin[gap].replace(side);
+        self.count_event();
+        if !observer.sees_events() {
+            return;
+        }
+        let of_contact = |side: Side| if side == Side::Right { b'1' } else { b'4' };
+        let mode = match self.modes.gaps[gap] {
+            GapMode::Open(side) => self.system.before_last(gap, side),
+            mode => mode,
+        };
+        let symbol = match (mode.contact(), origin) {
+            (Some(side), _) => Some(of_contact(side)),
+            (None, None) => None,
+            (None, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
+            (None, Some(Side::Left)) => Some(if side == Side::Left { b'5' } else { b'6' }),
+        };
+        // With several gaps, a symbol tells its gap.
+        let several = self.system.gaps() > 1;
+        let symbol = symbol.map(|symbol| if several { word::of_gap(symbol, gap) } else { symbol });
+        let n = self.system.n;
+        let place = &self.system.walls(gap, side)[wall];
+        let is_on_wall = self.before[gap] == place.at;
+        let of_wall = 1 + u64::from(side == Side::Right) + 2 * u64::from(is_on_wall);
+        let event = GapEvent {
+            gap,
+            kind,
+            side,
+            symbol,
+            period: self.period,
+            t: self.clock.time(),
+            before: [self.before[gap], self.before[n + gap], 0.0, 0.0],
+            after: [self.point[gap], self.point[n + gap], 0.0, 0.0],
+            meshing,
+            has_impact: !place.contact.is_elastic() && kind != EventKind::MeshEnd,
+            code: of_wall + 4 * kind as u64 + 256 * (gap + 4 * wall) as u64,
+            interval: 0,
+            ends_series: false,
+        };
+        observer.event(&event, &|| [self.system.to_state(&self.before), self.state()]);
+    }
+
+    /// Counts and reports a change of friction modes.
+    pub(super) fn record_slip(&mut self, symbol: Option<u8>, observer: &mut dyn Observer) {
+        self.count_event();
+        observer.slip(&SlipEvent {
+            slips: self.modes.slips,
+            symbol,
+            period: self.period,
+            t: self.clock.time(),
+            at: self.state(),
+        });
+    }
+}

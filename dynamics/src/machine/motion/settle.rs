@@ -1,0 +1,235 @@
+//! Modes that forces decide: of friction, of gaps at rest, of contact onsets, and of walls that only push.
+
+use super::Motion;
+use super::act::RELEASE_ORDER;
+use crate::machine::modes::{AtRest, GapMode, Modes};
+use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side};
+use crate::motion::Slip;
+use crate::motion::{EventKind, Observer};
+
+/// Decisions on elements at rest after one event.
+const MOST_DECISIONS: usize = 16;
+
+impl Motion<'_> {
+    /// Processes a sliding rate that vanishes.
+    pub(super) fn end_sliding(&mut self, i: usize, observer: &mut dyn Observer) {
+        let mut at_rest = self.at_rest();
+        at_rest.elements[i] = true;
+        let before = self.modes.slips[i];
+        let chosen = self.system.consistent(&self.modes, &at_rest, &self.point);
+        let next = chosen.unwrap_or(self.modes);
+        if next.slips[i] == before {
+            // The rate only touches 0, or begins on the wrong side of it.
+            self.near_grazing = true;
+            self.count_event();
+            self.roots.from_rate[i] = self.slide_order(i);
+            return;
+        }
+        self.change_modes(&next, Some(i), observer);
+    }
+
+    /// Returns the order of the root of a sliding rate.
+    pub(super) fn slide_order(&mut self, i: usize) -> usize {
+        self.refresh().first_derivative(&self.system.rate_row(i), &self.point, 1).0
+    }
+
+    /// Processes an element that breaks away.
+    pub(super) fn begin_sliding(&mut self, i: usize, next: Slip, observer: &mut dyn Observer) {
+        let system = self.system;
+        let kept: [bool; MOST_GAPS] =
+            std::array::from_fn(|gap| gap < system.gaps() && self.moment().is_kept(gap));
+        let before = self.modes;
+        self.modes.slips[i] = next;
+        let domain = self.refresh();
+        let freed = || (0..system.gaps()).filter(|&gap| kept[gap] && !domain.is_still[gap]);
+        for gap in freed() {
+            if let (Some((side, _)), GapMode::Beyond(_)) = (self.roots.at_wall[gap], self.modes.gaps[gap])
+                && let Some((own, number)) = self.system.wall_ahead(&self.modes, gap, side)
+                && own == side
+                && self.system.walls(gap, side)[number].contact == Contact::Rigid
+                && side.sign() * domain.first_derivative(&domain.unit_row(gap), &self.point, 3).1 > 0.0
+            {
+                // The wall holds the gap from here on.
+                self.modes = before;
+                self.record(gap, EventKind::MeshStart, side, number, Some(side), observer);
+                self.modes.gaps[gap] = GapMode::Stuck(side);
+                self.roots.at_wall[gap] = None;
+                return;
+            }
+        }
+        self.roots.from_rate[i] = 2;
+        self.has_slid[i] = true;
+        self.record_slip(Some(b'7'), observer);
+        for gap in freed() {
+            self.roots.at_wall[gap] = self.roots.at_wall[gap].map(|(side, _)| (side, RELEASE_ORDER));
+            if let GapMode::Onset(_) = self.modes.gaps[gap] {
+                self.roots.from_force[gap] = 1;
+            }
+        }
+    }
+
+    /// Returns all elements at rest: gaps on rigid walls, and elements that stick.
+    fn at_rest(&self) -> AtRest {
+        let mut at_rest = AtRest::default();
+        for gap in 0..self.system.gaps() {
+            at_rest.gaps[gap] = match (self.modes.gaps[gap], self.roots.at_wall[gap]) {
+                (GapMode::Beyond(_), Some((side, _))) if self.moment().is_kept(gap) => {
+                    let ahead = self.system.wall_ahead(&self.modes, gap, side);
+                    let is_rigid =
+                        |number: usize| self.system.walls(gap, side)[number].contact == Contact::Rigid;
+                    ahead.is_some_and(|(own, number)| own == side && is_rigid(number)).then_some(side)
+                }
+                (mode, _) => mode.rest(),
+            };
+        }
+        for i in 0..self.system.elements.len() {
+            at_rest.elements[i] = self.modes.slips[i] == Slip::Stick;
+        }
+        at_rest
+    }
+
+    /// Decides all modes anew that depend on forces, after a jump of forces or rates. `exempt` has just been decided.
+    pub(super) fn settle(&mut self, exempt: &AtRest, observer: &mut dyn Observer) {
+        for _ in 0..MOST_DECISIONS {
+            self.refresh();
+            if self.settle_pushing(observer) {
+                continue;
+            }
+            let mut at_rest = self.at_rest();
+            for gap in 0..MOST_GAPS {
+                at_rest.gaps[gap] = at_rest.gaps[gap].filter(|_| exempt.gaps[gap].is_none());
+            }
+            for i in 0..MOST_FRICTION {
+                at_rest.elements[i] &= !exempt.elements[i];
+            }
+            if self.system.is_consistent(&self.modes, &at_rest, &self.point) {
+                break;
+            }
+            match self.system.consistent(&self.modes, &at_rest, &self.point) {
+                Some(chosen) => self.change_modes(&chosen, None, observer),
+                None => {
+                    self.near_grazing = true;
+                    break;
+                }
+            }
+        }
+        // A gap on its wall may have got another rate or acceleration.
+        for gap in 0..self.system.gaps() {
+            if let Some((side, order)) = self.roots.at_wall[gap]
+                && (order < RELEASE_ORDER || self.rate(gap) != 0.0)
+            {
+                self.leave(gap, side);
+            }
+        }
+    }
+
+    /// Decides contact onsets and walls that only push anew. Returns whether a mode has changed.
+    fn settle_pushing(&mut self, observer: &mut dyn Observer) -> bool {
+        for gap in 0..self.system.gaps() {
+            if self.roots.from_force[gap] > 0 {
+                continue;
+            }
+            let (domain, pushed) = (self.domain, self.system.pushed(&self.modes, gap));
+            let mode = self.modes.gaps[gap];
+            match mode {
+                GapMode::Onset(side)
+                    if !self.moment().is_kept(gap)
+                        && side.sign() * domain.departure(gap, &self.point).1 <= 0.0 =>
+                {
+                    self.end_contact(gap, side, observer);
+                    self.roots.at_wall[gap] = self.roots.at_wall[gap].map(|_| (side, 1));
+                    return true;
+                }
+                GapMode::Open(side) if self.derivative_of_force(gap, side, 0).1 > 0.0 => {
+                    self.begin_force(gap, side, observer);
+                    self.start_from_force(gap, side);
+                    return true;
+                }
+                GapMode::Beyond(_) => {
+                    let pulls = |side: &Side| self.derivative_of_force(gap, *side, 0).1 < 0.0;
+                    if let Some(side) = pushed.filter(pulls) {
+                        self.end_contact(gap, side, observer);
+                        self.modes.gaps[gap] = GapMode::Open(side);
+                        self.start_from_force(gap, side);
+                        return true;
+                    }
+                }
+                _ => {}
+            }
+        }
+        false
+    }
+
+    /// Enters other modes of elements at rest, and reports the changes: of friction first, if the rate of the element `stopped` vanished.
+    pub(super) fn change_modes(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut dyn Observer) {
+        if stopped.is_some() {
+            self.change_slips(next, stopped, observer);
+        }
+        for gap in 0..self.system.gaps() {
+            match (self.modes.gaps[gap], next.gaps[gap]) {
+                (GapMode::Stuck(side), GapMode::Beyond(_)) => {
+                    self.end_contact(gap, side, observer);
+                    self.roots.at_wall[gap] = Some((side, 1));
+                }
+                (GapMode::Beyond(_), GapMode::Stuck(side)) => {
+                    let last = self.system.walls(gap, side).len() - 1;
+                    self.record(gap, EventKind::MeshStart, side, last, Some(side), observer);
+                    self.roots.at_wall[gap] = None;
+                }
+                _ => {}
+            }
+            self.modes.gaps[gap] = next.gaps[gap];
+        }
+        if stopped.is_none() {
+            self.change_slips(next, stopped, observer);
+        }
+        self.refresh();
+        self.system.hold(&self.modes, &mut self.point, false);
+        for gap in 0..self.system.gaps() {
+            if let Some((side, 1)) = self.roots.at_wall[gap] {
+                self.leave(gap, side);
+            }
+        }
+        for i in 0..self.system.elements.len() {
+            if self.roots.from_rate[i] > 0 {
+                self.roots.from_rate[i] = self.slide_order(i);
+            }
+        }
+    }
+
+    /// Enters other modes of friction, and reports the changes.
+    fn change_slips(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut dyn Observer) {
+        let before = std::mem::replace(&mut self.modes.slips, next.slips);
+        for (i, (before, after)) in
+            before.into_iter().zip(next.slips).enumerate().take(self.system.elements.len())
+        {
+            if after == before {
+                continue;
+            }
+            self.has_slid[i] |= after != Slip::Stick;
+            let reverses = before != Slip::Stick && after != Slip::Stick;
+            // An element that has just stopped has a small rate, because its time has a rounding error.
+            let is_at_rest = stopped == Some(i) || self.system.rate_row(i).vanishes(&self.point);
+            self.roots.from_rate[i] = usize::from(after != Slip::Stick && is_at_rest);
+            match before {
+                Slip::Stick => self.record_slip(Some(b'7'), observer),
+                _ if !reverses => self.record_slip(None, observer),
+                _ if stopped == Some(i) => self.record_slip(Some(b'0'), observer),
+                _ => {}
+            }
+        }
+    }
+
+    /// Enters a stage: what depends on forces is decided anew.
+    pub(super) fn enter_stage(&mut self, stage: usize, observer: &mut dyn Observer) {
+        self.modes.stage = stage;
+        self.before = self.point;
+        self.refresh();
+        self.settle(&AtRest::default(), observer);
+        for gap in 0..self.system.gaps() {
+            if let (Some((side, _)), true) = (self.roots.at_wall[gap], self.rate(gap) == 0.0) {
+                self.leave(gap, side);
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Starts of motions.
+
+use super::Motion;
+use crate::machine::domain::Carrier;
+use crate::machine::modes::{AtRest, GapMode, Modes, signed};
+use crate::machine::watch::Roots;
+use crate::machine::{Numbers, System};
+use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side};
+use crate::motion::{Allowance, Clock, Work};
+use crate::motion::{Slip, Slips};
+
+/// Rounding error of a gap that lies on a wall, relative to the terms of the gap and the wall's position.
+const ON_WALL: f64 = 4.0 * f64::EPSILON;
+
+impl<'s> Motion<'s> {
+    /// Starts at phase 0 in the state `(x1, v1, x2, v2, ...)`.
+    ///
+    /// A gap behind a wall with a force is in contact. A gap behind a rigid wall is moved by
+    /// [`put_on_walls`](crate::model::Oscillator::put_on_walls).
+    pub fn new(system: &'s System, state: &[f64]) -> Motion<'s> {
+        let stage = system.machine.first_stage();
+        let modes = Modes { stage, gaps: [GapMode::Beyond(0); MOST_GAPS], slips: Slips::default() };
+        let begins_now = system.schedule.first().is_some_and(|change| change.0 == 0.0);
+        let point = system.point(&system.to_flow(&system.machine.put_on_walls(state)), 0.0);
+        let mut motion = Motion {
+            system,
+            modes,
+            entered: modes,
+            domain: system.domain(&modes),
+            path: None,
+            watches: Vec::new(),
+            carrier: Carrier::default(),
+            point,
+            clock: Clock::default(),
+            goal: 0.0,
+            period: 0,
+            change: usize::from(begins_now),
+            roots: Roots::default(),
+            origin: [None; MOST_GAPS],
+            has_slid: [false; MOST_FRICTION],
+            tangents: Vec::new(),
+            log_scale: 0.0,
+            before: point,
+            jumps: Vec::new(),
+            events_in_period: 0,
+            steps_in_period: 0,
+            contact_time: 0.0,
+            sticking_time: 0.0,
+            near_grazing: false,
+            work: Work::default(),
+            allowance: Allowance::UNLIMITED,
+        };
+        motion.enter();
+        motion
+    }
+
+    /// Starts from another state at phase 0, in the modes of this motion and with its remaining allowance. The state alone does not determine
+    /// the modes: a gap just in front of a wall may be free or in a contact onset.
+    pub fn at(&self, state: &[f64], tangents: Vec<Numbers>) -> Motion<'s> {
+        let system = self.system;
+        let mut started = Motion::new(system, state);
+        started.allowance = self.allowance();
+        started.origin = self.origin;
+        for gap in 0..system.gaps() {
+            let mode = self.modes.gaps[gap];
+            let lasts = match mode {
+                GapMode::Stuck(side) => {
+                    started.point[gap] = system.last_wall(gap, side).at;
+                    true
+                }
+                GapMode::Onset(side) => started.modes.gaps[gap] == system.before_last(gap, side),
+                _ => false,
+            };
+            if lasts {
+                (started.modes.gaps[gap], started.roots.at_wall[gap]) = (mode, None);
+            }
+        }
+        started.modes.slips = self.modes.slips;
+        started.has_slid = self.modes.slips.map(|slip| slip != Slip::Stick);
+        started.roots.from_rate = [0; MOST_FRICTION];
+        system.hold(&started.modes, &mut started.point, false);
+        started.set_tangents(tangents);
+        started
+    }
+
+    /// Determines the modes of the start.
+    fn enter(&mut self) {
+        let (system, n) = (self.system, self.system.n);
+        let state = self.state();
+        for gap in 0..system.gaps() {
+            let row = &system.machine.gaps[gap].row;
+            let size: f64 = (0..n).map(|i| (row[i] * state[2 * i]).abs()).sum();
+            for side in Side::BOTH {
+                for (number, wall) in system.walls(gap, side).iter().enumerate() {
+                    let is_on_wall = (self.point[gap] - wall.at).abs() <= ON_WALL * (size + wall.at.abs());
+                    let beyond = side.sign() * (self.point[gap] - wall.at);
+                    if is_on_wall || beyond > 0.0 && wall.contact == Contact::Rigid {
+                        self.point[gap] = wall.at;
+                        self.origin[gap] = Some(side);
+                        self.roots.at_wall[gap] = Some((side, 1));
+                        break;
+                    }
+                    if beyond < 0.0 {
+                        break;
+                    }
+                    self.origin[gap] = Some(side);
+                    self.modes.gaps[gap] = match wall.contact {
+                        Contact::Impact => GapMode::Pressed(side),
+                        _ => GapMode::Beyond(signed(side, number + 1)),
+                    };
+                }
+            }
+        }
+        let mut at_rest = AtRest::default();
+        for (i, element) in system.elements.iter().enumerate() {
+            let [rate, size] = element.rate_and_size(&self.point[n..]);
+            at_rest.elements[i] = rate.abs() <= ON_WALL * size;
+            self.modes.slips[i] = if at_rest.elements[i] { Slip::Stick } else { Slip::of(rate) };
+            self.has_slid[i] = !at_rest.elements[i];
+        }
+        self.refresh();
+        for gap in 0..system.gaps() {
+            if let Some(side) = system.pushed(&self.modes, gap) {
+                let force = system.force(self.modes.stage, gap, side);
+                if self.domain.first_derivative(&force, &self.point, 0).1 <= 0.0 {
+                    self.modes.gaps[gap] = GapMode::Open(side);
+                }
+                self.start_from_force(gap, side);
+            }
+        }
+        if let Some(chosen) = system.consistent(&self.modes, &at_rest, &self.point) {
+            self.modes.slips = chosen.slips;
+        }
+        for i in 0..system.elements.len() {
+            if at_rest.elements[i] && self.modes.slips[i] != Slip::Stick {
+                self.has_slid[i] = true;
+                self.roots.from_rate[i] = self.slide_order(i);
+            }
+        }
+        for gap in 0..system.gaps() {
+            let Some((side, _)) = self.roots.at_wall[gap] else { continue };
+            let closing = side.sign() * self.rate(gap);
+            if closing > 0.0 || closing == 0.0 && self.heads(gap, side) {
+                // A contact, at once.
+                self.roots.at_wall[gap] = None;
+            } else {
+                self.leave(gap, side);
+            }
+        }
+    }
+}

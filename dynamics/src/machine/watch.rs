@@ -1,0 +1,237 @@
+//! What ends the modes of a motion: watches, their functions, and the first root of all on a step.
+
+use super::domain::{Domain, Path, Row};
+use super::modes::{GapMode, Modes};
+use super::polynomial::{Fall, Polynomial, bernstein, first_fall};
+use super::system::Frame;
+use super::{Point, ROUNDING};
+use crate::model::{MOST_FRICTION, MOST_GAPS, Side, Wall};
+use crate::motion::Slip;
+
+/// What ends the present modes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Watch {
+    /// The gap reaches the next wall in a direction.
+    Wall(usize, Side),
+    /// The gap of a contact onset comes back to its wall.
+    OnsetEnds(usize, Side),
+    /// The gap of a contact onset is not pressed to its wall any more.
+    PressingEnds(usize, Side),
+    /// The gap comes back from behind its wall.
+    Leaves(usize, Side),
+    /// A wall that only pushes would begin to pull.
+    ForceEnds(usize, Side),
+    /// A wall that only pushes begins to push.
+    ForceBegins(usize, Side),
+    /// A rigid wall would have to pull.
+    PushEnds(usize, Side),
+    /// A sliding rate vanishes.
+    RateVanishes(usize),
+    /// A holding force reaches its limit for sliding in a direction.
+    Slips(usize, Slip),
+}
+
+impl Watch {
+    /// Whether the watch waits for a gap to reach a position.
+    pub(super) fn is_distance(self) -> bool {
+        matches!(self, Watch::Wall(..) | Watch::OnsetEnds(..) | Watch::Leaves(..))
+    }
+}
+
+/// Roots of watches at the present instant, which are not events.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Roots {
+    /// For a gap on a wall: the direction of the wall from the gap, and the order of the root of the distance.
+    pub(super) at_wall: [Option<(Side, usize)>; MOST_GAPS],
+    /// Orders of the roots of pushing forces, and of pressing accelerations in a contact onset; 0 without a root.
+    pub(super) from_force: [usize; MOST_GAPS],
+    /// Orders of the roots of the sliding rates.
+    pub(super) from_rate: [usize; MOST_FRICTION],
+}
+
+/// A motion at an instant, as far as watches depend on it.
+#[derive(Clone, Copy)]
+pub(super) struct Moment<'a> {
+    pub(super) frame: &'a Frame,
+    pub(super) domain: &'a Domain,
+    pub(super) modes: &'a Modes,
+    pub(super) roots: &'a Roots,
+    pub(super) point: &'a Point,
+}
+
+impl<'a> Moment<'a> {
+    /// Whether constraints keep a gap where it is.
+    pub(super) fn is_kept(&self, gap: usize) -> bool {
+        self.domain.is_still[gap] && self.point[self.frame.n + gap] == 0.0
+    }
+
+    /// Lists everything that may end the present modes, gap by gap.
+    pub(super) fn list(&self, watches: &mut Vec<Watch>) {
+        watches.clear();
+        for gap in 0..self.frame.gaps() {
+            if let GapMode::Stuck(side) = self.modes.gaps[gap] {
+                watches.push(Watch::PushEnds(gap, side));
+                continue;
+            }
+            if self.is_kept(gap) {
+                continue;
+            }
+            match self.modes.gaps[gap] {
+                GapMode::Beyond(_) => {
+                    let ahead = |&side: &Side| self.frame.wall_ahead(self.modes, gap, side).is_some();
+                    watches.extend(Side::BOTH.into_iter().filter(ahead).map(|side| Watch::Wall(gap, side)));
+                    if let Some(side) = self.frame.pushed(self.modes, gap) {
+                        watches.push(Watch::ForceEnds(gap, side));
+                    }
+                }
+                GapMode::Onset(side) => {
+                    watches.extend([Watch::OnsetEnds(gap, side), Watch::PressingEnds(gap, side)]);
+                    if self.behind(gap, side).is_some() {
+                        watches.push(Watch::Wall(gap, side.mirrored()));
+                    }
+                }
+                GapMode::Pressed(side) => watches.push(Watch::Leaves(gap, side)),
+                GapMode::Open(side) => {
+                    watches.extend([Watch::Leaves(gap, side), Watch::ForceBegins(gap, side)]);
+                }
+                GapMode::Stuck(_) => {}
+            }
+        }
+        for i in 0..self.frame.elements.len() {
+            match self.modes.slips[i] {
+                Slip::Stick if self.domain.holds[i].is_some() => {
+                    watches.extend([Watch::Slips(i, Slip::Forward), Watch::Slips(i, Slip::Backward)]);
+                }
+                Slip::Stick => {}
+                _ => watches.push(Watch::RateVanishes(i)),
+            }
+        }
+    }
+
+    /// Returns side and number of the wall that a contact onset may reach backwards.
+    fn behind(&self, gap: usize, side: Side) -> Option<(Side, usize)> {
+        match self.frame.walls(gap, side).len() {
+            1 => self.frame.walls(gap, side.mirrored()).first().map(|_| (side.mirrored(), 0)),
+            count => Some((side, count - 2)),
+        }
+    }
+
+    /// Returns the wall that a gap reaches in a direction.
+    fn ahead(&self, gap: usize, direction: Side) -> Option<&'a Wall> {
+        let (side, number) = match self.modes.gaps[gap] {
+            GapMode::Onset(side) => self.behind(gap, side),
+            _ => self.frame.wall_ahead(self.modes, gap, direction),
+        }?;
+        Some(&self.frame.walls(gap, side)[number])
+    }
+
+    /// Returns gap, position and direction of the wall whose distance a watch is.
+    pub(super) fn distance(&self, watch: Watch) -> Option<(usize, f64, Side)> {
+        match watch {
+            Watch::Wall(gap, direction) => {
+                Some((gap, self.ahead(gap, direction).expect("the watch was listed").at, direction))
+            }
+            Watch::OnsetEnds(gap, side) => Some((gap, self.frame.last_wall(gap, side).at, side)),
+            Watch::Leaves(gap, side) => Some((gap, self.frame.last_wall(gap, side).at, side.mirrored())),
+            _ => None,
+        }
+    }
+
+    /// Returns the function whose root a watch is, positive before.
+    pub(super) fn function(&self, watch: Watch) -> Row {
+        let (frame, domain, width) = (self.frame, self.domain, self.frame.width());
+        let force = |gap: usize, side: Side| frame.force(self.modes.stage, gap, side);
+        match watch {
+            Watch::Wall(..) | Watch::OnsetEnds(..) | Watch::Leaves(..) => {
+                let (gap, at, direction) = self.distance(watch).expect("it is a distance");
+                domain.unit_row(gap).scaled(-direction.sign()).plus(direction.sign() * at, width)
+            }
+            Watch::PressingEnds(gap, side) => domain.accelerations[gap].scaled(side.sign()),
+            Watch::ForceEnds(gap, side) => force(gap, side),
+            Watch::ForceBegins(gap, side) => force(gap, side).scaled(-1.0),
+            Watch::PushEnds(gap, _) => {
+                domain.pushes[gap].clone().unwrap_or_else(|| domain.unit_row(width - 1))
+            }
+            Watch::RateVanishes(i) => frame.rate_row(i).scaled(self.modes.slips[i].sign()),
+            Watch::Slips(i, next) => {
+                let hold = domain.holds[i].as_ref().expect("the watch was listed");
+                hold.scaled(-next.sign()).plus(frame.elements[i].force, width)
+            }
+        }
+    }
+
+    /// Returns the order of the root of a watch at this instant. A force that holds an element or a gap may be at its limit.
+    fn order(&self, watch: Watch, row: &Row) -> usize {
+        match watch {
+            Watch::PressingEnds(gap, _) | Watch::ForceEnds(gap, _) | Watch::ForceBegins(gap, _) => {
+                self.roots.from_force[gap]
+            }
+            Watch::RateVanishes(i) => self.roots.from_rate[i],
+            _ if row.vanishes(self.point) => self.domain.first_derivative(row, self.point, 0).0,
+            _ => 0,
+        }
+    }
+
+    /// Returns the first watch that ends the modes on a step, and the share of the step at which it does. Also returns whether a watch
+    /// touched zero within rounding in a way that makes the linearisation unreliable.
+    pub(super) fn first_event(&self, watches: &[Watch], path: &mut Path) -> (Option<(f64, Watch)>, bool) {
+        let gaps = self.frame.gaps();
+        let expanded = if watches.iter().all(|watch| watch.is_distance()) { gaps } else { self.frame.n };
+        self.domain.expand(path, expanded);
+        let (mut first, mut touches): (Option<(f64, Watch)>, bool) = (None, false);
+        let mut latest: Option<(usize, Polynomial)> = None;
+        for &watch in watches {
+            match self.fall(watch, path, &mut latest) {
+                Fall::None => {}
+                Fall::Touches => touches |= !self.is_harmless(watch),
+                Fall::At(share) if first.is_none_or(|(earliest, _)| share < earliest) => {
+                    first = Some((share, watch));
+                }
+                Fall::At(_) => {}
+            }
+        }
+        (first, touches)
+    }
+
+    /// Returns where a watch ends the modes on a step. `latest` has the Bernstein coefficients of a gap, which several watches need.
+    fn fall(&self, watch: Watch, path: &Path, latest: &mut Option<(usize, Polynomial)>) -> Fall {
+        let Some((gap, at, direction)) = self.distance(watch) else {
+            let row = self.function(watch);
+            let [_, size] = row.value_and_size(self.point);
+            return first_fall(&self.domain.along(&row, path), None, self.order(watch, &row), size);
+        };
+        let order = match self.roots.at_wall[gap] {
+            Some((side, order)) if side == direction => order,
+            _ => 0,
+        };
+        let (sign, change) = (direction.sign(), path.changes[gap]);
+        let size = at.abs() + self.point[gap].abs();
+        let start = if order == 0 { sign * (at - self.point[gap]) } else { 0.0 };
+        if order == 0 && start > change + ROUNDING * (change + size) {
+            return Fall::None;
+        }
+        let coordinate = &path.coordinates[gap];
+        let (_, coefficients) = match latest {
+            Some(known) if known.0 == gap => known,
+            _ => latest.insert((gap, bernstein(coordinate, 1))),
+        };
+        let (mut c, b) = (coordinate.map(|c| -sign * c), coefficients.map(|b| start - sign * b));
+        c[0] = start;
+        first_fall(&c, Some(b), order, size)
+    }
+
+    /// Whether it does not matter that a function touches zero within rounding. At an elastic wall without a preload the linearisation is
+    /// valid with and without contact.
+    fn is_harmless(&self, watch: Watch) -> bool {
+        match watch {
+            Watch::Wall(gap, direction) => {
+                let wall = self.frame.wall_ahead(self.modes, gap, direction);
+                wall.map(|(side, number)| &self.frame.walls(gap, side)[number]).is_some_and(|wall| {
+                    wall.contact.is_elastic() && wall.springs.iter().all(|spring| spring.preload == 0.0)
+                })
+            }
+            Watch::Slips(..) => true,
+            _ => false,
+        }
+    }
+}
