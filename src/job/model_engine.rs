@@ -8,7 +8,7 @@ pub fn described(oscillator: &Oscillator) -> String {
         None => "pair, for up to two coordinates and one gap: about 0.3 us for a forcing period and 0.15 us for an event"
             .to_owned(),
         Some(reason) => {
-            format!("machine, because of {reason}: about 2 to 6 us for an event with its flight")
+            format!("machine, because of {reason}: about 2 to 6 us for an event")
         }
     }
 }

@@ -461,7 +461,7 @@ mod tests {
                 let [i, j] = plan.indices(id);
                 assert_eq!(model.get(first).unwrap(), plan.axes()[0].value(i));
                 assert_eq!(model.get(second).unwrap(), plan.axes()[1].value(j));
-                assert_eq!(plan.oscillator(cell.flow), model.oscillator().unwrap());
+                assert_eq!(plan.form(cell.flow), Form::from(&model.oscillator().unwrap()));
                 assert_eq!(plan.law(cell.law), model.law());
             }
         }

@@ -351,7 +351,7 @@ fn a_start_needs_as_many_numbers_as_the_models_state() {
 fn a_parameter_outside_its_limits_is_refused_with_the_set_arguments() {
     assert_eq!(
         refusal(&my_model(), "orbit --model my-bilinear.toml --set d=1 --set k=-0.5"),
-        "error: --set d=1 --set k=-0.5: stiffness added in contact with the right wall = -0.5: it must be at least 0; \
+        "error: --set d=1 --set k=-0.5: stiffness of right wall 1 = -0.5: it must be finite and at least 0; \
          change the parameters\n"
     );
 }

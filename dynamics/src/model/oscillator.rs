@@ -414,6 +414,9 @@ impl Oscillator {
         positive(|| "excitation frequency".to_owned(), self.omega)?;
         all_finite(|| "mass".to_owned(), &self.mass)?;
         symmetric("mass", &self.mass)?;
+        if n == 1 {
+            positive(|| "mass".to_owned(), self.mass[(0, 0)])?;
+        }
         if self.mass.clone().cholesky().is_none() {
             // The size is divided out, so that nothing overflows.
             let size = self.mass.amax().max(f64::MIN_POSITIVE);

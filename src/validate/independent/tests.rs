@@ -2,6 +2,7 @@
 
 mod friction;
 #[path = "../../../dynamics/tests/common/pairs.rs"]
+#[allow(dead_code, reason = "tests of the engines use the rest")]
 mod pairs;
 
 use std::f64::consts::TAU;

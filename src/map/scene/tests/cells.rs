@@ -3,6 +3,7 @@
 use super::*;
 use crate::map::plan::Plan;
 use crate::map::scene::FileText;
+use rattlemap_dynamics::model::Form;
 
 const SCENE: &str = "[parameters]\nF = 40.0\n\n[cells]\nfile = \"points.csv\"\n";
 const TABLE: &str = "e,omega\n0.5,5.6\n0.25,4\n\n 0.5 , 5.6e0 \n0.5,7\n";
@@ -55,7 +56,7 @@ fn cells_of_a_list_share_flows_and_laws() {
     for id in 0..4 {
         let (cell, model) = (plan.cell(id), plan.model(id));
         assert_eq!(model.get("k2").unwrap(), 4.0 * model.get("omega").unwrap());
-        assert_eq!(plan.oscillator(cell.flow), model.oscillator().unwrap());
+        assert_eq!(plan.form(cell.flow), Form::from(&model.oscillator().unwrap()));
         assert_eq!(plan.law(cell.law), model.law());
     }
     let bad = Plan::new(&read(&format!("{SCENE}[derived]\nk2 = \"omega - 5\"\n"), TABLE, &[]).unwrap());
