@@ -546,7 +546,7 @@ fn another_phase_of_all_harmonics_is_another_instant_of_the_same_motion() {
 #[test]
 fn cycles_have_the_same_multipliers_at_every_phase() {
     let orbit = |machine: Oscillator, start: State| -> Orbit {
-        let flow = Flow::new(&Form::Machine(machine));
+        let flow = Flow::new(Form::Machine(machine));
         analyse_flow(&flow, Law::both(0.0, 0.0), start, &Settings::default(), 8)
     };
     let at = |phase: f64| Oscillator { omega: 2.1, ..row_of_three(phase) };
@@ -588,7 +588,7 @@ fn dropped(restitution: Restitution) -> Oscillator {
         mesh_speed: 0.0,
         springs: vec![Spring::default()],
     };
-    let machine = Oscillator {
+    Oscillator {
         omega: 1.0,
         mass: one(0.7),
         stages: vec![Forces {
@@ -600,8 +600,7 @@ fn dropped(restitution: Restitution) -> Oscillator {
         drives: Vec::new(),
         gaps: vec![GapRow { row: DVector::from_element(1, 1.0), walls: [Vec::new(), vec![wall]] }],
         friction: Vec::new(),
-    };
-    machine
+    }
 }
 
 /// Each impact speed is `e(u) u` of the one before, and its derivative is `e + e' u`. Both follow from the start in closed form: the ball
@@ -757,7 +756,7 @@ fn the_work_of_the_force_is_what_dampers_friction_and_impacts_take() {
         let mut machine = machine("two-loose-gears", &[("omega", omega), ("A", swing), ("e", 0.6)]);
         machine.friction =
             vec![DryFriction { row: DVector::from_vec(vec![0.0, 1.0, 0.0]), force: friction, speed: 0.0 }];
-        let flow = Flow::new(&Form::Machine(machine.clone()));
+        let flow = Flow::new(Form::Machine(machine.clone()));
         let orbit = analyse_flow(&flow, Law::both(0.0, 0.0), REST, &SHORT, 8);
         let Class::Periodic { period } = orbit.class else { panic!("{:?} {:?}", orbit.class, orbit.status) };
         let of = orbit.quantities.expect("measured");
