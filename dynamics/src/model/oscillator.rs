@@ -690,7 +690,6 @@ mod tests {
                 "difference of opposite entries of stiffness = 0.1: it must be 0: the matrix must be symmetric",
             ),
             (slip(|o| o.stages[0].damping[(0, 1)] = f64::NAN), "damping = NaN: it must be a finite number"),
-            (slip(|o| o.gaps[0].walls[0][0].springs[0].stiffness = 1.7e308), "position of right wall 1 = "),
             (
                 slip(|o| {
                     (o.stages[0].damping[(0, 0)], o.gaps[0].walls[0][0].springs[0].damping) = (1e308, 1e308)
