@@ -272,7 +272,7 @@ fn a_cycle_of_a_machine_is_symmetric_up_to_the_pitchfork() {
         if let Some(change) = change {
             change(&mut machine);
         }
-        let flow = Flow::new(&Form::Machine(machine));
+        let flow = Flow::new(Form::Machine(machine));
         let law = Law::both(0.0, 0.0);
         let orbit = analyse_flow(&flow, law, REST, &Settings::default(), EVENT_PERIODS);
         let measured = measure(&flow, law, REST, &BUDGET);

@@ -33,8 +33,7 @@ fn staged(linear: Linear, others: &[Linear], schedule: &[(f64, usize)]) -> Pair 
         Stage { free, meshing }
     };
     let stages = others.iter().map(stage).collect();
-    let oscillator = Pair { stages, schedule: schedule.to_vec(), ..linear.oscillator() };
-    oscillator
+    Pair { stages, schedule: schedule.to_vec(), ..linear.oscillator() }
 }
 
 /// E. Meissner, Schweizerische Bauzeitung 72 (1918) 95: the trace of the monodromy matrix decides on stability.

@@ -76,7 +76,7 @@ fn has_friction_at_wall(machine: &Oscillator) -> bool {
 
 fn compare(case: &Case) -> Result<Agreement, String> {
     let machine = &case.machine;
-    let flow = Flow::new(&Form::Machine(machine.clone()));
+    let flow = Flow::new(Form::Machine(machine.clone()));
     let orbit = analyse_flow(&flow, Law::both(0.0, 0.0), state(&case.start), &BUDGET.settings, EVENT_PERIODS);
     let (Class::Periodic { period }, Status::Ok | Status::Slow) = (orbit.class, orbit.status) else {
         return Ok(Agreement::NotCompared);
