@@ -148,7 +148,7 @@ fn motion_from_the_start_agrees_with_closed_forms() {
         let found = followed(&oscillator, law, state(&start), 3).end;
         let end = pieces.run(start, 3);
         let size = end.y[0].abs().max(end.y[1].abs() / omega);
-        let off = apart([found[0], found[1] / omega, 0.0, 0.0], { [end.y[0], end.y[1] / omega, 0.0, 0.0] });
+        let off = apart([found[0], found[1] / omega, 0.0, 0.0], [end.y[0], end.y[1] / omega, 0.0, 0.0]);
         let m = end.tangent;
         // Contacts amplify rounding errors.
         let growth =
