@@ -175,8 +175,8 @@ at = "s" | at = "s + x" | m.toml:25:6: `contact.0.at = "s + x"` does not fit: `x
 gap = [1] | gap = ["F-1.5"] | m.toml:21:7: `motion.gap = ["F-1.5"]` does not fit: at the defaults of stop, the largest entry of the gap row = 0
 "impact"\nrestitution = "e"\n | "elastic"\nstiffness = -0.5\n | m.toml:27:13: `contact.0.stiffness = -0.5` does not fit: at the defaults of stop, stiffness of right wall 1 = -0.5: it must be finite and at least 0
 [["1"]] | [["1", "0"]] | `motion.mass.0 = ["1", "0"]` is out of range
-at = "s" | at = "1/0" | m.toml:25:6: `contact.0.at = "1/0"` does not fit: at the defaults of stop, position of the right wall = inf
-"e"\n | "2*e"\n | m.toml:27:15: `contact.0.restitution = "2*e"` does not fit: at the defaults of stop, restitution = 1.6
+at = "s" | at = "1/0" | m.toml:25:6: `contact.0.at = "1/0"` does not fit: at the defaults of stop, position of right wall 1 = inf
+"e"\n | "2*e"\n | m.toml:27:15: `contact.0.restitution = "2*e"` does not fit: at the defaults of stop, restitution of right wall 1 = 1.6
 "e"\n | "e"\nstiffness = "-k"\n | m.toml:28:13: `contact.0.stiffness = "-k"` does not fit
 F = 1.5 | t = 1.5 | m.toml:8:5: `parameters.t = 1.5` does not fit: `t` is the time and cannot be used
 F = 1.5 | pi = 1.5 | `pi` is a number and cannot be used

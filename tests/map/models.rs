@@ -34,7 +34,7 @@ fn impacts_between_stops_agree_with_the_closed_form() {
         .quantities(&[Quantity::Impacts])
         .build()
         .unwrap();
-    assert_eq!(scene.title(), "Pair between stops: half distance of the stops x excitation frequency");
+    assert_eq!(scene.title(), "Oscillator between stops: half distance of the stops x excitation frequency");
     let map = job::run(&scene, Processor::Cpu).unwrap();
     assert_eq!((map.counts(), map.cells().len()), ([4, 4], 16));
     for cell in map.cells() {

@@ -600,10 +600,7 @@ fn along(row: [f64; 2], matrix: [[f64; 2]; 2], less: [[f64; 2]; 2]) -> f64 {
 
 /// An oscillator in the form that its engine takes.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is one for each flow, and a flow is a hundred times as large"
-)]
+#[expect(clippy::large_enum_variant, reason = "short-lived; pairs must stay cheap to make")]
 pub enum Form {
     /// For the fast engine, [`crate::pair`].
     Pair(Pair),
