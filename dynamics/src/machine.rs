@@ -25,18 +25,18 @@ mod constraints;
 mod domain;
 mod domains;
 mod flight;
+mod frame;
 mod impact;
 mod modes;
 mod motion;
 mod polynomial;
-mod system;
 mod table;
 mod watch;
 
 pub use domains::System;
+pub use frame::Frame;
 pub use impact::LOWEST_FLIGHT;
-pub use motion::Motion;
-pub use system::Frame;
+pub use motion::MachineMotion;
 pub use table::{Equations, StartModes};
 
 use crate::model::{MOST_HARMONICS, STATE, State};
@@ -54,4 +54,4 @@ const ROUNDING: f64 = 32.0 * f64::EPSILON;
 pub(crate) type Numbers = State;
 
 /// The state, the phasors and 1, in the coordinates of the flow.
-pub(crate) type Point = [f64; WIDTH];
+pub(crate) type PhasePoint = [f64; WIDTH];

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::system::{Element, Frame};
+use super::frame::{Element, Frame};
 use crate::model::{MOST_GAPS, Side};
 use crate::motion::{Slip, Slips};
 

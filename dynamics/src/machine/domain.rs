@@ -6,9 +6,9 @@ use nalgebra::DMatrix;
 use wide::f64x4;
 
 use super::constraints::{Constraint, Constraints, NO_MOBILITY};
+use super::frame::Frame;
 use super::polynomial::{ORDER, Polynomial, Weights, combine, rest, stretched};
-use super::system::Frame;
-use super::{Numbers, Point, ROUNDING, SIZE, WIDTH};
+use super::{Numbers, PhasePoint, ROUNDING, SIZE, WIDTH};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
 
@@ -32,43 +32,43 @@ pub(super) struct DomainKey {
     pub(super) slips: [Slip; MOST_FRICTION],
 }
 
-/// A linear functional of a [`Point`].
+/// A linear functional of a [`PhasePoint`].
 #[derive(Clone, Debug)]
-pub(super) struct Row(pub(super) Point);
+pub(super) struct Functional(pub(super) PhasePoint);
 
 /// Registers of a point.
 const REGISTERS: usize = WIDTH / 4;
 
-fn registers(point: &Point) -> [f64x4; REGISTERS] {
+fn registers(point: &PhasePoint) -> [f64x4; REGISTERS] {
     std::array::from_fn(|i| f64x4::new(point.as_chunks().0[i]))
 }
 
-impl Row {
-    pub(super) const ZERO: Row = Row([0.0; WIDTH]);
+impl Functional {
+    pub(super) const ZERO: Functional = Functional([0.0; WIDTH]);
 
-    pub(super) fn dot(&self, point: &Point) -> f64 {
+    pub(super) fn dot(&self, point: &PhasePoint) -> f64 {
         self.value_and_size(point)[0]
     }
 
     /// Returns the value at a point, and the sum of the sizes of all terms, which rounding is relative to.
-    pub(super) fn value_and_size(&self, point: &Point) -> [f64; 2] {
+    pub(super) fn value_and_size(&self, point: &PhasePoint) -> [f64; 2] {
         let terms = registers(&self.0).into_iter().zip(registers(point)).map(|(row, point)| row * point);
         let sums = terms.fold([f64x4::ZERO; 2], |[sum, size], term| [sum + term, size + term.abs()]);
         sums.map(f64x4::reduce_add)
     }
 
     /// Whether a value at a point is 0 within rounding.
-    pub(super) fn vanishes(&self, point: &Point) -> bool {
+    pub(super) fn vanishes(&self, point: &PhasePoint) -> bool {
         let [value, size] = self.value_and_size(point);
         value.abs() <= ROUNDING * size
     }
 
-    pub(super) fn scaled(&self, factor: f64) -> Row {
-        Row(self.0.map(|x| factor * x))
+    pub(super) fn scaled(&self, factor: f64) -> Functional {
+        Functional(self.0.map(|x| factor * x))
     }
 
     /// Adds a constant.
-    pub(super) fn plus(mut self, constant: f64, width: usize) -> Row {
+    pub(super) fn plus(mut self, constant: f64, width: usize) -> Functional {
         self.0[width - 1] += constant;
         self
     }
@@ -78,7 +78,7 @@ impl Row {
 #[derive(Clone, Debug)]
 pub(super) struct Path {
     /// The start.
-    point: Point,
+    point: PhasePoint,
     /// The coordinates that have been expanded, which are the first ones.
     pub(super) coordinates: [Polynomial; MOST_COORDINATES],
     expanded: usize,
@@ -96,7 +96,7 @@ pub(super) struct Domain {
     /// Angular frequencies of the harmonics.
     rates: Vec<f64>,
     /// Rows of the accelerations.
-    pub(super) accelerations: Vec<Row>,
+    pub(super) accelerations: Vec<Functional>,
     /// Whether the acceleration of each coordinate is exactly 0, because constraints hold it.
     pub(super) is_still: [bool; SIZE],
     /// Damping matrix, with the dampers of contacts.
@@ -104,9 +104,9 @@ pub(super) struct Domain {
     /// Longest step.
     pub(super) unit: f64,
     /// Rows of the forces with which rigid walls push gaps that rest on them.
-    pub(super) pushes: [Option<Row>; MOST_GAPS],
+    pub(super) pushes: [Option<Functional>; MOST_GAPS],
     /// Rows of the forces that hold sticking elements. None if other constraints hold the element.
-    pub(super) holds: [Option<Row>; MOST_FRICTION],
+    pub(super) holds: [Option<Functional>; MOST_FRICTION],
     /// For each coordinate and each entry of the point at the start of the longest step, a polynomial of the share.
     tables: OnceLock<Vec<Polynomial>>,
     /// Carries points over the longest step.
@@ -164,7 +164,7 @@ impl Domain {
             }
         }
         let row = |matrix: &DMatrix<f64>, i: usize| {
-            Row(std::array::from_fn(|j| if j < width { matrix[(i, j)] } else { 0.0 }))
+            Functional(std::array::from_fn(|j| if j < width { matrix[(i, j)] } else { 0.0 }))
         };
         let mut pushes = [const { None }; MOST_GAPS];
         let mut holds = [const { None }; MOST_FRICTION];
@@ -195,14 +195,14 @@ impl Domain {
     }
 
     /// Returns the row of a coordinate, or of its rate.
-    pub(super) fn unit_row(&self, entry: usize) -> Row {
+    pub(super) fn unit_row(&self, entry: usize) -> Functional {
         let mut row = [0.0; WIDTH];
         row[entry] = 1.0;
-        Row(row)
+        Functional(row)
     }
 
     /// Returns the time derivative of a point.
-    pub(super) fn derivative(&self, point: &Point) -> Point {
+    pub(super) fn derivative(&self, point: &PhasePoint) -> PhasePoint {
         let n = self.n;
         let mut rate = [0.0; WIDTH];
         rate[..n].copy_from_slice(&point[n..2 * n]);
@@ -215,7 +215,7 @@ impl Domain {
     }
 
     /// Returns the time derivative of a functional along the motion, as a functional.
-    pub(super) fn rate_of(&self, row: &Row) -> Row {
+    pub(super) fn rate_of(&self, row: &Functional) -> Functional {
         let n = self.n;
         let mut sums = [f64x4::ZERO; REGISTERS];
         for (acceleration, &factor) in self.accelerations.iter().zip(&row.0[n..]) {
@@ -232,13 +232,18 @@ impl Domain {
             rate[at] += omega * row.0[at + 1];
             rate[at + 1] -= omega * row.0[at];
         }
-        Row(rate)
+        Functional(rate)
     }
 
     /// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value; [`STAYS_ZERO`] and
     /// 0 if there is none.
-    pub(super) fn first_derivative(&self, row: &Row, point: &Point, first: usize) -> (usize, f64) {
-        let value = |row: &Row| {
+    pub(super) fn first_derivative(
+        &self,
+        row: &Functional,
+        point: &PhasePoint,
+        first: usize,
+    ) -> (usize, f64) {
+        let value = |row: &Functional| {
             let [value, size] = row.value_and_size(point);
             (value.abs() > ROUNDING * size).then_some(value)
         };
@@ -261,7 +266,7 @@ impl Domain {
 
     /// Returns the lowest order, at least 2, of a derivative of a coordinate that is not 0 within rounding, and its value, as
     /// [`Domain::first_derivative`].
-    pub(super) fn departure(&self, coordinate: usize, point: &Point) -> (usize, f64) {
+    pub(super) fn departure(&self, coordinate: usize, point: &PhasePoint) -> (usize, f64) {
         let (order, value) = self.first_derivative(&self.accelerations[coordinate], point, 0);
         (order.saturating_add(2), value)
     }
@@ -285,7 +290,7 @@ impl Domain {
     }
 
     /// Begins a step over a time `h` of at most the longest step.
-    pub(super) fn begin(&self, point: &Point, h: f64, path: &mut Path) {
+    pub(super) fn begin(&self, point: &PhasePoint, h: f64, path: &mut Path) {
         (path.point, path.h, path.expanded) = (*point, h, 0);
     }
 
@@ -310,7 +315,7 @@ impl Domain {
     }
 
     /// Returns the whole point at a share of a step.
-    pub(super) fn point(&self, path: &Path, share: f64) -> Point {
+    pub(super) fn point(&self, path: &Path, share: f64) -> PhasePoint {
         let mut point = [0.0; WIDTH];
         self.set_state(&mut point, path, share);
         for (k, omega) in self.rates.iter().enumerate() {
@@ -324,7 +329,7 @@ impl Domain {
     }
 
     /// Returns a functional on a step.
-    pub(super) fn along(&self, row: &Row, path: &Path) -> Polynomial {
+    pub(super) fn along(&self, row: &Functional, path: &Path) -> Polynomial {
         let (n, row) = (self.n, &row.0);
         let mut sum = [0.0; ORDER + 1];
         sum[0] = row[self.width - 1];

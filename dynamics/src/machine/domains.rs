@@ -4,9 +4,9 @@ use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
 use super::domain::{Domain, DomainKey};
+use super::frame::Frame;
 use super::modes::{AtRest, GapMode, Modes};
-use super::system::Frame;
-use super::{Point, ROUNDING};
+use super::{PhasePoint, ROUNDING};
 use crate::model::{MOST_STAGES, Oscillator};
 use crate::motion::Slip;
 
@@ -57,7 +57,7 @@ impl System {
     }
 
     /// Whether the modes of the elements at rest fit the forces at a point.
-    pub(super) fn is_consistent(&self, modes: &Modes, at_rest: &AtRest, point: &Point) -> bool {
+    pub(super) fn is_consistent(&self, modes: &Modes, at_rest: &AtRest, point: &PhasePoint) -> bool {
         if *at_rest == AtRest::default() {
             return true;
         }
@@ -80,7 +80,7 @@ impl System {
     }
 
     /// Returns the first consistent combination of modes: walls hold before they let go, elements stick before they slide.
-    pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &Point) -> Option<Modes> {
+    pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &PhasePoint) -> Option<Modes> {
         let gaps = || (0..self.gaps()).filter_map(|gap| Some((gap, at_rest.gaps[gap]?)));
         let elements = || (0..self.elements.len()).filter(|&i| at_rest.elements[i]);
         let combinations = Slip::ALL.len().pow(elements().count() as u32) << gaps().count();

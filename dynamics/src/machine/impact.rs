@@ -3,7 +3,7 @@
 use super::domain::Domain;
 use super::domains::System;
 use super::modes::{AtRest, GapMode, Modes};
-use super::{Numbers, Point, ROUNDING, SIZE};
+use super::{Numbers, PhasePoint, ROUNDING, SIZE};
 use crate::model::{Contact, MOST_GAPS, Side, Wall};
 use crate::motion::Slip;
 
@@ -15,7 +15,7 @@ pub(super) struct Impact<'a> {
     pub(super) system: &'a System,
     /// Modes and point before the impact.
     pub(super) modes: &'a Modes,
-    pub(super) point: &'a Point,
+    pub(super) point: &'a PhasePoint,
     pub(super) gap: usize,
     pub(super) side: Side,
     pub(super) wall: &'a Wall,
@@ -27,7 +27,7 @@ pub(super) struct Impact<'a> {
 pub(super) struct Outcome {
     /// Modes and point after the impact.
     pub(super) modes: Modes,
-    pub(super) point: Point,
+    pub(super) point: PhasePoint,
     /// Whether contact lasts.
     pub(super) lasts: bool,
     /// Acceleration towards the wall, in free motion after the impact, or its first derivative that is not 0.
@@ -41,7 +41,7 @@ type Kick = (Numbers, [bool; MOST_GAPS]);
 
 impl Impact<'_> {
     /// Returns the leaving speed of a flight that is not followed in a series of impacts.
-    fn lowest_speed(&self, domain: &Domain, gap: usize, point: &Point) -> f64 {
+    fn lowest_speed(&self, domain: &Domain, gap: usize, point: &PhasePoint) -> f64 {
         let pressing = domain.accelerations[gap].dot(point).abs();
         (2.0 * LOWEST_FLIGHT * self.system.length * pressing).sqrt()
     }
@@ -172,7 +172,7 @@ impl Impact<'_> {
         &self,
         modes: &Modes,
         kick: &Numbers,
-        point: &Point,
+        point: &PhasePoint,
         stopped: Option<Side>,
     ) -> (Modes, bool) {
         let (system, n) = (self.system, self.system.n);

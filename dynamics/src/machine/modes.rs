@@ -1,7 +1,7 @@
 //! Modes of walls and friction.
 
-use super::domain::{DomainKey, Row};
-use super::system::Frame;
+use super::domain::{DomainKey, Functional};
+use super::frame::Frame;
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{Slip, Slips};
 
@@ -106,18 +106,18 @@ impl Frame {
     }
 
     /// Returns the row of the force of a wall that only pushes.
-    pub(super) fn force(&self, stage: usize, gap: usize, side: Side) -> Row {
+    pub(super) fn force(&self, stage: usize, gap: usize, side: Side) -> Functional {
         let (wall, sign) = (self.last_wall(gap, side), side.sign());
         let spring = wall.springs[stage];
-        let mut row = Row::ZERO;
+        let mut row = Functional::ZERO;
         row.0[gap] = sign * spring.stiffness;
         row.0[self.n + gap] = sign * spring.damping;
         row.plus(spring.preload - sign * spring.stiffness * wall.at, self.width())
     }
 
     /// Returns the row of an element's sliding rate.
-    pub(super) fn rate_row(&self, i: usize) -> Row {
-        let mut row = Row::ZERO;
+    pub(super) fn rate_row(&self, i: usize) -> Functional {
+        let mut row = Functional::ZERO;
         (0..self.n).for_each(|j| row.0[self.n + j] = self.elements[i].row[j]);
         row.plus(-self.elements[i].speed, self.width())
     }

@@ -12,7 +12,7 @@ use super::domains::System;
 use super::flight::Flight;
 use super::modes::{GapMode, Modes};
 use super::watch::{Moment, Roots, Watch};
-use super::{Numbers, Point};
+use super::{Numbers, PhasePoint};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{
     Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, STEPS_PER_PERIOD_CAP, Slip, Slips, Stop, Work,
@@ -20,7 +20,7 @@ use crate::motion::{
 
 /// The motion of a machine, with any number of tangent vectors.
 #[derive(Clone, Debug)]
-pub struct Motion<'s> {
+pub struct MachineMotion<'s> {
     system: &'s System,
     pub(super) modes: Modes,
     /// The latest domain that was entered, and its modes.
@@ -31,7 +31,7 @@ pub struct Motion<'s> {
     watches: Vec<Watch>,
     carrier: Carrier,
     /// State, harmonics and 1 at the present time.
-    pub(super) point: Point,
+    pub(super) point: PhasePoint,
     clock: Clock,
     goal: f64,
     period: u64,
@@ -44,7 +44,7 @@ pub struct Motion<'s> {
     tangents: Vec<Numbers>,
     log_scale: f64,
     /// Point before the event.
-    before: Point,
+    before: PhasePoint,
     /// Impacts of the event: the gap, and the derivatives of the jumps of all rates by its rate, with the opposite sign.
     jumps: Vec<(usize, Numbers)>,
     events_in_period: u64,
@@ -56,7 +56,7 @@ pub struct Motion<'s> {
     allowance: Allowance<'s>,
 }
 
-impl<'s> Motion<'s> {
+impl<'s> MachineMotion<'s> {
     /// Returns the present state `(x1, v1, x2, v2, ...)`.
     pub fn state(&self) -> Numbers {
         self.system.to_state(&self.point)
@@ -139,7 +139,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Whether another motion is in the same modes. Contact onset and pressed contact count as equal for a gap on its wall.
-    pub(crate) fn is_in_modes_of(&self, other: &Motion<'_>) -> bool {
+    pub(crate) fn is_in_modes_of(&self, other: &MachineMotion<'_>) -> bool {
         let is_on_wall = |gap: usize, side: Side| {
             let wall = self.system.last_wall(gap, side).at;
             (self.point[gap] - wall).abs() <= 1e-9 * wall.abs().max(self.system.length)
@@ -165,7 +165,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Whether another motion is in the same modes, with gaps on the same walls and from the same walls.
-    pub(crate) fn is_where(&self, other: &Motion<'_>) -> bool {
+    pub(crate) fn is_where(&self, other: &MachineMotion<'_>) -> bool {
         self.modes == other.modes && self.origin == other.origin && self.roots.at_wall == other.roots.at_wall
     }
 

@@ -25,7 +25,7 @@ const ROOT_CAP: u32 = 200;
 const MOST_ORDER: usize = 18;
 
 /// Rounding error of a coefficient, relative to the sum of all.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
+const BERNSTEIN_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Where a function that is positive at first becomes negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,7 +137,7 @@ pub(super) fn first_fall(c: &Polynomial, b: Option<Polynomial>, order: usize, si
     if positive == all {
         return Fall::None;
     }
-    let noise = ROUNDING * if order == 0 { rest(c) + size } else { rest(c) };
+    let noise = BERNSTEIN_ROUNDING * if order == 0 { rest(c) + size } else { rest(c) };
     // Bernstein coefficients of the quotient.
     let quotient =
         |i: usize| (0..order).fold(b[order + i], |b, k| b * ((ORDER - k) as f64 / (order + i - k) as f64));

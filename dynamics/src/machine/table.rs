@@ -2,11 +2,11 @@
 //!
 //! A point is listed as `(d1, w1, d2, w2, ..., cos and sin of each harmonic, 1)`.
 
-use super::domain::{Domain, DomainKey, Row};
+use super::domain::{Domain, DomainKey, Functional};
 use super::domains::System;
+use super::frame::{Element, Frame};
 use super::modes::GapMode;
-use super::motion::Motion;
-use super::system::{Element, Frame};
+use super::motion::MachineMotion;
 use super::{Numbers, SIZE};
 use crate::model::{Contact, MOST_GAPS, Oscillator, Side};
 use crate::motion::{Slip, Slips};
@@ -117,7 +117,7 @@ impl Frame {
     }
 
     fn equations_of(&self, domain: &Domain) -> Equations {
-        let row = |row: &Row| self.listed(&row.0);
+        let row = |row: &Functional| self.listed(&row.0);
         Equations {
             radian: domain.radian(),
             is_still: domain.is_still[..self.n].to_vec(),
@@ -192,11 +192,11 @@ impl Frame {
 impl System {
     /// Returns the modes and the state of a start, for the state `(x1, v1, ...)`.
     pub fn start(&self, state: &[f64]) -> StartModes {
-        Motion::new(self, state).start_modes()
+        MachineMotion::new(self, state).start_modes()
     }
 }
 
-impl Motion<'_> {
+impl MachineMotion<'_> {
     fn start_modes(&self) -> StartModes {
         let system = self.system();
         let side = |side: Option<Side>| side.map_or(2, side_code);

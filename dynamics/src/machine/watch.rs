@@ -1,10 +1,10 @@
 //! What ends the modes of a motion: watches, their functions, and the first root of all on a step.
 
-use super::domain::{Domain, Path, Row};
+use super::domain::{Domain, Functional, Path};
+use super::frame::Frame;
 use super::modes::{GapMode, Modes};
 use super::polynomial::{Fall, Polynomial, bernstein, first_fall};
-use super::system::Frame;
-use super::{Point, ROUNDING};
+use super::{PhasePoint, ROUNDING};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::motion::Slip;
 
@@ -56,7 +56,7 @@ pub(super) struct Moment<'a> {
     pub(super) domain: &'a Domain,
     pub(super) modes: &'a Modes,
     pub(super) roots: &'a Roots,
-    pub(super) point: &'a Point,
+    pub(super) point: &'a PhasePoint,
 }
 
 impl<'a> Moment<'a> {
@@ -138,7 +138,7 @@ impl<'a> Moment<'a> {
     }
 
     /// Returns the function whose root a watch is, positive before.
-    pub(super) fn function(&self, watch: Watch) -> Row {
+    pub(super) fn function(&self, watch: Watch) -> Functional {
         let (frame, domain, width) = (self.frame, self.domain, self.frame.width());
         let force = |gap: usize, side: Side| frame.force(self.modes.stage, gap, side);
         match watch {
@@ -161,7 +161,7 @@ impl<'a> Moment<'a> {
     }
 
     /// Returns the order of the root of a watch at this instant. A force that holds an element or a gap may be at its limit.
-    fn order(&self, watch: Watch, row: &Row) -> usize {
+    fn order(&self, watch: Watch, row: &Functional) -> usize {
         match watch {
             Watch::PressingEnds(gap, _) | Watch::ForceEnds(gap, _) | Watch::ForceBegins(gap, _) => {
                 self.roots.from_force[gap]

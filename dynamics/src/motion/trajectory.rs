@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Allowance, Engine, Flow, GapEvent, Observer, Stop, Sums, Work};
-use crate::machine::{Motion, System};
+use crate::machine::{MachineMotion, System};
 use crate::model::{Law, REST, Side, State, first_four, state};
 use crate::pair::{PairMeter, PairMotion};
 
@@ -19,7 +19,7 @@ pub struct Trajectory<'f, const N: usize = 0> {
 #[expect(clippy::large_enum_variant, reason = "a pointer to a pair's motion would cost time at each step")]
 enum Engines<'f, const N: usize> {
     Pair(PairMotion<'f, N>),
-    Machine(Box<Motion<'f>>),
+    Machine(Box<MachineMotion<'f>>),
 }
 
 /// Lets the motion of each engine do the same.
@@ -69,7 +69,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 Engines::Pair(PairMotion::with_tangents(of, law, first_four(&y), tangents))
             }
             Engine::Machine(system) => {
-                let mut motion = Motion::new(system, &y);
+                let mut motion = MachineMotion::new(system, &y);
                 motion.set_tangents(of_machine(system, tangents));
                 Engines::Machine(Box::new(motion))
             }
@@ -329,5 +329,5 @@ impl Flights<'_> {
 
 /// Returns the tangents of a machine: four stand for the unit vectors of all coordinates.
 fn of_machine<const M: usize>(system: &System, tangents: [State; M]) -> Vec<State> {
-    if M == 4 { Motion::unit_tangents(system) } else { tangents.to_vec() }
+    if M == 4 { MachineMotion::unit_tangents(system) } else { tangents.to_vec() }
 }

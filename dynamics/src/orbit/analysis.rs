@@ -20,7 +20,7 @@ use crate::word::Word;
 pub const EVENT_PERIODS: u32 = 8;
 
 /// Rounding error of the logarithm of a tangent vector's growth over a forcing period.
-pub(super) const ROUNDING: f64 = 64.0 * f64::EPSILON;
+pub(super) const GROWTH_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Standard errors by which an exponent must exceed zero for chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
@@ -299,7 +299,7 @@ impl Analysis<'_> {
     /// regular. Tangents on a torus may grow like those of neutral motion, but no more, and they do not shrink.
     fn is_quasi_periodic(&self, window: &Window) -> bool {
         let count = window.strobes.len() as f64;
-        window.lyapunov >= -CHAOS_ERRORS * window.lyapunov_error - ROUNDING / self.flow.period
+        window.lyapunov >= -CHAOS_ERRORS * window.lyapunov_error - GROWTH_ROUNDING / self.flow.period
             && window.lyapunov.abs() * count * self.flow.period <= neutral_growth(TANGENT_PERIODS, count)
             && is_regular(&window.strobes, &window.metric, self.settings.max_period)
     }

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::CHAOS_ERRORS;
 use super::analysis::{
-    APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, ROUNDING, is_growing, neutral_growth, status_of,
+    APPROACH_RATIO, Analysis, ESCAPE_GROWTH, GROWTH_ROUNDING, ON_CYCLE, is_growing, neutral_growth, status_of,
 };
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
@@ -544,7 +544,7 @@ impl<'a> CellRun<'a> {
         let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
         let is_quasi_periodic = self.strobes.len() > self.budget.periods() as usize
             && lyapunov.is_some_and(|(mean, error)| {
-                mean >= -errors * error - ROUNDING / period && is_neutral(mean.abs())
+                mean >= -errors * error - GROWTH_ROUNDING / period && is_neutral(mean.abs())
             })
             && is_regular(late, &Metric::of(late, self.analysis.flow), max_period);
         let status = match slow {

@@ -11,7 +11,7 @@ use crate::motion::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, StrobeMap, UNIT, refine, times};
 
 /// Rounding error of the motion between two events, in units of the machine epsilon times the size of the motion.
-const ROUNDING: f64 = 4.0;
+const FLIGHT_ROUNDING: f64 = 4.0;
 
 /// Whether arithmetic with this machine epsilon cannot determine the period of the cycle of `period` forcing periods
 /// through `state`. False if Newton's method finds no such cycle.
@@ -75,7 +75,7 @@ pub(super) fn is_below_resolution(
     }
     strobes.pop();
     let metric = Metric::of(&strobes, flow);
-    let rounding = (ROUNDING * epsilon).powi(2);
+    let rounding = (FLIGHT_ROUNDING * epsilon).powi(2);
     let largest = match flow.state_len() {
         0..=4 => largest_variance::<4>(&parts, &metric, rounding),
         5..=8 => largest_variance::<8>(&parts, &metric, rounding),

@@ -17,7 +17,7 @@ use crate::motion::{Allowance, Trajectory};
 const CLEARANCE: f64 = 1.0 / 16.0;
 
 /// Largest rounding error of a lane's gap, relative to the wall's position or the scale of length.
-const ON_WALL: f64 = 1e-5;
+const STROBE_ON_WALL: f64 = 1e-5;
 
 /// Distance from a wall, in the same unit, that is rounding in double precision.
 const IN_FRONT: f64 = 1e-15;
@@ -43,8 +43,8 @@ impl Section {
         periods: u32,
         allowance: Allowance<'_>,
     ) -> Option<Section> {
-        let mut trajectory =
-            Trajectory::<0>::new(flow, law, flow.in_front(strobe, ON_WALL, IN_FRONT)).allowing(allowance);
+        let mut trajectory = Trajectory::<0>::new(flow, law, flow.in_front(strobe, STROBE_ON_WALL, IN_FRONT))
+            .allowing(allowance);
         let mut log = EventLog::new(flow, 0);
         for _ in 0..periods {
             trajectory.advance_period(&mut log).ok()?;

@@ -41,21 +41,21 @@ mod constrained;
 mod energy;
 mod expansion;
 mod few;
+mod functional;
 mod gap_polynomial;
 mod generator;
 mod linear;
 mod pushing;
-mod row;
 mod short_flight;
 mod taylor;
 
 use nalgebra::Matrix2;
 
 pub(crate) use expansion::{EXPANSION_REACH, Expansion, TERMS, turned};
+pub(crate) use functional::PairFunctional;
 pub use linear::LinearFlow;
 pub(crate) use linear::Step;
 pub(crate) use pushing::PushingForce;
-pub(crate) use row::Row;
 pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 

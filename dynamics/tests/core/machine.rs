@@ -1,7 +1,7 @@
 //! The engine of machines, on oscillators of two coordinates, against the engine of such oscillators; mirror images.
 
 use nalgebra::DVector;
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{Drive, DryFriction, Form, Law, Oscillator, REST, Restitution};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::Trajectory;
@@ -108,8 +108,8 @@ fn the_mirror_image_of_a_motion_is_a_motion_of_a_symmetric_machine() {
     let off = |machine: &Oscillator| {
         let [system, later] = [machine, &machine.at_phase(std::f64::consts::PI)].map(System::new);
         let y = [0.3, 1.0, 0.1, -2.0];
-        let mut motion = Motion::new(&system, &y);
-        let mut image = Motion::new(&later, &y.map(|x| -x));
+        let mut motion = MachineMotion::new(&system, &y);
+        let mut image = MachineMotion::new(&later, &y.map(|x| -x));
         for motion in [&mut motion, &mut image] {
             motion.advance_period(&mut ()).unwrap();
         }
@@ -156,9 +156,9 @@ fn time_of_a_period_as_a_machine() {
         let mut times = [[f64::INFINITY; 2]; 2];
         for _ in 0..5 {
             for tangents in [false, true] {
-                let mut theirs = Motion::new(&system, &REST);
+                let mut theirs = MachineMotion::new(&system, &REST);
                 if tangents {
-                    theirs.set_tangents(Motion::unit_tangents(&system)[..1].to_vec());
+                    theirs.set_tangents(MachineMotion::unit_tangents(&system)[..1].to_vec());
                 }
                 let begin = std::time::Instant::now();
                 (0..2000).for_each(|_| theirs.advance_period(&mut ()).unwrap());

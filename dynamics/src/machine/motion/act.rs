@@ -1,6 +1,6 @@
 //! What happens at the root of a watch: contacts, impacts, and their reports.
 
-use super::Motion;
+use super::MachineMotion;
 use crate::machine::domain::STAYS_ZERO;
 use crate::machine::impact::{Impact, Outcome};
 use crate::machine::modes::{AtRest, GapMode, signed};
@@ -14,7 +14,7 @@ use crate::word;
 /// Order of the root of the distance when the gap leaves a rigid wall: its acceleration is zero, the derivative is not.
 pub(super) const RELEASE_ORDER: usize = 3;
 
-impl Motion<'_> {
+impl MachineMotion<'_> {
     /// Processes the root of a watch.
     pub(super) fn act(&mut self, watch: Watch, observer: &mut dyn Observer) {
         let mut exempt = AtRest::default();

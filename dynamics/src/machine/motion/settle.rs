@@ -1,6 +1,6 @@
 //! Modes that forces decide: of friction, of gaps at rest, of contact onsets, and of walls that only push.
 
-use super::Motion;
+use super::MachineMotion;
 use super::act::RELEASE_ORDER;
 use crate::machine::modes::{AtRest, GapMode, Modes};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side};
@@ -10,7 +10,7 @@ use crate::motion::{EventKind, Observer};
 /// Decisions on elements at rest after one event.
 const MOST_DECISIONS: usize = 16;
 
-impl Motion<'_> {
+impl MachineMotion<'_> {
     /// Processes a sliding rate that vanishes.
     pub(super) fn end_sliding(&mut self, i: usize, observer: &mut dyn Observer) {
         let mut at_rest = self.at_rest();

@@ -8,9 +8,9 @@ use super::constrained::ConstrainedMotion;
 use super::energy::EnergyBound;
 use super::expansion::{FINEST_PART, Grid};
 use super::few::Few;
+use super::functional::PairFunctional;
 use super::gap_polynomial::{GapPolynomial, GapWave};
 use super::generator::{Generator, generator, rate};
-use super::row::Row;
 use super::short_flight::ShortFlight;
 use super::taylor::{RADIUS, partial_sum, taylor_table};
 use super::{Gap, Phasor};
@@ -79,7 +79,7 @@ pub struct LinearFlow {
     field: Columns,
     /// Rows of `z'', z''', z''''` on `a`. For motion on a rigid wall: rows of the acceleration that the wall cancels,
     /// and of its first two derivatives.
-    gap_rates: [Row; 3],
+    gap_rates: [PairFunctional; 3],
     /// Bound on `z^(6)`, for the gap itself; zero for motion on a rigid wall.
     pub(crate) gap_bound: EnergyBound,
     /// Bound on the sixth derivative of [`acceleration`](Self::acceleration).
@@ -138,7 +138,7 @@ impl LinearFlow {
         oscillator: &Pair,
         generator: Generator,
         rate: f64,
-        pressing: Row,
+        pressing: PairFunctional,
         bounds: impl Fn(&[Columns], f64) -> [EnergyBound; 2],
     ) -> LinearFlow {
         let unit = RADIUS / rate;
@@ -209,12 +209,12 @@ impl LinearFlow {
     }
 
     /// Returns the row of [`acceleration`](Self::acceleration).
-    pub(crate) fn acceleration_row(&self) -> &Row {
+    pub(crate) fn acceleration_row(&self) -> &PairFunctional {
         &self.gap_rates[0]
     }
 
     /// Returns the row of the second displacement's acceleration.
-    pub(crate) fn second_acceleration_row(&self) -> Row {
+    pub(crate) fn second_acceleration_row(&self) -> PairFunctional {
         self.generator.row(3)
     }
 

@@ -9,7 +9,7 @@ use wide::f64x4;
 
 use super::columns::Columns;
 use super::few::Few;
-use super::row::{Row, power};
+use super::functional::{PairFunctional, power};
 use super::{Gap, Phasor};
 use crate::fused::fma;
 
@@ -89,8 +89,8 @@ impl Powers {
 impl ShortFlight {
     /// Builds the matrix from the Taylor table.
     pub(super) fn new(table: &[Columns]) -> ShortFlight {
-        let rows: Vec<[Row; 2]> = table.iter().map(|term| [term.row(0), term.row(2)]).collect();
-        let column = |of: &dyn Fn(&Row) -> f64| {
+        let rows: Vec<[PairFunctional; 2]> = table.iter().map(|term| [term.row(0), term.row(2)]).collect();
+        let column = |of: &dyn Fn(&PairFunctional) -> f64| {
             std::array::from_fn(|i| {
                 let quad = |n: usize| of(&rows[4 * (i % WIDTH) + n][i / WIDTH]);
                 f64x4::from(std::array::from_fn::<f64, 4, _>(quad))

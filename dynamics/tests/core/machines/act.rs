@@ -3,7 +3,7 @@
 use rattlemap_dynamics::model::{Contact, Side};
 
 use super::motion::{End, Event, Gap, Mode, Motion, What, side_of, step_of};
-use super::system::{Grip, Linear, Matrix, ROUNDING, Row, Vector};
+use super::system::{Functional, Grip, Linear, Matrix, ROUNDING, Vector};
 
 /// Height of flights, in scales of length, that end a series of impacts.
 const LOWEST_FLIGHT: f64 = 1e-13;
@@ -16,7 +16,7 @@ const AT_ONCE: f64 = 1e-10;
 const SMALL: f64 = 1e-14;
 
 /// Derivative of the state after an event by that before it at a fixed time, and the row that is constant where the event lies.
-type Saltation = (Matrix, Row);
+type Saltation = (Matrix, Functional);
 
 /// The change of velocities in a joint impact: for a change of the gap's rate by 1, with the gaps that rest on.
 struct Joint {
@@ -224,7 +224,7 @@ impl Motion<'_> {
     }
 
     fn is_wall_consistent(&self, linear: &Linear, i: usize, side: Side) -> bool {
-        let tends = |row: &Row| side.sign() * linear.tendency(row, &self.y);
+        let tends = |row: &Functional| side.sign() * linear.tendency(row, &self.y);
         match self.gaps[i].mode {
             Mode::Stuck(_) => tends(&linear.pressing[i]) > 0.0,
             _ => linear.is_still[i] || tends(&linear.acceleration[i]) <= 0.0,
@@ -293,7 +293,7 @@ impl Motion<'_> {
     }
 
     /// Whether the value of a row of velocities is not zero but for rounding.
-    fn has_rate(&self, row: &Row) -> bool {
+    fn has_rate(&self, row: &Functional) -> bool {
         self.of(row).abs() > ROUNDING * self.size_of_rate(row)
     }
 
@@ -476,7 +476,7 @@ impl Motion<'_> {
 
     /// Applies the derivative of an event to the tangents. The event lies where `row y` is constant; `before` is the field before it,
     /// and state and modes are those after it.
-    fn jump(&mut self, reset: &Matrix, row: &Row, before: &Vector) {
+    fn jump(&mut self, reset: &Matrix, row: &Functional, before: &Vector) {
         if self.tangents.is_none() {
             return;
         }

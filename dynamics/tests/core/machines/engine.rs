@@ -25,7 +25,7 @@ pub(crate) trait Follower {
 /// The program's motions of machines, and of models with one gap. Names and signatures of the program occur only here.
 pub(crate) mod program {
     use nalgebra::DMatrix;
-    use rattlemap_dynamics::machine::{Motion, System};
+    use rattlemap_dynamics::machine::{MachineMotion, System};
     use rattlemap_dynamics::model::{Law, Oscillator, Side, State};
     use rattlemap_dynamics::motion::{EventKind, Flow, GapEvent, Observer, SlipEvent, States, Trajectory};
 
@@ -33,7 +33,7 @@ pub(crate) mod program {
     use super::{Follower, Period};
 
     pub(crate) struct Engine<'a> {
-        motion: Motion<'a>,
+        motion: MachineMotion<'a>,
         degrees: usize,
         period: f64,
         several: bool,
@@ -72,8 +72,8 @@ pub(crate) mod program {
 
     impl<'a> Engine<'a> {
         pub(crate) fn new(system: &'a System, machine: &Oscillator, start: &[f64]) -> Engine<'a> {
-            let mut motion = Motion::new(system, start);
-            motion.set_tangents(Motion::unit_tangents(system));
+            let mut motion = MachineMotion::new(system, start);
+            motion.set_tangents(MachineMotion::unit_tangents(system));
             let several = machine.gaps.len() > 1;
             Engine { motion, degrees: machine.degrees(), period: machine.period(), several }
         }

@@ -9,7 +9,9 @@ use rattlemap_dynamics::model::{Contact, Side};
 
 use super::random::apart;
 use super::roots::first_fall;
-use super::system::{Grip, Key, Linear, Matrix, ROUNDING, Row, System, Vector, exponential, product, value};
+use super::system::{
+    Functional, Grip, Key, Linear, Matrix, ROUNDING, System, Vector, exponential, product, value,
+};
 
 /// Relative errors of velocities that stand for those of rounding, which are smaller.
 const SHAKEN: f64 = 1e-13;
@@ -285,7 +287,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Returns the value of a row.
-    pub(super) fn of(&self, row: &Row) -> f64 {
+    pub(super) fn of(&self, row: &Functional) -> f64 {
         value(row, &self.y)
     }
 
@@ -305,7 +307,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Returns the row of the force of a wall that the gap is behind and that only pushes.
-    pub(super) fn pushing(&self, gap: usize) -> Option<Row> {
+    pub(super) fn pushing(&self, gap: usize) -> Option<Functional> {
         let level = self.gaps[gap].level;
         let nth = usize::from(level.unsigned_abs()).checked_sub(1)?;
         self.system.pushing(gap, side_of(level), nth, self.stage)
@@ -358,7 +360,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Returns the size of the numbers that the value of a row of velocities is computed from.
-    pub(super) fn size_of_rate(&self, row: &Row) -> f64 {
+    pub(super) fn size_of_rate(&self, row: &Functional) -> f64 {
         let n = self.system.degrees;
         let rates = row.columns(n, n).abs().sum() * self.system.machine.omega * self.y.rows(0, n).amax();
         rates + row.iter().zip(self.y.iter()).map(|(a, b)| (a * b).abs()).sum::<f64>()
@@ -498,7 +500,7 @@ impl<'a> Motion<'a> {
     /// Returns the share of a step after which a flight ends, and what ends it.
     fn first_end(&self, linear: &Linear, series: &[Vector]) -> Option<(f64, End)> {
         let mut ends = Vec::new();
-        let of = |row: &Row, factor: f64| -> Vec<f64> {
+        let of = |row: &Functional, factor: f64| -> Vec<f64> {
             series.iter().map(|term| factor * value(row, term)).collect()
         };
         let mut fall = |c: &[f64], order: usize, end: End| {
@@ -550,7 +552,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Returns rows of the rooms that the force which makes an element stick has, and what follows without room.
-    pub(super) fn limits(&self, linear: &Linear, i: usize) -> [(Row, Grip); 2] {
+    pub(super) fn limits(&self, linear: &Linear, i: usize) -> [(Functional, Grip); 2] {
         [Grip::Plus, Grip::Minus].map(|grip| {
             let mut room = &linear.hold[i] * -grip.sign();
             room[2 * self.system.degrees] += self.system.machine.friction[i].force;

@@ -1,7 +1,7 @@
 //! Motions in which a function of time is exactly zero for a while, or has a root of high order.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{
     Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Spring, Wall, state as state_of,
 };
@@ -35,7 +35,7 @@ fn machine(
 
 fn after_a_period(machine: &Oscillator, start: &[f64]) -> Vec<f64> {
     let system = System::new(machine);
-    let mut motion = Motion::new(&system, start);
+    let mut motion = MachineMotion::new(&system, start);
     motion.advance_period(&mut ()).expect("it can be continued");
     assert!(motion.work().events < 20 && motion.work().steps < 2_000, "{:?}", motion.work());
     motion.state()[..start.len()].to_vec()
@@ -154,7 +154,7 @@ fn a_wall_on_which_another_gap_rests_takes_part_in_an_impact() {
     bodies.stages[0].load = DVector::from_element(2, -1.0);
     bodies.gaps.push(GapRow { row: DVector::from_row_slice(&[-1.0, 1.0]), walls: walls() });
     let system = System::new(&bodies);
-    let mut motion = Motion::new(&system, &[0.0, 0.0, 0.5, 0.0]);
+    let mut motion = MachineMotion::new(&system, &[0.0, 0.0, 0.5, 0.0]);
     let (before, after) = (0.999, 1.001);
     motion.advance_to(before, &mut ()).unwrap();
     assert!((motion.state()[3] + before).abs() < 1e-13, "{:?}", motion.state());

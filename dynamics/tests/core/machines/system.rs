@@ -19,7 +19,7 @@ const TERMS: usize = 18;
 pub(crate) const ROUNDING: f64 = 1e-12;
 
 pub(crate) type Vector = DVector<f64>;
-pub(crate) type Row = RowDVector<f64>;
+pub(crate) type Functional = RowDVector<f64>;
 pub(crate) type Matrix = DMatrix<f64>;
 
 /// What an element with dry friction does: it sticks, or slides with a positive or a negative rate.
@@ -53,11 +53,11 @@ pub(crate) struct Linear {
     /// Length of a step and its exponential.
     pub(crate) step: (f64, Matrix),
     /// Accelerations of the gaps. They are 0 for gaps at rest.
-    pub(crate) acceleration: Vec<Row>,
+    pub(crate) acceleration: Vec<Functional>,
     /// For each gap at rest on a rigid wall, its acceleration without this wall, and while all else that is at rest stays at rest.
-    pub(crate) pressing: Vec<Row>,
+    pub(crate) pressing: Vec<Functional>,
     /// Forces that make elements stick.
-    pub(crate) hold: Vec<Row>,
+    pub(crate) hold: Vec<Functional>,
     /// Elements that stick without a force, because walls hold their row.
     pub(crate) is_idle: Vec<bool>,
     /// Elements that slide at a rate which others at rest keep constant.
@@ -79,7 +79,7 @@ impl Linear {
     }
 
     /// Returns the sign of the first derivative of `row y` that is not zero but for rounding, the value itself included; 0 without one.
-    pub(crate) fn tendency(&self, row: &Row, y: &Vector) -> f64 {
+    pub(crate) fn tendency(&self, row: &Functional, y: &Vector) -> f64 {
         let mut row = row.clone();
         for _ in 0..4 {
             let value = value(&row, y);
@@ -94,7 +94,7 @@ impl Linear {
 }
 
 /// Returns the value of a row.
-pub(crate) fn value(row: &Row, y: &Vector) -> f64 {
+pub(crate) fn value(row: &Functional, y: &Vector) -> f64 {
     row.iter().zip(y.iter()).map(|(a, b)| a * b).sum()
 }
 
@@ -140,10 +140,10 @@ pub(crate) struct System {
     pub(crate) length: f64,
     pub(crate) per_mass: Matrix,
     /// Rows of the gaps and of their rates.
-    pub(crate) z: Vec<Row>,
-    pub(crate) w: Vec<Row>,
+    pub(crate) z: Vec<Functional>,
+    pub(crate) w: Vec<Functional>,
     /// Rows of the sliding rates.
-    pub(crate) slides: Vec<Row>,
+    pub(crate) slides: Vec<Functional>,
     angle: f64,
     domains: RefCell<HashMap<Key, Rc<Linear>>>,
 }
@@ -184,15 +184,15 @@ impl System {
     }
 
     /// Returns the row of a combination of entries from `at` on.
-    fn row(&self, along: &Vector, at: usize) -> Row {
-        let mut row = Row::zeros(self.size());
+    fn row(&self, along: &Vector, at: usize) -> Functional {
+        let mut row = Functional::zeros(self.size());
         row.columns_mut(at, self.degrees).copy_from(&along.transpose());
         row
     }
 
     /// Returns the row of the force, positive away from the wall, of spring, damper and preload behind a wall that only pushes. There
     /// is none if this force cannot pull behind the wall.
-    pub(crate) fn pushing(&self, gap: usize, side: Side, nth: usize, stage: usize) -> Option<Row> {
+    pub(crate) fn pushing(&self, gap: usize, side: Side, nth: usize, stage: usize) -> Option<Functional> {
         let wall = &self.machine.gaps[gap].walls[side.index()][nth];
         let spring = &wall.springs[stage];
         let may_pull = spring.damping != 0.0 || spring.preload != 0.0;
@@ -278,7 +278,7 @@ impl System {
     }
 
     fn build(&self, key: &Key) -> Linear {
-        let (machine, empty) = (&self.machine, Row::zeros(self.size()));
+        let (machine, empty) = (&self.machine, Functional::zeros(self.size()));
         let (gaps, elements) = (0..machine.gaps.len(), 0..machine.friction.len());
         let (free, fastest) = self.generator(key);
         let held: Vec<usize> = gaps.clone().filter(|&i| key.held[i]).collect();
@@ -304,7 +304,7 @@ impl System {
         };
         let is_driven = |i: usize| key.grips[i] != Grip::Stick && is_given(along(i));
         let mut is_still = vec![false; machine.gaps.len()];
-        let mut acceleration: Vec<Row> = self.w.iter().map(|w| w * &a).collect();
+        let mut acceleration: Vec<Functional> = self.w.iter().map(|w| w * &a).collect();
         for i in gaps.clone() {
             if is_given(gap(i)) {
                 acceleration[i] = empty.clone();

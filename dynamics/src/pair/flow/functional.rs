@@ -8,14 +8,14 @@ use crate::fused::fma;
 
 /// A linear functional of the state and the forcing.
 #[derive(Clone, Debug)]
-pub(crate) struct Row {
+pub(crate) struct PairFunctional {
     /// Factors of `(z, w, x, v, cos, sin, 1)`.
     pub(crate) base: [f64; 7],
     /// Orders of the higher harmonics, and the factors of their `cos` and `sin`.
     pub(crate) waves: Few<(u32, [f64; 2])>,
 }
 
-impl Row {
+impl PairFunctional {
     /// Returns the product with `a`.
     #[inline]
     pub(crate) fn dot(&self, q: &Gap, phasor: &Phasor) -> f64 {
@@ -48,10 +48,10 @@ impl Row {
     }
 
     /// Returns the sum of two rows, the second one multiplied by a factor.
-    pub(crate) fn plus(&self, factor: f64, other: &Row) -> Row {
+    pub(crate) fn plus(&self, factor: f64, other: &PairFunctional) -> PairFunctional {
         let sum = |a: [f64; 2], b: [f64; 2]| std::array::from_fn(|i| a[i] + factor * b[i]);
         let both = self.waves.iter().zip(other.waves.iter());
-        Row {
+        PairFunctional {
             base: std::array::from_fn(|j| self.base[j] + factor * other.base[j]),
             waves: both.map(|(&(order, a), &(_, b))| (order, sum(a, b))).collect(),
         }

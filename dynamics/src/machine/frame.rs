@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Numbers, Point, ROUNDING, SIZE};
+use super::{Numbers, PhasePoint, ROUNDING, SIZE};
 use crate::model::{Contact, Oscillator, Side, Wall};
 
 /// Linear forces in the coordinates of the flow.
@@ -216,13 +216,13 @@ impl Frame {
         (&self.from_flow * d).iter().copied().collect()
     }
 
-    /// Returns the number of entries of [`Point`] that are in use.
+    /// Returns the number of entries of [`PhasePoint`] that are in use.
     pub(super) fn width(&self) -> usize {
         2 * self.n + 2 * self.orders.len() + 1
     }
 
     /// Completes a state to a point, at a time since phase 0.
-    pub(super) fn point(&self, y: &[f64], t: f64) -> Point {
+    pub(super) fn point(&self, y: &[f64], t: f64) -> PhasePoint {
         let mut point = [0.0; super::WIDTH];
         point[..2 * self.n].copy_from_slice(&y[..2 * self.n]);
         point[self.width() - 1] = 1.0;
@@ -231,7 +231,7 @@ impl Frame {
     }
 
     /// Sets cosine and sine of all harmonics of a point, at a time since phase 0.
-    pub(super) fn set_phasors(&self, point: &mut Point, t: f64) {
+    pub(super) fn set_phasors(&self, point: &mut PhasePoint, t: f64) {
         let (phasors, _) = point[2 * self.n..].as_chunks_mut();
         for (phasor, order) in phasors.iter_mut().zip(&self.orders) {
             let (sin, cos) = (order * self.machine.omega * t).sin_cos();
