@@ -15,13 +15,14 @@ use crate::motion::Slip;
 /// Taylor radius: the largest product of a step and the rate of its domain.
 const RADIUS: f64 = 1.6;
 
-/// Derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the other end.
+/// Number of derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the
+/// other end.
 const DERIVATIVES: usize = 16;
 
 /// Order of the root of a function that stays zero: all derivatives are zero within rounding.
 pub(super) const STAYS_ZERO: usize = usize::MAX;
 
-/// What the linear equations depend on.
+/// The modes that the linear equations depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DomainKey {
     pub(super) stage: usize,
@@ -32,11 +33,11 @@ pub(super) struct DomainKey {
     pub(super) slips: [Slip; MOST_FRICTION],
 }
 
-/// A linear functional of a [`PhasePoint`].
+/// A linear functional of a [`PhasePoint`], also called a row.
 #[derive(Clone, Debug)]
 pub(super) struct Functional(pub(super) PhasePoint);
 
-/// Registers of a point.
+/// Number of SIMD registers that hold a point.
 const REGISTERS: usize = WIDTH / 4;
 
 fn registers(point: &PhasePoint) -> [f64x4; REGISTERS] {
@@ -50,14 +51,14 @@ impl Functional {
         self.value_and_size(point)[0]
     }
 
-    /// Returns the value at a point, and the sum of the sizes of all terms, which rounding is relative to.
+    /// Returns the value at a point, and the sum of the moduli of its terms. Rounding errors are relative to this sum.
     pub(super) fn value_and_size(&self, point: &PhasePoint) -> [f64; 2] {
         let terms = registers(&self.0).into_iter().zip(registers(point)).map(|(row, point)| row * point);
         let sums = terms.fold([f64x4::ZERO; 2], |[sum, size], term| [sum + term, size + term.abs()]);
         sums.map(f64x4::reduce_add)
     }
 
-    /// Whether a value at a point is 0 within rounding.
+    /// Whether the value at a point is 0 within rounding.
     pub(super) fn vanishes(&self, point: &PhasePoint) -> bool {
         let [value, size] = self.value_and_size(point);
         value.abs() <= ROUNDING * size
@@ -74,12 +75,12 @@ impl Functional {
     }
 }
 
-/// A step of a domain. The coordinates are polynomials of the share of the step.
+/// A step in a domain. The coordinates are polynomials of the share of the step, from 0 to 1.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
-    /// The start.
+    /// Point at the start of the step.
     point: PhasePoint,
-    /// The coordinates that have been expanded, which are the first ones.
+    /// Polynomials of the coordinates. Only the first `expanded` ones are valid.
     pub(super) coordinates: [Polynomial; MOST_COORDINATES],
     expanded: usize,
     /// Bounds on the changes of the coordinates.
@@ -103,11 +104,11 @@ pub(super) struct Domain {
     pub(super) damping: DMatrix<f64>,
     /// Longest step.
     pub(super) unit: f64,
-    /// Rows of the forces with which rigid walls push gaps that rest on them.
+    /// For each gap at rest on a rigid wall, the row of the force with which the wall pushes it.
     pub(super) pushes: [Option<Functional>; MOST_GAPS],
     /// Rows of the forces that hold sticking elements. None if other constraints hold the element.
     pub(super) holds: [Option<Functional>; MOST_FRICTION],
-    /// For each coordinate and each entry of the point at the start of the longest step, a polynomial of the share.
+    /// For each coordinate and each entry of the start point, a polynomial of the share of the longest step.
     tables: OnceLock<Vec<Polynomial>>,
     /// Carries points over the longest step.
     whole: OnceLock<Carrier>,
@@ -235,8 +236,8 @@ impl Domain {
         Functional(rate)
     }
 
-    /// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value; [`STAYS_ZERO`] and
-    /// 0 if there is none.
+    /// Finds the first derivative, of order `first` or higher, that is not 0 within rounding. Returns its order and value, or
+    /// [`STAYS_ZERO`] and 0 if there is none.
     pub(super) fn first_derivative(
         &self,
         row: &Functional,
@@ -264,8 +265,7 @@ impl Domain {
         (STAYS_ZERO, 0.0)
     }
 
-    /// Returns the lowest order, at least 2, of a derivative of a coordinate that is not 0 within rounding, and its value, as
-    /// [`Domain::first_derivative`].
+    /// Finds the first derivative of a coordinate, of order 2 or higher, that is not 0 within rounding, like [`Domain::first_derivative`].
     pub(super) fn departure(&self, coordinate: usize, point: &PhasePoint) -> (usize, f64) {
         let (order, value) = self.first_derivative(&self.accelerations[coordinate], point, 0);
         (order.saturating_add(2), value)
@@ -294,7 +294,7 @@ impl Domain {
         (path.point, path.h, path.expanded) = (*point, h, 0);
     }
 
-    /// Expands the first coordinates on a step, as far as that has not been done.
+    /// Expands the first `count` coordinates on a step, unless they are already expanded.
     pub(super) fn expand(&self, path: &mut Path, count: usize) {
         let part = path.h / self.unit;
         for (i, table) in self.tables().enumerate().take(count).skip(path.expanded) {
@@ -305,7 +305,7 @@ impl Domain {
         path.expanded = path.expanded.max(count);
     }
 
-    /// Sets a state to that at a share of a step, all of whose coordinates are expanded.
+    /// Writes the state at a share of a step. All coordinates must be expanded.
     pub(super) fn set_state(&self, y: &mut [f64], path: &Path, share: f64) {
         let weights = Weights::at(share);
         for (i, coordinate) in path.coordinates.iter().enumerate().take(self.n) {
@@ -328,7 +328,7 @@ impl Domain {
         point
     }
 
-    /// Returns a functional on a step.
+    /// Returns a functional as a polynomial of the share of a step.
     pub(super) fn along(&self, row: &Functional, path: &Path) -> Polynomial {
         let (n, row) = (self.n, &row.0);
         let mut sum = [0.0; ORDER + 1];
@@ -357,7 +357,7 @@ impl Domain {
         sum
     }
 
-    /// Returns what carries points over the longest step.
+    /// Returns the carrier over the longest step.
     pub(super) fn whole(&self) -> &Carrier {
         self.whole.get_or_init(|| {
             let mut carrier = Carrier::default();
@@ -366,7 +366,7 @@ impl Domain {
         })
     }
 
-    /// Sets a carrier to the changes of the first unit vectors over a time of at most the longest step.
+    /// Fills a carrier with the changes of the first `count` unit vectors over a time up to the longest step.
     pub(super) fn set_carrier(&self, carrier: &mut Carrier, time: f64, count: usize) {
         let (n, weights) = (self.n, Weights::at(time / self.unit));
         carrier.0.clear();
@@ -380,12 +380,12 @@ impl Domain {
     }
 }
 
-/// Carries points or tangent vectors along a flight: the changes of unit vectors.
+/// The propagator over a time, minus the identity: its columns are the changes of unit vectors.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Carrier(Vec<Numbers>);
 
 impl Carrier {
-    /// Returns the state, with `size` entries, that follows from a point or from a tangent vector. Further entries have no meaning.
+    /// Applies the propagator to a point or to a tangent vector. Only the first `size` entries of the result are valid.
     pub(super) fn carry(&self, from: &[f64], size: usize) -> Numbers {
         let mut image = [0.0; SIZE];
         let parts = image.as_chunks_mut::<4>().0.iter_mut().zip(from.as_chunks().0).take(size.div_ceil(4));

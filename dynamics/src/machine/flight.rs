@@ -1,4 +1,4 @@
-//! What is measured on a flight of a machine.
+//! Integrals and extremes over a flight of a machine.
 
 use super::PhasePoint;
 use super::domain::{Domain, Functional, Path};
@@ -14,7 +14,7 @@ pub(super) struct Flight<'a> {
     pub(super) domain: &'a Domain,
     pub(super) modes: &'a Modes,
     pub(super) path: &'a Path,
-    /// The part of the step that the flight takes.
+    /// The share of the step at which the flight ends.
     pub(super) share: f64,
     /// Duration, and time of the start since phase 0.
     pub(super) duration: f64,
@@ -114,7 +114,7 @@ impl Flight<'_> {
             .collect()
     }
 
-    /// Returns the power that all dampers take at a point.
+    /// Returns the power that all dampers dissipate at a point.
     fn dissipation(&self, point: &PhasePoint) -> f64 {
         let n = self.system.n;
         let rates = &point[n..2 * n];
@@ -137,7 +137,7 @@ impl Flight<'_> {
 }
 
 impl Frame {
-    /// Returns the row of a displacement; 0 for one that the machine does not have.
+    /// Returns the row of a displacement; 0 if the machine has no such displacement.
     fn displacement_row(&self, i: usize) -> Functional {
         let mut row = [0.0; super::WIDTH];
         if i < self.n {

@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use super::OscillatorError;
 use super::error::require;
 
-/// Distance of phases, in turns, that is rounding.
+/// Largest distance of phases, in turns, that counts as rounding error.
 const SAME_PHASE: f64 = 1e-12;
 
 /// Largest number of stages.

@@ -61,8 +61,8 @@ pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// [`ModelError`] if a parameter is out of its range, or the oscillator is not valid.
     fn oscillator(&self) -> Result<Oscillator, ModelError>;
 
-    /// Returns [`Oscillator::law`] of a pair without building the oscillator, since it may differ in millions of cells; 0 for a machine,
-    /// which has a law for each wall.
+    /// Returns [`Oscillator::law`] of a pair without building the oscillator, because millions of cells may have different laws. It is 0
+    /// for a machine, which has a law for each wall.
     fn law(&self) -> Law;
 
     /// Returns the start phase: the phase of the forcing, in radians, that the oscillator has as phase 0.

@@ -82,7 +82,7 @@ pub struct Sums {
     pub(crate) contacts: [Contacts; 2],
     /// Energy lost in impacts and in springs of contacts that end.
     pub(crate) lost: f64,
-    /// Energy that dampers take.
+    /// Energy that dampers dissipate.
     pub(crate) dissipated: f64,
     /// Displacements and gaps, by their places.
     pub(crate) displacements: [Moments; DISPLACEMENTS],

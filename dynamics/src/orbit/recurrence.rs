@@ -16,8 +16,8 @@ pub(super) struct Metric {
 }
 
 impl Metric {
-    /// Builds the metric of a set of strobe states from the largest position and the largest velocity. The flow's
-    /// scale of length, and that as a velocity, are lower bounds: at a turning point, velocities are rounding errors.
+    /// Builds the metric of a set of strobe states from the largest position and the largest velocity. The flow's scale of length, and this
+    /// scale times the flow's rate, are lower bounds: at a turning point, velocities are rounding errors.
     pub(super) fn of(strobes: &[State], flow: &Flow) -> Metric {
         let len = flow.state_len();
         let mut largest = [0.0f64; 2];
@@ -93,7 +93,7 @@ fn recurring(strobes: &[State], metric: &Metric, max_period: u32, within: f64) -
     let is_near = |i: usize, lag: usize| metric.distance(&strobes[i], &strobes[i - lag]) < within;
     let duration = |lag: usize| (lag..n).rev().take_while(|&i| is_near(i, lag)).count();
     (1..=(max_period as usize).min(n / 2)).fold(0, |most, lag| {
-        // A lag that is not near where the longest recurrence ended is not longer.
+        // If states at this lag are not near where the longest recurrence so far ended, this recurrence is not longer.
         if lag + most < n && is_near(n - 1 - most, lag) { most.max(duration(lag)) } else { most }
     })
 }
@@ -109,7 +109,7 @@ pub(super) fn candidates(strobes: &[State], metric: &Metric, max_period: u32) ->
         // For most lags this ends after a few strobes, because they are no better than the best.
         let largest = distances.try_fold(0.0f64, |most, d| (d < best).then(|| most.max(d)));
         let Some(distance) = largest else { continue };
-        // A lag must recur ten times as well as all shorter ones.
+        // The distance at a lag must be ten times smaller than at all shorter lags.
         if list.is_empty() || distance < 0.1 * best {
             list.push(Candidate { period: lag as u32, distance });
         }

@@ -33,9 +33,9 @@ pub fn rounding_decides(
     is_decided.is_some_and(|decided| decided.unwrap_or(false))
 }
 
-/// Whether so few events cannot amplify rounding errors of f64 enough. On a stable cycle of period 1, errors must grow to the size of
-/// the motion, by 1e15, within about one turn. Grazing has a status of its own, and an event that is not near grazing amplifies
-/// by at most `1 / GRAZING_SPEED`, 2.5e4. So more than three events are needed.
+/// Whether a cycle has too few events to amplify rounding errors of f64 to the size of the motion. On a stable cycle of period 1, errors
+/// must grow to the size of the motion, by 1e15, within about one turn. Grazing has a status of its own, and an event that is not near
+/// grazing amplifies by at most `1 / GRAZING_SPEED`, 2.5e4. So more than three events are needed.
 pub(super) fn too_few_events(period: u32, events: &[Event]) -> bool {
     period == 1 && events.len() <= 3
 }
@@ -102,7 +102,7 @@ fn largest_variance<const N: usize>(parts: &[DMatrix<f64>], metric: &Metric, rou
                 .zip(units)
                 .for_each(|((x, entry), unit)| *x = entry * unit * factor);
         }
-        // A part that leaves the range of f64 decides nothing.
+        // Entries beyond the range of f64 make the result NaN, which decides nothing.
         let is_finite = matrix.as_flattened().iter().all(|x| x.is_finite());
         if is_finite { matrix } else { [[f64::NAN; N]; N] }
     };

@@ -12,8 +12,8 @@ const CLOSING_DURATION: f64 = 1e-4;
 /// The closing duration as an angle, in radians of the fastest rate of free motion.
 pub const CLOSING_ANGLE: f64 = CLOSING_DURATION * RADIUS;
 
-/// Mesh speeds below this, relative to the scale of length and the rate of free motion, count as zero: in f64 the
-/// series does not end.
+/// Mesh speeds below this, relative to the scale of length times the rate of free motion, count as zero: in f64, a series of impacts does
+/// not reach them.
 pub const NO_THRESHOLD: f64 = 1e-10;
 
 /// Motion with the gap closed, while the wall cancels the relative acceleration.

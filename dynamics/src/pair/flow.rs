@@ -90,7 +90,7 @@ pub struct PairFlow {
     pub walls: [f64; 2],
     /// Scale of length, [`Pair::length_scale`].
     pub length: f64,
-    /// Displacement beyond which the motion has escaped: infinite if energy grows by the force alone.
+    /// Displacement beyond which the motion has escaped: infinite if only the force can increase the energy.
     pub escape: f64,
     /// The pair.
     pub(crate) oscillator: Pair,
@@ -268,7 +268,7 @@ impl PairFlow {
         passed(Side::Right) - passed(Side::Left)
     }
 
-    /// Returns the compliant contacts that last in a domain; none without such contacts.
+    /// Returns the force of the lasting compliant contacts in a domain, if there are any.
     pub(crate) fn contact_force(&self, kind: DomainKind) -> Option<ContactForce> {
         let own = match kind {
             DomainKind::Meshing(side) if self.is_compliant(side) => {
@@ -367,7 +367,7 @@ impl PairFlow {
         }
     }
 
-    /// Moves the gap of a state that lies behind a wall by less than `rounding` to a `distance` in front of it, both relative to the wall's
+    /// Moves a gap that lies less than `rounding` behind a wall to `distance` in front of it. Both distances are relative to the wall's
     /// position or the scale of length.
     pub(crate) fn in_front(&self, y: PairState, rounding: f64, distance: f64) -> PairState {
         let mut q = self.to_gap(y);
@@ -404,7 +404,7 @@ impl PairFlow {
     }
 }
 
-/// The force along the gap of the compliant contacts that last: of the wall of the domain, and of the walls in front of the interval.
+/// The force along the gap of all lasting compliant contacts: with the wall of the domain, and with the walls in front of the interval.
 pub(crate) struct ContactForce {
     stiffness: f64,
     damping: f64,
@@ -439,14 +439,14 @@ pub(crate) struct Schedule<'f> {
 }
 
 impl<'f> Schedule<'f> {
-    /// Begins at phase 0. Returns the flow of the stage that holds there, too.
+    /// Begins at phase 0. Also returns the flow of the stage at phase 0.
     pub(crate) fn new(whole: &'f PairFlow) -> (Schedule<'f>, &'f PairFlow) {
         let mut schedule = Schedule { whole, next: 0 };
         let flow = schedule.restart();
         (schedule, flow)
     }
 
-    /// Returns to phase 0, and returns the flow of the stage that holds there: the one that begins there, or the last one.
+    /// Resets to phase 0. Returns the flow of the stage that begins there, or else of the last stage.
     #[inline]
     pub(crate) fn restart(&mut self) -> &'f PairFlow {
         self.next = 0;

@@ -134,7 +134,7 @@ fn the_strobe_map_is_smooth_at_grazing_a_spring() {
     assert!(contacts >= 8 && misses >= 8, "{contacts} contacts, {misses} misses");
 }
 
-/// From rest on the wall, the gap follows the acceleration, or its first derivative that is not zero.
+/// From rest on the wall, the gap follows the acceleration or its first nonzero derivative.
 #[test]
 fn a_start_at_rest_on_the_wall_follows_the_load() {
     for (load, force, behind) in [(0.5, 0.0, true), (-0.5, 0.0, false), (-1.0, 1.0, false), (1.0, -1.0, true)]

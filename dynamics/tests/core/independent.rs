@@ -21,10 +21,10 @@ use crate::machines::random::{any_case, apart};
 use crate::machines::system::{ANGLE, System};
 use random::{Case, PLAIN, Shape, case};
 
-/// Rounding errors may have this multiple of the effect of known errors, [`Motion::shaken`].
+/// Allowed effect of rounding errors, as a multiple of the effect of the known errors of [`Motion::shaken`].
 const NOISES: f64 = 20.0;
 
-/// Motions in which this effect is larger are not compared further.
+/// Motions in which known errors have a larger effect are not compared further.
 const MOST_NOISE: f64 = 1e-6;
 
 /// Largest difference of the strobe states of a cycle, relative to the size of the motion.
@@ -36,7 +36,7 @@ const MULTIPLIER_OFF: f64 = 1e-7;
 /// Largest difference of the share of time in contact.
 const MESH_OFF: f64 = 1e-9;
 
-/// Distance of a multiplier from 1 at which dry friction creeps.
+/// Multipliers that are nearer to 1 than this may belong to creeping dry friction.
 const CREEP: f64 = 2e-5;
 
 /// Forcing periods after which a motion that is not near a cycle is not followed any more.

@@ -1,4 +1,4 @@
-//! The engine of machines, on oscillators of two coordinates, against the engine of such oscillators; mirror images.
+//! Compares both engines on oscillators of two coordinates, and tests mirror images of machines.
 
 use nalgebra::DVector;
 use rattlemap_dynamics::machine::{MachineMotion, System};
@@ -27,7 +27,7 @@ fn same_quantities(a: &Orbit, b: &Orbit) -> bool {
     list(&a).iter().zip(list(&b)).all(|(a, b)| (a - b).abs() <= 1e-9 * (1.0 + a.abs()))
 }
 
-/// The analysis of an oscillator and of the same as a machine.
+/// Both engines must give the same analysis of an oscillator.
 #[test]
 fn machines_have_the_classes_of_their_oscillators() {
     let of = |seed: u64| {
@@ -65,7 +65,7 @@ fn machines_have_the_classes_of_their_oscillators() {
     let all: Vec<_> = (0..120).into_par_iter().map(of).collect();
     let others: Vec<_> = all.iter().filter(|(agrees, _)| !agrees).map(|(_, what)| what).collect();
     others.iter().take(5).for_each(|what| println!("{what}"));
-    // Several attractors and slow transients may end elsewhere.
+    // With several attractors or slow transients, the engines may reach different attractors.
     assert!(others.len() <= 2, "{} of {} differ", others.len(), all.len());
 }
 
@@ -86,7 +86,7 @@ fn mirrored_pair(e: f64) -> Oscillator {
 /// A change of a machine.
 type Change = fn(&mut Oscillator);
 
-/// Changes after which the mirror image of a motion is no motion.
+/// Changes that break the mirror symmetry.
 const UNSYMMETRIC: [Change; 7] = [
     |machine| machine.stages[0].load[1] = 0.05,
     |machine| machine.stages[1].stiffness[(0, 0)] *= 1.1,
@@ -145,7 +145,7 @@ fn a_cycle_of_a_machine_is_symmetric_up_to_the_pitchfork() {
     }
 }
 
-/// Prints how much longer a period of the gear pair takes as a machine.
+/// Prints how much longer a period of the gear pair takes with the engine of machines.
 #[test]
 #[ignore = "a measurement: --release"]
 fn time_of_a_period_as_a_machine() {

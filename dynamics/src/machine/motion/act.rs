@@ -1,4 +1,4 @@
-//! What happens at the root of a watch: contacts, impacts, and their reports.
+//! Events at roots of watches: contacts, impacts, and their reports to observers.
 
 use super::MachineMotion;
 use crate::machine::domain::STAYS_ZERO;
@@ -93,7 +93,7 @@ impl MachineMotion<'_> {
         self.modes.gaps[gap] = next;
     }
 
-    /// Notes that a gap lies on the wall in a direction, and does not pass it.
+    /// Records that a gap lies on the wall in a direction, and does not pass it.
     pub(super) fn leave(&mut self, gap: usize, direction: Side) {
         let order = if self.rate(gap) != 0.0 { 1 } else { self.refresh().departure(gap, &self.point).0 };
         self.roots.at_wall[gap] = Some((direction, order));
@@ -118,7 +118,7 @@ impl MachineMotion<'_> {
         let pressing =
             |motion: &mut Self| direction.sign() * motion.refresh().accelerations[gap].dot(&motion.point);
         if is_tiny && !wall.contact.is_elastic() && pressing(self) <= 0.0 {
-            // Impacts of two gaps in turn end here: both leave their walls from rest.
+            // A series of alternating impacts of two gaps ends here: both leave their walls from rest.
             self.point[self.system.n + gap] = 0.0;
             self.near_grazing = true;
             self.count_event();
@@ -158,7 +158,7 @@ impl MachineMotion<'_> {
         }
     }
 
-    /// Notes the order of the root of a force at a flight's start.
+    /// Records the order of the root of a force at a flight's start.
     pub(super) fn start_from_force(&mut self, gap: usize, side: Side) {
         if self.system.pushing(gap, side).is_some() {
             self.roots.from_force[gap] = self.derivative_of_force(gap, side, 0).0;
@@ -224,7 +224,7 @@ impl MachineMotion<'_> {
             (None, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
             (None, Some(Side::Left)) => Some(if side == Side::Left { b'5' } else { b'6' }),
         };
-        // With several gaps, a symbol tells its gap.
+        // With several gaps, a symbol includes its gap.
         let several = self.system.gaps() > 1;
         let symbol = symbol.map(|symbol| if several { word::of_gap(symbol, gap) } else { symbol });
         let n = self.system.n;

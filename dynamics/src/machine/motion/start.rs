@@ -142,7 +142,7 @@ impl<'s> MachineMotion<'s> {
             let Some((side, _)) = self.roots.at_wall[gap] else { continue };
             let closing = side.sign() * self.rate(gap);
             if closing > 0.0 || closing == 0.0 && self.heads(gap, side) {
-                // A contact, at once.
+                // The motion starts with a contact.
                 self.roots.at_wall[gap] = None;
             } else {
                 self.leave(gap, side);

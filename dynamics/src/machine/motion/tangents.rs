@@ -95,7 +95,7 @@ impl MachineMotion<'_> {
         self.hold_tangents();
     }
 
-    /// Projects the tangents to the constraints: neighbouring motions rest, too.
+    /// Projects the tangents onto the constraints, because neighbouring motions rest, too.
     fn hold_tangents(&mut self) {
         for tangent in &mut self.tangents {
             for (entry, mode) in tangent.iter_mut().zip(self.modes.gaps).take(self.system.gaps()) {

@@ -1,4 +1,4 @@
-//! Rows of coefficients on `a = (z, w, x, v, cos, sin, 1)` and on the phasors of higher harmonics.
+//! Linear functionals of `a = (z, w, x, v, cos, sin, 1)` and of the phasors of higher harmonics.
 
 use nalgebra::Complex;
 
@@ -6,7 +6,7 @@ use super::few::Few;
 use super::{Gap, Phasor};
 use crate::fused::fma;
 
-/// A linear functional of the state and the forcing.
+/// A linear functional of the state and the forcing, also called a row.
 #[derive(Clone, Debug)]
 pub(crate) struct PairFunctional {
     /// Factors of `(z, w, x, v, cos, sin, 1)`.
@@ -16,7 +16,7 @@ pub(crate) struct PairFunctional {
 }
 
 impl PairFunctional {
-    /// Returns the product with `a`.
+    /// Returns the value at a state and phasor.
     #[inline]
     pub(crate) fn dot(&self, q: &Gap, phasor: &Phasor) -> f64 {
         let row = &self.base;

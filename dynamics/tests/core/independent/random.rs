@@ -38,7 +38,7 @@ impl Random {
     }
 }
 
-/// What a random model has beside a plain one.
+/// Features of a random model that a plain one lacks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shape {
     pub(crate) harmonics: bool,

@@ -28,7 +28,7 @@ const AT_ONCE: f64 = 1e-9;
 /// State and modes at phase 0.
 type Strobe = (Vec<f64>, Vec<Mode>, Vec<Grip>);
 
-/// What is known of a cycle.
+/// Properties of a cycle.
 #[derive(Clone, Debug)]
 pub(crate) struct Cycle {
     pub(crate) strobes: Vec<Strobe>,
@@ -41,7 +41,7 @@ pub(crate) struct Cycle {
     pub(crate) meshes: f64,
     /// Distance of the end from the start, relative to the size of the motion.
     pub(crate) off: f64,
-    /// Largest distance of a motion with larger rounding errors at phase 0.
+    /// Largest distance at phase 0 of a motion with larger rounding errors.
     pub(crate) noise: f64,
 }
 

@@ -1,10 +1,10 @@
-//! The program's motions, in the terms of the comparison.
+//! Adapts the program's motions to the interface of the comparison.
 
 use nalgebra::DMatrix;
 
 use super::motion::Event;
 
-/// What a motion does in a forcing period.
+/// Events and final state of a motion in one forcing period.
 #[derive(Clone, Debug)]
 pub(crate) struct Period {
     /// Events of gaps in order, with times from the start of the motion.
@@ -13,7 +13,7 @@ pub(crate) struct Period {
     pub(crate) slips: Vec<(u8, f64)>,
     /// `(x1, v1, x2, v2, ...)` at the end of the period.
     pub(crate) state: Vec<f64>,
-    /// Its derivative by the state at the start of the motion.
+    /// Derivative of this state with respect to the start of the motion.
     pub(crate) derivative: DMatrix<f64>,
 }
 

@@ -22,7 +22,7 @@ pub(crate) type Vector = DVector<f64>;
 pub(crate) type Functional = RowDVector<f64>;
 pub(crate) type Matrix = DMatrix<f64>;
 
-/// What an element with dry friction does: it sticks, or slides with a positive or a negative rate.
+/// The mode of an element with dry friction: it sticks, or slides with a positive or a negative rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Grip {
     Stick,
@@ -54,7 +54,7 @@ pub(crate) struct Linear {
     pub(crate) step: (f64, Matrix),
     /// Accelerations of the gaps. They are 0 for gaps at rest.
     pub(crate) acceleration: Vec<Functional>,
-    /// For each gap at rest on a rigid wall, its acceleration without this wall, and while all else that is at rest stays at rest.
+    /// For each gap at rest on a rigid wall, its acceleration if this wall were absent and everything else at rest stayed at rest.
     pub(crate) pressing: Vec<Functional>,
     /// Forces that make elements stick.
     pub(crate) hold: Vec<Functional>,
@@ -78,7 +78,8 @@ impl Linear {
         terms
     }
 
-    /// Returns the sign of the first derivative of `row y` that is not zero but for rounding, the value itself included; 0 without one.
+    /// Returns the sign of the first derivative of `row y` that exceeds rounding errors, beginning with the value itself; 0 if there is
+    /// none.
     pub(crate) fn tendency(&self, row: &Functional, y: &Vector) -> f64 {
         let mut row = row.clone();
         for _ in 0..4 {
@@ -127,8 +128,8 @@ fn norm(a: &Matrix) -> f64 {
     a.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
 }
 
-/// The change of velocities by an impulse along a row that changes the row's rate by 1 while rows before it are held, and this impulse.
-/// Both are 0 if the rows before it hold the row.
+/// The change of velocities by an impulse along a row that changes the row's rate by 1 while earlier rows are held, and this impulse. Both
+/// are 0 if the earlier rows hold the row.
 pub(crate) type Bond = (Vector, f64);
 
 /// A machine with its domains.
@@ -338,7 +339,7 @@ impl System {
         }
     }
 
-    /// Whether a gap whose rate is given by rows at rest has a rate, as of a belt that carries it.
+    /// Whether a gap moves although rows at rest determine its rate, for example on a moving belt.
     fn moves(&self, gap: &Vector, held: &[usize], sticking: &[usize]) -> bool {
         let machine = &self.machine;
         let walls = held.iter().map(|&i| (machine.gaps[i].row.clone(), 0.0));
