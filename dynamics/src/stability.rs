@@ -1,10 +1,10 @@
 //! Stability of periodic orbits: monodromy matrix, Floquet multipliers, Newton's method on the strobe map, and
 //! Lyapunov exponents.
 //!
-//! The strobe map `P` maps the state at one phase 0 to the state at the next. Its derivative is the product of flow
-//! and saltation matrices, and is integrated as one tangent vector for each entry of a state. For orbits that may be their own mirror image
-//! the half-period map `Q(y) = -P_{T/2}(y)` is used instead. Since `P = Q^2`, at a pitchfork, where a multiplier of
-//! `P` is `+1`, that of `Q` is `-1`, and `Q' - I` stays regular.
+//! The strobe map `P` maps the state at one phase 0 to the state at the next. Its derivative is the product of flow and saltation matrices,
+//! and is integrated as one tangent vector for each entry of a state. For orbits that may be their own mirror image the half-period map
+//! `Q(y) = -P_{T/2}(y)` is used instead. At a pitchfork a multiplier of `P` is `+1`. Since `P = Q^2`, this multiplier is `-1` for `Q`, so
+//! `Q' - I` stays regular.
 
 mod exponent;
 mod matrix;

@@ -146,7 +146,7 @@ impl Frame {
         Functional(row)
     }
 
-    /// Returns the part of the energy that events change: kinetic energy, and that of the springs and preloads of contacts.
+    /// Returns the part of the energy that events change: kinetic energy, and the energy of springs and preloads of contacts.
     pub(super) fn energy(&self, modes: &Modes, y: &[f64]) -> f64 {
         let (n, key) = (self.n, modes.key(self));
         let rates = &y[n..2 * n];

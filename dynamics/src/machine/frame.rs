@@ -22,8 +22,8 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Returns the sliding rate at rates of the coordinates, and the sum of the moduli of its terms. Rounding errors are relative to this
-    /// sum.
+    /// Returns the sliding rate for given rates of the coordinates, and the sum of the moduli of its terms. Rounding errors are relative to
+    /// this sum.
     pub(super) fn rate_and_size(&self, rates: &[f64]) -> [f64; 2] {
         let terms = self.row.iter().zip(rates).map(|(row, rate)| row * rate);
         terms.fold([-self.speed, self.speed.abs()], |[sum, size], x| [sum + x, size + x.abs()])
@@ -142,8 +142,8 @@ impl Frame {
         &self.mass_scale * matrix * self.mass_scale.transpose()
     }
 
-    /// Returns a bound on all rates for a given stiffness and damping: on that of the forcing and, by norms of the mass-scaled matrices, on
-    /// those of free motion.
+    /// Returns a bound on the rates of the forcing and of free motion, for a given stiffness and damping. Norms of the mass-scaled matrices
+    /// bound free motion.
     pub(super) fn rate(&self, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> f64 {
         let norm = |matrix: DMatrix<f64>| matrix.singular_values().max();
         let own = norm(self.mass_scaled(damping)) + norm(self.mass_scaled(stiffness)).sqrt();
@@ -251,7 +251,7 @@ fn inverse(mass: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. Among displacements with equal factors in a
-/// gap, that of the lightest body is left out. If a heavy body's were left out, the force on it would be a small difference of large
+/// gap, the lightest body's is left out. If a heavy body's were left out, the force on this body would be a small difference of large
 /// numbers.
 fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
     let n = machine.degrees();

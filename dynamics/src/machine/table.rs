@@ -169,7 +169,7 @@ impl Frame {
         listed
     }
 
-    /// Whether a wall only pushes, and its force differs from that of a wall that may pull.
+    /// Whether a wall only pushes and has a damper or a preload.
     pub fn is_pushing(&self, gap: usize, side: Side) -> bool {
         self.pushing(gap, side).is_some()
     }

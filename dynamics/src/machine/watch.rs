@@ -15,7 +15,7 @@ pub(super) enum Watch {
     Wall(usize, Side),
     /// The gap of a contact onset comes back to its wall.
     OnsetEnds(usize, Side),
-    /// The gap of a contact onset is not pressed to its wall any more.
+    /// The force on the gap of a contact onset no longer presses it to its wall.
     PressingEnds(usize, Side),
     /// The gap comes back from behind its wall.
     Leaves(usize, Side),

@@ -262,7 +262,7 @@ fn with_copy(oscillator: &Pair, resting: usize) -> Pair {
     copied
 }
 
-/// Whether a coordinate at rest stays at rest between the walls.
+/// Whether no force acts on a coordinate at rest between the walls.
 fn is_left_alone(machine: &Oscillator, i: usize) -> bool {
     let forces = &machine.stages[0];
     let matrices = [&machine.mass, &forces.damping, &forces.stiffness];

@@ -186,7 +186,7 @@ impl Pair {
         1 + self.stages.len()
     }
 
-    /// Returns the stage that holds at phase 0: the one that begins there, or the last one of the schedule.
+    /// Returns the stage at phase 0: the stage that begins there, or else the last stage of the schedule.
     pub fn first_stage(&self) -> usize {
         match self.schedule.first() {
             Some(&(0.0, stage)) => stage,
@@ -441,10 +441,10 @@ impl Pair {
     /// max(|wall|, |D force|, |D load|, |D preload g|, |D friction row|),   D = (|K| + omega^2 M)^-1
     /// ```
     ///
-    /// over the existing walls and both displacements, with [`|K|`](Self::energy_stiffness) and `load` of free motion. `|D force|` is the amplitude
-    /// of the forced deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
-    /// or none it is the distance that the load moves a mass in a radian of the forcing. The scale is finite for
-    /// every oscillator.
+    /// over the existing walls and both displacements, with [`|K|`](Self::energy_stiffness) and `load` of free motion. `|D force|` is the
+    /// amplitude of the forced deflection without the effects of resonance and damping. `D load` is the static deflection; if the spring is
+    /// soft or missing, it is the distance by which the load moves a mass in one radian of the forcing. The scale is finite for every
+    /// oscillator.
     ///
     /// A factor on `walls`, the force and `load` that is a power of two multiplies the scale exactly. A change of the
     /// unit of time does not change it.

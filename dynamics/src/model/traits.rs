@@ -20,9 +20,9 @@ pub enum ModelError {
 
 /// A model with the values of its parameters: one cell of a map.
 ///
-/// Scenes set parameters by name; engines use the oscillator and the law. [`Parameter::shapes`] says which of the two
-/// depends on a parameter, so that a map computes one flow per distinct oscillator. An implementation must be `Clone`
-/// and `PartialEq`; then `Box<dyn Model>` is, too.
+/// Scenes set parameters by name; engines use the oscillator and the law. [`Parameter::shapes`] says which of the two depends on a
+/// parameter, so that a map computes one flow per distinct oscillator. An implementation must be `Clone` and `PartialEq`; then `Box<dyn
+/// Model>` also is.
 pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// Returns the name in scenes.
     fn name(&self) -> &str;

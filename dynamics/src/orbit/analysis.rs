@@ -541,8 +541,8 @@ impl Analysis<'_> {
         Ok(Reading { closes, ..reading })
     }
 
-    /// Builds the orbit of a cycle; `distance` is that of the motion from the cycle. The growth of rounding errors is
-    /// computed only if no other status comes first.
+    /// Builds the orbit of a cycle; `distance` is the motion's distance from the cycle. The growth of rounding errors is computed only if
+    /// no other status comes first.
     ///
     /// # Errors
     /// A [`Stop`] if the cycle cannot be integrated.

@@ -11,8 +11,7 @@ use crate::motion::{Stop, Trajectory};
 /// Forcing periods that take about a minute if the motion is not stiff.
 pub const LONGEST_TIME: f64 = 3e7;
 
-/// Largest distance from the time of an event that counts as its time, in roundings of the time: the event itself is
-/// located to a few roundings.
+/// Times within this distance of an event count as the time of the event, in roundings of the time. Events are located to a few roundings.
 const EVENT_ROUNDINGS: f64 = 16.0;
 
 /// Returns the state at `time` of the motion that starts from `start` at phase 0 and time 0, or none if `halt` was

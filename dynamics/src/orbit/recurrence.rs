@@ -46,7 +46,7 @@ impl Metric {
         (largest[0] / self.position).max(largest[1] / self.velocity)
     }
 
-    /// Returns the size of a difference of states, of which `N` entries can differ from 0.
+    /// Returns the size of a difference of states with at most `N` nonzero entries.
     pub(super) fn size<const N: usize>(&self, difference: &[f64; N]) -> f64 {
         let scaled = self.scaled(difference);
         scaled[1..].iter().fold(scaled[0].abs(), |most, value| most.max(value.abs()))
@@ -73,7 +73,7 @@ pub(super) struct Candidate {
     pub(super) distance: f64,
 }
 
-/// Largest distance of two states that are equal but for rounding, relative to the motion.
+/// Largest distance of two states that are equal within rounding, relative to the motion.
 const WITHIN_ROUNDING: f64 = 1e-12;
 
 /// Returns the number of last periods over which the states recur at some lag: the motion stays near a periodic

@@ -40,8 +40,8 @@ pub(super) fn too_few_events(period: u32, events: &[Event]) -> bool {
     period == 1 && events.len() <= 3
 }
 
-/// Whether rounding scatters the states of a cycle by more than the distance between two strobes, or by the size of the
-/// motion. The period is then a result of rounding. `events` are those of the cycle.
+/// Whether rounding scatters the states of a cycle by more than the distance between two strobes, or by the size of the motion. The period
+/// is then a result of rounding. `events` are the events of the cycle.
 ///
 /// Each part of the cycle, from between two events to between the next two, adds a rounding error in every direction, and
 /// the derivative of the motion carries the sum of all earlier errors on. So an error counts with its largest growth up

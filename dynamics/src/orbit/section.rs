@@ -60,7 +60,7 @@ impl Section {
         is_determined.then_some(Section { flow: section, start, turns })
     }
 
-    /// Returns the state at the phase 0 that follows `state`, a state at this phase, and the wall of the lasting contact there. If an event
+    /// Converts a state at this phase to the state at the next phase 0. Also returns the wall of the lasting contact there. If an event
     /// lies within `tolerance` turns of phase 0, the state is that after the event.
     pub fn strobe(&self, law: Law, state: State, tolerance: f64) -> Option<(State, Option<Side>)> {
         let mut trajectory = Trajectory::<0>::new(&self.flow, law, state);

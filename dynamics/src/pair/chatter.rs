@@ -96,9 +96,9 @@ impl<const N: usize> PairMotion<'_, N> {
         let pressing_at_end = pressing + duration * pressing_rate;
         let is_rigid = flow.contacts[side.index()] == Contact::Rigid;
         self.tangents = self.tangents.map(|[dz, dw, dx, dv]| {
-            // A neighbouring motion leaves the wall `later`, at another speed and under another pressing
-            // acceleration, and its series ends `late`. `behind` is the difference of its gap's rate at the end of
-            // this series. It is 0 on a rigid wall, where the neighbour comes to rest, too.
+            // A neighbouring motion leaves the wall later by `later`, at another speed and under another pressing acceleration, and its
+            // series ends later by `late`. `behind` is the difference of the gaps' rates at the end of this series: 0 on a rigid wall,
+            // where both motions come to rest.
             let (dx, dv) = (dx + kick * dz, dv + kick * dw);
             let later = s * dz / leaving;
             let leaves = -s * dw - (pressing + sliding.damping * leaving) * later;

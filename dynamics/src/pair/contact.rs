@@ -161,7 +161,7 @@ impl<const N: usize> PairMotion<'_, N> {
     }
 
     pub(super) fn start_meshing(&mut self, side: Side, leaving: f64) {
-        // Both walls share one step level, and may have different numbers of levels.
+        // Contacts with both walls share one index of the step length, but may have different numbers of step lengths.
         self.level[1] = self.level[1].min(self.flow.domain(DomainKind::Meshing(side)).levels - 1);
         if leaving > 0.0 {
             self.mode = Mode::Onset(side);

@@ -24,8 +24,8 @@
 //!
 //! # Bounds on derivatives
 //!
-//! Every derivative `y^(n)` of a solution solves the same equations with the force amplitude multiplied by `omega^n`
-//! and no load. Damping cannot increase its energy `2 E = v M v + x K x`, so
+//! Every derivative `y^(n)` of a solution solves the equations without load and with the force amplitude multiplied by `omega^n`. Damping
+//! cannot increase its energy `2 E = v M v + x K x`, so
 //!
 //! ```text
 //! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(force M^-1 force + force_sin M^-1 force_sin)

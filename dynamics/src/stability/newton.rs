@@ -42,7 +42,7 @@ const SVD_CAP: usize = 1000;
 /// Residuals below this, relative to the state, are rounding errors.
 const CONVERGED: f64 = 1e-13;
 
-/// Residual, relative to the state, below which the multipliers differ from those of the orbit by at most a quarter.
+/// Residual, relative to the state, below which the computed multipliers differ by at most a quarter from the multipliers of the orbit.
 const MULTIPLIER_RESIDUAL: f64 = 1e-3;
 
 /// Largest multiplier, at that residual, from which the orbit is certainly unstable.
@@ -180,7 +180,7 @@ fn lies_within(image: &Image, bound: f64) -> Option<bool> {
     lies_within_unit_circle(image.scaled.nrows(), |i, j| image.scaled[(i, j)] * factor / bound)
 }
 
-/// Returns the size that residuals are relative to: that of the state, or the scale of length if that is larger.
+/// Returns the size that residuals are relative to: the size of the state, or the scale of length if it is larger.
 fn size_of(seed: &Trajectory<'_>, y: &State) -> f64 {
     let flow = seed.flow();
     size(y, flow.rate).max(flow.length * flow.omega / flow.rate)

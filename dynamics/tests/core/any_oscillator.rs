@@ -231,7 +231,7 @@ fn kinds(events: &[GapEvent]) -> Vec<(EventKind, Side)> {
     events.iter().map(|event| (event.kind, event.side)).collect()
 }
 
-/// Compares the motion of `periods` forcing periods of the first flow with that of one forcing period of the second.
+/// Compares `periods` forcing periods of the first flow's motion with one forcing period of the second flow's motion.
 fn have_the_same_motion(case: &Case, [flow, other]: [&Flow; 2], periods: usize) -> Result<(), TestCaseError> {
     let mut ours = Trajectory::with_tangents(flow, case.law, case.start, UNIT);
     let mut theirs = Trajectory::<0>::new(other, case.law, case.start);
@@ -306,7 +306,7 @@ proptest! {
                 (None, Some(Side::Left)) => Some(if right { b'6' } else { b'5' }),
                 (None, None) => None,
             };
-            // If the motion started on a wall, the events do not tell where the first flight comes from.
+            // If the motion started on a wall, the events do not show where the first flight comes from.
             if meshing.is_some() || origin.is_some() {
                 prop_assert_eq!(event.symbol, expected, "{:?}", event);
             }

@@ -104,8 +104,8 @@ fn differences(flow: &Flow, [x, v]: [f64; 2], h: f64) -> [[f64; 2]; 2] {
     [[a[0], b[0]], [a[1], b[1]]]
 }
 
-/// Without a damper the strobe map is continuously differentiable where the motion grazes the wall. Its derivative
-/// there is that of free motion, and nearby it differs by the root of the distance.
+/// Without a damper the strobe map is continuously differentiable where the motion grazes the wall. Its derivative at grazing equals the
+/// derivative of free motion, and nearby it differs by the root of the distance.
 #[test]
 fn the_strobe_map_is_smooth_at_grazing_a_spring() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };

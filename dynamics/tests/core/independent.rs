@@ -146,7 +146,7 @@ fn compare(case: &Case) -> Result<Compared, String> {
     found(Agreement::OtherEnd, same_cycle(case, &followed, &measured, &orbit)?)
 }
 
-/// Compares models. At least this share settles on the same cycle.
+/// Compares models. At least `share` of them must settle on the same cycle.
 fn check(shape: Shape, seeds: std::ops::Range<u64>, share: f64) {
     let count = seeds.end - seeds.start;
     let all: Vec<_> = seeds.into_par_iter().map(|seed| (seed, compare(&case(seed, shape)))).collect();
@@ -174,7 +174,7 @@ fn check(shape: Shape, seeds: std::ops::Range<u64>, share: f64) {
     assert!(by_stage[0] > 20 && has_onsets || !shape.stages || count < 200, "{by_stage:?}");
 }
 
-/// Shapes of models, and the share of them that at least settles on the same cycle.
+/// Shapes of models, and the least share of them that must settle on the same cycle.
 const SHAPES: [(Shape, f64); 11] = [
     (PLAIN, 0.9),
     (Shape { harmonics: true, ..PLAIN }, 0.8),

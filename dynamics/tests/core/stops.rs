@@ -67,7 +67,7 @@ fn a_harmonic_oscillator_between_stops_agrees_with_the_closed_form() {
         let events = events(&flow, stops.law(), state(&[0.0, start]), 30);
         let mut t = (w * stops.b / start).asin() / w;
         let mut speed = (start * start - (w * stops.b).powi(2)).sqrt();
-        // The rounding error of a speed is that of the energy divided by the speed.
+        // The rounding error of a speed is the rounding error of the energy divided by the speed.
         let fast_enough = events.iter().take_while(|event| event.before[1].abs() > 0.1);
         for (n, event) in fast_enough.enumerate() {
             assert!(

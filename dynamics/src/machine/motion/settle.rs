@@ -19,7 +19,7 @@ impl MachineMotion<'_> {
         let chosen = self.system.consistent(&self.modes, &at_rest, &self.point);
         let next = chosen.unwrap_or(self.modes);
         if next.slips[i] == before {
-            // The rate only touches 0, or begins on the wrong side of it.
+            // The rate only touches 0, or begins with the wrong sign.
             self.near_grazing = true;
             self.count_event();
             self.roots.from_rate[i] = self.slide_order(i);

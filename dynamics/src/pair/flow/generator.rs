@@ -84,7 +84,7 @@ pub(super) fn generator(oscillator: &Pair, domain: &Domain) -> Generator {
     Generator { matrix: g, waves: oscillator.harmonics.iter().map(wave).collect() }
 }
 
-/// Returns a bound on all rates of the domain: on that of the forcing and, by norms of the mass-scaled matrices, on those of free motion.
+/// Returns a bound on the rates of the forcing and of the domain. Norms of the mass-scaled matrices bound the rates of the domain.
 pub(super) fn rate(oscillator: &Pair, domain: &Domain) -> f64 {
     let norm = |m: [[f64; 2]; 2]| oscillator.mass_scaled(m).symmetric_eigenvalues().abs().max();
     let damping = norm(domain.dissipation()) + gyroscopic_rate(oscillator, domain);

@@ -113,7 +113,7 @@ impl LinearFlow {
         LinearFlow::assemble(oscillator, generator, rate, pressing, bounds)
     }
 
-    /// Returns the bound on `row . y^(n+1)` in a domain, which must be the one of this flow.
+    /// Returns the bound on `row . y^(n+1)` in a domain, which must be the domain of this flow.
     pub(super) fn energy_bound(
         &self,
         oscillator: &Pair,
@@ -124,8 +124,8 @@ impl LinearFlow {
         EnergyBound::new(oscillator, domain, row, &self.table[n as usize - 1], n, self.unit)
     }
 
-    /// Builds the flow of a gap at rest on a rigid wall, while the other displacement moves. Its
-    /// [`acceleration`](Self::acceleration) is the one that the wall cancels.
+    /// Builds the flow of a gap at rest on a rigid wall, while the other displacement moves. Its [`acceleration`](Self::acceleration) is
+    /// the acceleration that the wall cancels.
     pub(super) fn on_rigid_wall(oscillator: &Pair, kick: f64) -> LinearFlow {
         let motion = ConstrainedMotion::new(oscillator, kick);
         let bounds = |table: &[Columns], unit: f64| [EnergyBound::NONE, motion.bound(&table[4], unit)];
@@ -196,7 +196,7 @@ impl LinearFlow {
         self.field.apply(q, phasor).to_array()
     }
 
-    /// Returns the relative acceleration `w' = z''`; for motion on a rigid wall, the one that the wall cancels.
+    /// Returns the relative acceleration `w' = z''`; for motion on a rigid wall, the acceleration that the wall cancels.
     #[inline]
     pub fn acceleration(&self, q: &Gap, phasor: &Phasor) -> f64 {
         self.gap_rates[0].dot(q, phasor)

@@ -1,9 +1,8 @@
 //! Short flights from a wall, whose Taylor series proves when they end.
 //!
-//! The distance from the wall is `z(v) = v P(v)`, `v` in Taylor steps. Up to an eighth of a Taylor step, twelve terms
-//! reach rounding, in the speeds, too: `0.2^12 / 12! < 1e-17`. If the second coefficient outweighs all later ones,
-//! the gap is accelerated towards the wall until the root of `P`. Then that root is the first return, and the contact
-//! is pressed until then.
+//! The distance from the wall is `z(v) = v P(v)`, `v` in Taylor steps. Up to an eighth of a Taylor step, twelve terms are exact within
+//! rounding for displacements and speeds: `0.2^12 / 12! < 1e-17`. If the second coefficient outweighs all later ones, the gap is
+//! accelerated towards the wall until the root of `P`. Then that root is the first return, and the contact is pressed until then.
 
 use wide::f64x4;
 

@@ -45,7 +45,7 @@ pub(crate) struct Shape {
     pub(crate) stages: bool,
     /// Further walls behind elastic ones.
     pub(crate) walls: bool,
-    /// Elastic walls with a preload, of which most only push.
+    /// Elastic walls with a preload. Most of them only push.
     pub(crate) pushing: bool,
     /// Dry friction, and sometimes no walls.
     pub(crate) friction: bool,

@@ -99,7 +99,7 @@ impl Ours<'_> {
         let size = self.size(&ours);
         let of_derivative = (&ours.derivative - &other.derivative).amax() / size;
         let most = self.limits.most_noise;
-        // Derivatives in which errors of 1e-13 grow to this effect end a comparison, too.
+        // A comparison also ends if derivatives let errors of 1e-13 grow to this effect.
         (noise <= most && size <= most / 1e-13 && !self.motion.is_crowded).then_some((
             ours,
             other,

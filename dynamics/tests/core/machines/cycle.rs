@@ -19,7 +19,7 @@ const CLOSES: f64 = 1e-12;
 /// Distance from a cycle, relative to the size of the motion, at which a motion has the modes of the cycle.
 pub(crate) const SETTLED: f64 = 1e-4;
 
-/// Cycles after which the modes at phase 0 must be those of the cycle.
+/// Number of cycles after which the modes at phase 0 must agree with the modes of the cycle.
 const MOST_CYCLES: u32 = 50;
 
 /// Distance in forcing periods at which events of two gaps count as simultaneous: their order is arbitrary then.
@@ -32,7 +32,7 @@ type Strobe = (Vec<f64>, Vec<Mode>, Vec<Grip>);
 #[derive(Clone, Debug)]
 pub(crate) struct Cycle {
     pub(crate) strobes: Vec<Strobe>,
-    /// Largest modulus of a multiplier, without those of elements that stick for ever.
+    /// Largest modulus of the multipliers, except multipliers of elements that stick for ever.
     pub(crate) radius: f64,
     /// None if events of two gaps are simultaneous.
     pub(crate) word: Option<Word>,

@@ -17,7 +17,7 @@ pub(crate) struct Period {
     pub(crate) derivative: DMatrix<f64>,
 }
 
-/// Advances a motion by a period, or says why it ends.
+/// Advances a motion by a period, or returns the reason why it ends.
 pub(crate) trait Follower {
     fn advance(&mut self) -> Result<Period, String>;
 }

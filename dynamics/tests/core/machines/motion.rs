@@ -41,7 +41,7 @@ pub(crate) enum What {
     Ends,
 }
 
-/// An event of a gap. The symbol is that of the flight it ends, if the flight began with an event or is a contact.
+/// An event of a gap. The symbol belongs to the flight that ends here, if this flight began with an event or is a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Event {
     pub(crate) gap: usize,
@@ -116,7 +116,7 @@ pub(crate) struct Motion<'a> {
     pub(crate) is_crowded: bool,
     /// Number of flights that impacts of other gaps would have begun, but that were too low.
     pub(crate) corners: usize,
-    /// Relative errors of the velocities that are added in turn at events.
+    /// Relative errors that are added to the velocities at events, one after the other.
     shaken: [f64; 4],
 }
 
@@ -496,7 +496,7 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Returns the share of a step after which a flight ends, and what ends it.
+    /// Returns the share of a step after which a flight ends, and the kind of its end.
     fn first_end(&self, linear: &Linear, series: &[Vector]) -> Option<(f64, End)> {
         let mut ends = Vec::new();
         let of = |row: &Functional, factor: f64| -> Vec<f64> {

@@ -1,6 +1,6 @@
 //! The linear domains of a machine.
 //!
-//! The state is `y = (x, v, 1, cos and sin of each harmonic)`, so that every domain is `y' = A y`. A domain is built when it is first met.
+//! The state is `y = (x, v, 1, cos and sin of each harmonic)`, so that every domain is `y' = A y`. A domain is built on first use.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -15,7 +15,7 @@ pub(crate) const ANGLE: f64 = 0.6;
 /// Terms of Taylor series: `0.6^19 / 19!` is far below rounding.
 const TERMS: usize = 18;
 
-/// Relative size of numbers that are zero but for rounding.
+/// Relative size below which numbers count as rounding errors.
 pub(crate) const ROUNDING: f64 = 1e-12;
 
 pub(crate) type Vector = DVector<f64>;
@@ -36,7 +36,7 @@ impl Grip {
     }
 }
 
-/// What distinguishes the domains of a machine.
+/// The modes that distinguish the domains of a machine.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Key {
     pub(crate) stage: usize,
@@ -206,7 +206,7 @@ impl System {
         Some(row)
     }
 
-    /// Returns the bonds of rows of velocities, in turn.
+    /// Returns the bonds of rows of velocities, each while the earlier rows are held.
     pub(crate) fn bonds(&self, rows: &[&Vector]) -> Vec<Bond> {
         let mut mobility = self.per_mass.clone();
         let bond = |row: &&Vector| {
