@@ -38,9 +38,9 @@ pub(super) struct DomainKey {
 pub(super) struct Functional(pub(super) PhasePoint);
 
 /// Number of SIMD registers that hold a point.
-const REGISTERS: usize = WIDTH / 4;
+const POINT_REGISTERS: usize = WIDTH / 4;
 
-fn registers(point: &PhasePoint) -> [f64x4; REGISTERS] {
+fn registers(point: &PhasePoint) -> [f64x4; POINT_REGISTERS] {
     std::array::from_fn(|i| f64x4::new(point.as_chunks().0[i]))
 }
 
@@ -91,7 +91,7 @@ pub(super) struct Path {
 
 /// One linear domain.
 #[derive(Clone, Debug)]
-pub(super) struct Domain {
+pub(super) struct LinearDomain {
     n: usize,
     width: usize,
     /// Angular frequencies of the harmonics.
@@ -126,8 +126,8 @@ impl Default for Path {
     }
 }
 
-impl Domain {
-    pub(super) fn new(system: &Frame, key: DomainKey) -> Domain {
+impl LinearDomain {
+    pub(super) fn new(system: &Frame, key: DomainKey) -> LinearDomain {
         let (n, width) = (system.n, system.width());
         let forces = &system.stages[key.stage];
         let (mut stiffness, mut damping) = (forces.stiffness.clone(), forces.damping.clone());
@@ -175,7 +175,7 @@ impl Domain {
                 Constraint::Element(i_element) => holds[i_element] = Some(row(&multipliers, i)),
             }
         }
-        Domain {
+        LinearDomain {
             n,
             width,
             rates: system.orders.iter().map(|order| order * system.machine.omega).collect(),
@@ -218,11 +218,11 @@ impl Domain {
     /// Returns the time derivative of a functional along the motion, as a functional.
     pub(super) fn rate_of(&self, row: &Functional) -> Functional {
         let n = self.n;
-        let mut sums = [f64x4::ZERO; REGISTERS];
+        let mut sums = [f64x4::ZERO; POINT_REGISTERS];
         for (acceleration, &factor) in self.accelerations.iter().zip(&row.0[n..]) {
             if factor != 0.0 {
                 let (terms, factor) = (registers(&acceleration.0), f64x4::splat(factor));
-                (0..REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
+                (0..POINT_REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
             }
         }
         let mut rate = [0.0; WIDTH];
@@ -265,7 +265,7 @@ impl Domain {
         (STAYS_ZERO, 0.0)
     }
 
-    /// Finds the first derivative of a coordinate, of order 2 or higher, that is not 0 within rounding, like [`Domain::first_derivative`].
+    /// Finds the first derivative of a coordinate, of order 2 or higher, that is not 0 within rounding, like [`LinearDomain::first_derivative`].
     pub(super) fn departure(&self, coordinate: usize, point: &PhasePoint) -> (usize, f64) {
         let (order, value) = self.first_derivative(&self.accelerations[coordinate], point, 0);
         (order.saturating_add(2), value)

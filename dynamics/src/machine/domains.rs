@@ -3,7 +3,7 @@
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
-use super::domain::{Domain, DomainKey};
+use super::domain::{DomainKey, LinearDomain};
 use super::frame::Frame;
 use super::modes::{AtRest, GapMode, Modes};
 use super::{PhasePoint, ROUNDING};
@@ -24,7 +24,7 @@ type Domains = OnceLock<Box<Met>>;
 #[derive(Debug)]
 struct Met {
     key: DomainKey,
-    domain: Domain,
+    domain: LinearDomain,
     next: Domains,
 }
 
@@ -43,11 +43,11 @@ impl System {
     }
 
     /// Returns the domain of a combination of modes, and builds it on first use.
-    pub(super) fn domain(&self, modes: &Modes) -> &Domain {
+    pub(super) fn domain(&self, modes: &Modes) -> &LinearDomain {
         let key = modes.key(self);
         let mut place = &self.domains[key.stage];
         loop {
-            let build = || Box::new(Met { key, domain: Domain::new(self, key), next: OnceLock::new() });
+            let build = || Box::new(Met { key, domain: LinearDomain::new(self, key), next: OnceLock::new() });
             let met = place.get_or_init(build);
             if met.key == key {
                 return &met.domain;

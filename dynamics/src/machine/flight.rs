@@ -1,7 +1,7 @@
 //! Integrals and extremes over a flight of a machine.
 
 use super::PhasePoint;
-use super::domain::{Domain, Functional, Path};
+use super::domain::{Functional, LinearDomain, Path};
 use super::frame::{Element, Frame};
 use super::modes::Modes;
 use crate::model::Side;
@@ -11,7 +11,7 @@ use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, r
 /// Part of a flight: one domain, at most one Taylor step.
 pub(super) struct Flight<'a> {
     pub(super) system: &'a Frame,
-    pub(super) domain: &'a Domain,
+    pub(super) domain: &'a LinearDomain,
     pub(super) modes: &'a Modes,
     pub(super) path: &'a Path,
     /// The share of the step at which the flight ends.

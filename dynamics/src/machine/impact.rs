@@ -1,6 +1,6 @@
 //! The result of an impact: the jump of all rates, and the modes after the impact.
 
-use super::domain::Domain;
+use super::domain::LinearDomain;
 use super::domains::System;
 use super::modes::{AtRest, GapMode, Modes};
 use super::{Numbers, PhasePoint, ROUNDING, SIZE};
@@ -42,7 +42,7 @@ type Kick = (Numbers, [bool; MOST_GAPS]);
 
 impl Impact<'_> {
     /// Returns the leaving speed of a flight of the height [`LOWEST_FLIGHT`].
-    fn lowest_speed(&self, domain: &Domain, gap: usize, point: &PhasePoint) -> f64 {
+    fn lowest_speed(&self, domain: &LinearDomain, gap: usize, point: &PhasePoint) -> f64 {
         let pressing = domain.accelerations[gap].dot(point).abs();
         (2.0 * LOWEST_FLIGHT * self.system.length * pressing).sqrt()
     }

@@ -7,7 +7,7 @@ mod settle;
 mod start;
 mod tangents;
 
-use super::domain::{Carrier, Domain, Path, STAYS_ZERO};
+use super::domain::{Carrier, LinearDomain, Path, STAYS_ZERO};
 use super::domains::System;
 use super::flight::Flight;
 use super::modes::{GapMode, Modes};
@@ -25,7 +25,7 @@ pub struct MachineMotion<'s> {
     pub(super) modes: Modes,
     /// Modes of the latest domain that was entered, and this domain.
     entered: Modes,
-    domain: &'s Domain,
+    domain: &'s LinearDomain,
     /// Memory that is used again in each step: the step, the watches, and the carrier of tangents.
     path: Option<Box<Path>>,
     watches: Vec<Watch>,
@@ -245,7 +245,7 @@ impl<'s> MachineMotion<'s> {
     }
 
     /// Enters the domain of the present modes, and returns it.
-    fn refresh(&mut self) -> &'s Domain {
+    fn refresh(&mut self) -> &'s LinearDomain {
         if self.modes != self.entered {
             (self.entered, self.domain) = (self.modes, self.system.domain(&self.modes));
         }

@@ -19,7 +19,7 @@ pub(super) type Polynomial = [f64; ORDER + 1];
 const MOST_HALVINGS: u32 = 48;
 
 /// Largest number of steps of the final root search.
-const ROOT_CAP: u32 = 200;
+const ROOT_STEP_CAP: u32 = 200;
 
 /// Largest order of a root at the start of a step.
 const MOST_ORDER: usize = 18;
@@ -244,7 +244,7 @@ impl Weights {
 fn root(c: &[f64], [mut lo, mut hi]: [f64; 2], guess: f64) -> f64 {
     let (mut padded, mut u) = ([0.0; ORDER + 1], guess);
     padded[..c.len()].copy_from_slice(c);
-    for _ in 0..ROOT_CAP {
+    for _ in 0..ROOT_STEP_CAP {
         let [value, slope] = Weights::at(u).of(&padded);
         if value > 0.0 {
             lo = u;

@@ -2,7 +2,7 @@
 //!
 //! A point is listed as `(d1, w1, d2, w2, ..., cos and sin of each harmonic, 1)`.
 
-use super::domain::{Domain, DomainKey, Functional};
+use super::domain::{DomainKey, Functional, LinearDomain};
 use super::domains::System;
 use super::frame::{Element, Frame};
 use super::modes::GapMode;
@@ -111,12 +111,12 @@ impl Frame {
                 rest /= modes.len();
             }
             key.stage = rest;
-            self.equations_of(&Domain::new(self, key))
+            self.equations_of(&LinearDomain::new(self, key))
         };
         (0..self.domain_count()).map(of_number).collect()
     }
 
-    fn equations_of(&self, domain: &Domain) -> Equations {
+    fn equations_of(&self, domain: &LinearDomain) -> Equations {
         let row = |row: &Functional| self.listed(&row.0);
         Equations {
             radian: domain.radian(),

@@ -1,6 +1,6 @@
 //! Watches: conditions that end the present modes, their functions, and the first root of all functions on a step.
 
-use super::domain::{Domain, Functional, Path};
+use super::domain::{Functional, LinearDomain, Path};
 use super::frame::Frame;
 use super::modes::{GapMode, Modes};
 use super::polynomial::{Fall, Polynomial, bernstein, first_fall};
@@ -53,7 +53,7 @@ pub(super) struct Roots {
 #[derive(Clone, Copy)]
 pub(super) struct Moment<'a> {
     pub(super) frame: &'a Frame,
-    pub(super) domain: &'a Domain,
+    pub(super) domain: &'a LinearDomain,
     pub(super) modes: &'a Modes,
     pub(super) roots: &'a Roots,
     pub(super) point: &'a PhasePoint,

@@ -285,7 +285,7 @@ impl Oscillator {
     }
 
     /// Returns the impulse `p` of a wall on a gap in an event, from the states before and after. `M (v+ - v-)` is the sum of `p g` over all
-    /// gaps, because walls on which other gaps rest push, too.
+    /// gaps, because walls on which other gaps rest also push.
     pub fn gap_impulse(&self, gap: usize, [before, after]: [&State; 2]) -> f64 {
         let jump = |gap: usize| self.gap_value(gap, after, 1) - self.gap_value(gap, before, 1);
         if self.gaps.len() == 1 { jump(0) / self.mobility(0) } else { self.impulses(jump)[gap] }

@@ -50,7 +50,7 @@ pub(super) const APPROACH_RATIO: f64 = 0.7;
 /// Largest distance from which a trajectory is tested for approach, relative to the size of the motion.
 const APPROACH_DISTANCE: f64 = 0.3;
 
-/// Number of checks of an approach. At each the trajectory must be closer than before.
+/// Number of checks of an approach. At each check the trajectory must be closer than before.
 const APPROACH_CHECKS: u32 = 4;
 
 /// Work that one motion may take: about a minute.

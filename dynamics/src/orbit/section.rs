@@ -18,7 +18,7 @@ const CLEARANCE: f64 = 1.0 / 16.0;
 /// Largest rounding error of a lane's gap, relative to the wall's position or the scale of length.
 const STROBE_ON_WALL: f64 = 1e-5;
 
-/// Distance in front of a wall at which such a gap is put, in the same unit: about a rounding error of f64.
+/// A gap behind a wall by less is moved to this distance in front of it, about a rounding error of f64, in the same unit.
 const IN_FRONT: f64 = 1e-15;
 
 /// A phase far from the events of a motion, and the motion's state there.
@@ -82,8 +82,8 @@ impl Section {
         quantities
     }
 
-    /// Converts the events of a cycle of `periods` forcing periods, whose times begin at this phase, to times since the
-    /// next phase 0. An event there ends the cycle, as the strobe is the state after it.
+    /// Converts the events of a cycle of `periods` forcing periods, whose times begin at this phase, to times since the next phase 0. An
+    /// event at phase 0 ends the cycle, because the strobe is the state after the event.
     pub(super) fn events(&self, events: &[Event], periods: u32) -> Vec<Event> {
         let period = self.flow.period;
         let cycle = f64::from(periods) * period;

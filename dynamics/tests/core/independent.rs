@@ -1,5 +1,5 @@
-//! Compares the reference with an integrator by matrix exponentials that shares only the description of the oscillator with it, on
-//! random models of one gap with harmonics, stages, further walls, pushing walls, preloads and dry friction.
+//! Compares the reference with an integrator by matrix exponentials on random models of one gap with harmonics, stages, further walls,
+//! pushing walls, preloads and dry friction. Both share only the description of the oscillator.
 
 pub(crate) mod random;
 

@@ -60,7 +60,7 @@ fn a_constant_force_returns_the_mass_with_its_speed() {
             near(x, -0.5 - 3.0 * inside + 2.0 * inside * inside, 1e-14)
                 && near(v, -3.0 + 4.0 * inside, 1e-14)
         );
-        // A faster mass is earlier at the walls and stays longer behind them; a shifted one changes the time alone.
+        // A faster mass is earlier at the walls and stays longer behind them; a shift of the start changes the time alone.
         let speed = 3.0;
         let by_speed = |dx: f64, dv: f64| {
             // Time of the last event as a function of the start.

@@ -79,7 +79,7 @@ impl MachineMotion<'_> {
         self.roots.from_force[gap] = self.derivative_of_force(gap, side, 1).0;
     }
 
-    /// Returns order and value of the first nonzero derivative of a pushing wall's force, like `Domain::first_derivative`.
+    /// Returns order and value of the first nonzero derivative of a pushing wall's force, like `LinearDomain::first_derivative`.
     pub(super) fn derivative_of_force(&mut self, gap: usize, side: Side, first: usize) -> (usize, f64) {
         let force = self.system.force(self.modes.stage, gap, side);
         self.refresh().first_derivative(&force, &self.point, first)

@@ -217,7 +217,7 @@ impl<'a> Motion<'a> {
         Matrix::from_fn(2 * n, 2 * n, |i, j| tangents[(of(i), of(j))])
     }
 
-    /// Clears the fields that the caller may clear.
+    /// Clears all records that the caller reads period by period.
     pub(crate) fn clear(&mut self) {
         (self.events, self.slips, self.symbols) = Default::default();
         self.meshing_time = 0.0;
