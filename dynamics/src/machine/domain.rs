@@ -85,7 +85,6 @@ pub(super) struct Path {
     expanded: usize,
     /// Bounds on the changes of the coordinates.
     pub(super) changes: [f64; MOST_COORDINATES],
-    /// Duration.
     h: f64,
 }
 

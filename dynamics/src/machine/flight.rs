@@ -28,12 +28,10 @@ struct Signal {
 }
 
 impl Signal {
-    /// Returns the value at a point.
     fn at(&self, point: &PhasePoint) -> f64 {
         self.value.dot(point)
     }
 
-    /// Returns the rate at a point.
     fn rate(&self, point: &PhasePoint) -> f64 {
         self.rate.dot(point)
     }
@@ -130,7 +128,6 @@ impl Flight<'_> {
         elements.map(power).sum()
     }
 
-    /// Whether an element with dry friction sticks.
     fn sticks(&self) -> bool {
         self.system.elements.iter().zip(self.modes.slips).any(|(_, slip)| slip == Slip::Stick)
     }
@@ -164,7 +161,6 @@ impl Frame {
         0.5 * kinetic + (0..self.gaps()).map(of_gap).sum::<f64>()
     }
 
-    /// Whether the machine has dry friction.
     pub(crate) fn has_friction(&self) -> bool {
         !self.elements.is_empty()
     }

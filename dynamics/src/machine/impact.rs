@@ -28,7 +28,6 @@ pub(super) struct Outcome {
     /// Modes and point after the impact.
     pub(super) modes: Modes,
     pub(super) point: PhasePoint,
-    /// Whether contact lasts.
     pub(super) lasts: bool,
     /// Acceleration towards the wall, in free motion after the impact, or its first derivative that is not 0.
     pub(super) pressing: f64,

@@ -138,7 +138,6 @@ impl Flow {
         self.non_impacting.as_ref()
     }
 
-    /// Whether the oscillator has dry friction.
     pub(crate) fn has_friction(&self) -> bool {
         match &self.engine {
             Engine::Pair(_) => false,

@@ -180,7 +180,6 @@ pub(super) struct Analysis<'a> {
     pub(super) settings: &'a Settings,
     pub(super) longest_window: u32,
     pub(super) event_periods: u32,
-    /// Whether quantities are measured.
     pub(super) measures: bool,
     /// Whether the growth of rounding errors on cycles is computed.
     pub(super) resolves: bool,

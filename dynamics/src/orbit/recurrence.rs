@@ -35,7 +35,6 @@ impl Metric {
         self.len
     }
 
-    /// Returns the distance of two states.
     #[inline]
     pub(super) fn distance(&self, a: &State, b: &State) -> f64 {
         let difference = |i: usize| (a[i] - b[i]).abs();

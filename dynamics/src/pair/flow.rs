@@ -92,7 +92,6 @@ pub struct PairFlow {
     pub length: f64,
     /// Displacement beyond which the motion has escaped: infinite if only the force can increase the energy.
     pub escape: f64,
-    /// The pair.
     pub(crate) oscillator: Pair,
     /// Scale of speed: the scale of length times the rate of free motion.
     pub(crate) speed: f64,
@@ -283,7 +282,6 @@ impl PairFlow {
         Some(ContactForce { stiffness, damping, wall, preload, held: self.held.unwrap_or_default() })
     }
 
-    /// Returns the flow of a stage.
     fn stage(&self, stage: usize) -> &PairFlow {
         if stage == 0 { self } else { &self.stages[stage - 1] }
     }

@@ -88,7 +88,6 @@ fn strobe(flow: &Flow, start: [f64; 2]) -> ([[f64; 2]; 2], [f64; 2], Vec<GapEven
     ([[a[0], b[0]], [a[1], b[1]]], [x, v], events)
 }
 
-/// Returns the largest difference of two matrices.
 fn apart(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }

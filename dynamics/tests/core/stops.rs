@@ -11,7 +11,6 @@ fn stops(e: f64) -> Stops {
     Stops { m: 1.5, force: 0.0, mesh_speed: 0.0, ..Stops::with_restitution(e) }
 }
 
-/// Returns the time since the start.
 fn time(flow: &Flow, event: &GapEvent) -> f64 {
     event.period as f64 * flow.period + event.t
 }

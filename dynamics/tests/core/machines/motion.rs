@@ -286,7 +286,6 @@ impl<'a> Motion<'a> {
         self.system.domain(&self.key())
     }
 
-    /// Returns the value of a row.
     pub(super) fn of(&self, row: &Functional) -> f64 {
         value(row, &self.y)
     }

@@ -94,7 +94,6 @@ impl Linear {
     }
 }
 
-/// Returns the value of a row.
 pub(crate) fn value(row: &Functional, y: &Vector) -> f64 {
     row.iter().zip(y.iter()).map(|(a, b)| a * b).sum()
 }
