@@ -1,6 +1,6 @@
 //! The fast engine, for pairs: an event-driven f64 integrator on the exact flow.
 //!
-//! A [`PairMotion`] is the motion of one pair. Between events it takes the longest steps that [`certificate`] can prove to be free of
+//! A `PairMotion` is the motion of one pair. Between events it takes the longest steps that [`certificate`] can prove to be free of
 //! events. A step with an event ends at the event, which is located to rounding on the exact flow.
 //!
 //! # Cost

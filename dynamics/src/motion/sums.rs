@@ -19,12 +19,12 @@ const EXTREME_ITERATIONS: usize = 60;
 /// Largest number of displacements and gaps.
 pub const DISPLACEMENTS: usize = MOST_COORDINATES + MOST_GAPS;
 
-/// Returns the place of a displacement in [`Quantities::displacements`].
+/// Returns the place of a displacement in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
 pub fn place_of_displacement(i: usize) -> usize {
     if i < 2 { i } else { i + 1 }
 }
 
-/// Returns the place of a gap in [`Quantities::displacements`].
+/// Returns the place of a gap in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
 pub fn place_of_gap(i: usize) -> usize {
     if i == 0 { 2 } else { MOST_COORDINATES + i }
 }
