@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use rattlemap::gpu::{AdapterChoice, Features, Gpu, Lane, LaneSettings, Precision, is_hardware};
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{Form, GearPair, Law, REST};
 
 use rattlemap::cli::bench::spread::Spread;
@@ -88,7 +88,7 @@ fn processor_seconds(work: impl FnOnce()) -> f64 {
 /// Integrates machines from rest. Returns the number of events.
 fn on_reference(systems: &[System], periods: u32) -> u64 {
     let events = |system| {
-        let mut motion = Motion::new(system, &REST);
+        let mut motion = MachineMotion::new(system, &REST);
         (0..periods).for_each(|_| motion.advance_period(&mut ()).expect("an ordinary cell"));
         motion.work().events
     };

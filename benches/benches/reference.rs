@@ -6,7 +6,7 @@ use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use rattlemap_bench::shapes::CHAINS;
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{GearPair, REST, State, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::Trajectory;
@@ -149,12 +149,12 @@ fn per_period_of_machines(c: &mut Criterion) {
     group.sample_size(10);
     for chain in CHAINS {
         let systems: Vec<_> = chain.cells(side).iter().map(System::new).collect();
-        let work = |motions: &mut Vec<Motion<'_>>, periods: u64| {
+        let work = |motions: &mut Vec<MachineMotion<'_>>, periods: u64| {
             for motion in motions {
                 (0..periods).for_each(|_| motion.advance_period(&mut ()).expect("an ordinary cell"));
             }
         };
-        let mut start: Vec<_> = systems.iter().map(|system| Motion::new(system, &REST)).collect();
+        let mut start: Vec<_> = systems.iter().map(|system| MachineMotion::new(system, &REST)).collect();
         work(&mut start, size.transient / 4);
         group.bench_function(chain.name(), |b| {
             b.iter_batched_ref(|| start.clone(), |motions| work(motions, periods), BatchSize::LargeInput)

@@ -2,7 +2,7 @@
 
 use cpu_time::ThreadTime;
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{Oscillator, REST, Side, State, state};
 use rattlemap_dynamics::motion::{EventKind, GapEvent};
 use serde::Serialize;
@@ -60,11 +60,11 @@ pub struct Report {
 /// Returns the motion of a machine, if it has impacts, no lasting contact and no chaos.
 fn cell(machine: &Oscillator) -> Option<Cell> {
     let system = System::new(machine);
-    let mut settled = Motion::new(&system, &REST);
+    let mut settled = MachineMotion::new(&system, &REST);
     (0..SETTLING_PERIODS).try_for_each(|_| settled.advance_period(&mut ())).ok()?;
     let start = settled.state();
-    let mut motion = Motion::new(&system, &start);
-    motion.set_tangents(Motion::unit_tangents(&system));
+    let mut motion = MachineMotion::new(&system, &start);
+    motion.set_tangents(MachineMotion::unit_tangents(&system));
     let mut events: Vec<GapEvent> = Vec::new();
     (0..PERIODS).try_for_each(|_| motion.advance_period(&mut events)).ok()?;
     let has_impacts_alone = !events.is_empty() && events.iter().all(|event| event.kind == EventKind::Impact);
@@ -88,7 +88,7 @@ pub fn run(side: usize, least: f64) -> Report {
     let (clock, mut rounds) = (ThreadTime::now(), 0);
     let seconds = loop {
         for (system, start) in systems.iter().zip(&starts) {
-            let mut motion = Motion::new(system, start);
+            let mut motion = MachineMotion::new(system, start);
             (0..PERIODS).for_each(|_| motion.advance_period(&mut ()).expect("it was computed before"));
         }
         rounds += 1;

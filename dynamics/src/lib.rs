@@ -1,4 +1,4 @@
-//! One motion of a piecewise-linear vibro-impact oscillator, exactly.
+//! Computes one motion of a piecewise-linear vibro-impact oscillator exactly.
 //!
 //! Pure f64: no files, clock, threads or graphics. The modules, in the order in which data flows:
 //!

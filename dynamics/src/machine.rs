@@ -1,10 +1,10 @@
-//! The motion of a [`Oscillator`](crate::model::Oscillator) as a machine: any number of coordinates and gaps, and dry friction.
+//! The general engine: the motion of an [`Oscillator`](crate::model::Oscillator) with several coordinates and gaps, and dry friction.
 //!
 //! # Elements and domains
 //!
 //! Each wall and each element with dry friction has a few modes. A combination of all modes and a stage is a *domain*, in which the
-//! equations of motion are linear. Domains are built when they are first met. The coordinates are the gaps and as many displacements as
-//! are missing, so that a contact puts its gap exactly on the wall.
+//! equations of motion are linear. Domains are built on first use. The gaps are coordinates, completed by displacements, so that a contact
+//! puts its gap exactly on the wall.
 //!
 //! ```text
 //! a = (d, w, cos and sin of each harmonic, 1),   d' = w,   w' = row of accelerations . a
@@ -13,8 +13,8 @@
 //! # Steps and events
 //!
 //! A step is a Taylor polynomial of order 23 from the present state, over at most 1.6 radians of the fastest rate, so that its remainder is
-//! below rounding. Whatever ends a mode is the root of a linear function of `a` (a *watch*), which on a step is a polynomial, too.
-//! Its Bernstein coefficients show that it has no root, or isolate the first one. So no event is missed, at any step length.
+//! below rounding. A mode ends at a root of a linear function of `a`, called a *watch*. Over one step, a watch is a polynomial of time. Its
+//! Bernstein coefficients show that it has no root, or isolate the first one. So no event is missed, at any step length.
 //!
 //! # Tangents
 //!
@@ -25,33 +25,33 @@ mod constraints;
 mod domain;
 mod domains;
 mod flight;
+mod frame;
 mod impact;
 mod modes;
 mod motion;
 mod polynomial;
-mod system;
 mod table;
 mod watch;
 
 pub use domains::System;
+pub use frame::Frame;
 pub use impact::LOWEST_FLIGHT;
-pub use motion::Motion;
-pub use system::Frame;
+pub use motion::MachineMotion;
 pub use table::{Equations, StartModes};
 
 use crate::model::{MOST_HARMONICS, STATE, State};
 
-/// Numbers of a state.
+/// Number of entries of a state.
 pub(crate) const SIZE: usize = STATE;
 
-/// Entries of `a`: the state, a pair for each harmonic, and 1; a multiple of four, for products of registers.
+/// Length of `a`: the state, cosine and sine of each harmonic, and 1, rounded up to a multiple of four for SIMD registers.
 pub(crate) const WIDTH: usize = (SIZE + 2 * (MOST_HARMONICS + 1) + 1).next_multiple_of(4);
 
 /// Rounding error of a sum, relative to the size of its terms.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// A state in the coordinates of the model, `(x1, v1, x2, v2, ...)`, or in those of the flow, `(d1 .. dn, w1 .. wn)`; further numbers are 0.
+/// A state in the coordinates of the model, `(x1, v1, x2, v2, ...)`, or in those of the flow, `(d1 .. dn, w1 .. wn)`; unused entries are 0.
 pub(crate) type Numbers = State;
 
-/// The state, the phasors and 1, in the coordinates of the flow.
-pub(crate) type Point = [f64; WIDTH];
+/// A point `a` of the extended phase space: the state in the coordinates of the flow, the phasors, and 1.
+pub(crate) type PhasePoint = [f64; WIDTH];

@@ -1,8 +1,8 @@
 //! Models of piecewise-linear oscillators between walls.
 //!
-//! A [`Model`] has named parameters. Two models are built in: [`GearPair`], and [`Stops`], which can be solved by
-//! hand. From its parameters a model derives an [`Oscillator`], the only description of what moves: coordinates, gaps with walls and their
-//! laws, dry friction, stages and harmonics of the force. [`Pair::of`] gives the form of it for the fast engine, if it has one.
+//! A [`Model`] has named parameters. Two models are built in: [`GearPair`], and [`Stops`], which can be solved by hand. From its parameters
+//! a model derives an [`Oscillator`], the only description of the moving system: coordinates, gaps with walls and their laws, dry friction,
+//! stages and harmonics of the force. [`Pair::of`] converts it for the fast engine, if that engine supports it.
 
 mod error;
 mod gear_pair;

@@ -1,8 +1,8 @@
-//! The motion of an oscillator from event to event, in the same terms for both engines.
+//! The motion of an oscillator from event to event, with one interface for both engines.
 //!
-//! [`Flow`] prepares an oscillator and [`Trajectory`] follows a motion; these two are the only types that know both engines, [`crate::pair`]
-//! and [`crate::machine`]. Everything above them asks a trajectory. The other modules lie below the engines: events and their
-//! observers, reasons for an end, the clock, the work that a motion may take.
+//! [`Flow`] prepares an oscillator and [`Trajectory`] follows a motion; these two are the only types that know both engines,
+//! [`crate::pair`] and [`crate::machine`]. All other code uses these types. The engines use the other modules: events and their observers,
+//! reasons for an end, the clock, limits of work.
 //!
 //! There is no time-stepping error and no event is missed. Every loop has a cap; [`Stop`] lists the reasons why a motion can end.
 
@@ -26,12 +26,11 @@ pub use sums::{DISPLACEMENTS, Sums, place_of_displacement, place_of_gap};
 pub(crate) use trajectory::Flights;
 pub use trajectory::Trajectory;
 
-/// Approach speeds below this, relative to the scale of length and the rate of free motion, count as near grazing if
-/// the load pulls away from the wall. The saltation matrix is proportional to the inverse of the approach speed.
+/// Approach speeds below this, relative to the scale of length times the rate of free motion, count as near grazing if the load pulls away
+/// from the wall. The saltation matrix is proportional to the inverse of the approach speed.
 pub const GRAZING_SPEED: f64 = 4e-5;
 
-/// Speeds below this at an event, relative to the scale of length and the rate of free motion, make the linearisation
-/// meaningless.
+/// Speeds below this at an event, relative to the scale of length times the rate of free motion, make the linearisation meaningless.
 pub const NO_SPEED: f64 = 1e-14;
 
 /// Largest entry of a state that counts as finite.

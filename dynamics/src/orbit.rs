@@ -62,7 +62,7 @@ pub struct Event {
     pub before: State,
     /// State just after the event; equal to `before` where meshing ends.
     pub after: State,
-    /// The side of the contact that lasts after the event, if one does.
+    /// Side of the lasting contact after the event, if there is one.
     pub meshing: Option<Side>,
 }
 
@@ -76,7 +76,7 @@ pub enum Class {
     },
     /// A motion that is not periodic and has a positive Lyapunov exponent.
     Chaotic,
-    /// Neither periodic nor chaotic could be shown within the allowed periods.
+    /// Neither a period nor chaos could be shown within the allowed periods.
     Undecided,
     /// The integration ended early; the status gives the reason.
     Failed,
@@ -210,7 +210,7 @@ pub struct Orbit {
     pub quantities: Option<Quantities>,
     /// State at the phase 0 that precedes the first of `events`.
     pub strobe: State,
-    /// The wall of the contact that lasts at that instant, if one does.
+    /// The wall of the lasting contact at that instant, if there is one.
     pub strobe_meshing: Option<Side>,
     /// Events of one cycle, or of the last periods, in order of time.
     pub events: Vec<Event>,
@@ -229,7 +229,7 @@ pub struct Sample {
     pub t: f64,
     /// State.
     pub state: State,
-    /// The wall of the contact that lasts, if one does.
+    /// The wall of the lasting contact, if there is one.
     pub meshing: Option<Side>,
 }
 

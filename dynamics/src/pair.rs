@@ -1,6 +1,6 @@
 //! The fast engine, for pairs: an event-driven f64 integrator on the exact flow.
 //!
-//! A [`PairMotion`] is the motion of one pair. Between events it takes the longest steps that [`certificate`] can prove to be free of
+//! A `PairMotion` is the motion of one pair. Between events it takes the longest steps that [`certificate`] can prove to be free of
 //! events. A step with an event ends at the event, which is located to rounding on the exact flow.
 //!
 //! # Cost
@@ -126,8 +126,8 @@ pub(crate) struct PairMotion<'f, const N: usize = 0> {
 }
 
 impl<'f, const N: usize> PairMotion<'f, N> {
-    /// Multiplies each of the gap coordinates by 1 and a share, to simulate the rounding of a less precise engine. While
-    /// meshing, the first one is the distance from the wall. A gap that is just leaving a wall is not changed.
+    /// Multiplies each of the gap coordinates by `1 + share()`, to simulate the rounding of a less precise engine. While meshing, the first
+    /// coordinate is the distance from the wall. A gap that is just leaving a wall does not change.
     pub(crate) fn perturb(&mut self, mut share: impl FnMut() -> f64) {
         let shares: [f64; 4] = std::array::from_fn(|_| share());
         let wall = match self.mode {
@@ -165,7 +165,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
         self.tangents = tangents.map(|u| self.flow.tangent_to_gap(u));
     }
 
-    /// Returns the wall of the contact that lasts, if one does.
+    /// Returns the wall of the lasting contact, if there is one.
     pub(crate) fn meshing(&self) -> Option<Side> {
         match self.mode {
             Mode::Free | Mode::Open(_) => (self.interval != 0).then(|| side_of(self.interval)),
@@ -183,9 +183,9 @@ impl<'f, const N: usize> PairMotion<'f, N> {
         self.mode.domain()
     }
 
-    /// Whether the gap in free motion reaches a wall of its interval within a time of now, or has passed one within that time.
+    /// Whether the gap in free motion passed a wall of its interval less than `time` ago, or will reach one within `time`.
     pub(crate) fn passes_wall(&self, time: f64) -> bool {
-        // The gap of the state, as a trajectory from this state would have it.
+        // The gap is computed from the state, as at the start of a trajectory.
         let q = self.flow.to_gap(self.state());
         let reach = time * q[1].abs();
         self.domain() == DomainKind::Free && self.flow.walls.iter().any(|wall| (q[0] - wall).abs() < reach)
@@ -404,14 +404,14 @@ impl<'f, const N: usize> PairMotion<'f, N> {
         }
     }
 
-    /// Notes that the motion has left the place of the last event.
+    /// Records that the last event is no longer at the present instant.
     #[inline(always)]
     fn depart(&mut self) {
         self.from_wall = None;
         self.from_force = 0;
     }
 
-    /// Moves everything to `until`, a time `s` away, within a clear step.
+    /// Advances the motion to `until`, a time `s` away, within a clear step.
     #[inline(always)]
     fn move_to(&mut self, linear: &LinearFlow, s: f64, until: f64) {
         self.move_within(linear, s);
@@ -419,7 +419,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
         self.clock.set(until);
     }
 
-    /// Moves everything by a time `s` of at most the longest step.
+    /// Advances the motion by a time `s` of at most the longest step.
     #[inline(always)]
     fn move_within(&mut self, linear: &LinearFlow, s: f64) {
         let u = s * linear.per_unit;
@@ -428,7 +428,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
         self.count_meshing(s);
     }
 
-    /// Moves everything by `u` Taylor steps, near the grid point of the expansion.
+    /// Advances the motion by `u` Taylor steps, near the grid point of the expansion.
     #[inline(always)]
     fn move_along(&mut self, linear: &LinearFlow, expansion: &Expansion, u: f64) {
         let v = u - expansion.start;

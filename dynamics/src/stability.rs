@@ -1,10 +1,10 @@
 //! Stability of periodic orbits: monodromy matrix, Floquet multipliers, Newton's method on the strobe map, and
 //! Lyapunov exponents.
 //!
-//! The strobe map `P` maps the state at one phase 0 to the state at the next. Its derivative is the product of flow
-//! and saltation matrices, and is integrated as one tangent vector for each entry of a state. For orbits that may be their own mirror image
-//! the half-period map `Q(y) = -P_{T/2}(y)` is used instead. Since `P = Q^2`, at a pitchfork, where a multiplier of
-//! `P` is `+1`, that of `Q` is `-1`, and `Q' - I` stays regular.
+//! The strobe map `P` maps the state at one phase 0 to the state at the next. Its derivative is the product of flow and saltation matrices,
+//! and is integrated as one tangent vector for each entry of a state. For orbits that may be their own mirror image the half-period map
+//! `Q(y) = -P_{T/2}(y)` is used instead. At a pitchfork a multiplier of `P` is `+1`. Since `P = Q^2`, this multiplier is `-1` for `Q`, so
+//! `Q' - I` stays regular.
 
 mod exponent;
 mod matrix;
@@ -168,7 +168,7 @@ fn unit_size(matrix: DMatrix<f64>, log_scale: f64) -> (DMatrix<f64>, f64) {
     if size > 0.0 && size.is_finite() { (matrix / size, log_scale + size.ln()) } else { (matrix, log_scale) }
 }
 
-/// Transforms an entry of a matrix on states to that on states whose velocities are divided by `rate`, a power of two.
+/// Converts an entry of a matrix for states whose velocities are divided by `rate`, a power of two.
 fn in_displacements(entry: f64, rate: f64, i: usize, j: usize) -> f64 {
     let unit = |i: usize| if i % 2 == 1 { rate } else { 1.0 };
     entry * (unit(j) / unit(i))
@@ -195,8 +195,8 @@ pub struct Cycle {
     pub period: u32,
     /// Whether the orbit is its own mirror image.
     pub symmetric: bool,
-    /// The monodromy matrix, the derivative of the strobe map over one cycle. It has
-    /// [`Flow::state_len`](crate::motion::Flow::state_len) rows; in one degree of freedom those of the second displacement, and its columns, are 0.
+    /// The monodromy matrix, the derivative of the strobe map over one cycle. It has [`Flow::state_len`](crate::motion::Flow::state_len)
+    /// rows; with one degree of freedom, the rows and columns of the second displacement are 0.
     pub monodromy: DMatrix<f64>,
     /// Floquet multipliers `[re, im]`, largest modulus first; two for each degree of freedom. Where dry friction sticks for ever, the
     /// multiplier 1 along its row is left out.
@@ -248,7 +248,7 @@ pub fn multipliers(monodromy: &DMatrix<f64>) -> Option<Vec<[f64; 2]>> {
     if !monodromy.iter().all(|x| x.is_finite()) {
         return None;
     }
-    // The eigenvalues of four rows need no memory.
+    // With four rows, the eigenvalues need no heap memory.
     let eigenvalues = |m: &Complex<f64>| [m.re, m.im];
     let mut list: Vec<[f64; 2]> = match monodromy.nrows() {
         4 => {

@@ -1,6 +1,6 @@
 //! Mapping words: the cyclic sequence of flights, equations (18) to (23) of the paper.
 //!
-//! Each flight has one symbol. With dry friction there are two symbols of sliding, in order of time with the flights:
+//! Each flight has one symbol. Dry friction adds two symbols for changes of sliding. All symbols are in order of time:
 //!
 //! | flight or event | symbol |
 //! | --- | --- |
@@ -15,7 +15,7 @@
 
 use std::fmt;
 
-/// Returns the symbol of a flight of one of several gaps, given its symbol `b'0'..=b'7'`. It is written with the letter of the gap, as `b3`.
+/// Marks a symbol `b'0'..=b'7'` with its gap, for oscillators with several gaps. The gap's letter is then written before it, as in `b3`.
 pub fn of_gap(symbol: u8, gap: usize) -> u8 {
     symbol + 8 * (gap as u8 + 1)
 }

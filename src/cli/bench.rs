@@ -18,7 +18,7 @@ use crate::job::size::{self, Free};
 use crate::record::Record;
 use crate::store::folder::Folder;
 use crate::validate::{DEFAULT_SAMPLES, Kind};
-use measure::{OpenEngine, Point, Run, Series, Target, scene};
+use measure::{BenchPoint, OpenEngine, Run, Series, Target, scene};
 
 /// Sides of the maps: 10^3 to 10^7 cells, two sizes per decade.
 const SIDES: [u32; 9] = [32, 56, 100, 178, 316, 562, 1000, 1778, 3162];
@@ -121,8 +121,9 @@ fn measure(ask: &Engines, target: &Target, seconds: f64, first: Option<&Series>)
         let runs = if ask.run.quick { 2 } else { MAX_RUNS };
         let (mut point, records) = bench.point(&scene, runs, left)?;
         let same_size = first.and_then(|first| first.points.iter().find(|other| other.lanes == lanes));
-        let differing =
-            |other: &Point| point.classes.iter().zip(&other.classes).filter(|(own, its)| own != its).count();
+        let differing = |other: &BenchPoint| {
+            point.classes.iter().zip(&other.classes).filter(|(own, its)| own != its).count()
+        };
         point.differing = same_size.map(differing);
         note(ask, &progress(&point));
         series.points.push(point);
@@ -141,7 +142,7 @@ fn note(ask: &Engines, text: &str) {
     }
 }
 
-fn progress(point: &Point) -> String {
+fn progress(point: &BenchPoint) -> String {
     let rate = point.spread(Run::rate);
     format!(
         "{:>10} lanes: {:.2e} lane-periods/s ({:.2e} to {:.2e}), {:.3} s, {} runs",

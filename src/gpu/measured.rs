@@ -7,7 +7,7 @@ use super::layout::{Measured, SUMS};
 use rattlemap_dynamics::orbit::{Approaches, Displacement, Quantities};
 
 /// Coefficients of gap and x in a displacement.
-type Row = [f64; 2];
+type GapFactors = [f64; 2];
 
 /// Returns the quantities of a lane; none if it was not measured. `shaders/pair/measure.wgsl` has the places of the sums.
 pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quantities> {
@@ -41,7 +41,13 @@ pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quan
     })
 }
 
-fn displacement([a, b]: Row, totals: &[f64; SUMS], steps: f64, square: f64, amplitude: f64) -> Displacement {
+fn displacement(
+    [a, b]: GapFactors,
+    totals: &[f64; SUMS],
+    steps: f64,
+    square: f64,
+    amplitude: f64,
+) -> Displacement {
     let [z, x, _, _, _, zc, zs, xc, xs, ..] = *totals;
     let [cos, sin] = [a * zc + b * xc, a * zs + b * xs].map(|sum| 2.0 * sum / steps);
     Displacement {

@@ -9,7 +9,7 @@ use rattlemap_dynamics::model::{
 use super::contact::{self, Wall, WallLaw, WallSpring};
 use super::entry::{Names, Staged};
 use super::friction::{self, DryFriction};
-use super::motion::{self, Motion};
+use super::motion::{self, MotionTable};
 use super::{FileModel, parameters};
 use crate::text::document::{self, Node, Value};
 use crate::text::error::SceneError;
@@ -51,7 +51,7 @@ pub struct Definition {
     /// Default of each parameter, also of those that a scene must set.
     pub defaults: Vec<f64>,
     /// Free motion.
-    pub motion: Motion,
+    pub motion: MotionTable,
     /// Right and left walls of each gap, from the inside to the outside.
     pub walls: Vec<[Vec<Wall>; 2]>,
     /// Dry friction.

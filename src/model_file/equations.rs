@@ -6,7 +6,7 @@ use super::contact::{Wall, WallLaw};
 use super::definition::Definition;
 use super::entry::Entry;
 use super::friction::DryFriction;
-use super::motion::Motion;
+use super::motion::MotionTable;
 use crate::text::expression::Expression;
 
 /// Returns the equations as lines: gaps, stages, friction, and one equation per coordinate with a contact force for each gap that has
@@ -90,7 +90,7 @@ fn row(entries: &[Expression], names: &[String], result: &str) -> String {
 }
 
 /// Returns when each stage begins, and how entries that change are written; nothing without stages.
-fn stages(motion: &Motion) -> Vec<String> {
+fn stages(motion: &MotionTable) -> Vec<String> {
     if motion.stages.is_empty() {
         return Vec::new();
     }
@@ -114,13 +114,13 @@ fn acting(definition: &Definition) -> impl Iterator<Item = &DryFriction> {
 }
 
 /// Returns the sliding rate, such as `x1' - x2' - speed`.
-fn sliding_rate(friction: &DryFriction, motion: &Motion) -> String {
+fn sliding_rate(friction: &DryFriction, motion: &MotionTable) -> String {
     let rates = friction.row.iter().zip(&motion.coordinates);
     minus(&sum(rates.map(|(entry, name)| product(entry, &format!("{name}'")))), &friction.speed)
 }
 
 /// Returns the friction force on the `i`-th coordinate; none if there is none.
-fn friction_force(friction: &DryFriction, motion: &Motion, i: usize) -> Option<String> {
+fn friction_force(friction: &DryFriction, motion: &MotionTable, i: usize) -> Option<String> {
     let sign = format!("sgn({})", sliding_rate(friction, motion));
     let (row, force) = (&friction.row[i], &friction.force);
     match row.as_number() {

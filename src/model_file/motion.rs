@@ -36,7 +36,7 @@ pub struct Gap {
 
 /// Free motion and its gaps.
 #[derive(Clone, Debug)]
-pub struct Motion {
+pub struct MotionTable {
     /// Names of the displacements, one to eight.
     pub coordinates: Vec<String>,
     /// Names of their rates.
@@ -69,7 +69,7 @@ pub struct Motion {
     pub units: Units,
 }
 
-impl Motion {
+impl MotionTable {
     /// Returns the number of degrees of freedom.
     pub fn degrees(&self) -> usize {
         self.coordinates.len()
@@ -92,7 +92,7 @@ impl Motion {
 }
 
 /// Reads `[motion]`.
-pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, SceneError> {
+pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<MotionTable, SceneError> {
     root.require("motion", "write [motion] with coordinates, mass, frequency and gap")?;
     let section =
         root.section_among("motion", &MOTION_KEYS, &format!("{}; {LIMITS}", MOTION_KEYS.join(", ")))?;
@@ -141,7 +141,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
     let names = Names { stages: stages.len(), ..names };
     let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
     let gaps = read_gaps(&section, names, count)?;
-    Ok(Motion {
+    Ok(MotionTable {
         units: read_units(&section, count, &gaps)?,
         mass: names.matrix(&mass, count)?,
         damping: names.matrix_or_zeros(&section, "damping", count)?,

@@ -24,7 +24,7 @@ use rattlemap::gpu::{Features, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{Contact, Law, Model, State, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
@@ -189,7 +189,7 @@ fn images(known: &Known) -> Vec<State> {
         return (0..known.period).map(at).collect();
     };
     let system = System::new(machine);
-    let mut motion = Motion::new(&system, &known.strobe);
+    let mut motion = MachineMotion::new(&system, &known.strobe);
     let next = |_| {
         let state = motion.state();
         motion.advance_period(&mut ()).expect("an ordinary motion");

@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2};
 use rattlemap_dynamics::model::Form;
 
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{
     Contact, Drive, DryFriction, Forces, GapRow, Law, Model, Oscillator, REST, Restitution, Side, Spring,
     State, Wall, state,
@@ -212,7 +212,7 @@ fn gears_on_a_heavy_shaft_move_as_each_of_them_alone() {
     let off = |shaft: f64| {
         let system = System::new(&GEARS.together(shaft));
         let ([[z1, w1], [z2, w2]], at) = (GEARS.starts(), -GEARS.swing);
-        let mut motion = Motion::new(&system, &[at, 0.0, at - z1, -w1, at - z2, -w2]);
+        let mut motion = MachineMotion::new(&system, &[at, 0.0, at - z1, -w1, at - z2, -w2]);
         let (mut log, mut worst) = (Log::default(), [0.0f64; 2]);
         let [first, second] = &alone;
         for alone in first.iter().zip(second) {
@@ -264,7 +264,7 @@ fn the_first_gear_leaves_its_flank_where_its_inertia_exceeds_its_drag() {
                 let steady = drive / nalgebra::Complex::new(re, c * omega);
                 [steady.re, -omega * steady.im]
             };
-            let mut motion = Motion::new(&system, &[at, rate, at, rate, at, rate]);
+            let mut motion = MachineMotion::new(&system, &[at, rate, at, rate, at, rate]);
             let mut log = Log::default();
             (0..3).for_each(|_| motion.advance_period(&mut log).unwrap());
             let left = log.events.iter().any(|event| event.kind == EventKind::MeshEnd);
@@ -383,7 +383,7 @@ fn a_chain_moves_in_its_normal_modes_until_the_ball_hits_it() {
         wide.gaps[0].walls.iter_mut().flatten().for_each(|wall| wall.at *= 100.0);
         wide
     });
-    let mut motion = Motion::new(&free, &start);
+    let mut motion = MachineMotion::new(&free, &start);
     let mut log = Log::default();
     motion.advance_period(&mut log).unwrap();
     let off = apart(motion.state(), chain.after(0.0, &start, free.period()));
@@ -392,8 +392,8 @@ fn a_chain_moves_in_its_normal_modes_until_the_ball_hits_it() {
 
     let (m, mb, e) = (1.3, 0.2, 0.7);
     let reduced = m * mb / (m + mb);
-    let mut motion = Motion::new(&system, &start);
-    motion.set_tangents(Motion::unit_tangents(&system));
+    let mut motion = MachineMotion::new(&system, &start);
+    motion.set_tangents(MachineMotion::unit_tangents(&system));
     let (mut from, mut at) = ((0u64, 0.0), start);
     let (mut worst, mut impacts) = ([0.0f64; 4], 0);
     for period in 0..40u64 {
@@ -512,16 +512,16 @@ fn another_phase_of_all_harmonics_is_another_instant_of_the_same_motion() {
             assert!((&ours.cos - &theirs.cos).amax().max((&ours.sin - &theirs.sin).amax()) < 1e-15);
         }
         let time = phase / row_of_three(0.0).omega;
-        let mut motion = Motion::new(&system, &REST);
-        motion.set_tangents(Motion::unit_tangents(&system));
+        let mut motion = MachineMotion::new(&system, &REST);
+        motion.set_tangents(MachineMotion::unit_tangents(&system));
         let mut log = Log::default();
         motion.advance_to(time, &mut log).unwrap();
         let later = motion.state();
         for shifted in [by_hand, turned] {
             let shifted = System::new(&shifted);
-            let (mut whole, mut other) = (motion.clone(), Motion::new(&shifted, &later));
-            whole.set_tangents(Motion::unit_tangents(&system));
-            other.set_tangents(Motion::unit_tangents(&shifted));
+            let (mut whole, mut other) = (motion.clone(), MachineMotion::new(&shifted, &later));
+            whole.set_tangents(MachineMotion::unit_tangents(&system));
+            other.set_tangents(MachineMotion::unit_tangents(&shifted));
             let [mut ours, mut theirs] = [Log::default(), Log::default()];
             for _ in 0..3 {
                 whole.advance_period(&mut ours).unwrap();
@@ -556,7 +556,7 @@ fn cycles_have_the_same_multipliers_at_every_phase() {
     let other = orbit(at(phase), first.strobe);
     assert_eq!(other.class, first.class);
     let system = System::new(&at(0.0));
-    let mut motion = Motion::new(&system, &first.strobe);
+    let mut motion = MachineMotion::new(&system, &first.strobe);
     let off = (0..period).map(|_| {
         let mut later = motion.clone();
         later.advance_to(phase / 2.1, &mut ()).unwrap();
@@ -613,8 +613,8 @@ fn impact_speeds_follow_the_law_of_restitution() {
         let e = |u: f64| constant + factor * u.powf(power);
         let slope = |u: f64| e(u) + factor * power * u.powf(power);
         for start in [[2.0, 0.0], [0.3, 1.5], [5.0, -3.0]] {
-            let mut motion = Motion::new(&system, &start);
-            motion.set_tangents(Motion::unit_tangents(&system));
+            let mut motion = MachineMotion::new(&system, &start);
+            motion.set_tangents(MachineMotion::unit_tangents(&system));
             let [x, v] = start;
             let mut u = v.hypot((2.0 * GRAVITY * x).sqrt());
             let mut t = (v + u) / GRAVITY;
@@ -664,8 +664,8 @@ fn restitution_by_speed_is_limited() {
     // Above 1: no energy is gained. Below 0: the ball stays on the floor.
     for (constant, factor, keeps) in [(0.9, 0.5, true), (0.5, -0.2, false)] {
         let system = System::new(&dropped(Restitution::BySpeed { constant, factor, power: 1.0 }));
-        let mut motion = Motion::new(&system, &[2.0, 0.0]);
-        motion.set_tangents(Motion::unit_tangents(&system));
+        let mut motion = MachineMotion::new(&system, &[2.0, 0.0]);
+        motion.set_tangents(MachineMotion::unit_tangents(&system));
         let u = (4.0 * GRAVITY).sqrt();
         let mut log = Log::default();
         motion.advance_to(1.2 * u / GRAVITY, &mut log).unwrap();
@@ -718,8 +718,8 @@ fn a_viscoelastic_ball_bounces_once_per_period_in_closed_form() {
     for (loss, share) in [(0.2, 0.3), (0.3, 0.5), (0.4, 0.5), (0.4, 0.9), (0.5, 0.2)] {
         let Bounce { shaking, strobe, approach, product, sum } = Bounce::of(loss, share);
         let system = System::new(&machine("viscoelastic-ball", &[("A", shaking), ("B", loss)]));
-        let mut motion = Motion::new(&system, &strobe);
-        motion.set_tangents(Motion::unit_tangents(&system));
+        let mut motion = MachineMotion::new(&system, &strobe);
+        motion.set_tangents(MachineMotion::unit_tangents(&system));
         let mut log = Log::default();
         motion.advance_period(&mut log).unwrap();
         let [event] = log.events[..] else { panic!("{:?}", log.events) };
@@ -762,7 +762,7 @@ fn the_work_of_the_force_is_what_dampers_friction_and_impacts_take() {
         let of = orbit.quantities.expect("measured");
         let taken = [of.dissipated, of.impact_energy, of.friction.unwrap().dissipated];
         let system = System::new(&machine);
-        let mut motion = Motion::new(&system, &orbit.strobe);
+        let mut motion = MachineMotion::new(&system, &orbit.strobe);
         let mut work = 0.0;
         for _ in 0..period {
             let mut log = Log::default();

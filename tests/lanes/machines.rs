@@ -12,7 +12,7 @@ use rattlemap::record::classify::classify;
 use rattlemap::record::measures::GROUPS;
 use rattlemap::record::valid;
 use rattlemap::validate::{Field, differences};
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::Form;
 use rattlemap_dynamics::model::{GearPair, Law, NonImpacting, Oscillator, State, state};
 use rayon::prelude::*;
@@ -35,7 +35,7 @@ struct End {
 }
 
 fn run(system: &System, start: &State) -> Option<(State, u64)> {
-    let mut motion = Motion::new(system, start);
+    let mut motion = MachineMotion::new(system, start);
     for _ in 0..PERIODS {
         motion.advance_period(&mut ()).ok()?;
     }

@@ -2,14 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::system::{Element, Frame};
+use super::frame::{Element, Frame};
 use crate::model::{MOST_GAPS, Side};
 use crate::motion::{Slip, Slips};
 
-/// A mobility below this share of the unconstrained one is rounding: other constraints already hold the row.
+/// A constraint is redundant if the mobility along its row is below this share of the unconstrained mobility.
 pub(super) const NO_MOBILITY: f64 = 1e-12;
 
-/// What a row of constraints holds.
+/// The element that a constraint holds at rest.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Constraint {
     /// A gap on a rigid wall.
@@ -18,7 +18,7 @@ pub(super) enum Constraint {
     Element(usize),
 }
 
-/// Constraints on rates: each holds a row of `w` still.
+/// Linear constraints on the rates `w`: each keeps the product of a row and `w` constant.
 pub(super) struct Constraints {
     pub(super) kinds: Vec<Constraint>,
     /// The rows, and their products with the mobility.
@@ -31,7 +31,7 @@ pub(super) struct Constraints {
 }
 
 impl Constraints {
-    /// Collects the constraints of gaps on rigid walls and of sticking elements. A row that those before it hold is left out.
+    /// Collects the constraints of gaps on rigid walls and of sticking elements. A row that depends on earlier rows is left out.
     pub(super) fn new(system: &Frame, held: &[Option<Side>; MOST_GAPS], slips: &Slips) -> Constraints {
         let (n, mobility) = (system.n, &system.mobility);
         let unit = |gap: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == gap)));

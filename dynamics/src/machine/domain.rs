@@ -6,22 +6,23 @@ use nalgebra::DMatrix;
 use wide::f64x4;
 
 use super::constraints::{Constraint, Constraints, NO_MOBILITY};
+use super::frame::Frame;
 use super::polynomial::{ORDER, Polynomial, Weights, combine, rest, stretched};
-use super::system::Frame;
-use super::{Numbers, Point, ROUNDING, SIZE, WIDTH};
+use super::{Numbers, PhasePoint, ROUNDING, SIZE, WIDTH};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
 
 /// Taylor radius: the largest product of a step and the rate of its domain.
 const RADIUS: f64 = 1.6;
 
-/// Derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the other end.
+/// Number of derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the
+/// other end.
 const DERIVATIVES: usize = 16;
 
 /// Order of the root of a function that stays zero: all derivatives are zero within rounding.
 pub(super) const STAYS_ZERO: usize = usize::MAX;
 
-/// What the linear equations depend on.
+/// The modes that the linear equations depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DomainKey {
     pub(super) stage: usize,
@@ -32,82 +33,81 @@ pub(super) struct DomainKey {
     pub(super) slips: [Slip; MOST_FRICTION],
 }
 
-/// A linear functional of a [`Point`].
+/// A linear functional of a [`PhasePoint`], also called a row.
 #[derive(Clone, Debug)]
-pub(super) struct Row(pub(super) Point);
+pub(super) struct Functional(pub(super) PhasePoint);
 
-/// Registers of a point.
-const REGISTERS: usize = WIDTH / 4;
+/// Number of SIMD registers that hold a point.
+const POINT_REGISTERS: usize = WIDTH / 4;
 
-fn registers(point: &Point) -> [f64x4; REGISTERS] {
+fn registers(point: &PhasePoint) -> [f64x4; POINT_REGISTERS] {
     std::array::from_fn(|i| f64x4::new(point.as_chunks().0[i]))
 }
 
-impl Row {
-    pub(super) const ZERO: Row = Row([0.0; WIDTH]);
+impl Functional {
+    pub(super) const ZERO: Functional = Functional([0.0; WIDTH]);
 
-    pub(super) fn dot(&self, point: &Point) -> f64 {
+    pub(super) fn dot(&self, point: &PhasePoint) -> f64 {
         self.value_and_size(point)[0]
     }
 
-    /// Returns the value at a point, and the sum of the sizes of all terms, which rounding is relative to.
-    pub(super) fn value_and_size(&self, point: &Point) -> [f64; 2] {
+    /// Returns the value at a point, and the sum of the moduli of its terms. Rounding errors are relative to this sum.
+    pub(super) fn value_and_size(&self, point: &PhasePoint) -> [f64; 2] {
         let terms = registers(&self.0).into_iter().zip(registers(point)).map(|(row, point)| row * point);
         let sums = terms.fold([f64x4::ZERO; 2], |[sum, size], term| [sum + term, size + term.abs()]);
         sums.map(f64x4::reduce_add)
     }
 
-    /// Whether a value at a point is 0 within rounding.
-    pub(super) fn vanishes(&self, point: &Point) -> bool {
+    /// Whether the value at a point is 0 within rounding.
+    pub(super) fn vanishes(&self, point: &PhasePoint) -> bool {
         let [value, size] = self.value_and_size(point);
         value.abs() <= ROUNDING * size
     }
 
-    pub(super) fn scaled(&self, factor: f64) -> Row {
-        Row(self.0.map(|x| factor * x))
+    pub(super) fn scaled(&self, factor: f64) -> Functional {
+        Functional(self.0.map(|x| factor * x))
     }
 
     /// Adds a constant.
-    pub(super) fn plus(mut self, constant: f64, width: usize) -> Row {
+    pub(super) fn plus(mut self, constant: f64, width: usize) -> Functional {
         self.0[width - 1] += constant;
         self
     }
 }
 
-/// A step of a domain. The coordinates are polynomials of the share of the step.
+/// A step in a domain. The coordinates are polynomials of the share of the step, from 0 to 1.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
-    /// The start.
-    point: Point,
-    /// The coordinates that have been expanded, which are the first ones.
+    /// Point at the start of the step.
+    point: PhasePoint,
+    /// Polynomials of the coordinates. Only the first `expanded` ones are valid.
     pub(super) coordinates: [Polynomial; MOST_COORDINATES],
     expanded: usize,
     /// Bounds on the changes of the coordinates.
     pub(super) changes: [f64; MOST_COORDINATES],
-    /// Duration.
     h: f64,
 }
 
 /// One linear domain.
 #[derive(Clone, Debug)]
-pub(super) struct Domain {
+pub(super) struct LinearDomain {
     n: usize,
     width: usize,
     /// Angular frequencies of the harmonics.
     rates: Vec<f64>,
     /// Rows of the accelerations.
-    pub(super) accelerations: Vec<Row>,
+    pub(super) accelerations: Vec<Functional>,
     /// Whether the acceleration of each coordinate is exactly 0, because constraints hold it.
     pub(super) is_still: [bool; SIZE],
     /// Damping matrix, with the dampers of contacts.
     pub(super) damping: DMatrix<f64>,
     /// Longest step.
     pub(super) unit: f64,
-    /// Rows of the forces with which rigid walls push gaps that rest on them.
-    pub(super) pushes: [Option<Row>; MOST_GAPS],
+    /// For each gap at rest on a rigid wall, the row of the force with which the wall pushes it.
+    pub(super) pushes: [Option<Functional>; MOST_GAPS],
     /// Rows of the forces that hold sticking elements. None if other constraints hold the element.
-    pub(super) holds: [Option<Row>; MOST_FRICTION],
-    /// For each coordinate and each entry of the point at the start of the longest step, a polynomial of the share.
+    pub(super) holds: [Option<Functional>; MOST_FRICTION],
+    /// For each coordinate and each entry of the start point, a polynomial of the share of the longest step.
     tables: OnceLock<Vec<Polynomial>>,
     /// Carries points over the longest step.
     whole: OnceLock<Carrier>,
@@ -125,8 +125,8 @@ impl Default for Path {
     }
 }
 
-impl Domain {
-    pub(super) fn new(system: &Frame, key: DomainKey) -> Domain {
+impl LinearDomain {
+    pub(super) fn new(system: &Frame, key: DomainKey) -> LinearDomain {
         let (n, width) = (system.n, system.width());
         let forces = &system.stages[key.stage];
         let (mut stiffness, mut damping) = (forces.stiffness.clone(), forces.damping.clone());
@@ -164,7 +164,7 @@ impl Domain {
             }
         }
         let row = |matrix: &DMatrix<f64>, i: usize| {
-            Row(std::array::from_fn(|j| if j < width { matrix[(i, j)] } else { 0.0 }))
+            Functional(std::array::from_fn(|j| if j < width { matrix[(i, j)] } else { 0.0 }))
         };
         let mut pushes = [const { None }; MOST_GAPS];
         let mut holds = [const { None }; MOST_FRICTION];
@@ -174,7 +174,7 @@ impl Domain {
                 Constraint::Element(i_element) => holds[i_element] = Some(row(&multipliers, i)),
             }
         }
-        Domain {
+        LinearDomain {
             n,
             width,
             rates: system.orders.iter().map(|order| order * system.machine.omega).collect(),
@@ -195,14 +195,14 @@ impl Domain {
     }
 
     /// Returns the row of a coordinate, or of its rate.
-    pub(super) fn unit_row(&self, entry: usize) -> Row {
+    pub(super) fn unit_row(&self, entry: usize) -> Functional {
         let mut row = [0.0; WIDTH];
         row[entry] = 1.0;
-        Row(row)
+        Functional(row)
     }
 
     /// Returns the time derivative of a point.
-    pub(super) fn derivative(&self, point: &Point) -> Point {
+    pub(super) fn derivative(&self, point: &PhasePoint) -> PhasePoint {
         let n = self.n;
         let mut rate = [0.0; WIDTH];
         rate[..n].copy_from_slice(&point[n..2 * n]);
@@ -215,13 +215,13 @@ impl Domain {
     }
 
     /// Returns the time derivative of a functional along the motion, as a functional.
-    pub(super) fn rate_of(&self, row: &Row) -> Row {
+    pub(super) fn rate_of(&self, row: &Functional) -> Functional {
         let n = self.n;
-        let mut sums = [f64x4::ZERO; REGISTERS];
+        let mut sums = [f64x4::ZERO; POINT_REGISTERS];
         for (acceleration, &factor) in self.accelerations.iter().zip(&row.0[n..]) {
             if factor != 0.0 {
                 let (terms, factor) = (registers(&acceleration.0), f64x4::splat(factor));
-                (0..REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
+                (0..POINT_REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
             }
         }
         let mut rate = [0.0; WIDTH];
@@ -232,13 +232,18 @@ impl Domain {
             rate[at] += omega * row.0[at + 1];
             rate[at + 1] -= omega * row.0[at];
         }
-        Row(rate)
+        Functional(rate)
     }
 
-    /// Returns the lowest order, at least `first`, of a derivative of a row that is not 0 within rounding, and its value; [`STAYS_ZERO`] and
-    /// 0 if there is none.
-    pub(super) fn first_derivative(&self, row: &Row, point: &Point, first: usize) -> (usize, f64) {
-        let value = |row: &Row| {
+    /// Finds the first derivative, of order `first` or higher, that is not 0 within rounding. Returns its order and value, or
+    /// [`STAYS_ZERO`] and 0 if there is none.
+    pub(super) fn first_derivative(
+        &self,
+        row: &Functional,
+        point: &PhasePoint,
+        first: usize,
+    ) -> (usize, f64) {
+        let value = |row: &Functional| {
             let [value, size] = row.value_and_size(point);
             (value.abs() > ROUNDING * size).then_some(value)
         };
@@ -259,9 +264,8 @@ impl Domain {
         (STAYS_ZERO, 0.0)
     }
 
-    /// Returns the lowest order, at least 2, of a derivative of a coordinate that is not 0 within rounding, and its value, as
-    /// [`Domain::first_derivative`].
-    pub(super) fn departure(&self, coordinate: usize, point: &Point) -> (usize, f64) {
+    /// Finds the first derivative of a coordinate, of order 2 or higher, that is not 0 within rounding, like [`LinearDomain::first_derivative`].
+    pub(super) fn departure(&self, coordinate: usize, point: &PhasePoint) -> (usize, f64) {
         let (order, value) = self.first_derivative(&self.accelerations[coordinate], point, 0);
         (order.saturating_add(2), value)
     }
@@ -285,11 +289,11 @@ impl Domain {
     }
 
     /// Begins a step over a time `h` of at most the longest step.
-    pub(super) fn begin(&self, point: &Point, h: f64, path: &mut Path) {
+    pub(super) fn begin(&self, point: &PhasePoint, h: f64, path: &mut Path) {
         (path.point, path.h, path.expanded) = (*point, h, 0);
     }
 
-    /// Expands the first coordinates on a step, as far as that has not been done.
+    /// Expands the first `count` coordinates on a step, unless they are already expanded.
     pub(super) fn expand(&self, path: &mut Path, count: usize) {
         let part = path.h / self.unit;
         for (i, table) in self.tables().enumerate().take(count).skip(path.expanded) {
@@ -300,7 +304,7 @@ impl Domain {
         path.expanded = path.expanded.max(count);
     }
 
-    /// Sets a state to that at a share of a step, all of whose coordinates are expanded.
+    /// Writes the state at a share of a step. All coordinates must be expanded.
     pub(super) fn set_state(&self, y: &mut [f64], path: &Path, share: f64) {
         let weights = Weights::at(share);
         for (i, coordinate) in path.coordinates.iter().enumerate().take(self.n) {
@@ -310,7 +314,7 @@ impl Domain {
     }
 
     /// Returns the whole point at a share of a step.
-    pub(super) fn point(&self, path: &Path, share: f64) -> Point {
+    pub(super) fn point(&self, path: &Path, share: f64) -> PhasePoint {
         let mut point = [0.0; WIDTH];
         self.set_state(&mut point, path, share);
         for (k, omega) in self.rates.iter().enumerate() {
@@ -323,8 +327,8 @@ impl Domain {
         point
     }
 
-    /// Returns a functional on a step.
-    pub(super) fn along(&self, row: &Row, path: &Path) -> Polynomial {
+    /// Returns a functional as a polynomial of the share of a step.
+    pub(super) fn along(&self, row: &Functional, path: &Path) -> Polynomial {
         let (n, row) = (self.n, &row.0);
         let mut sum = [0.0; ORDER + 1];
         sum[0] = row[self.width - 1];
@@ -352,7 +356,7 @@ impl Domain {
         sum
     }
 
-    /// Returns what carries points over the longest step.
+    /// Returns the carrier over the longest step.
     pub(super) fn whole(&self) -> &Carrier {
         self.whole.get_or_init(|| {
             let mut carrier = Carrier::default();
@@ -361,7 +365,7 @@ impl Domain {
         })
     }
 
-    /// Sets a carrier to the changes of the first unit vectors over a time of at most the longest step.
+    /// Fills a carrier with the changes of the first `count` unit vectors over a time up to the longest step.
     pub(super) fn set_carrier(&self, carrier: &mut Carrier, time: f64, count: usize) {
         let (n, weights) = (self.n, Weights::at(time / self.unit));
         carrier.0.clear();
@@ -375,12 +379,12 @@ impl Domain {
     }
 }
 
-/// Carries points or tangent vectors along a flight: the changes of unit vectors.
+/// The propagator over a time, minus the identity: its columns are the changes of unit vectors.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Carrier(Vec<Numbers>);
 
 impl Carrier {
-    /// Returns the state, with `size` entries, that follows from a point or from a tangent vector. Further entries have no meaning.
+    /// Applies the propagator to a point or to a tangent vector. Only the first `size` entries of the result are valid.
     pub(super) fn carry(&self, from: &[f64], size: usize) -> Numbers {
         let mut image = [0.0; SIZE];
         let parts = image.as_chunks_mut::<4>().0.iter_mut().zip(from.as_chunks().0).take(size.div_ceil(4));

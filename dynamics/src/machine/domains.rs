@@ -1,30 +1,30 @@
-//! A machine with the domains that its motions have met.
+//! A machine and a cache of its domains.
 
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
-use super::domain::{Domain, DomainKey};
+use super::domain::{DomainKey, LinearDomain};
+use super::frame::Frame;
 use super::modes::{AtRest, GapMode, Modes};
-use super::system::Frame;
-use super::{Point, ROUNDING};
+use super::{PhasePoint, ROUNDING};
 use crate::model::{MOST_STAGES, Oscillator};
 use crate::motion::Slip;
 
-/// A machine, prepared for its motions. They share the domains that they have met.
+/// A machine, prepared for its motions. All motions share its domains, which are built on first use.
 #[derive(Clone, Debug)]
 pub struct System {
     frame: Frame,
-    /// A list for each stage.
+    /// One list of domains for each stage.
     domains: Arc<[Domains; MOST_STAGES]>,
 }
 
-/// A list of domains, which grows at its end. To search it takes no lock.
+/// A linked list of domains that grows at its end. A search takes no lock.
 type Domains = OnceLock<Box<Met>>;
 
 #[derive(Debug)]
 struct Met {
     key: DomainKey,
-    domain: Domain,
+    domain: LinearDomain,
     next: Domains,
 }
 
@@ -42,12 +42,12 @@ impl System {
         System { frame: Frame::new(machine), domains: Arc::default() }
     }
 
-    /// Returns the domain of a combination of modes, and builds it if it is the first time.
-    pub(super) fn domain(&self, modes: &Modes) -> &Domain {
+    /// Returns the domain of a combination of modes, and builds it on first use.
+    pub(super) fn domain(&self, modes: &Modes) -> &LinearDomain {
         let key = modes.key(self);
         let mut place = &self.domains[key.stage];
         loop {
-            let build = || Box::new(Met { key, domain: Domain::new(self, key), next: OnceLock::new() });
+            let build = || Box::new(Met { key, domain: LinearDomain::new(self, key), next: OnceLock::new() });
             let met = place.get_or_init(build);
             if met.key == key {
                 return &met.domain;
@@ -56,8 +56,8 @@ impl System {
         }
     }
 
-    /// Whether the modes of the elements at rest fit the forces at a point.
-    pub(super) fn is_consistent(&self, modes: &Modes, at_rest: &AtRest, point: &Point) -> bool {
+    /// Whether the modes of the elements at rest are consistent with the forces at a point.
+    pub(super) fn is_consistent(&self, modes: &Modes, at_rest: &AtRest, point: &PhasePoint) -> bool {
         if *at_rest == AtRest::default() {
             return true;
         }
@@ -79,8 +79,8 @@ impl System {
         })
     }
 
-    /// Returns the first consistent combination of modes: walls hold before they let go, elements stick before they slide.
-    pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &Point) -> Option<Modes> {
+    /// Returns the first consistent combination of modes. Holding walls and sticking elements are tried first.
+    pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &PhasePoint) -> Option<Modes> {
         let gaps = || (0..self.gaps()).filter_map(|gap| Some((gap, at_rest.gaps[gap]?)));
         let elements = || (0..self.elements.len()).filter(|&i| at_rest.elements[i]);
         let combinations = Slip::ALL.len().pow(elements().count() as u32) << gaps().count();

@@ -1,9 +1,9 @@
-//! What is measured on a flight of a machine.
+//! Integrals and extremes over a flight of a machine.
 
-use super::Point;
-use super::domain::{Domain, Path, Row};
+use super::PhasePoint;
+use super::domain::{Functional, LinearDomain, Path};
+use super::frame::{Element, Frame};
 use super::modes::Modes;
-use super::system::{Element, Frame};
 use crate::model::Side;
 use crate::motion::Slip;
 use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, root};
@@ -11,10 +11,10 @@ use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, r
 /// Part of a flight: one domain, at most one Taylor step.
 pub(super) struct Flight<'a> {
     pub(super) system: &'a Frame,
-    pub(super) domain: &'a Domain,
+    pub(super) domain: &'a LinearDomain,
     pub(super) modes: &'a Modes,
     pub(super) path: &'a Path,
-    /// The part of the step that the flight takes.
+    /// The share of the step at which the flight ends.
     pub(super) share: f64,
     /// Duration, and time of the start since phase 0.
     pub(super) duration: f64,
@@ -23,18 +23,16 @@ pub(super) struct Flight<'a> {
 
 /// A linear function of the motion, and its rate.
 struct Signal {
-    value: Row,
-    rate: Row,
+    value: Functional,
+    rate: Functional,
 }
 
 impl Signal {
-    /// Returns the value at a point.
-    fn at(&self, point: &Point) -> f64 {
+    fn at(&self, point: &PhasePoint) -> f64 {
         self.value.dot(point)
     }
 
-    /// Returns the rate at a point.
-    fn rate(&self, point: &Point) -> f64 {
+    fn rate(&self, point: &PhasePoint) -> f64 {
         self.rate.dot(point)
     }
 }
@@ -43,7 +41,7 @@ impl Flight<'_> {
     /// Adds the flight to integrals and extremes.
     pub(super) fn add_to(&self, sums: &mut Sums) {
         let (displacements, forces) = (self.displacements(), self.contact_forces());
-        let mut before: Option<(f64, Point)> = None;
+        let mut before: Option<(f64, PhasePoint)> = None;
         for (share, weight) in nodes().into_iter().chain([(1.0, 0.0)]) {
             let point = self.at(share);
             let (sin, cos) = (self.system.machine.omega * (self.start + share * self.duration)).sin_cos();
@@ -79,11 +77,11 @@ impl Flight<'_> {
     }
 
     /// Returns the point after a share of the flight.
-    fn at(&self, share: f64) -> Point {
+    fn at(&self, share: f64) -> PhasePoint {
         self.domain.point(self.path, self.share * share)
     }
 
-    fn signal(&self, value: Row) -> Signal {
+    fn signal(&self, value: Functional) -> Signal {
         Signal { rate: self.domain.rate_of(&value), value }
     }
 
@@ -102,7 +100,7 @@ impl Flight<'_> {
         engaged
             .map(|gap| {
                 let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
-                let (sign, mut row) = (side.sign(), Row::ZERO);
+                let (sign, mut row) = (side.sign(), Functional::ZERO);
                 for wall in &self.system.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())] {
                     let spring = wall.springs[self.modes.stage];
                     row.0[gap] += sign * spring.stiffness;
@@ -114,15 +112,15 @@ impl Flight<'_> {
             .collect()
     }
 
-    /// Returns the power that all dampers take at a point.
-    fn dissipation(&self, point: &Point) -> f64 {
+    /// Returns the power that all dampers dissipate at a point.
+    fn dissipation(&self, point: &PhasePoint) -> f64 {
         let n = self.system.n;
         let rates = &point[n..2 * n];
         (0..n).map(|i| rates[i] * (0..n).map(|j| self.domain.damping[(i, j)] * rates[j]).sum::<f64>()).sum()
     }
 
     /// Returns the power that dry friction turns into heat at a point.
-    fn heat(&self, point: &Point) -> f64 {
+    fn heat(&self, point: &PhasePoint) -> f64 {
         let elements = self.system.elements.iter().enumerate().zip(self.modes.slips);
         let power = |((i, element), slip): ((usize, &Element), Slip)| {
             element.force * slip.sign() * self.system.rate_row(i).dot(point)
@@ -130,23 +128,22 @@ impl Flight<'_> {
         elements.map(power).sum()
     }
 
-    /// Whether an element with dry friction sticks.
     fn sticks(&self) -> bool {
         self.system.elements.iter().zip(self.modes.slips).any(|(_, slip)| slip == Slip::Stick)
     }
 }
 
 impl Frame {
-    /// Returns the row of a displacement; 0 for one that the machine does not have.
-    fn displacement_row(&self, i: usize) -> Row {
+    /// Returns the row of a displacement; 0 if the machine has no such displacement.
+    fn displacement_row(&self, i: usize) -> Functional {
         let mut row = [0.0; super::WIDTH];
         if i < self.n {
             (0..self.n).for_each(|j| row[j] = self.from_flow[(i, j)]);
         }
-        Row(row)
+        Functional(row)
     }
 
-    /// Returns the part of the energy that events change: kinetic energy, and that of the springs and preloads of contacts.
+    /// Returns the part of the energy that events change: kinetic energy, and the energy of springs and preloads of contacts.
     pub(super) fn energy(&self, modes: &Modes, y: &[f64]) -> f64 {
         let (n, key) = (self.n, modes.key(self));
         let rates = &y[n..2 * n];
@@ -164,7 +161,6 @@ impl Frame {
         0.5 * kinetic + (0..self.gaps()).map(of_gap).sum::<f64>()
     }
 
-    /// Whether the machine has dry friction.
     pub(crate) fn has_friction(&self) -> bool {
         !self.elements.is_empty()
     }

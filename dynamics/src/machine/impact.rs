@@ -1,13 +1,13 @@
-//! What an impact leads to: the jump of all rates, and the modes after it.
+//! The result of an impact: the jump of all rates, and the modes after the impact.
 
-use super::domain::Domain;
+use super::domain::LinearDomain;
 use super::domains::System;
 use super::modes::{AtRest, GapMode, Modes};
-use super::{Numbers, Point, ROUNDING, SIZE};
+use super::{Numbers, PhasePoint, ROUNDING, SIZE};
 use crate::model::{Contact, MOST_GAPS, Side, Wall};
 use crate::motion::Slip;
 
-/// Height of a flight, relative to the scale of length, that is not followed in a series of impacts.
+/// Height, relative to the scale of length, below which flights of a series of impacts are not computed: the gap comes to rest.
 pub const LOWEST_FLIGHT: f64 = 1e-13;
 
 /// An impact of a gap on the last wall of a side.
@@ -15,7 +15,7 @@ pub(super) struct Impact<'a> {
     pub(super) system: &'a System,
     /// Modes and point before the impact.
     pub(super) modes: &'a Modes,
-    pub(super) point: &'a Point,
+    pub(super) point: &'a PhasePoint,
     pub(super) gap: usize,
     pub(super) side: Side,
     pub(super) wall: &'a Wall,
@@ -23,30 +23,31 @@ pub(super) struct Impact<'a> {
     pub(super) approach: f64,
 }
 
-/// What an impact leads to.
+/// The result of an impact.
 pub(super) struct Outcome {
     /// Modes and point after the impact.
     pub(super) modes: Modes,
-    pub(super) point: Point,
-    /// Whether contact lasts.
+    pub(super) point: PhasePoint,
     pub(super) lasts: bool,
     /// Acceleration towards the wall, in free motion after the impact, or its first derivative that is not 0.
     pub(super) pressing: f64,
-    /// Derivatives of the jumps of all rates by the gap's rate before the impact.
+    /// Derivatives of the jumps of all rates with respect to the gap's rate before the impact.
     pub(super) jump: Numbers,
 }
 
-/// Changes of all rates by an impulse that changes the gap's rate by 1, and which gaps at rest leave their rigid walls.
+/// Changes of all rates by an impulse that changes the gap's rate by 1, and for each gap whether it leaves the rigid wall on which it
+/// rests.
 type Kick = (Numbers, [bool; MOST_GAPS]);
 
 impl Impact<'_> {
-    /// Returns the leaving speed of a flight that is not followed in a series of impacts.
-    fn lowest_speed(&self, domain: &Domain, gap: usize, point: &Point) -> f64 {
+    /// Returns the leaving speed of a flight of the height [`LOWEST_FLIGHT`].
+    fn lowest_speed(&self, domain: &LinearDomain, gap: usize, point: &PhasePoint) -> f64 {
         let pressing = domain.accelerations[gap].dot(point).abs();
         (2.0 * LOWEST_FLIGHT * self.system.length * pressing).sqrt()
     }
 
-    /// Returns what the impact leads to. Gaps with too low a flight stay at rest. Otherwise the impacts of two gaps might alternate for ever.
+    /// Returns the result of the impact. Gaps whose flight would be too low stay at rest; otherwise impacts of two gaps could alternate for
+    /// ever.
     pub(super) fn outcome(&self) -> Outcome {
         let (system, n) = (self.system, self.system.n);
         let mut kept = [false; MOST_GAPS];
@@ -66,7 +67,7 @@ impl Impact<'_> {
         }
     }
 
-    /// Returns what the impact leads to, given the changes of all rates, and which gaps at rest it lets go.
+    /// Returns the result of the impact for a given kick.
     fn outcome_of(&self, (kick, let_go): &Kick) -> Outcome {
         let (system, n, gap, side) = (self.system, self.system.n, self.gap, self.side);
         let [e, slope] = self.wall.restitution.at(self.approach);
@@ -112,7 +113,7 @@ impl Impact<'_> {
         outcome(free, bounced, false, factor)
     }
 
-    /// Returns the kick while other gaps rest on rigid walls. Those stay at rest whose walls push, and those in `kept`.
+    /// Returns the kick while other gaps rest on rigid walls. A gap stays at rest if its wall pushes, or if it is in `kept`.
     fn joint_impact(&self, kept: [bool; MOST_GAPS]) -> Kick {
         let none = [false; MOST_GAPS];
         let mut resting = self.modes.gaps.map(GapMode::rest);
@@ -143,8 +144,8 @@ impl Impact<'_> {
         (self.kick(|other| resting[other].is_some()).0, none)
     }
 
-    /// Returns the changes of all rates by an impulse that changes the gap's rate by 1, while walls hold other gaps, and the impulses of these
-    /// walls relative to that on the gap. At most two gaps are held.
+    /// Returns the changes of all rates by an impulse that changes the gap's rate by 1 while walls hold other gaps, at most two. Also
+    /// returns the impulses of these walls, divided by the impulse on the gap.
     fn kick(&self, is_held: impl Fn(usize) -> bool) -> (Numbers, [f64; MOST_GAPS]) {
         let (gap, m) = (self.gap, |i, j| self.system.mobility[(i, j)]);
         let mut pushes = [0.0; MOST_GAPS];
@@ -166,13 +167,13 @@ impl Impact<'_> {
         (kick.map(|change| change / kick[gap]), pushes)
     }
 
-    /// Chooses modes of friction, and of other gaps at rest, after a jump of the rates to those of a point; `stopped` is the side of the gap
-    /// if it stops. Returns whether there is a consistent choice.
+    /// Chooses the modes of friction and of other gaps at rest after a jump of the rates. `point` has the rates after the jump; `stopped`
+    /// is the side of the gap if it stops. Returns whether a consistent choice exists.
     fn slide_after_jump(
         &self,
         modes: &Modes,
         kick: &Numbers,
-        point: &Point,
+        point: &PhasePoint,
         stopped: Option<Side>,
     ) -> (Modes, bool) {
         let (system, n) = (self.system, self.system.n);

@@ -1,20 +1,20 @@
 //! Modes of walls and friction.
 
-use super::domain::{DomainKey, Row};
-use super::system::Frame;
+use super::domain::{DomainKey, Functional};
+use super::frame::Frame;
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{Slip, Slips};
 
 /// The mode of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GapMode {
-    /// Beyond a number of walls whose springs act: 0 between the first walls, positive on the right, negative on the left.
+    /// The gap has passed this number of walls, whose springs act: positive on the right, negative on the left, 0 between the first walls.
     Beyond(i8),
     /// Lasting contact with the last wall of a side, which has begun with an impact; the gap is still in front of the wall.
     Onset(Side),
     /// Lasting contact with the last wall of a side, which has begun with an impact; the gap is behind the wall.
     Pressed(Side),
-    /// Behind the last wall of a side, which only pushes, while its spring and damper would pull.
+    /// Behind the last wall of a side without contact: the wall only pushes, and its spring and damper would pull.
     Open(Side),
     /// At rest on the rigid last wall of a side.
     Stuck(Side),
@@ -73,7 +73,7 @@ pub(super) fn signed(side: Side, count: usize) -> i8 {
     if side == Side::Right { count as i8 } else { -(count as i8) }
 }
 
-/// What may change in a decision on elements at rest: gaps that rest on rigid walls, with their sides, and elements without a rate.
+/// Elements at rest, whose modes depend on forces: gaps on rigid walls, with their sides, and friction elements without a sliding rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct AtRest {
     pub(super) gaps: [Option<Side>; MOST_GAPS],
@@ -86,7 +86,7 @@ impl Frame {
         GapMode::Beyond(signed(side, self.walls(gap, side).len() - 1))
     }
 
-    /// Returns side and number of the wall that lies in a direction from a gap.
+    /// Returns side and index of the next wall in a direction from a gap.
     pub(super) fn wall_ahead(&self, modes: &Modes, gap: usize, direction: Side) -> Option<(Side, usize)> {
         let GapMode::Beyond(passed) = modes.gaps[gap] else { return None };
         let number = usize::from(passed.unsigned_abs());
@@ -97,7 +97,7 @@ impl Frame {
         }
     }
 
-    /// Returns the side of a gap that has passed the last wall of a side, if this wall only pushes.
+    /// Returns the side on which a gap has passed the last wall, if there is one and this wall only pushes.
     pub(super) fn pushed(&self, modes: &Modes, gap: usize) -> Option<Side> {
         let GapMode::Beyond(passed) = modes.gaps[gap] else { return None };
         let side = if passed > 0 { Side::Right } else { Side::Left };
@@ -106,23 +106,23 @@ impl Frame {
     }
 
     /// Returns the row of the force of a wall that only pushes.
-    pub(super) fn force(&self, stage: usize, gap: usize, side: Side) -> Row {
+    pub(super) fn force(&self, stage: usize, gap: usize, side: Side) -> Functional {
         let (wall, sign) = (self.last_wall(gap, side), side.sign());
         let spring = wall.springs[stage];
-        let mut row = Row::ZERO;
+        let mut row = Functional::ZERO;
         row.0[gap] = sign * spring.stiffness;
         row.0[self.n + gap] = sign * spring.damping;
         row.plus(spring.preload - sign * spring.stiffness * wall.at, self.width())
     }
 
     /// Returns the row of an element's sliding rate.
-    pub(super) fn rate_row(&self, i: usize) -> Row {
-        let mut row = Row::ZERO;
+    pub(super) fn rate_row(&self, i: usize) -> Functional {
+        let mut row = Functional::ZERO;
         (0..self.n).for_each(|j| row.0[self.n + j] = self.elements[i].row[j]);
         row.plus(-self.elements[i].speed, self.width())
     }
 
-    /// Sets the rates of sticking elements, and of gaps at rest, to their values without rounding errors.
+    /// Removes rounding errors from the rates of sticking elements and of gaps at rest.
     pub(super) fn hold(&self, modes: &Modes, y: &mut [f64], is_tangent: bool) {
         let n = self.n;
         let is_stuck = |j: usize| modes.gaps.get(j).is_some_and(|mode| mode.rest().is_some());

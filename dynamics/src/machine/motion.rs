@@ -7,12 +7,12 @@ mod settle;
 mod start;
 mod tangents;
 
-use super::domain::{Carrier, Domain, Path, STAYS_ZERO};
+use super::domain::{Carrier, LinearDomain, Path, STAYS_ZERO};
 use super::domains::System;
 use super::flight::Flight;
 use super::modes::{GapMode, Modes};
 use super::watch::{Moment, Roots, Watch};
-use super::{Numbers, Point};
+use super::{Numbers, PhasePoint};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{
     Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, STEPS_PER_PERIOD_CAP, Slip, Slips, Stop, Work,
@@ -20,18 +20,18 @@ use crate::motion::{
 
 /// The motion of a machine, with any number of tangent vectors.
 #[derive(Clone, Debug)]
-pub struct Motion<'s> {
+pub struct MachineMotion<'s> {
     system: &'s System,
     pub(super) modes: Modes,
-    /// The latest domain that was entered, and its modes.
+    /// Modes of the latest domain that was entered, and this domain.
     entered: Modes,
-    domain: &'s Domain,
-    /// Memory for a step, for what may end the present modes, and for what carries tangents.
+    domain: &'s LinearDomain,
+    /// Memory that is used again in each step: the step, the watches, and the carrier of tangents.
     path: Option<Box<Path>>,
     watches: Vec<Watch>,
     carrier: Carrier,
     /// State, harmonics and 1 at the present time.
-    pub(super) point: Point,
+    pub(super) point: PhasePoint,
     clock: Clock,
     goal: f64,
     period: u64,
@@ -44,8 +44,8 @@ pub struct Motion<'s> {
     tangents: Vec<Numbers>,
     log_scale: f64,
     /// Point before the event.
-    before: Point,
-    /// Impacts of the event: the gap, and the derivatives of the jumps of all rates by its rate, with the opposite sign.
+    before: PhasePoint,
+    /// For each impact of the event, the gap and minus the derivatives of the jumps of all rates with respect to the gap's rate.
     jumps: Vec<(usize, Numbers)>,
     events_in_period: u64,
     steps_in_period: u64,
@@ -56,7 +56,7 @@ pub struct Motion<'s> {
     allowance: Allowance<'s>,
 }
 
-impl<'s> Motion<'s> {
+impl<'s> MachineMotion<'s> {
     /// Returns the present state `(x1, v1, x2, v2, ...)`.
     pub fn state(&self) -> Numbers {
         self.system.to_state(&self.point)
@@ -87,7 +87,7 @@ impl<'s> Motion<'s> {
         self.sticking_time
     }
 
-    /// Returns the side of the contact of a gap that lasts.
+    /// Returns the side of a gap's lasting contact, if there is one.
     pub fn contact(&self, gap: usize) -> Option<Side> {
         match self.modes.gaps[gap] {
             GapMode::Open(side) => self.system.before_last(gap, side).contact(),
@@ -95,7 +95,7 @@ impl<'s> Motion<'s> {
         }
     }
 
-    /// Whether no contact lasts.
+    /// Whether no gap is in lasting contact.
     pub(crate) fn is_free(&self) -> bool {
         (0..self.system.gaps()).all(|gap| self.contact(gap).is_none())
     }
@@ -138,8 +138,8 @@ impl<'s> Motion<'s> {
         self.allowance.after(self.work)
     }
 
-    /// Whether another motion is in the same modes. Contact onset and pressed contact count as equal for a gap on its wall.
-    pub(crate) fn is_in_modes_of(&self, other: &Motion<'_>) -> bool {
+    /// Whether another motion has the same modes. Contact onset and pressed contact count as equal for a gap on its wall.
+    pub(crate) fn is_in_modes_of(&self, other: &MachineMotion<'_>) -> bool {
         let is_on_wall = |gap: usize, side: Side| {
             let wall = self.system.last_wall(gap, side).at;
             (self.point[gap] - wall).abs() <= 1e-9 * wall.abs().max(self.system.length)
@@ -152,7 +152,7 @@ impl<'s> Motion<'s> {
             })
     }
 
-    /// Whether a gap in free motion reaches the next wall within a time, or has passed it within that time.
+    /// Whether a gap in free motion passed a wall less than `time` ago, or will reach one within `time`.
     pub(crate) fn passes_wall(&self, time: f64) -> bool {
         (0..self.system.gaps()).any(|gap| {
             let mut ahead =
@@ -164,12 +164,12 @@ impl<'s> Motion<'s> {
         })
     }
 
-    /// Whether another motion is in the same modes, with gaps on the same walls and from the same walls.
-    pub(crate) fn is_where(&self, other: &Motion<'_>) -> bool {
+    /// Whether two motions agree in their modes, in the walls that gaps lie on, and in the walls that gaps come from.
+    pub(crate) fn is_where(&self, other: &MachineMotion<'_>) -> bool {
         self.modes == other.modes && self.origin == other.origin && self.roots.at_wall == other.roots.at_wall
     }
 
-    /// Multiplies each entry of the state by 1 and a share, to simulate rounding.
+    /// Multiplies each entry of the state by `1 + share()`, to simulate rounding.
     pub(crate) fn perturb(&mut self, mut share: impl FnMut() -> f64) {
         self.point[..2 * self.system.n].iter_mut().for_each(|y| *y += share() * *y);
         self.system.hold(&self.modes, &mut self.point, false);
@@ -245,7 +245,7 @@ impl<'s> Motion<'s> {
     }
 
     /// Enters the domain of the present modes, and returns it.
-    fn refresh(&mut self) -> &'s Domain {
+    fn refresh(&mut self) -> &'s LinearDomain {
         if self.modes != self.entered {
             (self.entered, self.domain) = (self.modes, self.system.domain(&self.modes));
         }
@@ -256,7 +256,7 @@ impl<'s> Motion<'s> {
         self.point[self.system.n + gap]
     }
 
-    /// Takes one step: to the first event, or as far as the series or the goal allow.
+    /// Takes one step, which ends at the first event, at the longest step or at the goal.
     fn step(&mut self, observer: &mut dyn Observer) -> Result<(), Stop> {
         self.work.steps += 1;
         self.steps_in_period += 1;
@@ -293,7 +293,7 @@ impl<'s> Motion<'s> {
         if self.steps_in_period.is_multiple_of(1024) { self.check_finite() } else { Ok(()) }
     }
 
-    /// Moves everything to a share of a step.
+    /// Advances state, tangents and clock to a share of a step.
     fn advance(&mut self, path: &mut Path, share: f64, time: f64) {
         let (system, domain, n) = (self.system, self.domain, self.system.n);
         let before = self.point;

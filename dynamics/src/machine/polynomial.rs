@@ -1,12 +1,12 @@
 //! The first root of a polynomial on a step.
 //!
 //! In Bernstein form, the number of roots in an interval is at most the number of sign changes of the coefficients, and one sign change
-//! means exactly one root (Descartes' rule). Other intervals are halved by de Casteljau's algorithm. A root at the start is divided out: the
-//! Bernstein coefficients of the quotient have the signs of the later ones of the polynomial.
+//! means exactly one root (Descartes' rule). Other intervals are halved by de Casteljau's algorithm. A root of order m at the start is
+//! divided out: the Bernstein coefficients of the quotient have the signs of the polynomial's coefficients from the index m on.
 
 use wide::{CmpGt, f64x4};
 
-/// Order of the Taylor polynomial of a step. There are four times a whole number of coefficients, for products of registers.
+/// Order of the Taylor polynomial of a step. The number of coefficients is a multiple of four, for SIMD registers.
 pub(super) const ORDER: usize = 23;
 
 /// Number of registers that hold the coefficients of a polynomial.
@@ -15,17 +15,17 @@ const REGISTERS: usize = (ORDER + 1) / 4;
 /// Coefficients of a polynomial in powers of the share of the step.
 pub(super) type Polynomial = [f64; ORDER + 1];
 
-/// Halvings after which a function that is not decided touches zero within rounding.
+/// Largest number of halvings. A function that is still undecided then counts as touching zero within rounding.
 const MOST_HALVINGS: u32 = 48;
 
 /// Largest number of steps of the final root search.
-const ROOT_CAP: u32 = 200;
+const ROOT_STEP_CAP: u32 = 200;
 
 /// Largest order of a root at the start of a step.
 const MOST_ORDER: usize = 18;
 
 /// Rounding error of a coefficient, relative to the sum of all.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
+const BERNSTEIN_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Where a function that is positive at first becomes negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,7 @@ pub(super) fn rest(c: &Polynomial) -> f64 {
     (first + later[1] + (later[2] + later[3]) + (later[4] + later[5])).reduce_add()
 }
 
-/// Returns the sum of polynomials with given factors.
+/// Returns a linear combination of polynomials.
 pub(super) fn combine(polynomials: &[Polynomial], factors: &[f64]) -> Polynomial {
     let mut sums = [f64x4::ZERO; REGISTERS];
     for (polynomial, &factor) in polynomials.iter().zip(factors) {
@@ -66,7 +66,7 @@ pub(super) fn combine(polynomials: &[Polynomial], factors: &[f64]) -> Polynomial
     from_registers(sums)
 }
 
-/// Returns a polynomial of the share of a longer step as one of the share of a step that is this `part` of it.
+/// Changes the variable of a polynomial from the share of a step to the share of the first `part` of this step.
 pub(super) fn stretched(c: &Polynomial, part: f64) -> Polynomial {
     let (square, fourth) = (part * part, f64x4::splat((part * part) * (part * part)));
     let mut powers = f64x4::new([1.0, part, square, part * square]);
@@ -119,9 +119,9 @@ pub(super) fn bernstein(c: &Polynomial, order: usize) -> Polynomial {
     from_registers(sums)
 }
 
-/// Finds the first root of a polynomial, divided by `u^order`; the coefficients below are zero but for rounding. An `order`
-/// above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients. The Bernstein
-/// coefficients `b` are computed if they are not known, or if the order is above 1.
+/// Finds the first root of a polynomial after division by `u^order`. The coefficients of lower order must be zero within rounding. An
+/// `order` above [`MOST_ORDER`] means that all coefficients are zero. `size` bounds the terms that cancel in the coefficients. The
+/// Bernstein coefficients `b` are computed if they are not known, or if the order is above 1.
 pub(super) fn first_fall(c: &Polynomial, b: Option<Polynomial>, order: usize, size: f64) -> Fall {
     if order > MOST_ORDER {
         return Fall::None;
@@ -137,7 +137,7 @@ pub(super) fn first_fall(c: &Polynomial, b: Option<Polynomial>, order: usize, si
     if positive == all {
         return Fall::None;
     }
-    let noise = ROUNDING * if order == 0 { rest(c) + size } else { rest(c) };
+    let noise = BERNSTEIN_ROUNDING * if order == 0 { rest(c) + size } else { rest(c) };
     // Bernstein coefficients of the quotient.
     let quotient =
         |i: usize| (0..order).fold(b[order + i], |b, k| b * ((ORDER - k) as f64 / (order + i - k) as f64));
@@ -156,7 +156,7 @@ pub(super) fn first_fall(c: &Polynomial, b: Option<Polynomial>, order: usize, si
     }
 }
 
-/// Returns where the polygon of the Bernstein coefficients, which is near the function, meets zero in front of the coefficient `i`.
+/// Estimates the root: returns where the control polygon of the Bernstein coefficients crosses zero before the coefficient `i`.
 fn polygon(i: usize, [before, after]: [f64; 2], degree: usize) -> f64 {
     (i as f64 - after / (after - before)) / degree as f64
 }
@@ -203,7 +203,7 @@ fn halves(b: &[f64]) -> [Polynomial; 2] {
     [left, right]
 }
 
-/// Powers of a share, and their derivatives, to evaluate several polynomials there. The first one of each is left out.
+/// Powers of a share and their derivatives, to evaluate several polynomials at this share. The power 0 is left out.
 pub(super) struct Weights([[f64x4; REGISTERS]; 2]);
 
 impl Weights {
@@ -224,13 +224,13 @@ impl Weights {
         Weights([values, slopes])
     }
 
-    /// Returns value and slope of a polynomial. The largest term comes last.
+    /// Returns value and slope of a polynomial. The largest term is added last.
     pub(super) fn of(&self, c: &Polynomial) -> [f64; 2] {
         let [value, slope] = self.later(c);
         [c[0] + value, c[1] + slope]
     }
 
-    /// Returns value and slope without their first terms. Four sums run side by side, each from its smallest term on.
+    /// Returns value and slope without their first terms. Four sums run in parallel, each from its smallest to its largest term.
     pub(super) fn later(&self, c: &Polynomial) -> [f64; 2] {
         let terms = registers(c);
         self.0.each_ref().map(|weights| {
@@ -244,7 +244,7 @@ impl Weights {
 fn root(c: &[f64], [mut lo, mut hi]: [f64; 2], guess: f64) -> f64 {
     let (mut padded, mut u) = ([0.0; ORDER + 1], guess);
     padded[..c.len()].copy_from_slice(c);
-    for _ in 0..ROOT_CAP {
+    for _ in 0..ROOT_STEP_CAP {
         let [value, slope] = Weights::at(u).of(&padded);
         if value > 0.0 {
             lo = u;

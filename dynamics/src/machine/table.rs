@@ -1,20 +1,20 @@
-//! The equations of motion of all domains of a machine, and the modes of a start, as numbers: for engines that cannot build domains.
+//! A machine as tables of numbers, for lanes, which cannot build domains: the equations of motion of all domains, and the modes of a start.
 //!
 //! A point is listed as `(d1, w1, d2, w2, ..., cos and sin of each harmonic, 1)`.
 
-use super::domain::{Domain, DomainKey, Row};
+use super::domain::{DomainKey, Functional, LinearDomain};
 use super::domains::System;
+use super::frame::{Element, Frame};
 use super::modes::GapMode;
-use super::motion::Motion;
-use super::system::{Element, Frame};
+use super::motion::MachineMotion;
 use super::{Numbers, SIZE};
 use crate::model::{Contact, MOST_GAPS, Oscillator, Side};
 use crate::motion::{Slip, Slips};
 
-/// Frequency below all others, for equations that do not depend on it.
+/// A frequency that does not limit [`Equations::radian`].
 const LOWEST_FREQUENCY: f64 = 1e-100;
 
-/// Largest order of a root for which lanes have terms to decide.
+/// Largest order of a root that lanes distinguish; higher orders are reported as this one.
 const MOST_ORDER_OF_LANES: usize = 7;
 
 /// The equations of motion of one domain.
@@ -22,7 +22,7 @@ const MOST_ORDER_OF_LANES: usize = 7;
 pub struct Equations {
     /// Time in which the fastest rate turns by one radian.
     pub radian: f64,
-    /// Whether constraints keep each coordinate.
+    /// For each coordinate, whether constraints hold it.
     pub is_still: Vec<bool>,
     /// Rows of the accelerations.
     pub accelerations: Vec<Vec<f64>>,
@@ -37,8 +37,8 @@ pub struct Equations {
 pub struct StartModes {
     /// State in the coordinates of the flow, `(d1, w1, d2, w2, ...)`.
     pub state: Numbers,
-    /// Modes of the gaps: 4 between the first walls, one more or less for each wall that has been passed on the right or left; 9 in contact
-    /// onset, 11 pressed, 13 open, 15 at rest, on the right, and the next number on the left.
+    /// Modes of the gaps: 4 between the first walls, plus 1 for each wall passed on the right, minus 1 for each on the left. At the last
+    /// right wall: 9 in contact onset, 11 pressed, 13 open, 15 at rest. At the last left wall these numbers are larger by 1.
     pub gaps: [u32; MOST_GAPS],
     /// Modes of friction: 0 sticks, 1 slides forward, 2 backward.
     pub slips: [u32; 2],
@@ -48,9 +48,9 @@ pub struct StartModes {
     pub origins: [u32; MOST_GAPS],
     /// Direction of the wall that each gap lies on, as in `origins`, and the order of the root of its distance.
     pub walls: [(u32, u32); MOST_GAPS],
-    /// Orders of the roots of pushing forces and of sliding rates.
+    /// Orders of the roots of pushing forces.
     pub from_force: [u32; MOST_GAPS],
-    /// See `from_force`.
+    /// Orders of the roots of sliding rates.
     pub from_rate: [u32; 2],
 }
 
@@ -69,8 +69,8 @@ fn gap_code(mode: GapMode) -> u32 {
 }
 
 impl Frame {
-    /// Returns the modes of a gap that domains distinguish: the walls whose springs act, from the left to the right, then rest on a rigid wall
-    /// on the right and on the left.
+    /// Returns the modes of a gap with different equations of motion: the numbers of acting springs, from left to right, then rest on a
+    /// rigid right wall and on a rigid left wall.
     fn modes_of_gap(&self, gap: usize) -> Vec<(i8, Option<Side>)> {
         let is_rigid =
             |side: Side| self.walls(gap, side).last().is_some_and(|wall| wall.contact == Contact::Rigid);
@@ -90,8 +90,8 @@ impl Frame {
         self.stages.len() * of_gaps * Slip::ALL.len().pow(self.elements.len() as u32)
     }
 
-    /// Returns the equations of all domains. The number of a domain is `((stage * modes + mode) * modes + mode) ...` over the gaps and
-    /// the elements with friction, in their order.
+    /// Returns the equations of all domains. The index of a domain is `((stage * modes + mode) * modes + mode) ...` over the gaps and the
+    /// elements with friction, in their order.
     pub fn equations(&self) -> Vec<Equations> {
         let modes: Vec<_> = (0..self.gaps()).map(|gap| self.modes_of_gap(gap)).collect();
         let of_number = |number: usize| {
@@ -111,13 +111,13 @@ impl Frame {
                 rest /= modes.len();
             }
             key.stage = rest;
-            self.equations_of(&Domain::new(self, key))
+            self.equations_of(&LinearDomain::new(self, key))
         };
         (0..self.domain_count()).map(of_number).collect()
     }
 
-    fn equations_of(&self, domain: &Domain) -> Equations {
-        let row = |row: &Row| self.listed(&row.0);
+    fn equations_of(&self, domain: &LinearDomain) -> Equations {
+        let row = |row: &Functional| self.listed(&row.0);
         Equations {
             radian: domain.radian(),
             is_still: domain.is_still[..self.n].to_vec(),
@@ -127,7 +127,7 @@ impl Frame {
         }
     }
 
-    /// Lists a point: displacements and rates in turn, and what forces depend on beside them.
+    /// Lists the entries of a point: each displacement followed by its rate, then the phasors and 1.
     fn listed(&self, point: &[f64]) -> Vec<f64> {
         let states = (0..self.n).flat_map(|i| [point[i], point[self.n + i]]);
         states.chain(point[2 * self.n..self.width()].iter().copied()).collect()
@@ -144,7 +144,7 @@ impl Frame {
         self.elements.iter().map(row).collect()
     }
 
-    /// Returns the changes of the rates by unit impulses, row by row.
+    /// Returns the mobility matrix, row by row: the changes of the rates by unit impulses.
     pub fn mobilities(&self) -> Vec<f64> {
         (0..self.n * self.n).map(|k| self.mobility[(k / self.n, k % self.n)]).collect()
     }
@@ -160,7 +160,7 @@ impl Frame {
         self.in_turn(&self.to_flow(state))
     }
 
-    /// Lists displacements and rates in turn.
+    /// Lists each displacement followed by its rate.
     fn in_turn(&self, y: &[f64]) -> Numbers {
         let mut listed = [0.0; SIZE];
         for i in 0..self.n {
@@ -169,7 +169,7 @@ impl Frame {
         listed
     }
 
-    /// Whether a wall only pushes, and its force differs from that of a wall that may pull.
+    /// Whether a wall only pushes and has a damper or a preload.
     pub fn is_pushing(&self, gap: usize, side: Side) -> bool {
         self.pushing(gap, side).is_some()
     }
@@ -192,11 +192,11 @@ impl Frame {
 impl System {
     /// Returns the modes and the state of a start, for the state `(x1, v1, ...)`.
     pub fn start(&self, state: &[f64]) -> StartModes {
-        Motion::new(self, state).start_modes()
+        MachineMotion::new(self, state).start_modes()
     }
 }
 
-impl Motion<'_> {
+impl MachineMotion<'_> {
     fn start_modes(&self) -> StartModes {
         let system = self.system();
         let side = |side: Option<Side>| side.map_or(2, side_code);
@@ -220,8 +220,8 @@ impl Motion<'_> {
 }
 
 impl Oscillator {
-    /// Returns the machine without what does not change the equations of its domains: restitution and mesh speeds are 0, and the frequency
-    /// is so low that it does not limit [`Equations::radian`].
+    /// Returns the machine with restitution and mesh speeds of 0 and with a frequency that does not limit [`Equations::radian`]. Machines
+    /// for which this is equal have equal equations.
     pub fn without_laws(&self) -> Oscillator {
         let mut machine = self.clone();
         machine.omega = LOWEST_FREQUENCY;

@@ -1,21 +1,21 @@
-//! What ends the modes of a motion: watches, their functions, and the first root of all on a step.
+//! Watches: conditions that end the present modes, their functions, and the first root of all functions on a step.
 
-use super::domain::{Domain, Path, Row};
+use super::domain::{Functional, LinearDomain, Path};
+use super::frame::Frame;
 use super::modes::{GapMode, Modes};
 use super::polynomial::{Fall, Polynomial, bernstein, first_fall};
-use super::system::Frame;
-use super::{Point, ROUNDING};
+use super::{PhasePoint, ROUNDING};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::motion::Slip;
 
-/// What ends the present modes.
+/// A condition that ends the present modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Watch {
     /// The gap reaches the next wall in a direction.
     Wall(usize, Side),
     /// The gap of a contact onset comes back to its wall.
     OnsetEnds(usize, Side),
-    /// The gap of a contact onset is not pressed to its wall any more.
+    /// The force on the gap of a contact onset no longer presses it to its wall.
     PressingEnds(usize, Side),
     /// The gap comes back from behind its wall.
     Leaves(usize, Side),
@@ -38,7 +38,7 @@ impl Watch {
     }
 }
 
-/// Roots of watches at the present instant, which are not events.
+/// Roots of watches at the present instant. They are not events: the search for the next event divides them out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Roots {
     /// For a gap on a wall: the direction of the wall from the gap, and the order of the root of the distance.
@@ -49,18 +49,18 @@ pub(super) struct Roots {
     pub(super) from_rate: [usize; MOST_FRICTION],
 }
 
-/// A motion at an instant, as far as watches depend on it.
+/// The parts of a motion at an instant that watches depend on.
 #[derive(Clone, Copy)]
 pub(super) struct Moment<'a> {
     pub(super) frame: &'a Frame,
-    pub(super) domain: &'a Domain,
+    pub(super) domain: &'a LinearDomain,
     pub(super) modes: &'a Modes,
     pub(super) roots: &'a Roots,
-    pub(super) point: &'a Point,
+    pub(super) point: &'a PhasePoint,
 }
 
 impl<'a> Moment<'a> {
-    /// Whether constraints keep a gap where it is.
+    /// Whether constraints hold a gap at its position.
     pub(super) fn is_kept(&self, gap: usize) -> bool {
         self.domain.is_still[gap] && self.point[self.frame.n + gap] == 0.0
     }
@@ -108,7 +108,7 @@ impl<'a> Moment<'a> {
         }
     }
 
-    /// Returns side and number of the wall that a contact onset may reach backwards.
+    /// Returns side and index of the wall that a gap in contact onset may reach when it moves away from its own wall.
     fn behind(&self, gap: usize, side: Side) -> Option<(Side, usize)> {
         match self.frame.walls(gap, side).len() {
             1 => self.frame.walls(gap, side.mirrored()).first().map(|_| (side.mirrored(), 0)),
@@ -125,7 +125,7 @@ impl<'a> Moment<'a> {
         Some(&self.frame.walls(gap, side)[number])
     }
 
-    /// Returns gap, position and direction of the wall whose distance a watch is.
+    /// Returns gap, position and direction of the wall if a watch is the distance of a gap from a wall.
     pub(super) fn distance(&self, watch: Watch) -> Option<(usize, f64, Side)> {
         match watch {
             Watch::Wall(gap, direction) => {
@@ -137,8 +137,8 @@ impl<'a> Moment<'a> {
         }
     }
 
-    /// Returns the function whose root a watch is, positive before.
-    pub(super) fn function(&self, watch: Watch) -> Row {
+    /// Returns the function of a watch. It is positive before the root.
+    pub(super) fn function(&self, watch: Watch) -> Functional {
         let (frame, domain, width) = (self.frame, self.domain, self.frame.width());
         let force = |gap: usize, side: Side| frame.force(self.modes.stage, gap, side);
         match watch {
@@ -160,8 +160,9 @@ impl<'a> Moment<'a> {
         }
     }
 
-    /// Returns the order of the root of a watch at this instant. A force that holds an element or a gap may be at its limit.
-    fn order(&self, watch: Watch, row: &Row) -> usize {
+    /// Returns the order of the root of a watch at this instant; 0 without a root. A force that holds an element or a gap may start at its
+    /// limit.
+    fn order(&self, watch: Watch, row: &Functional) -> usize {
         match watch {
             Watch::PressingEnds(gap, _) | Watch::ForceEnds(gap, _) | Watch::ForceBegins(gap, _) => {
                 self.roots.from_force[gap]
@@ -193,7 +194,7 @@ impl<'a> Moment<'a> {
         (first, touches)
     }
 
-    /// Returns where a watch ends the modes on a step. `latest` has the Bernstein coefficients of a gap, which several watches need.
+    /// Returns where a watch ends the modes on a step. `latest` caches the Bernstein coefficients of a gap for further watches.
     fn fall(&self, watch: Watch, path: &Path, latest: &mut Option<(usize, Polynomial)>) -> Fall {
         let Some((gap, at, direction)) = self.distance(watch) else {
             let row = self.function(watch);
@@ -220,8 +221,8 @@ impl<'a> Moment<'a> {
         first_fall(&c, Some(b), order, size)
     }
 
-    /// Whether it does not matter that a function touches zero within rounding. At an elastic wall without a preload the linearisation is
-    /// valid with and without contact.
+    /// Whether the linearisation stays valid if the watch's function touches zero within rounding. At an elastic wall without a preload it
+    /// is valid with and without contact.
     fn is_harmless(&self, watch: Watch) -> bool {
         match watch {
             Watch::Wall(gap, direction) => {

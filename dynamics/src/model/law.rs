@@ -11,7 +11,7 @@ pub enum Contact {
     Rigid,
     /// No impact: the motion continues behind the wall, and the state is continuous.
     Elastic,
-    /// An elastic wall that only pushes: behind the wall, its force is the larger of 0 and that of spring, damper and preload.
+    /// An elastic wall that only pushes: behind the wall, the force of spring, damper and preload acts while it is positive.
     Pushing,
 }
 

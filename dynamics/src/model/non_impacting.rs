@@ -7,8 +7,8 @@
 //! |z - z_0| <= sum |g . X_n| + sqrt(2 E g K^-1 g),   z_0 = g . K^-1 load
 //! ```
 //!
-//! for all time, and every gap of a machine likewise, with `X_n` the complex amplitudes of the steady response to each harmonic (Cauchy-Schwarz in the inner product of K). If
-//! that interval lies between the walls, the motion has no further event.
+//! for all time, where `X_n` are the complex amplitudes of the steady response to each harmonic (Cauchy-Schwarz in the inner product of K).
+//! The bound holds for each gap of a machine. If that interval lies between the walls, the motion has no further event.
 
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
@@ -94,8 +94,8 @@ impl NonImpacting {
         Some(NonImpacting { steady: state(&steady), moving, mass, stiffness, reach, slowest, resting, rest })
     }
 
-    /// Computes the contact-free steady motion of a machine. Returns none if it touches a wall or is not stable, or if the machine
-    /// has stages or dry friction. Bodies that nothing moves between the walls must then be at rest.
+    /// Computes the contact-free steady motion of a machine. Returns none if it touches a wall or is not stable, or if the machine has
+    /// stages or dry friction. Coordinates on which no force acts between the walls must be at rest.
     pub fn of_machine(machine: &Oscillator) -> Option<NonImpacting> {
         if !machine.schedule.is_empty() || machine.friction.iter().any(|friction| friction.force > 0.0) {
             return None;
@@ -115,7 +115,7 @@ impl NonImpacting {
         });
         let slowest =
             rates.fold(motion.slowest, |slowest, own| if own.re > slowest.re { own } else { slowest });
-        // Bodies at rest are so within the margin of the distance to a wall.
+        // Coordinates count as being at rest if they move less than the margin of the distance to a wall.
         let rest = [1.0, machine.omega].map(|unit| 1e-3 * MARGIN * machine.length_scale() * unit);
         (slowest.re <= 0.0).then_some(NonImpacting { resting, rest, slowest, ..motion })
     }
@@ -152,7 +152,7 @@ impl NonImpacting {
             };
             let room =
                 room(Side::Right).min(room(Side::Left)) - swing - MARGIN * 2.0 * machine.length_scale();
-            // A gap between bodies at rest has no compliance, and then its room alone matters.
+            // A gap between bodies at rest has no compliance. Then only its distance from the walls matters.
             let share = room / row.dot(&(&compliance * &row)).sqrt();
             reach = reach.min(if room > 0.0 { share } else { room });
         }
@@ -172,8 +172,8 @@ impl NonImpacting {
         Some(NonImpacting { steady, moving, mass, stiffness, reach, slowest, resting, rest })
     }
 
-    /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
-    /// the walls, stays at rest. The one at rest may be undamped; then the motion is neutral.
+    /// Computes the contact-free steady motion of one degree of freedom while the other stays at rest, because no force acts on it between
+    /// the walls. If the one at rest is undamped, the motion is neutral.
     pub fn with_one_at_rest(oscillator: &Pair) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
             let Pair { gap, free, mass, .. } = *oscillator;
@@ -193,7 +193,7 @@ impl NonImpacting {
             let root = Complex::from(c * c - 4.0 * m * k).sqrt();
             let own = (root - c) / (2.0 * m);
             let slowest = if own.re > motion.slowest.re { own } else { motion.slowest };
-            // Rest that any perturbation leaves is not stable.
+            // Rest is not stable if perturbations of it grow.
             (slowest.re <= 0.0).then_some(NonImpacting { resting: vec![resting], slowest, ..motion })
         })
     }
@@ -262,7 +262,7 @@ fn with_copy(oscillator: &Pair, resting: usize) -> Pair {
     copied
 }
 
-/// Whether nothing moves a coordinate at rest between the walls.
+/// Whether no force acts on a coordinate at rest between the walls.
 fn is_left_alone(machine: &Oscillator, i: usize) -> bool {
     let forces = &machine.stages[0];
     let matrices = [&machine.mass, &forces.damping, &forces.stiffness];

@@ -1,6 +1,6 @@
 //! The description of an oscillator: coordinates, gaps with walls, dry friction, stages and harmonics of the force.
 //!
-//! Models make it, and everything above the engines reads it. [`Pair::of`](super::Pair::of) decides which engine computes it.
+//! Models build it, and all code above the engines reads it. [`Pair::of`](super::Pair::of) decides which engine computes it.
 //!
 //! ```text
 //! M x'' + C x' + K x = load + sum over harmonics (cos_k cos(k omega t) + sin_k sin(k omega t)) + contact forces + friction forces
@@ -33,7 +33,7 @@ pub const MOST_WALLS: usize = 4;
 /// Displacement, in scales of length, from which no motion is expected to return if energy can grow.
 pub(super) const ESCAPE: f64 = 1e6;
 
-/// Displacement from which no motion is expected to return if nothing gives a scale of length: no force, no load, and no wall but at 0.
+/// Displacement from which no motion is expected to return if there is no scale of length: no force, no load, and no wall except at 0.
 pub(super) const ESCAPE_WITHOUT_SCALE: f64 = 1e100;
 
 /// Rounding error that checks of a matrix allow, relative to its entries.
@@ -51,7 +51,7 @@ pub const MOST_GAPS: usize = 3;
 /// Linear forces that act always, in one stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Forces {
-    /// Damping matrix. Its skew-symmetric part, as of gyroscopic forces, does no work.
+    /// Damping matrix. Its skew-symmetric part describes gyroscopic forces, which do no work.
     pub damping: DMatrix<f64>,
     /// Stiffness matrix, symmetric.
     pub stiffness: DMatrix<f64>,
@@ -79,7 +79,7 @@ pub struct Spring {
     pub stiffness: f64,
     /// Damping, >= 0.
     pub damping: f64,
-    /// Force that begins at the wall. It is 0 where the law is [`Contact::Impact`].
+    /// Constant force behind the wall. It is 0 where the law is [`Contact::Impact`].
     pub preload: f64,
 }
 
@@ -131,11 +131,11 @@ pub struct Wall {
     pub at: f64,
     /// Contact law. All walls on a side but the outermost one are [`Contact::Elastic`].
     pub contact: Contact,
-    /// Coefficient of restitution; of no effect where the law is elastic.
+    /// Coefficient of restitution; ignored by elastic walls.
     pub restitution: Restitution,
     /// Leaving speed, >= 0, up to which a pressed contact lasts.
     pub mesh_speed: f64,
-    /// Spring, damper and preload in each stage; of no effect on a rigid wall.
+    /// Spring, damper and preload in each stage; ignored by a rigid wall.
     pub springs: Vec<Spring>,
 }
 
@@ -156,9 +156,9 @@ pub struct GapRow {
 pub struct DryFriction {
     /// Row of the sliding rate; not zero.
     pub row: DVector<f64>,
-    /// Friction force, >= 0: when sliding, and the largest one that holds.
+    /// Friction force, >= 0: the force while sliding, and the limit of the force while sticking.
     pub force: f64,
-    /// Speed of the other surface, as of a moving belt, along the row.
+    /// Speed of the other surface along the row, for example of a moving belt.
     pub speed: f64,
 }
 
@@ -172,7 +172,7 @@ pub struct Oscillator {
     /// Linear forces of each stage, at least one.
     pub stages: Vec<Forces>,
     /// Changes of the stage in a forcing period: the phase in turns, in `[0, 1)` and increasing, and the stage that begins there. The last
-    /// one holds up to the first. Empty if stage 0 holds always.
+    /// stage lasts until the first change. Empty if there is only stage 0.
     pub schedule: Vec<(f64, usize)>,
     /// Harmonics of the force, in increasing order, up to [`MOST_HARMONICS`] beside the first.
     pub drives: Vec<Drive>,
@@ -196,7 +196,8 @@ impl Oscillator {
         self.mass.nrows()
     }
 
-    /// Returns why only a machine can describe the oscillator, or nothing for a [`Pair`](super::Pair). It does not depend on values.
+    /// Returns the reason why the oscillator needs the general engine, or none if it is a [`Pair`](super::Pair). The reason does not depend
+    /// on values.
     pub fn needs_machine(&self) -> Option<&'static str> {
         let mut walls = self.gaps.iter().flat_map(|gap| gap.walls.iter().flatten());
         [
@@ -212,12 +213,13 @@ impl Oscillator {
         .find_map(|(is_so, what)| is_so.then_some(what))
     }
 
-    /// Whether a start tells the contact of the first gap. A machine decides on gaps at rest when it moves.
+    /// Whether the start state determines the contact of the first gap. A machine decides the contact of a gap at rest only when it begins
+    /// to move.
     pub fn tells_contact_at_start(&self) -> bool {
         self.needs_machine().is_none()
     }
 
-    /// Returns the law of the outermost walls of the first gap. Restitution that depends on the speed counts as that at speed 0.
+    /// Returns the law of the outermost walls of the first gap. Restitution that depends on the speed is evaluated at speed 0.
     pub fn law(&self) -> Law {
         let mut law = Law::both(0.0, 0.0);
         for (i, walls) in self.gaps[0].walls.iter().enumerate() {
@@ -269,21 +271,21 @@ impl Oscillator {
         Ok((0..repeat).flat_map(nth).collect())
     }
 
-    /// Returns the row of a gap, one entry for each coordinate; 0 for those that it does not have.
+    /// Returns the row of a gap, one entry for each coordinate; entries without a coordinate are 0.
     pub fn gap_row(&self, gap: usize) -> [f64; MOST_COORDINATES] {
         let mut row = [0.0; MOST_COORDINATES];
         self.gaps[gap].row.iter().zip(&mut row).for_each(|(x, entry)| *entry = *x);
         row
     }
 
-    /// Returns a gap in a state, or with `velocity` 1 its rate.
+    /// Returns a gap in a state if `velocity` is 0, and its rate if `velocity` is 1.
     pub fn gap_value(&self, gap: usize, state: &State, velocity: usize) -> f64 {
         let terms = self.gaps[gap].row.iter().enumerate();
         terms.map(|(i, factor)| factor * state[2 * i + velocity]).sum()
     }
 
-    /// Returns the impulse `p` of a wall on a gap that changes the velocities between two states: `M (v+ - v-)` is the sum of `p g` over all
-    /// gaps, because walls on which other gaps rest push, too.
+    /// Returns the impulse `p` of a wall on a gap in an event, from the states before and after. `M (v+ - v-)` is the sum of `p g` over all
+    /// gaps, because walls on which other gaps rest also push.
     pub fn gap_impulse(&self, gap: usize, [before, after]: [&State; 2]) -> f64 {
         let jump = |gap: usize| self.gap_value(gap, after, 1) - self.gap_value(gap, before, 1);
         if self.gaps.len() == 1 { jump(0) / self.mobility(0) } else { self.impulses(jump)[gap] }
@@ -321,8 +323,8 @@ impl Oscillator {
         }
     }
 
-    /// Chooses one displacement for each gap, by Gaussian elimination: the one with the largest remaining factor in the gap's row, and of equal
-    /// ones the first by `order`.
+    /// Chooses one displacement for each gap, by Gaussian elimination: the one with the largest remaining factor in the gap's row, and
+    /// among equal factors the first by `order`.
     pub(crate) fn displacements_of_gaps(&self, order: impl Fn(usize, usize) -> Ordering) -> Vec<usize> {
         let mut rows: Vec<DVector<f64>> = self.gaps.iter().map(|gap| gap.row.clone()).collect();
         let mut chosen = Vec::new();
@@ -580,9 +582,9 @@ impl Oscillator {
         if gram.iter().all(|x| x.is_finite()) { gram.symmetric_eigenvalues().min() } else { 0.0 }
     }
 
-    /// Returns the scale, > 0, of tolerances on distances: half the smallest distance between a gap's first walls. Without a gap with two
-    /// walls, it is the largest of the walls' positions and of the deflections `D f` under forces of order k, and under loads,
-    /// preloads and friction (k = 1), with `D = (|K| + (k omega)^2 M)^-1`.
+    /// Returns the scale, > 0, of tolerances on distances: half the smallest distance between a gap's first walls. If no gap has two walls,
+    /// it is the largest position of a wall or deflection `D f`, with `D = (|K| + (k omega)^2 M)^-1`, where `f` is a harmonic of order k, a
+    /// load, a preload or a friction force (k = 1).
     pub fn length_scale(&self) -> f64 {
         let half = |gap: &GapRow| {
             let [right, left] = gap.walls.each_ref().map(|walls| walls.first());
@@ -593,7 +595,7 @@ impl Oscillator {
 
     /// Returns the displacement from which no motion is expected to return if energy can grow.
     pub(crate) fn escape(&self) -> f64 {
-        // Walls may be near each other and far from rest, or much nearer than the motion of other coordinates.
+        // The distance between walls may be much smaller than their positions or than the motion of other coordinates.
         match self.length_scale().max(self.largest_length()) {
             LEAST_LENGTH => ESCAPE_WITHOUT_SCALE,
             length => ESCAPE * length,

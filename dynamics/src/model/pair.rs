@@ -1,7 +1,7 @@
 //! Pairs: the oscillators for which the fast engine has closed forms. Up to two coordinates move one gap.
 //!
-//! A pair is an [`Oscillator`] in another form, with one matrix for each domain. Its law of restitution is not part of it, so that cells
-//! that differ in restitution only share a flow.
+//! A pair is an [`Oscillator`] in another form, with one matrix for each domain. The law of restitution is not part of a pair, so that
+//! cells that differ only in restitution share a flow.
 
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, Vector2};
 
@@ -86,8 +86,8 @@ pub struct Pair {
     pub harmonics: Vec<Harmonic>,
     /// Further stages. Stage 0 is `free` and `meshing`, stage `i` is `stages[i - 1]`.
     pub stages: Vec<Stage>,
-    /// Changes of the stage in a forcing period: the phase in turns, in `[0, 1)` and increasing, and the stage that begins
-    /// there. The last one holds up to the first. Empty if stage 0 holds always.
+    /// Changes of the stage in a forcing period: the phase in turns, in `[0, 1)` and increasing, and the stage that begins there. The last
+    /// stage lasts until the first change. Empty if there is only stage 0.
     pub schedule: Vec<(f64, usize)>,
     /// Further walls behind the right and the left one, from the inside to the outside.
     pub outer_walls: [Vec<OuterWall>; 2],
@@ -186,7 +186,7 @@ impl Pair {
         1 + self.stages.len()
     }
 
-    /// Returns the stage that holds at phase 0: the one that begins there, or the last one of the schedule.
+    /// Returns the stage at phase 0: the stage that begins there, or else the last stage of the schedule.
     pub fn first_stage(&self) -> usize {
         match self.schedule.first() {
             Some(&(0.0, stage)) => stage,
@@ -202,7 +202,7 @@ impl Pair {
         }
     }
 
-    /// Returns the oscillator in which a stage holds always.
+    /// Returns the oscillator that has one of the stages at all phases.
     pub fn in_stage(&self, stage: usize) -> Pair {
         let Stage { free, meshing } = self.stage(stage);
         let mut alone = Pair { free, meshing, stages: Vec::new(), schedule: Vec::new(), ..self.clone() };
@@ -215,7 +215,7 @@ impl Pair {
     /// Returns the oscillator between two neighbouring walls of a side, in one stage: between the `nth` wall of the side,
     /// from 1, and the next one. Its free motion is contact with the first `nth` walls.
     ///
-    /// On the inner wall the motion continues in the interval before.
+    /// At the inner wall the motion continues in the previous interval.
     ///
     /// # Panics
     /// If the side has no further wall behind the `nth` one.
@@ -238,7 +238,7 @@ impl Pair {
         interval
     }
 
-    /// Returns stiffness, damping and constant of the force along the gap that free motion of this interval has and `centre` lacks.
+    /// Returns stiffness, damping and constant of the force along the gap by which free motion of this interval differs from `centre`.
     pub fn force_against(&self, centre: &Domain) -> [f64; 3] {
         let g = self.gap;
         let square = g[0] * g[0] + g[1] * g[1];
@@ -409,12 +409,12 @@ impl Pair {
         ]
     }
 
-    /// Returns the displacement beyond which the motion counts as escaped. It is infinite if energy grows by the force alone.
+    /// Returns the displacement beyond which the motion counts as escaped. It is infinite if only the force can increase the energy.
     pub fn escape(&self) -> f64 {
         let mut domains = self.domains();
-        // Stages can do work: parametric resonance.
+        // Changes of the stage can do work: parametric resonance.
         let grows = !self.stages.is_empty() || domains.any(|domain| self.growth_rate(domain) > 0.0);
-        // Walls may be near each other and far from rest, or much nearer than the motion of other coordinates.
+        // The distance between walls may be much smaller than their positions or than the motion of other coordinates.
         let of_stages = (0..self.stage_count()).map(|stage| self.in_stage(stage).deflection_scale());
         match of_stages.fold(self.length_scale(), f64::max) {
             _ if !grows => f64::INFINITY,
@@ -441,10 +441,10 @@ impl Pair {
     /// max(|wall|, |D force|, |D load|, |D preload g|, |D friction row|),   D = (|K| + omega^2 M)^-1
     /// ```
     ///
-    /// over the existing walls and both displacements, with [`|K|`](Self::energy_stiffness) and `load` of free motion. `|D force|` is the amplitude
-    /// of the forced deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
-    /// or none it is the distance that the load moves a mass in a radian of the forcing. The scale is finite for
-    /// every oscillator.
+    /// over the existing walls and both displacements, with [`|K|`](Self::energy_stiffness) and `load` of free motion. `|D force|` is the
+    /// amplitude of the forced deflection without the effects of resonance and damping. `D load` is the static deflection; if the spring is
+    /// soft or missing, it is the distance by which the load moves a mass in one radian of the forcing. The scale is finite for every
+    /// oscillator.
     ///
     /// A factor on `walls`, the force and `load` that is a power of two multiplies the scale exactly. A change of the
     /// unit of time does not change it.
@@ -551,7 +551,7 @@ fn plus(a: f64, b: f64) -> f64 {
     if a == 0.0 { b } else { a + b }
 }
 
-/// Returns the mass matrix of one or two coordinates. The second displacement of one does not exist, but its mass must not be 0.
+/// Returns the mass matrix of one or two coordinates. A missing second coordinate gets the mass 1, so that the matrix has an inverse.
 pub(super) fn mass(of: &DMatrix<f64>) -> [[f64; 2]; 2] {
     let mut mass = matrix(of);
     if of.nrows() == 1 {
@@ -566,7 +566,7 @@ fn matrix(of: &DMatrix<f64>) -> [[f64; 2]; 2] {
     [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
 }
 
-/// Returns a vector of one or two entries; one that does not exist is 0.
+/// Returns a vector of one or two entries; a missing entry is 0.
 pub(super) fn vector(of: &DVector<f64>) -> [f64; 2] {
     [0, 1].map(|i| of.get(i).copied().unwrap_or(0.0))
 }
@@ -631,7 +631,7 @@ mod tests {
     use super::*;
     use crate::model::{DryFriction, GearPair, Restitution};
 
-    /// What the file of a model states decides, and not values.
+    /// The structure that a model's file states decides the engine; values do not.
     #[test]
     fn structure_decides_between_pair_and_machine() {
         let pair = GearPair::paper(0.5).oscillator().unwrap();

@@ -80,7 +80,7 @@ impl Range {
     }
 }
 
-/// What depends on a parameter. Cells that differ only in parameters of the law share one flow.
+/// The parts of a model that depend on a parameter. Cells that differ only in parameters of the law share one flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shapes {
     /// The oscillator, and not the contact law.
@@ -128,7 +128,7 @@ pub struct Parameter {
     pub default: Option<f64>,
     /// The values it may take.
     pub range: Range,
-    /// What depends on it.
+    /// The parts of the model that depend on it.
     pub shapes: Shapes,
 }
 
@@ -171,7 +171,7 @@ impl Units {
         self.rate(self.gap.as_deref()?)
     }
 
-    /// Returns the unit of power: that of a contact force times that of the gap's velocity.
+    /// Returns the unit of power: the unit of a contact force times the unit of the gap's velocity.
     pub fn power(&self) -> Option<String> {
         let [force, velocity] = [self.force.as_deref()?, &self.gap_velocity()?];
         match (force, velocity) {

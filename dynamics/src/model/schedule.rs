@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use super::OscillatorError;
 use super::error::require;
 
-/// Distance of phases, in turns, that is rounding.
+/// Largest distance of phases, in turns, that counts as rounding error.
 const SAME_PHASE: f64 = 1e-12;
 
 /// Largest number of stages.
@@ -14,7 +14,7 @@ pub const MOST_STAGES: usize = 8;
 /// Largest number of changes of the stage in a forcing period.
 pub const MOST_CHANGES: usize = 1024;
 
-/// Whether the stage half a period after each stage of a schedule is its mirror image, in both orders.
+/// Whether each stage of a schedule is the mirror image of the stage half a period later, and vice versa.
 pub(super) fn recurs_after_half_a_period(
     schedule: &[(f64, usize)],
     is_mirrored: impl Fn(usize, usize) -> bool,

@@ -20,9 +20,9 @@ pub enum ModelError {
 
 /// A model with the values of its parameters: one cell of a map.
 ///
-/// Scenes set parameters by name; engines use the oscillator and the law. [`Parameter::shapes`] says which of the two
-/// depends on a parameter, so that a map computes one flow per distinct oscillator. An implementation must be `Clone`
-/// and `PartialEq`; then `Box<dyn Model>` is, too.
+/// Scenes set parameters by name; engines use the oscillator and the law. [`Parameter::shapes`] says which of the two depends on a
+/// parameter, so that a map computes one flow per distinct oscillator. An implementation must be `Clone` and `PartialEq`; then `Box<dyn
+/// Model>` also is.
 pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// Returns the name in scenes.
     fn name(&self) -> &str;
@@ -61,8 +61,8 @@ pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// [`ModelError`] if a parameter is out of its range, or the oscillator is not valid.
     fn oscillator(&self) -> Result<Oscillator, ModelError>;
 
-    /// Returns [`Oscillator::law`] of a pair without building the oscillator, since it may differ in millions of cells; 0 for a machine,
-    /// which has a law for each wall.
+    /// Returns [`Oscillator::law`] of a pair without building the oscillator, because millions of cells may have different laws. It is 0
+    /// for a machine, which has a law for each wall.
     fn law(&self) -> Law;
 
     /// Returns the start phase: the phase of the forcing, in radians, that the oscillator has as phase 0.

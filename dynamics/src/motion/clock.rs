@@ -1,4 +1,4 @@
-//! Time since the last phase 0, summed over many steps without loss.
+//! The time since the last phase 0, as a compensated sum over many steps.
 
 /// A compensated sum of steps.
 ///

@@ -8,7 +8,7 @@ use crate::model::{Side, State};
 /// Largest number of events in one forcing period.
 pub const EVENTS_PER_PERIOD_CAP: u64 = 1_000_000;
 
-/// Largest number of steps in one forcing period, including those that are halved: some tenths of a second.
+/// Largest number of steps in one forcing period, including those that are halved. They take some tenths of a second.
 pub const STEPS_PER_PERIOD_CAP: u64 = 20_000_000;
 
 /// The reason why a trajectory cannot be continued.
@@ -61,17 +61,17 @@ pub struct GapEvent {
     pub period: u64,
     /// Time since the last phase 0, in `[0, T]`.
     pub t: f64,
-    /// The gap and its rate just before the event, and of a pair the other displacement and its velocity.
+    /// Gap and rate of the gap just before the event; for a pair also the other displacement and its velocity.
     pub before: [f64; 4],
-    /// The same just after the event.
+    /// These values just after the event.
     pub after: [f64; 4],
-    /// The side of the contact of this gap that lasts after the event, if one does.
+    /// Side of this gap's lasting contact after the event, if there is one.
     pub meshing: Option<Side>,
     /// Whether the law of restitution applied.
     pub has_impact: bool,
-    /// A number for the kind, the wall, and whether the gap was on it, which distinguishes itineraries.
+    /// A code for the kind, the wall, and whether the gap was on the wall. Itineraries are hashed from these codes.
     pub(crate) code: u64,
-    /// The interval of a pair between walls after the event.
+    /// For a pair, the interval between walls after the event.
     pub(crate) interval: i32,
     /// Whether the event ends an infinite series of impacts, which the trajectory replaced by its limit.
     pub(crate) ends_series: bool,
@@ -92,7 +92,7 @@ pub struct SlipEvent {
     pub at: State,
 }
 
-/// Returns the states just before and just after an event. They are computed only if an observer asks.
+/// Returns the states just before and just after an event. Calling the function computes them.
 pub type States<'a> = &'a dyn Fn() -> [State; 2];
 
 /// Receives the events of a motion, in order of time. `()` ignores them, a vector stores those at walls.
@@ -100,7 +100,7 @@ pub trait Observer {
     /// Receives one event at a wall.
     fn event(&mut self, event: &GapEvent, states: States<'_>);
 
-    /// Whether the events of machines at walls are to be reported.
+    /// Whether a machine must report its events at walls to this observer.
     fn sees_events(&self) -> bool {
         true
     }
@@ -108,8 +108,8 @@ pub trait Observer {
     /// Receives one change of a friction mode.
     fn slip(&mut self, _: &SlipEvent) {}
 
-    /// Returns the integrals and extremes to which a machine adds its flights and losses of energy; none if they are not requested. Those of
-    /// a pair follow from its events.
+    /// Returns the integrals and extremes to which a machine adds its flights and losses of energy; none if they are not requested. For a
+    /// pair they are computed from its events.
     fn sums(&mut self) -> Option<&mut Sums> {
         None
     }

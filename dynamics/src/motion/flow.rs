@@ -5,7 +5,7 @@ use crate::model::{Form, Law, Model, ModelError, NonImpacting, Oscillator, Pair,
 use crate::pair::PairFlow;
 use crate::pair::flow::power_of_two;
 
-/// What the engine of an oscillator prepares.
+/// The data that an engine prepares for an oscillator.
 #[derive(Clone, Debug)]
 pub enum Engine {
     /// The exact flow of a pair.
@@ -16,7 +16,7 @@ pub enum Engine {
 
 /// The flow of one oscillator.
 ///
-/// That of a pair does not depend on the contact law, so cells that differ only in restitution or meshing speed share one flow.
+/// The flow of a pair does not depend on the contact law, so cells that differ only in restitution or meshing speed share one flow.
 #[derive(Clone, Debug)]
 pub struct Flow {
     /// Forcing period `2 pi / omega`.
@@ -25,7 +25,7 @@ pub struct Flow {
     pub omega: f64,
     /// Scale of length, [`Oscillator::length_scale`].
     pub length: f64,
-    /// Displacement beyond which the motion has escaped: infinite if energy grows by the force alone.
+    /// Displacement beyond which the motion has escaped: infinite if only the force can increase the energy.
     pub escape: f64,
     /// The largest power of two up to `omega`. Velocities divided by it are comparable with displacements, and the
     /// division is exact.
@@ -84,7 +84,7 @@ impl Flow {
         }
     }
 
-    /// Returns what the engine has prepared.
+    /// Returns the data of the engine.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
@@ -114,7 +114,7 @@ impl Flow {
         }
     }
 
-    /// Returns the memory that the flow occupies, in bytes, without the domains of a machine, which are built when they are met.
+    /// Returns the memory that the flow occupies, in bytes, without the domains of a machine, which are built on first use.
     pub fn bytes(&self) -> usize {
         size_of::<Flow>()
             + match &self.engine {
@@ -128,18 +128,16 @@ impl Flow {
         self.symmetric && (self.pair().is_none() || law.is_symmetric())
     }
 
-    /// Whether half a forcing period and a reflection map states to states, [`Trajectory::mirrored`](super::Trajectory). The mirror image of a
-    /// machine's modes is not known.
+    /// Whether [`Trajectory::mirrored`](super::Trajectory) is available: for mirror-symmetric pairs. Modes of a machine cannot be mirrored.
     pub(crate) fn is_half_symmetric(&self, law: &Law) -> bool {
         self.pair().is_some() && self.mirror_symmetric(law)
     }
 
-    /// Returns the stable steady motion that touches no wall, if there is one. It may require that coordinates are at rest.
+    /// Returns the stable steady motion that touches no wall, if there is one. Some coordinates may have to be at rest.
     pub fn non_impacting(&self) -> Option<&NonImpacting> {
         self.non_impacting.as_ref()
     }
 
-    /// Whether the oscillator has dry friction.
     pub(crate) fn has_friction(&self) -> bool {
         match &self.engine {
             Engine::Pair(_) => false,
@@ -152,8 +150,8 @@ impl Flow {
         2 * self.degrees.max(2)
     }
 
-    /// Moves a gap of a pair that lies behind a wall by less than `rounding` to its front: behind it would be a lasting contact. Both
-    /// distances are relative to the wall's position or the scale of length.
+    /// Moves a pair's gap that lies less than `rounding` behind a wall to `distance` in front of it, because a gap behind a wall means
+    /// lasting contact. Both distances are relative to the wall's position or the scale of length.
     pub(crate) fn in_front(&self, y: State, rounding: f64, distance: f64) -> State {
         match &self.engine {
             Engine::Pair(flow) => state(&flow.in_front(first_four(&y), rounding, distance)),

@@ -14,7 +14,7 @@ pub enum Slip {
     Backward,
 }
 
-/// The modes of all elements. Places without an element stay at [`Slip::Stick`].
+/// The modes of all elements. Unused entries are [`Slip::Stick`].
 pub type Slips = [Slip; MOST_FRICTION];
 
 impl Slip {

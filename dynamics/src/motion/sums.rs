@@ -19,12 +19,12 @@ const EXTREME_ITERATIONS: usize = 60;
 /// Largest number of displacements and gaps.
 pub const DISPLACEMENTS: usize = MOST_COORDINATES + MOST_GAPS;
 
-/// Returns the place of a displacement in [`Quantities::displacements`].
+/// Returns the place of a displacement in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
 pub fn place_of_displacement(i: usize) -> usize {
     if i < 2 { i } else { i + 1 }
 }
 
-/// Returns the place of a gap in [`Quantities::displacements`].
+/// Returns the place of a gap in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
 pub fn place_of_gap(i: usize) -> usize {
     if i == 0 { 2 } else { MOST_COORDINATES + i }
 }
@@ -82,7 +82,7 @@ pub struct Sums {
     pub(crate) contacts: [Contacts; 2],
     /// Energy lost in impacts and in springs of contacts that end.
     pub(crate) lost: f64,
-    /// Energy that dampers take.
+    /// Energy that dampers dissipate.
     pub(crate) dissipated: f64,
     /// Displacements and gaps, by their places.
     pub(crate) displacements: [Moments; DISPLACEMENTS],

@@ -1,14 +1,14 @@
-//! The motion of an oscillator: the only place that knows both engines.
+//! The motion of an oscillator, computed by the engine that its flow was prepared for.
 
 use nalgebra::DMatrix;
 
 use super::{Allowance, Engine, Flow, GapEvent, Observer, Stop, Sums, Work};
-use crate::machine::{Motion, System};
+use crate::machine::{MachineMotion, System};
 use crate::model::{Law, REST, Side, State, first_four, state};
 use crate::pair::{PairMeter, PairMotion};
 
-/// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix, which stands for
-/// two for each coordinate of a machine.
+/// The motion of one oscillator. `N` is the number of tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix. For a
+/// machine, 4 means two vectors for each coordinate.
 #[derive(Clone, Debug)]
 pub struct Trajectory<'f, const N: usize = 0> {
     flow: &'f Flow,
@@ -19,10 +19,10 @@ pub struct Trajectory<'f, const N: usize = 0> {
 #[expect(clippy::large_enum_variant, reason = "the pair's motion is the hot path, without an indirection")]
 enum Engines<'f, const N: usize> {
     Pair(PairMotion<'f, N>),
-    Machine(Box<Motion<'f>>),
+    Machine(Box<MachineMotion<'f>>),
 }
 
-/// Lets the motion of each engine do the same.
+/// Evaluates one expression with the motion of either engine.
 macro_rules! each {
     ($self:ident, $motion:ident => $does:expr) => {
         match $self.motion {
@@ -69,7 +69,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 Engines::Pair(PairMotion::with_tangents(of, law, first_four(&y), tangents))
             }
             Engine::Machine(system) => {
-                let mut motion = Motion::new(system, &y);
+                let mut motion = MachineMotion::new(system, &y);
                 motion.set_tangents(of_machine(system, tangents));
                 Engines::Machine(Box::new(motion))
             }
@@ -117,9 +117,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Multiplies each number of the state by 1 and a share, to simulate the rounding of a less precise engine. The numbers are those of the
-    /// engine: gaps, and the displacements that complete them. While a pair meshes, the first one is the distance from the wall. A gap of
-    /// a pair that is just leaving a wall is not changed.
+    /// Multiplies each coordinate of the engine by `1 + share()`, to simulate the rounding of a less precise engine. The coordinates are
+    /// the gaps and the displacements that complete them. While a pair meshes, its first coordinate is the distance from the wall. The gap
+    /// of a pair that is just leaving a wall does not change.
     pub fn perturb(&mut self, share: impl FnMut() -> f64) {
         each!(mut self, motion => motion.perturb(share));
     }
@@ -144,7 +144,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             Engines::Pair(motion) => motion.tangents().map(|u| state(&u)),
             Engines::Machine(motion) => {
                 let tangents = motion.tangents();
-                // Four stand for the unit vectors, of which one coordinate has two.
+                // Four vectors mean all unit vectors. One coordinate has only two.
                 std::array::from_fn(|i| tangents.get(i).copied().unwrap_or(REST))
             }
         }
@@ -179,7 +179,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Returns the side of the contact of the first gap that lasts, if one does.
+    /// Returns the side of the first gap's lasting contact, if there is one.
     pub fn meshing(&self) -> Option<Side> {
         match &self.motion {
             Engines::Pair(motion) => motion.meshing(),
@@ -187,7 +187,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Whether no contact lasts, at any gap.
+    /// Whether no gap is in lasting contact.
     pub(crate) fn is_free(&self) -> bool {
         match &self.motion {
             Engines::Pair(motion) => motion.meshing().is_none(),
@@ -195,7 +195,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Whether a gap in free motion reaches a wall within a time of now, or has passed one within that time.
+    /// Whether a gap in free motion passed a wall less than `time` ago, or will reach one within `time`.
     pub(crate) fn passes_wall(&self, time: f64) -> bool {
         each!(self, motion => motion.passes_wall(time))
     }
@@ -305,7 +305,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     }
 }
 
-/// Flights that are measured from events, those of a pair. A machine adds its own to an observer's [`Sums`].
+/// Measures the flights of a pair from its events. A machine adds its flights to an observer's [`Sums`] by itself.
 #[derive(Clone, Debug)]
 pub(crate) struct Flights<'f>(Option<PairMeter<'f>>);
 
@@ -327,7 +327,7 @@ impl Flights<'_> {
     }
 }
 
-/// Returns the tangents of a machine: four stand for the unit vectors of all coordinates.
+/// Returns the tangents of a machine. Four vectors mean the unit vectors of all coordinates.
 fn of_machine<const M: usize>(system: &System, tangents: [State; M]) -> Vec<State> {
-    if M == 4 { Motion::unit_tangents(system) } else { tangents.to_vec() }
+    if M == 4 { MachineMotion::unit_tangents(system) } else { tangents.to_vec() }
 }

@@ -20,7 +20,7 @@ use crate::word::Word;
 pub const EVENT_PERIODS: u32 = 8;
 
 /// Rounding error of the logarithm of a tangent vector's growth over a forcing period.
-pub(super) const ROUNDING: f64 = 64.0 * f64::EPSILON;
+pub(super) const GROWTH_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Standard errors by which an exponent must exceed zero for chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
@@ -28,14 +28,14 @@ pub const CHAOS_ERRORS: f64 = 3.0;
 /// Default number of forcing periods in the longest window. An undecided motion is observed in windows that double in length.
 pub const LONGEST_WINDOW: u32 = 32_768;
 
-/// Logarithm of the growth of a tangent vector that is too large for an escape from an unstable cycle: more than the
-/// ratio of the size of the motion to rounding.
+/// Growth of a tangent vector, as a logarithm, that no escape from an unstable cycle reaches: it exceeds the ratio of the size of the
+/// motion to rounding errors.
 pub const ESCAPE_GROWTH: f64 = 40.0;
 
-/// Share of the tangents' exponent at which the displacements grow at least, if the motion itself grows.
+/// A motion counts as growing if its displacements grow faster than this share of the tangents' exponent.
 pub const SHARED_GROWTH: f64 = 0.25;
 
-/// Logarithm of the smallest growth that shows whether a motion grows: largest displacements fluctuate.
+/// Smallest expected growth, as a logarithm, at which a motion can be tested for growth, because largest displacements fluctuate.
 pub const PLAIN_GROWTH: f64 = 0.5;
 
 /// Periods in which a new tangent vector turns to the most expanding direction.
@@ -50,7 +50,7 @@ pub(super) const APPROACH_RATIO: f64 = 0.7;
 /// Largest distance from which a trajectory is tested for approach, relative to the size of the motion.
 const APPROACH_DISTANCE: f64 = 0.3;
 
-/// Number of checks of an approach. At each the trajectory must be closer than before.
+/// Number of checks of an approach. At each check the trajectory must be closer than before.
 const APPROACH_CHECKS: u32 = 4;
 
 /// Work that one motion may take: about a minute.
@@ -107,8 +107,8 @@ pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, ev
     Analysis { event_periods, ..Analysis::new(flow, law, settings) }.orbit(start)
 }
 
-/// Growth of tangents that is not chaos, as a power of time. Tangents of neutral motion grow in proportion to time (a
-/// free body, a torus, an undamped oscillation), and at a double root to its square.
+/// Tangents that grow at most with this power of time do not show chaos. In neutral motion they grow in proportion to time (a free body, a
+/// torus, an undamped oscillation), or to its square at a double root.
 pub const NEUTRAL_ORDER: f64 = 2.0;
 
 /// Returns the logarithm of the largest growth of tangents in neutral motion over `periods` after the first `from`.
@@ -116,8 +116,8 @@ pub(super) fn neutral_growth(from: u32, periods: f64) -> f64 {
     NEUTRAL_ORDER * ((f64::from(from) + periods) / f64::from(from.max(1))).ln()
 }
 
-/// Whether displacements or rates of a motion grow, by negative damping or stiffness, or the motion is too short to know. Its tangents then grow, too, without chaos.
-/// `exponent` is theirs, per forcing period.
+/// Whether a motion grows because of negative damping or stiffness, or is too short to tell. Its tangents then grow without chaos.
+/// `exponent` is the tangents' exponent per forcing period.
 pub(super) fn is_growing(flow: &Flow, strobes: &[State], exponent: f64) -> bool {
     let (first, second) = strobes.split_at(strobes.len() / 2);
     let expected = SHARED_GROWTH * exponent * second.len() as f64;
@@ -180,7 +180,6 @@ pub(super) struct Analysis<'a> {
     pub(super) settings: &'a Settings,
     pub(super) longest_window: u32,
     pub(super) event_periods: u32,
-    /// Whether quantities are measured.
     pub(super) measures: bool,
     /// Whether the growth of rounding errors on cycles is computed.
     pub(super) resolves: bool,
@@ -191,7 +190,7 @@ pub(super) struct Analysis<'a> {
 }
 
 impl<'a> Analysis<'a> {
-    /// Measures and resolves, with the default work and windows; lists no events of aperiodic motion.
+    /// Prepares an analysis with default limits that computes everything except the events of aperiodic motion.
     pub(super) fn new(flow: &'a Flow, law: Law, settings: &'a Settings) -> Analysis<'a> {
         Analysis {
             flow,
@@ -295,11 +294,11 @@ impl Analysis<'_> {
         cycle.map(|cycle| self.periodic(&steady, &self.read(&steady, &cycle)?, &cycle, 0.0)).transpose()
     }
 
-    /// Whether the motion is quasi-periodic: the largest exponent is zero, like the one of the phase, and the section is
-    /// regular. Tangents on a torus may grow like those of neutral motion, but no more, and they do not shrink.
+    /// Whether the motion is quasi-periodic: the largest exponent is zero, and the section is regular. On a torus, tangents do not shrink,
+    /// and grow at most like those of neutral motion.
     fn is_quasi_periodic(&self, window: &Window) -> bool {
         let count = window.strobes.len() as f64;
-        window.lyapunov >= -CHAOS_ERRORS * window.lyapunov_error - ROUNDING / self.flow.period
+        window.lyapunov >= -CHAOS_ERRORS * window.lyapunov_error - GROWTH_ROUNDING / self.flow.period
             && window.lyapunov.abs() * count * self.flow.period <= neutral_growth(TANGENT_PERIODS, count)
             && is_regular(&window.strobes, &window.metric, self.settings.max_period)
     }
@@ -396,8 +395,8 @@ impl Analysis<'_> {
         Ok(None)
     }
 
-    /// Returns the maps of which a cycle of this period may be a fixed point. Only cycles of odd period can be
-    /// symmetric; for these the half-period map is tried first, because it is more reliable.
+    /// Returns the maps that may have a cycle of this period as a fixed point. Only cycles of odd period can be symmetric; for these the
+    /// half-period map is tried first, because it is more reliable.
     pub(super) fn maps(&self, period: u32) -> Vec<StrobeMap> {
         let whole = StrobeMap::Periods(period);
         // `smallest` tests the symmetry of other cycles.
@@ -541,8 +540,8 @@ impl Analysis<'_> {
         Ok(Reading { closes, ..reading })
     }
 
-    /// Builds the orbit of a cycle; `distance` is that of the motion from the cycle. The growth of rounding errors is
-    /// computed only if no other status comes first.
+    /// Builds the orbit of a cycle; `distance` is the motion's distance from the cycle. The growth of rounding errors is computed only if
+    /// no other status comes first.
     ///
     /// # Errors
     /// A [`Stop`] if the cycle cannot be integrated.

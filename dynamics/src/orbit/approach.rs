@@ -39,8 +39,8 @@ const HULL_STEPS: usize = 64;
 
 /// Whether a motion stays near a cycle.
 ///
-/// `strobe(n)` is the strobe state `n` cycles ago, and `is_on_branch(n)` says whether the events since then, over one
-/// cycle, were those of the cycle. `tolerance` is the largest error of the linear map, relative to the deviation.
+/// `strobe(n)` is the strobe state `n` cycles ago, and `is_on_branch(n)` says whether the events of the motion in the following cycle agree
+/// with the events of the cycle. `tolerance` is the largest error of the linear map, relative to the deviation.
 pub(super) fn stays(
     cycle: &Cycle,
     strobe: impl Fn(usize) -> Option<State>,
@@ -55,7 +55,7 @@ pub(super) fn stays(
     }
 }
 
-/// The test of [`stays`] for states of which `N` entries can differ from 0.
+/// The test of [`stays`] for states with at most `N` nonzero entries.
 fn stays_among<const N: usize>(
     cycle: &Cycle,
     strobe: impl Fn(usize) -> Option<State>,

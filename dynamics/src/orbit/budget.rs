@@ -7,10 +7,10 @@ use crate::motion::Allowance;
 /// Period from which a reported exponent accumulates; a shorter transient makes it earlier.
 const EXPONENT_FROM: u32 = 100;
 
-/// Period from which an exponent accumulates that only distinguishes chaos. It may contain more of the transient.
+/// Period from which the exponent accumulates if it only distinguishes chaos. It may contain more of the transient.
 const CLASS_EXPONENT_FROM: u32 = 50;
 
-/// Periods in which the tangent vector of such an exponent turns to the most expanding direction.
+/// Periods in which the tangent vector turns to the most expanding direction, if the exponent only distinguishes chaos.
 const CLASS_TANGENT_PERIODS: u32 = 18;
 
 /// Standard errors by which a reported exponent must exceed zero for an early stop. With five, 3 % of the periods
@@ -46,7 +46,7 @@ pub struct Budget {
     pub early_stop: bool,
     /// Additional periods for cells that are still undecided; used only with early stops.
     pub undecided_periods: u32,
-    /// Further periods for cells that are chaotic after all others. A cell whose chaos ends in them gets a new class.
+    /// Further periods for cells that are chaotic after all other periods. A cell whose chaos ends in these periods gets a new class.
     pub confirm_chaos: u32,
     /// Whether aperiodic motion gets an exponent, which costs a tangent vector.
     pub exponent: bool,
@@ -62,7 +62,7 @@ impl Budget {
         self.settings.transient_periods.saturating_add(self.settings.observed_periods)
     }
 
-    /// Returns the forcing periods after which every cell ends that is not chaotic.
+    /// Returns the forcing periods after which every cell ends, except chaotic ones.
     pub fn decided_by(&self) -> u32 {
         let more = if self.early_stop { self.undecided_periods } else { 0 };
         self.periods().saturating_add(more)

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::CHAOS_ERRORS;
 use super::analysis::{
-    APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, ROUNDING, is_growing, neutral_growth, status_of,
+    APPROACH_RATIO, Analysis, ESCAPE_GROWTH, GROWTH_ROUNDING, ON_CYCLE, is_growing, neutral_growth, status_of,
 };
 use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
@@ -36,7 +36,7 @@ const CHECK_DIVISOR: u32 = 6;
 /// `mesh_speed`: with 2e-3, one cell of 4,000 over restitution and frequency got a period that it then left.
 const EARLY_STOP_DISTANCE: f64 = 5e-4;
 
-/// Share of a motion, as a divisor, that the test for regularity leaves out because it may be transient.
+/// The test for regularity leaves out the first strobes, which may be transient: their number divided by this.
 const TRANSIENT_SHARE: usize = 4;
 
 /// Least number of cycles of an approach.
@@ -52,8 +52,8 @@ pub struct Measurement {
     pub period: Option<u32>,
     /// Whether the motion is quasi-periodic.
     pub is_quasi_periodic: bool,
-    /// How the integration ended. `Slow` without a period means that the motion stays near some cycle, or that the
-    /// exponent does not exceed zero by three standard errors: it is undecided. So it is with `Neutral`.
+    /// How the integration ended. `Slow` without a period means that the motion stays near some cycle, or that the exponent does not exceed
+    /// zero by three standard errors. With `Slow` or `Neutral` and without a period, the cell is undecided.
     pub status: Status,
     /// Largest Lyapunov exponent per unit time, and its standard error, which is zero for a cycle.
     pub lyapunov: Option<[f64; 2]>,
@@ -73,8 +73,8 @@ pub struct Measurement {
     pub strobe: State,
     /// Forcing periods of the motion itself.
     pub periods_run: u32,
-    /// Forcing periods of searches: of Newton's method, with four tangent vectors, of the readings of cycles, and of the
-    /// comparison at another phase.
+    /// Forcing periods integrated by Newton's method with four tangent vectors, by readings of cycles, and by the comparison at another
+    /// phase.
     pub search_periods: u32,
 }
 
@@ -286,7 +286,7 @@ impl<'a> CellRun<'a> {
             // Newton's method does not find this cycle if the degree of freedom at rest is undamped.
             _ if now >= decided_by && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
-            // Only chaos continues until the last period.
+            // Only chaotic cells continue until the last period.
             _ if now == decided_by => Some(self.aperiodic(CHAOS_ERRORS)).filter(|cell| !cell.is_chaotic()),
             _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS))
                 .filter(|cell| cell.is_quasi_periodic || decided_by == last && cell.is_chaotic()),
@@ -304,7 +304,7 @@ impl<'a> CellRun<'a> {
         }))
     }
 
-    /// Whether an event stays near phase 0: it may lie before and after the strobe in turn, so every second period has none.
+    /// Whether an event stays near phase 0. It may alternate between the sides of the strobe; then every second period has no such event.
     fn has_events_at_strobes(&self) -> bool {
         self.near_strobe.count_ones() >= u16::BITS / 2
     }
@@ -346,7 +346,7 @@ impl<'a> CellRun<'a> {
         if let Some(orbit) = self.orbit_of_last_cycle(&metric, near)? {
             return Ok(Some(orbit));
         }
-        // While the motion approaches a cycle, no other one is searched.
+        // While the motion approaches a cycle, no other cycle is searched.
         self.approaches =
             self.cycle.as_ref().is_some_and(|found| self.distance_now(found, &metric) < found.distance);
         if !is_last && self.approaches {
@@ -526,7 +526,7 @@ impl<'a> CellRun<'a> {
             [0, 1].map(|i| self.counts[self.counts.len() - 1][i] - self.counts[from][i]);
         let lyapunov = self.budget.exponent.then(|| self.exponent.estimate(period));
         let least = lyapunov.map(|(mean, error)| mean - errors * error);
-        // Chaos in narrow bands may stay near a cycle for ever, but an escape does not last through such growth.
+        // Chaos in narrow bands may stay near a cycle for ever. An escape from a cycle ends before tangents grow as much.
         let averaged = &self.strobes[self.budget.exponent_from() as usize..];
         let near_saddle_periods = near_saddle(averaged, &Metric::of(window, self.analysis.flow), max_period);
         let is_escape = |rate: f64| rate * near_saddle_periods as f64 * period < ESCAPE_GROWTH;
@@ -544,7 +544,7 @@ impl<'a> CellRun<'a> {
         let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
         let is_quasi_periodic = self.strobes.len() > self.budget.periods() as usize
             && lyapunov.is_some_and(|(mean, error)| {
-                mean >= -errors * error - ROUNDING / period && is_neutral(mean.abs())
+                mean >= -errors * error - GROWTH_ROUNDING / period && is_neutral(mean.abs())
             })
             && is_regular(late, &Metric::of(late, self.analysis.flow), max_period);
         let status = match slow {

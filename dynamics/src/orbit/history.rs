@@ -16,7 +16,7 @@ const MOST_EVENTS: u64 = 1_000_000;
 /// Samples and events of a motion over consecutive forcing periods.
 #[derive(Clone, Debug)]
 pub struct History {
-    /// The wall of the contact that lasts at the beginning, if one does.
+    /// The wall of the lasting contact at the beginning, if there is one.
     pub meshing: Option<Side>,
     /// Samples at equal intervals, including both ends.
     pub samples: Vec<Sample>,

@@ -11,8 +11,7 @@ use crate::motion::{Stop, Trajectory};
 /// Forcing periods that take about a minute if the motion is not stiff.
 pub const LONGEST_TIME: f64 = 3e7;
 
-/// Largest distance from the time of an event that counts as its time, in roundings of the time: the event itself is
-/// located to a few roundings.
+/// Times within this distance of an event count as the time of the event, in roundings of the time. Events are located to a few roundings.
 const EVENT_ROUNDINGS: f64 = 16.0;
 
 /// Returns the state at `time` of the motion that starts from `start` at phase 0 and time 0, or none if `halt` was
@@ -46,19 +45,19 @@ pub fn state_at(
     if allowance.is_halted() { Ok(None) } else { state.map(Some) }
 }
 
-/// Whether a time is that of an event or a later one, within rounding.
+/// Whether `time` is at or after the time of an event, within rounding.
 pub fn is_reached(event: f64, time: f64) -> bool {
     event - time <= EVENT_ROUNDINGS * f64::EPSILON * time.abs()
 }
 
-/// Returns the state of a trajectory at the present time, and the wall of the contact that lasts. `time` is the time
-/// since its start. If rounding has put an event just behind this time, it is the state after the event.
+/// Returns the state of a trajectory at the present time, and the wall of the lasting contact. `time` is the time since its start. If
+/// rounding has put an event just behind this time, it is the state after the event.
 pub(super) fn at_present(trajectory: &Trajectory<'_, 0>, time: f64) -> (State, Option<Side>) {
     after_events(trajectory, EVENT_ROUNDINGS * f64::EPSILON * time)
 }
 
-/// Returns the state of a trajectory at the present time, and the wall of the contact that lasts. If an event follows
-/// within the time `tolerance`, it is the state after the event.
+/// Returns the state of a trajectory at the present time, and the wall of the lasting contact. If an event follows within the time
+/// `tolerance`, it is the state after the event.
 pub(super) fn after_events(trajectory: &Trajectory<'_, 0>, tolerance: f64) -> (State, Option<Side>) {
     let (flow, mut ahead) = (trajectory.flow(), trajectory.clone());
     let mut log = EventLog::new(flow, 0);

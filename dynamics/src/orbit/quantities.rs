@@ -1,4 +1,4 @@
-//! What people measure on a motion: impacts, contact forces, amplitudes, harmonics, dissipated energy.
+//! Measured quantities of a motion: impacts, contact forces, amplitudes, harmonics, dissipated energy.
 //!
 //! A [`Meter`] receives the events of a trajectory, whose engine measures the flights between them.
 
@@ -18,9 +18,9 @@ pub struct Quantities {
     pub impact_energy: f64,
     /// Largest and root mean square force of compliant contacts, positive if it presses; none without such contact.
     pub contact_force: Option<[f64; 2]>,
-    /// The first two displacements, the first gap, the other displacements and the other gaps; 0 where the oscillator has no more.
+    /// The first two displacements, the first gap, the other displacements and the other gaps; unused entries are 0.
     pub displacements: [Displacement; DISPLACEMENTS],
-    /// Energy that all dampers take per unit time.
+    /// Energy that all dampers dissipate per unit time.
     pub dissipated: f64,
     /// Dry friction; none without it.
     pub friction: Option<FrictionQuantities>,
@@ -67,7 +67,7 @@ pub struct Displacement {
 }
 
 impl Displacement {
-    /// Returns the averages over a time; 0 of a displacement that the oscillator does not have.
+    /// Returns the averages over a time; 0 for a displacement that the oscillator does not have.
     fn of(moments: &Moments, time: f64) -> Displacement {
         if moments.high < moments.low {
             return Displacement::default();

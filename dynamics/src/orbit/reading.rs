@@ -132,7 +132,7 @@ impl<'f> EventLog<'f> {
 impl Observer for EventLog<'_> {
     fn event(&mut self, event: &GapEvent, states: States<'_>) {
         let GapEvent { gap, kind, side, t, meshing, .. } = *event;
-        // An event at the end of a period, by rounding, is at phase 0 of the next one.
+        // An event that rounding puts at the end of a period lies at phase 0 of the next period.
         let t_mod_period = if t < self.flow.period { t } else { 0.0 };
         let [before, after] = states();
         let after = if kind == EventKind::MeshEnd { before } else { after };

@@ -16,8 +16,8 @@ pub(super) struct Metric {
 }
 
 impl Metric {
-    /// Builds the metric of a set of strobe states from the largest position and the largest velocity. The flow's
-    /// scale of length, and that as a velocity, are lower bounds: at a turning point, velocities are rounding errors.
+    /// Builds the metric of a set of strobe states from the largest position and the largest velocity. The flow's scale of length, and this
+    /// scale times the flow's rate, are lower bounds: at a turning point, velocities are rounding errors.
     pub(super) fn of(strobes: &[State], flow: &Flow) -> Metric {
         let len = flow.state_len();
         let mut largest = [0.0f64; 2];
@@ -35,7 +35,6 @@ impl Metric {
         self.len
     }
 
-    /// Returns the distance of two states.
     #[inline]
     pub(super) fn distance(&self, a: &State, b: &State) -> f64 {
         let difference = |i: usize| (a[i] - b[i]).abs();
@@ -46,7 +45,7 @@ impl Metric {
         (largest[0] / self.position).max(largest[1] / self.velocity)
     }
 
-    /// Returns the size of a difference of states, of which `N` entries can differ from 0.
+    /// Returns the size of a difference of states with at most `N` nonzero entries.
     pub(super) fn size<const N: usize>(&self, difference: &[f64; N]) -> f64 {
         let scaled = self.scaled(difference);
         scaled[1..].iter().fold(scaled[0].abs(), |most, value| most.max(value.abs()))
@@ -73,7 +72,7 @@ pub(super) struct Candidate {
     pub(super) distance: f64,
 }
 
-/// Largest distance of two states that are equal but for rounding, relative to the motion.
+/// Largest distance of two states that are equal within rounding, relative to the motion.
 const WITHIN_ROUNDING: f64 = 1e-12;
 
 /// Returns the number of last periods over which the states recur at some lag: the motion stays near a periodic
@@ -93,7 +92,7 @@ fn recurring(strobes: &[State], metric: &Metric, max_period: u32, within: f64) -
     let is_near = |i: usize, lag: usize| metric.distance(&strobes[i], &strobes[i - lag]) < within;
     let duration = |lag: usize| (lag..n).rev().take_while(|&i| is_near(i, lag)).count();
     (1..=(max_period as usize).min(n / 2)).fold(0, |most, lag| {
-        // A lag that is not near where the longest recurrence ended is not longer.
+        // If states at this lag are not near where the longest recurrence so far ended, this recurrence is not longer.
         if lag + most < n && is_near(n - 1 - most, lag) { most.max(duration(lag)) } else { most }
     })
 }
@@ -109,7 +108,7 @@ pub(super) fn candidates(strobes: &[State], metric: &Metric, max_period: u32) ->
         // For most lags this ends after a few strobes, because they are no better than the best.
         let largest = distances.try_fold(0.0f64, |most, d| (d < best).then(|| most.max(d)));
         let Some(distance) = largest else { continue };
-        // A lag must recur ten times as well as all shorter ones.
+        // The distance at a lag must be ten times smaller than at all shorter lags.
         if list.is_empty() || distance < 0.1 * best {
             list.push(Candidate { period: lag as u32, distance });
         }

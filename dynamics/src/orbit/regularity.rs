@@ -16,15 +16,15 @@ pub const LEAST_WINDOW: usize = 64;
 /// sequences of the logistic map, with windows of 64 to 200 strobes, none was below 0.0024 and half exceeded 0.06.
 pub const LARGEST_DIFFERENCE: f64 = 1.0 / 1024.0;
 
-/// Least distance within which the motion recurs, relative to the size of its section: nearer motion may approach a long
+/// Least distance within which the motion recurs, relative to the size of its section. Motion that recurs within less may approach a long
 /// cycle.
 pub const LEAST_RECURRENCE: f64 = 5e-3;
 
 /// Largest rounding error of an average, in units of the machine epsilon times the displacements.
 pub const ROUNDING_OF_AVERAGES: f64 = 16.0;
 
-/// Power of `t (1 - t)` in the window, with `t` from 0 to 1. WGSL has no exponential function of f64, so the window is a
-/// polynomial; for windows of up to 500 strobes its side lobes are lower than those of the exponential window.
+/// Power of `t (1 - t)` in the window, with `t` from 0 to 1. WGSL has no exponential function of f64, so the window is a polynomial; for
+/// windows of up to 500 strobes it has lower side lobes than the exponential window.
 const POWER: i32 = 4;
 
 /// Whether averages over both halves of a sequence of strobe states agree.
@@ -100,7 +100,7 @@ mod tests {
             assert!(!regular(|n| state(&[1.0 + (n % period) as f64]), 400), "period {period}");
         }
         assert!(!regular(|n| state(&[n as f64, 1.0]), 400));
-        // Narrow bands of chaos, which alternate.
+        // Chaotic sequences that alternate between two narrow bands.
         for (seed, width) in (0..500).flat_map(|seed| [1.0, 0.05].map(|width| (seed, width))) {
             let mut x = 0.1 + 0.001 * f64::from(seed);
             let state = |n: usize| {

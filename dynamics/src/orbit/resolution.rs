@@ -11,7 +11,7 @@ use crate::motion::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, StrobeMap, UNIT, refine, times};
 
 /// Rounding error of the motion between two events, in units of the machine epsilon times the size of the motion.
-const ROUNDING: f64 = 4.0;
+const FLIGHT_ROUNDING: f64 = 4.0;
 
 /// Whether arithmetic with this machine epsilon cannot determine the period of the cycle of `period` forcing periods
 /// through `state`. False if Newton's method finds no such cycle.
@@ -33,15 +33,15 @@ pub fn rounding_decides(
     is_decided.is_some_and(|decided| decided.unwrap_or(false))
 }
 
-/// Whether so few events cannot amplify rounding errors of f64 enough. On a stable cycle of period 1, errors must grow to the size of
-/// the motion, by 1e15, within about one turn. Grazing has a status of its own, and an event that is not near grazing amplifies
-/// by at most `1 / GRAZING_SPEED`, 2.5e4. So more than three events are needed.
+/// Whether a cycle has too few events to amplify rounding errors of f64 to the size of the motion. On a stable cycle of period 1, errors
+/// must grow to the size of the motion, by 1e15, within about one turn. Grazing has a status of its own, and an event that is not near
+/// grazing amplifies by at most `1 / GRAZING_SPEED`, 2.5e4. So more than three events are needed.
 pub(super) fn too_few_events(period: u32, events: &[Event]) -> bool {
     period == 1 && events.len() <= 3
 }
 
-/// Whether rounding scatters the states of a cycle by more than the distance between two strobes, or by the size of the
-/// motion. The period is then a result of rounding. `events` are those of the cycle.
+/// Whether rounding scatters the states of a cycle by more than the distance between two strobes, or by the size of the motion. The period
+/// is then a result of rounding. `events` are the events of the cycle.
 ///
 /// Each part of the cycle, from between two events to between the next two, adds a rounding error in every direction, and
 /// the derivative of the motion carries the sum of all earlier errors on. So an error counts with its largest growth up
@@ -75,7 +75,7 @@ pub(super) fn is_below_resolution(
     }
     strobes.pop();
     let metric = Metric::of(&strobes, flow);
-    let rounding = (ROUNDING * epsilon).powi(2);
+    let rounding = (FLIGHT_ROUNDING * epsilon).powi(2);
     let largest = match flow.state_len() {
         0..=4 => largest_variance::<4>(&parts, &metric, rounding),
         5..=8 => largest_variance::<8>(&parts, &metric, rounding),
@@ -102,7 +102,7 @@ fn largest_variance<const N: usize>(parts: &[DMatrix<f64>], metric: &Metric, rou
                 .zip(units)
                 .for_each(|((x, entry), unit)| *x = entry * unit * factor);
         }
-        // A part that leaves the range of f64 decides nothing.
+        // Entries beyond the range of f64 make the result NaN, which decides nothing.
         let is_finite = matrix.as_flattened().iter().all(|x| x.is_finite());
         if is_finite { matrix } else { [[f64::NAN; N]; N] }
     };

@@ -27,9 +27,9 @@ const ESCAPE_CYCLES: usize = 2;
 /// once, while it turns from displacements to velocities, but by less than `2^8`.
 const LAST_ESCAPE_CYCLES: usize = 8;
 
-/// Returns the distance between the last strobe state and that of `lag` periods ago, if it is smaller than the
-/// distance one lag earlier. With a lag of more than one period, whose search is expensive, that distance must also
-/// be smaller than the one before it, if there is one. Returns none if there are fewer than two lags.
+/// Returns the distance between the last strobe state and that of `lag` periods ago, if it is smaller than the distance one lag earlier.
+/// With a lag of more than one period, whose search is expensive, the distance one lag earlier must also be smaller than the distance two
+/// lags earlier, if it is known. Returns none if there are fewer than two lags.
 pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Option<f64> {
     let last = strobes.len() - 1;
     let distance = |back: usize| {
@@ -78,7 +78,7 @@ impl SearchHistory {
     /// Whether an unstable cycle or a failed search explains that a state recurs at this distance under `map`.
     pub(super) fn explains(&self, map: StrobeMap, state: &State, distance: f64, metric: &Metric) -> bool {
         let is_near = |y: &State| metric.distance(state, y) < EXPLAINED_RATIO * distance;
-        // A recurrence after some periods is one after their multiples, too.
+        // A state that recurs after some periods also recurs after their multiples.
         self.unstable.iter().any(|(of, y)| map.iterates(*of) && is_near(y))
             || self.failed.iter().any(|(of, y)| *of == map && is_near(y))
     }

@@ -12,14 +12,13 @@ use crate::model::{Law, Side, State};
 use crate::motion::Flow;
 use crate::motion::{Allowance, Trajectory};
 
-/// Least distance of half a turn from events, in turns, at which states are compared there. Half a turn adds no sine to
-/// the force.
+/// States are compared at half a turn if no event is nearer to it than this, in turns. Half a turn adds no sine to the force.
 const CLEARANCE: f64 = 1.0 / 16.0;
 
 /// Largest rounding error of a lane's gap, relative to the wall's position or the scale of length.
-const ON_WALL: f64 = 1e-5;
+const STROBE_ON_WALL: f64 = 1e-5;
 
-/// Distance from a wall, in the same unit, that is rounding in double precision.
+/// A gap behind a wall by less is moved to this distance in front of it, about a rounding error of f64, in the same unit.
 const IN_FRONT: f64 = 1e-15;
 
 /// A phase far from the events of a motion, and the motion's state there.
@@ -43,8 +42,8 @@ impl Section {
         periods: u32,
         allowance: Allowance<'_>,
     ) -> Option<Section> {
-        let mut trajectory =
-            Trajectory::<0>::new(flow, law, flow.in_front(strobe, ON_WALL, IN_FRONT)).allowing(allowance);
+        let mut trajectory = Trajectory::<0>::new(flow, law, flow.in_front(strobe, STROBE_ON_WALL, IN_FRONT))
+            .allowing(allowance);
         let mut log = EventLog::new(flow, 0);
         for _ in 0..periods {
             trajectory.advance_period(&mut log).ok()?;
@@ -61,15 +60,15 @@ impl Section {
         is_determined.then_some(Section { flow: section, start, turns })
     }
 
-    /// Returns the state at the phase 0 that follows `state`, a state at this phase, and the wall of the contact that
-    /// lasts then. It is the state after an event that lies within `tolerance` turns of phase 0.
+    /// Converts a state at this phase to the state at the next phase 0. Also returns the wall of the lasting contact there. If an event
+    /// lies within `tolerance` turns of phase 0, the state is that after the event.
     pub fn strobe(&self, law: Law, state: State, tolerance: f64) -> Option<(State, Option<Side>)> {
         let mut trajectory = Trajectory::<0>::new(&self.flow, law, state);
         trajectory.advance_to(self.time_to_strobe(), &mut ()).ok()?;
         Some(after_events(&trajectory, tolerance * self.flow.period))
     }
 
-    /// Returns the phase of a harmonic, given its phase with the time since this phase of the forcing.
+    /// Converts the phase of a harmonic from times since this phase to times since phase 0.
     pub fn harmonic_phase(&self, phase: f64) -> f64 {
         let turned = phase - self.turns * std::f64::consts::TAU;
         turned.sin().atan2(turned.cos())
@@ -83,8 +82,8 @@ impl Section {
         quantities
     }
 
-    /// Converts the events of a cycle of `periods` forcing periods, whose times begin at this phase, to times since the
-    /// next phase 0. An event there ends the cycle, as the strobe is the state after it.
+    /// Converts the events of a cycle of `periods` forcing periods, whose times begin at this phase, to times since the next phase 0. An
+    /// event at phase 0 ends the cycle, because the strobe is the state after the event.
     pub(super) fn events(&self, events: &[Event], periods: u32) -> Vec<Event> {
         let period = self.flow.period;
         let cycle = f64::from(periods) * period;

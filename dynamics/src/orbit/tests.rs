@@ -1,4 +1,4 @@
-//! Tests of whole cells: the reported class is that of the motion which the start reaches.
+//! Tests of whole cells: the reported class must be the class of the motion that the start reaches.
 
 use super::{Budget, Class, Measurement, Settings, Status, analyse, measure};
 use crate::model::{GearPair, REST};

@@ -33,7 +33,7 @@ pub fn trace(
     Ok(samples)
 }
 
-/// Advances the trajectory by one forcing period and appends its samples, of which the last is at the end.
+/// Advances the trajectory by one forcing period and appends its samples, the last one at the end of the period.
 pub(super) fn sample_period(
     trajectory: &mut Trajectory<'_, 0>,
     samples_per_period: usize,

@@ -108,8 +108,8 @@ impl Bernstein {
 
     /// Returns bounds of the function on the step, without the first `order` coefficients.
     ///
-    /// A start on a wall has a root of order `order` there. Without its coefficients the signs of the bounds are
-    /// those of the function divided by `u^order`.
+    /// A start on a wall has a root of order `order` there. Without its coefficients the bounds have the signs of the function divided by
+    /// `u^order`.
     #[inline(always)]
     pub(crate) fn range(&self, order: usize, remainder: f64) -> [f64; 2] {
         let blur = f64x4::from([0.0, 0.0, remainder, 0.0]);
@@ -176,8 +176,7 @@ pub(crate) struct Bracket {
 
 /// Finds the roots of the distance `sign * (f - level)` on a step.
 ///
-/// `order` is the order of its root at the start, 0 if it is positive there; `remainder` is `eps` of the module's
-/// argument.
+/// `order` is the order of its root at the start, or 0 if it is positive there. `remainder` is `eps` in the text of this module.
 #[inline(always)]
 pub(crate) fn judge(f: &Bernstein, level: f64, sign: f64, order: usize, remainder: f64) -> Verdict {
     let wide = f64x4::splat(sign);

@@ -3,7 +3,7 @@
 use super::PairMotion;
 use crate::model::{Contact, Side};
 use crate::motion::{EventKind, Observer};
-use crate::pair::flow::{DomainKind, Gap, LinearFlow, Phasor, RADIUS, Row};
+use crate::pair::flow::{DomainKind, Gap, LinearFlow, PairFunctional, Phasor, RADIUS};
 
 /// Longest duration of a series that is replaced by its closed form, in Taylor steps of free motion. The error of the
 /// closed form is of third order in the duration.
@@ -12,12 +12,12 @@ const CLOSING_DURATION: f64 = 1e-4;
 /// The closing duration as an angle, in radians of the fastest rate of free motion.
 pub const CLOSING_ANGLE: f64 = CLOSING_DURATION * RADIUS;
 
-/// Mesh speeds below this, relative to the scale of length and the rate of free motion, count as zero: in f64 the
-/// series does not end.
+/// Mesh speeds below this, relative to the scale of length times the rate of free motion, count as zero: in f64, a series of impacts does
+/// not reach them.
 pub const NO_THRESHOLD: f64 = 1e-10;
 
 /// Motion with the gap closed, while the wall cancels the relative acceleration.
-struct Sliding {
+struct ClosedGap {
     /// Relative acceleration that the wall cancels, and its time derivative.
     acceleration: f64,
     acceleration_rate: f64,
@@ -33,16 +33,17 @@ struct Sliding {
     drag: f64,
 }
 
-impl Sliding {
-    fn new(free: &LinearFlow, closed: &Gap, phasor: &Phasor, omega: f64, kick: f64) -> Sliding {
+impl ClosedGap {
+    fn new(free: &LinearFlow, closed: &Gap, phasor: &Phasor, omega: f64, kick: f64) -> ClosedGap {
         let row = free.acceleration_row();
         let second = free.second_acceleration_row();
         let shared = second.plus(kick, row);
         let [_, acceleration, _, v_free] = free.field(closed, phasor);
         let v_rate = v_free + kick * acceleration;
-        let change =
-            |row: &Row| row.base[2] * closed[3] + row.base[3] * v_rate + row.forcing_rate(phasor, omega);
-        Sliding {
+        let change = |row: &PairFunctional| {
+            row.base[2] * closed[3] + row.base[3] * v_rate + row.forcing_rate(phasor, omega)
+        };
+        ClosedGap {
             acceleration,
             acceleration_rate: change(row),
             gradient: [row.base[2], row.base[3]],
@@ -72,7 +73,7 @@ impl<const N: usize> PairMotion<'_, N> {
         let free = flow.domain(DomainKind::Free);
         let [z, w, x, v] = self.q;
         let closed = [z, 0.0, x, v + kick * w];
-        let sliding = Sliding::new(free, &closed, &self.phasor, flow.omega, kick);
+        let sliding = ClosedGap::new(free, &closed, &self.phasor, flow.omega, kick);
         let pressing = side.sign() * sliding.acceleration;
         let whole = 2.0 * leaving / (pressing * (1.0 - e));
         if !(pressing > 0.0 && whole < CLOSING_DURATION * free.unit) {
@@ -85,7 +86,7 @@ impl<const N: usize> PairMotion<'_, N> {
             return;
         }
         let v = closed[3];
-        let Sliding { v_rate, v_jerk, gradient, v_gradient, .. } = sliding;
+        let ClosedGap { v_rate, v_jerk, gradient, v_gradient, .. } = sliding;
         let x = x + duration * (v + duration * (v_rate / 2.0 + duration * v_jerk / 6.0));
         self.q = [z, 0.0, x, v + duration * (v_rate + duration * v_jerk / 2.0)];
         let s = side.sign();
@@ -95,9 +96,9 @@ impl<const N: usize> PairMotion<'_, N> {
         let pressing_at_end = pressing + duration * pressing_rate;
         let is_rigid = flow.contacts[side.index()] == Contact::Rigid;
         self.tangents = self.tangents.map(|[dz, dw, dx, dv]| {
-            // A neighbouring motion leaves the wall `later`, at another speed and under another pressing
-            // acceleration, and its series ends `late`. `behind` is the difference of its gap's rate at the end of
-            // this series. It is 0 on a rigid wall, where the neighbour comes to rest, too.
+            // A neighbouring motion leaves the wall later by `later`, at another speed and under another pressing acceleration, and its
+            // series ends later by `late`. `behind` is the difference of the gaps' rates at the end of this series: 0 on a rigid wall,
+            // where both motions come to rest.
             let (dx, dv) = (dx + kick * dz, dv + kick * dw);
             let later = s * dz / leaving;
             let leaves = -s * dw - (pressing + sliding.damping * leaving) * later;

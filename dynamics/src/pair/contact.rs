@@ -161,7 +161,7 @@ impl<const N: usize> PairMotion<'_, N> {
     }
 
     pub(super) fn start_meshing(&mut self, side: Side, leaving: f64) {
-        // Both walls share one step level, and may have different numbers of levels.
+        // Contacts with both walls share one index of the step length, but may have different numbers of step lengths.
         self.level[1] = self.level[1].min(self.flow.domain(DomainKind::Meshing(side)).levels - 1);
         if leaving > 0.0 {
             self.mode = Mode::Onset(side);
@@ -194,8 +194,7 @@ impl<const N: usize> PairMotion<'_, N> {
         if self.flow.domain(kind).acceleration(&self.q, &self.phasor) == 0.0 { 3 } else { 2 }
     }
 
-    /// Whether the relative acceleration points into the wall. If it is zero, its first derivative that is not zero
-    /// decides.
+    /// Whether the relative acceleration points into the wall. If the acceleration is zero, its first nonzero derivative decides.
     pub(super) fn presses(&self, kind: DomainKind, side: Side, q: &Gap) -> bool {
         let linear = self.flow.domain(kind);
         let a = linear.acceleration(q, &self.phasor);
@@ -237,7 +236,7 @@ impl<const N: usize> PairMotion<'_, N> {
         self.work.events += 1;
         self.events_in_period += 1;
         let whole = self.schedule.whole;
-        // If meshing ends before the gap reaches the wall, the branch of the strobe map is another one.
+        // The strobe map has another branch if meshing ends before the gap reaches the wall.
         let is_on_wall = before[0] == whole.wall(side);
         let event = GapEvent {
             gap: 0,

@@ -13,8 +13,8 @@ use crate::motion::{EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, NO_SPEED, O
 use crate::pair::flow::DomainKind;
 
 impl<const N: usize> PairMotion<'_, N> {
-    /// Processes free motion that reaches an elastic wall. If the speed is zero, the gap's first derivative that is
-    /// not zero decides whether the motion continues behind the wall.
+    /// Processes free motion that reaches an elastic wall. If the speed is zero, the gap's first nonzero derivative decides whether the
+    /// motion continues behind the wall.
     #[inline(never)]
     pub(super) fn go_behind(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);

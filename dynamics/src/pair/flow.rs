@@ -24,8 +24,8 @@
 //!
 //! # Bounds on derivatives
 //!
-//! Every derivative `y^(n)` of a solution solves the same equations with the force amplitude multiplied by `omega^n`
-//! and no load. Damping cannot increase its energy `2 E = v M v + x K x`, so
+//! Every derivative `y^(n)` of a solution solves the equations without load and with the force amplitude multiplied by `omega^n`. Damping
+//! cannot increase its energy `2 E = v M v + x K x`, so
 //!
 //! ```text
 //! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(force M^-1 force + force_sin M^-1 force_sin)
@@ -41,21 +41,21 @@ mod constrained;
 mod energy;
 mod expansion;
 mod few;
+mod functional;
 mod gap_polynomial;
 mod generator;
 mod linear;
 mod pushing;
-mod row;
 mod short_flight;
 mod taylor;
 
 use nalgebra::Matrix2;
 
 pub(crate) use expansion::{EXPANSION_REACH, Expansion, TERMS, turned};
+pub(crate) use functional::PairFunctional;
 pub use linear::LinearFlow;
 pub(crate) use linear::Step;
 pub(crate) use pushing::PushingForce;
-pub(crate) use row::Row;
 pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 
@@ -90,9 +90,8 @@ pub struct PairFlow {
     pub walls: [f64; 2],
     /// Scale of length, [`Pair::length_scale`].
     pub length: f64,
-    /// Displacement beyond which the motion has escaped: infinite if energy grows by the force alone.
+    /// Displacement beyond which the motion has escaped: infinite if only the force can increase the energy.
     pub escape: f64,
-    /// The pair.
     pub(crate) oscillator: Pair,
     /// Scale of speed: the scale of length times the rate of free motion.
     pub(crate) speed: f64,
@@ -268,7 +267,7 @@ impl PairFlow {
         passed(Side::Right) - passed(Side::Left)
     }
 
-    /// Returns the compliant contacts that last in a domain; none without such contacts.
+    /// Returns the force of the lasting compliant contacts in a domain, if there are any.
     pub(crate) fn contact_force(&self, kind: DomainKind) -> Option<ContactForce> {
         let own = match kind {
             DomainKind::Meshing(side) if self.is_compliant(side) => {
@@ -283,7 +282,6 @@ impl PairFlow {
         Some(ContactForce { stiffness, damping, wall, preload, held: self.held.unwrap_or_default() })
     }
 
-    /// Returns the flow of a stage.
     fn stage(&self, stage: usize) -> &PairFlow {
         if stage == 0 { self } else { &self.stages[stage - 1] }
     }
@@ -367,7 +365,7 @@ impl PairFlow {
         }
     }
 
-    /// Moves the gap of a state that lies behind a wall by less than `rounding` to a `distance` in front of it, both relative to the wall's
+    /// Moves a gap that lies less than `rounding` behind a wall to `distance` in front of it. Both distances are relative to the wall's
     /// position or the scale of length.
     pub(crate) fn in_front(&self, y: PairState, rounding: f64, distance: f64) -> PairState {
         let mut q = self.to_gap(y);
@@ -404,7 +402,7 @@ impl PairFlow {
     }
 }
 
-/// The force along the gap of the compliant contacts that last: of the wall of the domain, and of the walls in front of the interval.
+/// The force along the gap of all lasting compliant contacts: with the wall of the domain, and with the walls in front of the interval.
 pub(crate) struct ContactForce {
     stiffness: f64,
     damping: f64,
@@ -439,14 +437,14 @@ pub(crate) struct Schedule<'f> {
 }
 
 impl<'f> Schedule<'f> {
-    /// Begins at phase 0. Returns the flow of the stage that holds there, too.
+    /// Begins at phase 0. Also returns the flow of the stage at phase 0.
     pub(crate) fn new(whole: &'f PairFlow) -> (Schedule<'f>, &'f PairFlow) {
         let mut schedule = Schedule { whole, next: 0 };
         let flow = schedule.restart();
         (schedule, flow)
     }
 
-    /// Returns to phase 0, and returns the flow of the stage that holds there: the one that begins there, or the last one.
+    /// Resets to phase 0. Returns the flow of the stage that begins there, or else of the last stage.
     #[inline]
     pub(crate) fn restart(&mut self) -> &'f PairFlow {
         self.next = 0;

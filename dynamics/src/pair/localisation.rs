@@ -166,7 +166,7 @@ fn root_of(
 /// Finds the root of a series near `v`, by reversion of the series there and then Newton steps to rounding. The
 /// tolerance is relative to the time of flight `u`.
 ///
-/// The next flight waits for the result, so there are few divisions, and sums are trees.
+/// The next flight waits for the result. For low latency there are few divisions, and sums are evaluated as trees.
 #[inline(always)]
 fn root_near(c: &[f64; TERMS + 1], v: f64, u: f64) -> Option<f64> {
     let value = sum(c, v);

@@ -1,5 +1,5 @@
-//! Measures the motion of a pair from its events: between two events it is one flight in one linear domain, on which the exact flow is
-//! evaluated.
+//! Measures the motion of a pair from its events. Between two events there is one flight in one linear domain, and the exact flow gives its
+//! states.
 
 use super::{DomainKind, Gap, LinearFlow, PairFlow, PairMotion, Phasor, Schedule, side_of};
 use crate::motion::{EventKind, GapEvent, Sums, nodes, root};
@@ -50,7 +50,7 @@ impl<'f> PairMeter<'f> {
         }
     }
 
-    /// Measures the present flight up to a time since phase 0. Changes of the stage at that time are still to come.
+    /// Measures the present flight up to a time since phase 0. A change of the stage at that time is not included.
     fn fly_to(&mut self, until: f64, sums: &mut Sums) {
         while let Some(change) = self.schedule.next_change().filter(|&change| change < until) {
             if change > self.t {
@@ -167,7 +167,7 @@ impl<'f> PairMeter<'f> {
         }
     }
 
-    /// Counts the energy that a contact takes at an instant.
+    /// Adds the energy that a contact dissipates at an instant.
     fn contact(&self, event: &GapEvent, sums: &mut Sums) {
         let (side, flow) = (event.side, self.flow);
         let kinetic = |w: f64| 0.5 * w * w / flow.compliance();
@@ -177,7 +177,7 @@ impl<'f> PairMeter<'f> {
             sums.lost -= self.stored(event);
         } else {
             if event.ends_series {
-                // The series has taken the energy with which the gap left the wall.
+                // The series of impacts dissipates the energy with which the gap left the wall.
                 sums.lost += kinetic(self.q[1]);
                 return;
             }

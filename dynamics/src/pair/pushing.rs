@@ -1,6 +1,7 @@
 //! Walls that only push: contact behind the wall is open while spring and damper would pull.
 //!
-//! The state alone tells whether contact is open. At `N = 0` the force is continuous, so no tangent jumps there.
+//! The state alone determines whether contact is open. The force is continuous where contact opens and closes, so tangents do not jump
+//! there.
 
 use super::step_verdict::{Crossing, StepVerdict, first_of};
 use super::{Mode, PairMotion};
@@ -16,15 +17,15 @@ impl<const N: usize> PairMotion<'_, N> {
         force.map_or([f64::INFINITY; 3], |force| force.rates(linear, q, phasor))
     }
 
-    /// Whether contact with an elastic wall is closed for a gap on the wall or behind it: always, if the wall may pull. If the force is
-    /// 0, its first derivative that is not 0 decides.
+    /// Whether contact with an elastic wall is closed for a gap on the wall or behind it: always, if the wall may pull. If the force is 0,
+    /// its first nonzero derivative decides.
     pub(super) fn closes(&self, side: Side) -> bool {
         let Some(force) = &self.flow.pushing[side.index()] else { return true };
         let rates = force.rates(self.flow.domain(DomainKind::Free), &self.q, &self.phasor);
         rates.into_iter().find(|&rate| rate != 0.0).is_some_and(|rate| rate > 0.0)
     }
 
-    /// Notes whether a flight begins with no force of a pushing wall.
+    /// Records the order of the root if the force of a pushing wall is 0 at the start of a flight.
     pub(super) fn start_from_force(&mut self, side: Side) {
         let linear = self.flow.domain(self.mode.domain());
         let [force, rate, _] = self.wall_force(side, linear, &self.q, &self.phasor);

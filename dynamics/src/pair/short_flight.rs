@@ -9,8 +9,8 @@ use crate::pair::flow::{LONGEST_SHORT_FLIGHT, LinearFlow, turned};
 /// Longest expected flight for which the short-flight series is tried, as a share of the longest short flight.
 const TRIED_SHARE: f64 = 0.9;
 
-/// Least change of speed by the pressing acceleration in a Taylor step, relative to the scale of length and the rate
-/// of free motion. Below it the acceleration may be rounding error, and the certificate is used instead.
+/// Least change of speed by the pressing acceleration in a Taylor step, relative to the scale of length times the rate of free motion.
+/// Below it the acceleration may be rounding error, and the certificate is used instead.
 const LEAST_PRESSING: f64 = 1e-6;
 
 impl<const N: usize> PairMotion<'_, N> {
@@ -24,7 +24,8 @@ impl<const N: usize> PairMotion<'_, N> {
             && leaving > 0.0
     }
 
-    /// Moves to the return to the wall that the gap has just left, if the series proves it. Returns whether it did.
+    /// Advances the motion until the gap returns to the wall that it has just left, if the series proves this return. Returns whether it
+    /// does.
     #[inline(always)]
     pub(super) fn fly_back(
         &mut self,

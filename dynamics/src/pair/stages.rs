@@ -1,8 +1,8 @@
 //! Changes of the stage at given phases.
 //!
-//! State and tangents are continuous there, because the phase of a change is the same for all neighbouring motions. A gap in
-//! front of a wall stays in free motion, and a gap behind a wall stays in contact. A contact that depends on a force is
-//! decided anew: a gap at rest on a rigid wall, a contact onset, and a gap behind a wall that only pushes.
+//! State and tangents are continuous there, because the phase of a change is the same for all neighbouring motions. A gap in front of a
+//! wall stays in free motion, and a gap behind a wall stays in contact. A contact that depends on a force is decided again: a gap at rest
+//! on a rigid wall, a contact onset, and a gap behind a wall that only pushes.
 
 use super::{Mode, PairMotion};
 use crate::motion::{EventKind, Observer};

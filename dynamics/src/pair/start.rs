@@ -5,7 +5,7 @@ use crate::model::{Contact, Law, Side};
 use crate::motion::{Allowance, Clock, Work};
 
 /// Distance of a gap that lies on a wall, relative to the wall's position or the scale of length.
-const ON_WALL: f64 = 1e-9;
+const START_ON_WALL: f64 = 1e-9;
 
 impl<'f> PairMotion<'f, 0> {
     /// Starts a trajectory at phase 0 in the state `y`.
@@ -159,7 +159,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     pub(crate) fn is_in_domain_of(&self, other: &PairMotion<'_, N>) -> bool {
         let is_between = |side: Side| {
             let wall = self.flow.wall(side);
-            (self.q[0] - wall).abs() <= ON_WALL * wall.abs().max(self.flow.length)
+            (self.q[0] - wall).abs() <= START_ON_WALL * wall.abs().max(self.flow.length)
         };
         self.interval == other.interval
             && (self.mode == other.mode

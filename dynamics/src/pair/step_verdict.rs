@@ -8,7 +8,7 @@ use crate::pair::flow::{Gap, LinearFlow, Phasor, Step};
 /// Distance from a wall that is rounding error, relative to the wall's position or the scale of length.
 const WALL_ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Bounds that no gap is between, so that a step is judged by all its crossings.
+/// An empty interval of gaps: no step is known to lie within it, so every step is checked for crossings.
 const UNREACHABLE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
 /// The end of a flight.

@@ -6,15 +6,15 @@ use crate::motion::Trajectory;
 /// Number of blocks whose means give the standard error.
 const BLOCKS: usize = 16;
 
-/// Least distance from 1 of the correlation of `n` neighbouring blocks, times the square root of `n`: 1.2 times the
-/// scatter of a measured correlation.
+/// The correlation of `n` neighbouring blocks is limited to 1 minus this number divided by the square root of `n`: by 1.2 times the scatter
+/// of a measured correlation.
 pub const CORRELATION_MARGIN: f64 = 1.2;
 
 /// Least number of periods for a finite standard error.
 pub const LEAST_FOR_ERROR: u32 = BLOCKS as u32;
 
-/// The initial tangent vector; an oscillator uses as many entries as its states have. It lies in no invariant direction of a gear
-/// pair. Equal entries would be a common translation, which without supports never meets a wall.
+/// The initial tangent vector; an oscillator uses as many entries as its states have. It lies in no invariant direction of a gear pair. A
+/// vector with equal entries would: without supports, a common translation never meets a wall.
 pub const FRESH_TANGENT: State =
     [0.64, -0.36, 0.28, 0.61, -0.47, 0.53, 0.39, -0.58, 0.72, 0.33, -0.29, 0.45, 0.56, -0.68, 0.41, 0.51];
 

@@ -16,10 +16,10 @@ pub(crate) fn times<const N: usize>(a: &[[f64; N]; N], b: &[[f64; N]; N]) -> [[f
     })
 }
 
-/// Returns the product of two square matrices. That of nalgebra depends on the processor if matrices have more than five rows.
+/// Returns the product of two square matrices. nalgebra's product depends on the processor if matrices have more than five rows.
 pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let size = a.nrows();
-    // A known number of rows is much faster.
+    // Code for a known number of rows is much faster.
     if size == 4 {
         let [a, b] = [a, b].map(|m| std::array::from_fn(|j| std::array::from_fn(|i| m[(i, j)])));
         return DMatrix::from_column_slice(4, 4, times::<4>(&a, &b).as_flattened());
@@ -37,7 +37,7 @@ pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     product
 }
 
-/// Returns the image of a vector, of which the matrix has `N` rows or fewer.
+/// Returns the product of a matrix of at most `N` rows and a vector.
 pub(crate) fn image_of<const N: usize>(matrix: &DMatrix<f64>, vector: &[f64; N]) -> [f64; N] {
     let mut image = [0.0; N];
     for (column, factor) in matrix.as_slice().chunks_exact(matrix.nrows()).zip(vector) {

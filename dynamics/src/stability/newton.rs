@@ -42,7 +42,7 @@ const SVD_CAP: usize = 1000;
 /// Residuals below this, relative to the state, are rounding errors.
 const CONVERGED: f64 = 1e-13;
 
-/// Residual, relative to the state, below which the multipliers differ from those of the orbit by at most a quarter.
+/// Residual, relative to the state, below which the computed multipliers differ by at most a quarter from the multipliers of the orbit.
 const MULTIPLIER_RESIDUAL: f64 = 1e-3;
 
 /// Largest multiplier, at that residual, from which the orbit is certainly unstable.
@@ -180,7 +180,7 @@ fn lies_within(image: &Image, bound: f64) -> Option<bool> {
     lies_within_unit_circle(image.scaled.nrows(), |i, j| image.scaled[(i, j)] * factor / bound)
 }
 
-/// Returns the size that residuals are relative to: that of the state, or the scale of length if that is larger.
+/// Returns the size that residuals are relative to: the size of the state, or the scale of length if it is larger.
 fn size_of(seed: &Trajectory<'_>, y: &State) -> f64 {
     let flow = seed.flow();
     size(y, flow.rate).max(flow.length * flow.omega / flow.rate)
@@ -202,7 +202,7 @@ fn in_displacements(y: &State, rate: f64) -> State {
 fn newton_step(image: &Image, residual: &State) -> Option<State> {
     let (size, residual) = (image.scaled.nrows(), in_displacements(residual, image.rate));
     let entry = image.balanced_entries();
-    // Oscillators of one or two coordinates need no memory.
+    // With one or two coordinates, no heap memory is needed.
     let step = if size == 4 {
         let matrix = Matrix4::from_fn(entry) - Matrix4::identity();
         state(balanced_step(matrix, &Vector4::from_column_slice(&residual[..4]))?.as_slice())
@@ -239,7 +239,7 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
     let matrix = DMatrix::from_fn(size, size, entry);
     let mut scaled_multipliers = multipliers(&matrix)?;
     scaled_multipliers.truncate(2 * seed.flow().degrees);
-    // Friction that never slides leaves a family of cycles along its row.
+    // An element that never slides makes a family of cycles along its row, whose multiplier 1 is removed.
     for _ in 0..image.never_slid {
         let off = |[re, im]: &[f64; 2]| (re * log_scale.exp() - 1.0).hypot(im * log_scale.exp());
         let (along, _) =
@@ -248,7 +248,7 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
     }
     let [re, im] = scaled_multipliers[0];
     let (radius, scale) = (re.hypot(im), log_scale.exp());
-    // A radius below the rounding errors of the matrix may as well be zero.
+    // A radius below the rounding errors of the matrix is not distinguished from zero.
     let is_resolved = radius > f64::EPSILON * matrix.amax();
     Some(Cycle {
         state,

@@ -19,8 +19,8 @@ pub(super) fn lies_within_unit_circle(size: usize, entry: impl Fn(usize, usize) 
     if !polynomial.iter().all(|c| c.is_finite()) {
         return None;
     }
-    // All roots of a polynomial of degree n lie inside if its last coefficient is smaller than its first, and if the
-    // same holds for the polynomial of degree n - 1 that remains after elimination with the reversed one.
+    // All roots of a polynomial of degree n lie inside the circle if its last coefficient is smaller than its first, and if all roots of
+    // another polynomial lie inside: the one of degree n - 1 that remains after elimination with the reversed polynomial.
     for degree in (1..=size).rev() {
         let (first, last) = (polynomial[0], polynomial[degree]);
         // NaN is a sign of overflow.
@@ -35,7 +35,7 @@ pub(super) fn lies_within_unit_circle(size: usize, entry: impl Fn(usize, usize) 
     Some(true)
 }
 
-/// Returns the coefficients of `det(z - A)`, that of the highest power first, and zeros behind them. The matrix has `N` rows or fewer.
+/// Returns the coefficients of `det(z - A)`, highest power first, followed by zeros. The matrix has `N` rows or fewer.
 fn characteristic<const N: usize>(size: usize, entry: impl Fn(usize, usize) -> f64) -> [f64; STATE + 1] {
     let column = |j| std::array::from_fn(|i| if i.max(j) < size { entry(i, j) } else { 0.0 });
     let matrix: [[f64; N]; N] = std::array::from_fn(column);

@@ -76,7 +76,6 @@ impl Linear {
     }
 }
 
-/// Returns the product of two matrices.
 pub(crate) fn product(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
 }

@@ -33,7 +33,6 @@ pub(crate) fn paper(e: f64, omega: f64) -> GearPair {
     GearPair { omega, ..GearPair::paper(e) }
 }
 
-/// Returns the flow of a valid pair.
 pub(crate) fn flow_of(pair: &GearPair) -> Flow {
     Flow::new(&pair.pair())
 }
@@ -161,7 +160,6 @@ pub(crate) fn mirrored_symbol(symbol: u8) -> u8 {
     }
 }
 
-/// Returns a state with all signs reversed.
 pub(crate) fn negated<const N: usize>(y: [f64; N]) -> [f64; N] {
     y.map(|x| -x)
 }

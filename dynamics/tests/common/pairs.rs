@@ -8,7 +8,7 @@ use rattlemap_dynamics::model::{
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::pair::{DomainKind, Gap, LinearFlow, PairFlow};
 
-/// The pair of a model that has one.
+/// Converts a model to its pair.
 pub(crate) trait AsPair {
     fn pair(&self) -> Pair;
 }
@@ -86,7 +86,7 @@ pub(crate) struct Rubbing {
 }
 
 impl Rubbing {
-    /// Describes it with a law.
+    /// Describes the pair and its friction, with a law of restitution.
     pub(crate) fn described(&self, law: Law) -> Oscillator {
         let n = self.pair.degrees;
         let element = |one: &Friction| DryFriction {
@@ -98,7 +98,7 @@ impl Rubbing {
         Oscillator { friction, ..described(&self.pair, law) }
     }
 
-    /// Returns it in the form that its engine takes.
+    /// Returns the oscillator in the form that its engine takes.
     pub(crate) fn form(&self, law: Law) -> Form {
         if self.friction.is_empty() {
             Form::Pair(self.pair.clone())
@@ -130,7 +130,7 @@ pub(crate) fn omega_of(form: &Form) -> f64 {
     }
 }
 
-/// Describes a pair with a law: the other direction of [`Pair::of`].
+/// Describes a pair with a law of restitution: the inverse of [`Pair::of`].
 pub(crate) fn described(pair: &Pair, law: Law) -> Oscillator {
     let n = pair.degrees;
     let matrix = |m: [[f64; 2]; 2]| DMatrix::from_fn(n, n, |i, j| m[i][j]);

@@ -30,7 +30,7 @@ struct Case {
 /// Largest growth of tangents for which two computations of one motion are compared.
 const GROWTH: f64 = 1e4;
 
-/// Part of a period after phase 0, where a motion that began at another phase ends.
+/// Motions that begin at another phase end this share of a period after phase 0.
 const BEYOND: f64 = 0.03;
 
 fn or_none(values: impl Strategy<Value = f64> + 'static) -> impl Strategy<Value = f64> {
@@ -231,7 +231,7 @@ fn kinds(events: &[GapEvent]) -> Vec<(EventKind, Side)> {
     events.iter().map(|event| (event.kind, event.side)).collect()
 }
 
-/// Compares the motion of `periods` forcing periods of the first flow with that of one forcing period of the second.
+/// Compares `periods` forcing periods of the first flow's motion with one forcing period of the second flow's motion.
 fn have_the_same_motion(case: &Case, [flow, other]: [&Flow; 2], periods: usize) -> Result<(), TestCaseError> {
     let mut ours = Trajectory::with_tangents(flow, case.law, case.start, UNIT);
     let mut theirs = Trajectory::<0>::new(other, case.law, case.start);
@@ -306,7 +306,7 @@ proptest! {
                 (None, Some(Side::Left)) => Some(if right { b'6' } else { b'5' }),
                 (None, None) => None,
             };
-            // If the motion started on a wall, the events do not tell where the first flight comes from.
+            // If the motion started on a wall, the events do not show where the first flight comes from.
             if meshing.is_some() || origin.is_some() {
                 prop_assert_eq!(event.symbol, expected, "{:?}", event);
             }
@@ -483,7 +483,7 @@ proptest! {
         let congruent = |m: Matrix| -> Matrix {
             let half = m.map(row);
             let whole: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| a[0][i] * half[0][j] + a[1][i] * half[1][j]));
-            // Symmetric without rounding errors, if it was.
+            // Rounding must not make a symmetric matrix unsymmetric.
             let below = if m[0][1] == m[1][0] { whole[0][1] } else { whole[1][0] };
             [[whole[0][0], whole[0][1]], [below, whole[1][1]]]
         };
@@ -521,7 +521,7 @@ proptest! {
         prop_assert!(off < 1e-10 * growth(&ours) * size(ours.state()), "off by {off:e}");
     }
 
-    /// A change to a stage that is equal to the present one only ends steps.
+    /// A change to a stage that is equal to the present one must not change the motion.
     #[test]
     fn a_change_to_an_equal_stage_changes_nothing(case in cases(), turn in 1e-3..1.0f64) {
         let o = &case.oscillator;

@@ -88,7 +88,6 @@ fn strobe(flow: &Flow, start: [f64; 2]) -> ([[f64; 2]; 2], [f64; 2], Vec<GapEven
     ([[a[0], b[0]], [a[1], b[1]]], [x, v], events)
 }
 
-/// Returns the largest difference of two matrices.
 fn apart(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
@@ -104,8 +103,8 @@ fn differences(flow: &Flow, [x, v]: [f64; 2], h: f64) -> [[f64; 2]; 2] {
     [[a[0], b[0]], [a[1], b[1]]]
 }
 
-/// Without a damper the strobe map is continuously differentiable where the motion grazes the wall. Its derivative
-/// there is that of free motion, and nearby it differs by the root of the distance.
+/// Without a damper the strobe map is continuously differentiable where the motion grazes the wall. Its derivative at grazing equals the
+/// derivative of free motion, and nearby it differs by the root of the distance.
 #[test]
 fn the_strobe_map_is_smooth_at_grazing_a_spring() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
@@ -134,7 +133,7 @@ fn the_strobe_map_is_smooth_at_grazing_a_spring() {
     assert!(contacts >= 8 && misses >= 8, "{contacts} contacts, {misses} misses");
 }
 
-/// From rest on the wall, the gap follows the acceleration, or its first derivative that is not zero.
+/// From rest on the wall, the gap follows the acceleration or its first nonzero derivative.
 #[test]
 fn a_start_at_rest_on_the_wall_follows_the_load() {
     for (load, force, behind) in [(0.5, 0.0, true), (-0.5, 0.0, false), (-1.0, 1.0, false), (1.0, -1.0, true)]

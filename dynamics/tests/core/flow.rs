@@ -7,8 +7,8 @@ use rattlemap_dynamics::model::{GearPair, Side, State, state};
 use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::pair::DomainKind;
 
-/// Rounding error of a matrix exponential per radian of the fastest rate. Every doubling of the time doubles the
-/// error and adds that of a product.
+/// Rounding error of a matrix exponential per radian of the fastest rate. Every doubling of the time doubles the error and adds the error
+/// of a product.
 const PER_RADIAN: f64 = 32.0 * f64::EPSILON;
 
 const DOMAINS: [DomainKind; 3] =
@@ -282,7 +282,7 @@ fn phase_volume_shrinks_at_the_rate_of_the_trace() {
                 }
                 let fundamental = linear.fundamental(t);
                 let (got, want) = (fundamental.determinant(), (trace * t).exp());
-                // The error of the determinant is that of the entries times the cofactors.
+                // The error of the determinant is the error of the entries times the cofactors.
                 let size = fundamental.norm() * fundamental.map(f64::abs).max();
                 let allowed = 64.0 * f64::EPSILON * (1.0 + rate(&pair) * t) * size.max(1.0) * size.max(1.0);
                 assert!((got - want).abs() <= allowed, "{what}, {domain:?}: {got} is not {want} after {t}");

@@ -8,7 +8,7 @@ use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, state};
 use rattlemap_dynamics::motion::{Flow, GapEvent, Observer, SlipEvent, States, Trajectory};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, Status, analyse_flow};
 
-/// A single mass on a spring, between no walls, with `m = k = 1`.
+/// A single mass on a spring without walls, with `m = k = 1`.
 fn block(omega: f64, drive: f64, friction: f64) -> Rubbing {
     let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
     let free = Domain { damping: first(0.0), stiffness: first(1.0), load: [0.0; 2], preload: 0.0 };

@@ -1,5 +1,5 @@
-//! Compares the reference with an integrator by matrix exponentials that shares only the description of the oscillator with it, on
-//! random models of one gap with harmonics, stages, further walls, pushing walls, preloads and dry friction.
+//! Compares the reference with an integrator by matrix exponentials on random models of one gap with harmonics, stages, further walls,
+//! pushing walls, preloads and dry friction. Both share only the description of the oscillator.
 
 pub(crate) mod random;
 
@@ -21,10 +21,10 @@ use crate::machines::random::{any_case, apart};
 use crate::machines::system::{ANGLE, System};
 use random::{Case, PLAIN, Shape, case};
 
-/// Rounding errors may have this multiple of the effect of known errors, [`Motion::shaken`].
+/// Allowed effect of rounding errors, as a multiple of the effect of the known errors of [`Motion::shaken`].
 const NOISES: f64 = 20.0;
 
-/// Motions in which this effect is larger are not compared further.
+/// Motions in which known errors have a larger effect are not compared further.
 const MOST_NOISE: f64 = 1e-6;
 
 /// Largest difference of the strobe states of a cycle, relative to the size of the motion.
@@ -36,7 +36,7 @@ const MULTIPLIER_OFF: f64 = 1e-7;
 /// Largest difference of the share of time in contact.
 const MESH_OFF: f64 = 1e-9;
 
-/// Distance of a multiplier from 1 at which dry friction creeps.
+/// Multipliers that are nearer to 1 than this may belong to creeping dry friction.
 const CREEP: f64 = 2e-5;
 
 /// Forcing periods after which a motion that is not near a cycle is not followed any more.
@@ -146,7 +146,7 @@ fn compare(case: &Case) -> Result<Compared, String> {
     found(Agreement::OtherEnd, same_cycle(case, &followed, &measured, &orbit)?)
 }
 
-/// Compares models. At least this share settles on the same cycle.
+/// Compares models. At least `share` of them must settle on the same cycle.
 fn check(shape: Shape, seeds: std::ops::Range<u64>, share: f64) {
     let count = seeds.end - seeds.start;
     let all: Vec<_> = seeds.into_par_iter().map(|seed| (seed, compare(&case(seed, shape)))).collect();
@@ -174,7 +174,7 @@ fn check(shape: Shape, seeds: std::ops::Range<u64>, share: f64) {
     assert!(by_stage[0] > 20 && has_onsets || !shape.stages || count < 200, "{by_stage:?}");
 }
 
-/// Shapes of models, and the share of them that at least settles on the same cycle.
+/// Shapes of models, and the least share of them that must settle on the same cycle.
 const SHAPES: [(Shape, f64); 11] = [
     (PLAIN, 0.9),
     (Shape { harmonics: true, ..PLAIN }, 0.8),

@@ -1,7 +1,7 @@
-//! The engine of machines, on oscillators of two coordinates, against the engine of such oscillators; mirror images.
+//! Compares both engines on oscillators of two coordinates, and tests mirror images of machines.
 
 use nalgebra::DVector;
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{Drive, DryFriction, Form, Law, Oscillator, REST, Restitution};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::Trajectory;
@@ -27,7 +27,7 @@ fn same_quantities(a: &Orbit, b: &Orbit) -> bool {
     list(&a).iter().zip(list(&b)).all(|(a, b)| (a - b).abs() <= 1e-9 * (1.0 + a.abs()))
 }
 
-/// The analysis of an oscillator and of the same as a machine.
+/// Both engines must give the same analysis of an oscillator.
 #[test]
 fn machines_have_the_classes_of_their_oscillators() {
     let of = |seed: u64| {
@@ -65,7 +65,7 @@ fn machines_have_the_classes_of_their_oscillators() {
     let all: Vec<_> = (0..120).into_par_iter().map(of).collect();
     let others: Vec<_> = all.iter().filter(|(agrees, _)| !agrees).map(|(_, what)| what).collect();
     others.iter().take(5).for_each(|what| println!("{what}"));
-    // Several attractors and slow transients may end elsewhere.
+    // With several attractors or slow transients, the engines may reach different attractors.
     assert!(others.len() <= 2, "{} of {} differ", others.len(), all.len());
 }
 
@@ -86,7 +86,7 @@ fn mirrored_pair(e: f64) -> Oscillator {
 /// A change of a machine.
 type Change = fn(&mut Oscillator);
 
-/// Changes after which the mirror image of a motion is no motion.
+/// Changes that break the mirror symmetry.
 const UNSYMMETRIC: [Change; 7] = [
     |machine| machine.stages[0].load[1] = 0.05,
     |machine| machine.stages[1].stiffness[(0, 0)] *= 1.1,
@@ -108,8 +108,8 @@ fn the_mirror_image_of_a_motion_is_a_motion_of_a_symmetric_machine() {
     let off = |machine: &Oscillator| {
         let [system, later] = [machine, &machine.at_phase(std::f64::consts::PI)].map(System::new);
         let y = [0.3, 1.0, 0.1, -2.0];
-        let mut motion = Motion::new(&system, &y);
-        let mut image = Motion::new(&later, &y.map(|x| -x));
+        let mut motion = MachineMotion::new(&system, &y);
+        let mut image = MachineMotion::new(&later, &y.map(|x| -x));
         for motion in [&mut motion, &mut image] {
             motion.advance_period(&mut ()).unwrap();
         }
@@ -145,7 +145,7 @@ fn a_cycle_of_a_machine_is_symmetric_up_to_the_pitchfork() {
     }
 }
 
-/// Prints how much longer a period of the gear pair takes as a machine.
+/// Prints how much longer a period of the gear pair takes with the engine of machines.
 #[test]
 #[ignore = "a measurement: --release"]
 fn time_of_a_period_as_a_machine() {
@@ -156,9 +156,9 @@ fn time_of_a_period_as_a_machine() {
         let mut times = [[f64::INFINITY; 2]; 2];
         for _ in 0..5 {
             for tangents in [false, true] {
-                let mut theirs = Motion::new(&system, &REST);
+                let mut theirs = MachineMotion::new(&system, &REST);
                 if tangents {
-                    theirs.set_tangents(Motion::unit_tangents(&system)[..1].to_vec());
+                    theirs.set_tangents(MachineMotion::unit_tangents(&system)[..1].to_vec());
                 }
                 let begin = std::time::Instant::now();
                 (0..2000).for_each(|_| theirs.advance_period(&mut ()).unwrap());

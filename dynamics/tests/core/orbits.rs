@@ -177,7 +177,7 @@ fn a_free_body_at_rest_is_neutral_and_has_all_multipliers() {
     let measured = measure(&flow_of(&pair), pair.law(), REST, &BUDGET);
     assert_eq!((measured.period, measured.status), (Some(1), Status::Neutral));
     assert_eq!((measured.lyapunov, measured.multiplier), (Some([0.0, 0.0]), Some([1.0, 0.0])));
-    // With damping but no support, one of its multipliers is 1.
+    // If gear 2 has damping but no support, one of its multipliers is 1.
     let damped = measure(&flow_of(&GearPair { k2: 0.0, ..pair }), pair.law(), REST, &BUDGET);
     assert_eq!((damped.status, damped.lyapunov), (Status::Neutral, Some([0.0, 0.0])));
 }
@@ -263,7 +263,7 @@ fn chaos_of_a_pair_without_supports_is_recognised() {
 
 #[test]
 fn exponents_are_right_if_tangents_leave_the_range_of_f64_in_one_period() {
-    // Without contact the largest exponent is that of the slower support, -0.15, for every period.
+    // Without contact the largest exponent is the exponent of the slower support, -0.15, for every period.
     for omega in [1.0, 0.01, 0.001] {
         let orbit = orbit(&GearPair { b: 1e6, ..cell(0.5, omega) });
         assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{omega}");

@@ -9,8 +9,8 @@ use rattlemap_dynamics::stability::UNIT;
 use rattlemap_dynamics::{motion::Flow, pair::DomainKind};
 use rayon::prelude::*;
 
-/// Largest number of events for which two computations of one motion are compared. After more events, a difference by
-/// rounding may have grown in an instability that the tangents, damped before, do not show.
+/// Largest number of events for which two computations of one motion are compared. After more events, rounding errors may have grown
+/// although the tangents have not, because damping reduced the tangents before.
 pub(crate) const COMPARABLE_EVENTS: usize = 12;
 
 /// Number of events examined in one trajectory. There may be millions in a period.
@@ -21,7 +21,7 @@ pub(crate) fn logarithmic(low: f64, high: f64) -> impl Strategy<Value = f64> {
     (low.ln()..high.ln()).prop_map(f64::exp)
 }
 
-/// The given numbers, and zero in one case of `weight + 1`.
+/// Numbers of a strategy, and zero in one of `weight + 1` cases.
 pub(crate) fn or_zero(
     weight: u32,
     values: impl Strategy<Value = f64> + 'static,

@@ -16,8 +16,8 @@ fn both_walls(free: Linear, at: f64, contact: Contact, spring: [f64; 2]) -> Pair
         .fold(free.oscillator(), |o, side| with_wall(o, side, side.sign() * at, contact, spring))
 }
 
-/// An inertia of 5 kg m^2 behind a backlash of 45 degrees with a spring and a damper, released at 90 degrees, as in the Modelica
-/// library's example of backlash. The values at 1 s are those of an integrator of order 8 that switches at the events.
+/// An inertia of 5 kg m^2 behind a backlash of 45 degrees with a spring and a damper, released at 90 degrees, as in the Modelica library's
+/// example of backlash. The values at 1 s come from an integrator of order 8 that switches at the events.
 #[test]
 fn backlash_that_does_not_pull_has_the_published_trace() {
     let still = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: 0.0, omega: std::f64::consts::TAU };
@@ -34,8 +34,8 @@ fn backlash_that_does_not_pull_has_the_published_trace() {
     }
 }
 
-/// A mass between walls whose force is the preload alone flies freely between them. Behind a wall it turns around after the time
-/// `2 w / preload` with the same speed. All times and states are sums.
+/// A mass between walls whose force is the preload alone flies freely between them. Behind a wall it turns around, and returns to the wall
+/// after the time `2 w / preload` with the same speed. All times and states are sums of these terms.
 #[test]
 fn a_constant_force_returns_the_mass_with_its_speed() {
     let still = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: 0.0, omega: 0.25 };
@@ -60,7 +60,7 @@ fn a_constant_force_returns_the_mass_with_its_speed() {
             near(x, -0.5 - 3.0 * inside + 2.0 * inside * inside, 1e-14)
                 && near(v, -3.0 + 4.0 * inside, 1e-14)
         );
-        // A faster mass is earlier at the walls and stays longer behind them; a shifted one changes the time alone.
+        // A faster mass is earlier at the walls and stays longer behind them; a shift of the start changes the time alone.
         let speed = 3.0;
         let by_speed = |dx: f64, dv: f64| {
             // Time of the last event as a function of the start.

@@ -1,4 +1,4 @@
-//! Stages and harmonics of the force, against closed forms and other descriptions of one motion.
+//! Stages and harmonics of the force, against closed forms and equivalent oscillators.
 
 use crate::common::pairs::AsPair;
 use std::f64::consts::TAU;
@@ -26,7 +26,7 @@ fn apart(a: State, b: State) -> f64 {
     (0..4).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
 }
 
-/// Returns an oscillator whose free motion is that of `linear` in the first stage and that of `others` in further ones.
+/// Returns an oscillator that moves freely like `linear` in the first stage and like `others` in further stages.
 fn staged(linear: Linear, others: &[Linear], schedule: &[(f64, usize)]) -> Pair {
     let stage = |linear: &Linear| {
         let Pair { free, meshing, .. } = linear.oscillator();

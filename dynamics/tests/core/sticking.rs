@@ -135,7 +135,6 @@ fn an_impact_at_the_mesh_speed_sticks() {
     assert!(near(last.before[1], speed * e.powi(count as i32 - 1), 1e-13), "{last:?}");
 }
 
-/// Returns the gear pair between rigid walls.
 fn rigid(pair: &GearPair) -> Pair {
     Pair { contacts: [Contact::Rigid; 2], ..pair.pair() }
 }

@@ -11,7 +11,6 @@ fn stops(e: f64) -> Stops {
     Stops { m: 1.5, force: 0.0, mesh_speed: 0.0, ..Stops::with_restitution(e) }
 }
 
-/// Returns the time since the start.
 fn time(flow: &Flow, event: &GapEvent) -> f64 {
     event.period as f64 * flow.period + event.t
 }
@@ -67,7 +66,7 @@ fn a_harmonic_oscillator_between_stops_agrees_with_the_closed_form() {
         let events = events(&flow, stops.law(), state(&[0.0, start]), 30);
         let mut t = (w * stops.b / start).asin() / w;
         let mut speed = (start * start - (w * stops.b).powi(2)).sqrt();
-        // The rounding error of a speed is that of the energy divided by the speed.
+        // The rounding error of a speed is the rounding error of the energy divided by the speed.
         let fast_enough = events.iter().take_while(|event| event.before[1].abs() > 0.1);
         for (n, event) in fast_enough.enumerate() {
             assert!(

@@ -239,8 +239,8 @@ fn rates_out_of_range_stop_the_trajectory_at_once() {
     }
 }
 
-/// If the rounding error of the displacements exceeds the distance of the walls, there are events on every shortest
-/// step. These must count, too.
+/// If the rounding error of the displacements exceeds the distance of the walls, there are events on every shortest step. These events must
+/// also count.
 #[test]
 fn events_within_rounding_count_for_the_cap() {
     let pair = GearPair { force: 5e112, b: 0.01, e: 0.0, mesh_speed: 14.0, ..paper(0.0, 0.6) };

@@ -1,7 +1,7 @@
 //! Tangent vectors against central differences of the strobe map.
 //!
-//! The differences limit the agreement: with steps of `1e-6` their rounding error is `1e-10` times the scale of the
-//! state over that of the derivative.
+//! The differences limit the agreement: with steps of `1e-6` their rounding error is `1e-10` times the ratio of the scales of state and
+//! derivative.
 
 use crate::common::{REST, flow_of, paper, strobe};
 use nalgebra::Matrix4;

@@ -95,7 +95,7 @@ fn energy_balances_with_several_walls() {
     assert!(cycles > 60, "{cycles}");
 }
 
-/// A spring of stiffness 0 behind a wall does nothing, whatever its wall does to the events.
+/// A wall with a spring of stiffness 0 adds events but does not change the motion.
 #[test]
 fn a_wall_without_a_spring_changes_no_motion() {
     for at in [1.2, 1.7, 2.5] {

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::measure::{Point, Run, Series, Target};
+use super::measure::{BenchPoint, Run, Series, Target};
 use crate::gpu::Precision;
 use crate::map::scene::{FigureStyle, Format};
 use crate::show::drawing::axis::Axis;
@@ -38,7 +38,7 @@ pub(super) fn write(
     all: &[Series],
     processor: &str,
 ) -> Result<(), WriteError> {
-    let rate = |point: &Point| point.spread(Run::rate).median;
+    let rate = |point: &BenchPoint| point.spread(Run::rate).median;
     let best = |series: &Series| series.points.iter().map(rate).fold(0.0, f64::max);
     let mut sorted: Vec<&Series> = all.iter().collect();
     sorted.sort_by(|a, b| best(b).total_cmp(&best(a)));
@@ -85,7 +85,7 @@ fn axes(all: &[&Series]) -> [Axis; 2] {
 
 fn curve(canvas: &Canvas, frame: &Frame, series: &Series) {
     let color = color(&series.target);
-    let place = |point: &Point, rate: f64| frame.at(point.lanes as f64, rate);
+    let place = |point: &BenchPoint, rate: f64| frame.at(point.lanes as f64, rate);
     let medians = series.points.iter().map(|point| place(point, point.spread(Run::rate).median));
     let line: Vec<_> = medians.collect();
     canvas.stroke(&line, WIDTH, color);

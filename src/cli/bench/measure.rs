@@ -88,7 +88,7 @@ impl Run {
 
 /// Repeated runs of one map on one engine.
 #[derive(Clone, Debug)]
-pub(super) struct Point {
+pub(super) struct BenchPoint {
     pub(super) lanes: usize,
     pub(super) runs: Vec<Run>,
     pub(super) classes: Vec<Class>,
@@ -96,7 +96,7 @@ pub(super) struct Point {
     pub(super) differing: Option<usize>,
 }
 
-impl Point {
+impl BenchPoint {
     /// Computes the spread of a quantity over the runs.
     pub(super) fn spread(&self, of: impl Fn(&Run) -> f64) -> Spread {
         Spread::of(self.runs.iter().map(of).collect())
@@ -122,7 +122,7 @@ pub(super) struct Series {
     pub(super) target: Target,
     /// Seconds to open the device, compile the lane and compute the first four cells.
     pub(super) open_seconds: f64,
-    pub(super) points: Vec<Point>,
+    pub(super) points: Vec<BenchPoint>,
     /// Smallest number of cells that was not measured, with the reason.
     pub(super) skipped: Option<(usize, String)>,
     pub(super) check: Option<SampleCheck>,
@@ -208,7 +208,12 @@ impl OpenEngine {
     ///
     /// # Errors
     /// If the engine fails.
-    pub(super) fn point(&mut self, scene: &Scene, runs: usize, seconds: f64) -> Result<(Point, Vec<Record>)> {
+    pub(super) fn point(
+        &mut self,
+        scene: &Scene,
+        runs: usize,
+        seconds: f64,
+    ) -> Result<(BenchPoint, Vec<Record>)> {
         let clock = Instant::now();
         let (first, mut records) = self.run(scene)?;
         let mut list = vec![first];
@@ -219,7 +224,7 @@ impl OpenEngine {
             records = again;
         }
         let classes = records.iter().map(classify).collect();
-        Ok((Point { lanes: records.len(), runs: list, classes, differing: None }, records))
+        Ok((BenchPoint { lanes: records.len(), runs: list, classes, differing: None }, records))
     }
 
     /// Recomputes `samples` cells of a map on the reference and compares them.

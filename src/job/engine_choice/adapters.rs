@@ -232,19 +232,20 @@ mod tests {
     const SINGLE: &[Precision] = &[Precision::F32];
 
     /// One adapter: name, model, kind, interface, address, precisions.
-    type Row = (&'static str, u32, wgpu::DeviceType, wgpu::Backend, &'static str, &'static [Precision]);
+    type AdapterRow =
+        (&'static str, u32, wgpu::DeviceType, wgpu::Backend, &'static str, &'static [Precision]);
 
-    const SOFTWARE: Row = ("llvmpipe", 0, wgpu::DeviceType::Cpu, wgpu::Backend::Vulkan, "", BOTH);
-    const INTEL: Row =
+    const SOFTWARE: AdapterRow = ("llvmpipe", 0, wgpu::DeviceType::Cpu, wgpu::Backend::Vulkan, "", BOTH);
+    const INTEL: AdapterRow =
         ("Arc A770", 9, wgpu::DeviceType::DiscreteGpu, wgpu::Backend::Vulkan, "0000:03:00.0", SINGLE);
 
-    fn big(pci: &'static str) -> Row {
+    fn big(pci: &'static str) -> AdapterRow {
         ("RTX 4090", 7, wgpu::DeviceType::DiscreteGpu, wgpu::Backend::Vulkan, pci, BOTH)
     }
 
-    fn machine(rows: &[Row]) -> Vec<AdapterReport> {
+    fn machine(rows: &[AdapterRow]) -> Vec<AdapterReport> {
         let report =
-            |(number, &(name, device, kind, backend, pci, precisions)): (usize, &Row)| AdapterReport {
+            |(number, &(name, device, kind, backend, pci, precisions)): (usize, &AdapterRow)| AdapterReport {
                 number,
                 info: wgpu::AdapterInfo {
                     name: name.to_owned(),
@@ -260,7 +261,12 @@ mod tests {
         rows.iter().enumerate().map(report).collect()
     }
 
-    fn number(rows: &[Row], request: &str, environment: &str, precision: Precision) -> Result<usize, String> {
+    fn number(
+        rows: &[AdapterRow],
+        request: &str,
+        environment: &str,
+        precision: Precision,
+    ) -> Result<usize, String> {
         let request = (!request.is_empty()).then(|| request.parse().unwrap());
         let environment = match environment {
             "" => AdapterChoice::default(),

@@ -8,7 +8,7 @@ use crate::show::caption;
 use crate::show::color::Color;
 use crate::show::drawing::{Canvas, write_figure};
 use crate::show::error::WriteError;
-use crate::show::figure::map_layout::{MapFigure, Row, RowKey};
+use crate::show::figure::map_layout::{LegendKey, LegendRow, MapFigure};
 use crate::show::layers::colors::QUASI_PERIODIC;
 use crate::show::map_pair::{MapPair, MapSide, SceneDifference};
 use crate::show::symbols::symbol;
@@ -122,7 +122,7 @@ fn subtitle(pair: &MapPair<'_>) -> String {
 }
 
 /// Returns the rows of the legend: colours with numbers and shares of cells, below the sum of their kind.
-fn rows(indices: &[usize], other_pattern: &str) -> Vec<Row> {
+fn rows(indices: &[usize], other_pattern: &str) -> Vec<LegendRow> {
     let mut counts = [0usize; COLORS.len()];
     indices.iter().for_each(|&index| counts[index] += 1);
     let count = |cells: usize| format!("{cells}  ({:.2} %)", 100.0 * cells as f64 / indices.len() as f64);
@@ -136,10 +136,10 @@ fn rows(indices: &[usize], other_pattern: &str) -> Vec<Row> {
             || COLORS.iter().zip(counts).enumerate().filter(move |(_, (entry, _))| entry.kind == kind);
         let sum: usize = entries().map(|(_, (_, cells))| cells).sum();
         let (is_apart, text) = (!rows.is_empty(), text.to_owned());
-        rows.push(Row { key: RowKey::Heading, text, cells: count(sum), is_apart });
+        rows.push(LegendRow { key: LegendKey::Heading, text, cells: count(sum), is_apart });
         for (index, (entry, cells)) in entries().filter(|(_, (_, cells))| *cells > 0) {
             let text = if index == OTHER_PATTERN { other_pattern } else { entry.text };
-            rows.push(Row::of_color(entry.color, text, count(cells)));
+            rows.push(LegendRow::of_color(entry.color, text, count(cells)));
         }
     }
     rows

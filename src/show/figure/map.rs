@@ -9,7 +9,7 @@ use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::Key;
 use crate::show::drawing::{Canvas, Color, DARK, Marker, Point, WHITE, wall_color, write_figure};
 use crate::show::error::WriteError;
-use crate::show::figure::map_layout::{MapFigure, Row};
+use crate::show::figure::map_layout::{LegendRow, MapFigure};
 use crate::show::figure::map_lines;
 use crate::show::layers::{Layer, NamedColor, share};
 use rattlemap_dynamics::model::{Side, State};
@@ -33,19 +33,20 @@ pub fn write(out: impl Write, format: Format, cells: &Cells<'_>, layer: &Layer) 
 pub(super) fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
     let scene = cells.scene();
     let subtitle = format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
-    let row = |entry: &NamedColor| Row::of_color(entry.color, &entry.text, share(entry.cells, cells.count()));
-    let mut rows: Vec<Row> = layer.entries.iter().map(row).collect();
+    let row =
+        |entry: &NamedColor| LegendRow::of_color(entry.color, &entry.text, share(entry.cells, cells.count()));
+    let mut rows: Vec<LegendRow> = layer.entries.iter().map(row).collect();
     let color = |nth: usize| LINE_COLORS[nth % LINE_COLORS.len()]();
     rows.extend(
         scene
             .lines()
             .iter()
             .enumerate()
-            .map(|(nth, line)| Row::drawn(Key::Line { color: color(nth), width: LINE }, &line.name)),
+            .map(|(nth, line)| LegendRow::drawn(Key::Line { color: color(nth), width: LINE }, &line.name)),
     );
     let attractors = attractors(cells);
     if !attractors.is_empty() {
-        rows.push(Row::drawn(Key::Marker(ATTRACTOR), "attractor, at phase 0"));
+        rows.push(LegendRow::drawn(Key::Marker(ATTRACTOR), "attractor, at phase 0"));
     }
     let figure = MapFigure {
         cells,

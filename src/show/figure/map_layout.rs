@@ -49,7 +49,7 @@ const ABOVE_BAR: f64 = 26.0;
 const FLAT_LABELS: f64 = 46.0;
 
 /// The symbol of a row.
-pub(crate) enum RowKey {
+pub(crate) enum LegendKey {
     /// A colour of cells.
     Patch(Color),
     /// A line or marker on the map.
@@ -59,8 +59,8 @@ pub(crate) enum RowKey {
 }
 
 /// A row of the legend.
-pub(crate) struct Row {
-    pub(crate) key: RowKey,
+pub(crate) struct LegendRow {
+    pub(crate) key: LegendKey,
     pub(crate) text: String,
     /// Number or share of the cells.
     pub(crate) cells: String,
@@ -73,7 +73,7 @@ pub(crate) struct MapFigure<'a> {
     pub(crate) cells: &'a Cells<'a>,
     pub(crate) title: &'a str,
     pub(crate) subtitle: &'a str,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<LegendRow>,
     pub(crate) bar: Option<&'a Bar>,
     /// Width of a legend at the right of the map, and least height of map and legend in a figure of default size.
     pub(crate) legend: (f64, f64),
@@ -157,7 +157,7 @@ impl MapFigure<'_> {
 
     /// Returns the height of the legend at the right: rows, then the bar.
     fn height(&self) -> f64 {
-        let rows: f64 = self.rows.iter().map(Row::height).sum();
+        let rows: f64 = self.rows.iter().map(LegendRow::height).sum();
         let below = |bar: &Bar| match bar.remarks(1).len() {
             0 => 0.0,
             lines => ARROW + ROW * lines as f64,
@@ -167,7 +167,7 @@ impl MapFigure<'_> {
     }
 
     /// Draws rows from the top of a rectangle, and returns the y coordinate below them.
-    fn draw_rows(&self, canvas: &Canvas, place: Rect, rows: &[Row]) -> f64 {
+    fn draw_rows(&self, canvas: &Canvas, place: Rect, rows: &[LegendRow]) -> f64 {
         let mut y = place.top;
         for row in rows {
             y += row.height();
@@ -257,15 +257,15 @@ impl MapFigure<'_> {
 }
 
 /// Columns of a legend: their rows and widths.
-struct Columns<'a>(Vec<(&'a [Row], f64)>);
+struct Columns<'a>(Vec<(&'a [LegendRow], f64)>);
 
 impl<'a> Columns<'a> {
     /// Divides rows among as many columns as fit side by side. Rows with sections stay in one column.
-    fn fitting(canvas: &Canvas, rows: &'a [Row]) -> Self {
+    fn fitting(canvas: &Canvas, rows: &'a [LegendRow]) -> Self {
         let room = canvas.size().0 - 2.0 * EDGE;
         let has_sections = rows.iter().any(|row| row.is_apart);
         let most = if has_sections { 1 } else { rows.len().clamp(1, MOST_COLUMNS) };
-        let widest = |rows: &[Row]| rows.iter().map(|row| row.width(canvas)).fold(0.0, f64::max);
+        let widest = |rows: &[LegendRow]| rows.iter().map(|row| row.width(canvas)).fold(0.0, f64::max);
         let of = |count: usize| {
             let columns = rows.chunks(rows.len().div_ceil(count).max(1));
             Columns(columns.map(|rows| (rows, widest(rows).min(room))).collect())
@@ -301,15 +301,15 @@ fn draw_arrows(canvas: &Canvas, bar: &Bar, corners: [[Point; 3]; 2]) {
     }
 }
 
-impl Row {
+impl LegendRow {
     /// Returns the row of a colour.
-    pub(crate) fn of_color(color: Color, text: &str, cells: String) -> Row {
-        Row { key: RowKey::Patch(color), text: text.to_owned(), cells, is_apart: false }
+    pub(crate) fn of_color(color: Color, text: &str, cells: String) -> LegendRow {
+        LegendRow { key: LegendKey::Patch(color), text: text.to_owned(), cells, is_apart: false }
     }
 
     /// Returns the row of a line or marker on the map.
-    pub(crate) fn drawn(key: Key, text: &str) -> Row {
-        Row { key: RowKey::Drawn(key), text: text.to_owned(), cells: String::new(), is_apart: false }
+    pub(crate) fn drawn(key: Key, text: &str) -> LegendRow {
+        LegendRow { key: LegendKey::Drawn(key), text: text.to_owned(), cells: String::new(), is_apart: false }
     }
 
     fn height(&self) -> f64 {
@@ -318,7 +318,7 @@ impl Row {
 
     /// Returns the distance from the left edge to the text.
     fn text_left(&self) -> f64 {
-        if matches!(self.key, RowKey::Heading) { 0.0 } else { PATCH.0 + AFTER_PATCH }
+        if matches!(self.key, LegendKey::Heading) { 0.0 } else { PATCH.0 + AFTER_PATCH }
     }
 
     /// Returns the width of the room for the number of cells.
@@ -334,13 +334,13 @@ impl Row {
     fn draw(&self, canvas: &Canvas, place: Rect, y: f64) {
         let (left, right) = (place.left, place.left + PATCH.0);
         match self.key {
-            RowKey::Patch(color) => {
+            LegendKey::Patch(color) => {
                 let patch = Rect { left, top: y - PATCH.1 / 2.0, right, bottom: y + PATCH.1 / 2.0 };
                 canvas.fill(patch, color, 1.0);
                 canvas.outline(patch, 1.0);
             }
-            RowKey::Drawn(key) => draw_key(canvas, key, (left + (PATCH.0 - KEY) / 2.0, y)),
-            RowKey::Heading => {}
+            LegendKey::Drawn(key) => draw_key(canvas, key, (left + (PATCH.0 - KEY) / 2.0, y)),
+            LegendKey::Heading => {}
         }
         let text_left = left + self.text_left();
         // Rounding must not cut a text that fits.

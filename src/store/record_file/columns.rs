@@ -108,7 +108,7 @@ fn bytes_of(column: usize, strobes: usize) -> impl Iterator<Item = usize> {
     range_of(column, strobes).step_by(width).flat_map(move |number| (number..number + width).rev())
 }
 
-type Row = [u8; ROW];
+type RecordBytes = [u8; ROW];
 
 /// Returns a bit for each column that is stored, and the compressed columns. `strobes` is the number of entries of strobe states.
 pub(crate) fn encode(batch: &[(u32, Record)], strobes: usize) -> io::Result<(u32, Vec<u8>)> {
@@ -149,7 +149,7 @@ pub(crate) fn decode(mask: u32, cells: usize, strobes: usize, bytes: &[u8]) -> O
     Some(batch(&rows))
 }
 
-fn rows(batch: &[(u32, Record)]) -> Vec<Row> {
+fn rows(batch: &[(u32, Record)]) -> Vec<RecordBytes> {
     let mut before = 0;
     let row = |&(id, record): &(u32, Record)| {
         let mut row = [0; ROW];
@@ -162,9 +162,9 @@ fn rows(batch: &[(u32, Record)]) -> Vec<Row> {
     batch.iter().map(row).collect()
 }
 
-fn batch(rows: &[Row]) -> Vec<(u32, Record)> {
+fn batch(rows: &[RecordBytes]) -> Vec<(u32, Record)> {
     let mut before = 0;
-    let cell = |row: &Row| {
+    let cell = |row: &RecordBytes| {
         before = u32::wrapping_add(before, u32::from_le_bytes([row[0], row[1], row[2], row[3]]));
         (before, bytemuck::pod_read_unaligned(&row[ID..]))
     };

@@ -11,16 +11,16 @@ const SHORTEST: f64 = 1e-12;
 /// Largest number of steps of one integration.
 const MOST_STEPS: u32 = 100_000;
 
-/// Equations of motion of a state whose last entry is the time: the crate evaluates stage 12 at the wrong time (its table has 0 for
+/// The vector field of a state whose last entry is the time: the crate evaluates stage 12 at the wrong time (its table has 0 for
 /// `c_12 = 1`), which does not affect an autonomous system.
-struct Motion<F, W> {
+struct WatchedField<F, W> {
     /// Writes the derivative of a state.
     field: F,
     /// Receives each step and returns whether to stop there.
     watch: W,
 }
 
-impl<const N: usize, F, W> System<f64, SVector<f64, N>> for Motion<F, W>
+impl<const N: usize, F, W> System<f64, SVector<f64, N>> for WatchedField<F, W>
 where
     F: Fn(&[f64; N]) -> [f64; N],
     W: FnMut(f64, &[f64; N]) -> bool,
@@ -61,7 +61,7 @@ impl Integration {
             return Some(vec![(0.0, start), (duration, end)]);
         }
         let mut solver = Dop853::from_param(
-            Motion { field, watch },
+            WatchedField { field, watch },
             0.0,
             duration,
             self.samples.unwrap_or(duration),

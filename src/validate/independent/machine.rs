@@ -17,7 +17,7 @@ use super::dop853::Integration;
 use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Oscillator, Side, State};
 use rattlemap_dynamics::motion::EventKind;
 
-use system::{Constraints, Domain, Key, Numbers, Point, Row, Slide, System, affine, dot, size};
+use system::{Constraints, Domain, Functional, Key, Numbers, PhasePoint, Slide, System, affine, dot, size};
 
 /// Relative and absolute tolerance of one step.
 const TOLERANCE: f64 = 1e-12;
@@ -63,7 +63,7 @@ enum Ending {
 /// A function that falls below 0 at an ending.
 struct Watch {
     ending: Ending,
-    row: Row,
+    row: Functional,
     /// Order of the root with which the flight starts, or 0.
     order: usize,
 }
@@ -281,7 +281,7 @@ impl Flight {
     }
 
     /// Returns the force of the wall that the gap is behind, if this wall only pushes.
-    fn force(&self, gap: usize) -> Option<Row> {
+    fn force(&self, gap: usize) -> Option<Functional> {
         let level = self.gaps[gap].level;
         let side = side_of(level);
         let is_last = level != 0 && usize::from(level.unsigned_abs()) == self.system.walls(gap, side).len();
@@ -289,9 +289,9 @@ impl Flight {
     }
 
     /// Lists the functions that may end the present modes.
-    fn watches(&self, domain: &Domain, point: &Point) -> Vec<Watch> {
+    fn watches(&self, domain: &Domain, point: &PhasePoint) -> Vec<Watch> {
         let mut watches = Vec::new();
-        let mut add = |ending: Ending, row: Row, order: usize| {
+        let mut add = |ending: Ending, row: Functional, order: usize| {
             // A force that has just risen from 0 may be below it by rounding.
             let is_force = !matches!(ending, Ending::Reaches(..) | Ending::OnsetEnds(..));
             let rises = || {
@@ -453,8 +453,8 @@ impl Flight {
 }
 
 /// Returns the state after a short time.
-fn taylor(domain: &Domain, point: &Point, time: f64) -> Numbers {
-    let jet: [Point; TERMS] = domain.jet(point);
+fn taylor(domain: &Domain, point: &PhasePoint, time: f64) -> Numbers {
+    let jet: [PhasePoint; TERMS] = domain.jet(point);
     let of = |i: usize| {
         jet.iter().enumerate().rev().fold(0.0, |sum, (k, term)| term[i] + sum * time / (k + 1) as f64)
     };

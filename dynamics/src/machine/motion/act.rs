@@ -1,6 +1,6 @@
-//! What happens at the root of a watch: contacts, impacts, and their reports.
+//! Events at roots of watches: contacts, impacts, and their reports to observers.
 
-use super::Motion;
+use super::MachineMotion;
 use crate::machine::domain::STAYS_ZERO;
 use crate::machine::impact::{Impact, Outcome};
 use crate::machine::modes::{AtRest, GapMode, signed};
@@ -14,7 +14,7 @@ use crate::word;
 /// Order of the root of the distance when the gap leaves a rigid wall: its acceleration is zero, the derivative is not.
 pub(super) const RELEASE_ORDER: usize = 3;
 
-impl Motion<'_> {
+impl MachineMotion<'_> {
     /// Processes the root of a watch.
     pub(super) fn act(&mut self, watch: Watch, observer: &mut dyn Observer) {
         let mut exempt = AtRest::default();
@@ -79,7 +79,7 @@ impl Motion<'_> {
         self.roots.from_force[gap] = self.derivative_of_force(gap, side, 1).0;
     }
 
-    /// Returns order and value of the first derivative of a pushing wall's force that is not 0, as `Domain::first_derivative`.
+    /// Returns order and value of the first nonzero derivative of a pushing wall's force, like `LinearDomain::first_derivative`.
     pub(super) fn derivative_of_force(&mut self, gap: usize, side: Side, first: usize) -> (usize, f64) {
         let force = self.system.force(self.modes.stage, gap, side);
         self.refresh().first_derivative(&force, &self.point, first)
@@ -93,7 +93,7 @@ impl Motion<'_> {
         self.modes.gaps[gap] = next;
     }
 
-    /// Notes that a gap lies on the wall in a direction, and does not pass it.
+    /// Records that a gap lies on the wall in a direction, and does not pass it.
     pub(super) fn leave(&mut self, gap: usize, direction: Side) {
         let order = if self.rate(gap) != 0.0 { 1 } else { self.refresh().departure(gap, &self.point).0 };
         self.roots.at_wall[gap] = Some((direction, order));
@@ -118,7 +118,7 @@ impl Motion<'_> {
         let pressing =
             |motion: &mut Self| direction.sign() * motion.refresh().accelerations[gap].dot(&motion.point);
         if is_tiny && !wall.contact.is_elastic() && pressing(self) <= 0.0 {
-            // Impacts of two gaps in turn end here: both leave their walls from rest.
+            // A series of alternating impacts of two gaps ends here: both leave their walls from rest.
             self.point[self.system.n + gap] = 0.0;
             self.near_grazing = true;
             self.count_event();
@@ -158,7 +158,7 @@ impl Motion<'_> {
         }
     }
 
-    /// Notes the order of the root of a force at a flight's start.
+    /// Records the order of the root of a force at a flight's start.
     pub(super) fn start_from_force(&mut self, gap: usize, side: Side) {
         if self.system.pushing(gap, side).is_some() {
             self.roots.from_force[gap] = self.derivative_of_force(gap, side, 0).0;
@@ -224,7 +224,7 @@ impl Motion<'_> {
             (None, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
             (None, Some(Side::Left)) => Some(if side == Side::Left { b'5' } else { b'6' }),
         };
-        // With several gaps, a symbol tells its gap.
+        // With several gaps, a symbol includes its gap.
         let several = self.system.gaps() > 1;
         let symbol = symbol.map(|symbol| if several { word::of_gap(symbol, gap) } else { symbol });
         let n = self.system.n;

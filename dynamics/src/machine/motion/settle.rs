@@ -1,16 +1,16 @@
-//! Modes that forces decide: of friction, of gaps at rest, of contact onsets, and of walls that only push.
+//! Modes that depend on forces: those of friction, gaps at rest, contact onsets, and walls that only push.
 
-use super::Motion;
+use super::MachineMotion;
 use super::act::RELEASE_ORDER;
 use crate::machine::modes::{AtRest, GapMode, Modes};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
 use crate::motion::{EventKind, Observer};
 
-/// Decisions on elements at rest after one event.
+/// Largest number of decisions on elements at rest after one event.
 const MOST_DECISIONS: usize = 16;
 
-impl Motion<'_> {
+impl MachineMotion<'_> {
     /// Processes a sliding rate that vanishes.
     pub(super) fn end_sliding(&mut self, i: usize, observer: &mut dyn Observer) {
         let mut at_rest = self.at_rest();
@@ -19,7 +19,7 @@ impl Motion<'_> {
         let chosen = self.system.consistent(&self.modes, &at_rest, &self.point);
         let next = chosen.unwrap_or(self.modes);
         if next.slips[i] == before {
-            // The rate only touches 0, or begins on the wrong side of it.
+            // The rate only touches 0, or begins with the wrong sign.
             self.near_grazing = true;
             self.count_event();
             self.roots.from_rate[i] = self.slide_order(i);
@@ -88,7 +88,7 @@ impl Motion<'_> {
         at_rest
     }
 
-    /// Decides all modes anew that depend on forces, after a jump of forces or rates. `exempt` has just been decided.
+    /// Decides all modes that depend on forces again, after a jump of forces or rates. The modes in `exempt` have just been decided.
     pub(super) fn settle(&mut self, exempt: &AtRest, observer: &mut dyn Observer) {
         for _ in 0..MOST_DECISIONS {
             self.refresh();
@@ -113,7 +113,7 @@ impl Motion<'_> {
                 }
             }
         }
-        // A gap on its wall may have got another rate or acceleration.
+        // The rate or acceleration of a gap on its wall may have changed.
         for gap in 0..self.system.gaps() {
             if let Some((side, order)) = self.roots.at_wall[gap]
                 && (order < RELEASE_ORDER || self.rate(gap) != 0.0)
@@ -123,7 +123,7 @@ impl Motion<'_> {
         }
     }
 
-    /// Decides contact onsets and walls that only push anew. Returns whether a mode has changed.
+    /// Decides the modes of contact onsets and of walls that only push again. Returns whether a mode has changed.
     fn settle_pushing(&mut self, observer: &mut dyn Observer) -> bool {
         for gap in 0..self.system.gaps() {
             if self.roots.from_force[gap] > 0 {
@@ -160,7 +160,8 @@ impl Motion<'_> {
         false
     }
 
-    /// Enters other modes of elements at rest, and reports the changes: of friction first, if the rate of the element `stopped` vanished.
+    /// Enters new modes of elements at rest and reports the changes. Changes of friction come first if the element `stopped` has just
+    /// stopped sliding.
     pub(super) fn change_modes(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut dyn Observer) {
         if stopped.is_some() {
             self.change_slips(next, stopped, observer);
@@ -197,7 +198,7 @@ impl Motion<'_> {
         }
     }
 
-    /// Enters other modes of friction, and reports the changes.
+    /// Enters new modes of friction and reports the changes.
     fn change_slips(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut dyn Observer) {
         let before = std::mem::replace(&mut self.modes.slips, next.slips);
         for (i, (before, after)) in
@@ -220,7 +221,7 @@ impl Motion<'_> {
         }
     }
 
-    /// Enters a stage: what depends on forces is decided anew.
+    /// Enters a stage and decides the modes that depend on forces again.
     pub(super) fn enter_stage(&mut self, stage: usize, observer: &mut dyn Observer) {
         self.modes.stage = stage;
         self.before = self.point;

@@ -1,6 +1,6 @@
 //! Starts of motions.
 
-use super::Motion;
+use super::MachineMotion;
 use crate::machine::domain::Carrier;
 use crate::machine::modes::{AtRest, GapMode, Modes, signed};
 use crate::machine::watch::Roots;
@@ -10,19 +10,19 @@ use crate::motion::{Allowance, Clock, Work};
 use crate::motion::{Slip, Slips};
 
 /// Rounding error of a gap that lies on a wall, relative to the terms of the gap and the wall's position.
-const ON_WALL: f64 = 4.0 * f64::EPSILON;
+const GAP_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-impl<'s> Motion<'s> {
+impl<'s> MachineMotion<'s> {
     /// Starts at phase 0 in the state `(x1, v1, x2, v2, ...)`.
     ///
     /// A gap behind a wall with a force is in contact. A gap behind a rigid wall is moved by
     /// [`put_on_walls`](crate::model::Oscillator::put_on_walls).
-    pub fn new(system: &'s System, state: &[f64]) -> Motion<'s> {
+    pub fn new(system: &'s System, state: &[f64]) -> MachineMotion<'s> {
         let stage = system.machine.first_stage();
         let modes = Modes { stage, gaps: [GapMode::Beyond(0); MOST_GAPS], slips: Slips::default() };
         let begins_now = system.schedule.first().is_some_and(|change| change.0 == 0.0);
         let point = system.point(&system.to_flow(&system.machine.put_on_walls(state)), 0.0);
-        let mut motion = Motion {
+        let mut motion = MachineMotion {
             system,
             modes,
             entered: modes,
@@ -56,9 +56,9 @@ impl<'s> Motion<'s> {
 
     /// Starts from another state at phase 0, in the modes of this motion and with its remaining allowance. The state alone does not determine
     /// the modes: a gap just in front of a wall may be free or in a contact onset.
-    pub fn at(&self, state: &[f64], tangents: Vec<Numbers>) -> Motion<'s> {
+    pub fn at(&self, state: &[f64], tangents: Vec<Numbers>) -> MachineMotion<'s> {
         let system = self.system;
-        let mut started = Motion::new(system, state);
+        let mut started = MachineMotion::new(system, state);
         started.allowance = self.allowance();
         started.origin = self.origin;
         for gap in 0..system.gaps() {
@@ -92,7 +92,8 @@ impl<'s> Motion<'s> {
             let size: f64 = (0..n).map(|i| (row[i] * state[2 * i]).abs()).sum();
             for side in Side::BOTH {
                 for (number, wall) in system.walls(gap, side).iter().enumerate() {
-                    let is_on_wall = (self.point[gap] - wall.at).abs() <= ON_WALL * (size + wall.at.abs());
+                    let is_on_wall =
+                        (self.point[gap] - wall.at).abs() <= GAP_ROUNDING * (size + wall.at.abs());
                     let beyond = side.sign() * (self.point[gap] - wall.at);
                     if is_on_wall || beyond > 0.0 && wall.contact == Contact::Rigid {
                         self.point[gap] = wall.at;
@@ -114,7 +115,7 @@ impl<'s> Motion<'s> {
         let mut at_rest = AtRest::default();
         for (i, element) in system.elements.iter().enumerate() {
             let [rate, size] = element.rate_and_size(&self.point[n..]);
-            at_rest.elements[i] = rate.abs() <= ON_WALL * size;
+            at_rest.elements[i] = rate.abs() <= GAP_ROUNDING * size;
             self.modes.slips[i] = if at_rest.elements[i] { Slip::Stick } else { Slip::of(rate) };
             self.has_slid[i] = !at_rest.elements[i];
         }
@@ -141,7 +142,7 @@ impl<'s> Motion<'s> {
             let Some((side, _)) = self.roots.at_wall[gap] else { continue };
             let closing = side.sign() * self.rate(gap);
             if closing > 0.0 || closing == 0.0 && self.heads(gap, side) {
-                // A contact, at once.
+                // The motion starts with a contact.
                 self.roots.at_wall[gap] = None;
             } else {
                 self.leave(gap, side);

@@ -2,16 +2,16 @@
 
 use nalgebra::DMatrix;
 
-use super::Motion;
-use crate::machine::domain::{Carrier, Row};
+use super::MachineMotion;
+use crate::machine::domain::{Carrier, Functional};
 use crate::machine::watch::Watch;
-use crate::machine::{Numbers, Point, SIZE, System};
+use crate::machine::{Numbers, PhasePoint, SIZE, System};
 use crate::motion::NO_SPEED;
 
 /// Tangents larger than this or smaller than its inverse are rescaled.
 const LARGEST_TANGENT: f64 = 1e100;
 
-impl Motion<'_> {
+impl MachineMotion<'_> {
     /// Replaces the tangent vectors, which are in the coordinates `(x1, v1, x2, v2, ...)`.
     pub fn set_tangents(&mut self, tangents: Vec<Numbers>) {
         self.log_scale = 0.0;
@@ -63,7 +63,7 @@ impl Motion<'_> {
     }
 
     /// Applies `S u = R u + (f+ - R f-) (n . u) / (n . f-)` to every tangent vector.
-    pub(super) fn saltate(&mut self, watch: Watch, row: &Row, field: &Point) {
+    pub(super) fn saltate(&mut self, watch: Watch, row: &Functional, field: &PhasePoint) {
         let n = self.system.n;
         let jumps = std::mem::take(&mut self.jumps);
         let jump = |u: &[f64]| {
@@ -95,7 +95,7 @@ impl Motion<'_> {
         self.hold_tangents();
     }
 
-    /// Projects the tangents to the constraints: neighbouring motions rest, too.
+    /// Projects the tangents onto the constraints, because neighbouring motions rest, too.
     fn hold_tangents(&mut self) {
         for tangent in &mut self.tangents {
             for (entry, mode) in tangent.iter_mut().zip(self.modes.gaps).take(self.system.gaps()) {

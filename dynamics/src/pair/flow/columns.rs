@@ -5,8 +5,8 @@ use nalgebra::Matrix4;
 use wide::f64x4;
 
 use super::few::Few;
+use super::functional::{PairFunctional, power};
 use super::generator::Generator;
-use super::row::{Row, power};
 use super::{Gap, Phasor};
 
 /// Seven columns of `(z, w, x, v)`, one wide register each, the rotation of the phasor, and the higher harmonics.
@@ -84,16 +84,16 @@ impl Columns {
         self.waves.heap_bytes()
     }
 
-    pub(super) fn row(&self, i: usize) -> Row {
+    pub(super) fn row(&self, i: usize) -> PairFunctional {
         let wave = |wave: &Wave| (wave.order, wave.columns.map(|column| column.to_array()[i]));
-        Row {
+        PairFunctional {
             base: std::array::from_fn(|j| self.columns[j].to_array()[i]),
             waves: self.waves.iter().map(wave).collect(),
         }
     }
 
     /// Multiplies a row vector by the matrix.
-    pub(super) fn left(&self, row: &Row) -> Row {
+    pub(super) fn left(&self, row: &PairFunctional) -> PairFunctional {
         let of_state = &row.base;
         let along = |column: &f64x4| {
             let c = column.to_array();
@@ -108,7 +108,7 @@ impl Columns {
             let turned = turned(factors, wave.rotation);
             (order, [0, 1].map(|i| along(&wave.columns[i]) + turned[i]))
         };
-        Row { base: product, waves: self.waves.iter().zip(row.waves.iter()).map(wave).collect() }
+        PairFunctional { base: product, waves: self.waves.iter().zip(row.waves.iter()).map(wave).collect() }
     }
 
     /// Returns the product of two matrices whose row of the constant is zero.

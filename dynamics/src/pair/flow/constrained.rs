@@ -25,8 +25,8 @@ use nalgebra::Matrix4;
 
 use super::columns::Columns;
 use super::energy::EnergyBound;
+use super::functional::PairFunctional;
 use super::generator::{Generator, generator};
-use super::row::Row;
 use crate::model::{Pair, is_semidefinite};
 
 /// The motion of an oscillator whose gap rests on a rigid wall.
@@ -35,7 +35,7 @@ pub(super) struct ConstrainedMotion {
     /// Bound on all rates.
     pub(super) rate: f64,
     /// The row of `p`.
-    pub(super) pressing: Row,
+    pub(super) pressing: PairFunctional,
     mass: f64,
     /// Modulus of `k`.
     stiffness: f64,

@@ -10,8 +10,8 @@ use crate::model::{Domain, Pair};
 /// Energies below this may have lost digits by underflow of the squares.
 const LEAST_ENERGY: f64 = 1e-280;
 
-/// A bound on `|row . y^(n+1)|` over a step, for a row of displacements such as that of the gap, from the energy of `y^(n)` at its left end. It is scaled to be the remainder
-/// of a two-point Hermite quintic in Bernstein form.
+/// A bound on `|row . y^(n+1)|` over a step, from the energy of `y^(n)` at the start of the step. The row acts on displacements, like the
+/// row of the gap. The bound is scaled to the remainder of a two-point Hermite quintic in Bernstein form.
 ///
 /// The quintic through value, slope and curvature at both ends of a step `h` differs from the function by
 /// `u^3 (1-u)^3 h^6 f^(6) / 720`. The factor `u^3 (1-u)^3` is a twentieth of the middle Bernstein polynomial of

@@ -1,9 +1,8 @@
 //! The motion near any instant of a step, as a short Taylor polynomial.
 //!
-//! The grid stores the propagators of every sixteenth of the Taylor step, and of whole Taylor steps. One of each
-//! reaches within a thirty-second of any instant. From there eight terms of the Taylor series reach rounding, with
-//! some margin: `(1.6 * 0.035)^9 / 9! < 2e-17`. An event needs one such polynomial, both to find the root and for the
-//! state there.
+//! The grid stores the propagators of every sixteenth of the Taylor step, and of whole Taylor steps. One of each reaches within a
+//! thirty-second of any instant. From there eight terms of the Taylor series are exact within rounding: `(1.6 * 0.035)^9 / 9! < 2e-17`. An
+//! event needs one such polynomial, both to find the root and for the state there.
 
 use wide::f64x4;
 

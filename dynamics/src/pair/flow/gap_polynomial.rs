@@ -4,7 +4,7 @@ use wide::f64x4;
 
 use super::columns::Columns;
 use super::few::Few;
-use super::row::{Row, power};
+use super::functional::{PairFunctional, power};
 use super::{Gap, Phasor};
 use crate::pair::certificate::Bernstein;
 
@@ -20,10 +20,14 @@ pub(crate) type GapWave = (u32, [[f64x4; 2]; 2]);
 
 impl GapPolynomial {
     /// Builds the matrix, and the higher harmonics, from the propagator of a step `h`, minus the identity, and the row of `z''`.
-    pub(super) fn new(propagator: &Columns, curvature: &Row, h: f64) -> (GapPolynomial, Few<GapWave>) {
+    pub(super) fn new(
+        propagator: &Columns,
+        curvature: &PairFunctional,
+        h: f64,
+    ) -> (GapPolynomial, Few<GapWave>) {
         let slope = [0.0, h, 0.0, 0.0, 0.0, 0.0, 0.0];
         let scaled = |(order, factors): &(u32, [f64; 2])| (*order, factors.map(|x| h * h * x));
-        let bend = Row {
+        let bend = PairFunctional {
             base: curvature.base.map(|x| h * h * x),
             waves: curvature.waves.iter().map(scaled).collect(),
         };

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::displacement_matrix;
-use super::row::Row;
+use super::functional::PairFunctional;
 use crate::model::{Domain, Harmonic, Pair};
 
 /// A generator of `a = (z, w, x, v, cos, sin, 1)` and of the phasors of higher harmonics.
@@ -25,20 +25,20 @@ pub(super) struct ForceWave {
 
 impl Generator {
     /// Returns a row of the matrix.
-    pub(super) fn row(&self, i: usize) -> Row {
+    pub(super) fn row(&self, i: usize) -> PairFunctional {
         let factors = |wave: &ForceWave| match i {
             1 => wave.gap,
             3 => wave.other,
             _ => [0.0; 2],
         };
-        Row {
+        PairFunctional {
             base: std::array::from_fn(|j| self.matrix[(i, j)]),
             waves: self.waves.iter().map(|wave| (wave.order, factors(wave))).collect(),
         }
     }
 
     /// Multiplies a row by the matrix, from the left: the derivative of the row's product with `a`.
-    pub(super) fn derivative(&self, row: &Row) -> Row {
+    pub(super) fn derivative(&self, row: &PairFunctional) -> PairFunctional {
         let omega = self.matrix[(5, 4)];
         let base = SMatrix::<f64, 1, 7>::from(row.base) * self.matrix;
         let wave = |(&(order, [cos, sin]), wave): (&(u32, [f64; 2]), &ForceWave)| {
@@ -46,7 +46,7 @@ impl Generator {
             let forced = |part: usize| row.base[1] * wave.gap[part] + row.base[3] * wave.other[part];
             (order, [forced(0) + rate * sin, forced(1) - rate * cos])
         };
-        Row {
+        PairFunctional {
             base: std::array::from_fn(|j| base[j]),
             waves: row.waves.iter().zip(self.waves.iter()).map(wave).collect(),
         }
@@ -84,7 +84,7 @@ pub(super) fn generator(oscillator: &Pair, domain: &Domain) -> Generator {
     Generator { matrix: g, waves: oscillator.harmonics.iter().map(wave).collect() }
 }
 
-/// Returns a bound on all rates of the domain: of the forcing, and of the mass-scaled system by its norm.
+/// Returns a bound on the rates of the forcing and of the domain. Norms of the mass-scaled matrices bound the rates of the domain.
 pub(super) fn rate(oscillator: &Pair, domain: &Domain) -> f64 {
     let norm = |m: [[f64; 2]; 2]| oscillator.mass_scaled(m).symmetric_eigenvalues().abs().max();
     let damping = norm(domain.dissipation()) + gyroscopic_rate(oscillator, domain);

@@ -8,9 +8,9 @@ use super::constrained::ConstrainedMotion;
 use super::energy::EnergyBound;
 use super::expansion::{FINEST_PART, Grid};
 use super::few::Few;
+use super::functional::PairFunctional;
 use super::gap_polynomial::{GapPolynomial, GapWave};
 use super::generator::{Generator, generator, rate};
-use super::row::Row;
 use super::short_flight::ShortFlight;
 use super::taylor::{RADIUS, partial_sum, taylor_table};
 use super::{Gap, Phasor};
@@ -79,7 +79,7 @@ pub struct LinearFlow {
     field: Columns,
     /// Rows of `z'', z''', z''''` on `a`. For motion on a rigid wall: rows of the acceleration that the wall cancels,
     /// and of its first two derivatives.
-    gap_rates: [Row; 3],
+    gap_rates: [PairFunctional; 3],
     /// Bound on `z^(6)`, for the gap itself; zero for motion on a rigid wall.
     pub(crate) gap_bound: EnergyBound,
     /// Bound on the sixth derivative of [`acceleration`](Self::acceleration).
@@ -113,7 +113,7 @@ impl LinearFlow {
         LinearFlow::assemble(oscillator, generator, rate, pressing, bounds)
     }
 
-    /// Returns the bound on `row . y^(n+1)` in a domain, which must be the one of this flow.
+    /// Returns the bound on `row . y^(n+1)` in a domain, which must be the domain of this flow.
     pub(super) fn energy_bound(
         &self,
         oscillator: &Pair,
@@ -124,8 +124,8 @@ impl LinearFlow {
         EnergyBound::new(oscillator, domain, row, &self.table[n as usize - 1], n, self.unit)
     }
 
-    /// Builds the flow of a gap at rest on a rigid wall, while the other displacement moves. Its
-    /// [`acceleration`](Self::acceleration) is the one that the wall cancels.
+    /// Builds the flow of a gap at rest on a rigid wall, while the other displacement moves. Its [`acceleration`](Self::acceleration) is
+    /// the acceleration that the wall cancels.
     pub(super) fn on_rigid_wall(oscillator: &Pair, kick: f64) -> LinearFlow {
         let motion = ConstrainedMotion::new(oscillator, kick);
         let bounds = |table: &[Columns], unit: f64| [EnergyBound::NONE, motion.bound(&table[4], unit)];
@@ -138,7 +138,7 @@ impl LinearFlow {
         oscillator: &Pair,
         generator: Generator,
         rate: f64,
-        pressing: Row,
+        pressing: PairFunctional,
         bounds: impl Fn(&[Columns], f64) -> [EnergyBound; 2],
     ) -> LinearFlow {
         let unit = RADIUS / rate;
@@ -196,7 +196,7 @@ impl LinearFlow {
         self.field.apply(q, phasor).to_array()
     }
 
-    /// Returns the relative acceleration `w' = z''`; for motion on a rigid wall, the one that the wall cancels.
+    /// Returns the relative acceleration `w' = z''`; for motion on a rigid wall, the acceleration that the wall cancels.
     #[inline]
     pub fn acceleration(&self, q: &Gap, phasor: &Phasor) -> f64 {
         self.gap_rates[0].dot(q, phasor)
@@ -209,12 +209,12 @@ impl LinearFlow {
     }
 
     /// Returns the row of [`acceleration`](Self::acceleration).
-    pub(crate) fn acceleration_row(&self) -> &Row {
+    pub(crate) fn acceleration_row(&self) -> &PairFunctional {
         &self.gap_rates[0]
     }
 
     /// Returns the row of the second displacement's acceleration.
-    pub(crate) fn second_acceleration_row(&self) -> Row {
+    pub(crate) fn second_acceleration_row(&self) -> PairFunctional {
         self.generator.row(3)
     }
 

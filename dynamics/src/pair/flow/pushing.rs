@@ -5,7 +5,7 @@ use super::{Gap, LinearFlow, Phasor, Step};
 use crate::model::{Contact, Domain, Pair, Side};
 use crate::pair::certificate::Bernstein;
 
-/// The force of spring, damper and preload of a wall that only pushes, as long as spring and damper may move freely.
+/// The signed force `N` of spring, damper and preload of a wall that only pushes, before it is limited to positive values.
 ///
 /// ```text
 /// N = stiffness s (z - wall) + damping s w + preload,   s = +1 right, -1 left
@@ -25,8 +25,8 @@ pub(crate) struct PushingForce {
 }
 
 impl PushingForce {
-    /// Builds the force of a wall, given the flows in front of it and behind it. Returns none if the wall may pull, and if it never
-    /// would, because it has neither a damper nor a preload.
+    /// Builds the force of a wall, given the flows in front of it and behind it. Returns none if the wall may pull, or if it never pulls
+    /// because it has neither a damper nor a preload.
     pub(super) fn new(oscillator: &Pair, side: Side, flows: [&LinearFlow; 2]) -> Option<PushingForce> {
         let [stiffness, damping] = oscillator.wall_stiffness_and_damping(side);
         let (wall, preload) = (oscillator.walls[side.index()], oscillator.preload(side));

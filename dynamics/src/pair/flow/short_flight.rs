@@ -1,23 +1,22 @@
 //! Short flights from a wall, whose Taylor series proves when they end.
 //!
-//! The distance from the wall is `z(v) = v P(v)`, `v` in Taylor steps. Up to an eighth of a Taylor step, twelve terms
-//! reach rounding, in the speeds, too: `0.2^12 / 12! < 1e-17`. If the second coefficient outweighs all later ones,
-//! the gap is accelerated towards the wall until the root of `P`. Then that root is the first return, and the contact
-//! is pressed until then.
+//! The distance from the wall is `z(v) = v P(v)`, `v` in Taylor steps. Up to an eighth of a Taylor step, twelve terms are exact within
+//! rounding for displacements and speeds: `0.2^12 / 12! < 1e-17`. If the second coefficient outweighs all later ones, the gap is
+//! accelerated towards the wall until the root of `P`. Then that root is the first return, and the contact is pressed until then.
 
 use wide::f64x4;
 
 use super::columns::Columns;
 use super::few::Few;
-use super::row::{Row, power};
+use super::functional::{PairFunctional, power};
 use super::{Gap, Phasor};
 use crate::fused::fma;
 
 /// Registers that hold the coefficients of one series.
-const WIDTH: usize = 3;
+const SERIES_REGISTERS: usize = 3;
 
 /// Coefficients of one series.
-type Series = [f64x4; WIDTH];
+type Series = [f64x4; SERIES_REGISTERS];
 
 /// Duration of the longest short flight, in Taylor steps.
 pub(crate) const LONGEST_SHORT_FLIGHT: f64 = 0.125;
@@ -42,7 +41,7 @@ const TURNING: Series =
     weights([[0.0, 0.0, 6.0, 12.0], [20.0, 30.0, 42.0, 56.0], [72.0, 90.0, 110.0, 132.0]]);
 const GAIN: Series = weights([[0.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0], [9.0, 10.0, 11.0, 12.0]]);
 
-const fn weights(w: [[f64; 4]; WIDTH]) -> Series {
+const fn weights(w: [[f64; 4]; SERIES_REGISTERS]) -> Series {
     [f64x4::new(w[0]), f64x4::new(w[1]), f64x4::new(w[2])]
 }
 
@@ -50,9 +49,9 @@ const fn weights(w: [[f64; 4]; WIDTH]) -> Series {
 /// displacement.
 #[derive(Clone, Debug)]
 pub(crate) struct ShortFlight {
-    columns: [[f64x4; 2 * WIDTH]; 7],
+    columns: [[f64x4; 2 * SERIES_REGISTERS]; 7],
     /// Orders of the higher harmonics, and the columns of their `cos` and `sin`.
-    waves: Few<(u32, [[f64x4; 2 * WIDTH]; 2])>,
+    waves: Few<(u32, [[f64x4; 2 * SERIES_REGISTERS]; 2])>,
 }
 
 /// The changes of the gap and of the second displacement, in powers of the time in Taylor steps.
@@ -89,10 +88,10 @@ impl Powers {
 impl ShortFlight {
     /// Builds the matrix from the Taylor table.
     pub(super) fn new(table: &[Columns]) -> ShortFlight {
-        let rows: Vec<[Row; 2]> = table.iter().map(|term| [term.row(0), term.row(2)]).collect();
-        let column = |of: &dyn Fn(&Row) -> f64| {
+        let rows: Vec<[PairFunctional; 2]> = table.iter().map(|term| [term.row(0), term.row(2)]).collect();
+        let column = |of: &dyn Fn(&PairFunctional) -> f64| {
             std::array::from_fn(|i| {
-                let quad = |n: usize| of(&rows[4 * (i % WIDTH) + n][i / WIDTH]);
+                let quad = |n: usize| of(&rows[4 * (i % SERIES_REGISTERS) + n][i / SERIES_REGISTERS]);
                 f64x4::from(std::array::from_fn::<f64, 4, _>(quad))
             })
         };
@@ -126,9 +125,9 @@ impl ShortFlight {
     /// Returns the part of the higher harmonics in both series.
     #[cold]
     #[inline(never)]
-    fn waved(&self, cos: f64, sin: f64) -> [f64x4; 2 * WIDTH] {
+    fn waved(&self, cos: f64, sin: f64) -> [f64x4; 2 * SERIES_REGISTERS] {
         let phasor = [cos, sin];
-        self.waves.iter().fold([f64x4::ZERO; 2 * WIDTH], |sum, (order, [cos, sin])| {
+        self.waves.iter().fold([f64x4::ZERO; 2 * SERIES_REGISTERS], |sum, (order, [cos, sin])| {
             let [c, s] = power(&phasor, *order).map(f64x4::splat);
             std::array::from_fn(|i| sum[i] + cos[i].mul_add(c, sin[i] * s))
         })

@@ -38,14 +38,14 @@ impl Random {
     }
 }
 
-/// What a random model has beside a plain one.
+/// Features of a random model that a plain one lacks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shape {
     pub(crate) harmonics: bool,
     pub(crate) stages: bool,
     /// Further walls behind elastic ones.
     pub(crate) walls: bool,
-    /// Elastic walls with a preload, of which most only push.
+    /// Elastic walls with a preload. Most of them only push.
     pub(crate) pushing: bool,
     /// Dry friction, and sometimes no walls.
     pub(crate) friction: bool,

@@ -1,27 +1,28 @@
-//! What happens at events of a machine.
+//! Changes of modes, state and tangents at events of a machine.
 
 use rattlemap_dynamics::model::{Contact, Side};
 
 use super::motion::{End, Event, Gap, Mode, Motion, What, side_of, step_of};
-use super::system::{Grip, Linear, Matrix, ROUNDING, Row, Vector};
+use super::system::{Functional, Grip, Linear, Matrix, ROUNDING, Vector};
 
 /// Height of flights, in scales of length, that end a series of impacts.
 const LOWEST_FLIGHT: f64 = 1e-13;
 
-/// Number of events at one time, in forcing periods, after which an impact shows that impacts of several gaps follow each other without end.
+/// After this number of simultaneous events, an impact shows that impacts of several gaps follow each other without end.
 const CROWD: usize = 4;
 const AT_ONCE: f64 = 1e-10;
 
 /// Relative rounding error of a rate that an impact has made zero.
 const SMALL: f64 = 1e-14;
 
-/// Derivative of the state after an event by that before it at a fixed time, and the row that is constant where the event lies.
-type Saltation = (Matrix, Row);
+/// Derivative of the state after an event with respect to the state before it, at a fixed time, and the functional that is constant at the
+/// event.
+type Saltation = (Matrix, Functional);
 
-/// The change of velocities in a joint impact: for a change of the gap's rate by 1, with the gaps that rest on.
+/// The change of velocities in a joint impact that changes the gap's rate by 1.
 struct Joint {
     change: Vector,
-    /// Gaps that walls release, with the sides of these.
+    /// Gaps that leave their walls, with the sides of these walls.
     released: Vec<(usize, Side)>,
 }
 
@@ -103,9 +104,9 @@ impl Motion<'_> {
         self.gaps.iter().map(of).collect()
     }
 
-    /// Decides about all that is at rest, ends contacts that are not pressed, and records what the elements do then. They did `before`,
-    /// and the element `cause` has come to rest or has begun to slip. `was_stuck` and `was_still` are the gaps that were at rest. Forces of
-    /// walls that only push may have jumped.
+    /// Decides the modes of everything at rest, ends contacts that are not pressed, and records changes of friction. `before` has the
+    /// earlier modes of friction. The element `cause` has come to rest or has begun to slip. `was_stuck` and `was_still` are the gaps that
+    /// were at rest. Forces of walls that only push may have jumped.
     fn settle(
         &mut self,
         before: &[Grip],
@@ -151,7 +152,7 @@ impl Motion<'_> {
             if after != Grip::Stick && after != before && (before == Grip::Stick || cause == Some(i)) {
                 let symbol = if before == Grip::Stick { b'7' } else { b'0' };
                 self.slips.push((symbol, self.time()));
-                // The cause of an event of a gap comes before it.
+                // The symbol of the cause comes before that of the gap.
                 let at = if is_of_gap && cause == Some(i) { first } else { self.symbols.len() };
                 self.symbols.insert(at, symbol);
             }
@@ -159,7 +160,7 @@ impl Motion<'_> {
         self.project();
     }
 
-    /// Opens or closes the contact with a wall that only pushes by the sign of its force.
+    /// Opens or closes the contact with a wall that only pushes, according to the sign of its force.
     fn push(&mut self, i: usize) {
         let mode = self.gaps[i].mode;
         if self.gaps[i].is_unloaded || !matches!(mode, Mode::Plain | Mode::Open) || self.pushing(i).is_none()
@@ -183,8 +184,8 @@ impl Motion<'_> {
         }
     }
 
-    /// Chooses the first consistent modes of all that is at rest: for walls holding before releasing, for friction sticking before a
-    /// positive and a negative rate. The first gap or element changes last.
+    /// Chooses the first consistent modes of everything at rest. Walls first hold, then release; friction first sticks, then slides
+    /// forward, then backward. The modes of the first gap or element vary slowest.
     pub(super) fn decide(&mut self) {
         let stuck = self.stuck();
         let walls: Vec<(usize, Side)> = (0..stuck.len()).filter_map(|i| Some((i, stuck[i]?))).collect();
@@ -224,7 +225,7 @@ impl Motion<'_> {
     }
 
     fn is_wall_consistent(&self, linear: &Linear, i: usize, side: Side) -> bool {
-        let tends = |row: &Row| side.sign() * linear.tendency(row, &self.y);
+        let tends = |row: &Functional| side.sign() * linear.tendency(row, &self.y);
         match self.gaps[i].mode {
             Mode::Stuck(_) => tends(&linear.pressing[i]) > 0.0,
             _ => linear.is_still[i] || tends(&linear.acceleration[i]) <= 0.0,
@@ -250,8 +251,8 @@ impl Motion<'_> {
         !linear.is_still[i] && side.sign() * linear.tendency(&linear.acceleration[i], &self.y) > 0.0
     }
 
-    /// Gaps begin to move that friction has held. A gap on a wall may be pressed to the wall: contact with it begins, and on a rigid wall the
-    /// gap rests on.
+    /// Releases gaps that friction has held. If the wall of such a gap presses it, contact begins, and on a rigid wall the gap stays at
+    /// rest.
     fn loosen(&mut self, before: &[Grip], was_still: &[bool]) {
         for i in (0..self.gaps.len()).filter(|&i| was_still[i]) {
             let linear = self.linear();
@@ -292,8 +293,8 @@ impl Motion<'_> {
         }
     }
 
-    /// Whether the value of a row of velocities is not zero but for rounding.
-    fn has_rate(&self, row: &Row) -> bool {
+    /// Whether the rate along a row exceeds rounding errors.
+    fn has_rate(&self, row: &Functional) -> bool {
         self.of(row).abs() > ROUNDING * self.size_of_rate(row)
     }
 
@@ -304,7 +305,7 @@ impl Motion<'_> {
         (gap.mode, gap.leaves) = (Mode::Plain, Some((direction.mirrored(), 1)));
     }
 
-    /// A gap reaches a wall. Returns the change of tangents at a fixed time, if the field jumps.
+    /// Processes a gap that reaches a wall. Returns the change of tangents at a fixed time, if the field jumps.
     fn cross(&mut self, i: usize, direction: Side, at_start: bool) -> Option<Matrix> {
         let (side, nth) = self.next_wall(i, direction).expect("a wall");
         let closing = self.rate(i, direction);
@@ -339,8 +340,8 @@ impl Motion<'_> {
         }
     }
 
-    /// Returns the joint impact of a gap with a wall. Gaps at rest on rigid walls rest on if this needs a push of their walls, and the gaps of
-    /// `keep` in any case.
+    /// Returns the joint impact of a gap with a wall. A gap on a rigid wall stays at rest if its wall must push for this, or if it is in
+    /// `keep`.
     fn joint(&self, i: usize, side: Side, keep: &[usize]) -> Joint {
         let (machine, stuck) = (&self.system.machine, self.stuck());
         let walls: Vec<(usize, Side)> = (0..stuck.len()).filter_map(|j| Some((j, stuck[j]?))).collect();
@@ -351,7 +352,7 @@ impl Motion<'_> {
             let rows: Vec<&Vector> =
                 held.iter().map(|&j| &machine.gaps[walls[j].0].row).chain([hit]).collect();
             let change = self.system.bonds(&rows).pop().expect("the gap").0;
-            // The impulses of the walls: the rate of the gap changes towards the inside, and those of held gaps do not.
+            // Impulses of the walls: they change the gap's rate towards the inside and do not change the rates of held gaps.
             let all = Matrix::from_columns(&rows.iter().map(|row| (*row).clone()).collect::<Vec<_>>());
             let mobility = all.transpose() * &self.system.per_mass * &all;
             let mut rates = Vector::zeros(rows.len());
@@ -374,7 +375,7 @@ impl Motion<'_> {
         panic!("one set of walls pushes")
     }
 
-    /// An impact, of which contact may remain. Returns the change of tangents at a fixed time.
+    /// Processes an impact, after which contact may last. Returns the change of tangents at a fixed time.
     fn impact(&mut self, i: usize, side: Side, nth: usize, closing: f64) -> Matrix {
         let (n, system) = (self.system.degrees, self.system);
         let (gap, s) = (&system.machine.gaps[i], side.sign());
@@ -422,7 +423,7 @@ impl Motion<'_> {
                     after(self, &joint, e, Mode::Plain);
                 }
             }
-            // Gaps that begin a flight which is too low rest on, or impacts of two gaps in turn could be infinitely many.
+            // Gaps whose flight would be too low stay at rest; otherwise impacts of two gaps could alternate for ever.
             let linear = self.linear();
             let low = joint
                 .released
@@ -476,7 +477,7 @@ impl Motion<'_> {
 
     /// Applies the derivative of an event to the tangents. The event lies where `row y` is constant; `before` is the field before it,
     /// and state and modes are those after it.
-    fn jump(&mut self, reset: &Matrix, row: &Row, before: &Vector) {
+    fn jump(&mut self, reset: &Matrix, row: &Functional, before: &Vector) {
         if self.tangents.is_none() {
             return;
         }
@@ -487,7 +488,7 @@ impl Motion<'_> {
         self.tangents = self.tangents.take().map(|tangents| saltation * tangents);
     }
 
-    /// Contact ends, and the gap moves without its last wall.
+    /// Ends contact: the gap then moves without its last wall.
     fn ends(&mut self, i: usize, side: Side) {
         self.record(i, What::Ends, side);
         (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Plain, None);

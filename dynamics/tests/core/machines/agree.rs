@@ -22,13 +22,13 @@ const DERIVATIVE_OFF: f64 = 1e-7;
 /// Largest difference of times, in forcing periods.
 const TIME_OFF: f64 = 1e-9;
 
-/// Rounding errors may have this multiple of the effect of known errors.
+/// Allowed effect of rounding errors, as a multiple of the effect of the known errors.
 const NOISES: f64 = 20.0;
 
-/// What is compared.
+/// Limits of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Size of derivatives to which their errors are relative, if they are smaller. They are 0 but for rounding when everything rests.
+    /// Least size that errors of derivatives are relative to. When everything rests, derivatives are only rounding errors.
     least_derivative: f64,
     /// Motions in which known errors have a larger effect are not compared further.
     most_noise: f64,
@@ -37,7 +37,7 @@ pub(crate) struct Limits {
 const MACHINES: Limits = Limits { least_derivative: 1e-6, most_noise: 1e-9 };
 pub(crate) const ONE_GAP: Limits = Limits { least_derivative: 1.0, most_noise: 1e-7 };
 
-/// The integrator with several steps and errors.
+/// The integrator with two lengths of steps, and with known errors.
 struct Ours<'a> {
     limits: Limits,
     motion: Motion<'a>,
@@ -60,7 +60,7 @@ impl Follower for Motion<'_> {
     }
 }
 
-/// Largest differences and numbers of what is compared.
+/// Largest differences, and numbers of compared periods and events.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Found {
     pub(crate) state: f64,
@@ -86,8 +86,8 @@ impl Ours<'_> {
         period.derivative.amax().max(self.limits.least_derivative)
     }
 
-    /// Advances by a period. Returns it with the effects of errors on state and derivative and the events with other steps, or none if
-    /// they are too large.
+    /// Advances by a period. Returns the period, the same period with other steps, and the effects of errors on state and derivative; none
+    /// if these are too large.
     fn advance(&mut self, omega: f64) -> Option<(Period, Period, [f64; 2])> {
         let (ours, other) =
             (Follower::advance(&mut self.motion).ok()?, Follower::advance(&mut self.other).ok()?);
@@ -99,7 +99,7 @@ impl Ours<'_> {
         let size = self.size(&ours);
         let of_derivative = (&ours.derivative - &other.derivative).amax() / size;
         let most = self.limits.most_noise;
-        // Derivatives in which errors of 1e-13 grow to this effect end a comparison, too.
+        // A comparison also ends if derivatives let errors of 1e-13 grow to this effect.
         (noise <= most && size <= most / 1e-13 && !self.motion.is_crowded).then_some((
             ours,
             other,

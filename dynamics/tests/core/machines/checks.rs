@@ -22,13 +22,13 @@ fn by_gap(events: &[Event], gaps: usize) -> Vec<Vec<(What, Side, Option<u8>)>> {
     (0..gaps).map(of).collect()
 }
 
-/// Largest effect of errors of velocities by 1e-13 at events, relative to the state, in motions that are compared.
+/// Motions are compared only if velocity errors of 1e-13 at events change the state by less than this, relative to the state.
 const MOST_NOISE: f64 = 1e-11;
 
 /// Largest difference of states with other steps or coordinates.
 const STEPS_OFF: f64 = 3e-11;
 
-/// Rounding errors may have this multiple of the effect of known errors.
+/// Allowed effect of rounding errors, as a multiple of the effect of the known errors.
 const NOISES: f64 = 20.0;
 
 /// Compares motions with larger and smaller steps.
@@ -117,7 +117,7 @@ fn check_derivatives(seeds: std::ops::Range<u64>) {
         let Some((_, Some(exact), what)) = image(0, 0.0) else { return Ok((found, 0.0)) };
         let (size, mut worst) = (exact.amax().max(1.0), 0.0f64);
         for i in 0..2 * n {
-            // A motion with steep turns needs small differences, and one that rounding errors grow in needs large ones.
+            // A strongly curved motion needs small differences. A motion that amplifies rounding errors needs large ones.
             let off = |h: f64| {
                 let [above, below] = [image(i, h / size)?, image(i, -h / size)?];
                 let is_same = above.2 == what && below.2 == what;
@@ -223,11 +223,11 @@ const SHAPES: [Shape; 5] = [
     Shape { friction: true, walls: true, stages: true, pushing: true, ..PLAIN },
 ];
 
-/// Largest effect of errors of velocities at events in motions of machines side by side that are compared.
+/// The limit [`MOST_NOISE`] for machines side by side.
 const MOST_PART_NOISE: f64 = 1e-9;
 
-/// Compares the part of a motion from a gap on with the motion of a machine with this gap alone, over a period. `noise` is the effect of
-/// errors.
+/// Compares the events of a gap in a joint motion, and the state of its part, with the motion of its machine alone. `noise` is the effect
+/// of known errors.
 fn same_as_alone(
     ours: &Motion,
     gap: usize,

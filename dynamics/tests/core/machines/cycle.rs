@@ -19,7 +19,7 @@ const CLOSES: f64 = 1e-12;
 /// Distance from a cycle, relative to the size of the motion, at which a motion has the modes of the cycle.
 pub(crate) const SETTLED: f64 = 1e-4;
 
-/// Cycles after which the modes at phase 0 must be those of the cycle.
+/// Number of cycles after which the modes at phase 0 must agree with the modes of the cycle.
 const MOST_CYCLES: u32 = 50;
 
 /// Distance in forcing periods at which events of two gaps count as simultaneous: their order is arbitrary then.
@@ -28,11 +28,11 @@ const AT_ONCE: f64 = 1e-9;
 /// State and modes at phase 0.
 type Strobe = (Vec<f64>, Vec<Mode>, Vec<Grip>);
 
-/// What is known of a cycle.
+/// Properties of a cycle.
 #[derive(Clone, Debug)]
 pub(crate) struct Cycle {
     pub(crate) strobes: Vec<Strobe>,
-    /// Largest modulus of a multiplier, without those of elements that stick for ever.
+    /// Largest modulus of the multipliers, except multipliers of elements that stick for ever.
     pub(crate) radius: f64,
     /// None if events of two gaps are simultaneous.
     pub(crate) word: Option<Word>,
@@ -41,7 +41,7 @@ pub(crate) struct Cycle {
     pub(crate) meshes: f64,
     /// Distance of the end from the start, relative to the size of the motion.
     pub(crate) off: f64,
-    /// Largest distance of a motion with larger rounding errors at phase 0.
+    /// Largest distance at phase 0 of a motion with larger rounding errors.
     pub(crate) noise: f64,
 }
 

@@ -19,7 +19,7 @@ const STROBE_OFF: f64 = 1e-10;
 /// Largest difference of the moduli of largest multipliers, per forcing period of the cycle.
 const MULTIPLIER_OFF: f64 = 1e-7;
 
-/// Rounding errors may have this multiple of the effect of known errors.
+/// Allowed effect of rounding errors, as a multiple of the effect of the known errors.
 const NOISES: f64 = 20.0;
 
 /// Cycles on which known errors have a larger effect are not compared.
@@ -28,14 +28,14 @@ const MOST_NOISE: f64 = 1e-9;
 /// Forcing periods within which a motion must settle to be compared.
 const MOST_PERIODS: usize = 250;
 
-/// How a cycle of the program compares.
+/// Result of the comparison for a cycle of the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Agreement {
     /// It is a cycle with the same multiplier and word, and the other motion settles on it.
     Cycle,
     /// It is a cycle with the same multiplier and word, but the other motion does not settle on it in time.
     Unsettled,
-    /// The program finds no cycle, or errors decide it.
+    /// The program finds no cycle, or the effect of errors is too large.
     NotCompared,
 }
 

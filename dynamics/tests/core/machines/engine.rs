@@ -1,10 +1,10 @@
-//! The program's motions, in the terms of the comparison.
+//! Adapts the program's motions to the interface of the comparison.
 
 use nalgebra::DMatrix;
 
 use super::motion::Event;
 
-/// What a motion does in a forcing period.
+/// Events and final state of a motion in one forcing period.
 #[derive(Clone, Debug)]
 pub(crate) struct Period {
     /// Events of gaps in order, with times from the start of the motion.
@@ -13,11 +13,11 @@ pub(crate) struct Period {
     pub(crate) slips: Vec<(u8, f64)>,
     /// `(x1, v1, x2, v2, ...)` at the end of the period.
     pub(crate) state: Vec<f64>,
-    /// Its derivative by the state at the start of the motion.
+    /// Derivative of this state with respect to the start of the motion.
     pub(crate) derivative: DMatrix<f64>,
 }
 
-/// Advances a motion by a period, or says why it ends.
+/// Advances a motion by a period, or returns the reason why it ends.
 pub(crate) trait Follower {
     fn advance(&mut self) -> Result<Period, String>;
 }
@@ -25,7 +25,7 @@ pub(crate) trait Follower {
 /// The program's motions of machines, and of models with one gap. Names and signatures of the program occur only here.
 pub(crate) mod program {
     use nalgebra::DMatrix;
-    use rattlemap_dynamics::machine::{Motion, System};
+    use rattlemap_dynamics::machine::{MachineMotion, System};
     use rattlemap_dynamics::model::{Law, Oscillator, Side, State};
     use rattlemap_dynamics::motion::{EventKind, Flow, GapEvent, Observer, SlipEvent, States, Trajectory};
 
@@ -33,7 +33,7 @@ pub(crate) mod program {
     use super::{Follower, Period};
 
     pub(crate) struct Engine<'a> {
-        motion: Motion<'a>,
+        motion: MachineMotion<'a>,
         degrees: usize,
         period: f64,
         several: bool,
@@ -72,8 +72,8 @@ pub(crate) mod program {
 
     impl<'a> Engine<'a> {
         pub(crate) fn new(system: &'a System, machine: &Oscillator, start: &[f64]) -> Engine<'a> {
-            let mut motion = Motion::new(system, start);
-            motion.set_tangents(Motion::unit_tangents(system));
+            let mut motion = MachineMotion::new(system, start);
+            motion.set_tangents(MachineMotion::unit_tangents(system));
             let several = machine.gaps.len() > 1;
             Engine { motion, degrees: machine.degrees(), period: machine.period(), several }
         }

@@ -20,7 +20,7 @@ fn block(square: f64, force: f64, omega: f64, friction: f64, speed: f64) -> Rubb
     Rubbing { pair: Linear { gamma: 0.0, square, force, load: 0.0, omega }.oscillator(), friction }
 }
 
-/// Returns the system of an oscillator with impacts that take all energy.
+/// Returns the system of an oscillator with plastic impacts.
 fn system(o: &Rubbing) -> System {
     System::new(&o.described(Law::both(0.0, 0.0)), ANGLE)
 }
@@ -72,7 +72,7 @@ fn motion_without_stops_is_that_of_den_hartog() {
     }
 }
 
-/// Half swings are about `f` from the middle, and stop for ever where the spring is weaker than friction.
+/// The centres of half swings are `f` away from the middle. The mass stops for ever where the spring is weaker than friction.
 #[test]
 fn swings_shorten_by_twice_the_friction_over_the_stiffness() {
     let (square, friction) = (4.0, 0.52);
@@ -126,7 +126,7 @@ fn a_belt_carries_a_block_until_the_spring_is_stronger() {
     }
 }
 
-/// A rigid wall lets a gap go when the force vanishes, and friction when the force is as large.
+/// A rigid wall releases a gap when the force vanishes. Friction releases it when the force reaches the friction force.
 #[test]
 fn friction_holds_a_gap_on_a_rigid_wall() {
     let omega = 1.3;
@@ -173,13 +173,13 @@ fn a_wall_takes_over_from_friction() {
     }
 }
 
-/// Of free motion without dampers.
+/// Returns the energy of free motion without dampers.
 fn energy(o: &Rubbing, y: State) -> f64 {
     let form = |m: [[f64; 2]; 2], a: f64, b: f64| m[0][0] * a * a + 2.0 * m[0][1] * a * b + m[1][1] * b * b;
     0.5 * (form(o.mass, y[1], y[3]) + form(o.free.stiffness, y[0], y[2]))
 }
 
-/// Checks directions, and that the forces which make elements stick are small enough.
+/// Checks directions of sliding, and that the forces which hold sticking elements do not exceed friction.
 fn check_grips(o: &Rubbing, motion: &Motion) {
     let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
     let (per_mass, y) = (matrix(o.mass).try_inverse().unwrap(), state(&motion.state()));
@@ -270,7 +270,7 @@ fn small_friction_changes_little() {
     assert!(worst < 3e-9, "{worst:e}");
 }
 
-/// Differences of motions from neighbouring starts that slide.
+/// Compares derivatives with differences of motions from neighbouring starts that slide.
 #[test]
 fn tangents_are_limits_of_differences() {
     let mut found = [0; 3];
@@ -296,7 +296,7 @@ fn tangents_are_limits_of_differences() {
         let (_, exact, symbols) = image(motion.clone(), 0, 0.0);
         let size = exact.amax().max(1.0);
         for i in 0..2 * case.oscillator.degrees {
-            // A motion with steep turns needs small differences, and one that rounding errors grow in needs large ones.
+            // A strongly curved motion needs small differences. A motion that amplifies rounding errors needs large ones.
             let off = |h: f64| {
                 let [above, below] = [h, -h].map(|h| image(motion.clone(), i, h / size));
                 let is_same = above.2 == symbols && below.2 == symbols;

@@ -11,8 +11,8 @@ fn wall(at: f64, e: f64) -> Wall {
     Wall { at, contact: Contact::Rigid, restitution, mesh_speed: 0.0, springs: vec![Spring::default()] }
 }
 
-/// Returns masses of 1 without springs under constant loads. The last one has a plastic wall at 0 on its right. A mass meets the next one
-/// at a distance of 0, and of 1 where it moves away, with a restitution of 0.5.
+/// Returns masses of 1 without springs under constant loads. The last one has a plastic wall at 0 on its right. The distance of
+/// neighbouring masses is limited to 0 and 1, with a restitution of 0.5 at both limits.
 fn row_of_masses(loads: &[f64]) -> Oscillator {
     let n = loads.len();
     let gap = |i: usize| {
@@ -41,7 +41,7 @@ fn near(found: &[f64], expected: &[f64]) -> bool {
     found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-13)
 }
 
-/// Falls on its wall within 0.2.
+/// Start of a mass that falls on its wall within 0.2.
 const FALL: [f64; 2] = [-1e-3, 0.0];
 
 #[test]
@@ -85,7 +85,7 @@ fn an_impact_that_pulls_releases_a_mass() {
     assert!(near(&motion.state(), &state), "{:?} but {state:?}", motion.state());
 }
 
-/// Impacts of a mass on a resting one under a load: the flights shorten by half, and both rest in the end.
+/// Impacts of a mass on a resting one under a load: each flight is half as long as the one before, and both masses come to rest.
 #[test]
 fn impacts_on_a_resting_mass_end() {
     let system = System::new(&row_of_masses(&[1.0, 0.1]), ANGLE);
@@ -93,7 +93,7 @@ fn impacts_on_a_resting_mass_end() {
     motion.run(5.0).unwrap();
     assert!(near(&motion.state(), &[0.0; 4]), "{:?}", motion.state());
     assert_eq!(motion.modes(), [Mode::Stuck(Side::Right); 2]);
-    // The first impact has a speed of 1 at the time 1, and the last one leaves with at most the root of 2e-13 of half the distance.
+    // The first impact has the speed 1 at the time 1. Impacts halve the speed until it is at most `sqrt(2e-13 * 0.5)`.
     let last = motion.events.last().unwrap();
     let flights = (1..).find(|&i| 0.5f64.powi(i) <= (2e-13f64 * 0.5).sqrt()).unwrap();
     assert_eq!((last.gap, last.what), (0, What::Begins));

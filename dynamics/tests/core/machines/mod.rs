@@ -1,5 +1,5 @@
-//! An integrator of machines by matrix exponentials that shares only the description of the machine with the program, its checks, and the
-//! comparison with the program on random machines.
+//! An integrator of machines by matrix exponentials, checks of it, and its comparison with the program on random machines. It shares only
+//! the description of the machine with the program.
 
 mod act;
 pub(crate) mod agree;

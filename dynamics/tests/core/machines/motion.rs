@@ -9,9 +9,11 @@ use rattlemap_dynamics::model::{Contact, Side};
 
 use super::random::apart;
 use super::roots::first_fall;
-use super::system::{Grip, Key, Linear, Matrix, ROUNDING, Row, System, Vector, exponential, product, value};
+use super::system::{
+    Functional, Grip, Key, Linear, Matrix, ROUNDING, System, Vector, exponential, product, value,
+};
 
-/// Relative errors of velocities that stand for those of rounding, which are smaller.
+/// Known relative errors of velocities. They are larger than rounding errors and show their growth.
 const SHAKEN: f64 = 1e-13;
 
 /// Largest number of events in a part of a period.
@@ -22,13 +24,13 @@ const ESCAPE: f64 = 1e9;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mode {
-    /// The springs of all walls act that the gap has crossed.
+    /// Springs act behind all walls that the gap has crossed.
     Plain,
     /// Contact with the next wall has begun with a leaving speed, and the gap is in front of it.
     Onset(Side),
     /// The gap is at rest on the next wall, a rigid one.
     Stuck(Side),
-    /// The last wall that the gap has crossed only pushes, and no force of it acts.
+    /// The last wall that the gap has crossed only pushes, and its force is 0.
     Open,
 }
 
@@ -39,7 +41,7 @@ pub(crate) enum What {
     Ends,
 }
 
-/// An event of a gap. The symbol is that of the flight it ends, if the flight began with an event or is a contact.
+/// An event of a gap. The symbol belongs to the flight that ends here, if this flight began with an event or is a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Event {
     pub(crate) gap: usize,
@@ -65,12 +67,12 @@ pub(super) struct Gap {
     pub(super) origin: Option<Side>,
 }
 
-/// What ends a flight.
+/// The end of a flight.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum End {
-    /// Sliding of an element.
+    /// An element stops sliding.
     Rests(usize),
-    /// Sticking of an element.
+    /// An element stops sticking.
     Slips(usize, Grip),
     /// A gap reaches the next wall in a direction, from the front or from behind.
     Crosses(usize, Side),
@@ -81,7 +83,7 @@ pub(super) enum End {
     Closes(usize, Side),
 }
 
-/// A motion, with the derivative of its state by that at the start.
+/// A motion, with the derivative of its state with respect to the start.
 #[derive(Clone)]
 pub(crate) struct Motion<'a> {
     pub(super) system: &'a System,
@@ -100,7 +102,7 @@ pub(crate) struct Motion<'a> {
     pub(crate) events: Vec<Event>,
     /// Ends of sticking, `7`, and reversals, `0`, with their times, which the caller may clear.
     pub(crate) slips: Vec<(u8, f64)>,
-    /// Symbols of flights and of slips in order, those of several gaps told apart as in the program's words. The caller may clear them.
+    /// Symbols of flights and of slips in order, with the gap's letter if there are several gaps. The caller may clear them.
     pub(crate) symbols: Vec<u8>,
     /// Time in which a gap has been in contact, which the caller may clear.
     pub(crate) meshing_time: f64,
@@ -110,11 +112,11 @@ pub(crate) struct Motion<'a> {
     pub(crate) for_good: Vec<bool>,
     /// Rests on rigid walls and contact onsets that a change of the stage has ended.
     pub(crate) by_stage: [usize; 2],
-    /// Whether impacts of several gaps have followed each other at one time but for rounding. Their number then depends on rounding.
+    /// Whether impacts of several gaps were simultaneous within rounding. Their number then depends on rounding.
     pub(crate) is_crowded: bool,
-    /// Number of flights of gaps off walls which impacts of other gaps would have begun, and that are too low.
+    /// Number of flights that impacts of other gaps would have begun, but that were too low.
     pub(crate) corners: usize,
-    /// Relative errors of the velocities that are added in turn at events.
+    /// Relative errors that are added to the velocities at events, one after the other.
     shaken: [f64; 4],
 }
 
@@ -201,13 +203,13 @@ impl<'a> Motion<'a> {
         (0..2 * n).map(|i| self.y[i / 2 + n * (i % 2)]).collect()
     }
 
-    /// Changes the state without any other change, except that rates of what is at rest are removed.
+    /// Replaces the state and removes the rates of everything at rest. Modes do not change.
     pub(crate) fn set_state(&mut self, state: &[f64]) {
         self.put(state);
         self.project();
     }
 
-    /// Returns the derivative of `(x1, v1, x2, v2, ...)` by that at the start.
+    /// Returns the derivative of `(x1, v1, x2, v2, ...)` with respect to the start.
     pub(crate) fn derivative(&self) -> Matrix {
         let n = self.system.degrees;
         let tangents = self.tangents.as_ref().expect("tangents");
@@ -215,7 +217,7 @@ impl<'a> Motion<'a> {
         Matrix::from_fn(2 * n, 2 * n, |i, j| tangents[(of(i), of(j))])
     }
 
-    /// Clears what the caller reads about a part of the motion.
+    /// Clears all records that the caller reads period by period.
     pub(crate) fn clear(&mut self) {
         (self.events, self.slips, self.symbols) = Default::default();
         self.meshing_time = 0.0;
@@ -239,8 +241,8 @@ impl<'a> Motion<'a> {
         self.tangents = Some(tangents);
     }
 
-    /// Returns the same motion with errors of velocities at each event that are larger than those of rounding: once of one sign, and
-    /// once of two signs, since errors can cancel.
+    /// Returns two copies of the motion with known errors of velocities at each event: errors of one sign and of both signs, because errors
+    /// can cancel.
     pub(crate) fn shaken(&self) -> Vec<Motion<'a>> {
         let with = |signs: [f64; 4]| Motion { shaken: signs.map(|sign| SHAKEN * sign), ..self.clone() };
         vec![with([1.0; 4]), with([1.0, 1.0, -1.0, -1.0])]
@@ -284,8 +286,7 @@ impl<'a> Motion<'a> {
         self.system.domain(&self.key())
     }
 
-    /// Returns the value of a row.
-    pub(super) fn of(&self, row: &Row) -> f64 {
+    pub(super) fn of(&self, row: &Functional) -> f64 {
         value(row, &self.y)
     }
 
@@ -305,7 +306,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Returns the row of the force of a wall that the gap is behind and that only pushes.
-    pub(super) fn pushing(&self, gap: usize) -> Option<Row> {
+    pub(super) fn pushing(&self, gap: usize) -> Option<Functional> {
         let level = self.gaps[gap].level;
         let nth = usize::from(level.unsigned_abs()).checked_sub(1)?;
         self.system.pushing(gap, side_of(level), nth, self.stage)
@@ -338,7 +339,7 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Elements without a sliding rate are at rest.
+    /// Determines the modes of friction at the start: elements without a sliding rate stick.
     fn begin_grips(&mut self) {
         for i in 0..self.grips.len() {
             self.grips[i] = self.grip(i, ROUNDING * self.size_of_rate(&self.system.slides[i]));
@@ -357,8 +358,8 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Returns the size of the numbers that the value of a row of velocities is computed from.
-    pub(super) fn size_of_rate(&self, row: &Row) -> f64 {
+    /// Returns the size of the terms of a rate, which rounding errors are relative to.
+    pub(super) fn size_of_rate(&self, row: &Functional) -> f64 {
         let n = self.system.degrees;
         let rates = row.columns(n, n).abs().sum() * self.system.machine.omega * self.y.rows(0, n).amax();
         rates + row.iter().zip(self.y.iter()).map(|(a, b)| (a * b).abs()).sum::<f64>()
@@ -373,8 +374,7 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Returns what is at rest: its row, the change of velocities that stops it while those before it hold, and the element, or none for a
-    /// gap.
+    /// Returns everything at rest: its row, its bond while earlier rows are held, and the element, or none for a gap.
     fn at_rest(&self) -> Vec<(Vector, super::system::Bond, Option<usize>)> {
         let machine = &self.system.machine;
         let walls = (0..self.gaps.len()).filter(|&i| matches!(self.gaps[i].mode, Mode::Stuck(_)));
@@ -387,7 +387,7 @@ impl<'a> Motion<'a> {
         rows.into_iter().zip(bonds).map(|((row, element), bond)| (row.clone(), bond, element)).collect()
     }
 
-    /// Removes rates of what is at rest.
+    /// Removes the rates of everything at rest.
     pub(super) fn project(&mut self) {
         let (n, machine) = (self.system.degrees, &self.system.machine);
         for (row, (change, _), element) in self.at_rest() {
@@ -495,10 +495,10 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Returns the share of a step after which a flight ends, and what ends it.
+    /// Returns the share of a step after which a flight ends, and the kind of its end.
     fn first_end(&self, linear: &Linear, series: &[Vector]) -> Option<(f64, End)> {
         let mut ends = Vec::new();
-        let of = |row: &Row, factor: f64| -> Vec<f64> {
+        let of = |row: &Functional, factor: f64| -> Vec<f64> {
             series.iter().map(|term| factor * value(row, term)).collect()
         };
         let mut fall = |c: &[f64], order: usize, end: End| {
@@ -549,8 +549,8 @@ impl<'a> Motion<'a> {
         ends.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Returns rows of the rooms that the force which makes an element stick has, and what follows without room.
-    pub(super) fn limits(&self, linear: &Linear, i: usize) -> [(Row, Grip); 2] {
+    /// Returns the distances of an element's sticking force from its two limits, as functionals, and the mode that follows at each limit.
+    pub(super) fn limits(&self, linear: &Linear, i: usize) -> [(Functional, Grip); 2] {
         [Grip::Plus, Grip::Minus].map(|grip| {
             let mut room = &linear.hold[i] * -grip.sign();
             room[2 * self.system.degrees] += self.system.machine.friction[i].force;

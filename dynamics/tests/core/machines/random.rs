@@ -7,7 +7,7 @@ use rattlemap_dynamics::model::{
 
 use super::super::independent::random::Random;
 
-/// What a random machine has.
+/// Sizes and features of a random machine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shape {
     pub(crate) coordinates: usize,

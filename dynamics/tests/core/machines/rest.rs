@@ -1,7 +1,7 @@
 //! Motions in which a function of time is exactly zero for a while, or has a root of high order.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::machine::{Motion, System};
+use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{
     Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Spring, Wall, state as state_of,
 };
@@ -35,7 +35,7 @@ fn machine(
 
 fn after_a_period(machine: &Oscillator, start: &[f64]) -> Vec<f64> {
     let system = System::new(machine);
-    let mut motion = Motion::new(&system, start);
+    let mut motion = MachineMotion::new(&system, start);
     motion.advance_period(&mut ()).expect("it can be continued");
     assert!(motion.work().events < 20 && motion.work().steps < 2_000, "{:?}", motion.work());
     motion.state()[..start.len()].to_vec()
@@ -56,7 +56,7 @@ fn pendulums_that_collide_without_rebound_move_on_together() {
     let walls = [Vec::new(), vec![wall(0.0, Contact::Impact, 0.0)]];
     let machine = machine(DMatrix::identity(3, 3), omega, [0.0; 2], &[-1.0, 1.0, 0.0], walls);
     let state = after_a_period(&machine, &[-0.5, 1.0, 0.0, 0.0, 0.3, 0.0]);
-    // The first meets the second at rest at x = 0, with its largest speed, of which each keeps a half.
+    // The first pendulum hits the resting second one at x = 0 with its largest speed. Then both move at half this speed.
     let (speed, t) = (1.25f64.sqrt() / 2.0, std::f64::consts::TAU / omega - 0.5f64.atan());
     for (i, expected) in [speed * t.sin(), speed * t.cos()].into_iter().enumerate() {
         for body in [0, 1] {
@@ -65,7 +65,8 @@ fn pendulums_that_collide_without_rebound_move_on_together() {
     }
 }
 
-/// A force on one end of a chain lifts the other end off its wall, or presses it, in a derivative of high order.
+/// A force on one end of a chain reaches the other end through a derivative of high order: it lifts this end off its wall or presses it to
+/// the wall.
 #[test]
 fn a_chain_at_rest_on_a_wall_starts_like_one_a_little_off_the_wall() {
     for n in 2..=8 {
@@ -122,7 +123,8 @@ fn friction_holds_a_force_at_its_limit() {
     }
 }
 
-/// Motion that is large against a narrow clearance has not escaped, nor has decay towards a wall at 0, though stages could do work.
+/// Two motions must not count as escaped, although stages could do work: one that is much larger than a narrow clearance, and decay towards
+/// a wall at 0.
 #[test]
 fn bounded_motion_with_stages_does_not_escape() {
     let with_stages = |mut machine: Oscillator| {
@@ -146,7 +148,8 @@ fn bounded_motion_with_stages_does_not_escape() {
     assert!(state[0].abs() < 1.0, "{state:?}");
 }
 
-/// A body that falls on another one, which rests on the floor, feels the impulse of an impact with a fixed wall; the floor pushes as much.
+/// A body falls on a body that rests on the floor. The impulse equals that of an impact with a fixed wall, and the floor pushes with the
+/// same impulse.
 #[test]
 fn a_wall_on_which_another_gap_rests_takes_part_in_an_impact() {
     let walls = || [Vec::new(), vec![wall(0.0, Contact::Rigid, 0.5)]];
@@ -154,7 +157,7 @@ fn a_wall_on_which_another_gap_rests_takes_part_in_an_impact() {
     bodies.stages[0].load = DVector::from_element(2, -1.0);
     bodies.gaps.push(GapRow { row: DVector::from_row_slice(&[-1.0, 1.0]), walls: walls() });
     let system = System::new(&bodies);
-    let mut motion = Motion::new(&system, &[0.0, 0.0, 0.5, 0.0]);
+    let mut motion = MachineMotion::new(&system, &[0.0, 0.0, 0.5, 0.0]);
     let (before, after) = (0.999, 1.001);
     motion.advance_to(before, &mut ()).unwrap();
     assert!((motion.state()[3] + before).abs() < 1e-13, "{:?}", motion.state());

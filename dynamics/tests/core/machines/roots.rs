@@ -30,7 +30,7 @@ fn roots(c: &[f64]) -> Vec<f64> {
     found
 }
 
-/// Returns where a polynomial falls below zero in [0, 1]: at 0 if it starts there. `is_divided` says that roots at 0 were divided out.
+/// Returns where a polynomial falls below zero in [0, 1]: at 0 if it starts there. `is_divided` means that roots at 0 were divided out.
 pub(crate) fn first_fall(c: &[f64], is_divided: bool) -> Option<f64> {
     let starts_below = c[0] < 0.0 || c[0] == 0.0 && !is_divided;
     if starts_below { Some(0.0) } else { roots(c).first().copied() }

@@ -1,6 +1,6 @@
 //! The linear domains of a machine.
 //!
-//! The state is `y = (x, v, 1, cos and sin of each harmonic)`, so that every domain is `y' = A y`. A domain is built when it is first met.
+//! The state is `y = (x, v, 1, cos and sin of each harmonic)`, so that every domain is `y' = A y`. A domain is built on first use.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -15,14 +15,14 @@ pub(crate) const ANGLE: f64 = 0.6;
 /// Terms of Taylor series: `0.6^19 / 19!` is far below rounding.
 const TERMS: usize = 18;
 
-/// Relative size of numbers that are zero but for rounding.
+/// Relative size below which numbers count as rounding errors.
 pub(crate) const ROUNDING: f64 = 1e-12;
 
 pub(crate) type Vector = DVector<f64>;
-pub(crate) type Row = RowDVector<f64>;
+pub(crate) type Functional = RowDVector<f64>;
 pub(crate) type Matrix = DMatrix<f64>;
 
-/// What an element with dry friction does: it sticks, or slides with a positive or a negative rate.
+/// The mode of an element with dry friction: it sticks, or slides with a positive or a negative rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Grip {
     Stick,
@@ -36,7 +36,7 @@ impl Grip {
     }
 }
 
-/// What distinguishes the domains of a machine.
+/// The modes that distinguish the domains of a machine.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Key {
     pub(crate) stage: usize,
@@ -53,11 +53,11 @@ pub(crate) struct Linear {
     /// Length of a step and its exponential.
     pub(crate) step: (f64, Matrix),
     /// Accelerations of the gaps. They are 0 for gaps at rest.
-    pub(crate) acceleration: Vec<Row>,
-    /// For each gap at rest on a rigid wall, its acceleration without this wall, and while all else that is at rest stays at rest.
-    pub(crate) pressing: Vec<Row>,
+    pub(crate) acceleration: Vec<Functional>,
+    /// For each gap at rest on a rigid wall, its acceleration if this wall were absent and everything else at rest stayed at rest.
+    pub(crate) pressing: Vec<Functional>,
     /// Forces that make elements stick.
-    pub(crate) hold: Vec<Row>,
+    pub(crate) hold: Vec<Functional>,
     /// Elements that stick without a force, because walls hold their row.
     pub(crate) is_idle: Vec<bool>,
     /// Elements that slide at a rate which others at rest keep constant.
@@ -78,8 +78,9 @@ impl Linear {
         terms
     }
 
-    /// Returns the sign of the first derivative of `row y` that is not zero but for rounding, the value itself included; 0 without one.
-    pub(crate) fn tendency(&self, row: &Row, y: &Vector) -> f64 {
+    /// Returns the sign of the first derivative of `row y` that exceeds rounding errors, beginning with the value itself; 0 if there is
+    /// none.
+    pub(crate) fn tendency(&self, row: &Functional, y: &Vector) -> f64 {
         let mut row = row.clone();
         for _ in 0..4 {
             let value = value(&row, y);
@@ -93,8 +94,7 @@ impl Linear {
     }
 }
 
-/// Returns the value of a row.
-pub(crate) fn value(row: &Row, y: &Vector) -> f64 {
+pub(crate) fn value(row: &Functional, y: &Vector) -> f64 {
     row.iter().zip(y.iter()).map(|(a, b)| a * b).sum()
 }
 
@@ -127,8 +127,8 @@ fn norm(a: &Matrix) -> f64 {
     a.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
 }
 
-/// The change of velocities by an impulse along a row that changes the row's rate by 1 while rows before it are held, and this impulse.
-/// Both are 0 if the rows before it hold the row.
+/// The change of velocities by an impulse along a row that changes the row's rate by 1 while earlier rows are held, and this impulse. Both
+/// are 0 if the earlier rows hold the row.
 pub(crate) type Bond = (Vector, f64);
 
 /// A machine with its domains.
@@ -140,10 +140,10 @@ pub(crate) struct System {
     pub(crate) length: f64,
     pub(crate) per_mass: Matrix,
     /// Rows of the gaps and of their rates.
-    pub(crate) z: Vec<Row>,
-    pub(crate) w: Vec<Row>,
+    pub(crate) z: Vec<Functional>,
+    pub(crate) w: Vec<Functional>,
     /// Rows of the sliding rates.
-    pub(crate) slides: Vec<Row>,
+    pub(crate) slides: Vec<Functional>,
     angle: f64,
     domains: RefCell<HashMap<Key, Rc<Linear>>>,
 }
@@ -184,15 +184,15 @@ impl System {
     }
 
     /// Returns the row of a combination of entries from `at` on.
-    fn row(&self, along: &Vector, at: usize) -> Row {
-        let mut row = Row::zeros(self.size());
+    fn row(&self, along: &Vector, at: usize) -> Functional {
+        let mut row = Functional::zeros(self.size());
         row.columns_mut(at, self.degrees).copy_from(&along.transpose());
         row
     }
 
     /// Returns the row of the force, positive away from the wall, of spring, damper and preload behind a wall that only pushes. There
     /// is none if this force cannot pull behind the wall.
-    pub(crate) fn pushing(&self, gap: usize, side: Side, nth: usize, stage: usize) -> Option<Row> {
+    pub(crate) fn pushing(&self, gap: usize, side: Side, nth: usize, stage: usize) -> Option<Functional> {
         let wall = &self.machine.gaps[gap].walls[side.index()][nth];
         let spring = &wall.springs[stage];
         let may_pull = spring.damping != 0.0 || spring.preload != 0.0;
@@ -205,7 +205,7 @@ impl System {
         Some(row)
     }
 
-    /// Returns the bonds of rows of velocities, in turn.
+    /// Returns the bonds of rows of velocities, each while the earlier rows are held.
     pub(crate) fn bonds(&self, rows: &[&Vector]) -> Vec<Bond> {
         let mut mobility = self.per_mass.clone();
         let bond = |row: &&Vector| {
@@ -278,7 +278,7 @@ impl System {
     }
 
     fn build(&self, key: &Key) -> Linear {
-        let (machine, empty) = (&self.machine, Row::zeros(self.size()));
+        let (machine, empty) = (&self.machine, Functional::zeros(self.size()));
         let (gaps, elements) = (0..machine.gaps.len(), 0..machine.friction.len());
         let (free, fastest) = self.generator(key);
         let held: Vec<usize> = gaps.clone().filter(|&i| key.held[i]).collect();
@@ -304,7 +304,7 @@ impl System {
         };
         let is_driven = |i: usize| key.grips[i] != Grip::Stick && is_given(along(i));
         let mut is_still = vec![false; machine.gaps.len()];
-        let mut acceleration: Vec<Row> = self.w.iter().map(|w| w * &a).collect();
+        let mut acceleration: Vec<Functional> = self.w.iter().map(|w| w * &a).collect();
         for i in gaps.clone() {
             if is_given(gap(i)) {
                 acceleration[i] = empty.clone();
@@ -338,7 +338,7 @@ impl System {
         }
     }
 
-    /// Whether a gap whose rate is given by rows at rest has a rate, as of a belt that carries it.
+    /// Whether a gap moves although rows at rest determine its rate, for example on a moving belt.
     fn moves(&self, gap: &Vector, held: &[usize], sticking: &[usize]) -> bool {
         let machine = &self.machine;
         let walls = held.iter().map(|&i| (machine.gaps[i].row.clone(), 0.0));

@@ -26,13 +26,13 @@ impl Piece {
 }
 
 /// The motion of an orbit. Its times are in forcing periods, or in the model's unit for a motion from the start.
-pub(crate) struct Motion {
+pub(crate) struct DrawnMotion {
     pub(crate) pieces: Vec<Piece>,
     /// Events within the trace, with their times.
     pub(crate) events: Vec<(f64, Event)>,
 }
 
-impl Motion {
+impl DrawnMotion {
     /// Merges trace and events, and divides times by `unit`. `contacts` holds for each gap the side of the contact at the start of the
     /// trace. States that are not finite are skipped.
     pub(crate) fn new(
@@ -40,7 +40,7 @@ impl Motion {
         trace: &[Sample],
         contacts: [Option<Side>; MOST_GAPS],
         unit: f64,
-    ) -> Motion {
+    ) -> DrawnMotion {
         let unit = if unit > 0.0 { unit } else { 1.0 };
         let finite = |t: f64, state: &State| t.is_finite() && state.iter().all(|v| v.is_finite());
         // The events of a chaotic orbit may continue after the trace. Those up to one sample after its end belong to it.
@@ -60,7 +60,7 @@ impl Motion {
             pieces.push(sample.t / unit, sample);
         }
         next.for_each(|(at, event)| pieces.cross(*at, event));
-        Motion { pieces: pieces.finished(), events }
+        DrawnMotion { pieces: pieces.finished(), events }
     }
 
     /// Whether the motion contains contact that lasts, of any gap.
@@ -165,7 +165,7 @@ mod tests {
             sample(1.5, meshing),
             sample(2.0, None),
         ];
-        let motion = Motion::new(&events, &trace, FREE, 2.0);
+        let motion = DrawnMotion::new(&events, &trace, FREE, 2.0);
         let modes: Vec<_> = motion.pieces.iter().map(|p| p.contacts[0]).collect();
         assert_eq!(modes, [None, None, meshing, None]);
         assert_eq!(motion.pieces[0].points.last().unwrap().1, state(&[0.5, 1.0]));
@@ -185,7 +185,7 @@ mod tests {
             event(EventKind::MeshEnd, 1.5),
         ];
         let trace = [sample(0.0, None), sample(0.7, right), sample(1.2, right), sample(2.0, None)];
-        let motion = Motion::new(&events, &trace, [None, left, None], 2.0);
+        let motion = DrawnMotion::new(&events, &trace, [None, left, None], 2.0);
         let contacts: Vec<_> = motion.pieces.iter().map(|piece| piece.contacts).collect();
         let expected = [[None, left, None], [right, left, None], [right, None, None], [None; 3]];
         assert_eq!(contacts, expected);
@@ -196,14 +196,18 @@ mod tests {
 
     #[test]
     fn incomplete_data_are_accepted() {
-        assert!(Motion::new(&[], &[], FREE, 2.0).pieces.is_empty());
-        let late =
-            Motion::new(&[event(EventKind::Impact, 9.0)], &[sample(0.0, None), sample(1.0, None)], FREE, 2.0);
+        assert!(DrawnMotion::new(&[], &[], FREE, 2.0).pieces.is_empty());
+        let late = DrawnMotion::new(
+            &[event(EventKind::Impact, 9.0)],
+            &[sample(0.0, None), sample(1.0, None)],
+            FREE,
+            2.0,
+        );
         assert!(late.events.is_empty());
         let without_event = [sample(0.0, None), sample(1.0, Some(Side::Left)), sample(2.0, None)];
-        assert_eq!(Motion::new(&[], &without_event, FREE, 2.0).pieces.len(), 3);
+        assert_eq!(DrawnMotion::new(&[], &without_event, FREE, 2.0).pieces.len(), 3);
         let mut broken = sample(1.0, None);
         broken.state[2] = f64::NAN;
-        assert_eq!(Motion::new(&[], &[sample(0.0, None), broken], FREE, 2.0).points().count(), 1);
+        assert_eq!(DrawnMotion::new(&[], &[sample(0.0, None), broken], FREE, 2.0).points().count(), 1);
     }
 }

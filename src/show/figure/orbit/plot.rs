@@ -9,7 +9,7 @@ use crate::show::drawing::legend::{Entry, Key};
 use crate::show::drawing::{Canvas, DARK, FAINT, MESHING, Marker, Point, Shape, wall_color};
 use crate::show::figure::orbit::gaps::{PlotGap, contacts_at_start};
 use crate::show::figure::orbit::heading;
-use crate::show::figure::orbit::motion::Motion;
+use crate::show::figure::orbit::motion::DrawnMotion;
 use crate::show::names;
 use crate::show::symbols::{symbol, with_unit};
 use rattlemap_dynamics::model::{Contact, Model, ModelError, Oscillator, Side, State, Units};
@@ -30,7 +30,7 @@ pub struct OrbitPlot<'a> {
     pub(crate) bodies: Vec<&'a str>,
     pub(crate) oscillator: Oscillator,
     pub(crate) gaps: Vec<PlotGap>,
-    pub(crate) motion: Motion,
+    pub(crate) motion: DrawnMotion,
     /// Label of the axis of time.
     time: String,
     /// Length of the cycle in forcing periods; none if the motion is not periodic.
@@ -82,7 +82,7 @@ impl<'a> OrbitPlot<'a> {
             names: model.state_names().into_iter().map(symbol).collect(),
             units: model.units(),
             bodies: model.bodies(),
-            motion: Motion::new(events, trace, contacts, unit_of_time),
+            motion: DrawnMotion::new(events, trace, contacts, unit_of_time),
             oscillator,
             gaps,
             time: "time in forcing periods, t / T".to_owned(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::system::{Constraints, Domain, Key, Numbers, Point, ROUNDING, Slide, affine, dot, size};
+use super::system::{Constraints, Domain, Key, Numbers, PhasePoint, ROUNDING, Slide, affine, dot, size};
 use super::{Ending, Event, Flight, Gap, Mode, Slip, side_of, signed};
 use rattlemap_dynamics::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use rattlemap_dynamics::motion::EventKind;
@@ -12,7 +12,7 @@ use rattlemap_dynamics::word;
 const LOWEST_FLIGHT: f64 = 1e-13;
 
 /// Largest distance of a start from a wall that counts as rounding, relative to the terms of the gap.
-const ON_WALL: f64 = 4.0 * f64::EPSILON;
+const GAP_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Decisions on what is at rest after one event.
 const MOST_DECISIONS: usize = 16;
@@ -65,7 +65,7 @@ impl Flight {
             for side in Side::BOTH {
                 for (nth, wall) in system.walls(gap, side).iter().enumerate() {
                     let beyond = side.sign() * (self.y[gap] - wall.at);
-                    let is_on_wall = beyond.abs() <= ON_WALL * (self.size_of_gap(gap) + wall.at.abs());
+                    let is_on_wall = beyond.abs() <= GAP_ROUNDING * (self.size_of_gap(gap) + wall.at.abs());
                     if is_on_wall || beyond > 0.0 && wall.contact == Contact::Rigid {
                         self.y[gap] = wall.at;
                         self.gaps[gap].on_wall = Some((side, 1));
@@ -157,7 +157,7 @@ impl Flight {
         self.settle(&exempt, t, t);
     }
 
-    fn point(&self, domain: &Domain, t: f64) -> Point {
+    fn point(&self, domain: &Domain, t: f64) -> PhasePoint {
         domain.point(&self.y, t)
     }
 
@@ -382,7 +382,7 @@ impl Flight {
     }
 
     /// Returns how an element slides at a point.
-    fn slide_at(&self, i: usize, point: &Point) -> Slide {
+    fn slide_at(&self, i: usize, point: &PhasePoint) -> Slide {
         let row = self.system.sliding_rate(i);
         match dot(&row, point) {
             rate if rate.abs() <= 0.1 * ROUNDING * size(&row, point) => Slide::Sticks,
@@ -392,7 +392,7 @@ impl Flight {
     }
 
     /// Whether modes fit the forces on what is at rest.
-    fn is_consistent(&self, key: Key, at_rest: &AtRest, point: &Point) -> bool {
+    fn is_consistent(&self, key: Key, at_rest: &AtRest, point: &PhasePoint) -> bool {
         let domain = self.system.domain(key);
         let gaps = (0..self.system.gaps()).all(|gap| match (at_rest.gaps[gap], domain.pushes[gap]) {
             (None, _) => true,
@@ -412,7 +412,7 @@ impl Flight {
     }
 
     /// Returns the first consistent modes: walls hold before they release, elements stick before they slide.
-    fn consistent(&self, key: Key, at_rest: &AtRest, point: &Point) -> Option<Key> {
+    fn consistent(&self, key: Key, at_rest: &AtRest, point: &PhasePoint) -> Option<Key> {
         let gaps: Vec<usize> = (0..MOST_GAPS).filter(|&gap| at_rest.gaps[gap].is_some()).collect();
         let elements: Vec<usize> = (0..MOST_FRICTION).filter(|&i| at_rest.elements[i]).collect();
         let slides = 3usize.pow(elements.len() as u32);
@@ -672,6 +672,6 @@ impl Flight {
 }
 
 /// Returns the leaving speed of a flight that is not followed.
-fn lowest_speed(domain: &Domain, gap: usize, point: &Point) -> f64 {
+fn lowest_speed(domain: &Domain, gap: usize, point: &PhasePoint) -> f64 {
     (2.0 * LOWEST_FLIGHT * dot(&domain.accelerations[gap], point).abs()).sqrt()
 }

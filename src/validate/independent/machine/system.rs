@@ -22,10 +22,10 @@ pub(super) const WIDTH: usize = 2 * MOST_COORDINATES + 2 * (MOST_HARMONICS + 1) 
 pub(super) type Numbers = [f64; 2 * MOST_COORDINATES];
 
 /// What rows are applied to.
-pub(super) type Point = [f64; WIDTH];
+pub(super) type PhasePoint = [f64; WIDTH];
 
 /// A functional of the motion.
-pub(super) type Row = [f64; WIDTH];
+pub(super) type Functional = [f64; WIDTH];
 
 /// Relative rounding error of sums, and of mobilities that vanish.
 pub(super) const ROUNDING: f64 = 1e-12;
@@ -80,13 +80,13 @@ pub(super) struct Domain {
     pub(super) width: usize,
     /// Orders of the harmonics.
     orders: Vec<u32>,
-    pub(super) accelerations: Vec<Row>,
+    pub(super) accelerations: Vec<Functional>,
     /// Coordinates whose rate cannot change.
     pub(super) is_still: [bool; MOST_COORDINATES],
     /// Forces by which rigid walls push the gaps that rest on them.
-    pub(super) pushes: [Option<Row>; MOST_GAPS],
+    pub(super) pushes: [Option<Functional>; MOST_GAPS],
     /// Forces that hold elements. An element whose row others hold has none.
-    pub(super) holds: [Option<Row>; MOST_FRICTION],
+    pub(super) holds: [Option<Functional>; MOST_FRICTION],
     /// Time in which the fastest rate turns by one radian.
     pub(super) radian: f64,
 }
@@ -96,12 +96,12 @@ pub(super) fn dot(row: &[f64], point: &[f64]) -> f64 {
 }
 
 /// Returns the sum of the sizes of the terms of [`dot`].
-pub(super) fn size(row: &Row, point: &Point) -> f64 {
+pub(super) fn size(row: &Functional, point: &PhasePoint) -> f64 {
     row.iter().zip(point).map(|(a, b)| (a * b).abs()).sum()
 }
 
 /// Returns `factor row + constant`.
-pub(super) fn affine(row: &Row, factor: f64, constant: f64, width: usize) -> Row {
+pub(super) fn affine(row: &Functional, factor: f64, constant: f64, width: usize) -> Functional {
     let mut row = row.map(|x| factor * x);
     row[width - 1] += constant;
     row
@@ -109,14 +109,14 @@ pub(super) fn affine(row: &Row, factor: f64, constant: f64, width: usize) -> Row
 
 impl Domain {
     /// Returns the row of a coordinate, or of its rate.
-    pub(super) fn unit(&self, entry: usize) -> Row {
+    pub(super) fn unit(&self, entry: usize) -> Functional {
         let mut row = [0.0; WIDTH];
         row[entry] = 1.0;
         row
     }
 
     /// Returns a point.
-    pub(super) fn point(&self, y: &[f64], t: f64) -> Point {
+    pub(super) fn point(&self, y: &[f64], t: f64) -> PhasePoint {
         let n = self.n;
         let mut point = [0.0; WIDTH];
         point[..2 * n].copy_from_slice(&y[..2 * n]);
@@ -130,7 +130,7 @@ impl Domain {
     }
 
     /// Returns the time derivative of a point.
-    pub(super) fn derivative(&self, point: &Point) -> Point {
+    pub(super) fn derivative(&self, point: &PhasePoint) -> PhasePoint {
         let n = self.n;
         let mut rate = [0.0; WIDTH];
         rate[..n].copy_from_slice(&point[n..2 * n]);
@@ -145,14 +145,14 @@ impl Domain {
     }
 
     /// Returns a point and its derivatives.
-    pub(super) fn jet<const N: usize>(&self, point: &Point) -> [Point; N] {
+    pub(super) fn jet<const N: usize>(&self, point: &PhasePoint) -> [PhasePoint; N] {
         let mut jet = [*point; N];
         (1..N).for_each(|k| jet[k] = self.derivative(&jet[k - 1]));
         jet
     }
 
     /// Returns the row of a functional's time derivative.
-    fn rate_of(&self, row: &Row) -> Row {
+    fn rate_of(&self, row: &Functional) -> Functional {
         let n = self.n;
         let mut rate = [0.0; WIDTH];
         rate[n..2 * n].copy_from_slice(&row[..n]);
@@ -168,7 +168,7 @@ impl Domain {
     }
 
     /// Returns order and value of the first derivative, from `first` on, that is not 0 but for rounding; the value 0 if four are 0.
-    pub(super) fn tendency(&self, row: &Row, point: &Point, first: usize) -> (usize, f64) {
+    pub(super) fn tendency(&self, row: &Functional, point: &PhasePoint, first: usize) -> (usize, f64) {
         let mut row = *row;
         for order in 0..first + 4 {
             let value = dot(&row, point);
@@ -297,7 +297,7 @@ impl System {
     }
 
     /// Returns the row of an element's sliding rate.
-    pub(super) fn sliding_rate(&self, i: usize) -> Row {
+    pub(super) fn sliding_rate(&self, i: usize) -> Functional {
         let mut row = [0.0; WIDTH];
         row[self.n..2 * self.n].copy_from_slice(self.elements[i].row.as_slice());
         row[self.width() - 1] = -self.elements[i].speed;
@@ -306,7 +306,7 @@ impl System {
 
     /// Returns the row of the force, positive away from it, of the last wall of a side if this wall only pushes. There is none if the
     /// force never pulls behind the wall.
-    pub(super) fn pushing(&self, gap: usize, side: Side, stage: usize) -> Option<Row> {
+    pub(super) fn pushing(&self, gap: usize, side: Side, stage: usize) -> Option<Functional> {
         let wall = self.walls(gap, side).last()?;
         let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
         if wall.contact != Contact::Pushing || !may_pull {
@@ -374,7 +374,7 @@ impl System {
         // The forces of the constraints are `-multipliers`.
         let multipliers = &bound.inverse * &bound.rows * &self.mobility * &forces;
         let accelerations = &bound.mobility * &forces;
-        let row = |m: &DMatrix<f64>, i: usize, factor: f64| -> Row {
+        let row = |m: &DMatrix<f64>, i: usize, factor: f64| -> Functional {
             std::array::from_fn(|j| if j < width { factor * m[(i, j)] } else { 0.0 })
         };
         let is_still = |i: usize| i < n && bound.mobility[(i, i)] <= ROUNDING * self.mobility[(i, i)];

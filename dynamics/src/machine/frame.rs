@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Numbers, Point, ROUNDING, SIZE};
+use super::{Numbers, PhasePoint, ROUNDING, SIZE};
 use crate::model::{Contact, Oscillator, Side, Wall};
 
 /// Linear forces in the coordinates of the flow.
@@ -22,7 +22,8 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Returns the sliding rate at rates of the coordinates, and the sum of the sizes of its terms, which rounding is relative to.
+    /// Returns the sliding rate for given rates of the coordinates, and the sum of the moduli of its terms. Rounding errors are relative to
+    /// this sum.
     pub(super) fn rate_and_size(&self, rates: &[f64]) -> [f64; 2] {
         let terms = self.row.iter().zip(rates).map(|(row, rate)| row * rate);
         terms.fold([-self.speed, self.speed.abs()], |[sum, size], x| [sum + x, size + x.abs()])
@@ -86,7 +87,7 @@ impl Frame {
         let elements = with_force
             .map(|friction| {
                 let row = &back * &friction.row;
-                // A row along a gap must not have rounding errors in other entries.
+                // Entries that are zero without rounding are set to zero, so that a row along a gap has no other entries.
                 let least = ROUNDING * row.amax();
                 let row = row.map(|x| if x.abs() > least { x } else { 0.0 });
                 Element { row, force: friction.force, speed: friction.speed }
@@ -141,7 +142,8 @@ impl Frame {
         &self.mass_scale * matrix * self.mass_scale.transpose()
     }
 
-    /// Returns a bound on all rates under given stiffness and damping: of the forcing, and of the mass-scaled system by its norm.
+    /// Returns a bound on the rates of the forcing and of free motion, for a given stiffness and damping. Norms of the mass-scaled matrices
+    /// bound free motion.
     pub(super) fn rate(&self, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> f64 {
         let norm = |matrix: DMatrix<f64>| matrix.singular_values().max();
         let own = norm(self.mass_scaled(damping)) + norm(self.mass_scaled(stiffness)).sqrt();
@@ -171,12 +173,12 @@ impl Frame {
         &self.machine.gaps[gap].walls[side.index()]
     }
 
-    /// Returns the last wall of a side on which there is one.
+    /// Returns the last wall of a side, which must have walls.
     pub(super) fn last_wall(&self, gap: usize, side: Side) -> &Wall {
         self.walls(gap, side).last().expect("there is a wall on this side")
     }
 
-    /// Returns the last wall of a side if it only pushes, and its force differs from that of a wall that may pull.
+    /// Returns the last wall of a side if it only pushes and has a damper or a preload. Without both it never pulls, like any elastic wall.
     pub(super) fn pushing(&self, gap: usize, side: Side) -> Option<&Wall> {
         let last = self.walls(gap, side).last()?;
         let differs = last.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
@@ -209,20 +211,19 @@ impl Frame {
         state
     }
 
-    /// Returns displacements at which the gaps have given values. Further values are those of the displacements that complete the gaps to
-    /// coordinates.
+    /// Returns all displacements, given the gaps and the displacements that complete them to coordinates.
     pub fn displacements(&self, gaps_and_others: &[f64]) -> Vec<f64> {
         let d = DVector::from_fn(self.n, |i, _| gaps_and_others[i]);
         (&self.from_flow * d).iter().copied().collect()
     }
 
-    /// Returns the number of entries of [`Point`] that are in use.
+    /// Returns the number of entries of [`PhasePoint`] that are in use.
     pub(super) fn width(&self) -> usize {
         2 * self.n + 2 * self.orders.len() + 1
     }
 
     /// Completes a state to a point, at a time since phase 0.
-    pub(super) fn point(&self, y: &[f64], t: f64) -> Point {
+    pub(super) fn point(&self, y: &[f64], t: f64) -> PhasePoint {
         let mut point = [0.0; super::WIDTH];
         point[..2 * self.n].copy_from_slice(&y[..2 * self.n]);
         point[self.width() - 1] = 1.0;
@@ -231,7 +232,7 @@ impl Frame {
     }
 
     /// Sets cosine and sine of all harmonics of a point, at a time since phase 0.
-    pub(super) fn set_phasors(&self, point: &mut Point, t: f64) {
+    pub(super) fn set_phasors(&self, point: &mut PhasePoint, t: f64) {
         let (phasors, _) = point[2 * self.n..].as_chunks_mut();
         for (phasor, order) in phasors.iter_mut().zip(&self.orders) {
             let (sin, cos) = (order * self.machine.omega * t).sin_cos();
@@ -249,8 +250,9 @@ fn inverse(mass: &DMatrix<f64>) -> DMatrix<f64> {
     mass.clone().cholesky().expect("the mass matrix is positive definite").inverse()
 }
 
-/// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. Of displacements with equal factors in a gap,
-/// the lightest is left out: a force on a heavy body that is left out would be computed as a small difference.
+/// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. Among displacements with equal factors in a
+/// gap, the lightest body's is left out. If a heavy body's were left out, the force on this body would be a small difference of large
+/// numbers.
 fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
     let n = machine.degrees();
     let mass = |i: usize| machine.mass[(i, i)];

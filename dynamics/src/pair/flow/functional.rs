@@ -1,4 +1,4 @@
-//! Rows of coefficients on `a = (z, w, x, v, cos, sin, 1)` and on the phasors of higher harmonics.
+//! Linear functionals of `a = (z, w, x, v, cos, sin, 1)` and of the phasors of higher harmonics.
 
 use nalgebra::Complex;
 
@@ -6,17 +6,17 @@ use super::few::Few;
 use super::{Gap, Phasor};
 use crate::fused::fma;
 
-/// A linear functional of the state and the forcing.
+/// A linear functional of the state and the forcing, also called a row.
 #[derive(Clone, Debug)]
-pub(crate) struct Row {
+pub(crate) struct PairFunctional {
     /// Factors of `(z, w, x, v, cos, sin, 1)`.
     pub(crate) base: [f64; 7],
     /// Orders of the higher harmonics, and the factors of their `cos` and `sin`.
     pub(crate) waves: Few<(u32, [f64; 2])>,
 }
 
-impl Row {
-    /// Returns the product with `a`.
+impl PairFunctional {
+    /// Returns the value at a state and phasor.
     #[inline]
     pub(crate) fn dot(&self, q: &Gap, phasor: &Phasor) -> f64 {
         let row = &self.base;
@@ -48,10 +48,10 @@ impl Row {
     }
 
     /// Returns the sum of two rows, the second one multiplied by a factor.
-    pub(crate) fn plus(&self, factor: f64, other: &Row) -> Row {
+    pub(crate) fn plus(&self, factor: f64, other: &PairFunctional) -> PairFunctional {
         let sum = |a: [f64; 2], b: [f64; 2]| std::array::from_fn(|i| a[i] + factor * b[i]);
         let both = self.waves.iter().zip(other.waves.iter());
-        Row {
+        PairFunctional {
             base: std::array::from_fn(|j| self.base[j] + factor * other.base[j]),
             waves: both.map(|(&(order, a), &(_, b))| (order, sum(a, b))).collect(),
         }
