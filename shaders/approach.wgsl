@@ -1,13 +1,11 @@
-// Decides from the last strobes whether motion near a cycle ends on it. The reference uses the same rule
-// (dynamics/src/orbit/approach.rs).
+// Decides from the last strobes whether motion near a cycle ends on it. The reference uses the same rule (dynamics/src/orbit/approach.rs).
 //
-// Only the strobes of the motion itself count, because a stable cycle need not be the motion's limit. The rule requires
-// that the motion has the events of the cycle, and that the monodromy matrix maps each deviation from the cycle to the
-// next one. Then a deviation within the convex hull of earlier deviations stays in the part of the branch that the
-// motion has visited.
+// Only the strobes of the motion itself count, because a stable cycle need not be the motion's limit. The rule requires that the motion has
+// the events of the cycle, and that the monodromy matrix maps each deviation from the cycle to the next one. Then a deviation within the
+// convex hull of earlier deviations stays in the part of the branch that the motion has visited.
 
-// Distance from the cycle, relative to the motion, within which the error of the linear map may be as large as the
-// deviation. Farther away it may be at most the share LINEAR of the deviation.
+// Distance from the cycle, relative to the motion, within which the error of the linear map may be as large as the deviation. Farther away
+// it may be at most the share LINEAR of the deviation.
 const BENT_WITHIN: Real = 5e-4;
 // How far outside the hull a deviation may lie: as a share of itself, or relative to the motion.
 const OUTSIDE_OF_DEVIATION: Real = 0.1;
@@ -33,8 +31,7 @@ fn cycles_on_trail() -> u32 {
     return (min(search.strobe_count, TRAIL) - 1u) / tally.candidate;
 }
 
-// Called after period `read` of the cycle has been read. Updates how many of the motion's last cycles have the same
-// events.
+// Called after period `read` of the cycle has been read. Updates how many of the motion's last cycles have the same events.
 fn compare_itineraries(itinerary: u32, read: u32) {
     let is_own = search.newton_steps == 0u;
     // A cycle that is read along the motion is the motion's last cycle.
@@ -95,9 +92,8 @@ fn stays_near_cycle(to: State) -> bool {
 
 // Whether a deviation lies in the convex hull of the origin and the earlier deviations, within a tolerance.
 //
-// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step leads from the nearest point found so far towards the corner
-// that is farthest in the direction from this point to the deviation. That corner also gives a lower bound of the
-// distance.
+// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step leads from the nearest point found so far towards the corner that is farthest in
+// the direction from this point to the deviation. That corner also gives a lower bound of the distance.
 fn is_in_hull(point: State, corners: u32, to: State) -> bool {
     let target_point = in_units(point);
     let allowed = max(OUTSIDE_OF_DEVIATION * sqrt(inner(target_point, target_point)), OUTSIDE_OF_MOTION);
@@ -131,8 +127,8 @@ fn is_in_hull(point: State, corners: u32, to: State) -> bool {
     return false;
 }
 
-// Returns the distance from the previous deviation. In slow motion this distance decides at once, where the search
-// would need many short steps.
+// Returns the distance from the previous deviation. In slow motion this distance decides at once, where the search would need many short
+// steps.
 fn distance_from_last(point: State, to: State) -> Real {
     let off = difference(in_units(difference(trail(search.strobe_count - tally.candidate), to)), point);
     return sqrt(inner(off, off));

@@ -1,5 +1,4 @@
-// Decides whether motion is chaotic: the tangent vector certainly grows, and an escape from a cycle does not explain
-// the growth.
+// Decides whether motion is chaotic: the tangent vector certainly grows, and an escape from a cycle does not explain the growth.
 
 // Fewest periods over which averages are taken before a lane may stop as chaotic.
 const LEAST_COUNTED: u32 = 32u;
@@ -36,23 +35,21 @@ fn grows(errors: Real) -> bool {
     return growth.x > errors * growth.y;
 }
 
-// Whether growth exceeds that of neutral motion and of rounding. Tangents of a free body, a torus or an undamped
-// oscillation grow in proportion to time; at a double root they grow with its square. Rounding can replace the zero in
-// a shear `1 s; 0 1` by ULP, which gives a growth of sqrt(s ULP). One event has an s of at most 1. Without events the
-// motion is linear, and growth by negative damping is not chaos.
+// Whether growth exceeds that of neutral motion and of rounding. Tangents of a free body, a torus or an undamped oscillation grow in
+// proportion to time; at a double root they grow with its square. Rounding can replace the zero in a shear `1 s; 0 1` by ULP, which gives a
+// growth of sqrt(s ULP). One event has an s of at most 1. Without events the motion is linear, and growth by negative damping is not chaos.
 fn outgrows(errors: Real) -> bool {
     let growth = mean_growth();
     return tally.events > 0u && !is_growing(growth.x) && exceeds_neutral(growth.x - errors * growth.y);
 }
 
-// Returns the number of periods of the first part of the motion. Later displacements and rates are compared with those
-// of this part.
+// Returns the number of periods of the first part of the motion. Later displacements and rates are compared with those of this part.
 fn early_periods() -> u32 {
     return max(settings.transient_periods, settings.periods / 2u);
 }
 
-// Whether negative damping or stiffness makes the motion itself grow, at a certain share of its tangents' growth per
-// period. Also true if the motion is too short to know.
+// Whether negative damping or stiffness makes the motion itself grow, at a certain share of its tangents' growth per period. Also true if
+// the motion is too short to know.
 fn is_growing(growth: Real) -> bool {
     if escape_size() < 0.0 {
         return false;
@@ -74,8 +71,8 @@ fn exceeds_neutral(growth: Real) -> bool {
 
 // Whether the motion stays near a cycle, so that its tangents may grow because it leaves the cycle.
 fn escapes(errors: Real) -> bool {
-    // A lane that has just been moved off a cycle was near a saddle. Motion can recur by chance at one lag, but not at
-    // all multiples of the lag.
+    // A lane that has just been moved off a cycle was near a saddle. Motion can recur by chance at one lag, but not at all multiples of the
+    // lag.
     var is_near_saddle = search.known_lags == 0u;
     var rests = false;
     for (var lag = 1u; 2u * lag <= search.known_lags && !rests; lag++) {

@@ -1,5 +1,5 @@
-// Compaction lists the lanes that a variant has work for, or those that have ended. Lanes that are not listed cost
-// nothing. The list keeps the order of the active list, in which neighbouring lanes behave alike.
+// Compaction lists the lanes that a variant has work for, or those that have ended. Lanes that are not listed cost nothing. The list keeps
+// the order of the active list, in which neighbouring lanes behave alike.
 //
 // Three passes: count the selected lanes of each block of the active list, sum the counts, and copy each block's
 // lanes to their place.

@@ -27,9 +27,9 @@ fn largest_entry(m: Matrix) -> Real {
     return size;
 }
 
-// Returns a matrix with the eigenvalues of `m / size`, by one step of the QR iteration with rotations. Entries of `m`
-// that are larger than its eigenvalues move above the diagonal. Squares of `m` itself would lose the eigenvalues: for a
-// matrix with an entry of 46 and a radius of 0.15, the radius in f32 was wrong by a fifth.
+// Returns a matrix with the eigenvalues of `m / size`, by one step of the QR iteration with rotations. Entries of `m` that are larger than
+// its eigenvalues move above the diagonal. Squares of `m` itself would lose the eigenvalues: for a matrix with an entry of 46 and a radius
+// of 0.15, the radius in f32 was wrong by a fifth.
 fn nearly_triangular(m: Matrix, inverse: Real) -> Matrix {
     var r = m;
     for (var k = 0u; k < MATRIX; k++) {
@@ -119,9 +119,9 @@ fn restore_columns() {
 // Distance of 0.01, in quarter octaves below 1.
 const NEAR_RETURN: u32 = 26u;
 
-// Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. The lane continues if
-// it has periods left and the cycle is unstable, or its multiplier shows that the lane is still too far from it. Such
-// motion may be chaos, which stays near unstable cycles and near places where a pair of cycles has just vanished.
+// Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. The lane continues if it has periods left
+// and the cycle is unstable, or its multiplier shows that the lane is still too far from it. Such motion may be chaos, which stays near
+// unstable cycles and near places where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
     if !EXPONENT {
@@ -188,8 +188,7 @@ fn judge_cycle() {
     if is_cycle && reads_divisor() {
         return;
     }
-    // Newton's method has left the branch of the motion. If the lane returned to its start, it would repeat the same
-    // search.
+    // Newton's method has left the branch of the motion. If the lane returned to its start, it would repeat the same search.
     let is_lost = search.newton_steps > 0u && !is_on_branch();
     if is_stable && !is_lost && search.newton_steps > 0u {
         search.failed_searches += 1u;
@@ -211,8 +210,8 @@ const EXPONENT_ERROR: f32 = 0.02;
 // Binary logarithm of the smallest multiplier for which `EXPONENT_ERROR` is checked. Smaller multipliers are below the resolution of f32.
 const LEAST_GROWTH: f32 = -7.0;
 
-// Compares the exponent with the exponent of the previous reading, which was at another distance from the cycle. The
-// error is assumed to be proportional to the distance.
+// Compares the exponent with the exponent of the previous reading, which was at another distance from the cycle. The error is assumed to be
+// proportional to the distance.
 fn compare_growth() {
     let growth = f32(measures.cycle_growth);
     let now = distance_to_cycle();
@@ -296,13 +295,13 @@ fn is_multiple() -> bool {
     return search.divisor > 0u && is_closed;
 }
 
-// The divisor is certainly another cycle if the cycle's points are farther apart than the lane's distance from the
-// cycle by this factor, in quarter octaves.
+// The divisor is certainly another cycle if the cycle's points are farther apart than the lane's distance from the cycle by this factor, in
+// quarter octaves.
 const SEPARATION: u32 = 12u;
 
-// Whether the divisor has been rejected: it was read, was unstable, and is certainly another cycle, read at another
-// place. A lane can approach the divisor's own cycle on alternating sides. Its distance from that cycle is then half of
-// the apparent distance between the points.
+// Whether the divisor has been rejected: it was read, was unstable, and is certainly another cycle, read at another place. A lane can
+// approach the divisor's own cycle on alternating sides. Its distance from that cycle is then half of the apparent distance between the
+// points.
 fn is_rejected() -> bool {
     let is_separate = search.divisor_distance + SEPARATION <= search.linear_distance;
     return search.rejected_divisor == search.divisor && search.divisor_distance < AT_REST && is_separate;
@@ -324,8 +323,8 @@ fn hides_period() -> bool {
     return EXPONENT && roundings * ULP * measures.cycle_stretch >= nearest;
 }
 
-// Returns the largest change of the state by rounding over a cycle, relative to the motion. Every event adds a rounding
-// error, and the cycle amplifies it.
+// Returns the largest change of the state by rounding over a cycle, relative to the motion. Every event adds a rounding error, and the
+// cycle amplifies it.
 fn noise() -> f32 {
     if !EXPONENT {
         return NOISE;
@@ -345,8 +344,8 @@ fn gain() -> Real {
     return most;
 }
 
-// Returns a bound on the lane's distance from its cycle, relative to the motion. Both recurrence and the linearised map
-// give one, because a spiral comes near its last strobe before it comes near its cycle.
+// Returns a bound on the lane's distance from its cycle, relative to the motion. Both recurrence and the linearised map give one, because a
+// spiral comes near its last strobe before it comes near its cycle.
 fn distance_to_cycle() -> f32 {
     // Rounding can stop a lane before it reaches the cycle.
     let by_recurrence = limit_of(max(exp2(-f32(search.return_distance) / PARTS_PER_OCTAVE), NOISE));
@@ -370,8 +369,8 @@ fn is_near_cycle() -> bool {
     return distance_to_cycle() < ON_CYCLE;
 }
 
-// Whether the cycle is farther from its mirror image than the lane's distance from the cycle explains. That distance
-// counts twice for the state, and amplified twice for the image.
+// Whether the cycle is farther from its mirror image than the lane's distance from the cycle explains. That distance counts twice for the
+// state, and amplified twice for the image.
 fn is_surely_unsymmetric() -> bool {
     let amplified = select(1.0, f32(gain()), EXPONENT);
     return exp2(-f32(search.mirror) / PARTS_PER_OCTAVE) > 2.0 * (1.0 + amplified) * max(blurred_distance_to_cycle(), SYMMETRIC);
@@ -390,8 +389,8 @@ fn is_at_rest() -> bool {
     return search.return_distance >= AT_REST && is_there;
 }
 
-// Whether the lane is near its cycle, or as near as rounding allows. The fixed point must lie in the lane's domain.
-// Near a graze the lane must be at rest.
+// Whether the lane is near its cycle, or as near as rounding allows. The fixed point must lie in the lane's domain. Near a graze the lane
+// must be at rest.
 fn is_on_cycle(to: State, is_last: bool) -> bool {
     // If periods are left, Newton's method shows whether the motion continues with the same events.
     let is_confirmed = !is_last || settings.early_stop == 0u || search.newton_steps > 0u || distance_to_cycle() <= NEWTON_CONVERGED;

@@ -1,7 +1,6 @@
 // Growth of tangent vectors. Only shader variants with an exponent contain this file.
 
-// The tangent vector for the exponent. The columns of the monodromy matrix stay in the buffer; they are carried while a
-// cycle is read.
+// The tangent vector for the exponent. The columns of the monodromy matrix stay in the buffer; they are carried while a cycle is read.
 var<private> tangent_now: State;
 
 fn tangent(i: u32) -> State {
@@ -59,9 +58,8 @@ fn save_vector() {
     }
 }
 
-// Multiplies the saved vector by the monodromy matrix of the cycle that was read along the motion. A new vector would
-// first turn into the direction of growth, which adds growth: 0.2 per period for motion with an exponent of zero whose
-// cycles are read again and again.
+// Multiplies the saved vector by the monodromy matrix of the cycle that was read along the motion. A new vector would first turn into the
+// direction of growth, which adds growth: 0.2 per period for motion with an exponent of zero whose cycles are read again and again.
 fn carry_vector() {
     if search.newton_steps > 0u {
         return;
@@ -127,8 +125,8 @@ fn begin_columns() {
     constrain_columns();
 }
 
-// Keeps the columns of the monodromy matrix in range after an event. Measures how much perturbations grow between two
-// instants of the cycle, because rounding errors grow in the same way.
+// Keeps the columns of the monodromy matrix in range after an event. Measures how much perturbations grow between two instants of the
+// cycle, because rounding errors grow in the same way.
 fn check_columns() {
     let size = size_of_columns();
     if size >= OUT_OF_RANGE {
@@ -197,8 +195,8 @@ fn check_range() {
     }
 }
 
-// Many events in one period may take the vector out of the range of single precision. So the vector is scaled, and the
-// factor counts as growth of the present period.
+// Many events in one period may take the vector out of the range of single precision. So the vector is scaled, and the factor counts as
+// growth of the present period.
 const LARGE: Real = 1099511627776.0;
 const LARGE_OCTAVES: Real = 40.0;
 
@@ -274,8 +272,8 @@ fn count_growth(growth: Real, periods: u32) {
 
 const LN_2: Real = 0.6931471805599453;
 
-// Returns the mean of the natural logarithm of the tangent vector's growth per period, and its standard error, which
-// follows from the means of blocks.
+// Returns the mean of the natural logarithm of the tangent vector's growth per period, and its standard error, which follows from the means
+// of blocks.
 fn mean_growth() -> vec2<Real> {
     let blocks = Real(search.blocks);
     let mean = measures.growth_sum / blocks;

@@ -117,8 +117,8 @@ struct Motion {
     tangents: Matrix,
     // The exponent's tangent vector while the matrix takes its place.
     vector: State,
-    // Growth of perturbations on the cycle that is read (check_columns in growth.wgsl): smallest size of the columns so
-    // far, largest ratio of a size to an earlier one, and largest size.
+    // Growth of perturbations on the cycle that is read (check_columns in growth.wgsl): smallest size of the columns so far, largest ratio
+    // of a size to an earlier one, and largest size.
     stretch: array<Real, 3>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<State, TRAIL>,
@@ -157,8 +157,8 @@ struct TallyNow {
     // Impacts and events since counting began.
     impacts: u32,
     events: u32,
-    // Time spent meshing: whole steps of the right and of the left meshing domain, and the whole part of the sum of
-    // partial steps, in free steps.
+    // Time spent meshing: whole steps of the right and of the left meshing domain, and the whole part of the sum of partial steps, in free
+    // steps.
     mesh_right: u32,
     mesh_left: u32,
     mesh_whole: u32,
@@ -200,17 +200,16 @@ struct Search {
     // Number of whole blocks of the exponent's average, and number of periods in the present block.
     blocks: u32,
     block_periods: u32,
-    // Recurrence: period of the anchor, number of lags of the present window, number of windows over which the
-    // candidate has contracted, and number of lags of the last window.
+    // Recurrence: period of the anchor, number of lags of the present window, number of windows over which the candidate has contracted,
+    // and number of lags of the last window.
     anchor_period: u32,
     window: u32,
     streak: u32,
     known_lags: u32,
     // 1 if the candidate's limit is near.
     is_settled: u32,
-    // Distances in quarter octaves below 1. `mirror`: the cycle's distance from its mirror image. `return_distance`:
-    // the lane's distance from the cycle's start at the end of the last reading. `earlier_return_distance`:
-    // `return_distance` before a Newton step.
+    // Distances in quarter octaves below 1. `mirror`: the cycle's distance from its mirror image. `return_distance`: the lane's distance
+    // from the cycle's start at the end of the last reading. `earlier_return_distance`: `return_distance` before a Newton step.
     mirror: u32,
     return_distance: u32,
     earlier_return_distance: u32,
@@ -226,8 +225,8 @@ struct Search {
     // octaves below 1.
     divisor: u32,
     divisor_distance: u32,
-    // Number of failed Newton searches. `checks_divisor`: 1 while a divisor is read to find out whether it is the
-    // period. `rejected_divisor`: a divisor whose cycle was found to be unstable.
+    // Number of failed Newton searches. `checks_divisor`: 1 while a divisor is read to find out whether it is the period.
+    // `rejected_divisor`: a divisor whose cycle was found to be unstable.
     failed_searches: u32,
     checks_divisor: u32,
     rejected_divisor: u32,
@@ -321,8 +320,8 @@ struct Finding {
     spelling: array<u32, SPELLING>,
 }
 
-// Lists of slots. The first `slots` entries are the active list: the lanes under way, in the order in which they began.
-// The next entries are the lanes that compaction selected.
+// Lists of slots. The first `slots` entries are the active list: the lanes under way, in the order in which they began. The next entries
+// are the lanes that compaction selected.
 struct Queue {
     // Number of selected lanes. `beat` counts compactions; the host notices by it that a device no longer works.
     count: u32,

@@ -87,8 +87,8 @@ fn strobe_distance() -> Real {
     return Real(bitcast<f32>(tally.strobe_distance));
 }
 
-// Whether an event near phase 0 makes the comparison of strobe states uncertain although the status does not say so.
-// Such an event may lie before and after the strobe in turn. A cycle then seems twice as long, or is not found.
+// Whether an event near phase 0 makes the comparison of strobe states uncertain although the status does not say so. Such an event may lie
+// before and after the strobe in turn. A cycle then seems twice as long, or is not found.
 fn is_near_strobe() -> bool {
     if search.cycle > 1u {
         return strobe_distance() < NEAR_STROBE;
@@ -99,8 +99,8 @@ fn is_near_strobe() -> bool {
 }
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
-    // Contact-free motion is symmetric, and is not read as a cycle. If the approach is slow or rounding is amplified,
-    // only a clearly broken symmetry is known. On a symmetric cycle every impact has a mirror image.
+    // Contact-free motion is symmetric, and is not read as a cycle. If the approach is slow or rounding is amplified, only a clearly broken
+    // symmetry is known. On a symmetric cycle every impact has a mirror image.
     if SYMMETRY && cell.mirror == 1u {
         let has_conjugate = tally.impacts % 2u == 0u;
         let is_symmetric = search.has_read == 0u || (is_surely_symmetric() && has_conjugate);
@@ -131,8 +131,8 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     }
 }
 
-// Stores a number of the word or the pattern. The place is an argument, because variants without words have a shorter
-// array, which a constant place would exceed.
+// Stores a number of the word or the pattern. The place is an argument, because variants without words have a shorter array, which a
+// constant place would exceed.
 fn spell(finding: ptr<function, Finding>, place: u32, number: u32) {
     (*finding).spelling[place] = number;
 }

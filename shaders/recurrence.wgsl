@@ -3,8 +3,7 @@
 // A lane has settled once its limit is estimated to lie within 2^-14 of the motion. Weak chaos comes within 2^-12 of
 // a cycle by chance.
 const SETTLED: f32 = 56.0;
-// Newton's method may search the limit once its distance is below 2^-4 of the motion. `LONGEST_NEWTON_STEP` limits the
-// step.
+// Newton's method may search the limit once its distance is below 2^-4 of the motion. `LONGEST_NEWTON_STEP` limits the step.
 const REFINABLE: f32 = 16.0;
 // Least approach per period in `is_refinable`. A slower motion is treated as if it approached at this rate.
 const SLOWEST: f32 = 0.008;
@@ -39,8 +38,8 @@ fn recurs() -> bool {
     search.known_lags = search.window;
     tallies[lane].last_distances = tallies[lane].distances;
     keep_recurrence();
-    // The next anchor lies at the same point of the cycle, because distances at other points are not comparable. The
-    // points of a cycle may be so close together that a lag shorter than its period seems to recur.
+    // The next anchor lies at the same point of the cycle, because distances at other points are not comparable. The points of a cycle may
+    // be so close together that a lag shorter than its period seems to recur.
     let cycle = max(closest_lag(), 1u);
     // A short lag that contracts is found in short windows, too.
     let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
@@ -55,8 +54,8 @@ fn widen_scales(q: State) {
     measures.rate_scale = max(measures.rate_scale, largest_rate(q));
 }
 
-// Lowers the units of distances when a cycle is read, so that earlier motion does not count. A strobe may lie at a
-// turning point, where rates vanish, or midway between two, where the displacement vanishes.
+// Lowers the units of distances when a cycle is read, so that earlier motion does not count. A strobe may lie at a turning point, where
+// rates vanish, or midway between two, where the displacement vanishes.
 fn narrow_scales(q: State) {
     let angle = unit_of_frequency();
     let position = largest_position(q);
@@ -103,16 +102,16 @@ fn closest_of(lags: u32) -> u32 {
     return best;
 }
 
-// Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because rates
-// at a turning point are rounding errors.
+// Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because rates at a turning point
+// are rounding errors.
 fn distance_between(a: State, b: State) -> Real {
     let d = difference(a, b);
     return max(largest_displacement(d) / unit_of_positions(), largest_rate(d) / unit_of_rates());
 }
 
-// Returns the unit of positions: the size of the motion. With stages it is at least the scale of length. Motion that
-// decays to rest would otherwise never come near to rest, because its size decays with it. Without stages such motion
-// is recognised by its energy (is_non_impacting).
+// Returns the unit of positions: the size of the motion. With stages it is at least the scale of length. Motion that decays to rest would
+// otherwise never come near to rest, because its size decays with it. Without stages such motion is recognised by its energy
+// (is_non_impacting).
 fn unit_of_positions() -> Real {
     var least: Real = 1e-30;
     if has_stages() {
@@ -153,8 +152,7 @@ fn last_distance_at(lag: u32) -> u32 {
 // Returns the smallest lag that recurs at all its multiples and contracts or has reached rounding; 0 if there is
 // none. Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
 fn contracting_lag() -> u32 {
-    // If points of a cycle are close together, their distances neither shrink nor grow. A longer lag then recurs
-    // better.
+    // If points of a cycle are close together, their distances neither shrink nor grow. A longer lag then recurs better.
     let best = closest_of(search.window);
     for (var lag = 1u; lag <= min(search.window, search.known_lags); lag++) {
         iterations += 1u;
@@ -182,8 +180,8 @@ fn shrinks(lag: u32) -> bool {
     return now >= WITHIN_ROUNDING || now >= last_distance_at(lag) + SHRUNK;
 }
 
-// Whether the limit of the strobes is near enough. If the distance `d` between strobes shrinks by the factor `mu` per
-// period, the limit is `d / (1 - mu)` away. So strobes that approach slowly must be closer together.
+// Whether the limit of the strobes is near enough. If the distance `d` between strobes shrinks by the factor `mu` per period, the limit is
+// `d / (1 - mu)` away. So strobes that approach slowly must be closer together.
 fn has_settled(lag: u32) -> bool {
     let now = distance_at(lag);
     let shrunk = f32(now) - f32(last_distance_at(lag));
@@ -219,8 +217,8 @@ fn judge_lag(found: u32) -> bool {
     }
     search.streak = select(1u, search.streak + 1u, found == tally.candidate);
     tally.candidate = found;
-    // Strobes of weak chaos may contract by chance, and more checks find more such cases. So each failed reading raises
-    // the number of windows that must contract by one.
+    // Strobes of weak chaos may contract by chance, and more checks find more such cases. So each failed reading raises the number of
+    // windows that must contract by one.
     let windows = STREAK + search.failed_readings + select(0u, 2u, grows(CHAOS_ERRORS));
     let has_contracted = search.streak >= windows;
     search.is_settled = select(0u, 1u, has_contracted && has_settled(found));

@@ -1,8 +1,8 @@
-// Decides whether motion without a period is quasi-periodic: weighted averages of the strobes over two successive
-// windows must agree. The reference uses the same rule (dynamics/src/orbit/regularity.rs).
+// Decides whether motion without a period is quasi-periodic: weighted averages of the strobes over two successive windows must agree. The
+// reference uses the same rule (dynamics/src/orbit/regularity.rs).
 
-// Adds the strobe that was stored last to the averages. The first pair of windows ends before the budget, and the next
-// pair before the budget of undecided lanes. The periods that are left may be used by Newton's method.
+// Adds the strobe that was stored last to the averages. The first pair of windows ends before the budget, and the next pair before the
+// budget of undecided lanes. The periods that are left may be used by Newton's method.
 fn add_to_averages() {
     let length = search.average_length;
     if length == 0u || (has_averages() && tally.period > settings.periods) {
@@ -38,8 +38,8 @@ fn has_averages() -> bool {
     return search.average_length > 0u && search.strobe_count >= search.average_start + 2u * search.average_length;
 }
 
-// Stores the distance within which the motion recurs. Each window has a distance from the anchor to its nearest strobe,
-// and the largest of these distances is stored.
+// Stores the distance within which the motion recurs. Each window has a distance from the anchor to its nearest strobe, and the largest of
+// these distances is stored.
 fn keep_recurrence() {
     if 2u * search.known_lags < settings.max_period {
         return;

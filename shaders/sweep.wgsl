@@ -44,9 +44,9 @@ fn is_over() -> bool {
     return tally.status != STATUS_OK || tally.stage == STAGE_READ || tally.stage == STAGE_DONE;
 }
 
-// Whether this variant has work for the lane. The variant without the exponent's tangent vector moves a lane until it
-// needs the vector; a reading in progress is finished first. From then on the lane belongs to the other variant. The
-// choice must not depend on where a dispatch ends, because the variants round differently.
+// Whether this variant has work for the lane. The variant without the exponent's tangent vector moves a lane until it needs the vector; a
+// reading in progress is finished first. From then on the lane belongs to the other variant. The choice must not depend on where a dispatch
+// ends, because the variants round differently.
 fn has_work() -> bool {
     let measures = tally.stage == STAGE_MEASURING;
     if MEASURE || measures {
