@@ -1,4 +1,4 @@
-// What observers ask the engine of motion of a machine. The functions are those of oscillator.wgsl.
+// The functions that observers call, for machines. pair/oscillator.wgsl defines them for oscillators with one gap.
 
 fn begin_motion() {
     let start = starts[lane];

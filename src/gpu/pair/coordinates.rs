@@ -66,7 +66,7 @@ impl Coordinates {
         [g0 * y[0] + g1 * y[2], h * (g0 * y[1] + g1 * y[3]), x[0], h * x[1]]
     }
 
-    /// Returns the state from lane units.
+    /// Converts a state from lane units.
     pub(super) fn to_state(self, q: [f64; 4], h: f64) -> State {
         let (o, p) = (self.other, 1 - self.other);
         let (w, v) = (q[1] / h, q[3] / h);
