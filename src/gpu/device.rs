@@ -172,7 +172,7 @@ pub(super) async fn pipelines(gpu: &Gpu, variants: &[Variant]) -> Result<Vec<Pip
     Ok((0..variants.len()).map(of).collect())
 }
 
-/// Creates a part of a shader's program at once. The future returns this part or the driver's error.
+/// Creates a part of a shader's program immediately, not when the future is polled. The future returns this part or the driver's error.
 fn compiling<'g, T>(
     gpu: &'g Gpu,
     make: &dyn Fn() -> T,

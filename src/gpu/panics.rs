@@ -57,7 +57,7 @@ impl<T> Deref for PanicFree<T> {
 impl<T> Drop for PanicFree<T> {
     fn drop(&mut self) {
         let inner = self.0.take();
-        // The value no longer exists, so no caller needs its error.
+        // The error concerns no caller, because the value no longer exists.
         let _ = catch_panic(|| drop(inner));
     }
 }

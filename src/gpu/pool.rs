@@ -109,7 +109,7 @@ impl Pool {
         // Takes the lowest slots, so that lanes that begin together are adjacent.
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.free.split_off(self.free.len() - lanes.len());
-        // In a browser, buffers belong to one thread, so the work is not distributed.
+        // In a browser, buffers cannot be shared between threads, so the closure uses these two fields only.
         let Tables { constants, is_even, .. } = tables;
         let started: Vec<_> = lanes.par_iter().map(|(_, lane)| start(constants, is_even, lane)).collect();
         let size = self.settings.features.start_numbers();

@@ -28,7 +28,7 @@ pub struct DeviceTimes {
 }
 
 impl DeviceTimes {
-    /// Returns the times of two successive measurements together.
+    /// Returns the times of two successive measurements as one.
     pub fn and(self, other: DeviceTimes) -> DeviceTimes {
         DeviceTimes {
             busy: self.busy + other.busy,

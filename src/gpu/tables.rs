@@ -88,7 +88,7 @@ impl Tables {
         [&self.flows, &self.shapes, &self.pairs, &self.laws].map(wgpu::Buffer::size).iter().sum()
     }
 
-    /// Returns the memory of the constants, which the next tables overwrite.
+    /// Returns the vector of the constants, whose memory the next tables use again.
     pub(crate) fn into_constants(self) -> Vec<Option<Constants>> {
         self.constants
     }

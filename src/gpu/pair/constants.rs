@@ -187,8 +187,8 @@ impl Common {
 
     fn domains(&self, oscillator: &Pair) -> [Domain; 3] {
         let behind = |side: usize| match self.is_passed[side] {
-            // Motion never enters this domain, and its step is not used. The steps of contact with the last wall are stored here, because
-            // its time is counted in them.
+            // Motion never enters this domain. It stores the step of contact with the last wall, in which the time of that contact is
+            // counted.
             true => {
                 let substeps = self.substeps[side];
                 Domain { share: substeps.recip(), substeps, ..Domain::zeroed() }
@@ -357,7 +357,7 @@ pub(in crate::gpu) fn speed(oscillator: &Pair) -> f64 {
     oscillator.length_scale() * further.fold(free_rate(oscillator), f64::max)
 }
 
-/// Returns the positions of the walls. A missing wall is at [`FAR`](FAR).
+/// Returns the positions of the walls. A missing wall is at [`NOWHERE`].
 fn walls(oscillator: &Pair) -> [f64; 2] {
     let far = NOWHERE * oscillator.length_scale();
     oscillator.walls.map(|wall| wall.clamp(-far, far))
