@@ -198,7 +198,7 @@ pub(super) struct Bars<'a> {
     pub(super) labels: Option<Labels<'a>>,
 }
 
-/// For one cell of a map of basins: the known attractors, and the cell's own label.
+/// For one cell of a map of basins: the known attractors, and the state that identifies the cell's own record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Labels<'a> {
     pub(super) basins: &'a Basins,

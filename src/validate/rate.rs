@@ -80,7 +80,7 @@ fn at_least(count: usize, among: usize, p: f64) -> f64 {
         below += term.exp();
         term += ((among - k) as f64 / (k + 1) as f64).ln() + success - failure;
     }
-    // If the result is small, 1 minus the other tail would cancel, so this tail is summed.
+    // A small result would lose its digits in `1 - below`, so it is summed directly.
     if below < 0.5 {
         return 1.0 - below;
     }

@@ -438,7 +438,7 @@ impl Flight {
         None
     }
 
-    /// Records that time has passed since the last event.
+    /// Adds a time without events to the tally. Afterwards gaps are off their walls, and the flight has no roots at its start.
     fn leave_walls(&mut self, domain: &Domain, time: f64) {
         if self.gaps.iter().take(self.system.gaps()).any(|gap| gap.contact().is_some()) {
             self.tally.meshing_time += time;

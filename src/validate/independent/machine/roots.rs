@@ -131,7 +131,7 @@ mod tests {
         assert!(near(fall(&[0.0, 0.3, -1.0], 2.0, 1), 0.3));
         assert!(near(fall(&[0.0, 0.0, 0.3, -1.0], 0.5, 2), 0.3));
         assert!(near(fall(&[0.0, 0.0, 0.0, 0.3, -1.0], 1.0, 3), 0.3));
-        // (x - 0.5)^2 + 1e-10 stays above 0. With a constant that is smaller by more, the polynomial falls below 0.
+        // (x - 0.5)^2 + 1e-10 stays above 0; (x - 0.5)^2 - 1e-10 falls below it.
         assert_eq!(fall(&[0.25 + 1e-10, -1.0, 1.0], 1.0, 0), None);
         assert!((fall(&[0.25 - 1e-10, -1.0, 1.0], 1.0, 0).unwrap() - (0.5 - 1e-5)).abs() < 1e-9);
     }
