@@ -1,6 +1,6 @@
 // Decides whether motion is chaotic: the tangent vector certainly grows, and an escape from a cycle does not explain the growth.
 
-// Fewest periods over which averages are taken before a lane may stop as chaotic.
+// Smallest number of averaged periods after which a lane may stop as chaotic.
 const LEAST_COUNTED: u32 = 32u;
 
 // A lane that has not settled on its cycle is doubted if growth exceeds zero by this number of standard errors.

@@ -9,13 +9,13 @@ const REFINABLE: f32 = 16.0;
 const SLOWEST: f32 = 0.008;
 // Recurrences within 2^-12 of the motion need not shrink, but must not grow.
 const SLOW: u32 = 48u;
-// Least shrinkage since the last window: a factor of 0.7.
+// Least shrinkage since the last window, in quarter octaves: a factor of 0.7.
 const SHRUNK: u32 = 2u;
-// Windows over which a candidate must have contracted.
+// Number of windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-// Fewest lags of a window.
+// Smallest number of lags of a window.
 const LEAST_WINDOW: u32 = 2u;
-// A window has at least this number of contracting cycles; it need not be longer.
+// Number of contracting cycles after which a window ends, even if it could be longer.
 const LAGS_PER_CYCLE: u32 = 4u;
 
 // Checks a strobe. Returns true once a period is confirmed.
@@ -41,7 +41,7 @@ fn recurs() -> bool {
     // The next anchor lies at the same point of the cycle, because distances at other points are not comparable. The points of a cycle may
     // be so close together that a lag shorter than its period seems to recur.
     let cycle = max(closest_lag(), 1u);
-    // A short lag that contracts is found in short windows, too.
+    // Short windows suffice to find a short lag that contracts.
     let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
     let lags = select(widest(), min(enough, widest()), is_fast && search.failed_readings == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));

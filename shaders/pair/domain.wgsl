@@ -47,7 +47,7 @@ fn mesh_speed(side: u32) -> Real {
     return select(law.mesh_speed[1], law.mesh_speed[0], side == SIDE_RIGHT) * h;
 }
 
-// Makes domain `d` the one that governs the motion.
+// Makes domain `d` govern the motion.
 fn enter(d: u32) {
     if !KEEP {
         here = flows[cell.flow_index].domains[d];
@@ -74,7 +74,7 @@ struct Pull {
     x_row: array<Real, 7>,
     share: Real,
     angle: Real,
-    // Places of the harmonics' parts.
+    // Places of the harmonics' factors (harmonics.wgsl).
     gap_place: u32,
     x_place: u32,
 }

@@ -9,7 +9,7 @@ const NO_STEP: u32 = 0xffffffffu;
 var<private> change_step: u32;
 var<private> change_theta: Real;
 
-// Returns the flow of the present stage, between the first walls. `flow` is the flow of the first stage there.
+// Returns the flow of the present stage between the first walls. `flow` is that of the first stage.
 fn flow_of_stage(flow: u32) -> u32 {
     let count = shapes[flow].changes;
     if count == 0u {

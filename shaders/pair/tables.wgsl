@@ -52,7 +52,7 @@ struct Flow {
     transient_growth: Real,
     // Acceleration of a gap that rests on the right and on the left wall: a `gap_row` with the gap measured from that wall.
     pressing: array<array<Real, 7>, 2>,
-    // Change of the tangent's rates of the gap and of x per displacement of its gap, where the motion enters an elastic wall.
+    // Where the motion enters an elastic wall, tangent vectors change: change of their rates of gap and x per displacement of their gap.
     damper: array<array<Real, 2>, 2>,
     // Contact force of the right and of the left wall per displacement and per rate of the gap, in the units of
     // measure.wgsl.

@@ -11,7 +11,7 @@ pub struct Features {
     pub kinds: bool,
     /// Forces with a sine.
     pub sine: bool,
-    /// Most harmonics of a force beside the first.
+    /// Largest number of harmonics of a force besides the first.
     pub harmonics: u32,
     /// Stages: domains that change within a forcing period.
     pub stages: bool,

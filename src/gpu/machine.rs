@@ -38,13 +38,13 @@ pub struct MachineShape {
     pub coordinates: u32,
     /// Number of gaps.
     pub gaps: u32,
-    /// Most elements with dry friction.
+    /// Largest number of elements with dry friction.
     pub elements: u32,
-    /// Most harmonics of the force.
+    /// Largest number of harmonics of the force.
     pub harmonics: u32,
-    /// Most walls on one side of a gap.
+    /// Largest number of walls on one side of a gap.
     pub walls: u32,
-    /// Most stages.
+    /// Largest number of stages.
     pub stages: u32,
 }
 

@@ -127,9 +127,8 @@ pub struct LaneSettings {
     pub chaos_from: u32,
     /// Number of standard errors by which the exponent of such a lane must exceed zero.
     pub chaos_errors: f32,
-    /// Least number of free steps per period; `None` for as many as the motion needs. More steps do not improve
-    /// results: rounding errors add up like a random walk, and a short flight that spans several steps loses the
-    /// relative accuracy of its gap.
+    /// Least number of free steps per period; `None` for the number that the motion needs. More steps do not improve results: rounding
+    /// errors add up like a random walk, and a short flight that spans several steps loses the relative accuracy of its gap.
     pub steps_per_period: Option<u32>,
     /// Largest number of lanes under way; `None` for as many as the adapter's limits allow.
     pub batch: Option<usize>,
@@ -381,8 +380,8 @@ impl Gpu {
         self.trouble.message().map_or(error, |message| GpuError::Lost { message })
     }
 
-    /// Derives the constants of flows and laws and uploads them, for any number of runs. `steps_per_period` is the
-    /// least number of free steps per forcing period; `None` for as many as the motion needs.
+    /// Derives the constants of flows and laws and uploads them, for any number of runs. `steps_per_period` is the least number of free
+    /// steps per forcing period; `None` for the number that the motion needs.
     ///
     /// # Errors
     /// [`GpuError::TooManyFlows`] if they do not fit one buffer, [`GpuError::OutOfMemory`] if

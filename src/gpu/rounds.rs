@@ -249,7 +249,7 @@ fn at_once(gpu: &Gpu) -> u32 {
     }
 }
 
-/// Returns the least iterations of a round with so many lanes.
+/// Returns the least number of iterations of a round with this number of lanes.
 fn fewest_iterations(lanes: u32, at_once: u32) -> u32 {
     (FEWEST_ITERATIONS * at_once / lanes.max(1)).clamp(1, FEWEST_ITERATIONS)
 }
@@ -261,7 +261,7 @@ fn next_iterations(iterations: u32, took: Duration, round: Duration) -> u32 {
     (f64::from(iterations) * factor.clamp(0.25, 8.0)) as u32
 }
 
-/// Returns the workgroups in a row of the grid for so many lanes.
+/// Returns the number of workgroups in a row of the grid for this number of lanes.
 pub(super) fn row(gpu: &Gpu, lanes: usize, workgroup: u32) -> u32 {
     let groups = (lanes as u32).div_ceil(workgroup).max(1);
     let widest = gpu.device.limits().max_compute_workgroups_per_dimension;

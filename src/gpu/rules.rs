@@ -27,7 +27,7 @@ pub(crate) const RECURRENCE_LIMIT: u32 = 24;
 /// A recurrence window lasts this fraction (one fifth) of the elapsed time.
 pub(crate) const WINDOW_SHARE: u32 = 5;
 
-/// Most steps of Newton's method towards one cycle.
+/// Largest number of steps of Newton's method towards one cycle.
 pub(crate) const MOST_NEWTON_STEPS: u32 = 5;
 
 /// Longest Newton step, relative to the motion. On a longer way to the cycle, the strobe map may have a fold.

@@ -1,9 +1,8 @@
 //! Averages of chaotic motion, compared as distributions over the class.
 //!
 //! The averages of a chaotic cell over its budget scatter. Therefore the reference computes each chaotic cell of the uniform sample twice,
-//! over the same number of periods and from starts within the engine's resolution. If the engine is right, the differences of the record
-//! from the first result have the distribution of the differences of the second from the first. The two samples are compared by the
-//! Kolmogorov-Smirnov statistic.
+//! over the same number of periods and from starts within the engine's resolution. If the engine is right, record and second result differ
+//! from the first result by numbers of the same distribution. The two samples are compared by the Kolmogorov-Smirnov statistic.
 
 use super::cell::Cell;
 use crate::record::classify::classify;

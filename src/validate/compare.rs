@@ -142,7 +142,7 @@ impl Either {
         Either { own, mirrored }
     }
 
-    /// Whether a text is that of the word or of its mirror image.
+    /// Whether a text spells the word or its mirror image.
     fn is(&self, ours: &Spelling) -> bool {
         let length = |spelling: &Spelling| match spelling {
             Spelling::Whole(word) => word.len() as u32,

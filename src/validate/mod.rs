@@ -275,8 +275,8 @@ pub fn replay(
     replay_whole(subject, None, false, sample, lanes, report, &NEVER)
 }
 
-/// Like [`replay`], but returns `None` once `halt` is set. In a map of basins the attractors are compared, too. With
-/// `is_exact` the map fails if its engine does not reproduce a record to the bit.
+/// Like [`replay`], but returns `None` once `halt` is set. In a map of basins, attractors are also compared. With `is_exact` the map fails
+/// if its engine does not reproduce a record to the bit.
 pub fn replay_until(
     subject: &Subject<'_>,
     basins: Option<&Basins>,
@@ -420,7 +420,7 @@ fn replay_cell(
     let mut fields = cell.bars.compare(&cell.record, &truth);
     let differs = |fields: &[Compared]| fields.iter().any(|(_, differs)| differs.is_some());
     let ran = explain::RepeatedLanes { again, whole: lanes.whole(id), double: lanes.double(id) };
-    // Its engine cannot have returned such a record, so no explanation is searched.
+    // An engine cannot return such a record, so no explanation is searched for.
     let is_forged = is_exact && is_same == Some(false);
     let mut kind = match is_forged {
         true => Some(Kind::Unexplained),

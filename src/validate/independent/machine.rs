@@ -73,7 +73,7 @@ struct Watch {
 enum Mode {
     /// The springs of all crossed walls act.
     Plain,
-    /// Contact with the next wall lasts since an impact with a leaving speed. The gap is in front of this wall.
+    /// Contact with the next wall has lasted since an impact after which the gap still had a speed. The gap is in front of this wall.
     Onset(Side),
     /// The gap is at rest on the next wall, which is rigid.
     Stuck(Side),
