@@ -3,8 +3,8 @@
 // Size of the perturbation that moves a lane off an unstable cycle, in units of the distance below which a lane counts as at rest.
 const PERTURBATION: f32 = 8.0;
 
-// Returns the binary logarithm of a number between about 1e-30 and 1e30, to the precision of its type: f64 has no
-// logarithm. `ln m = 2 artanh((m - 1) / (m + 1))`, with m within a factor of sqrt 2 of 1.
+// Returns the binary logarithm of a number between about 1e-30 and 1e30, to the precision of its type. WGSL has no logarithm for f64. `ln m
+// = 2 artanh((m - 1) / (m + 1))`, with m within a factor of sqrt 2 of 1.
 fn octaves_of(x: Real) -> Real {
     let whole = round(log2(f32(x)));
     let m = x * Real(ldexp(1.0, -i32(whole)));
@@ -398,7 +398,7 @@ fn is_on_cycle(to: State, is_last: bool) -> bool {
     return is_near || moves_no_more(to, is_last);
 }
 
-// Whether the motion itself has come to rest on its cycle, or as near to it as rounding allows.
+// Whether the motion itself has reached its cycle, as nearly as rounding allows.
 fn rests_on_cycle(to: State, is_last: bool) -> bool {
     return search.newton_steps == 0u && moves_no_more(to, is_last);
 }

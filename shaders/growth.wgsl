@@ -157,7 +157,7 @@ fn check_columns() {
     }
 }
 
-// Size from which a tangent vector counts as lost: its next step may leave the range of single precision.
+// Size above which a tangent vector counts as lost, because its next step may leave the range of single precision.
 const OUT_OF_RANGE: Real = 1e30;
 
 // Whether a vector is below OUT_OF_RANGE. The function `max` may ignore NaN; a sum does not.

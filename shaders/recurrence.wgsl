@@ -149,8 +149,8 @@ fn last_distance_at(lag: u32) -> u32 {
     return (tallies[lane].last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
 }
 
-// Returns the smallest lag that recurs at all its multiples and contracts or has reached rounding; 0 if there is
-// none. Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
+// Returns the smallest lag that recurs at all its multiples, and whose distance contracts or has reached rounding; 0 without such a lag.
+// Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
 fn contracting_lag() -> u32 {
     // If points of a cycle are close together, their distances neither shrink nor grow. A longer lag then recurs better.
     let best = closest_of(search.window);
@@ -225,8 +225,7 @@ fn judge_lag(found: u32) -> bool {
     return has_contracted && (search.is_settled != 0u || is_refinable(found));
 }
 
-// Compares the state half a period after the middle of a cycle of odd period with the mirror image of the cycle's
-// start.
+// Compares the cycle's start with the mirror image of the present state. The lane is half-way through a cycle of odd period.
 fn compare_mirror() {
     search.mirror = octaves(distance_between(strobe_state(), difference(State(), measures.anchor)));
 }

@@ -96,8 +96,8 @@ fn store_strobe_state() {
     }
 }
 
-// Returns the step at which the lane must stop: phase 0, or half a period in the middle period of a cycle that is
-// read and may be its own mirror image.
+// Returns the step at which the lane must stop. This is phase 0; half-way through a cycle of odd period that may be its own mirror image,
+// it is half a period.
 fn next_stop_phase() -> u32 {
     let steps = shape.steps;
     let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.periods_to_read == tally.candidate + 1u;

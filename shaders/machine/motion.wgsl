@@ -630,7 +630,7 @@ fn restitution(gap: u32, side: u32, speed: Real) -> array<Real, 2> {
     return array<Real, 2>(clamp(value, Real(0.0), Real(1.0)), select(Real(0.0), slope, is_inside));
 }
 
-// Returns `x^p` for a positive number, to the precision of its type: f64 has no powers.
+// Returns `x^p` for a positive number, to the precision of its type. WGSL has no powers for f64.
 fn power(x: Real, p: Real) -> Real {
     let octaves = p * octaves_of(clamp(x, Real(1e-30), Real(1e30)));
     let whole = clamp(round(octaves), Real(-120.0), Real(120.0));

@@ -30,7 +30,7 @@ fn acceleration(row: array<Real, 7>, share: Real, q: array<Real, 4>, place: u32)
         + with_harmonics(row[4] * motion.phasor[0] + with_sine(row[5], row[6], motion.phasor[1]), place);
 }
 
-// Whether the gap is pressed into the wall: the first nonzero derivative, from the second on, points into it.
+// Whether the gap is pressed into the wall: its first nonzero derivative, from the second on, points into the wall.
 fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
     var first = acceleration(pull.gap_row, pull.share, q, pull.gap_place);
     if first == 0.0 || (q[1] == 0.0 && abs(first) <= balance(pull.gap_row, pull.share, q, pull.gap_place)) {

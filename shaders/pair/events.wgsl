@@ -28,7 +28,7 @@ fn judge(left: vec3<Real>, right: vec3<Real>, dt: Real, order: u32, eps: Real) -
     if lower == (127u >> order) {
         return CLEAR;
     }
-    // Positive coefficients from the start, then negative ones to the end: one change of sign in each polynomial.
+    // Positive coefficients followed by negative ones mean one change of sign in each polynomial.
     let single = (lower & (lower + 1u)) == 0u && (upper & (upper + 1u)) == 0u && lower > 0u;
     if single && upper != (127u >> order) {
         return CROSSING;

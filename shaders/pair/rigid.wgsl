@@ -11,7 +11,7 @@ fn sticks() -> bool {
     return KINDS && tally.mode >= MODE_STUCK;
 }
 
-// Whether the motion is in the contact onset: the gap leaves its wall slowly, and is pressed back.
+// Whether the motion is in the contact onset: the gap has left its wall slowly and is pressed back.
 fn is_onset() -> bool {
     return tally.mode >= MODE_ONSET && !sticks();
 }
@@ -45,7 +45,7 @@ fn let_go(side: u32) -> Jump {
     return Jump(true, MODE_FREE, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
 }
 
-// Returns the order of the root of the pressing acceleration where sticking begins: 1 if the load is balanced.
+// Returns the order of the root of the pressing acceleration at the start of sticking: 1 if the load is balanced.
 fn stuck_order(side: u32) -> u32 {
     let pull = stuck_pull(side);
     let pressing = acceleration(pull.gap_row, pull.share, motion.q, pull.gap_place);

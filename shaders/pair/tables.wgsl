@@ -65,7 +65,7 @@ struct Flow {
     // Force of a wall that only pushes, positive inside the interval that it bounds: factors of gap, rate and 1, in the units of
     // measure.wgsl.
     push: array<Real, 3>,
-    // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters it.
+    // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters the wall.
     preload: array<array<Real, 2>, 2>,
 }
 

@@ -177,7 +177,7 @@ fn compiling<'g, T>(
     gpu: &'g Gpu,
     make: &dyn Fn() -> T,
 ) -> impl Future<Output = Result<T, GpuError>> + use<'g, T> {
-    // wgpu reports errors of a driver's own compiler as internal errors or as lack of memory.
+    // wgpu reports errors of the driver's compiler as internal errors or as lack of memory.
     let filters =
         [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation];
     let scopes = filters.map(|filter| gpu.device.push_error_scope(filter));

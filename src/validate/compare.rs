@@ -169,7 +169,7 @@ impl Answer {
         Answer { record, word: Either::new(record.spelling(), word), pattern }
     }
 
-    /// Whether another result has the same word, and whether it has the same pattern, up to mirror image.
+    /// Whether another result has the same word up to mirror image, and whether it has the same pattern up to mirror image.
     pub(super) fn is_spelled_as(&self, other: &Answer) -> [bool; 2] {
         let is = |own: &Either, other: &Either| own.own.as_ref().is_none_or(|own| other.is(own));
         [is(&self.word, &other.word), is(&self.pattern, &other.pattern)]
@@ -178,9 +178,9 @@ impl Answer {
 
 /// Tolerances of the comparison of numbers.
 ///
-/// Lanes compute the multipliers of a cycle at a state near it, in their own precision. Over the plane, multipliers of
-/// 99 % of the cycles agree with the reference within 3e-4 (f32) and 4e-6 (f64). All agree within 6e-3 and 3e-3, except
-/// where the multiplier is close to 1 or the motion has not settled. Fractions of meshing agree within 2e-6 and 3e-8.
+/// Lanes compute the multipliers of a cycle at a state near it, in their own precision. Over the plane, multipliers of 99 % of the cycles
+/// agree with the reference within 3e-4 (f32) and 4e-6 (f64). All multipliers agree within 6e-3 (f32) and 3e-3 (f64), unless a multiplier
+/// is close to 1 or the motion has not settled. Fractions of meshing agree within 2e-6 and 3e-8.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bars<'a> {
     /// Tolerance of the natural logarithm of the largest multiplier, per forcing period. Cycles of fewer than five
@@ -312,9 +312,8 @@ impl Bars<'_> {
         Some(compared(Field::Attractor, ours == theirs, || (shown(ours), shown(theirs))))
     }
 
-    /// Whether two statuses of one class agree. Lanes in f32 report `slow` at distances above 1e-4 from the cycle, other
-    /// engines above 1e-8, and a multiplier of 1 has a larger error in f32. So `ok`, `slow` and `neutral` agree for motion
-    /// that settles slowly.
+    /// Whether two statuses of one class agree. Lanes in f32 report `slow` at distances above 1e-4 from the cycle, and other engines above
+    /// 1e-8. In f32 a multiplier of 1 also has a larger error. So `ok`, `slow` and `neutral` agree for motion that settles slowly.
     fn is_same_status(&self, class: Class, statuses: [Status; 2], judge: &Record) -> bool {
         match class {
             // For these classes the status gives no further information.

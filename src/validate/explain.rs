@@ -11,8 +11,8 @@ use rattlemap_dynamics::orbit::{Class, Status};
 /// Number of perturbed cells.
 const PERTURBED: u64 = 12;
 
-/// Number of perturbed cells in a map of basins. Where basins are mixed on every scale, one start in a hundred may lead to
-/// an attractor.
+/// Number of perturbed cells in a map of basins. Where basins are mixed on every scale, only one start in a hundred may lead to the
+/// record's attractor.
 const PERTURBED_IN_BASINS: u64 = 512;
 
 /// Number of perturbed cells if the transient must be as long as the transient of the record.

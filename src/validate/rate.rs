@@ -131,7 +131,8 @@ mod tests {
         assert_eq!(Rate::new(2, 400).text(), "0.5 %, 0.061 to 1.8");
         assert_eq!(Rate::new(0, 400).text(), "below 0.75 %");
         assert_eq!(Rate::new(0, 0).interval, [0.0, 1.0]);
-        // A map has millions of trials. 260 events in 4 10^6: the interval of Poisson (exact tables: 229.4 and 293.6).
+        // A map has millions of trials. For 260 events in 4 10^6 trials, the interval is that of a Poisson distribution (exact tables:
+        // 229.4 and 293.6).
         let rate = Rate::new(260, 4_000_000);
         assert!((4e6 * rate.interval[0] - 229.4).abs() < 0.1 && (4e6 * rate.interval[1] - 293.6).abs() < 0.1);
         assert_eq!(rate.text_within(1000), "6.3 %, 5.6 to 7.1");

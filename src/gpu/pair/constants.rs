@@ -122,7 +122,7 @@ impl PairConstants {
         Some(constants)
     }
 
-    /// Returns a state in lane units `(z, z', x, x')`, where `x` is the displacement that lanes use beside the gap.
+    /// Returns a state in lane units `(z, z', x, x')`, where `x` is the displacement that lanes use besides the gap.
     pub fn to_lane(&self, y: model::State) -> [f64; 4] {
         self.coordinates.to_lane(y, self.flow.h)
     }

@@ -1,7 +1,7 @@
 //! Walls that only push, and walls with a preload, as further intervals of a lane.
 //!
-//! Behind such a wall a lane moves in an interval without another wall. Behind a wall that only pushes there are two of them, for closed
-//! and for open contact. Each interval ends at the wall, and where the force of spring, damper and preload changes its sign.
+//! Behind such a wall a lane moves in an interval without another wall. Behind a wall that only pushes there are two such intervals, for
+//! closed and for open contact. Each interval ends at the wall, and where the force of spring, damper and preload changes its sign.
 
 use std::borrow::Cow;
 

@@ -158,8 +158,8 @@ fn check_events(events: &[Event], expected: &[(EventKind, f64)]) {
     }
 }
 
-/// A mass rests on the floor until a stage lifts it with 2, and falls with 20 in the next. It rises by `h = 2 (0.3 T)^2 / 2` and has
-/// the speed `v = 2 (0.3 T)` then; it reaches the floor `(v + sqrt(v^2 + 40 h)) / 20` later.
+/// A mass rests on the floor until a stage lifts it with the acceleration 2. In the next stage it falls with the acceleration 20. It rises
+/// by `h = 2 (0.3 T)^2 / 2` and has the speed `v = 2 (0.3 T)` then; it reaches the floor `(v + sqrt(v^2 + 40 h)) / 20` later.
 #[test]
 fn a_stage_releases_a_mass_at_rest() {
     let floor = mass(-20.0, [f64::INFINITY, 0.0], Contact::Rigid);

@@ -305,7 +305,7 @@ impl System {
         row
     }
 
-    /// Returns the row of the force, positive away from it, of the last wall of a side if this wall only pushes. None if the force never
+    /// Returns the row of the force of a side's last wall, positive away from the wall, if this wall only pushes. None if the force never
     /// pulls behind the wall.
     pub(super) fn pushing(&self, gap: usize, side: Side, stage: usize) -> Option<Row> {
         let wall = self.walls(gap, side).last()?;
