@@ -1,17 +1,16 @@
-// Whether motion near a cycle ends on it, by the rule of the reference (dynamics/src/orbit/approach.rs) on the last
-// strobes.
+// Decides from the last strobes whether motion near a cycle ends on it. The reference uses the same rule (dynamics/src/orbit/approach.rs).
 //
-// Only the strobes of the motion itself count, because a stable cycle need not be the motion's limit. While the
-// motion has the events of the cycle, and each deviation from the cycle follows from the last by the monodromy
-// matrix, a deviation within the convex hull of the earlier ones stays in the visited part of the branch.
+// Only the strobes of the motion itself count, because a stable cycle need not be the motion's limit. The rule requires that the motion has
+// the events of the cycle, and that the monodromy matrix maps each deviation from the cycle to the next one. Then a deviation within the
+// convex hull of earlier deviations stays in the part of the branch that the motion has visited.
 
-// A departure from the linear map may be this share of the deviation (LINEAR). Within `BENT_WITHIN` of the cycle,
-// relative to the motion, it may be all of the deviation.
+// Distance from the cycle, relative to the motion, within which the error of the linear map may be as large as the deviation. Farther away
+// it may be at most the share LINEAR of the deviation.
 const BENT_WITHIN: Real = 5e-4;
 // How far outside the hull a deviation may lie: as a share of itself, or relative to the motion.
 const OUTSIDE_OF_DEVIATION: Real = 0.1;
 const OUTSIDE_OF_MOTION: Real = 1e-4;
-// Most steps towards the nearest point of a hull.
+// Largest number of steps towards the nearest point of a hull.
 const HULL_STEPS: u32 = 32u;
 
 // Stores a strobe of the motion, and the events of the period before it.
@@ -32,11 +31,10 @@ fn cycles_on_trail() -> u32 {
     return (min(search.strobe_count, TRAIL) - 1u) / tally.candidate;
 }
 
-// Updates the number of the motion's last cycles with the same events, after the `read`-th period of the cycle has
-// been read.
+// Called after period `read` of the cycle has been read. Updates how many of the motion's last cycles have the same events.
 fn compare_itineraries(itinerary: u32, read: u32) {
     let is_own = search.newton_steps == 0u;
-    // A cycle that is read along the motion is itself the motion's last cycle.
+    // A cycle that is read along the motion is the motion's last cycle.
     let most = min(search.matching_cycles, cycles_on_trail());
     var cycles = select(0u, 1u, is_own);
     while cycles < most {
@@ -56,7 +54,7 @@ fn required_cycles(period: u32) -> u32 {
     return min(REQUIRED_CYCLES, (TRAIL - 1u) / period);
 }
 
-// Whether the same events have recurred for the cycles that are required, without the one to be read.
+// Whether the same events have recurred in all required cycles except the one that is still to be read.
 fn repeats_itself(period: u32) -> bool {
     if !EXPONENT {
         return true;
@@ -72,7 +70,7 @@ fn repeats_itself(period: u32) -> bool {
     return true;
 }
 
-// Whether the motion, which is at the end of its trail, stays near the cycle that has been read.
+// Whether the motion stays near the cycle that has been read. The motion's present state is the last one of the trail.
 fn stays_near_cycle(to: State) -> bool {
     let present = difference(trail(search.strobe_count), to);
     let bend = select(LINEAR, Real(1.0), size_of(present) < BENT_WITHIN);
@@ -92,10 +90,10 @@ fn stays_near_cycle(to: State) -> bool {
     return cycles >= required_cycles(tally.candidate) && is_in_hull(present, cycles, to);
 }
 
-// Whether a deviation lies within the convex hull of the origin and the earlier deviations, or nearly so.
+// Whether a deviation lies in the convex hull of the origin and the earlier deviations, within a tolerance.
 //
-// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step leads from the nearest point so far towards the corner that
-// lies farthest beyond it. That corner also gives a lower bound of the distance.
+// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step leads from the nearest point found so far towards the corner that is farthest in
+// the direction from this point to the deviation. That corner also gives a lower bound of the distance.
 fn is_in_hull(point: State, corners: u32, to: State) -> bool {
     let target_point = in_units(point);
     let allowed = max(OUTSIDE_OF_DEVIATION * sqrt(inner(target_point, target_point)), OUTSIDE_OF_MOTION);
@@ -129,8 +127,8 @@ fn is_in_hull(point: State, corners: u32, to: State) -> bool {
     return false;
 }
 
-// Returns the distance from the deviation before. In slow motion this decides at once; the steps of the search would
-// be short.
+// Returns the distance from the previous deviation. In slow motion this distance decides at once, where the search would need many short
+// steps.
 fn distance_from_last(point: State, to: State) -> Real {
     let off = difference(in_units(difference(trail(search.strobe_count - tally.candidate), to)), point);
     return sqrt(inner(off, off));

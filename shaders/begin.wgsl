@@ -12,7 +12,7 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     tally.strobe_distance = FAR_FROM_STROBE;
     restart_phase();
     begin_motion();
-    // The trail needs no initial value: `strobe_count` is its length.
+    // The trail needs no initial value, because `strobe_count` says that it is empty.
     motions[lane].now = motion;
     motions[lane].measures = measures;
     motions[lane].tangents = Matrix();

@@ -1,9 +1,9 @@
-// Chaos: the tangent vector grows with certainty, and the growth is not that of an escape from a cycle.
+// Decides whether motion is chaotic: the tangent vector certainly grows, and an escape from a cycle does not explain the growth.
 
-// Fewest periods over which averages are taken before a lane may stop as chaotic.
+// Smallest number of averaged periods after which a lane may stop as chaotic.
 const LEAST_COUNTED: u32 = 32u;
 
-// Standard errors of growth that cast doubt on a cycle that has not settled.
+// A lane that has not settled on its cycle is doubted if growth exceeds zero by this number of standard errors.
 const DOUBT: Real = 1.0;
 
 // Whether growth is certain and no recurrence contracts. Checked when a block is complete.
@@ -35,22 +35,21 @@ fn grows(errors: Real) -> bool {
     return growth.x > errors * growth.y;
 }
 
-// Whether growth exceeds that of neutral motion and of rounding. Tangents of a free body, a torus or an undamped
-// oscillation grow in proportion to time, at a double root to its square. Rounding can replace the zero in a shear `1
-// s; 0 1` by d = ULP, which gives growth of sqrt(s ULP); s of one event is at most 1. Without events the motion is linear,
-// and growth by negative damping is not chaos.
+// Whether growth exceeds that of neutral motion and of rounding. Tangents of a free body, a torus or an undamped oscillation grow in
+// proportion to time; at a double root they grow with its square. Rounding can replace the zero in a shear `1 s; 0 1` by ULP, which gives a
+// growth of sqrt(s ULP). One event has an s of at most 1. Without events the motion is linear, and growth by negative damping is not chaos.
 fn outgrows(errors: Real) -> bool {
     let growth = mean_growth();
     return tally.events > 0u && !is_growing(growth.x) && exceeds_neutral(growth.x - errors * growth.y);
 }
 
-// Returns the length of the first part of the motion, whose displacements and rates later ones are compared with.
+// Returns the number of periods of the first part of the motion. Later displacements and rates are compared with those of this part.
 fn early_periods() -> u32 {
     return max(settings.transient_periods, settings.periods / 2u);
 }
 
-// Whether the motion itself grows, by negative damping or stiffness, at a share of its tangents' growth per period; or whether
-// it is too short to know.
+// Whether negative damping or stiffness makes the motion itself grow, at a certain share of its tangents' growth per period. Also true if
+// the motion is too short to know.
 fn is_growing(growth: Real) -> bool {
     if escape_size() < 0.0 {
         return false;
@@ -70,10 +69,10 @@ fn exceeds_neutral(growth: Real) -> bool {
     return (growth - rounding) * Real(periods) > Real(neutral);
 }
 
-// Whether the motion stays near a cycle, so that its growth may be that of leaving the cycle.
+// Whether the motion stays near a cycle, so that its tangents may grow because it leaves the cycle.
 fn escapes(errors: Real) -> bool {
-    // A lane that has just been moved off a cycle was near a saddle. A single lag can be near by chance, but not all
-    // its multiples.
+    // A lane that has just been moved off a cycle was near a saddle. Motion can recur by chance at one lag, but not at all multiples of the
+    // lag.
     var is_near_saddle = search.known_lags == 0u;
     var rests = false;
     for (var lag = 1u; 2u * lag <= search.known_lags && !rests; lag++) {
@@ -85,7 +84,7 @@ fn escapes(errors: Real) -> bool {
         is_near_saddle = is_near_saddle || nearest >= RECURRENCE_LIMIT;
         rests = nearest >= WITHIN_ROUNDING;
     }
-    // Rounding holds a motion that rests on a cycle: its growth is not chaos.
+    // Rounding can hold a motion on an unstable cycle. Its growth is then not chaos.
     if rests {
         return true;
     }

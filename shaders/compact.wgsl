@@ -1,5 +1,5 @@
-// Compaction: lists the lanes that a variant has work for, or that have ended. Other lanes then cost nothing. The
-// list keeps the order of the active list, because neighbours behave alike.
+// Compaction lists the lanes that a variant has work for, or those that have ended. Lanes that are not listed cost nothing. The list keeps
+// the order of the active list, in which neighbouring lanes behave alike.
 //
 // Three passes: count the selected lanes of each block of the active list, sum the counts, and copy each block's
 // lanes to their place.
@@ -43,7 +43,7 @@ fn sum_block(k: u32, own: u32) {
     }
 }
 
-// Each workgroup takes every `groups.x`-th block: there may be more blocks than workgroups.
+// There may be more blocks than workgroups, so each workgroup takes every `groups.x`-th block.
 @compute @workgroup_size(BLOCK)
 fn count_selected(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
     let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;

@@ -1,10 +1,10 @@
 // Judges the cycle that was read: whether it is stable, and whether the lane has come near it.
 
-// Size of the perturbation that moves a lane off an unstable cycle, in multiples of the distance that counts as rest.
+// Size of the perturbation that moves a lane off an unstable cycle, in units of the distance below which a lane counts as at rest.
 const PERTURBATION: f32 = 8.0;
 
-// Returns the binary logarithm of a number between about 1e-30 and 1e30, to the precision of its type: f64 has no
-// logarithm. `ln m = 2 artanh((m - 1) / (m + 1))`, with m within a factor of sqrt 2 of 1.
+// Returns the binary logarithm of a number between about 1e-30 and 1e30, to the precision of its type. WGSL has no logarithm for f64. `ln m
+// = 2 artanh((m - 1) / (m + 1))`, with m within a factor of sqrt 2 of 1.
 fn octaves_of(x: Real) -> Real {
     let whole = round(log2(f32(x)));
     let m = x * Real(ldexp(1.0, -i32(whole)));
@@ -15,7 +15,8 @@ fn octaves_of(x: Real) -> Real {
     return Real(whole) + (2.0 / LN_2) * s * series;
 }
 
-// Growth in octaves if all neighbours end in the same motion: a gap that has stuck to a wall, with one displacement.
+// Growth in octaves that stands for a multiplier of zero: all neighbouring motions have become the same motion. This happens with one
+// displacement whose gap has stuck to a wall.
 const SUPERSTABLE_GROWTH: Real = -1e9;
 
 fn largest_entry(m: Matrix) -> Real {
@@ -26,9 +27,9 @@ fn largest_entry(m: Matrix) -> Real {
     return size;
 }
 
-// Returns a matrix with the eigenvalues of `m / size`, by one step of the QR iteration with rotations. Entries of `m`
-// that are large beside its eigenvalues move above the diagonal. Squaring `m` itself would lose the eigenvalues: with
-// 46 as the largest entry beside 0.15, the radius in f32 was wrong by a fifth.
+// Returns a matrix with the eigenvalues of `m / size`, by one step of the QR iteration with rotations. Entries of `m` that are larger than
+// its eigenvalues move above the diagonal. Squares of `m` itself would lose the eigenvalues: for a matrix with an entry of 46 and a radius
+// of 0.15, the radius in f32 was wrong by a fifth.
 fn nearly_triangular(m: Matrix, inverse: Real) -> Matrix {
     var r = m;
     for (var k = 0u; k < MATRIX; k++) {
@@ -71,7 +72,7 @@ fn spectral_growth() -> Real {
     var m = motions[lane].tangents;
     let whole = largest_entry(m);
     if tallies[lane].has_overflowed == 1u || !(whole < OUT_OF_RANGE) {
-        // Too large, or not a number.
+        // The matrix is too large, or contains NaN.
         return 100.0;
     }
     if tallies[lane].is_superstable == 1u || !(whole > 1e-30) {
@@ -101,11 +102,11 @@ fn spectral_growth() -> Real {
         }
         m = square;
     }
-    // A radius below the rounding errors of the matrix may as well be zero.
+    // A radius below the rounding errors of the matrix counts as zero.
     return select(growth - LARGE_OCTAVES * Real(tallies[lane].column_scalings), SUPERSTABLE_GROWTH, growth < unresolved);
 }
 
-// Gives the columns that were kept in range their true size, after `spectral_growth`.
+// Gives the columns their true size after `spectral_growth`. They were scaled before to keep them in range.
 fn restore_columns() {
     for (var n = 0u; n < tallies[lane].column_scalings + tallies[lane].is_superstable; n++) {
         let factor = select(1.0 / LARGE, Real(0.0), tallies[lane].is_superstable == 1u);
@@ -118,13 +119,13 @@ fn restore_columns() {
 // Distance of 0.01, in quarter octaves below 1.
 const NEAR_RETURN: u32 = 26u;
 
-// Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. If the cycle
-// is unstable, or if its multiplier shows that the lane is still too far from it, the lane goes on while it has periods
-// left: chaos stays near unstable cycles, and near places where a pair of cycles has just vanished.
+// Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. The lane continues if it has periods left
+// and the cycle is unstable, or its multiplier shows that the lane is still too far from it. Such motion may be chaos, which stays near
+// unstable cycles and near places where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
     if !EXPONENT {
-        // The divisor's distance is as small as the cycle's: a multiple of the period has been read.
+        // The motion returns as closely after the divisor as after the whole cycle, so a multiple of the period has been read.
         if search.divisor > 0u && search.divisor_distance + 8u >= search.return_distance && reads_divisor() {
             return;
         }
@@ -152,7 +153,8 @@ fn judge_cycle() {
         if is_at_divisor && reads_divisor() {
             return;
         }
-        // Motion that slowly approaches a cycle from both sides in turn nearly returns after half of the period that it seems to have.
+        // Motion can approach a cycle slowly, on alternating sides. It then seems to have twice the true period, and nearly returns after
+        // half of it.
         if is_at_divisor || search.divisor == 0u || search.divisor_distance < NEAR_RETURN {
             search.cycle = tally.candidate;
             return;
@@ -160,7 +162,8 @@ fn judge_cycle() {
     }
     // Near a graze the strobe map has no derivative that locates the cycle.
     let is_smooth = tally.grazes == 0u || search.newton_steps > 0u;
-    // Where rounding is amplified, it moves the lane away from the fixed point: such cycles are only waited for.
+    // Amplified rounding can move the lane away from the fixed point. Newton's method is then given up, and the lane waits until the motion
+    // has approached the cycle by itself.
     let helps = is_smooth && search.failed_searches < MOST_FAILED_SEARCHES;
     if is_stable && helps && settings.early_stop == 1u && !is_last && distance_to_cycle() > NEWTON_CONVERGED && refine(to) {
         tally.stage = STAGE_READING;
@@ -185,8 +188,7 @@ fn judge_cycle() {
     if is_cycle && reads_divisor() {
         return;
     }
-    // Newton's method has left the branch of the motion. A lane that returned to its start would search in the same
-    // way again.
+    // Newton's method has left the branch of the motion. If the lane returned to its start, it would repeat the same search.
     let is_lost = search.newton_steps > 0u && !is_on_branch();
     if is_stable && !is_lost && search.newton_steps > 0u {
         search.failed_searches += 1u;
@@ -205,11 +207,11 @@ fn judge_cycle() {
 
 // Largest relative error of the exponent of a cycle whose status is ok.
 const EXPONENT_ERROR: f32 = 0.02;
-// Binary logarithm of the smallest multiplier for which that error counts: smaller ones are below the resolution of f32.
+// Binary logarithm of the smallest multiplier for which `EXPONENT_ERROR` is checked. Smaller multipliers are below the resolution of f32.
 const LEAST_GROWTH: f32 = -7.0;
 
-// Compares the exponent with that of the reading before, at another distance from the cycle. The change per distance
-// gives the error at the present distance.
+// Compares the exponent with the exponent of the previous reading, which was at another distance from the cycle. The error is assumed to be
+// proportional to the distance.
 fn compare_growth() {
     let growth = f32(measures.cycle_growth);
     let now = distance_to_cycle();
@@ -222,8 +224,8 @@ fn compare_growth() {
     measures.earlier_distance = Real(now);
 }
 
-// Whether the motion has not settled on the cycle by the end of the budget, as far as its multiplier tells, or is too far
-// from the cycle for its exponent.
+// Whether the motion approaches the cycle slowly: its multiplier shows that it does not settle within the budget, or it is too far from the
+// cycle for an accurate exponent.
 fn is_slow() -> bool {
     if !EXPONENT {
         return !is_near_cycle();
@@ -245,7 +247,7 @@ fn reads_divisor() -> bool {
     return true;
 }
 
-// Continues the search: the cycle is stable, but too far away. Its recurrences still count.
+// Continues the search if the cycle is stable but too far away. Recurrences found so far still count.
 fn continue_search() {
     tally.stage = STAGE_RUNNING;
     search.has_read = 0u;
@@ -257,14 +259,14 @@ fn continue_search() {
 
 // Restarts the search for recurrences. The average of the exponent continues.
 fn restart_search() {
-    // Rounding can hold a lane on an unstable cycle for ever.
+    // Rounding can hold a lane on an unstable cycle, so the lane is moved off it.
     let is_unstable = measures.cycle_growth > NEUTRAL * Real(tally.candidate);
     if is_unstable && search.return_distance >= AT_REST && is_free() {
         motion.q[1] += Real(PERTURBATION * exp2(-f32(AT_REST) / PARTS_PER_OCTAVE)) * measures.rate_scale;
         motion.bound = 0.0;
         search.strobe_count = 0u;
         search.average_length = 0u;
-        // Growth there was that of the unstable cycle, not of chaos.
+        // The growth so far belongs to the unstable cycle and says nothing about chaos.
         search.blocks = 0u;
         search.block_periods = 0u;
         motion.block_growth = 0.0;
@@ -274,7 +276,7 @@ fn restart_search() {
     tally.stage = STAGE_RUNNING;
     search.has_read = 0u;
     search.failed_readings += 1u;
-    // A stable divisor that the lane has not come near to may still be the cycle.
+    // A stable divisor may still be the lane's cycle, even if the lane has not come near to it.
     let is_stable = measures.cycle_growth < -NEUTRAL * Real(tally.candidate);
     search.rejected_divisor = select(0u, tally.candidate, search.checks_divisor == 1u && !is_stable);
     begin_counting();
@@ -287,31 +289,31 @@ fn restart_search() {
     tallies[lane].last_distances = array<u32, 16>();
 }
 
-// Whether the cycle closes earlier, within rounding and the lane's distance from it.
+// Whether the cycle closes after a divisor of its period, within rounding and the lane's distance from the cycle.
 fn is_multiple() -> bool {
     let is_closed = search.divisor_distance >= AT_REST || exp2(-f32(search.divisor_distance) / PARTS_PER_OCTAVE) < 4.0 * distance_to_cycle();
     return search.divisor > 0u && is_closed;
 }
 
-// Least ratio, in quarter octaves, of the distance between the cycle's points to the lane's distance from the cycle, at
-// which the divisor is certainly another cycle.
+// The divisor is certainly another cycle if the cycle's points are farther apart than the lane's distance from the cycle by this factor, in
+// quarter octaves.
 const SEPARATION: u32 = 12u;
 
-// Whether the divisor was read for this multiple, is unstable, and is certainly another cycle: it may have been read
-// elsewhere. A lane that approaches the divisor's own cycle from alternating sides is half as far from it as its
-// points seem to be apart.
+// Whether the divisor has been rejected: it was read, was unstable, and is certainly another cycle, read at another place. A lane can
+// approach the divisor's own cycle on alternating sides. Its distance from that cycle is then half of the apparent distance between the
+// points.
 fn is_rejected() -> bool {
     let is_separate = search.divisor_distance + SEPARATION <= search.linear_distance;
     return search.rejected_divisor == search.divisor && search.divisor_distance < AT_REST && is_separate;
 }
 
-// Rounding errors that the motion between two events adds, as a multiple of ULP; the same in resolution.rs.
+// Rounding error of the motion between two events, in units of ULP. dynamics/src/orbit/resolution.rs has the same value.
 const ROUNDINGS: Real = 8.0;
 
-// Whether rounding decides the period: the cycle closes earlier within rounding, or rounding scatters its states by more
-// than the distance between two strobes. If there is only one strobe, a single rounding error must grow to the size of the
-// motion; with eight, f32 would doubt cells of the main map whose words and exponents are right. The reference has the
-// same rule (dynamics/src/orbit/resolution.rs).
+// Whether rounding decides the period: the cycle closes earlier within rounding, or rounding scatters its states by more than the distance
+// between two strobes. For a cycle with one strobe, a single rounding error must grow to the size of the motion. With a limit of eight
+// errors, f32 would doubt cells of the main map whose words and exponents are right. The reference has the same rule
+// (dynamics/src/orbit/resolution.rs).
 fn hides_period() -> bool {
     if search.divisor > 0u && exp2(-f32(search.divisor_distance) / PARTS_PER_OCTAVE) < max(noise(), NOISE) {
         return true;
@@ -321,8 +323,8 @@ fn hides_period() -> bool {
     return EXPONENT && roundings * ULP * measures.cycle_stretch >= nearest;
 }
 
-// Returns the largest change of the state over a cycle by rounding, relative to the motion: every event rounds, and
-// the cycle amplifies it.
+// Returns the largest change of the state by rounding over a cycle, relative to the motion. Every event adds a rounding error, and the
+// cycle amplifies it.
 fn noise() -> f32 {
     if !EXPONENT {
         return NOISE;
@@ -342,20 +344,21 @@ fn gain() -> Real {
     return most;
 }
 
-// Returns a bound on the lane's distance from its cycle, relative to the motion: by recurrence and by the linearised
-// map. A spiral comes near its last strobe before it comes near its cycle.
+// Returns a bound on the lane's distance from its cycle, relative to the motion. Both recurrence and the linearised map give one, because a
+// spiral comes near its last strobe before it comes near its cycle.
 fn distance_to_cycle() -> f32 {
     // Rounding can stop a lane before it reaches the cycle.
     let by_recurrence = limit_of(max(exp2(-f32(search.return_distance) / PARTS_PER_OCTAVE), NOISE));
     return select(by_recurrence, max(by_recurrence, exp2(-f32(search.linear_distance) / PARTS_PER_OCTAVE)), EXPONENT);
 }
 
-// Returns a bound on that distance that includes the largest rounding error.
+// Returns a bound on the lane's distance from its cycle that includes the largest rounding error.
 fn blurred_distance_to_cycle() -> f32 {
     return max(distance_to_cycle(), limit_of(noise()));
 }
 
-// Returns the distance from the limit of strobes at a distance `d` that shrinks by `mu` per cycle: `d / (1 - mu)`.
+// Returns the distance of the strobes from their limit: `d / (1 - mu)` if their distance `d` from each other shrinks by the factor `mu` per
+// cycle.
 fn limit_of(d: f32) -> f32 {
     let mu = select(0.0, exp2(f32(measures.cycle_growth)), EXPONENT);
     return d / max(1.0 - mu, 1e-6);
@@ -366,8 +369,8 @@ fn is_near_cycle() -> bool {
     return distance_to_cycle() < ON_CYCLE;
 }
 
-// Whether the cycle is farther from its mirror image than the lane's distance from the cycle explains: twice that
-// distance for the state, and twice the amplified distance for the image.
+// Whether the cycle is farther from its mirror image than the lane's distance from the cycle explains. That distance counts twice for the
+// state, and amplified twice for the image.
 fn is_surely_unsymmetric() -> bool {
     let amplified = select(1.0, f32(gain()), EXPONENT);
     return exp2(-f32(search.mirror) / PARTS_PER_OCTAVE) > 2.0 * (1.0 + amplified) * max(blurred_distance_to_cycle(), SYMMETRIC);
@@ -380,27 +383,27 @@ fn is_surely_symmetric() -> bool {
     return is_near_cycle() && is_close && mirror + 2.0 * distance_to_cycle() < MIRROR_DISTANCE;
 }
 
-// Whether the lane rests. A slow lane far from the cycle does not count.
+// Whether the lane is at rest. A slow lane far from the cycle is not.
 fn is_at_rest() -> bool {
     let is_there = !EXPONENT || exp2(-f32(search.linear_distance) / PARTS_PER_OCTAVE) < max(ON_CYCLE, limit_of(noise()));
     return search.return_distance >= AT_REST && is_there;
 }
 
-// Whether the lane is near its cycle, or as near as rounding allows. A fixed point in another domain than the lane's
-// is not its cycle. Near a graze only rest counts.
+// Whether the lane is near its cycle, or as near as rounding allows. The fixed point must lie in the lane's domain. Near a graze the lane
+// must be at rest.
 fn is_on_cycle(to: State, is_last: bool) -> bool {
-    // Newton's method shows whether the motion continues with the same events, if there is time for it.
+    // If periods are left, Newton's method shows whether the motion continues with the same events.
     let is_confirmed = !is_last || settings.early_stop == 0u || search.newton_steps > 0u || distance_to_cycle() <= NEWTON_CONVERGED;
     let is_near = is_near_cycle() && keeps_domain(to) && tally.grazes == 0u && is_confirmed;
     return is_near || moves_no_more(to, is_last);
 }
 
-// Whether the motion itself has come to rest on its cycle, or as near to it as rounding allows.
+// Whether the motion itself has reached its cycle, as nearly as rounding allows.
 fn rests_on_cycle(to: State, is_last: bool) -> bool {
     return search.newton_steps == 0u && moves_no_more(to, is_last);
 }
 
-// Whether the lane rests, or moves by less than rounding, and does not leave its domain.
+// Whether the lane is at rest or moves by less than rounding, and stays in its domain.
 fn moves_no_more(to: State, is_last: bool) -> bool {
     let is_blurred = (search.failed_searches >= MOST_FAILED_SEARCHES || is_last) && search.is_settled != 0u && exp2(-f32(search.return_distance) / PARTS_PER_OCTAVE) < min(noise(), ON_CYCLE);
     return (is_at_rest() || is_blurred) && !leaves_domain(to);

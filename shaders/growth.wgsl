@@ -1,7 +1,6 @@
-// Growth of tangent vectors. Only variants with an exponent contain it.
+// Growth of tangent vectors. Only shader variants with an exponent contain this file.
 
-// The one vector for the exponent. The columns of the monodromy matrix, which are carried while a cycle is read,
-// stay in the buffer.
+// The tangent vector for the exponent. The columns of the monodromy matrix stay in the buffer; they are carried while a cycle is read.
 var<private> tangent_now: State;
 
 fn tangent(i: u32) -> State {
@@ -59,9 +58,8 @@ fn save_vector() {
     }
 }
 
-// Multiplies the saved vector by the monodromy matrix of the cycle that was read along the motion. A new vector would
-// first have to turn into its direction, which adds growth: where cycles are read again and again, 0.2 per period of
-// motion whose exponent is zero.
+// Multiplies the saved vector by the monodromy matrix of the cycle that was read along the motion. A new vector would first turn into the
+// direction of growth, which adds growth: 0.2 per period for motion with an exponent of zero whose cycles are read again and again.
 fn carry_vector() {
     if search.newton_steps > 0u {
         return;
@@ -90,7 +88,7 @@ fn carry_vector() {
 
 // Scales a vector, whose largest entry is `size`, to unit length. Returns its former length divided by `size`.
 fn unit(u: ptr<function, State>, size: Real) -> Real {
-    // Squares would leave the range of numbers.
+    // Squares of these numbers would overflow or underflow.
     let scale = 1.0 / size;
     let v = scaled(*u, scale);
     let length = sqrt(inner(v, v));
@@ -118,7 +116,7 @@ fn store_tangent_now() {
     }
 }
 
-// Starts to carry the columns of the monodromy matrix. With one displacement, x has no neighbours.
+// Starts to carry the columns of the monodromy matrix. With one displacement, x is always 0 and has no tangent.
 fn begin_columns() {
     motions[lane].tangents = Matrix();
     for (var i = 0u; i < 2u * shapes[cell.flow_index].degrees; i++) {
@@ -127,8 +125,8 @@ fn begin_columns() {
     constrain_columns();
 }
 
-// Keeps the columns of the monodromy matrix in range after an event, and measures how much perturbations grow between
-// two instants of the cycle: rounding at the first one is amplified until the second.
+// Keeps the columns of the monodromy matrix in range after an event. Measures how much perturbations grow between two instants of the
+// cycle, because rounding errors grow in the same way.
 fn check_columns() {
     let size = size_of_columns();
     if size >= OUT_OF_RANGE {
@@ -137,7 +135,7 @@ fn check_columns() {
         return;
     }
     if size == 0.0 {
-        // All neighbours have become the same motion. New perturbations grow from here on.
+        // All neighbouring motions have become the same motion. From here on, only new perturbations grow.
         tallies[lane].is_superstable = 1u;
         motions[lane].stretch[0] = 1.0;
         begin_columns();
@@ -159,10 +157,10 @@ fn check_columns() {
     }
 }
 
-// Size from which a tangent vector counts as lost: its next step may leave the range of single precision.
+// Size above which a tangent vector counts as lost, because its next step may leave the range of single precision.
 const OUT_OF_RANGE: Real = 1e30;
 
-// Whether a vector is below OUT_OF_RANGE. The function `max` may leave out what is not a number, and a sum does not.
+// Whether a vector is below OUT_OF_RANGE. The function `max` may ignore NaN; a sum does not.
 fn is_in_range(u: State) -> bool {
     return is_bounded((HUGE / OUT_OF_RANGE) * sum_of_sizes(u));
 }
@@ -197,8 +195,8 @@ fn check_range() {
     }
 }
 
-// Many events in one period may take the vector out of the range of single precision. Factors that are taken out of
-// it count as growth of the present period.
+// Many events in one period may take the vector out of the range of single precision. So the vector is scaled, and the factor counts as
+// growth of the present period.
 const LARGE: Real = 1099511627776.0;
 const LARGE_OCTAVES: Real = 40.0;
 
@@ -217,7 +215,7 @@ fn largest(u: State) -> Real {
     return max(largest_displacement(u), largest_rate(u));
 }
 
-// Returns the growth of the one vector since the last strobe, in octaves, and scales the vector to unit length.
+// Returns the growth of the exponent's vector since the last strobe, in octaves, and scales the vector to unit length.
 fn renormalise() -> Real {
     var u = tangent(0u);
     let size = largest(u);
@@ -227,7 +225,7 @@ fn renormalise() -> Real {
         return 100.0;
     }
     if !(size > 1e-30) {
-        // Superstable: returns a large loss, and starts with a new vector.
+        // The cycle is superstable: returns a large decrease, and starts with a new vector.
         set_tangent(0u, initial_tangent());
         return -100.0;
     }
@@ -248,7 +246,7 @@ fn accumulate_growth() {
     count_growth(growth, 1u);
 }
 
-// Adds growth over a number of periods. A block that a cycle makes longer has the same weight as the others.
+// Adds growth over a number of periods. A cycle can make a block longer; all blocks have the same weight.
 fn count_growth(growth: Real, periods: u32) {
     motion.block_growth += growth;
     search.block_periods += periods;
@@ -274,7 +272,7 @@ fn count_growth(growth: Real, periods: u32) {
 
 const LN_2: Real = 0.6931471805599453;
 
-// Returns the mean growth of the tangent vector per period, natural logarithms, and its standard error from the means
+// Returns the mean of the natural logarithm of the tangent vector's growth per period, and its standard error, which follows from the means
 // of blocks.
 fn mean_growth() -> vec2<Real> {
     let blocks = Real(search.blocks);

@@ -2,10 +2,10 @@
 // compares names, offsets and sizes. A struct holds either Reals or 32-bit numbers alone, so that it has the same
 // shape in both precisions. src/gpu/shader.rs puts the constants that no shader declares in front of the source.
 //
-// The observers, which search for cycles and chaos, serve two engines of motion: oscillators with one gap (oscillator.wgsl) and machines
-// (machine/machine.wgsl). These two files have the same functions.
+// The observers, which search for cycles and chaos, serve two engines of motion: oscillators with one gap (pair/oscillator.wgsl) and
+// machines (machine/machine.wgsl). Both files define the functions that the observers call.
 
-// A state of COORDINATES displacements, each followed by its rate; and a matrix of such states as columns.
+// A state lists COORDINATES displacements, each followed by its rate. A matrix has such states as columns.
 alias State = array<Real, DIM>;
 alias Matrix = array<Real, MATRIX>;
 
@@ -13,26 +13,26 @@ alias Matrix = array<Real, MATRIX>;
 struct Cell {
     flow_index: u32,
     law_index: u32,
-    // STATUS_* of a lane that the host refuses, else 0.
+    // Status (STATUS_*) of a lane that the host refuses; 0 otherwise.
     refused: u32,
-    // 1 if the mirror image of a motion is a motion of the same lane.
+    // 1 if the mirror image of a motion obeys the same equations and contact law.
     mirror: u32,
 }
 
 // Settings of one dispatch.
 struct Settings {
-    // Lanes that the buffers have room for.
+    // Number of lanes for which the buffers have room.
     slots: u32,
-    // Length of the active list, and the place in it from which lanes have yet to begin.
+    // Length of the active list, and the place of its first lane that has not begun.
     active_lanes: u32,
     first_new: u32,
-    // Forcing periods to integrate, the number that undecided lanes get, and the number that chaotic lanes get.
+    // Largest number of forcing periods: of any lane, of an undecided lane, and of a chaotic lane.
     periods: u32,
     decided_by: u32,
     longest: u32,
     // First period at which a lane may stop as chaotic.
     chaos_from: u32,
-    // Standard errors by which its exponent must then exceed zero.
+    // Number of standard errors by which the exponent of such a lane must exceed zero.
     chaos_errors: f32,
     // Loop iterations that one dispatch may spend on a lane.
     iterations: u32,
@@ -73,11 +73,11 @@ struct MotionNow {
     phasor: array<Real, 2>,
     // Fraction of the present free step that has passed.
     theta: Real,
-    // Bound on the sixth derivative of the gap, in steps of the present domain.
+    // Bound on the sixth derivative of the gap; time in steps of the present domain.
     bound: Real,
-    // Second derivative of the gap where the end of a dispatch interrupted a scan.
+    // Second derivative of the gap at the instant at which the end of a dispatch interrupted a scan.
     bend: Real,
-    // Fractional part of the time spent meshing in partial steps, in free steps.
+    // Time spent meshing in partial steps: the fractional part of its sum, in free steps.
     mesh_part: Real,
     // Growth of the tangent vector in the present block, in octaves.
     block_growth: Real,
@@ -88,23 +88,24 @@ struct Measures {
     // Growth of the tangent vector over whole blocks: its sum, and the sum of squared deviations from its mean.
     growth_sum: Real,
     growth_squares: Real,
-    // Sum of products of consecutive blocks, both relative to the first block; the first and the last whole block.
+    // Sum of the products of consecutive blocks, whose growth is taken relative to the first block; growth of the first and of the last
+    // whole block.
     growth_products: Real,
     first_block: Real,
     last_block: Real,
     // Strobe state that later strobes are compared with. While a cycle is read, the cycle's start.
     anchor: State,
-    // Largest position at strobes, and in the first part of the motion; largest rate there; largest rate. The positions and rates
-    // of the whole motion are the units of distances.
+    // Largest position at strobes, of the whole motion and of its first part; largest rate of the first part and of the whole motion.
+    // Distances are relative to those of the whole motion.
     position_scale: Real,
     early_scale: Real,
     early_rate_scale: Real,
     rate_scale: Real,
-    // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
+    // Binary logarithm of the modulus of the largest multiplier of the cycle that was read.
     cycle_growth: Real,
     // Largest growth of a perturbation between two instants of that cycle.
     cycle_stretch: Real,
-    // Growth and distance from the cycle at the reading before.
+    // `cycle_growth` and the distance from the cycle at the previous reading.
     earlier_growth: Real,
     earlier_distance: Real,
 }
@@ -116,17 +117,18 @@ struct Motion {
     tangents: Matrix,
     // The exponent's tangent vector while the matrix takes its place.
     vector: State,
-    // Growth of perturbations on the cycle that is read (check_columns in tangent.wgsl): smallest size of the columns so
-    // far, largest ratio of a size to a smaller one before it, and largest size.
+    // Growth of perturbations on the cycle that is read (check_columns in growth.wgsl): smallest size of the columns so far, largest ratio
+    // of a size to an earlier one, and largest size.
     stretch: array<Real, 3>,
     // The last strobe states of the motion (approach.wgsl).
     trail: array<State, TRAIL>,
-    // Weighted averages of gap, x and their squares from a centre: the first window less the second (regularity.wgsl).
+    // Weighted averages of the displacements and of the sum of their squares, relative to a centre: first window minus second window
+    // (regularity.wgsl).
     averages: array<Real, COORDINATES + 1>,
     average_centre: State,
-    // The last state of a lane that is being measured.
+    // The state of a lane before it was measured.
     ended: MotionNow,
-    // What was measured in the present period, and in all (measure.wgsl).
+    // Measured sums of the present period and of all periods; largest and smallest values (pair/measure.wgsl).
     sums: array<Real, SUMS>,
     totals: array<Real, SUMS>,
     highs: array<Real, EXTREMES>,
@@ -143,7 +145,7 @@ struct TallyNow {
     mode: u32,
     // Wall of the last event: SIDE_*.
     origin: u32,
-    // Order of the root, at the present state, of the distance from that wall; 0 away from it.
+    // If the present state is on that wall: order of the root of the distance from it; 0 otherwise.
     order: u32,
     // Forcing periods completed.
     period: u32,
@@ -155,19 +157,19 @@ struct TallyNow {
     // Impacts and events since counting began.
     impacts: u32,
     events: u32,
-    // Time spent meshing: whole steps of the right and of the left meshing domain, and whole free steps summed from
-    // partial ones.
+    // Time spent meshing: whole steps of the right and of the left meshing domain, and the whole part of the sum of partial steps, in free
+    // steps.
     mesh_right: u32,
     mesh_left: u32,
     mesh_whole: u32,
-    // Events so near to grazing that the linearisation means little.
+    // Number of events so near to grazing that the linearisation has little meaning.
     grazes: u32,
     // STAGE_*.
     stage: u32,
     // Smallest lag that recurs and contracts, and periods of its cycle still to be read.
     candidate: u32,
     periods_to_read: u32,
-    // Number of tangent vectors; and 1 once the lane belongs to the variant that carries one for the exponent.
+    // Number of tangent vectors. `carries_growth`: 1 once the lane belongs to the variant that carries a vector for the exponent.
     tangent_count: u32,
     carries_growth: u32,
     // The word: number of symbols, halves of its rotation-invariant hash, and the eight latest symbols, three bits
@@ -176,43 +178,42 @@ struct TallyNow {
     hash_low: u32,
     hash_high: u32,
     recent: u32,
-    // Distance from phase 0 of the nearest event since counting began, in turns: the bits of an f32.
+    // Smallest distance of an event from phase 0 since counting began, in turns: the bits of an f32.
     strobe_distance: u32,
     // Hash of the present period's events.
     itinerary: u32,
     // Number of changes of the stage in the present period so far.
     next_change: u32,
-    // The present interval between walls (intervals.wgsl).
+    // The present interval between walls (pair/intervals.wgsl).
     interval: u32,
 }
 
 // Search for a cycle, updated at strobes.
 struct Search {
-    // 1 once a cycle is being read or has been read; and the period of the cycle that was read, if it is stable.
+    // `has_read`: 1 once a cycle is being read or has been read. `cycle`: period of a cycle that was read and is stable.
     has_read: u32,
     cycle: u32,
     // Cycles that were read without success.
     failed_readings: u32,
     // Period at which counting began.
     counting_start: u32,
-    // Blocks of the exponent's average, and periods in the present one.
+    // Number of whole blocks of the exponent's average, and number of periods in the present block.
     blocks: u32,
     block_periods: u32,
-    // Recurrence: period of the anchor, lags of the present window, number of windows for which the candidate has
-    // contracted, and lags of the last window.
+    // Recurrence: period of the anchor, number of lags of the present window, number of windows over which the candidate has contracted,
+    // and number of lags of the last window.
     anchor_period: u32,
     window: u32,
     streak: u32,
     known_lags: u32,
     // 1 if the candidate's limit is near.
     is_settled: u32,
-    // Distances in quarter octaves below 1. `mirror`: of the cycle from its mirror image. `return_distance`: of the
-    // lane from the cycle's start after the cycle was read last. `earlier_return_distance`: the latter before a
-    // Newton step.
+    // Distances in quarter octaves below 1. `mirror`: the cycle's distance from its mirror image. `return_distance`: the lane's distance
+    // from the cycle's start at the end of the last reading. `earlier_return_distance`: `return_distance` before a Newton step.
     mirror: u32,
     return_distance: u32,
     earlier_return_distance: u32,
-    // Newton steps towards the cycle; hash of the events on it before the first step, and the period of that cycle.
+    // Number of Newton steps towards the cycle; hash of the cycle's events before the first step, and its period then.
     newton_steps: u32,
     branch: u32,
     branch_period: u32,
@@ -224,28 +225,28 @@ struct Search {
     // octaves below 1.
     divisor: u32,
     divisor_distance: u32,
-    // Failed Newton searches. `checks_divisor`: 1 while a divisor is read to find out whether it is the period.
-    // `rejected_divisor`: a divisor whose cycle was then found unstable.
+    // Number of failed Newton searches. `checks_divisor`: 1 while a divisor is read to find out whether it is the period.
+    // `rejected_divisor`: a divisor whose cycle was found to be unstable.
     failed_searches: u32,
     checks_divisor: u32,
     rejected_divisor: u32,
     // Distance of the lane from the fixed point of the linearised strobe map, in quarter octaves below 1.
     linear_distance: u32,
-    // Distance of the motion itself from that point, and of the cycle's start from the nearest other strobe of the cycle,
-    // in quarter octaves below 1.
+    // In quarter octaves below 1: `motion_distance` is the distance of the motion itself from that fixed point; `nearest` is the distance
+    // of the cycle's start from its nearest other strobe.
     motion_distance: u32,
     nearest: u32,
-    // Hash of the events of the reading before; and 1 if the exponents of the two readings differ by too much.
+    // Hash of the events of the previous reading. `is_uncertain`: 1 if the exponents of the last two readings differ too much.
     earlier_branch: u32,
     is_uncertain: u32,
-    // Strobes of the motion so far, and its latest cycles that have the same events as the cycle that is read.
+    // Number of strobes of the motion so far, and number of its latest cycles with the same events as the cycle that is read.
     strobe_count: u32,
     matching_cycles: u32,
-    // Events of all whole periods.
+    // Number of events in all whole periods.
     all_events: u32,
-    // 1 once only further periods of chaos are left.
+    // 1 once only the periods that confirm chaos are left.
     confirms_chaos: u32,
-    // Strobe after which the windows of the averages begin, and their length; 0 if they have not begun.
+    // Strobe after which the windows of the averages begin, and the length of each window; a length of 0 if they have not begun.
     average_start: u32,
     average_length: u32,
     // Distance within which the motion recurs, in quarter octaves below 1.
@@ -263,11 +264,11 @@ struct Tally {
     last_distances: array<u32, 16>,
     // Hashes of the events of the trail's periods.
     itineraries: array<u32, TRAIL>,
-    // The columns of the monodromy matrix: how often they were multiplied by LARGE; and 1 if an event has made them zero,
-    // after which they start again.
+    // How often the columns of the monodromy matrix were multiplied by LARGE. `is_superstable`: 1 if an event has made the columns zero;
+    // they then start again.
     column_scalings: u32,
     is_superstable: u32,
-    // 1 if a column is lost (OUT_OF_RANGE in tangent.wgsl): the cycle is unstable.
+    // 1 if a column is lost (OUT_OF_RANGE in growth.wgsl), so that the cycle counts as unstable.
     has_overflowed: u32,
     // Symbols of the word, ten to a number.
     word: array<u32, 7>,
@@ -276,14 +277,14 @@ struct Tally {
     pattern_length: u32,
     pattern_hash: array<u32, 2>,
     pattern_recent: u32,
-    // The last counters of a lane that is being measured; and 1 if it is or was.
+    // The counters of a lane before it was measured. `is_measured`: 1 if the lane is being measured or was measured.
     ended: TallyNow,
     is_measured: u32,
 }
 
 // Results of a lane: real numbers.
 struct Reading {
-    // Exponent per period, natural logarithms, and its standard error.
+    // Exponent per period as a natural logarithm, and its standard error.
     growth: Real,
     growth_error: Real,
     mesh_fraction: Real,
@@ -296,40 +297,39 @@ struct Measured {
     totals: array<Real, SUMS>,
     highs: array<Real, EXTREMES>,
     lows: array<Real, EXTREMES>,
-    // 1 if a cycle was read; the columns mean nothing otherwise.
+    // 1 if a cycle was read; otherwise the columns have no meaning.
     has_read: Real,
     tangents: Matrix,
 }
 
 // Results of a lane: whole numbers.
 struct Finding {
-    // VALID_* bits; a field whose bit is missing is zero.
+    // Bits VALID_*. A field without its bit is zero.
     valid: u32,
     // Slot of the lane.
     slot: u32,
     status: u32,
-    // 0 if there is none.
+    // 0 if the motion has no period.
     period: u32,
     periods_run: u32,
     impacts: u32,
     // Periods over which impacts were counted.
     counted: u32,
     symmetric: u32,
-    // Word and pattern, by SPELLED_*; one unused number if neither is requested.
+    // Word and pattern, at the places SPELLED_*; one unused number if neither is requested.
     spelling: array<u32, SPELLING>,
 }
 
-// Lists of slots. The first `slots` entries are the active list: lanes under way, in the order in which they began.
-// The next entries are the lanes that compaction selected.
+// Lists of slots. The first `slots` entries are the active list: the lanes under way, in the order in which they began. The next entries
+// are the lanes that compaction selected.
 struct Queue {
-    // Number of selected lanes; and a counter of compactions, by which the host notices a device that no longer
-    // works.
+    // Number of selected lanes. `beat` counts compactions; the host notices by it that a device no longer works.
     count: u32,
     beat: u32,
     lanes: array<u32>,
 }
 
-// A strobe distance of half a turn: there is no event.
+// Strobe distance without any event: half a turn, as the bits of an f32.
 const FAR_FROM_STROBE: u32 = 0x3f000000u;
 
 const STAGE_RUNNING: u32 = 0u;

@@ -1,4 +1,4 @@
-// Work of a lane at phase 0: what it checks, counts and reads.
+// What a lane checks, counts and reads at phase 0.
 
 // Completes a forcing period at phase 0.
 fn begin_period() {
@@ -51,7 +51,7 @@ fn begin_period() {
     // The budget includes the periods in which the cycle is read.
     let read_by = tally.period + tally.candidate;
     let is_last = read_by == settings.periods || read_by == last_period();
-    // A chance contraction in growing motion has not settled.
+    // Strobes may contract by chance while tangents grow. Such motion has not settled.
     let is_due = is_last && search.streak >= STREAK && (search.is_settled == 1u || !grows(DOUBT));
     let early = settings.early_stop == 1u;
     if read_by <= last_period() && (is_due || (decided && (early || search.confirms_chaos == 1u))) {
@@ -75,12 +75,12 @@ fn confirm_chaos() {
     }
 }
 
-// Returns the period after which the lane ends if it is not decided before.
+// Returns the period after which an undecided lane ends.
 fn last_period() -> u32 {
     return select(settings.decided_by, settings.longest, search.confirms_chaos == 1u);
 }
 
-// Ends contact-free motion: period 1, and no cycle to read.
+// Ends contact-free motion. It has period 1, and no cycle is read.
 fn end_non_impacting() {
     begin_counting();
     search.cycle = 1u;
@@ -117,7 +117,7 @@ fn begin_reading() {
     tally.stage = STAGE_READING;
     tally.periods_to_read = tally.candidate;
     search.has_read = 1u;
-    // Cycles of even period cannot be their own mirror image and are not compared.
+    // A cycle of even period cannot be its own mirror image, so it is not compared.
     search.mirror = 0u;
     search.divisor = 0u;
     search.divisor_distance = 0u;

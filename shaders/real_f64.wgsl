@@ -23,5 +23,5 @@ fn is_bounded(size: Real) -> bool {
 const AT_REST: u32 = WITHIN_ROUNDING;
 const NEUTRAL: Real = 1e-7;
 const NEWTON_CONVERGED: f32 = 1e-10;
-// Enough for the spectral radius to the last digits.
+// This number of squarings gives the spectral radius to the last digits.
 const SQUARINGS: u32 = 40u;

@@ -87,8 +87,8 @@ fn strobe_distance() -> Real {
     return Real(bitcast<f32>(tally.strobe_distance));
 }
 
-// Whether an event near phase 0 makes the comparison of strobe states uncertain although the status does not say so: it
-// may lie before and after the strobe in turn, so that a cycle seems twice as long, or none is found.
+// Whether an event near phase 0 makes the comparison of strobe states uncertain although the status does not say so. Such an event may lie
+// before and after the strobe in turn. A cycle then seems twice as long, or is not found.
 fn is_near_strobe() -> bool {
     if search.cycle > 1u {
         return strobe_distance() < NEAR_STROBE;
@@ -99,8 +99,8 @@ fn is_near_strobe() -> bool {
 }
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
-    // Contact-free motion has not been read, and is symmetric. On a slow approach, or where rounding is amplified,
-    // the symmetry is known only if it is broken by far. On a symmetric cycle every impact has a mirror image.
+    // Contact-free motion is symmetric, and is not read as a cycle. If the approach is slow or rounding is amplified, only a clearly broken
+    // symmetry is known. On a symmetric cycle every impact has a mirror image.
     if SYMMETRY && cell.mirror == 1u {
         let has_conjugate = tally.impacts % 2u == 0u;
         let is_symmetric = search.has_read == 0u || (is_surely_symmetric() && has_conjugate);
@@ -131,7 +131,8 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     }
 }
 
-// Stores a number of the word or the pattern. The place is an argument because a constant place must exist in every variant.
+// Stores a number of the word or the pattern. The place is an argument, because variants without words have a shorter array, which a
+// constant place would exceed.
 fn spell(finding: ptr<function, Finding>, place: u32, number: u32) {
     (*finding).spelling[place] = number;
 }
@@ -141,7 +142,7 @@ fn read_pattern(finding: ptr<function, Finding>) {
     var recent = tallies[lane].pattern_recent;
     var hash = vec2<u32>(tallies[lane].pattern_hash[0], tallies[lane].pattern_hash[1]);
     let first = tallies[lane].pattern[0];
-    // The last run continues as the first: both count as one.
+    // The cycle's last run and its first one have the same symbol, so they are one run.
     if length > 1u && (recent & LATEST_SYMBOL) == (first & LATEST_SYMBOL) {
         if length > HASH_WINDOW - 1u {
             hash -= hash_window(recent);
@@ -164,7 +165,7 @@ fn read_pattern(finding: ptr<function, Finding>) {
     }
 }
 
-// Adds the hash windows that span the end of the word; all others have been added.
+// Adds the hash windows that span the end of the word. All other windows have been added before.
 fn close_hash() {
     for (var n = 0u; n < HASH_WINDOW - 1u; n++) {
         push_symbol((tallies[lane].word[0] >> (SYMBOL_BITS * n)) & LATEST_SYMBOL);

@@ -1,22 +1,21 @@
-// Recurrence: whether the lane returns to earlier strobe states, nearer each time.
+// Recurrence: checks whether the lane returns to earlier strobe states, and comes nearer each time.
 
 // A lane has settled once its limit is estimated to lie within 2^-14 of the motion. Weak chaos comes within 2^-12 of
 // a cycle by chance.
 const SETTLED: f32 = 56.0;
-// Distance of the limit, 2^-4 of the motion, from which Newton's method may search it. `LONGEST_NEWTON_STEP` limits
-// the result.
+// Newton's method may search the limit once its distance is below 2^-4 of the motion. `LONGEST_NEWTON_STEP` limits the step.
 const REFINABLE: f32 = 16.0;
-// Approach per period that `is_refinable` also assumes for slower motion, which need not recur more closely.
+// Least approach per period in `is_refinable`. A slower motion is treated as if it approached at this rate.
 const SLOWEST: f32 = 0.008;
-// Recurrences this close, 2^-12 of the motion, need not shrink; they must not grow.
+// Recurrences within 2^-12 of the motion need not shrink, but must not grow.
 const SLOW: u32 = 48u;
-// Least shrinkage since the last window: a factor of 0.7.
+// Least shrinkage since the last window, in quarter octaves: a factor of 0.7.
 const SHRUNK: u32 = 2u;
-// Windows over which a candidate must have contracted.
+// Number of windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-// Fewest lags of a window.
+// Smallest number of lags of a window.
 const LEAST_WINDOW: u32 = 2u;
-// A window need not be longer than this many contracting cycles.
+// Number of contracting cycles after which a window ends, even if it could be longer.
 const LAGS_PER_CYCLE: u32 = 4u;
 
 // Checks a strobe. Returns true once a period is confirmed.
@@ -39,10 +38,10 @@ fn recurs() -> bool {
     search.known_lags = search.window;
     tallies[lane].last_distances = tallies[lane].distances;
     keep_recurrence();
-    // The next anchor lies at the same point of the cycle, because distances compare only there. The points of a
-    // cycle may be so close together that a shorter lag seems to recur.
+    // The next anchor lies at the same point of the cycle, because distances at other points are not comparable. The points of a cycle may
+    // be so close together that a lag shorter than its period seems to recur.
     let cycle = max(closest_lag(), 1u);
-    // A short lag that contracts is found in short windows, too.
+    // Short windows suffice to find a short lag that contracts.
     let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
     let lags = select(widest(), min(enough, widest()), is_fast && search.failed_readings == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
@@ -55,8 +54,8 @@ fn widen_scales(q: State) {
     measures.rate_scale = max(measures.rate_scale, largest_rate(q));
 }
 
-// Lowers the units of distances where a cycle is read, so that the motion before it does not count. A strobe may lie
-// at a turning point or midway between two.
+// Lowers the units of distances when a cycle is read, so that earlier motion does not count. A strobe may lie at a turning point, where
+// rates vanish, or midway between two, where the displacement vanishes.
 fn narrow_scales(q: State) {
     let angle = unit_of_frequency();
     let position = largest_position(q);
@@ -103,16 +102,16 @@ fn closest_of(lags: u32) -> u32 {
     return best;
 }
 
-// Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because at
-// a turning point rates are rounding error.
+// Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because rates at a turning point
+// are rounding errors.
 fn distance_between(a: State, b: State) -> Real {
     let d = difference(a, b);
     return max(largest_displacement(d) / unit_of_positions(), largest_rate(d) / unit_of_rates());
 }
 
-// Returns the unit of positions: the size of the motion. With stages it is at least the scale of length. Motion that decays to rest
-// would otherwise never come near to rest, because its size decays with it. Without stages, its energy decides that it makes no
-// contact (is_non_impacting in observe.wgsl).
+// Returns the unit of positions: the size of the motion. With stages it is at least the scale of length. Motion that decays to rest would
+// otherwise never come near to rest, because its size decays with it. Without stages such motion is recognised by its energy
+// (is_non_impacting).
 fn unit_of_positions() -> Real {
     var least: Real = 1e-30;
     if has_stages() {
@@ -150,10 +149,10 @@ fn last_distance_at(lag: u32) -> u32 {
     return (tallies[lane].last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
 }
 
-// Returns the smallest lag that recurs at all its multiples and contracts or has reached rounding; 0 if there is
-// none. Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
+// Returns the smallest lag that recurs at all its multiples, and whose distance contracts or has reached rounding; 0 without such a lag.
+// Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
 fn contracting_lag() -> u32 {
-    // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
+    // If points of a cycle are close together, their distances neither shrink nor grow. A longer lag then recurs better.
     let best = closest_of(search.window);
     for (var lag = 1u; lag <= min(search.window, search.known_lags); lag++) {
         iterations += 1u;
@@ -175,21 +174,21 @@ fn contracting_lag() -> u32 {
     return 0u;
 }
 
-// Whether the distance at a lag has shrunk since the last window, or is rounding.
+// Whether the distance at a lag has shrunk since the last window, or is a rounding error.
 fn shrinks(lag: u32) -> bool {
     let now = distance_at(lag);
     return now >= WITHIN_ROUNDING || now >= last_distance_at(lag) + SHRUNK;
 }
 
-// Whether the limit is near enough. Strobes at a distance `d` that shrinks by `mu` per period are `d / (1 - mu)` away
-// from it, so that a slow approach must come closer.
+// Whether the limit of the strobes is near enough. If the distance `d` between strobes shrinks by the factor `mu` per period, the limit is
+// `d / (1 - mu)` away. So strobes that approach slowly must be closer together.
 fn has_settled(lag: u32) -> bool {
     let now = distance_at(lag);
     let shrunk = f32(now) - f32(last_distance_at(lag));
     if now >= WITHIN_ROUNDING {
         return true;
     }
-    // 1 - mu, from the factor since the last anchor, `known_lags` periods ago.
+    // 1 - mu, from the change of the distance since the last anchor, `known_lags` periods ago.
     let away = clamp(shrunk * QUARTER_OCTAVE / f32(search.known_lags), 1e-6, 1.0);
     return f32(now) >= SETTLED - PARTS_PER_OCTAVE * log2(away);
 }
@@ -218,16 +217,15 @@ fn judge_lag(found: u32) -> bool {
     }
     search.streak = select(1u, search.streak + 1u, found == tally.candidate);
     tally.candidate = found;
-    // Weak chaos contracts by chance, more often the more it is checked. After each failed reading, one more window
-    // must contract.
+    // Strobes of weak chaos may contract by chance, and more checks find more such cases. So each failed reading raises the number of
+    // windows that must contract by one.
     let windows = STREAK + search.failed_readings + select(0u, 2u, grows(CHAOS_ERRORS));
     let has_contracted = search.streak >= windows;
     search.is_settled = select(0u, 1u, has_contracted && has_settled(found));
     return has_contracted && (search.is_settled != 0u || is_refinable(found));
 }
 
-// Compares the state half a period after the middle of a cycle of odd period with the mirror image of the cycle's
-// start.
+// Compares the cycle's start with the mirror image of the present state. The lane is half-way through a cycle of odd period.
 fn compare_mirror() {
     search.mirror = octaves(distance_between(strobe_state(), difference(State(), measures.anchor)));
 }

@@ -1,8 +1,8 @@
 // Newton's method on the strobe map: leads a motion that approaches a cycle to the cycle.
 
-// Moves the lane to `to`, the fixed point of the linearised strobe map, and reads on from there. The monodromy matrix
-// has been read along one candidate cycle, from the anchor to the present strobe. Returns false if the step brings
-// the lane no closer or leaves the domain.
+// Moves the lane to `to`, the fixed point of the linearised strobe map, and reads the cycle from there. The monodromy matrix has been read
+// along one candidate cycle, from the anchor to the present strobe. Returns false if the last step has not brought the lane closer, or if
+// this step would leave the domain.
 fn refine(to: State) -> bool {
     if search.newton_steps == 0u {
         keep_modes();
@@ -22,12 +22,12 @@ fn refine(to: State) -> bool {
     return true;
 }
 
-// Returns the hash of the events of the cycle that has been read. It is constant along one branch of the strobe map.
+// Returns the hash of the events of the cycle that has been read. All motions on one branch of the strobe map have the same hash.
 fn branch() -> u32 {
     return mix_bits(mix_bits(tally.hash_low + tally.events) + tally.recent);
 }
 
-// Stores the events of the first reading with the present period.
+// Stores the hash of the events if this is the first reading with the present period.
 fn store_branch() {
     if search.newton_steps == 0u || search.branch_period != tally.candidate {
         search.branch = branch();
@@ -67,7 +67,7 @@ fn image_of(u: State) -> State {
     return image;
 }
 
-// Moves the lane back to where Newton's method started.
+// Moves the lane back to the state at which Newton's method started.
 fn return_to_start() {
     if search.newton_steps == 0u {
         return;

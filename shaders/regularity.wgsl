@@ -1,8 +1,8 @@
-// Whether motion without a period is quasi-periodic, by the rule of the reference (dynamics/src/orbit/regularity.rs):
-// weighted averages of the strobes over two successive windows agree.
+// Decides whether motion without a period is quasi-periodic: weighted averages of the strobes over two successive windows must agree. The
+// reference uses the same rule (dynamics/src/orbit/regularity.rs).
 
-// Adds the strobe that was stored last to the averages. The first windows end before the budget does, the next ones
-// before that of undecided lanes. Newton's method may use up the periods that are left over.
+// Adds the strobe that was stored last to the averages. The first pair of windows ends before the budget, and the next pair before the
+// budget of undecided lanes. The periods that are left may be used by Newton's method.
 fn add_to_averages() {
     let length = search.average_length;
     if length == 0u || (has_averages() && tally.period > settings.periods) {
@@ -22,7 +22,7 @@ fn add_to_averages() {
     }
     let t = (Real(n % length) + 0.5) / Real(length);
     let square = (t * (1.0 - t)) * (t * (1.0 - t));
-    // The integral of the window from 0 to 1 is 1/630. The second window counts as negative.
+    // The weight function has the integral 1/630 from 0 to 1. Strobes of the second window have negative weights.
     let weight = select(Real(-630.0), Real(630.0), n < length) / Real(length) * square * square;
     let u = difference(strobe_state(), motions[lane].average_centre);
     var squares: Real = 0.0;
@@ -38,8 +38,8 @@ fn has_averages() -> bool {
     return search.average_length > 0u && search.strobe_count >= search.average_start + 2u * search.average_length;
 }
 
-// Keeps the distance within which the motion recurs: the largest, over the windows, of the distance to the anchor's
-// nearest strobe.
+// Stores the distance within which the motion recurs. Each window has a distance from the anchor to its nearest strobe, and the largest of
+// these distances is stored.
 fn keep_recurrence() {
     if 2u * search.known_lags < settings.max_period {
         return;
@@ -52,7 +52,7 @@ fn keep_recurrence() {
     search.recurrence = min(search.recurrence, nearest);
 }
 
-// Whether the exponent is that of neutral motion and the section is regular.
+// Whether the exponent is zero, as in neutral motion, and the section is regular.
 fn is_quasi_periodic() -> bool {
     if !EXPONENT || search.blocks < 2u || !has_averages() {
         return false;

@@ -1,7 +1,7 @@
 // The main loop of a lane. One invocation is one lane.
 
 var<private> cell: Cell;
-// State that steps and events use.
+// State that steps and events use, in registers.
 var<private> motion: MotionNow;
 var<private> tally: TallyNow;
 // State that strobes use.
@@ -12,7 +12,7 @@ var<private> lane: u32;
 // Loop iterations spent in this dispatch.
 var<private> iterations: u32;
 
-// Returns the sum of the sizes. It is a NaN if one of them is.
+// Returns the sum of the sizes of the numbers; NaN if one of them is NaN.
 fn sum_of_sizes(q: State) -> Real {
     var sum = abs(q[0u]) + abs(q[1u]);
     //% for k in 1..COORDINATES
@@ -44,9 +44,9 @@ fn is_over() -> bool {
     return tally.status != STATUS_OK || tally.stage == STAGE_READ || tally.stage == STAGE_DONE;
 }
 
-// Whether this variant has work for the lane. The variant without the exponent's tangent vector carries a lane until
-// it needs the vector, and finishes a cycle that is being read; the other variant then has the lane for good. The
-// choice must not depend on where a dispatch ends, because the variants round differently.
+// Whether this variant has work for the lane. The variant without the exponent's tangent vector moves a lane until it needs the vector; a
+// reading in progress is finished first. From then on the lane belongs to the other variant. The choice must not depend on where a dispatch
+// ends, because the variants round differently.
 fn has_work() -> bool {
     let measures = tally.stage == STAGE_MEASURING;
     if MEASURE || measures {
@@ -81,7 +81,7 @@ fn store_lane() {
     }
 }
 
-// Loads the state that strobes use. Between strobes, the steps need its registers.
+// Loads the state that strobes use. It stays in memory between strobes, because the steps need the registers.
 fn load_strobe_state() {
     if !KEEP {
         measures = motions[lane].measures;
@@ -96,8 +96,8 @@ fn store_strobe_state() {
     }
 }
 
-// Returns the step at which the lane must stop: phase 0, or half a period in the middle period of a cycle that is
-// read and may be its own mirror image.
+// Returns the step at which the lane must stop. This is phase 0; half-way through a cycle of odd period that may be its own mirror image,
+// it is half a period.
 fn next_stop_phase() -> u32 {
     let steps = shape.steps;
     let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.periods_to_read == tally.candidate + 1u;
@@ -114,7 +114,7 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     resume_motion();
     load_tangent();
     prepare_motion();
-    // Scans, events and strobes are in separate loops, so that lanes do the same work at the same time.
+    // Scans, events and strobes have separate loops, so that lanes do the same work at the same time.
     while has_work() && iterations < settings.iterations {
         if fly_to_stop_phase() {
             if MEASURE {

@@ -1,6 +1,6 @@
-// Small turns of phasors.
+// Turns of phasors by small angles.
 
-// Returns cos - 1 and sin of an angle of at most little more than a radian.
+// Returns cos - 1 and sin of an angle of up to about a radian.
 fn small_turn(angle: Real) -> vec2<Real> {
     let s = angle * angle;
     let c = s * (-1.0 / 2.0 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * (1.0 / 40320.0

@@ -23,7 +23,7 @@ fn begin_pattern() {
     tallies[lane].pattern_recent = 0u;
 }
 
-// Adds a symbol to the pattern. Runs are rarer than flights, so that the pattern stays in the buffer.
+// Adds a symbol to the pattern. The pattern stays in the buffer, because runs are rarer than flights.
 fn add_run(symbol: u32) {
     let n = tallies[lane].pattern_length;
     if n < 7u * SYMBOLS_PER_NUMBER {
@@ -43,11 +43,11 @@ fn push_symbol(symbol: u32) {
     tally.recent = append_symbol(tally.recent, symbol);
 }
 
-// Bits of the latest symbol, and of all that are hashed together.
+// Bit masks of the latest symbol, and of all symbols that are hashed together.
 const LATEST_SYMBOL: u32 = (1u << SYMBOL_BITS) - 1u;
 const LATEST_SYMBOLS: u32 = (1u << (SYMBOL_BITS * HASH_WINDOW)) - 1u;
 
-// Appends a symbol to the latest ones and keeps HASH_WINDOW of them.
+// Appends a symbol to the latest symbols and keeps HASH_WINDOW of them.
 fn append_symbol(recent: u32, symbol: u32) -> u32 {
     return ((recent << SYMBOL_BITS) | symbol) & LATEST_SYMBOLS;
 }
@@ -71,9 +71,9 @@ fn mix_bits(x: u32) -> u32 {
     return h ^ (h >> 16u);
 }
 
-// Keeps the distance of the event that is nearest to phase 0, in turns.
+// Stores the distance from phase 0, in turns, of the event that is nearest to it.
 fn keep_strobe_distance() {
     let turns = (Real(tally.step) + motion.theta) / Real(shapes[cell.flow_index].steps);
-    // Positive numbers have the order of their bits.
+    // The bits of positive floating-point numbers are ordered as the numbers are.
     tally.strobe_distance = min(tally.strobe_distance, bitcast<u32>(f32(min(turns, abs(1.0 - turns)))));
 }

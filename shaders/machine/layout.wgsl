@@ -1,23 +1,22 @@
 // Constants of machines: oscillators of one to eight coordinates with several gaps and dry friction.
 //
-// A lane is in one domain at a time: a stage, a mode of every gap, and a mode of every element with friction. The host computes the
-// equations of motion of every domain and writes them to a table (src/gpu/machine.rs). Constants that no file declares, such as WIDTH and
-// AT_WALLS, are sizes and places of this table.
+// A domain is a stage, a mode of each gap, and a mode of each element with friction. A lane is in one domain at a time. The host writes the
+// equations of motion of all domains to a table (src/gpu/machine.rs). Constants that no file declares, such as WIDTH and AT_WALLS, are
+// sizes and places in this table.
 //
 // A point lists the numbers that forces depend on: displacements and rates in turn, the cosine and the sine of each harmonic, zeros up to a
-// multiple of four numbers, and 1.
-// A row lists the factors of these numbers in a force or an acceleration.
+// multiple of four numbers, and 1. A row lists the factors by which a force or an acceleration depends on these numbers.
 
 struct Flow {
     // Excitation frequency, and length of a step of the grid in time units.
     omega: Real,
     h: Real,
-    // Scales of length and speed, and the displacement beyond which the motion has escaped.
+    // Scales of length and speed. `escape`: displacement beyond which the motion has escaped.
     length: Real,
     speed: Real,
     escape: Real,
-    // Contact-free motion: twice the energy of a transient below which no contact follows, negative if there is none; growth of the
-    // transient per period, in octaves; and steady state at phase 0.
+    // Contact-free motion. Twice the energy of the transient below which no contact follows, negative if no transient is small enough;
+    // growth of the transient per period, in octaves; steady state at phase 0.
     contact_free_energy: Real,
     transient_growth: Real,
     steady: array<Real, 16>,
@@ -35,19 +34,20 @@ struct FlowShape {
     // Number of elements with friction, and of coordinates.
     elements: u32,
     degrees: u32,
-    // The constants COORDINATES, DIM, WIDTH and TERMS. Some drivers copy out loops whose bounds they know, and take minutes to compile them.
+    // The constants COORDINATES, DIM, WIDTH and TERMS. As constants, they would be known bounds of loops; some drivers unroll such loops
+    // and take minutes to compile them.
     coordinates: u32,
     dim: u32,
     width: u32,
     terms: u32,
     // Orders of the harmonics.
     orders: array<u32, 8>,
-    // Number of walls: right, left walls of each gap. Kind of the last one: LAST_*.
+    // Number of right and of left walls of each gap. Kind of the last wall: LAST_*.
     walls: array<u32, 6>,
     kinds: array<u32, 6>,
 }
 
-// Kinds of a side's last wall.
+// Kinds of the last wall of a side.
 const LAST_NONE: u32 = 0u;
 const LAST_ELASTIC: u32 = 1u;
 const LAST_PUSHING: u32 = 2u; // its force differs from that of an elastic wall
@@ -57,16 +57,16 @@ const LAST_RIGID: u32 = 4u;
 @group(0) @binding(1) var<storage, read> flows: array<Flow>;
 @group(0) @binding(2) var<storage, read> shapes: array<FlowShape>;
 @group(0) @binding(3) var<storage, read> table: array<Real>;
-// Restitution (constant, factor and power of the speed) and mesh speed of the last walls: right, left wall of each gap.
+// Law of the last right and the last left wall of each gap: restitution (constant, factor and power of the speed) and mesh speed.
 @group(0) @binding(4) var<storage, read> laws: array<array<array<Real, 4>, 6>>;
 
 const SIDE_RIGHT: u32 = 0u;
 const SIDE_LEFT: u32 = 1u;
 const SIDE_NONE: u32 = 2u;
 
-// Modes of a gap. BEYOND, plus the number of walls passed on the right, or minus that on the left. For the others, add the side.
-// ONSET: lasting contact that has begun with an impact, the gap in front of its wall. PRESSED: the same, the gap behind it.
-// OPEN: behind a wall that only pushes, without force. STUCK: at rest on a rigid wall.
+// Modes of a gap. BEYOND plus the number of right walls, or minus the number of left walls, that the gap has passed. For the other modes,
+// add the side. ONSET: lasting contact after an impact, with the gap in front of its wall. PRESSED: lasting contact after an impact, with
+// the gap behind its wall. OPEN: the gap is behind a wall that only pushes, and the wall's force is 0. STUCK: at rest on a rigid wall.
 const BEYOND: u32 = 4u;
 const ONSET: u32 = 9u;
 const PRESSED: u32 = 11u;
@@ -80,17 +80,18 @@ const BACKWARD: u32 = 2u;
 
 var<private> flow: Flow;
 var<private> shape: FlowShape;
-// Modes, and the stage of the forces.
+// The present modes, and the present stage of the forces.
 var<private> gap_modes: array<u32, GAPS>;
 var<private> slips: array<u32, ELEMENT_SLOTS>;
 var<private> stage: u32;
-// For a gap on a wall: the direction of the wall from the gap, and the order of the root of the distance.
+// For a gap on a wall: the direction from the gap to the wall, and the order of the root of their distance.
 var<private> wall_side: array<u32, GAPS>;
 var<private> wall_order: array<u32, GAPS>;
 // Orders of the roots of pushing forces and of sliding rates; 0 without a root.
 var<private> from_force: array<u32, GAPS>;
 var<private> from_rate: array<u32, ELEMENT_SLOTS>;
-// Elements that have slid since the cycle's start, as bits. The counter `is_scan_interrupted`, which machines do not need, stores it.
+// Bit mask of the elements that have slid since the cycle's start. It is stored in the counter `is_scan_interrupted`, which machines do not
+// need.
 var<private> slid: u32;
 // Bit of `slid`: the columns of the monodromy matrix are new.
 const NEW_COLUMNS: u32 = 4u;
@@ -167,7 +168,7 @@ fn spring(gap: u32, side: u32, nth: u32) -> array<Real, 3> {
     return array<Real, 3>(number(place), number(place + 1u), number(place + 2u));
 }
 
-// Number of walls behind which the motion continues.
+// Number of walls of a side behind which the motion can continue.
 fn passable(gap: u32, side: u32) -> u32 {
     return wall_count(gap, side) - select(0u, 1u, last_kind(gap, side) >= LAST_IMPACT);
 }
@@ -187,7 +188,7 @@ fn before_last(gap: u32, side: u32) -> u32 {
     return beyond_walls(side, wall_count(gap, side) - 1u);
 }
 
-// Place of the present or of another domain in the table.
+// Place in the table of the domain that has these modes in the present stage.
 fn domain_of(modes: array<u32, GAPS>, slips_of: array<u32, ELEMENT_SLOTS>) -> u32 {
     var of_gap = modes;
     var of_element = slips_of;
@@ -199,7 +200,7 @@ fn domain_of(modes: array<u32, GAPS>, slips_of: array<u32, ELEMENT_SLOTS>) -> u3
         let side = (mode + 1u) % 2u;
         var code = left + mode - BEYOND;
         if mode >= STUCK {
-            // The left wall follows the right one, if that is rigid.
+            // The place of a rigid left wall follows that of a rigid right wall.
             let is_second = side == SIDE_LEFT && last_kind(gap, SIDE_RIGHT) == LAST_RIGID;
             code = left + right + 1u + select(0u, 1u, is_second);
         } else if mode >= OPEN {

@@ -1,15 +1,15 @@
-// What observers ask the engine of motion of a machine. The functions are those of oscillator.wgsl.
+// The functions that observers call, for machines. pair/oscillator.wgsl defines them for oscillators with one gap.
 
 fn begin_motion() {
     let start = starts[lane];
     for (var i = 0u; i < DIM; i++) {
         motion.q[i] = start[i];
     }
-    // The host packs the modes like `pack_modes`.
+    // The host has packed the modes in the format of `pack_modes`.
     tally.mode = u32(start[DIM]);
     tally.origin = u32(start[DIM + 1u]);
     tally.order = u32(start[DIM + 2u]);
-    // A change of the stage at phase 0 is part of the start.
+    // The start already includes a change of the stage at phase 0.
     tally.next_change = u32(start[DIM + 3u]);
 }
 
@@ -23,14 +23,14 @@ fn suspend_motion() {
     pack_modes();
 }
 
-// The last stage holds until the first change, which may be at phase 0. The first step of the period then has no length.
+// The last stage holds until the first change. If this change is at phase 0, the first step of the period has zero length.
 fn begin_schedule() {
     tally.next_change = 0u;
 }
 
 fn restart_phase() {}
 
-// Projects a tangent vector to the constraints: neighbouring motions rest, too.
+// Projects a tangent vector to the constraints: what is at rest is also at rest in neighbouring motions.
 fn constrained(u: State) -> State {
     var v = u;
     for (var gap = 0u; gap < GAPS; gap++) {
@@ -42,7 +42,7 @@ fn constrained(u: State) -> State {
     return v;
 }
 
-// The next step does it: it is the only caller of the code.
+// Makes the next step constrain the columns. Drivers copy a function to each call, so only the step contains this code.
 fn constrain_columns() {
     slid |= NEW_COLUMNS;
 }
@@ -54,8 +54,8 @@ fn begin_cycle() {
     }
 }
 
-// An element that sticks for ever keeps the displacement along its row, which gives a multiplier of exactly 1. Other multipliers belong to
-// deviations without this displacement: the matrix is multiplied by the projection to them.
+// A displacement along the row of an element that sticks for ever stays constant, which gives a multiplier of exactly 1. To exclude it, the
+// matrix is multiplied by the projection to deviations without this displacement.
 fn deflate_columns() {
     if ELEMENTS == 0u {
         return;
@@ -161,7 +161,7 @@ fn contact_free_growth() -> Real {
     return flow.transient_growth;
 }
 
-// Whether no gap lies on a wall and no force or rate is at its limit.
+// Whether the motion is away from all walls, and no force or rate is at its limit.
 fn is_away_from_roots() -> bool {
     var is_away = true;
     for (var gap = 0u; gap < GAPS; gap++) {
@@ -211,7 +211,7 @@ fn keeps_domain(to: State) -> bool {
     return beyond(to) < 0.0;
 }
 
-// Returns how far the gaps at `to` lie beyond the walls that end their modes, at most; negative inside.
+// Returns the largest distance by which a gap at `to` lies beyond a wall that ends its mode; negative if all are inside.
 fn beyond(to: State) -> Real {
     var q = to;
     var most = -HUGE;
@@ -234,7 +234,7 @@ fn beyond(to: State) -> Real {
     return most;
 }
 
-// Error of a computed fixed point in rounding errors of the motion, before amplification.
+// Error of a computed fixed point before amplification, in units of the motion's rounding error.
 const MISPLACED: Real = 8.0;
 
 fn leaves_domain(to: State) -> bool {

@@ -1,10 +1,9 @@
-// Which modes of walls and friction are consistent with a state. The rules are those of the reference
-// (dynamics/src/machine/modes.rs).
+// Finds modes of walls and friction that are consistent with a state, by the rules of the reference (dynamics/src/machine/modes.rs).
 
-// What is decided: gaps that rest on rigid walls, with their sides, and elements without a rate.
+// Gaps and elements whose modes are decided: gaps that rest on rigid walls, with their sides, and elements without a sliding rate.
 var<private> rest_side: array<u32, GAPS>;
 var<private> rest_element: array<u32, ELEMENT_SLOTS>;
-// The modes that are tried, and those that were chosen.
+// Modes that are tried; after a successful search, the modes that were chosen.
 var<private> tried_gaps: array<u32, GAPS>;
 var<private> tried_slips: array<u32, ELEMENT_SLOTS>;
 
@@ -12,7 +11,7 @@ fn sign_of_slip(slip: u32) -> Real {
     return select(select(Real(0.0), Real(-1.0), slip == BACKWARD), Real(1.0), slip == FORWARD);
 }
 
-// Whether the modes that are tried fit the forces at a state.
+// Whether the tried modes are consistent with the forces at a state.
 fn are_consistent(q: State) -> bool {
     let domain = domain_of(tried_gaps, tried_slips);
     for (var n = 0u; n < GAPS + ELEMENTS; n++) {
@@ -28,7 +27,7 @@ fn are_consistent(q: State) -> bool {
             if wants_positive {
                 line = push_line(domain, n);
             } else {
-                // Without a push the gap leaves the wall, or friction holds it there.
+                // If the wall does not push, the gap must leave it, or friction holds the gap there.
                 line = distance_line(n, 0.0, 1u - side);
                 least = 2u;
             }
@@ -58,8 +57,8 @@ fn are_consistent(q: State) -> bool {
     return true;
 }
 
-// Chooses the first consistent combination of modes: walls hold before they let go, elements stick before they slide. If `keeps`, the present
-// modes come first. Returns false, and leaves the modes, if there is none.
+// Chooses the first consistent combination of modes: walls hold before they let go, elements stick before they slide. With `keeps`, the
+// present modes are tried first. If no combination is consistent, returns false and changes no mode.
 fn choose(q: State, keeps: bool) -> bool {
     var releases = 1u;
     for (var gap = 0u; gap < GAPS; gap++) {
@@ -100,7 +99,7 @@ fn choose(q: State, keeps: bool) -> bool {
     return false;
 }
 
-// Loads a point with the sizes of its numbers.
+// Loads a point whose numbers are replaced by their absolute values.
 fn load_sizes(q: State) {
     load_point(q);
     for (var i = 0u; i < shape.width; i++) {
@@ -112,8 +111,7 @@ fn is_stuck(mode: u32) -> bool {
     return mode >= STUCK;
 }
 
-// Sets the rates of sticking elements and of gaps at rest to their values without rounding errors. `speeds` is 1 for a state and 0 for a
-// tangent vector.
+// Removes rounding errors from the rates of sticking elements and of gaps at rest. `speeds` is 1 for a state and 0 for a tangent vector.
 fn hold(q: ptr<function, State>, speeds: Real) {
     var held = 0u;
     for (var gap = 0u; gap < GAPS; gap++) {
@@ -126,7 +124,7 @@ fn hold(q: ptr<function, State>, speeds: Real) {
         return;
     }
     var pivots: array<u32, ELEMENT_SLOTS>;
-    // The second pass completes the first where rows share coordinates.
+    // Rows may share coordinates, so one pass does not suffice.
     for (var n = 0u; n < 2u * ELEMENTS; n++) {
         let i = n % ELEMENT_SLOTS;
         if i >= shape.elements || slips[i] != STICKS {
@@ -150,7 +148,7 @@ fn hold(q: ptr<function, State>, speeds: Real) {
         if pivot == COORDINATES {
             continue;
         }
-        // The last number of a sliding rate is the speed with a minus sign.
+        // The constant of a sliding rate is minus the speed of the surface.
         var rest = speeds * number(row + WIDTH - 1u);
         for (var j = 0u; j < shape.coordinates; j++) {
             if j != pivot {

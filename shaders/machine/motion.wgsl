@@ -1,10 +1,10 @@
 // The motion of a machine from event to event, by the rules of the reference (dynamics/src/machine/motion.rs).
 
-// Order of the root of the distance when the gap leaves a rigid wall: its acceleration is zero, the derivative is not.
+// Order of the root of the distance when a gap leaves a rigid wall. Its acceleration is zero, and the next derivative is not.
 const RELEASE_ORDER: u32 = 3u;
-// An order that is computed at the end of an event.
+// Stands for an order that will be computed at the end of the event.
 const UNKNOWN_ORDER: u32 = 7u;
-// Decisions on elements at rest after one event.
+// Largest number of decisions on gaps and elements at rest after one event.
 const MOST_DECISIONS: u32 = 16u;
 
 // Kinds of events.
@@ -20,8 +20,9 @@ const ENDS_SLIDING: u32 = 8u; // a sliding rate vanishes
 const BEGINS_SLIDING: u32 = 9u; // a holding force reaches its limit for sliding in a direction
 const BEGINS_STAGE: u32 = 10u; // the stage of the forces changes
 
-// An event that may come. `index`: its gap or its element with friction. `side`: a side, or the mode of friction that follows. `line`: a
-// function that is positive before the event and zero at it. `order`: the order of its root at the start of the step, 0 without one.
+// A possible event. `index`: its gap or its element with friction. `side`: a side, or the mode of friction that follows. `line`: a function
+// that is positive before the event and zero at the event. `order`: the order of this function's root at the start of the step; 0 without a
+// root.
 struct Watch {
     kind: u32,
     index: u32,
@@ -42,7 +43,7 @@ fn is_kept(domain: u32, gap: u32) -> bool {
     return is_still(domain, gap) && rate_of_gap(gap) == 0.0;
 }
 
-// Side and number of the wall that lies in a direction from the gap; NO_WALL as its number if there is none.
+// Side and number of the next wall in a direction from the gap. The number is NO_WALL if no wall lies there.
 fn wall_ahead(gap: u32, direction: u32) -> vec2<u32> {
     let mode = gap_modes[gap];
     if mode >= ONSET {
@@ -55,7 +56,7 @@ fn wall_ahead(gap: u32, direction: u32) -> vec2<u32> {
     return vec2<u32>(1u - direction, passed - 1u);
 }
 
-// Side and number of the wall that a contact onset may reach backwards.
+// Side and number of the wall that a gap in a contact onset reaches if it moves away from the wall of its contact.
 fn wall_behind(gap: u32, side: u32) -> vec2<u32> {
     let count = wall_count(gap, side);
     if count > 1u {
@@ -64,12 +65,12 @@ fn wall_behind(gap: u32, side: u32) -> vec2<u32> {
     return vec2<u32>(1u - side, select(NO_WALL, 0u, wall_count(gap, 1u - side) > 0u));
 }
 
-// Order of the root of the distance from the wall in a direction.
+// Order of the root of the gap's distance from the wall in a direction; 0 if the gap is not on that wall.
 fn order_from_wall(gap: u32, direction: u32) -> u32 {
     return select(0u, wall_order[gap], wall_side[gap] == direction);
 }
 
-// Side of the last wall that only pushes and behind which the gap is, or SIDE_NONE.
+// Side on which the gap is behind a last wall that only pushes; SIDE_NONE otherwise.
 fn pushing_side(gap: u32) -> u32 {
     let mode = gap_modes[gap];
     if mode >= ONSET || mode == BEYOND {
@@ -168,7 +169,7 @@ fn watch(number_of_watch: u32, domain: u32) -> Watch {
     return found;
 }
 
-// Share of a grid step until the stage changes or the present step ends.
+// Share of a grid step that is left until the stage changes or the grid step ends.
 fn steps_to_stop() -> Real {
     var stop: Real = 1.0;
     if is_change_next() {
@@ -185,7 +186,7 @@ fn change_theta() -> Real {
     return table[shape.schedule + 3u * tally.next_change + 1u];
 }
 
-// Takes one step: to the first event, or as far as the series or the grid allow. Returns whether it ends at a stop phase.
+// Takes one step to the first event, or as far as the series or the grid allow. Returns whether the step ends at a stop phase.
 fn step() -> bool {
     tally.passes_in_period += 1u;
     if EXPONENT && (slid & NEW_COLUMNS) != 0u {
@@ -250,12 +251,13 @@ fn step() -> bool {
     return tally.step >= stop;
 }
 
-// Whether a change of the stage is the next stop.
+// Whether the next stop is a change of the stage.
 fn is_change_next() -> bool {
     return tally.next_change < shape.changes && change_step() == tally.step;
 }
 
-// A function touches zero within rounding. At an elastic wall without a preload the linearisation is valid with and without contact.
+// Handles a function that touches zero within rounding. At an elastic wall without a preload the linearisation is valid with and without
+// contact, so such a touch is no graze.
 fn note_touch(touched: Watch) {
     if touched.kind == BEGINS_SLIDING {
         return;
@@ -270,7 +272,7 @@ fn note_touch(touched: Watch) {
     tally.grazes += 1u;
 }
 
-// Moves everything over a part of a step.
+// Moves state, tangents and phase over a part of a step.
 fn advance(domain: u32, share: Real, time: Real) {
     motion.q = state_after(share);
     if EXPONENT {
@@ -282,7 +284,7 @@ fn advance(domain: u32, share: Real, time: Real) {
         check_range();
     }
     let part = time / flow.h;
-    // The end of the step of the grid is reached only by a step without an event.
+    // Only a step without an event reaches the end of the grid step.
     motion.theta = min(motion.theta + part, 1.0 - 2.0 * ULP);
     var is_in_contact = false;
     for (var gap = 0u; gap < GAPS; gap++) {
@@ -300,7 +302,7 @@ fn advance(domain: u32, share: Real, time: Real) {
     }
 }
 
-// Mode of a gap that tells its contact.
+// Mode of a gap that says which contact it has.
 fn contact_mode(gap: u32) -> u32 {
     let mode = gap_modes[gap];
     if mode >= OPEN && mode < STUCK {
@@ -322,7 +324,7 @@ fn count_event(gap: u32, side: u32) {
     origins[gap] = side;
 }
 
-// Counts a change of friction, with its symbol if `symbol` has one.
+// Counts a change of friction; adds its symbol unless `symbol` is NO_SYMBOL.
 fn count_slip(symbol: u32) {
     note(symbol, 512u + symbol);
 }
@@ -331,7 +333,7 @@ const NO_SYMBOL: u32 = 64u;
 const STICKING_ENDS: u32 = 7u;
 const SLIDING_REVERSES: u32 = 0u;
 
-// The events of one instant: symbols and codes. They are counted together, because drivers copy functions to each call.
+// Symbols and codes of the events of one instant. They are counted together in one call, because drivers copy a function to each call.
 const MOST_NOTES: u32 = 16u;
 var<private> noted_symbols: array<u32, MOST_NOTES>;
 var<private> noted_codes: array<u32, MOST_NOTES>;
@@ -358,12 +360,13 @@ fn count_notes() {
     note_count = 0u;
 }
 
-// Impact: changes of the rates per change of the gap's rate; the gap; minus the derivative of the latter change by this rate.
+// An impact. `kick`: change of each rate per unit of change of the gap's rate. `kick_gap`: the gap. `kick_factor`: minus the derivative of
+// the change of the gap's rate with respect to this rate.
 var<private> kick: array<Real, COORDINATES>;
 var<private> kick_gap: u32;
 var<private> kick_factor: Real;
 
-// Changes a vector by the derivative of the jump.
+// Applies the derivative of the impact's jump to a vector.
 fn jump(u: State) -> State {
     var v = u;
     let change = kick_factor * v[2u * kick_gap + 1u];
@@ -384,7 +387,7 @@ fn field(domain: u32) -> State {
     return f;
 }
 
-// Processes the end of the present modes, and lets the tangents jump.
+// Processes the event that ends the present modes, and applies its saltation to the tangents.
 fn cross(event: Watch, domain: u32) {
     let is_at_wall = event.kind == ENDS_AT_WALL || event.kind == ENDS_ONSET || event.kind == LEAVES;
     if is_at_wall {
@@ -485,7 +488,7 @@ fn act(event: Watch) {
             exempt_element = i;
         }
         default: {
-            // What depends on forces is decided anew in the stage that begins.
+            // Modes that depend on forces are decided again in the stage that begins.
             stage = u32(table[shape.schedule + 3u * tally.next_change + 2u]);
             tally.next_change += 1u;
         }
@@ -512,7 +515,7 @@ fn end_contact(gap: u32, side: u32) {
     gap_modes[gap] = before_last(gap, side);
 }
 
-// Notes that a gap lies on the wall in a direction, and does not pass it.
+// Records that a gap lies on the wall in a direction and does not pass it.
 fn leave(gap: u32, direction: u32) {
     wall_side[gap] = direction;
     wall_order[gap] = 1u;
@@ -563,7 +566,7 @@ fn reach(gap: u32, direction: u32) {
     let is_elastic = wall.y < passable(gap, wall.x);
     let is_tiny = closing < NO_SPEED * flow.speed;
     let is_pushing = wall.x == direction && is_elastic && wall.y + 1u == wall_count(gap, wall.x) && last_kind(gap, wall.x) == LAST_PUSHING;
-    // The acceleration towards the wall, and the force of a wall that only pushes, where they matter.
+    // Acceleration towards the wall, and force of a wall that only pushes. They are computed only if they are used.
     var heads: Real = 1.0;
     var pushes: Real = 1.0;
     for (var n = 0u; n < 2u; n++) {
@@ -582,7 +585,7 @@ fn reach(gap: u32, direction: u32) {
         return;
     }
     if is_tiny && closing > 0.0 && !is_elastic && !(heads > 0.0) {
-        // Impacts of two gaps in turn end here: both leave their walls from rest.
+        // Ends alternating impacts of two gaps: both leave their walls from rest.
         motion.q[2u * gap + 1u] = 0.0;
         tally.grazes += 1u;
         note(NO_SYMBOL, 0u);
@@ -613,7 +616,7 @@ fn reach(gap: u32, direction: u32) {
     }
 }
 
-// Returns restitution and its derivative at an approach speed.
+// Returns the restitution at an approach speed, and its derivative with respect to the speed.
 fn restitution(gap: u32, side: u32, speed: Real) -> array<Real, 2> {
     let law = laws[cell.law_index][2u * gap + side];
     var value = law[0];
@@ -627,7 +630,7 @@ fn restitution(gap: u32, side: u32, speed: Real) -> array<Real, 2> {
     return array<Real, 2>(clamp(value, Real(0.0), Real(1.0)), select(Real(0.0), slope, is_inside));
 }
 
-// Returns `x^p` for a positive number, to the precision of its type: f64 has no powers.
+// Returns `x^p` for a positive number, to the precision of its type. WGSL has no powers for f64.
 fn power(x: Real, p: Real) -> Real {
     let octaves = p * octaves_of(clamp(x, Real(1e-30), Real(1e30)));
     let whole = clamp(round(octaves), Real(-120.0), Real(120.0));
@@ -639,7 +642,7 @@ fn power(x: Real, p: Real) -> Real {
     return sum * Real(ldexp(1.0, i32(whole)));
 }
 
-// Returns the leaving speed of a flight that is not followed in a series of impacts, for the point that is loaded.
+// Returns the leaving speed below which the flights of a series of impacts are not followed, at the loaded point.
 fn lowest_speed(domain: u32, gap: u32) -> Real {
     return sqrt(2.0 * LOWEST_FLIGHT * flow.length * abs(product(acceleration_row(domain, gap), 0u)));
 }
@@ -658,7 +661,7 @@ fn impact(gap: u32, side: u32) {
     var pressing: Real = 0.0;
     for (var trial = 0u; trial <= GAPS; trial++) {
         let let_go = joint_impact(gap, side, kept);
-        // First the gap leaves its wall; then, if it is slow, contact may last.
+        // First the impact as if the gap leaves its wall. If the gap is then slow, contact may last.
         lasts = false;
         var is_slow = false;
         var chosen_gaps = gap_modes;
@@ -695,7 +698,7 @@ fn impact(gap: u32, side: u32) {
             next = q;
             chosen_gaps = tried_gaps;
             chosen_slips = tried_slips;
-            // The gap must be pressed to the wall without and with contact.
+            // Contact lasts only if the gap is pressed to the wall both without and with contact.
             for (var with_contact = 0u; with_contact < 2u; with_contact++) {
                 let domain = domain_of(tried_gaps, tried_slips);
                 let value = lead(distance_line(gap, 0.0, 1u - side), domain, q, 2u).value;
@@ -717,7 +720,7 @@ fn impact(gap: u32, side: u32) {
         }
         tried_gaps = chosen_gaps;
         tried_slips = chosen_slips;
-        // Gaps with too low a flight stay at rest. Otherwise the impacts of two gaps might alternate for ever.
+        // Gaps whose flight would be too low stay at rest. Otherwise the impacts of two gaps might alternate for ever.
         var low = 0u;
         let domain = domain_of(tried_gaps, tried_slips);
         for (var other = 0u; other < GAPS; other++) {
@@ -754,8 +757,8 @@ fn impact(gap: u32, side: u32) {
     }
 }
 
-// Computes the changes of all rates by an impulse that changes the gap's rate by 1, and returns the gaps at rest that leave their
-// rigid walls, as bits. The others stay at rest, because their walls push. Gaps in `kept` stay at rest in any case.
+// Computes the changes of all rates by an impulse that changes the gap's rate by 1. Returns the bit mask of the resting gaps that leave
+// their rigid walls. Other resting gaps stay, because their walls push; gaps in `kept` stay in any case.
 fn joint_impact(gap: u32, side: u32, kept: u32) -> u32 {
     var resting: array<u32, 2>;
     var count_of_resting = 0u;
@@ -765,12 +768,12 @@ fn joint_impact(gap: u32, side: u32, kept: u32) -> u32 {
             count_of_resting += 1u;
         }
     }
-    // The last trial repeats the first one, if no set of released gaps fits.
+    // If no set of released gaps is consistent, the last trial repeats the first one.
     for (var n = 0u; n <= (1u << count_of_resting); n++) {
         iterations += 1u;
         let is_last = n == (1u << count_of_resting);
         let released = select(n, 0u, is_last);
-        // Shares of the impulse that the walls of held gaps add.
+        // Impulses of the walls of held gaps, relative to the impulse of the impact.
         var shares = array<Real, 2>(0.0, 0.0);
         var held: array<u32, 2>;
         var count_of_held = 0u;
@@ -807,7 +810,7 @@ fn joint_impact(gap: u32, side: u32, kept: u32) -> u32 {
             kick[held[k]] = 0.0;
             let is_kept_here = ((kept >> held[k]) & 1u) == 1u;
             let at = (gap_modes[held[k]] + 1u) % 2u;
-            // The wall pushes the gap away, so that all rates change by -side kick.
+            // The wall pushes the gap away, so all rates change by `-side kick`.
             let push = -sign_of(side) * sign_of(at) * shares[k];
             fits = fits && (is_kept_here || push >= -ROUNDING * sqrt(mobility(gap, gap) / mobility(held[k], held[k])));
         }
@@ -831,8 +834,8 @@ fn mobility(i: u32, j: u32) -> Real {
     return number(AT_MOBILITY + i * COORDINATES + j);
 }
 
-// Chooses modes of friction and of other gaps at rest after a jump of the rates to `q`. The modes that are tried are those of the gaps. Returns
-// whether there is a consistent choice.
+// Chooses modes of friction and of other gaps at rest after a jump of the rates to `q`. The tried modes of the gaps are given. Returns
+// whether a consistent choice exists.
 fn slide_after_jump(q: State, jumps: bool, gap: u32, stopped: u32) -> bool {
     var after = q;
     for (var other = 0u; other < GAPS; other++) {
@@ -937,8 +940,8 @@ fn begin_sliding(i: u32, next: u32) {
     }
 }
 
-// Decides all modes anew that depend on forces, after a jump of forces or rates. The exempt gap or element has just been decided. The sliding
-// rate of the element `stopped` has just vanished.
+// Decides all modes that depend on forces again, after a jump of forces or rates. The exempt gap or element was just decided and is left
+// out. The sliding rate of the element `stopped` has just vanished.
 fn settle(exempt_gap: u32, exempt_element: u32, stopped: u32) {
     for (var n = 0u; n < MOST_DECISIONS; n++) {
         let domain = present_domain();
@@ -958,7 +961,7 @@ fn settle(exempt_gap: u32, exempt_element: u32, stopped: u32) {
         }
         let has_choice = choose(motion.q, !ends_sliding);
         if ends_sliding && tried_slips[stopped] == slips[stopped] {
-            // The rate only touches 0, or begins on the wrong side of it.
+            // The sliding rate only touches 0, or starts with the wrong sign by rounding.
             tally.grazes += 1u;
             note(NO_SYMBOL, 1u);
             from_rate[stopped] = UNKNOWN_ORDER;
@@ -986,7 +989,7 @@ fn are_tried_modes_present() -> bool {
     return same;
 }
 
-// Decides contact onsets and walls that only push anew. Returns whether a mode has changed.
+// Decides again the modes of contact onsets and of walls that only push. Returns whether a mode has changed.
 fn settle_pushing(domain: u32) -> bool {
     for (var gap = 0u; gap < GAPS; gap++) {
         let mode = gap_modes[gap];
@@ -1031,7 +1034,7 @@ fn settle_pushing(domain: u32) -> bool {
     return false;
 }
 
-// Enters the modes that were chosen, and counts the changes: of friction first, if the rate of the element `stopped` has vanished.
+// Enters the chosen modes and counts the changes. If the rate of the element `stopped` has vanished, changes of friction are counted first.
 fn change_modes(stopped: u32) {
     for (var n = 0u; n < 2u; n++) {
         if (n == 0u) == (stopped < ELEMENTS) {
@@ -1069,7 +1072,7 @@ fn change_slips(stopped: u32) {
         if after != STICKS {
             load_sizes(motion.q);
             let line = rate_line(i, 1.0);
-            // An element that has just stopped has a small rate, because its time has a rounding error.
+            // An element that has just stopped has a small rate, because the time of its stop has a rounding error.
             if i == stopped || abs(value_of(line, 0u)) <= ROUNDING * size_of_value(line) {
                 from_rate[i] = UNKNOWN_ORDER;
             }

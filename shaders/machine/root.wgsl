@@ -1,16 +1,16 @@
 // The first root of a polynomial on a step.
 //
 // In Bernstein form, the number of roots in an interval is at most the number of sign changes of the coefficients, and one sign change
-// means exactly one root (Descartes' rule). Other intervals are halved, from the left.
+// means exactly one root (Descartes' rule). Intervals with more sign changes are halved, and the left half is searched first.
 
-// Coefficients in powers of the share of the step, and in Bernstein form on an interval.
+// Coefficients of the powers of the share of the step, and of the Bernstein form on an interval.
 var<private> powers: array<Real, COEFFICIENTS>;
 var<private> bernstein: array<Real, COEFFICIENTS>;
 
-// Whether a function that does not become negative comes so near to zero that rounding decides.
+// Whether a function that does not become negative touches zero within rounding.
 var<private> touches: bool;
 
-// No root, as a share of a step.
+// Stands for "no root" where a share of a step is returned.
 const NO_ROOT: Real = 2.0;
 
 // Computes the Bernstein form on `[low, high]` of the polynomial whose lowest coefficient is `powers[order]`.
@@ -27,7 +27,7 @@ fn convert(order: u32, low: Real, high: Real) {
             }
         }
     }
-    // The coefficient of u^j, divided by the binomial coefficient; then sums as in Pascal's triangle.
+    // Divides the coefficient of u^j by the binomial coefficient, and then forms sums as in Pascal's triangle.
     var factor: Real = 1.0;
     for (var j = 0u; j <= degree; j++) {
         bernstein[j] *= factor;
@@ -41,7 +41,7 @@ fn convert(order: u32, low: Real, high: Real) {
 }
 
 // Returns the share of the step at which a function that is positive at first becomes negative, or NO_ROOT. Its first `order` coefficients
-// are zero but for rounding. `size` bounds the terms that cancel in the coefficients.
+// are zero within rounding. `size` bounds the terms that cancel in the coefficients.
 fn first_fall(order: u32, size: Real) -> Real {
     touches = false;
     var rest: Real = 0.0;
@@ -87,7 +87,7 @@ fn first_fall(order: u32, size: Real) -> Real {
     return NO_ROOT;
 }
 
-// Finds the only root in an interval by Newton's method, or by bisection where that leaves the interval.
+// Finds the only root in an interval by Newton's method, or by bisection if a Newton step would leave the interval.
 fn root(order: u32, begin_at: Real, end_at: Real) -> Real {
     var low = begin_at;
     var high = end_at;

@@ -2,18 +2,19 @@
 
 // Terms of the series, one point after the other.
 var<private> series: array<Real, SERIES>;
-// Sizes of the terms that have been added up in a point.
+// Sums of the absolute values of the terms that were added in each number of a point.
 var<private> sizes: array<Real, WIDTH>;
 
-// Trips of the loops over the rates and over the numbers of a point. Inner loops count: some drivers add up the trips of all loops of a dispatch
-// and stop at a limit.
+// Number of loop iterations over the rates and over the numbers of a point. Inner loops count, because some drivers count the iterations of
+// all loops of a dispatch and stop at a limit.
 const TRIPS_OF_RATES: u32 = COORDINATES * (1u + WIDTH / 4u) + HARMONICS + 4u;
 const TRIPS_OF_POINT: u32 = WIDTH + HARMONICS;
 
-// Derivatives that are compared with zero.
+// Number of derivatives that are compared with zero.
 const DERIVATIVES: u32 = 4u;
 
-// A linear function of a point: `scale` times a row of the table, factors of one displacement and of its rate, and a constant.
+// A linear function of a point. It is a sum of `scale` times a row of the table, one displacement and its rate with factors, and a
+// constant.
 struct Line {
     scale: Real,
     row: u32,
@@ -54,7 +55,7 @@ fn acceleration_row(domain: u32, i: u32) -> u32 {
     return domain + IN_DOMAIN_ACCELERATIONS + i * WIDTH;
 }
 
-// Force with which a rigid wall pushes a gap that rests on it. It has a meaning only with `has_push`.
+// Force with which a rigid wall pushes a gap that rests on it. It is defined only if `has_push` is true.
 fn push_line(domain: u32, gap: u32) -> Line {
     return row_line(domain + IN_DOMAIN_PUSHES + gap * WIDTH, 1.0);
 }
@@ -72,12 +73,12 @@ fn has_hold(domain: u32, i: u32) -> bool {
     return number(domain + IN_DOMAIN_HAS_HOLD + i) != 0.0;
 }
 
-// Whether constraints keep a gap where it is.
+// Whether constraints keep a gap at its place.
 fn is_still(domain: u32, gap: u32) -> bool {
     return number(domain + IN_DOMAIN_STILL + gap) != 0.0;
 }
 
-// Longest step of a domain: the fastest rate turns by a radian, or the step of the grid ends.
+// Longest step of a domain: until the fastest rate has turned by a radian, or the grid step ends.
 fn unit_of(domain: u32) -> Real {
     return min(number(domain), flow.h);
 }
@@ -113,7 +114,7 @@ fn value_of(line: Line, k: u32) -> Real {
     return value;
 }
 
-// Size of the terms that are added up in a value.
+// Sum of the absolute values of the terms of a row's value.
 fn size_of_value(line: Line) -> Real {
     var size = (abs(line.factor) * sizes[line.entry] + abs(line.rate_factor) * sizes[line.entry + 1u]) + abs(line.constant) * sizes[WIDTH - 1u];
     if line.scale != 0.0 {
@@ -195,13 +196,13 @@ fn state_after(share: Real) -> State {
     return q;
 }
 
-// Lowest derivative of a line that is not zero within rounding, and its order.
+// Value and order of the lowest derivative of a line that is not zero within rounding.
 struct Lead {
     order: u32,
     value: Real,
 }
 
-// Returns the lowest such derivative of order `least` or higher, at a state at the present phase. Only its sign has a meaning.
+// Returns the lowest nonzero derivative of order `least` or higher, for a state at the present phase. Only its sign has a meaning.
 fn lead(line: Line, domain: u32, q: State, least: u32) -> Lead {
     load_point(q);
     for (var i = 0u; i < shape.width; i++) {
@@ -220,7 +221,7 @@ fn lead(line: Line, domain: u32, q: State, least: u32) -> Lead {
         iterations += TRIPS_OF_RATES + 2u * TRIPS_OF_POINT;
         for (var i = 0u; i < shape.coordinates; i++) {
             let rate = sizes[2u * i + 1u];
-            // The rates of the sizes: all of the old sizes are needed for each.
+            // Each new size depends on all old sizes, so they are stored separately.
             next_sizes[2u * i] = unit * rate;
             next_sizes[2u * i + 1u] = unit * size_of_product(acceleration_row(domain, i));
         }

@@ -1,18 +1,17 @@
-// Chatter: slower and slower impacts while the load presses. Short flights are followed impact by impact, with a
-// short series. An infinite sequence of impacts, without a meshing speed, is closed by its limit.
+// Chatter: the load presses the gap to its wall, and impacts become slower and slower. Short flights are followed impact by impact, with a
+// short series. Without a meshing speed the sequence of impacts is infinite and is replaced by its limit.
 
 // Whether a sequence of impacts that the load presses back is infinite.
 fn is_endless(side: u32) -> bool {
     return restitution(side) < 1.0 && mesh_speed(side) <= NO_THRESHOLD * speed;
 }
 
-// Closes an infinite sequence of impacts by its limit, once it is so short that the terms that the formula omits are
+// Replaces the rest of an infinite sequence of impacts by its limit. The rest must be so short that the terms which the formula omits are
 // negligible. The gap then rests on the wall, and meshing starts.
 //
-// `u` is the leaving speed, G the pressing acceleration, J its rate of change while the gap stays closed, and gamma
-// the damping of the gap. With `T = 2 u / (G (1 - e))` the sequence lasts `T (1 - J T / (3 G) - gamma T / 6)`, up to
-// third order. Meanwhile the other coordinate moves as with the gap closed. Tangent vectors follow these formulas up
-// to second order.
+// `u` is the leaving speed, G the pressing acceleration, J its rate of change while the gap stays closed, and gamma the damping of the gap.
+// With `T = 2 u / (G (1 - e))` the sequence lasts `T (1 - J T / (3 G) - gamma T / 6)`, up to third order. Meanwhile x moves as it does with
+// a closed gap. Tangent vectors follow these formulas up to second order.
 fn close_chatter(side: u32, u: Real) {
     if !is_endless(side) {
         return;
@@ -21,7 +20,7 @@ fn close_chatter(side: u32, u: Real) {
     let sign = sign_of(side);
     let rate = motion.q[3] + kick * motion.q[1];
     let closed = array<Real, 4>(motion.q[0], 0.0, motion.q[2], rate);
-    // The wall takes up the acceleration of the gap; x receives its share of that force.
+    // The wall's force cancels the acceleration of the gap; x receives its share of that force.
     let wall_acceleration = acceleration(here.gap_row, here.share, closed, place_of_gap(0u));
     let v_rate = acceleration(here.x_row, here.share, closed, place_of_x(0u)) + kick * wall_acceleration;
     let pressing = sign * wall_acceleration;
@@ -35,7 +34,7 @@ fn close_chatter(side: u32, u: Real) {
     let change = sign * with_derivative(first, place_of_gap(0u), here.angle, 1u);
     let damping = kick * row[3] - row[1];
     let lasts = whole * (1.0 - (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole);
-    // A sequence that a stop phase interrupts continues impact by impact, until it fits before the next one.
+    // If a stop phase would interrupt the sequence, the motion continues impact by impact until the rest fits before the next stop phase.
     if lasts <= 0.0 || lasts >= steps_to_stop(next_stop_phase()) {
         return;
     }
@@ -47,12 +46,12 @@ fn close_chatter(side: u32, u: Real) {
     let of_gap = kick * with_derivative(0.0, place_of_gap(0u), here.angle, 1u);
     let v_jerk = with_term(with_derivative(forced, place_of_x(0u), here.angle, 1u), of_gap);
     if EXPONENT {
-        // A neighbour leaves at another time, and so at another speed and under another pressing acceleration: its
-        // sequence ends later by `late_by`.
+        // A neighbouring motion leaves the wall at another time, with another speed and pressing acceleration. Its sequence ends later by
+        // `late_by`.
         let per_speed = (1.0 - 2.0 * (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole) * whole / u;
         let per_pressing = whole / pressing;
         crossing.lasts = lasts;
-        // A gap that sticks at the end does so for all neighbours.
+        // If the gap sticks at the end, it also sticks in all neighbouring motions.
         crossing.pressing = select(sign * (pressing + lasts * change), Real(0.0), is_rigid(side));
         crossing.late_by = array<Real, 4>(
             sign * (1.0 - per_speed * (pressing + damping * u) - per_pressing * change) / u,
@@ -69,7 +68,7 @@ fn close_chatter(side: u32, u: Real) {
         rate + lasts * (v_rate + 0.5 * lasts * v_jerk),
     );
     if MEASURE {
-        // The series takes the energy with which the gap leaves the wall.
+        // The sequence dissipates the energy with which the gap leaves the wall.
         add(SUM_LOST, u * u);
         measure_series(closed, ends, lasts);
     }
@@ -88,11 +87,10 @@ fn close_chatter(side: u32, u: Real) {
     enter(domain_of(tally.mode));
 }
 
-// Whether the last event was an impact that begins a series of short flights.
+// Whether the last event was an impact after which a series of short flights begins.
 var<private> chatters: bool;
 
-// Whether the flight from wall `side` at leaving speed `u` is short, judged by its parabola, and whether two more
-// flights follow.
+// Whether the parabola of the flight from wall `side` at leaving speed `u` is short, and whether two more flights follow.
 fn begins_chatter(side: u32, u: Real) -> bool {
     let e = restitution(side);
     let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q, place_of_gap(0u));
@@ -100,27 +98,25 @@ fn begins_chatter(side: u32, u: Real) -> bool {
     return mesh_speed(side) <= FOLLOWED_MESH_SPEED * speed && is_short && e * e * u > least_leaving(side, pressing);
 }
 
-// Returns the leaving speed at which a sequence ends in meshing or, if it is infinite, is closed by its limit.
+// Returns the leaving speed at which a sequence ends: in meshing, or by its limit if it is infinite.
 fn least_leaving(side: u32, pressing: Real) -> Real {
-    // 1 % more than `close_chatter` needs, so that this limit is reached first.
+    // 1 % above the limit of `close_chatter`, so that the speed falls below this value first.
     return select(mesh_speed(side), 0.505 * closing * (1.0 - restitution(side)) * pressing, is_endless(side));
 }
 
-// Most flights that are followed in one call.
+// Largest number of flights that one call follows.
 const SHORT_FLIGHTS: u32 = 100u;
 
-// Follows the motion from an impact that the load presses back, impact by impact, while flights are short. Fewer
-// terms of the series then give a flight to rounding, its end needs no search, and no other event is possible on it.
+// Follows short flights under a pressing load, impact by impact. A short flight needs fewer terms of the series for the same accuracy, its
+// end needs no search, and no other event is possible on it.
 //
-// Let n = SHORT_TERMS - 1 be the number of the gap's terms beyond its start, G the pressing acceleration, and B a
-// bound on the n-th derivative. The next derivative is at most 2 B, because a step turns the fastest mode by at most
-// a radian. At the end of a flight of length t, the relative error of the speed is then at most
-// `4 (B / G) t^(n-1) / n! (1 + 2 / (n + 1))`. It is at most ULP where `B (t / SHORT)^(n-1) <= G`. Each flight is e
-// times as long as the one before, so that the error of a whole sequence is at most `1 / (1 - e^(n-1))` times that of
-// its first flight.
+// Let n = SHORT_TERMS - 1 be the number of the gap's terms beyond its start, G the pressing acceleration, and B a bound on the n-th
+// derivative. The derivative of order n + 1 is at most 2 B, because a step turns the fastest mode by at most a radian. At the end of a
+// flight of length t, the relative error of the speed is then at most `4 (B / G) t^(n-1) / n! (1 + 2 / (n + 1))`. It is at most ULP where
+// `B (t / SHORT)^(n-1) <= G`. Each flight is e times as long as the previous one. So the error of a whole sequence is at most `1 / (1 -
+// e^(n-1))` times the error of its first flight.
 //
-// The careful step handles the impact with which meshing or the limit begins, and the motion after the load has
-// ceased to press.
+// The careful step handles the last impact before meshing or the limit, and the motion once the load no longer presses.
 fn follow_chatter(side: u32) {
     let sign = sign_of(side);
     let e = restitution(side);
@@ -180,11 +176,11 @@ fn expand_short() {
     //% again expand for k in 0..SHORT_TERMS-2
 }
 
-// Returns the length of the flight from the wall, in steps; 0 if it is not short.
+// Returns the duration of the flight from the wall, in steps; 0 if the flight is not short.
 fn short_flight() -> Real {
     let w = gap_terms[1];
     let half = gap_terms[2];
-    // Root of the parabola, corrected by two orders.
+    // Root of the parabola, with two orders of corrections.
     let inverse = 1.0 / half;
     let first = -w * inverse;
     let cubic = first * gap_terms[3] * inverse;
@@ -202,8 +198,8 @@ fn short_flight() -> Real {
         step = p / p1;
         t -= step;
     }
-    // The flight is pressed by at least half of G throughout: it returns once, and its height is below `w^2 / G`. The
-    // other wall must be farther away.
+    // At least half of G presses throughout the flight. So the gap returns once, and its height is below `w^2 / G`; the other wall must be
+    // farther away.
     let is_clear = w * w < abs(half) * (walls[0] - walls[1]);
     var change: Real = 0.0;
     //% for k in 3..SHORT_TERMS down

@@ -15,7 +15,7 @@ fn sign_of(side: u32) -> Real {
     return select(Real(-1.0), Real(1.0), side == SIDE_RIGHT);
 }
 
-// Adds the force's sine term `factor * s`, where any oscillator has one.
+// Adds the force's sine term `factor * s`. Variants whose forces have no sine leave it out.
 fn with_sine(rest: Real, factor: Real, s: Real) -> Real {
     if SINE {
         return rest + factor * s;
@@ -23,14 +23,14 @@ fn with_sine(rest: Real, factor: Real, s: Real) -> Real {
     return rest;
 }
 
-// Returns an acceleration from its row, in units of the domain's step. `q` is in lane units, and `place` is that of the
+// Returns the acceleration that a row describes, in units of the domain's step. `q` is in lane units; `place` is the place of the
 // harmonics' part.
 fn acceleration(row: array<Real, 7>, share: Real, q: array<Real, 4>, place: u32) -> Real {
     return (row[0] * q[0] + row[2] * q[2]) + share * (row[1] * q[1] + row[3] * q[3])
         + with_harmonics(row[4] * motion.phasor[0] + with_sine(row[5], row[6], motion.phasor[1]), place);
 }
 
-// Whether the gap is pressed into the wall: the first nonzero derivative, from the second on, points into it.
+// Whether the gap is pressed into the wall: its first nonzero derivative, from the second on, points into the wall.
 fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
     var first = acceleration(pull.gap_row, pull.share, q, pull.gap_place);
     if first == 0.0 || (q[1] == 0.0 && abs(first) <= balance(pull.gap_row, pull.share, q, pull.gap_place)) {
@@ -39,9 +39,9 @@ fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
     return sign_of(side) * first > 0.0;
 }
 
-// Returns the size up to which an acceleration of a gap at rest counts as zero. Where its terms cancel, its sign is
-// rounding, and depends on the order of summation and on the domain. If two domains disagreed, the gap would leave its
-// wall and be pressed back for ever.
+// Returns the size up to which the acceleration of a gap at rest counts as zero. If its terms cancel, its sign is a rounding error that
+// depends on the order of summation and on the domain. If two domains gave different signs, the gap would leave its wall and be pressed
+// back for ever.
 fn balance(row: array<Real, 7>, share: Real, q: array<Real, 4>, place: u32) -> Real {
     return 4.0 * ULP * ((abs(row[0] * q[0]) + abs(row[2] * q[2])) + share * abs(row[3] * q[3])
         + with_sizes(abs(row[4] * motion.phasor[0]) + with_sine(abs(row[5]), abs(row[6]), abs(motion.phasor[1])), place));
@@ -76,26 +76,25 @@ fn later_derivative(pull: Pull, q: array<Real, 4>) -> Real {
     return first;
 }
 
-// Effect of an event on the motion.
+// The effect of an event on the motion.
 struct Jump {
-    // Whether there is an event, and the mode after it.
+    // Whether an event happens, and the mode after it.
     event: bool,
     mode: u32,
-    // Event function: its gradient and its rate, per free step.
+    // Gradient and rate of the event function, per free step.
     normal: array<Real, 4>,
     rate: Real,
-    // Factor of the gap's rate, and change of the rate of x per unit of the gap's rate.
+    // Factor by which the gap's rate changes, and change of the rate of x per unit of the gap's rate.
     rate_factor: Real,
     kick: Real,
-    // Leaving speed of an impact after which the load presses the gap back.
+    // Leaving speed if the load presses the gap back after an impact.
     pressed_back: Real,
 }
 
 // The gradient of the gap.
 const ALONG_GAP = array<Real, 4>(1.0, 0.0, 0.0, 0.0);
 
-// Applies the contact law where free motion reaches a wall: an impact, or the start of meshing. The gap is on the
-// wall.
+// Applies the contact law where free motion has reached a wall: an impact, or the start of meshing.
 fn contact(side: u32, settling: bool) -> Jump {
     if is_elastic(side) {
         return enter_elastic(side);
@@ -110,7 +109,7 @@ fn contact(side: u32, settling: bool) -> Jump {
     after[3] += kick * (sign * (1.0 + e) * approach);
     let pressed = presses(present_pull(), side, after);
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], -e, kick * (1.0 + e), 0.0);
-    // A start on or beyond the wall (within rounding, too) is a contact only if the gap closes.
+    // A start on the wall, or beyond it by rounding, is a contact only if the gap closes.
     if settling && (closing < 0.0 || (closing == 0.0 && !pressed)) {
         return jump;
     }
@@ -161,15 +160,14 @@ fn end_meshing(side: u32, settling: bool, tau: Real) -> Jump {
     jump.event = true;
     jump.mode = MODE_FREE;
     motion.q[0] = walls[side];
-    // A gap that was at rest under a balanced load leaves at rest. Its computed rate is rounding. With that
-    // rate, the next acceleration, which is rounding, too, could press it back.
+    // A gap that was at rest under a balanced load leaves at rest. Its computed rate is a rounding error and is set to zero. With this
+    // rate, an acceleration that is also a rounding error could press the gap back.
     let leaving = max(-sign * motion.q[1], Real(0.0));
     motion.q[1] = select(-sign * leaving, Real(0.0), leaving <= here.substeps * balanced * tau);
     return jump;
 }
 
-// Ends the contact onset because the load no longer presses, `tau` after the expansion point. The event function is
-// the acceleration.
+// Ends the contact onset because the load no longer presses, `tau` after the expansion point. The acceleration is the event function.
 fn end_onset(side: u32, tau: Real) -> Jump {
     if MEASURE {
         measure_release(side);
@@ -180,7 +178,7 @@ fn end_onset(side: u32, tau: Real) -> Jump {
     return Jump(true, MODE_FREE, normal, here.substeps * pressing_jet(tau).y, 1.0, 0.0, 0.0);
 }
 
-// Ends the contact onset in sustained contact. That is no event.
+// Ends the contact onset where sustained contact begins. This does not count as an event.
 fn onset_ends(side: u32) -> Jump {
     let sign = sign_of(side);
     motion.q[1] = sign * max(sign * motion.q[1], Real(0.0));
@@ -190,7 +188,7 @@ fn onset_ends(side: u32) -> Jump {
 fn count_event(side: u32) {
     add_symbol_of_flight(side);
     keep_strobe_distance();
-    // Meshing that ends before the wall is reached belongs to another branch: its mode differs.
+    // Meshing may also end before the gap reaches its wall. Such motion lies on another branch of the strobe map, because its modes differ.
     var code = 2u * tally.mode + side + 1u;
     if INTERVALS {
         code += 16u * tally.interval;

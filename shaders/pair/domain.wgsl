@@ -1,5 +1,5 @@
-// Constants of a lane in registers. Storage is slow, so a lane copies the constants that every pass uses. The domain
-// that governs the motion changes at events alone.
+// Constants of a lane in registers. Storage is slow, so a lane copies the constants that every pass uses. The domain that governs the
+// motion changes only at events.
 
 // The domain that governs the motion.
 var<private> here: Domain;
@@ -11,9 +11,8 @@ var<private> closing: Real;
 var<private> law: Law;
 var<private> shape: FlowShape;
 
-// All three domains, in variants that keep copies (KEEP). A software driver gathers from storage lane by lane, which
-// costs more than the arithmetic. On a graphics device lanes of one flow read the same address at once, and copies
-// would not fit into registers.
+// All three domains, in variants that keep copies (KEEP). A software driver reads storage lane by lane, which takes longer than the
+// arithmetic. On a graphics device, lanes of one flow read the same address together, and copies would not fit into registers.
 var<private> free: Domain;
 var<private> on_right: Domain;
 var<private> on_left: Domain;
@@ -38,17 +37,17 @@ fn fetch_constants() {
     enter(domain_of(tally.mode));
 }
 
-// Restitution at a wall. The arrays of the law are not indexed: an indexed array would not stay in registers.
+// Restitution at a wall. The law's arrays are not indexed by a variable, because such arrays do not stay in registers.
 fn restitution(side: u32) -> Real {
     return select(law.restitution[1], law.restitution[0], side == SIDE_RIGHT);
 }
 
-// Largest leaving speed, per free step, at which a pressed contact lasts.
+// Largest leaving speed, per free step, at which contact lasts under a pressing load.
 fn mesh_speed(side: u32) -> Real {
     return select(law.mesh_speed[1], law.mesh_speed[0], side == SIDE_RIGHT) * h;
 }
 
-// Makes domain `d` the one that governs the motion.
+// Makes domain `d` govern the motion.
 fn enter(d: u32) {
     if !KEEP {
         here = flows[cell.flow_index].domains[d];
@@ -75,7 +74,7 @@ struct Pull {
     x_row: array<Real, 7>,
     share: Real,
     angle: Real,
-    // Places of the harmonics' parts.
+    // Places of the harmonics' factors (harmonics.wgsl).
     gap_place: u32,
     x_place: u32,
 }

@@ -9,14 +9,14 @@ fn is_elastic(side: u32) -> bool {
     return KINDS && contact_at(side) == CONTACT_ELASTIC;
 }
 
-// Free motion reaches an elastic wall. If it is at rest there, the first nonzero derivative decides on which side it
-// continues: the fields of both sides agree but for the damper, whose force is proportional to the rate.
+// Free motion reaches an elastic wall. If the gap is at rest there, the first nonzero derivative decides on which side it continues. The
+// vector fields of both sides differ by the damper's force alone, which is zero at rest.
 fn enter_elastic(side: u32) -> Jump {
     let closing = sign_of(side) * motion.q[1];
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
     let is_pressed = closing == 0.0 && presses(present_pull(), side, motion.q);
     if closing > 0.0 || is_pressed {
-        // A gap that returns to a wall from open contact is not in contact.
+        // A gap that returns to the wall from open contact has no contact to end.
         jump.event = !is_open();
         pass_damper(side, 1.0);
         if has_preload(side) && closing < GRAZING_SPEED * speed {
@@ -41,16 +41,15 @@ fn stays_behind(side: u32) -> bool {
     return presses(present_pull(), side, rest);
 }
 
-// Sets the change of tangent vectors across a wall with a damper, inwards (`way` = 1) or outwards (-1). The fields of
-// both sides differ by the damper's force alone, which is proportional to the rate. The rate cancels, so that grazing
-// is no special case.
+// Sets the change of tangent vectors across a wall with a damper, inwards (`way` = 1) or outwards (-1). The fields of both sides differ by
+// the damper's force alone, which is proportional to the rate. The rate cancels in the saltation matrix, so grazing is no special case.
 fn pass_damper(side: u32, way: Real) {
     if EXPONENT {
         let damper = flows[cell.flow_index].damper[side];
         crossing.is_smooth = true;
         crossing.jolt = array<Real, 2>(way * damper[0], way * damper[1]);
         if has_preload(side) && abs(motion.q[1]) >= NO_SPEED * speed {
-            // The force jumps by the preload, and the rate does not cancel.
+            // The preload makes the force jump, so the rate does not cancel.
             let preload = flows[cell.flow_index].preload[side];
             let per_rate = way / motion.q[1];
             crossing.jolt = array<Real, 2>(crossing.jolt[0] + per_rate * preload[0], crossing.jolt[1] + per_rate * preload[1]);

@@ -1,13 +1,12 @@
 // The careful step: finds the first event on the next step and acts on it.
 
-// Verdicts on a distance over a stretch of motion: it stays positive, it falls through zero once, or neither is certain.
+// Verdicts on a distance over a part of a step: it stays positive, it falls through zero once, or neither is certain.
 const CLEAR: u32 = 0u;
 const CROSSING: u32 = 1u;
 const UNCLEAR: u32 = 2u;
 
-// Judges a distance (positive inside) over a stretch of length `dt`, from value, slope and curvature at both ends.
-// `order` is the order of its root at the start: dividing the root out drops as many Bernstein coefficients. `eps`
-// bounds the remainder.
+// Judges a distance (positive inside) over a time `dt`, from value, slope and curvature at both ends. `order` is the order of its root at
+// the start. This root is divided out, which drops `order` Bernstein coefficients. `eps` bounds the remainder.
 fn judge(left: vec3<Real>, right: vec3<Real>, dt: Real, order: u32, eps: Real) -> u32 {
     let f0 = select(left.x, Real(0.0), order > 0u);
     let s0 = dt * left.y;
@@ -29,7 +28,7 @@ fn judge(left: vec3<Real>, right: vec3<Real>, dt: Real, order: u32, eps: Real) -
     if lower == (127u >> order) {
         return CLEAR;
     }
-    // Positive coefficients from the start, then negative ones to the end: one change of sign in each polynomial.
+    // Positive coefficients followed by negative ones mean one change of sign in each polynomial.
     let single = (lower & (lower + 1u)) == 0u && (upper & (upper + 1u)) == 0u && lower > 0u;
     if single && upper != (127u >> order) {
         return CROSSING;
@@ -72,7 +71,7 @@ fn set_offsets() {
     if tally.mode == MODE_FREE {
         offsets = vec2<Real>(walls[0] - z, z - walls[1]);
         if watches_force() {
-            // A flight that begins where the force is 0 has its root there.
+            // A flight that begins where the force is 0 has a root at its start.
             let begins = tally.order > 0u && tally.origin == side_of_interval();
             let start = select(force_inside(motion.q), Real(0.0), begins);
             offsets = select(vec2<Real>(offsets.x, start), vec2<Real>(start, offsets.y), side_of_interval() == SIDE_RIGHT);
@@ -85,18 +84,18 @@ fn set_offsets() {
     }
 }
 
-// A crossing must be this much steeper than its remainder. The derivative of a step's remainder is at most 1.08 times
-// the remainder.
+// A crossing is certain if its slope exceeds the remainder by this factor. The derivative of a step's remainder is at most 1.08 times the
+// remainder.
 const STEEP: Real = 4.0;
 
-// Iterations of the root search by Newton's method, and in all; bisection does the rest.
+// Largest number of Newton steps of the root search, and of all its steps. The steps after Newton's are bisections.
 const NEWTON_CAP: u32 = 10u;
 const ROOT_CAP: u32 = 120u;
-// Stretches into which one careful step may be cut.
+// Largest number of parts into which one careful step may be divided.
 const CHECK_CAP: u32 = 200u;
 
-// Returns the root of one distance in (lo, hi], where it falls from + to -, on the exact flow, and the slope there. A
-// root at the start is divided out.
+// Returns the root in (lo, hi] at which a distance on the exact flow falls from + to -, and the slope there. A root at the start is divided
+// out.
 fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<Real> {
     var lo = start;
     var hi = end;
@@ -110,7 +109,7 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<R
         } else {
             hi = t;
         }
-        // The error that a Newton step leaves is of second order in it.
+        // The error after a Newton step is of second order in the step.
         let step = f.x / (f.y - Real(order) * f.x / t);
         var next = t - step;
         let converged = abs(f.z) * (step * step) <= ULP * t * abs(f.y) || abs(step) <= 4.0 * ULP * t;
@@ -131,7 +130,7 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<R
 
 // Result of a careful step.
 struct Find {
-    // Whether there is an event, and of which of the two distances.
+    // Whether there is an event, and which of the two distances vanishes.
     event: bool,
     second: bool,
     // Its time; the end of the step if there is no event.
@@ -145,7 +144,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
     var width = len;
     var left = watch(0.0);
     var checks = 0u;
-    // Rounding has put the start on or beyond its boundary.
+    // Rounding has put the start on the boundary or beyond it.
     if orders.x == 0u && left.first.x <= 0.0 {
         return Find(true, false, 0.0);
     }
@@ -167,8 +166,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
         let right = watch(b);
         let cube = dt * dt * dt;
         let rest = cube * cube * (1.0 / 14400.0);
-        // In the contact onset the second distance is an acceleration, so that its remainder holds two more
-        // derivatives.
+        // In the contact onset the second distance is an acceleration, so its remainder has derivatives of two more orders.
         var eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest) * here.swell
             + 8.0 * ULP * abs(offsets);
         if watches_force() {
@@ -188,8 +186,8 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 2.0 * dt;
             continue;
         }
-        // Within a stretch the distance may be an eighth of its bend less than at the ends. While the bend exceeds the
-        // remainder, a crossing is possible, however short the stretch.
+        // Between the ends, the distance may be smaller by an eighth of its bend. While the bend exceeds the remainder, a crossing is
+        // possible even in a very short time.
         var is_shortest = dt <= SHORTEST;
         if is_shortest && dt > SHORTEST_STEP {
             let bend = dt * dt * vec2<Real>(
@@ -198,7 +196,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             );
             is_shortest = !((first != CLEAR && bend.x > 8.0 * eps.x) || (second != CLEAR && bend.y > 8.0 * eps.y));
         }
-        // Two crossings on the shortest stretch: the linear estimate decides which is earlier.
+        // Both distances vanish within the shortest time that is resolved. Linear estimates decide which one is earlier.
         let both = first == CROSSING && second == CROSSING && is_shortest && orders.x + orders.y == 0u;
         if first + second == CROSSING || both {
             let falls = vec2<Real>(left.first.x - right.first.x, left.second.x - right.second.x);
@@ -209,13 +207,13 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             let order = select(orders.x, orders.y, which);
             var guess = a + clamp(at_start / (at_start - at_end), Real(0.01), Real(0.99)) * dt;
             if order > 0u {
-                // Leaving a wall and pressed back: the parabola of a short flight.
+                // The gap leaves a wall and is pressed back: the parabola of a short flight.
                 let leaving = select(left.first, left.second, which);
                 let short = -2.0 * leaving.y / leaving.z;
                 guess = select(Real(0.5) * b, short, short > 0.0 && short < 0.5 * b);
             }
             let found = root(which, a, b, order, guess);
-            // Where the slope is below the remainder there may be three roots instead of one.
+            // If the slope is below the remainder, there may be three roots instead of one.
             if dt * abs(found.y) > STEEP * select(eps.x, eps.y, which) || is_shortest {
                 return Find(true, which, found.x);
             }
@@ -226,7 +224,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 0.5 * dt;
             continue;
         }
-        // The shortest stretch is still unclear: a touch within rounding. At elastic walls it does not matter.
+        // The shortest part is still unclear, so the gap touches the wall within rounding. At elastic walls this has no effect.
         let touched = select(side_of(tally.mode), select(SIDE_LEFT, SIDE_RIGHT, first != CLEAR), tally.mode == MODE_FREE);
         if !is_elastic(touched) || has_preload(touched) {
             tally.grazes += 1u;
@@ -248,8 +246,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
     return Find(false, false, len);
 }
 
-// Largest acceleration that the gap may have had where it began this step at rest and its acceleration was set to
-// zero; else 0.
+// If the gap began this step at rest and its acceleration was set to zero: a bound on the true acceleration; 0 otherwise.
 var<private> balanced: Real;
 
 // Bound on the eighth derivative of the gap, which the contact onset needs.
@@ -258,12 +255,12 @@ var<private> pressing_bound: Real;
 // Bound on the seventh derivative of the gap, which the force of a wall that only pushes needs.
 var<private> rate_bound: Real;
 
-// Bisections of the time at which the contact onset is deepest.
+// Largest number of bisections for the time at which the contact onset is deepest.
 const DEEPEST_CAP: u32 = 30u;
 
-// Whether the gap meets the other wall in the contact onset, at most `tau` after the expansion point; the model has
-// no rule for that. The depth is concave while the spring presses, so that its first tangent bounds it. Where the
-// tangent does not exclude the wall, the deepest point is searched.
+// Whether the gap meets the other wall in the contact onset, at most `tau` after the expansion point. The model has no rule for this case.
+// The depth is concave while the spring presses, so its tangent at the start is a bound. If this bound does not exclude the wall, the
+// deepest point is searched.
 fn crosses_backlash(tau: Real) -> bool {
     let backlash = walls[0] - walls[1];
     let rate = abs(gap_terms[1]);
@@ -428,7 +425,7 @@ fn act(second: bool, tau: Real) {
         if is_force {
             tally.order = 1u;
         } else if PUSHING && motion.q[1] == 0.0 && has_preload(1u - side) && !presses(present_pull(), side, motion.q) {
-            // Rest on the wall under a load below the preload is an infinite series of contacts.
+            // A load below the preload holds the gap on the wall by an infinite series of contacts.
             tally.status = STATUS_CAP_EVENTS;
         }
     } else if jump.mode != mode {

@@ -1,9 +1,9 @@
-// Scanning: full steps of the exact propagator, as long as a bound shows them free of events.
+// Scanning: the motion moves by full steps of the exact propagator while a bound shows that no event occurs.
 
-// Returns by how much a function stays within [low, high] over a step, from value, slope and curvature at both ends,
-// in units of the step. It is negative if the bound cannot show that. Quintic Hermite interpolation in Bernstein form
-// of degree 6; the remainder is at most `eps` times the middle basis polynomial. If the step starts on the wall
-// (`leaves`), that root is divided out, and its coefficient is dropped.
+// Returns the margin by which a function certainly stays in [low, high] over a step; negative if the bound cannot show this. Value, slope
+// and curvature at both ends are in units of the step. Quintic Hermite interpolation in Bernstein form of degree 6; the remainder is at
+// most `eps` times the middle basis polynomial. If the step starts on the wall (`leaves`), that root is divided out, and its coefficient is
+// dropped.
 fn clearance(leaves: bool, f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real, eps: Real, low: Real, high: Real) -> Real {
     let c1 = f0 + s0 * (1.0 / 6.0);
     let c2 = f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0));
@@ -21,7 +21,8 @@ const SCAN_CAREFUL: u32 = 0u; // the next step needs a careful pass
 const SCAN_BUDGET: u32 = 1u; // the iterations of this dispatch are used up
 
 fn scan() -> u32 {
-    // From rest on a wall, in the contact onset, behind a wall that only pushes, and where the motion is measured, every step is a careful one.
+    // Every step is a careful one from rest on a wall, in the contact onset, behind a wall that only pushes, and while the motion is
+    // measured.
     if MEASURE || tally.order > 1u || tally.mode >= MODE_ONSET || watches_force() {
         return SCAN_CAREFUL;
     }
@@ -35,7 +36,7 @@ fn scan() -> u32 {
     let share = here.share;
     let substeps = here.substeps;
     let stop = next_stop_phase();
-    // Meshing measures the gap from its wall and has only that wall.
+    // While meshing, the gap is measured from its wall, and only this wall bounds the motion.
     var low = walls[1];
     var high = walls[0];
     if d == 1u {
@@ -60,7 +61,7 @@ fn scan() -> u32 {
     }
     var step_count = 0u;
     var leaves = tally.order > 0u;
-    // The tangent vector is carried along. While a cycle is read, four vectors are (step_columns).
+    // The exponent's tangent vector is carried here; `step_columns` carries the four vectors of a cycle that is read.
     var tz = tangent_now[0];
     var tw = tangent_now[1] * share;
     var tx = tangent_now[2];
@@ -85,8 +86,8 @@ fn scan() -> u32 {
         let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + with_harmonics(m[13], place_of_step(d) + 1u)));
         let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + with_harmonics(m[20], place_of_step(d) + 2u)));
         let v1 = v + (((m[21] * z + m[22] * w) + (m[23] * x + m[24] * v)) + ((m[25] * c + m[26] * s) + with_harmonics(m[27], place_of_step(d) + 3u)));
-        // The phasor turns by three shears. The usual form is `c + ((cos - 1) c - sin s)`. Drivers reorder it, and then
-        // `c + (cos - 1) c` loses digits below rounding, in the same direction at every step.
+        // The phasor turns by three shears. Drivers reorder the usual form `c + ((cos - 1) c - sin s)`. Then `c + (cos - 1) c` loses small
+        // digits, in the same direction at every step.
         let sheared = c - half * s;
         let s1 = s + sine * sheared;
         let c1 = sheared - half * s1;
@@ -128,8 +129,8 @@ fn scan() -> u32 {
     motion.phasor[1] = s;
     motion.theta = theta;
     motion.bound = bound;
-    // The next dispatch must continue with the same bits, wherever this one ends; computed anew, the value might
-    // round differently.
+    // This value is stored, because a value that the next dispatch computed again might round differently. The bits must not depend on
+    // where a dispatch ends.
     motion.bend = a;
     tally.is_scan_interrupted = select(0u, 1u, verdict == SCAN_BUDGET);
     tally.step = n;
@@ -141,7 +142,7 @@ fn scan() -> u32 {
     if EXPONENT {
         step_columns(step_count);
     }
-    // Whole numbers do not depend on where a dispatch ends.
+    // Whole steps are counted as whole numbers, whose sum does not depend on where a dispatch ends.
     if MESH {
         tally.mesh_right += select(0u, step_count, d == 1u);
         tally.mesh_left += select(0u, step_count, d == 2u);
@@ -150,7 +151,7 @@ fn scan() -> u32 {
     return verdict;
 }
 
-// Counts the time of a short flight from the last of several walls as contact: the springs in front of that wall still press.
+// Counts a short flight from the last of several walls as contact, because the springs in front of that wall still press.
 fn count_short_contact(part: Real) {
     if MESH && is_behind_wall() {
         count_meshing(part);

@@ -1,9 +1,9 @@
-// Harmonics of the force beside the first. Their number, HARMONICS, is known when the shader is compiled; a flow may have
-// fewer. Without them these functions return what they are given.
+// Harmonics of the force beside the first. Their number, HARMONICS, is known when the shader is compiled; a flow may have fewer. Without
+// harmonics these functions return their arguments unchanged.
 //
-// For each harmonic a flow has PAIRS_PER_HARMONIC pairs of numbers: its order; then its factors of cosine and sine in the
-// accelerations of a gap that rests on the right and on the left wall; and, for each domain, in the accelerations of the gap
-// and of x, and in the four rows of the propagator. `place` below is the place of a pair.
+// For each harmonic a flow has PAIRS_PER_HARMONIC pairs of numbers. The first pair contains the order. The other pairs are factors of
+// cosine and sine: in the acceleration of a gap at rest on the right wall and on the left wall; then for each domain in the accelerations
+// of the gap and of x, and in the four rows of the propagator. `place` below is the place of a pair.
 
 const PAIRS_PER_DOMAIN: u32 = 6u;
 const PLACE_OF_PRESSING: u32 = 1u;
@@ -28,7 +28,7 @@ fn place_of_step(domain: u32) -> u32 {
     return place_of_gap(domain) + 2u;
 }
 
-// Returns a pair of a harmonic. The first pairs of the buffer are the zeros of a harmonic that the flow does not have.
+// Returns a pair of a harmonic. The buffer begins with zeros, which stand for a harmonic that the flow does not have.
 fn harmonic_pair(n: u32, place: u32) -> vec2<Real> {
     let first = select(0u, shape.harmonics + PAIRS_PER_HARMONIC * n, n < shape.harmonic_count);
     let pair = pairs[first + place];
@@ -39,7 +39,8 @@ fn order_of(n: u32) -> Real {
     return harmonic_pair(n, 0u).x;
 }
 
-// Computes the phasors of the harmonics at a step and a fraction. They depend on these alone, wherever a dispatch ends.
+// Computes the phasors of the harmonics at a step and a fraction. They depend on step and fraction alone, so they are the same wherever a
+// dispatch ends.
 fn sync_overtones(step: u32, theta: Real) {
     //% for k in 0..HARMONICS
     {

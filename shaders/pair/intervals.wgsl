@@ -1,11 +1,11 @@
-// Several walls on one side: each interval between neighbouring walls has a flow of its own. The springs of the walls that
-// the gap has passed act in its free motion, and the motion changes its flow where it passes a wall. Only the last wall of a
-// side has a domain of contact. The rules are those of the reference (dynamics/src/pair/elastic.rs).
+// Several walls on one side: each interval between neighbouring walls has a flow of its own. Free motion includes the springs of the walls
+// that the gap has passed. Where the motion passes a wall, it changes to the flow of the next interval. Only the last wall of a side has a
+// domain of contact. The rules are those of the reference (dynamics/src/pair/elastic.rs).
 //
-// `tally.interval` is 0 between the first walls, `2 n` behind the nth right wall, and `2 n + 1` behind the nth left wall. Open contact
-// with a wall that only pushes adds a flag (pushing.wgsl).
+// `tally.interval` is 0 between the first walls, `2 n` behind the nth right wall, and `2 n + 1` behind the nth left wall. A flag is added
+// in open contact with a wall that only pushes (pushing.wgsl).
 
-// The mode of a jump that passes a wall: free motion in the next interval.
+// Mode in a `Jump` that means: the motion passes a wall, and continues as free motion in the next interval.
 const MODE_PASSING: u32 = 7u;
 
 // Whether the gap is behind a wall, in free motion or in contact with the next wall.
@@ -59,7 +59,7 @@ fn pass_wall(side: u32) {
             inner = select(tally.interval - OPEN, 0u, tally.interval < OPEN + 2u);
         }
         tally.interval = select(inner, max(tally.interval, side) + 2u, is_outwards);
-        // The wall is now on the other side.
+        // The wall is now on the gap's other side.
         tally.origin = 1u - side;
     }
     cell.flow_index = flow_behind(side);

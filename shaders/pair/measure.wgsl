@@ -1,17 +1,17 @@
-// Measures a lane whose class is decided: over one cycle, or over further periods of aperiodic motion. The variant
-// MEASURE moves by careful steps alone. On each it integrates the Taylor series by Gauss-Legendre quadrature, whose
-// error is below 1e-12 on a step of at most a radian, and searches for extremes where a rate changes its sign.
+// Measures a lane whose class is decided: over one cycle, or over further periods of aperiodic motion. The variant MEASURE takes careful
+// steps only. On each step it integrates the Taylor series by Gauss-Legendre quadrature, with an error below 1e-12 for a step of at most a
+// radian. It searches for extremes where a rate changes its sign.
 //
-// Units: time in free steps, rates per free step. Energies are multiplied by `2 g M^-1 g h^2`, so that a rate w of the
-// gap has the energy w^2, and forces by `g M^-1 g h^2`.
+// Time is in free steps, and rates are per free step. Energies are multiplied by `2 g M^-1 g h^2`, so that a rate w of the gap has the
+// energy w^2. Forces are multiplied by `g M^-1 g h^2`.
 
 const NODES: u32 = 6u;
-// Iterations that locate an extreme. Its error is quadratic in that of its time.
+// Largest number of iterations that locate an extreme. The error of the extreme is quadratic in the error of its time.
 const EXTREME_ITERATIONS: u32 = 6u;
 
-// Places in `sums`: integrals of gap and x, of the squares of both displacements and of the gap, and of gap and x times the
-// phasor; energy of dampers; square of the contact force, and contact time; approach speeds, energy lost at events, number
-// of contacts; periods measured.
+// Places in `sums`. Integrals: gap and x; squares of both displacements and of the gap; gap and x times the phasor; power of the dampers;
+// square of the contact force; contact time. Sums over events: approach speeds, lost energy, number of contacts. Last: number of measured
+// periods.
 const SUM_Z: u32 = 0u;
 const SUM_X: u32 = 1u;
 const SUM_SQUARES: u32 = 2u;
@@ -30,7 +30,7 @@ const SUM_PERIODS: u32 = 15u;
 const FORCE: u32 = 3u;
 const APPROACH: u32 = 4u;
 
-// Begins to measure a lane that has ended. The lane's last state is stored for its results.
+// Begins to measure a lane that has ended. The lane's last state is stored, because the results contain it.
 fn begin_measuring() {
     motions[lane].ended = motion;
     tallies[lane].ended = tally;
@@ -49,7 +49,7 @@ fn begin_measuring() {
     }
 }
 
-// Completes a measured period. Each period has a sum of its own, so that rounding errors do not add up.
+// Completes a measured period. Each period has its own sums, so that rounding errors do not grow with the number of steps.
 fn measure_period() {
     tally.step = 0u;
     motion.theta = 0.0;
@@ -91,7 +91,7 @@ fn measured_state(tau: Real) -> array<Real, 4> {
     return q;
 }
 
-// Returns the force of the compliant contacts, positive if they press. `q` is in the coordinates of the present domain.
+// Returns the force of the contacts with springs, positive if they press. `q` is in the coordinates of the present domain.
 fn contact_force(q: array<Real, 4>) -> Real {
     var side = side_of(tally.mode);
     var force: Real = 0.0;
@@ -152,7 +152,7 @@ fn measured_rates(tau: Real) -> array<Real, 4> {
     return array<Real, 4>(rows[0][0] * q[1] + rows[0][1] * q[3], rows[1][0] * q[1] + rows[1][1] * q[3], q[1], force);
 }
 
-// Includes the extreme between two instants at which the rate has opposite signs (regula falsi, Illinois form).
+// Locates the extreme between two instants at which the rate has opposite signs, by regula falsi in the Illinois form.
 fn find_extreme(place: u32, begin_at: Real, end_at: Real, rate_at_begin: Real, rate_at_end: Real) {
     var a = begin_at;
     var b = end_at;
@@ -254,8 +254,8 @@ fn measure_flight(tau: Real) {
     }
 }
 
-// Measures an infinite series of impacts from `begins` to `ends`, which is replaced by its limit with a closed gap. The
-// phasor is that of its begin. The error of the midpoint rule is of third order in the short time that the series lasts.
+// Measures an infinite series of impacts between the states `begins` and `ends`. The limit that replaces the series has a closed gap. The
+// phasor is that at the start. The midpoint rule has an error of third order in the short duration of the series.
 fn measure_series(begins: array<Real, 4>, ends: array<Real, 4>, lasts: Real) {
     if MOMENTS {
         let begun = motion.phasor;
@@ -274,7 +274,7 @@ fn measure_contact(approach: Real, leaving: Real) {
     include_one(APPROACH, approach);
 }
 
-// Measures the release of a contact spring that is not relaxed. The gap is measured from the wall.
+// Measures the energy in a contact spring that is not relaxed when contact ends. The gap is measured from the wall.
 fn measure_release(side: u32) {
     add(SUM_LOST, flows[cell.flow_index].springs[side][0] * motion.q[0] * motion.q[0]);
 }

@@ -1,4 +1,4 @@
-// What observers ask the engine of motion of an oscillator with one gap. Machines answer the same questions in machine/machine.wgsl.
+// The functions that observers call, for an oscillator with one gap. machine/machine.wgsl defines them for machines.
 
 // Loads constants at the start of a dispatch.
 fn resume_motion() {
@@ -12,16 +12,16 @@ fn resume_motion() {
 fn prepare_motion() {
     sync_overtones(tally.step, motion.theta);
     if !STAGES && motion.bound == 0.0 {
-        // A start: no pass has computed the bound yet.
+        // At the start of a motion, no step has computed the bound yet.
         renew_bound();
     }
 }
 
-// Stores what the motion needs, at the end of a dispatch.
+// At the end of a dispatch, stores the state that the motion needs.
 fn suspend_motion() {}
 
-// Machines project new columns of the monodromy matrix to their constraints, note which elements slide, and leave out the multipliers of
-// elements that stick for ever. An oscillator with one gap needs none of this.
+// For machines, these functions project new columns of the monodromy matrix to the constraints, record which elements slide, and exclude
+// the multipliers of elements that stick for ever. An oscillator with one gap needs none of this.
 fn constrain_columns() {}
 
 fn begin_cycle() {}
@@ -35,7 +35,7 @@ fn begin_schedule() {
     }
 }
 
-// Starts the phase of the forcing anew at phase 0.
+// Sets the phase of the forcing to exactly 0.
 fn restart_phase() {
     motion.phasor = array<Real, 2>(1.0, 0.0);
 }
@@ -58,7 +58,7 @@ fn contact_free_growth() -> Real {
     return flows[cell.flow_index].transient_growth;
 }
 
-// Returns the present state with the gap measured from the middle, in every domain.
+// Returns the present state in any domain, with the gap measured from the middle between the walls.
 fn strobe_state() -> State {
     var q = motion.q;
     if tally.mode != MODE_FREE {
@@ -67,7 +67,7 @@ fn strobe_state() -> State {
     return q;
 }
 
-// Returns the largest displacement of a strobe, whose rounding error limits distances. In contact, the gap is the sum of
+// Returns the largest displacement of a strobe. Its rounding error limits the resolution of distances. In contact, the gap is the sum of
 // the wall's position and the penetration, which may have opposite signs.
 fn largest_position(q: State) -> Real {
     let position = largest_displacement(q);
@@ -77,7 +77,7 @@ fn largest_position(q: State) -> Real {
     return max(position, abs(flows[cell.flow_index].walls[side_of(tally.mode)]));
 }
 
-// Returns the forcing frequency in the unit of rates.
+// Returns the forcing frequency in radians per unit of time of the rates.
 fn unit_of_frequency() -> Real {
     return flows[cell.flow_index].domains[0].angle;
 }
@@ -90,7 +90,7 @@ fn escape_size() -> Real {
     return flows[cell.flow_index].escape;
 }
 
-// Whether forces change at given phases.
+// Whether stages change the forces at given phases.
 fn has_stages() -> bool {
     return STAGES && shape.changes > 0u;
 }
@@ -129,7 +129,7 @@ fn place(to: State) {
     motion.bound = 0.0;
 }
 
-// Keeps the modes where Newton's method starts, and returns to them.
+// Stores the modes in which Newton's method starts, and restores them.
 fn keep_modes() {
     search.newton_start_mode = tally.mode;
     search.newton_start_origin = tally.origin;
@@ -146,22 +146,22 @@ fn restore_modes() {
     }
 }
 
-// Error of a computed fixed point in rounding errors of the motion, before amplification.
+// Error of a computed fixed point before amplification, in units of the motion's rounding error.
 const MISPLACED: Real = 8.0;
 
-// Whether a motion without events has its limit beyond the wall, by more than the rounding error of a period.
+// Whether a motion without events has a limit that lies beyond the wall by more than the rounding error of a period.
 fn leaves_domain(to: State) -> bool {
     let unsure = MISPLACED * ULP * measures.position_scale * Real(limit_of(1.0));
     let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_ONSET;
     return may_leave && beyond(to) > unsure;
 }
 
-// Whether the motion is away from all walls, so that it may be moved a little.
+// Whether the motion is away from all walls, so that the state may be perturbed.
 fn is_free() -> bool {
     return tally.mode == MODE_FREE && tally.order == 0u;
 }
 
-// Loads what results need of the motion.
+// Loads the state of the motion that results need.
 fn conclude_motion() {
     if INTERVALS {
         // Walls are the same in all stages.
@@ -228,8 +228,8 @@ fn add_symbol_of_flight(side: u32) {
     add_symbol(symbol);
 }
 
-// Follows the motion to the next stop phase. Returns false if the lane or its iterations in this dispatch end before.
-// Lanes wait for each other where chatter begins, too.
+// Follows the motion to the next stop phase. Returns false if the lane, or its iterations in this dispatch, end before. Lanes also wait for
+// each other at the start of chatter.
 fn fly_to_stop_phase() -> bool {
     if CHATTER {
         while has_work() && iterations < settings.iterations {
@@ -262,7 +262,7 @@ fn flight_to_chatter() -> bool {
         if careful() {
             return true;
         }
-        // Each step of a lane that is measured is a pass.
+        // Each step of a measured lane counts as a pass.
         if !MEASURE && tally.passes_in_period > settings.passes_per_period {
             tally.status = STATUS_TOO_STIFF;
         }

@@ -1,4 +1,4 @@
-// The forcing phase, stored as a whole step and a fraction, never as a time.
+// The forcing phase. It is stored as a whole number of steps and a fraction, not as a time.
 
 // Computes the phasor at `theta` of a free step after step `n`, from the table and by angle addition.
 fn sync_phasor() {
@@ -16,7 +16,7 @@ fn turn_phasor(part: Real) {
     motion.phasor[1] = s + (turn.y * c + turn.x * s);
 }
 
-// Moves the phase on by a part of a free step.
+// Advances the phase by a part of a free step.
 fn advance_phase(part: Real) {
     motion.theta += part;
     if motion.theta >= 1.0 {

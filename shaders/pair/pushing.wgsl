@@ -1,16 +1,17 @@
-// Walls that only push, and walls with a preload. Behind such a wall the motion is in an interval without another wall. Behind a wall
-// that only pushes there are two intervals, for closed and for open contact. In both, the distance to the missing wall is
-// replaced by the force of spring, damper and preload: contact ends where it falls to 0, and begins where it rises above 0. The rules
-// are those of the reference (dynamics/src/pair/pushing.rs).
+// Walls that only push, and walls with a preload. Behind such a wall the motion is in an interval without another wall. Behind a wall that
+// only pushes there are two intervals, for closed and for open contact. In both, the distance to the missing wall is replaced by the force
+// of spring, damper and preload: contact ends where this force falls to 0, and begins where it rises above 0. The rules are those of the
+// reference (dynamics/src/pair/pushing.rs).
 
-// Added to `tally.interval` in open contact; the rest is the interval before the wall, with the side.
+// Flag of open contact in `tally.interval`. The other bits are the number of the interval in front of this wall; between the first walls,
+// they contain the side.
 const OPEN: u32 = 256u;
 
 fn is_open() -> bool {
     return PUSHING && (tally.interval & OPEN) != 0u;
 }
 
-// Whether the force of a wall is watched in this interval.
+// Whether the force of a wall can end the motion in this interval.
 fn watches_force() -> bool {
     if !PUSHING || tally.interval == 0u {
         return false;
@@ -19,7 +20,7 @@ fn watches_force() -> bool {
     return push[0] != 0.0 || push[1] != 0.0 || push[2] != 0.0;
 }
 
-// Whether a side of the present interval is bounded by the force, and not by a wall.
+// Whether the force bounds a side of the present interval, where no wall bounds it.
 fn is_bounded_by_force(side: u32) -> bool {
     return watches_force() && side == side_of_interval();
 }
@@ -30,14 +31,14 @@ fn force_inside(q: array<Real, 4>) -> Real {
     return push[0] * q[0] + push[1] * q[1] + push[2];
 }
 
-// Returns the size of the terms of this force, which its rounding errors are relative to.
+// Returns the sum of the sizes of the force's terms. Its rounding error is relative to this sum.
 fn size_of_force(q: array<Real, 4>) -> Real {
     let push = flows[cell.flow_index].push;
     return abs(push[0] * q[0]) + abs(push[1] * q[1]) + abs(push[2]);
 }
 
-// Returns that force, its slope and its curvature at `tau` of the expansion. `start` is its value at the expansion point, and `z` the jet
-// of the gap.
+// Returns the force that bounds the interval, its slope and its curvature at `tau` of the expansion. `start` is the force at the expansion
+// point, and `z` the jet of the gap.
 fn force_jet(start: Real, z: vec3<Real>, tau: Real) -> vec3<Real> {
     let push = flows[cell.flow_index].push;
     let jerk = pressing_jet(tau).y;
@@ -48,7 +49,8 @@ fn force_jet(start: Real, z: vec3<Real>, tau: Real) -> vec3<Real> {
     );
 }
 
-// Returns a bound on the sixth derivative of that force, from bounds on those of the gap and of its rate.
+// Returns a bound on the sixth derivative of the force that bounds the interval, from bounds on the sixth derivatives of the gap and of its
+// rate.
 fn force_bound(gap: Real, rate: Real) -> Real {
     let push = flows[cell.flow_index].push;
     return abs(push[0]) * gap + abs(push[1]) * rate;
@@ -71,7 +73,7 @@ fn change_force() -> Jump {
     return Jump(true, MODE_PASSING, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
 }
 
-// Measures the energy of the wall's spring and preload where contact ends, or begins, behind the wall.
+// Measures the energy of the wall's spring and preload if contact ends or begins behind the wall.
 fn measure_push() {
     let side = side_of_interval();
     let at = walls[1u - side];

@@ -1,8 +1,7 @@
-// Rigid walls: a pressed contact that has come to rest sticks until the load pulls it off.
+// Rigid walls: a gap that comes to rest under a pressing load sticks until the load pulls it off.
 //
-// While a gap sticks, it stays on the wall, and the other displacement moves in the domain of that side, in which the
-// wall takes up the gap's acceleration. Contact ends when that acceleration changes sign; its series takes the place
-// of the gap's series.
+// While a gap sticks, it stays on the wall, and x moves in the domain of that side. In this domain the wall's force cancels the gap's
+// acceleration. Contact ends when the cancelled acceleration changes its sign; its series takes the place of the gap's series.
 
 fn is_rigid(side: u32) -> bool {
     return KINDS && contact_at(side) == CONTACT_RIGID;
@@ -12,7 +11,7 @@ fn sticks() -> bool {
     return KINDS && tally.mode >= MODE_STUCK;
 }
 
-// Whether the motion is in the contact onset: the gap leaves its wall slowly, and is pressed back.
+// Whether the motion is in the contact onset: the gap has left its wall slowly and is pressed back.
 fn is_onset() -> bool {
     return tally.mode >= MODE_ONSET && !sticks();
 }
@@ -23,8 +22,7 @@ fn stuck_pull(side: u32) -> Pull {
     return Pull(flows[cell.flow_index].pressing[side], behind.x_row, behind.share, behind.angle, PLACE_OF_PRESSING + side, behind.x_place);
 }
 
-// Makes a gap that has come to rest stick, if the load presses it: the wall takes all of its rate. Returns no event
-// if it is not pressed.
+// Makes a gap that has come to rest stick if the load presses it: its rate becomes 0. Otherwise returns no event.
 fn stick(side: u32) -> Jump {
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 0.0, kick, 0.0);
     let removed = sign_of(side) * max(sign_of(side) * motion.q[1], Real(0.0));
@@ -37,7 +35,7 @@ fn stick(side: u32) -> Jump {
     return jump;
 }
 
-// Releases the gap where the load pulls it off the wall: it leaves without rate and acceleration.
+// Releases the gap where the load pulls it off the wall. It leaves with zero rate and zero acceleration.
 fn let_go(side: u32) -> Jump {
     motion.q[0] = walls[side];
     motion.q[1] = 0.0;
@@ -47,14 +45,14 @@ fn let_go(side: u32) -> Jump {
     return Jump(true, MODE_FREE, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
 }
 
-// Returns the order of the root of the pressing acceleration where sticking begins: 1 if the load is balanced.
+// Returns the order of the root of the pressing acceleration at the start of sticking: 1 if the load is balanced.
 fn stuck_order(side: u32) -> u32 {
     let pull = stuck_pull(side);
     let pressing = acceleration(pull.gap_row, pull.share, motion.q, pull.gap_place);
     return select(0u, 1u, abs(pressing) <= balance(pull.gap_row, pull.share, motion.q, pull.gap_place));
 }
 
-// Expands the motion of x while the gap sticks. The acceleration that the wall takes up replaces the gap's series.
+// Expands the motion of x while the gap sticks. The series of the acceleration that the wall cancels replaces the gap's series.
 fn expand_stuck() {
     let side = side_of(tally.mode);
     let p = flows[cell.flow_index].pressing[side];
@@ -88,8 +86,8 @@ fn expand_stuck() {
     }
 }
 
-// Returns a bound on the sixth derivative of that acceleration over the step. It is a sum of x, its rate and the
-// forcing, whose derivatives are bounded by the energy of the differentiated motion.
+// Returns a bound on the sixth derivative of the acceleration that the wall cancels, over the step. This acceleration is a sum of x, its
+// rate and the forcing. The energy of the differentiated motion bounds their derivatives.
 fn stuck_bound() -> Real {
     let side = side_of(tally.mode);
     let place = place_of_x(1u + side);

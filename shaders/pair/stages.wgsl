@@ -1,15 +1,15 @@
-// Stages: the domains change at given phases of the forcing period. Each stage has a flow of its own, and the lane changes its
-// flow. The rules are those of the reference (dynamics/src/pair/stages.rs).
+// Stages: the domains change at given phases of the forcing period. Each stage has its own flow, and the lane changes its flow there. The
+// rules are those of the reference (dynamics/src/pair/stages.rs).
 //
-// Two pairs of numbers describe a change: whole free steps since phase 0 and the fraction of the next step; and the flow
-// that begins. The last change of a period holds up to the first.
+// Two pairs of numbers describe a change. The first pair has the whole free steps since phase 0 and the fraction of the next step; the
+// second pair has the flow that begins. The stage that begins last holds until the first change of the next period.
 
-// The next change: whole free steps and the fraction. No step if none is left in this period.
+// Position of the next change: whole free steps and the fraction; NO_STEP if no change is left in this period.
 const NO_STEP: u32 = 0xffffffffu;
 var<private> change_step: u32;
 var<private> change_theta: Real;
 
-// Returns the flow of the present stage, between the first walls. `flow` is the flow of the first stage there.
+// Returns the flow of the present stage between the first walls. `flow` is that of the first stage.
 fn flow_of_stage(flow: u32) -> u32 {
     let count = shapes[flow].changes;
     if count == 0u {
@@ -19,7 +19,7 @@ fn flow_of_stage(flow: u32) -> u32 {
     return u32(pairs[shapes[flow].schedule + 2u * last + 1u][0]);
 }
 
-// Loads the place of the next change.
+// Loads the position of the next change.
 fn load_change() {
     change_step = NO_STEP;
     if tally.next_change < shape.changes {
@@ -45,7 +45,7 @@ fn steps_to_change() -> Real {
     return 1.0;
 }
 
-// Enters the stages that begin at the present phase. Several do if rounding has put their changes in the same place.
+// Enters the stages that begin at the present phase. Rounding may put several changes at the same position.
 fn change_stage() {
     while is_at_change(tally.step, motion.theta) {
         iterations += 1u;
@@ -56,14 +56,14 @@ fn change_stage() {
     }
 }
 
-// Returns to the begin of the schedule at phase 0. The last stage holds until the first change, which may be there.
+// Returns to the start of the schedule at phase 0. The last stage holds until the first change, which may be at phase 0.
 fn restart_schedule() {
     tally.next_change = 0u;
     load_change();
 }
 
-// Enters a stage: state and tangent vectors are continuous. A contact that depends on a force is decided anew: a gap at rest on
-// a rigid wall, a contact onset, and contact with a wall that only pushes.
+// Enters a stage. State and tangent vectors are continuous. Contacts that depend on a force are decided again: a gap at rest on a rigid
+// wall, a contact onset, and contact with a wall that only pushes.
 fn enter_stage() {
     let side = side_of(tally.mode);
     let spring = flows[cell.flow_index].springs[side][0];
@@ -85,7 +85,7 @@ fn enter_stage() {
     if sticks() {
         tally.order = stuck_order(side);
     } else if tally.order > 0u {
-        // An event has put the gap on a wall at this instant. At rest, the new acceleration decides.
+        // An event has put the gap on a wall at this instant. If the gap is at rest, the new acceleration decides.
         tally.order = select(1u, 2u, motion.q[1] == 0.0);
     }
     motion.bound = 0.0;

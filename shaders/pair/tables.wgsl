@@ -1,4 +1,4 @@
-// Constants of an oscillator with one gap: what lanes read of a flow.
+// Constants of a flow of an oscillator with one gap, as lanes read them.
 
 // A linear domain in units of its own step: time tau = t / h, rates per step.
 struct Domain {
@@ -8,18 +8,17 @@ struct Domain {
     // Accelerations of the gap and of x: factors of gap, rate, x, rate, cos, 1, sin. Only variants with SINE read the last.
     gap_row: array<Real, 7>,
     x_row: array<Real, 7>,
-    // Quadratic form of the n-th derivatives that bounds |(n+1)-th derivative of the gap|^2: factors of rate^2, rate
-    // * x_rate, x_rate^2, gap^2, gap * x, x^2.
+    // Quadratic form in the n-th derivatives of the motion. It bounds the square of the (n+1)-th derivative of the gap. Factors of rate^2,
+    // rate * x_rate, x_rate^2, gap^2, gap * x, x^2.
     energy: array<Real, 6>,
-    // Growth of that bound per step by the force, for n = 5, and its factor by negative damping and stiffness.
+    // Growth of this bound per step: the part that the force adds, for n = 5, and the factor by negative damping and stiffness.
     growth: Real,
     swell: Real,
     // Forcing angle of one step; tan of half of it; sin of it.
     angle: Real,
     turn_half: Real,
     turn_sin: Real,
-    // Form of the power of dampers on the rates of gap and x, in the units of measure.wgsl: factors of rate^2, rate *
-    // x_rate, x_rate^2.
+    // Power of the dampers as a quadratic form in the rates, in the units of measure.wgsl: factors of rate^2, rate * x_rate, x_rate^2.
     damping: array<Real, 3>,
     // Free steps per step of this domain: a power of two, at most 1.
     share: Real,
@@ -27,35 +26,33 @@ struct Domain {
     substeps: Real,
 }
 
-// Constants that lanes share if they differ in the contact law alone. There is one such struct for each stage and each interval
-// between walls.
+// Constants that lanes share if they differ only in the contact law. Each stage and each interval between walls has such a struct.
 struct Flow {
     // Free motion, meshing on the right, meshing on the left. Meshing domains measure the gap from their wall.
     domains: array<Domain, 3>,
     // Positions of the right and of the left wall.
     walls: array<Real, 2>,
-    // Change of the rate of x per unit of gap rate that the contact impulse removes.
+    // Change of the rate of x if the contact impulse reduces the gap's rate by 1.
     kick: Real,
     // Length of a free step in time units.
     h: Real,
-    // Scale of length: half the distance of the first walls, if there are two.
+    // Scale of length: with two first walls, half of their distance.
     length: Real,
     // Unit of speeds: the scale of length times the rate of free motion, per free step.
     speed: Real,
-    // Longest infinite series of impacts that is closed by its limit, in free steps.
+    // Longest duration of an infinite series of impacts that its limit replaces, in free steps.
     closing: Real,
-    // Sum of the sizes of gap and x beyond which the motion has escaped; negative if energy grows by the force alone.
+    // Motion has escaped if the sum of the sizes of gap and x exceeds this. Negative if only the force can raise the energy.
     escape: Real,
-    // Contact-free motion. `steady`: steady state at phase 0, in lane units. `contact_free_size`: size of the transient (by the
-    // free domain's energy form) below which no contact will follow; negative if there is no such size. `transient_growth`:
-    // growth of the transient per period, in octaves.
+    // Contact-free motion. `steady`: steady state at phase 0, in lane units. `contact_free_size`: if the transient is smaller than this by
+    // the free domain's energy form, no contact will follow; negative if no transient is small enough. `transient_growth`: growth of the
+    // transient per period, in octaves.
     steady: array<Real, 4>,
     contact_free_size: Real,
     transient_growth: Real,
-    // Acceleration of a gap that rests on the right and on the left wall: a `gap_row` that measures the gap from that
-    // wall.
+    // Acceleration of a gap that rests on the right and on the left wall: a `gap_row` with the gap measured from that wall.
     pressing: array<array<Real, 7>, 2>,
-    // Change of the rates of the gap and of x per displacement of the gap, where the motion enters an elastic wall.
+    // Where the motion enters an elastic wall, tangent vectors change: change of their rates of gap and x per displacement of their gap.
     damper: array<array<Real, 2>, 2>,
     // Contact force of the right and of the left wall per displacement and per rate of the gap, in the units of
     // measure.wgsl.
@@ -65,9 +62,10 @@ struct Flow {
     // Contact force of the walls that the gap has passed, positive to the left: factors of gap, rate and 1, in the units of
     // measure.wgsl.
     held: array<Real, 3>,
-    // Force of a wall that only pushes, positive inside the interval that it bounds: factors of gap, rate and 1, in these units.
+    // Force of a wall that only pushes, positive inside the interval that it bounds: factors of gap, rate and 1, in the units of
+    // measure.wgsl.
     push: array<Real, 3>,
-    // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters it.
+    // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters the wall.
     preload: array<array<Real, 2>, 2>,
 }
 
@@ -77,7 +75,7 @@ struct FlowShape {
     steps: u32,
     // Index in `pairs` of its first phasor.
     phasors: u32,
-    // Number of displacements. With one, the second rests at 0.
+    // Number of displacements. With one displacement, x rests at 0.
     degrees: u32,
     // 1 if contact-free motion also requires that x rests at 0.
     must_rest: u32,
@@ -93,8 +91,7 @@ struct FlowShape {
     behind: array<u32, 2>,
 }
 
-// Contact law of the right and of the left wall: restitution, and the largest leaving speed at which a pressed
-// contact lasts.
+// Contact law of the right and of the left wall: restitution, and the largest leaving speed at which contact lasts under a pressing load.
 struct Law {
     restitution: array<Real, 2>,
     mesh_speed: array<Real, 2>,
@@ -105,7 +102,7 @@ struct Law {
 @group(0) @binding(3) var<storage, read> pairs: array<array<Real, 2>>;
 @group(0) @binding(4) var<storage, read> laws: array<Law>;
 
-// What governs the motion. All modes but the first are followed by the side: mode + SIDE_*.
+// Modes of the motion. For all modes except the first, add the side: mode + SIDE_*.
 const MODE_FREE: u32 = 0u;
 const MODE_SUSTAINED: u32 = 1u;
 const MODE_ONSET: u32 = 3u;

@@ -1,6 +1,6 @@
 // Tangent vectors of an oscillator with one gap: propagation along a flight, and saltation at events.
 
-// Carries the columns of the monodromy matrix over full steps; each vector costs one iteration.
+// Carries the columns of the monodromy matrix over full steps. Each vector counts as one iteration.
 fn step_columns(count: u32) {
     if tally.tangent_count <= 1u {
         return;
@@ -30,22 +30,22 @@ struct Crossing {
     jump: Jump,
     before: array<Real, 4>,
     after: array<Real, 4>,
-    // The infinite sequence of impacts after it. `lasts`: its length, 0 if there is none. `pressing`: the
-    // acceleration into the wall at its end. `late_by`: by how much a neighbour's sequence ends later, per (z, w, x,
-    // v), x and v with the gap closed. `v_by`: change of the acceleration of x per w, x, v.
+    // An infinite sequence of impacts after the event. `lasts`: its duration, 0 without a sequence. `pressing`: the acceleration into the
+    // wall at its end. `late_by`: delay of the end of a neighbour's sequence per (z, w, x, v), with x and v for a closed gap. `v_by`:
+    // change of the acceleration of x per w, x, v.
     lasts: Real,
     pressing: Real,
     late_by: array<Real, 4>,
     v_by: array<Real, 3>,
-    // Whether state and field are continuous but for a change of the rates of gap and x per displacement of the gap
-    // (`jolt`).
+    // Whether state and field are continuous, so that tangents change by `jolt` alone: a change of the rates of gap and x per displacement
+    // of the gap.
     is_smooth: bool,
     jolt: array<Real, 2>,
 }
 
 var<private> crossing: Crossing;
 
-// Carries every vector over a part of a step and the event after it. A gap that was stuck has no neighbouring
+// Carries every vector over a part of a step and the event after it. A stuck gap has the same displacement and rate in all neighbouring
 // motions.
 fn carry_tangents(flight_pull: Pull, tau: Real, held: bool) {
     let back = 1.0 / flight_pull.share;
@@ -133,7 +133,7 @@ fn saltate(u: array<Real, 4>) -> array<Real, 4> {
     let after = crossing.after;
     let inverse = select(1.0 / jump.rate, Real(0.0), abs(jump.rate) < NO_SPEED * speed);
     let along = inverse * ((jump.normal[0] * u[0] + jump.normal[1] * u[1]) + (jump.normal[2] * u[2] + jump.normal[3] * u[3]));
-    // The first row is the quotient of the gap's rates; written as a sum it would lose digits where `e` is small.
+    // The first row is the quotient of the gap's rates. As a sum it would lose digits if `e` is small.
     return array<Real, 4>(
         jump.rate_factor * u[0],
         jump.rate_factor * u[1] + (after[1] - jump.rate_factor * before[1]) * along,
@@ -142,8 +142,8 @@ fn saltate(u: array<Real, 4>) -> array<Real, 4> {
     );
 }
 
-// Carries a vector through an infinite sequence of impacts. A neighbour's sequence ends `late`; until then it lacks
-// the pressing acceleration. x moves as with the gap closed.
+// Carries a vector through an infinite sequence of impacts. A neighbour's sequence ends later by `late`. Until then, the pressing
+// acceleration does not act on it. x moves as it does with a closed gap.
 fn close(u: array<Real, 4>) -> array<Real, 4> {
     let x = u[2] + kick * u[0];
     let v = u[3] + kick * u[1];

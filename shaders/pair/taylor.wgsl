@@ -1,7 +1,7 @@
 // Taylor series of the exact flow over a part of a step, in units of the domain's step.
 //
-// Loops over terms are marked with //% and copied out before compilation (src/gpu/unroll.rs), because drivers keep
-// the terms in registers only then.
+// Loops over terms are marked with //% and unrolled before compilation (src/gpu/unroll.rs). Otherwise drivers do not keep the terms in
+// registers.
 
 var<private> gap_terms: array<Real, TERMS>;
 var<private> x_terms: array<Real, TERMS>;
@@ -42,8 +42,8 @@ fn expand() {
     //% end
 }
 
-// Returns a bound on the gap's derivative of order n + 1 from the derivatives of order n and n + 1 of gap and x: the
-// energy of the differentiated motion.
+// Returns a bound on the gap's derivative of order n + 1, from the derivatives of order n and n + 1 of gap and x. The bound is the energy
+// of the differentiated motion.
 fn derivative_bound(z: Real, w: Real, x: Real, v: Real) -> Real {
     let e = here.energy;
     let square = (e[0] * w * w + e[1] * w * v + e[2] * v * v) + (e[3] * z * z + e[4] * z * x + e[5] * x * x);
@@ -55,7 +55,7 @@ fn renew_bound() {
     let d = domain_of(tally.mode);
     let g = here.gap_row;
     let r = here.x_row;
-    // Derivatives of order k and k + 1; of the forcing, order k.
+    // Derivatives of order k and k + 1 of the motion, and of order k of the forcing.
     var z = motion.q[0];
     var w = here.share * motion.q[1];
     var x = motion.q[2];
@@ -94,7 +94,7 @@ fn gap_jet(tau: Real) -> vec3<Real> {
     p1 = p1 * tau + p;
     p = p * tau + gap_terms[$k];
     //% end
-    // The constant term is left out, so that a flight from the wall keeps its relative accuracy.
+    // The sum omits the constant term, so that a flight from the wall keeps its relative accuracy.
     p2 = p2 * tau + p1;
     p1 = p1 * tau + p;
     return vec3<Real>(p * tau, p1, 2.0 * p2);

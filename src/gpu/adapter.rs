@@ -6,11 +6,11 @@ use super::layout::{Motion, Tally};
 use super::panics::catch_panic;
 use super::{GpuError, Precision};
 
-/// Environment variables that select adapters. wgpu reads the first one.
+/// Environment variables that select adapters. wgpu reads the first of them.
 const BACKEND: &str = "WGPU_BACKEND";
 const ADAPTER_NAME: &str = "WGPU_ADAPTER_NAME";
 
-/// Selection of an adapter.
+/// The caller's choice of an adapter.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AdapterChoice {
     /// Part of the adapter's name or of its description ([`describe`]), in upper or lower case; `None` selects the
@@ -47,7 +47,7 @@ impl AdapterChoice {
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-    // This validation would precede each indirect dispatch by a dispatch of its own.
+    // With this validation, wgpu would insert a further dispatch before each indirect dispatch.
     descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     wgpu::Instance::new(descriptor)
 }
@@ -62,9 +62,9 @@ pub struct AdapterReport {
     pub info: wgpu::AdapterInfo,
     /// Precisions in which it can run lanes.
     pub precisions: Vec<Precision>,
-    /// Largest storage buffer in a shader, in bytes.
+    /// Largest storage buffer that a shader can bind, in bytes.
     pub largest_binding: u64,
-    /// Most lanes under way at a time.
+    /// Largest number of lanes under way at a time.
     pub most_lanes: usize,
 }
 
@@ -85,7 +85,7 @@ impl AdapterReport {
     }
 }
 
-/// Identity of an adapter among others with the same name.
+/// Identity that distinguishes an adapter from others with the same name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterId {
     /// Number of the adapter ([`AdapterReport::number`]).
@@ -144,10 +144,10 @@ pub fn is_card(info: &wgpu::AdapterInfo) -> bool {
     matches!(info.device_type, wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::VirtualGpu)
 }
 
-/// Most slots of a pool: about 2 GB on the device in f32, 3 GB in f64.
+/// Largest number of slots of a pool. They take about 2 GB on the device in f32, 3 GB in f64.
 const MOST_SLOTS: usize = 1 << 20;
 
-/// Returns the most slots that an adapter's limits allow.
+/// Returns the largest number of slots that an adapter's limits allow.
 pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
     let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
     let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
@@ -166,8 +166,8 @@ pub(super) fn features(precision: Precision) -> wgpu::Features {
     }
 }
 
-/// Ranks an adapter: hardware before software, dedicated before integrated; among the interfaces to one adapter, the
-/// most capable first.
+/// Returns an adapter's rank: hardware before software, dedicated before integrated. An adapter may have several interfaces; the most
+/// capable interface comes first.
 fn rank(info: &wgpu::AdapterInfo) -> (u32, u32) {
     let kind = match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,

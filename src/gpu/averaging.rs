@@ -1,15 +1,15 @@
 //! Periods over which lanes average the growth of their tangent vector.
 
-/// Periods in which the tangent vector turns into the direction of fastest growth.
+/// Number of periods in which the tangent vector turns into the direction of fastest growth.
 const ALIGNMENT: u32 = 50;
 
-/// Blocks whose means give the exponent's standard error.
+/// Number of blocks whose means give the exponent's standard error.
 const EXPONENT_BLOCKS: u32 = 32;
 
-/// Least periods of a block. Lanes measure the correlation of neighbouring blocks; shorter blocks would have more of it.
+/// Least number of periods of a block. Lanes measure the correlation of neighbouring blocks, and shorter blocks would be more correlated.
 const SHORTEST_BLOCK: u32 = 2;
 
-/// Periods that count, and their blocks.
+/// The periods over which growth is averaged, and their division into blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Averaging {
     /// Period from which the tangent vector is carried.

@@ -10,7 +10,7 @@ use rattlemap_dynamics::model::{Form, State};
 pub struct Constants {
     /// Free steps per forcing period.
     pub steps: u32,
-    /// Whether the mirror image of a motion is a motion. Of a pair, the law must be the same at both walls, too.
+    /// Whether the mirror image of a motion obeys the same equations. For a pair, the caller also checks that both walls have the same law.
     pub mirror_symmetric: bool,
     /// Number of displacements.
     pub degrees: u32,
@@ -20,7 +20,7 @@ pub struct Constants {
     pub(super) engine: Engine,
 }
 
-/// The constants that the code of lanes for a pair or for a machine reads.
+/// Constants for one of the two engines of lanes.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "constants of many pairs lie in one vector")]
 pub(super) enum Engine {
@@ -78,7 +78,7 @@ impl Constants {
         }
     }
 
-    /// Takes the sizes of the machines that a shader is compiled for.
+    /// Sets the sizes of the machines for which a shader is compiled.
     pub fn widen(&mut self, features: Features) {
         if self.features.machine.is_some() && features.machine.is_some() {
             self.features.machine = features.machine;
@@ -98,7 +98,7 @@ impl Constants {
         }
     }
 
-    /// Returns the state of the model from that of a lane.
+    /// Converts a lane's state to a state of the model.
     pub(super) fn strobe(&self, q: &[f64]) -> State {
         match &self.engine {
             Engine::Pair(pair) => pair.to_state([q[0], q[1], q[2], q[3]]),

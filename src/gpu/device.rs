@@ -14,7 +14,7 @@ use super::{Gpu, GpuError, Precision, Variant};
 const WRITES: [bool; 14] =
     [false, false, false, false, false, true, true, true, false, true, true, true, true, true];
 
-/// An entry point of the shader and its storage bindings: at most eight, which every adapter supports.
+/// An entry point of the shader and its storage bindings. There are at most eight, because every adapter supports eight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EntryPoint {
     name: &'static str,
@@ -46,8 +46,8 @@ pub(super) struct Pipelines {
     pub(super) gather: wgpu::ComputePipeline,
 }
 
-/// First failure of a device outside any error scope: its loss, or a command that it refused. Without these callbacks
-/// wgpu would panic.
+/// First failure of a device outside any error scope: its loss, or a refused command. It is stored by callbacks, without which wgpu would
+/// panic.
 pub(super) struct Trouble(Arc<Mutex<Option<String>>>);
 
 impl Trouble {
@@ -60,13 +60,12 @@ impl Trouble {
         Trouble(first)
     }
 
-    /// Stores the first failure. Later ones only follow from it.
+    /// Stores the first failure. Later failures are only its consequences.
     pub(super) fn note(&self, message: String) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
     }
 
-    /// # Errors
-    /// [`GpuError::Lost`] once something has gone wrong.
+    /// # Errors [`GpuError::Lost`] if a failure is stored.
     pub(super) fn check(&self) -> Result<(), GpuError> {
         self.message().map_or(Ok(()), |message| Err(GpuError::Lost { message }))
     }
@@ -155,7 +154,7 @@ pub(super) async fn pipelines(gpu: &Gpu, variants: &[Variant]) -> Result<Vec<Pip
         };
         modules.push(compiling(gpu, &|| gpu.device.create_shader_module(descriptor())).await?);
     }
-    // The largest ones come first.
+    // Starts with the largest entry points, which take longest to compile.
     let entry_points = [SWEEP, CONCLUDE, BEGIN, GATHER].into_iter().chain(COMPACT);
     let jobs: Vec<_> =
         entry_points.flat_map(|entry| modules.iter().map(move |module| (module, entry))).collect();
@@ -173,12 +172,12 @@ pub(super) async fn pipelines(gpu: &Gpu, variants: &[Variant]) -> Result<Vec<Pip
     Ok((0..variants.len()).map(of).collect())
 }
 
-/// Makes a part of a shader's program now. The future returns it, or the driver's error.
+/// Creates a part of a shader's program immediately, not when the future is polled. The future returns this part or the driver's error.
 fn compiling<'g, T>(
     gpu: &'g Gpu,
     make: &dyn Fn() -> T,
 ) -> impl Future<Output = Result<T, GpuError>> + use<'g, T> {
-    // wgpu reports errors of a driver's own compiler as internal errors or as lack of memory.
+    // wgpu reports errors of the driver's compiler as internal errors or as lack of memory.
     let filters =
         [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation];
     let scopes = filters.map(|filter| gpu.device.push_error_scope(filter));

@@ -2,32 +2,32 @@
 
 use web_time::Duration;
 
-/// How lanes are driven. Records depend on `late_tangent` and `keep` alone, by rounding.
+/// Settings by which the host dispatches lanes. Only `late_tangent` and `keep` affect records, by rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DispatchPolicy {
-    /// Parts of a round, each of which begins with a list of the lanes that have work.
+    /// Number of parts of a round. Each part first lists the lanes that have work.
     pub(super) parts: u32,
-    /// Dispatches of a part. A lane that has read a cycle continues in the next dispatch.
+    /// Number of dispatches of a part. A lane that has read a cycle continues in the next dispatch.
     pub(super) dispatches: u32,
     /// Desired duration of a round, from one check to the next.
     pub(super) round: Duration,
-    /// With at most so many lanes, all dispatches of a round with
-    /// [`FEWEST_ITERATIONS`](super::rounds::FEWEST_ITERATIONS) surely take less than a second together.
+    /// Largest number of lanes with which a round of [`FEWEST_ITERATIONS`](super::rounds::FEWEST_ITERATIONS) certainly takes less than a
+    /// second.
     pub(super) at_once: u32,
-    /// Rounds after which lanes that have ended no longer wait for others, if further lanes can begin.
+    /// Number of rounds after which results of ended lanes are read even if few lanes have ended, provided that further lanes can begin.
     pub(super) patience: u32,
-    /// Whether lanes begin in a variant without the tangent vector and change to the other variant when they need it.
-    /// That is less work, but the variants run one after the other.
+    /// Whether lanes begin in a variant without the tangent vector and change to the other variant when they need it. This reduces the
+    /// work, but the variants run one after the other.
     pub(super) late_tangent: bool,
     /// Whether lanes keep copies of all their constants.
     pub(super) keep: bool,
     /// Longest time to wait for a submission. A device that takes longer counts as lost.
     pub(super) longest_wait: Duration,
-    /// Time of an iteration of a dispatch on a simulated device. Rounds of a real device are measured.
+    /// Duration of one iteration of a dispatch on a simulated device, for tests; `None` measures the rounds of a real device.
     pub(super) simulated: Option<Duration>,
 }
 
-/// A round takes some milliseconds, and seconds on a busy processor.
+/// Rounds usually take some milliseconds; on a busy processor they take seconds.
 const LONGEST_WAIT: Duration = Duration::from_secs(300);
 
 /// Software: the duration of a round grows with the number of lanes, and only the amount of work matters.
@@ -43,7 +43,7 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
     simulated: None,
 };
 
-/// Hardware that shares the processor's memory and draws the screen: the amount of work matters there, too.
+/// Hardware that shares the processor's memory and draws the screen. The amount of work matters as it does for software.
 const INTEGRATED: DispatchPolicy = DispatchPolicy {
     parts: 1,
     dispatches: 4,
@@ -56,8 +56,8 @@ const INTEGRATED: DispatchPolicy = DispatchPolicy {
     simulated: None,
 };
 
-/// Hardware with room for more lanes than a map has. A round costs the host more than the first lanes of a map cost the
-/// device, so that rounds are few and long. A part is about 64 periods of a lane, and all lanes run side by side.
+/// Hardware with room for more lanes than a map has. A round costs the host more time than the first lanes of a map cost the device, so
+/// rounds are few and long. A part is about 64 periods of a lane, and all lanes run side by side.
 pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
     parts: 4,
     dispatches: 4,
@@ -70,11 +70,11 @@ pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
     simulated: None,
 };
 
-/// Hardware of a browser, which may be a card or draw the screen of a laptop.
+/// Hardware behind a browser: a card, or the integrated graphics of a laptop.
 const BROWSER: DispatchPolicy = DispatchPolicy { at_once: 1 << 14, ..DEDICATED };
 
 impl DispatchPolicy {
-    /// Returns the policy for an adapter. A browser does not say of which kind its hardware is.
+    /// Returns the policy for an adapter. A browser does not report the kind of its hardware.
     pub(super) fn of(info: &wgpu::AdapterInfo) -> DispatchPolicy {
         match info.device_type {
             wgpu::DeviceType::Cpu => SOFTWARE,

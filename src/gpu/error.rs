@@ -68,9 +68,9 @@ pub enum GpuError {
     TooManyFlows {
         /// Number of flows.
         flows: usize,
-        /// Bytes that they need.
+        /// Number of bytes that the flows need.
         needed: u64,
-        /// Bytes that the adapter allows.
+        /// Number of bytes that the adapter allows.
         allowed: u64,
     },
     /// A flow has a feature that the settings exclude.

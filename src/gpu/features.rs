@@ -1,29 +1,29 @@
-//! Features of oscillators for which shaders have code only if it is needed.
+//! Features of oscillators whose shader code is compiled only if it is needed.
 
 use super::machine::{MODES, MOST_DOMAINS, MachineShape, domain_count};
 use super::pair::has_negative_preload;
 use rattlemap_dynamics::model::{Contact, Form, Pair, Side};
 
-/// The features that some oscillators have, or that a shader has code for.
+/// The features of one or more oscillators, or the features that a shader supports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Features {
     /// Elastic or rigid walls.
     pub kinds: bool,
     /// Forces with a sine.
     pub sine: bool,
-    /// Most harmonics of a force beside the first.
+    /// Largest number of harmonics of a force besides the first.
     pub harmonics: u32,
-    /// Domains that change in a forcing period.
+    /// Stages: domains that change within a forcing period.
     pub stages: bool,
     /// Several walls on one side.
     pub intervals: bool,
     /// Walls that only push, or that have a preload.
     pub pushing: bool,
-    /// Walls that only push and have a negative preload. No shader has code for these.
+    /// Walls that only push and have a negative preload. No shader supports them.
     pub negative_preload: bool,
     /// Sizes of a machine.
     pub machine: Option<MachineShape>,
-    /// More domains of a machine than a table holds.
+    /// Machines with more domains than a table can hold.
     pub too_many_domains: bool,
 }
 
@@ -56,7 +56,7 @@ impl Features {
         }
     }
 
-    /// Returns the features of both.
+    /// Returns the union of two sets of features.
     pub fn and(self, other: Features) -> Features {
         Features {
             kinds: self.kinds || other.kinds,
@@ -74,7 +74,7 @@ impl Features {
         }
     }
 
-    /// Returns a feature that no shader has code for, in words.
+    /// Returns the description of a feature that no shader supports.
     pub fn needing_reference(self) -> Option<&'static str> {
         self.without_code().into_iter().find_map(|(is_there, feature, _)| is_there.then_some(feature))
     }
@@ -97,7 +97,7 @@ impl Features {
         ]
     }
 
-    /// Returns a feature that `code` lacks, in words, and the name of its field.
+    /// Returns the description of a feature that `code` lacks, and the name of its field.
     pub(super) fn lacking_in(self, code: Features) -> Option<(&'static str, &'static str)> {
         [
             (self.kinds && !code.kinds, "an elastic or a rigid wall", "kinds"),
@@ -121,7 +121,7 @@ mod tests {
     use rattlemap_dynamics::model::Model;
     use rattlemap_dynamics::motion::Flow;
 
-    /// Lanes and reference take the same engine, whatever the values are.
+    /// Lanes and reference use the same engine for a model, whatever its values are.
     #[test]
     fn friction_makes_a_machine_of_an_oscillator() {
         let mut model = FileModel::built_in("friction-oscillator").unwrap();

@@ -1,8 +1,8 @@
-//! Creation of buffers, with errors in place of wgpu's panics.
+//! Creates buffers; returns errors where wgpu would panic.
 
 use super::{Gpu, GpuError};
 
-/// Runs `make`, which creates and fills buffers for `count` things called `what`.
+/// Runs `make`, which creates and fills buffers for `count` items. `what` is their name in errors.
 ///
 /// # Errors
 /// [`GpuError::OutOfMemory`] if the device has no room for them; other errors of the device.
@@ -13,7 +13,7 @@ pub(super) async fn with_error_scopes<T>(
     make: impl FnOnce() -> T,
 ) -> Result<T, GpuError> {
     let out_of_memory = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-    // Commands on a buffer that could not be created are refused, too.
+    // wgpu also refuses commands on a buffer that could not be created.
     let refused = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
     let result = gpu.call(make);
     let (refused, out_of_memory) = (refused.pop(), out_of_memory.pop());

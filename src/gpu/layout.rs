@@ -1,8 +1,7 @@
-//! The structs of `shaders/layout.wgsl` as the host reads and writes them, and other numbers that both sides know.
+//! The structs of `shaders/layout.wgsl` as the host reads and writes them, and other numbers that host and shaders share.
 //!
-//! `shaders/layout.wgsl` describes the fields; a test compares their names, offsets and sizes. A struct holds real
-//! numbers or 32-bit numbers alone. Real numbers are f64 here and are converted for the f32 variant one by one, so
-//! that both precisions have the same shape.
+//! `shaders/layout.wgsl` describes the fields; a test compares their names, offsets and sizes. A struct holds real numbers or 32-bit
+//! numbers alone. Real numbers are f64 here and are converted one by one for the f32 variant, so both precisions have the same shape.
 
 use std::mem::offset_of;
 
@@ -20,7 +19,7 @@ pub struct StructLayout {
     pub fields: &'static [(&'static str, usize)],
     /// Size in bytes.
     pub size: usize,
-    /// Whether its numbers are real, so that their size depends on the precision.
+    /// Whether its numbers are real. The size of real numbers depends on the precision.
     pub is_real: bool,
 }
 
@@ -64,7 +63,7 @@ structs! {
         substeps: f64,
     }
 
-    /// Constants that lanes share if they differ in the contact law alone.
+    /// Constants that lanes share if they differ only in the contact law.
     Flow of f64 {
         domains: [Domain; 3],
         walls: [f64; 2],
@@ -288,7 +287,7 @@ structs! {
     }
 }
 
-/// Most numbers of a lane's state.
+/// Largest number of entries of a lane's state.
 const MOST_NUMBERS: usize = STATE;
 
 /// Returns the size on the host of a struct in variants whose lanes have `dim` numbers.
@@ -305,7 +304,8 @@ pub fn size_with(host: &StructLayout, dim: usize) -> usize {
 /// Numbers of the structs whose size depends on the number `dim` of a lane's state.
 impl Motion {
     pub(super) fn numbers(dim: usize) -> usize {
-        // In `now` and `ended`, the anchor, the vector, the trail, the averages and their centre; and the matrix.
+        // These fields depend on `dim`: the states in `now` and `ended`, the anchor, the vector, the trail, the averages and their centre,
+        // and the matrix.
         let of_dim = |dim: usize| dim * (5 + TRAIL) + dim / 2 + dim * dim;
         size_of::<Motion>() / size_of::<f64>() + of_dim(dim) - of_dim(4)
     }
@@ -324,7 +324,7 @@ impl Measured {
 
     const BEFORE_COLUMNS: usize = size_of::<Measured>() / size_of::<f64>();
 
-    /// Separates the columns of the monodromy matrix from what comes before them.
+    /// Splits off the columns of the monodromy matrix, which come last.
     pub(super) fn split(numbers: &[f64]) -> (&Measured, &[f64]) {
         let (fixed, columns) = numbers.split_at(Self::BEFORE_COLUMNS);
         (bytemuck::from_bytes(bytemuck::cast_slice(fixed)), columns)
@@ -338,8 +338,8 @@ pub(super) const EXTREMES: usize = 5;
 /// Numbers for a word and a pattern in a [`Finding`].
 pub(super) const SPELLING: usize = 20;
 
-/// Places of these numbers, with their names in the shader: symbols and length. The two halves of the hash follow the length; a
-/// word or pattern has a hash if it is too long to be stored.
+/// Places of symbols and length in a spelling, with their names in the shader. The two halves of the hash follow the length. A word or
+/// pattern has a hash if it is too long to be stored.
 pub(super) const SPELLED_WORD: usize = 0;
 pub(super) const SPELLED_PATTERN: usize = 7;
 pub(super) const SPELLED_WORD_LENGTH: usize = 14;
@@ -352,21 +352,21 @@ impl Finding {
     }
 }
 
-/// Lanes of a workgroup that compacts.
+/// Number of lanes per workgroup of a compaction.
 pub(super) const BLOCK: u32 = 256;
 
-/// Numbers of the queue in front of its slots, and the byte offsets of these two: how many lanes are selected, and the
+/// Number of entries of the queue in front of its slots, and the byte offsets of these two entries: the number of selected lanes, and the
 /// counter of compactions.
 pub(super) const QUEUE_HEAD: usize = 2;
 pub(super) const COUNT_AT: u64 = 0;
 pub(super) const BEAT_AT: u64 = 4;
 
-/// Returns the symbols that one number of a word or a pattern holds.
+/// Returns the number of symbols that one number of a word or a pattern holds.
 pub(super) fn symbols_per_number(bits: usize) -> usize {
     30 / bits
 }
 
-/// There is no interval behind a wall.
+/// Stands for "no interval" where the index of a flow is expected.
 pub(super) const NO_FLOW: u32 = u32::MAX;
 
 /// Codes of the kinds of contact, with their names in the shader.
@@ -378,7 +378,7 @@ pub(super) fn contact_code(contact: Contact) -> u32 {
     match contact {
         Contact::Impact => impact,
         Contact::Rigid => rigid,
-        // A wall that only pushes has pages of its own (pushing.rs).
+        // A wall that only pushes is described by further pages (pair/pushing.rs).
         Contact::Elastic | Contact::Pushing => elastic,
     }
 }

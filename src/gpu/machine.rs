@@ -1,6 +1,6 @@
 //! Constants of machines: oscillators of up to eight coordinates with several gaps and dry friction.
 //!
-//! Lanes look the equations of motion of their domain up in a table. `shaders/machine/layout.wgsl` describes it.
+//! Lanes find the equations of motion of their domain in a table, which `shaders/machine/layout.wgsl` describes.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -19,16 +19,16 @@ pub(super) const FLOW: usize = 7 + STATE;
 pub(super) const SHAPE: usize = 31;
 pub(super) const LAW: usize = 24;
 
-/// Size of a start beside the state: the packed modes, and the next change of the stage.
+/// Number of entries of a start besides the state: the packed modes, and the next change of the stage.
 pub(super) const MODES: usize = 4;
 
-/// Steps of the grid per turn of the highest harmonic, which turns by less than a radian in one of them.
+/// Steps of the grid per turn of the highest harmonic. In one step it turns by less than a radian.
 const STEPS_PER_TURN: u32 = 8;
 
-/// Longest step in the table, in time units: without stiffness and damping there is none. It is a number in f32.
+/// Stands for an unlimited step in the table, in time units, for machines without stiffness and damping. The value can be stored in f32.
 const LONGEST_STEP: f64 = 1e30;
 
-/// Largest limit of an energy in the table, a number in f32.
+/// Stands for an unlimited energy in the table. The value can be stored in f32.
 const LARGEST_ENERGY: f64 = 1e30;
 
 /// Sizes of machines, for which shaders are compiled.
@@ -38,13 +38,13 @@ pub struct MachineShape {
     pub coordinates: u32,
     /// Number of gaps.
     pub gaps: u32,
-    /// Most elements with dry friction.
+    /// Largest number of elements with dry friction.
     pub elements: u32,
-    /// Most harmonics of the force.
+    /// Largest number of harmonics of the force.
     pub harmonics: u32,
-    /// Most walls on one side of a gap.
+    /// Largest number of walls on one side of a gap.
     pub walls: u32,
-    /// Most stages.
+    /// Largest number of stages.
     pub stages: u32,
 }
 
@@ -79,12 +79,13 @@ impl MachineShape {
         2 * self.coordinates as usize
     }
 
-    /// Numbers that forces depend on: the state, two for each harmonic, and 1 as the last of a multiple of four.
+    /// Number of entries of a point, on which forces depend: the state, two numbers for each harmonic, and 1. Zeros before the 1 fill up to
+    /// a multiple of four.
     pub(super) fn width(&self) -> usize {
         (self.dim() + 2 * self.harmonics as usize + 1).next_multiple_of(4)
     }
 
-    /// Returns the places in the table, by their names in the shader.
+    /// Returns the names and values of the shader's constants for places in the table.
     pub(super) fn places(&self) -> [(&'static str, usize); 13] {
         let [n, gaps, elements] = [self.coordinates, self.gaps, self.elements].map(|size| size as usize);
         let (width, sides) = (self.width(), 2 * gaps * self.walls as usize);
@@ -115,7 +116,7 @@ impl MachineShape {
         ]
     }
 
-    /// Returns all sizes and places, by their names in the shader.
+    /// Returns the names and values of the shader's constants for all sizes and places.
     pub(super) fn sizes(&self) -> Vec<(&'static str, u32)> {
         let mut sizes: Vec<_> = self.places().map(|(name, place)| (name, place as u32)).to_vec();
         sizes.extend([
@@ -166,7 +167,7 @@ pub(super) struct MachineConstants {
     tables: Arc<MachineTable>,
 }
 
-/// What machines share that differ in frequency and contact laws alone.
+/// Data that machines share if they differ only in frequency and contact laws.
 #[derive(Debug)]
 pub(super) struct MachineTable {
     machine: Oscillator,
@@ -174,7 +175,7 @@ pub(super) struct MachineTable {
 }
 
 thread_local! {
-    /// The table that was made last. Neighbouring cells often have the same one.
+    /// The last table that was built. Neighbouring cells often have the same table.
     static LAST: RefCell<Option<Arc<MachineTable>>> = const { RefCell::new(None) };
 }
 
@@ -186,7 +187,7 @@ impl MachineConstants {
         let tables = LAST.with_borrow_mut(|last| match last {
             Some(tables) if tables.machine == bare => Arc::clone(tables),
             _ => {
-                // Equations must not depend on the cell that needs them first.
+                // Built from the machine without its laws, so that the equations do not depend on which cell needs them first.
                 let equations = System::new(&bare).equations();
                 let tables = Arc::new(MachineTable { machine: bare, equations });
                 *last = Some(Arc::clone(&tables));
@@ -213,7 +214,7 @@ impl MachineConstants {
         self.system.machine().degrees()
     }
 
-    /// Returns what identifies the table.
+    /// Returns the shared table, whose address identifies it.
     pub(super) fn shared(&self) -> &Arc<MachineTable> {
         &self.tables
     }
@@ -234,9 +235,9 @@ impl MachineConstants {
             0.0,
         ]);
         let motion = NonImpacting::of_machine(self.system.machine());
-        // Lanes in single precision do not know whether a body rests.
+        // Lanes in single precision cannot tell whether a body is at rest, so motions that require this are excluded.
         if let Some(motion) = motion.filter(|motion| motion.resting().is_none()) {
-            // Without walls the energy has no limit.
+            // Without walls the limit of the energy is infinite.
             flow[5] = motion.reach().min(LARGEST_ENERGY);
             flow[6] = motion.exponent() * self.period() / std::f64::consts::LN_2;
             flow[7..].copy_from_slice(&self.system.listed_state(&motion.steady()));
@@ -251,7 +252,7 @@ impl MachineConstants {
         Some(Complex::new(re, im))
     }
 
-    /// Returns the numbers of the shader's shape, given the places of phasors, schedule and table.
+    /// Returns the numbers of the shader's struct `Shape`. The caller passes the places of phasors, schedule and table.
     pub(super) fn shape(
         &self,
         sizes: &MachineShape,
@@ -307,7 +308,7 @@ impl MachineConstants {
         (0..=self.steps).flat_map(of_step).collect()
     }
 
-    /// Returns the orders of the harmonics and the steps, on which phasors depend.
+    /// Returns the orders of the harmonics and the number of steps. Machines that agree in these share their phasors.
     pub(super) fn grid(&self) -> (u32, Vec<u32>) {
         (self.steps, self.system.machine().drives.iter().map(|drive| drive.order).collect())
     }
@@ -371,7 +372,7 @@ impl MachineConstants {
                 }
             }
         }
-        // Puts a row of the machine's own sizes at a place.
+        // Writes a row, which has the machine's own sizes, at a place of the table.
         let put = |table: &mut [f64], at: usize, row: &[f64]| {
             let harmonics = row.len() - 2 * n - 1;
             table[at..at + 2 * n].copy_from_slice(&row[..2 * n]);
@@ -427,7 +428,7 @@ impl MachineConstants {
         start
     }
 
-    /// Returns a state of the model.
+    /// Converts a lane's state to a state of the model.
     pub(super) fn to_state(&self, strobe: &[f64]) -> State {
         self.system.state_of(strobe)
     }
@@ -439,7 +440,7 @@ mod tests {
     use crate::model_file::FileModel;
     use rattlemap_dynamics::model::Model;
 
-    /// Returns the table of the last of these frequencies, derived in a thread of its own.
+    /// Derives the tables of these frequencies in turn, in a new thread, and returns the last one.
     fn table(frequencies: &'static [f64]) -> Vec<f64> {
         let derive = || {
             let mut model = FileModel::built_in("friction-oscillator").unwrap();

@@ -1,4 +1,4 @@
-//! Conversion of what a lane measured to quantities in the model's units.
+//! Converts a lane's measured sums to quantities in the model's units.
 
 use nalgebra::{Complex, DMatrix, Matrix2, Matrix4};
 
@@ -6,7 +6,7 @@ use super::constants::{Constants, Engine};
 use super::layout::{Measured, SUMS};
 use rattlemap_dynamics::orbit::{Approaches, Displacement, Quantities};
 
-/// Coefficients of gap and x in a displacement.
+/// A displacement of the model as factors of the gap and of x.
 type GapFactors = [f64; 2];
 
 /// Returns the quantities of a lane; none if it was not measured. `shaders/pair/measure.wgsl` has the places of the sums.
@@ -58,8 +58,8 @@ fn displacement(
     }
 }
 
-/// Returns modulus and argument of the largest multiplier of a cycle. The columns of the monodromy matrix are the
-/// tangents of a cycle that was read; other cycles are free of contact.
+/// Returns modulus and argument of the largest multiplier of a cycle. If a cycle was read, its columns are the monodromy matrix; otherwise
+/// the motion is free of contact.
 pub(super) fn multiplier(constants: &Constants, measured: &[f64]) -> [f64; 2] {
     let (measured, columns) = Measured::split(measured);
     let pair = match &constants.engine {
@@ -93,6 +93,6 @@ pub(super) fn multiplier(constants: &Constants, measured: &[f64]) -> [f64; 2] {
 
 fn largest(multipliers: impl Iterator<Item = Complex<f64>>) -> [f64; 2] {
     let largest = multipliers.max_by(|a, b| a.norm().total_cmp(&b.norm())).expect("a matrix has eigenvalues");
-    // Of a complex pair, the one in the upper half plane.
+    // Of a complex pair, returns the multiplier in the upper half plane.
     [largest.norm(), largest.arg().abs()]
 }

@@ -1,13 +1,11 @@
 //! The GPU engine: runs WGSL lanes on a graphics adapter.
 //!
-//! [`Gpu::open`] opens an adapter for one precision. [`Gpu::run`] integrates lanes and returns one [`Record`] per
-//! lane. It runs as many lanes at a time as the adapter's limits allow, by short dispatches over state that stays on
-//! the device. In a [`Pool`], lanes can begin and end at any time. The engine uses no files, and several threads only to
-//! compile shaders.
+//! [`Gpu::open`] opens an adapter for one precision. [`Gpu::run`] integrates lanes and returns one [`Record`] per lane. It runs as many
+//! lanes at a time as the adapter's limits allow, in short dispatches; the lanes' state stays on the device. In a [`Pool`], lanes can begin
+//! and end at any time. The engine uses no files. It uses several threads only to compile shaders.
 //!
-//! Lanes are independent of [`rattlemap_dynamics::motion`]: they read the description of the model
-//! ([`rattlemap_dynamics::model`]) and nothing else. A lane moves from event to event on a fixed grid of steps with
-//! the exact propagator; see `shaders/`.
+//! Lanes are independent of [`rattlemap_dynamics::motion`]: they use only the description of the model ([`rattlemap_dynamics::model`]). A
+//! lane moves from event to event on a fixed grid of steps with the exact propagator; see `shaders/`.
 
 mod adapter;
 mod averaging;
@@ -68,7 +66,7 @@ use dispatch_policy::DispatchPolicy;
 use rattlemap_dynamics::model::{Form, Law, Pair, State};
 use rattlemap_dynamics::orbit::Budget;
 
-/// Default limit of a lane's events, so that their count does not overflow.
+/// Default limit of the number of a lane's events, so that the counter does not overflow.
 const MOST_EVENTS: u32 = 1 << 31;
 
 /// Whether lanes with this meshing speed follow chatter by short flights.
@@ -90,8 +88,7 @@ pub struct Lane {
 /// How lanes are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneSettings {
-    /// Most forcing periods to integrate, without `undecided_periods`. The last of them read the cycle of a periodic
-    /// cell.
+    /// Largest number of forcing periods, without `undecided_periods`. The last periods are used to read the cycle of a periodic cell.
     pub periods: u32,
     /// Periods before averages begin; `exponent_from` if that is less and lanes stop early. Averages of periodic
     /// cells are taken over one cycle.
@@ -103,7 +100,7 @@ pub struct LaneSettings {
     pub early_stop: bool,
     /// Further periods for lanes that are undecided after `periods`; only with early stops.
     pub undecided_periods: u32,
-    /// Further periods for lanes that are chaotic after all others; only with exponents.
+    /// Further periods for lanes that are still chaotic after all other periods; only with exponents.
     pub confirm_chaos: u32,
     /// Whether records contain exponents.
     pub exponent: bool,
@@ -119,7 +116,8 @@ pub struct LaneSettings {
     pub chatter: bool,
     /// Features that flows may have.
     pub features: Features,
-    /// What is measured on motions whose class is decided. Lanes of machines do not measure; `measure_machines` completes their records.
+    /// Quantities to measure on motions whose class is decided. Lanes of machines do not measure; `measure_machines` completes their
+    /// records.
     pub measures: Option<Measures>,
     /// Whether records contain the largest multiplier of cycles.
     pub multiplier: bool,
@@ -127,24 +125,23 @@ pub struct LaneSettings {
     pub exponent_from: u32,
     /// First period at which a lane may stop as chaotic, with early stops.
     pub chaos_from: u32,
-    /// Standard errors by which the exponent must then exceed zero.
+    /// Number of standard errors by which the exponent of such a lane must exceed zero.
     pub chaos_errors: f32,
-    /// Least number of free steps per period; `None` for as many as the motion needs. More steps do not improve
-    /// results: rounding errors add up like a random walk, and a short flight that spans several steps loses the
-    /// relative accuracy of its gap.
+    /// Least number of free steps per period; `None` for the number that the motion needs. More steps do not improve results: rounding
+    /// errors add up like a random walk, and a short flight that spans several steps loses the relative accuracy of its gap.
     pub steps_per_period: Option<u32>,
-    /// Most lanes under way; `None` for as many as the adapter's limits allow.
+    /// Largest number of lanes under way; `None` for as many as the adapter's limits allow.
     pub batch: Option<usize>,
     /// Loop iterations that one dispatch may spend on a lane. Some drivers stop loops after 65,535 iterations.
     pub iterations: u32,
     /// Invocations per workgroup.
     pub workgroup: u32,
-    /// Passes per period above which a lane ends as too stiff.
+    /// Largest number of passes per period. A lane that needs more ends as too stiff.
     pub passes_per_period: u32,
-    /// Events per period above which a lane ends.
+    /// Largest number of events per period. A lane with more events ends.
     pub events_per_period: u32,
-    /// Events in all periods above which a lane ends. Checked once per period: this limit and the events of one period
-    /// together must be below 2^32.
+    /// Largest number of events in all periods. A lane with more events ends. The limit is checked once per period, so its sum with the
+    /// limit per period must be below 2^32.
     pub most_events: u32,
 }
 
@@ -154,13 +151,13 @@ impl LaneSettings {
         self.multiplier || self.measured_on_lanes().is_some()
     }
 
-    /// Returns what lanes measure themselves.
+    /// Returns the quantities that lanes measure; `None` for machines, which the processor measures.
     pub(super) fn measured_on_lanes(&self) -> Option<Measures> {
         self.measures.filter(|_| self.features.machine.is_none())
     }
 }
 
-/// What is measured on lanes whose class is decided. Impacts are always measured.
+/// Quantities to measure on lanes whose class is decided. Impacts are always measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Measures {
     /// Forcing periods over which aperiodic motion is measured, at least 1. Periodic motion is measured over a cycle.
@@ -239,13 +236,12 @@ impl LaneSettings {
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
 
 impl Drop for Gpu {
-    /// Waits until the driver works no more on a lost device, and leaves the device to the driver. The process may end
-    /// after this, and a driver that still works would use its own destroyed objects. The last owner of a lost device
-    /// would panic when it is dropped.
+    /// Waits until the driver has stopped working on a lost device, and never drops the device. The process may end afterwards, and a
+    /// driver that still works would then use objects that it has destroyed. Dropping the last owner of a lost device would panic.
     fn drop(&mut self) {
         if self.trouble.message().is_some() {
             let idle = wgpu::PollType::Wait { submission_index: None, timeout: Some(LONGEST_WAIT) };
-            // A driver that reports the loss here has stopped.
+            // A driver that reports the loss here has stopped working.
             let _ = catch_panic(|| self.device.poll(idle));
             std::mem::forget((self.device.clone(), (*self.queue).clone()));
         }
@@ -255,7 +251,7 @@ impl Drop for Gpu {
 /// A device that integrates lanes in one precision.
 pub struct Gpu {
     device: wgpu::Device,
-    /// Dropping a queue waits for it.
+    /// Dropping a queue waits for its work.
     queue: PanicFree<wgpu::Queue>,
     number: usize,
     info: wgpu::AdapterInfo,
@@ -293,8 +289,8 @@ impl Gpu {
         self.precision
     }
 
-    /// Compiles shaders after this call as `rewrite` changes their source. Measurements count work and compare forms
-    /// of a loop in this way.
+    /// After this call, `rewrite` changes the source of each shader before it is compiled. Measurements use this to count work and to
+    /// compare forms of a loop.
     #[doc(hidden)]
     pub fn rewrite_shaders(&mut self, rewrite: fn(String) -> String) {
         self.rewrite = Some(rewrite);
@@ -321,7 +317,7 @@ impl Gpu {
         self.halt.load(Ordering::Relaxed)
     }
 
-    /// Makes a call that may panic where the driver fails. Makes no call on a lost device.
+    /// Makes a call that may panic if the driver fails. On a lost device it makes no call.
     fn call<T>(&self, call: impl FnOnce() -> T) -> Result<T, GpuError> {
         self.trouble.check()?;
         catch_panic(call).map_err(|message| {
@@ -379,13 +375,13 @@ impl Gpu {
         self.run_on(&tables, lanes, settings).await
     }
 
-    /// Returns the loss of the device in place of an error that follows from it.
+    /// If the device is lost, returns this loss instead of an error that it caused.
     fn failure(&self, error: GpuError) -> GpuError {
         self.trouble.message().map_or(error, |message| GpuError::Lost { message })
     }
 
-    /// Derives the constants of flows and laws and uploads them, for any number of runs. `steps_per_period` is the
-    /// least number of free steps per forcing period; `None` for as many as the motion needs.
+    /// Derives the constants of flows and laws and uploads them, for any number of runs. `steps_per_period` is the least number of free
+    /// steps per forcing period; `None` for the number that the motion needs.
     ///
     /// # Errors
     /// [`GpuError::TooManyFlows`] if they do not fit one buffer, [`GpuError::OutOfMemory`] if
@@ -454,7 +450,7 @@ impl Gpu {
         let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, .. } = *settings;
         let LaneSettings { chatter, features, .. } = *settings;
         let keep = self.policy.keep;
-        // Where it saves time, lanes run without the tangent vector until they need it.
+        // Lanes run without the tangent vector until they need it, if this saves time.
         let growths: &[bool] = match (exponent, self.policy.late_tangent) {
             (false, _) => &[false],
             (true, true) => &[false, true],
@@ -502,7 +498,7 @@ impl Gpu {
         Ok(Pool::new(self, variants, settings))
     }
 
-    /// Returns the largest number of bytes of device memory that so many lanes take.
+    /// Returns the largest number of bytes of device memory for this number of lanes.
     pub(crate) fn bytes_of_lanes(&self, lanes: usize, settings: &LaneSettings) -> u64 {
         slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision, settings)
     }

@@ -1,4 +1,4 @@
-//! Turns panics of wgpu, where a driver fails, into errors.
+//! Turns panics of wgpu into errors. wgpu panics if a driver fails.
 //!
 //! wgpu 30 returns no error if a device is lost during a wait, and panics when it drops a partly created object. It
 //! has released its locks by then, and none of our state is inconsistent.
@@ -9,14 +9,13 @@ use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
 
 thread_local! {
-    /// Whether a panic of this thread becomes an error, so that it is not printed.
+    /// Whether a panic of this thread becomes an error and is not printed.
     static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
 static HOOK: Once = Once::new();
 
-/// Makes a call. If it panics, returns the message as an error and prints nothing. Where panics end the process (in
-/// web pages), they do so and are printed.
+/// Makes a call. If it panics, returns the message as an error and prints nothing. In web pages a panic ends the process and is printed.
 pub(super) fn catch_panic<T>(call: impl FnOnce() -> T) -> Result<T, String> {
     if cfg!(panic = "abort") {
         return Ok(call());
@@ -58,12 +57,12 @@ impl<T> Deref for PanicFree<T> {
 impl<T> Drop for PanicFree<T> {
     fn drop(&mut self) {
         let inner = self.0.take();
-        // The value is gone, so that its error concerns no caller.
+        // The error concerns no caller, because the value no longer exists.
         let _ = catch_panic(|| drop(inner));
     }
 }
 
-/// Returns the innermost cause, which wgpu lists last.
+/// Returns the innermost cause. wgpu lists it last.
 fn cause(text: &str) -> String {
     text.lines()
         .map(str::trim)
@@ -97,7 +96,7 @@ mod tests {
         assert_eq!(catch_panic(|| panic!("{poll}")), Err::<(), _>("Parent device is lost".to_owned()));
         assert_eq!(catch_panic(|| panic!("plain")), Err::<(), _>("plain".to_owned()));
         assert_eq!(catch_panic(|| panic!("")), Err::<(), _>("no reason is given".to_owned()));
-        // Nested calls.
+        // Tests nested calls.
         assert_eq!(catch_panic(|| catch_panic(|| panic!("inner"))), Ok(Err::<(), _>("inner".to_owned())));
         assert!(!IS_CAUGHT.get());
     }

@@ -21,7 +21,7 @@ use super::{Gpu, GpuError, Lane, LaneSettings};
 use rattlemap_dynamics::model::REST;
 use rattlemap_dynamics::orbit::Status;
 
-/// Most unchanged slots that are uploaded again to avoid one more transfer.
+/// Largest number of unchanged slots that are uploaded again to save a transfer.
 const WIDEST_GAP: usize = 1024;
 
 /// Lanes under way on a device. Lanes can begin at any time, and their records are available when they end, without
@@ -29,21 +29,21 @@ const WIDEST_GAP: usize = 1024;
 pub struct Pool {
     pub(super) settings: LaneSettings,
     pub(super) variants: Vec<Variant>,
-    /// Most slots.
+    /// Largest number of slots.
     most: usize,
     buffers: Option<Slots>,
-    /// Slots of the lanes under way, in the order in which they began: neighbours behave alike.
+    /// Slots of the lanes under way, in the order in which they began. Lanes that are neighbours in this order behave alike.
     active_list: Vec<u32>,
     /// Slots without a lane.
     free: Vec<u32>,
-    /// Lane and its number, by slot.
+    /// The lane in each slot, and the caller's number for it.
     lanes: Vec<(u32, Lane)>,
     /// Contents of the buffers, by slot.
     cells: Vec<Cell>,
     starts: Vec<f64>,
     /// Iterations of the next round.
     iterations: u32,
-    /// Whether a round is under way that no one waits for.
+    /// Whether a round is under way that was sent ahead, while the host reads results.
     is_ahead: bool,
 }
 
@@ -80,8 +80,8 @@ impl Pool {
         self.free.append(&mut self.active_list);
     }
 
-    /// Puts lanes at their starts. All lanes of a pool are on the same tables. Each lane has a number by which its
-    /// record is recognised.
+    /// Puts lanes at their starts. All lanes of a pool use the same tables. Each lane has a number by which the caller recognises its
+    /// record.
     ///
     /// # Errors
     /// [`GpuError::NoSuchCell`] if a lane names a missing flow or law; [`GpuError::OutOfMemory`] if there are more
@@ -103,13 +103,13 @@ impl Pool {
             }
         }
         self.make_room(gpu, lanes.len()).await?;
-        // A few lanes had long dispatches; with many more lanes the same dispatches would take longer in proportion.
+        // The number of iterations was chosen for fewer lanes. With many more lanes, such dispatches would take too long.
         self.iterations = (u64::from(self.iterations) * self.active_list.len() as u64
             / (self.active_list.len() + lanes.len()) as u64) as u32;
         // Takes the lowest slots, so that lanes that begin together are adjacent.
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.free.split_off(self.free.len() - lanes.len());
-        // In a browser, buffers belong to one thread.
+        // In a browser, buffers cannot be shared between threads, so the closure uses these two fields only.
         let Tables { constants, is_even, .. } = tables;
         let started: Vec<_> = lanes.par_iter().map(|(_, lane)| start(constants, is_even, lane)).collect();
         let size = self.settings.features.start_numbers();
@@ -140,8 +140,8 @@ impl Pool {
         Ok(())
     }
 
-    /// Integrates until at most `until` lanes are under way, or until some have ended and have waited for others, and returns
-    /// those that have ended. The result is empty only if a flag has stopped the device.
+    /// Integrates until at most `until` lanes are under way, or until some ended lanes have waited long enough for others. Returns the
+    /// lanes that have ended; none only if a flag has stopped the device.
     ///
     /// # Errors
     /// Errors of the device. The pool cannot be used afterwards.
@@ -166,7 +166,7 @@ impl Pool {
         };
         let variants: Vec<&Pipelines> = self.variants.iter().map(|variant| &gpu.pipelines[variant]).collect();
         gpu.call(|| buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings))?;
-        // The last variant that decides classes.
+        // Keeps the last of the variants that decide classes.
         let decided = self.variants.iter().rposition(|variant| variant.measures.is_none()).unwrap_or(0);
         let (active_lanes, settings) = (self.active_list.len(), &self.settings);
         let conclude = || buffers.conclude(gpu, variants[decided], &bindings, active_lanes, settings);
@@ -203,7 +203,7 @@ impl Pool {
         if needed <= had {
             return Ok(());
         }
-        // Doubles the slots, so that lanes move rarely; makes only those that are needed if memory is too small.
+        // Doubles the slots, so that lanes move rarely. If memory is too small for this, makes only the slots that are needed.
         let ample = needed.max(2 * had).min(self.most);
         let make = async |slots| {
             with_error_scopes(gpu, "lanes", slots, || Slots::new(gpu, slots, &self.settings)).await
@@ -243,7 +243,7 @@ fn stretches(slots: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
     found
 }
 
-/// Returns a lane's entry in the table of cells, and its start in lane units; no numbers if it is refused.
+/// Returns a lane's entry in the table of cells, and its start in lane units. The start of a refused lane is empty.
 fn start(constants: &[Option<Constants>], is_even: &[bool], lane: &Lane) -> (Cell, Vec<f64>) {
     let cell = Cell { flow_index: lane.flow, law_index: lane.law, refused: Status::Ok.code(), mirror: 0 };
     let refuse = |status: Status| (Cell { refused: status.code(), ..cell }, Vec::new());
@@ -251,7 +251,7 @@ fn start(constants: &[Option<Constants>], is_even: &[bool], lane: &Lane) -> (Cel
         None => refuse(Status::TooStiff),
         Some(_) if !lane.start.iter().all(|x| x.is_finite()) => refuse(Status::NonFinite),
         Some(constants) => {
-            // Machines have laws of their own, one for each flow.
+            // Each flow of a machine has its own law.
             let is_pair = constants.pair().is_some();
             let mirror = constants.mirror_symmetric && (!is_pair || is_even[lane.law as usize]);
             let law_index = if is_pair { lane.law } else { lane.flow };
@@ -279,8 +279,8 @@ mod tests {
         assert!(stretches(std::iter::empty()).is_empty());
     }
 
-    /// Few rounds, although the slowest lanes take ten times as long as most. The first round is as short as that of a map of
-    /// 1,024 x 1,024 cells. Iterations take the time of a card, so that this machine's speed changes no count.
+    /// A map takes few rounds, although its slowest lanes take ten times as long as most. The first round is as short as that of a map of
+    /// 1,024 x 1,024 cells. Iterations have the simulated duration of a card, so the speed of the test machine does not affect the counts.
     #[test]
     fn a_map_on_a_card_is_waited_for_a_few_times() {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
@@ -295,7 +295,7 @@ mod tests {
         let lanes: Vec<_> = (0..flows.len() as u32).map(lane).collect();
         let settings = LaneSettings::default();
         let tables = pollster::block_on(gpu.load(&flows, &laws, None)).unwrap();
-        // Half of the lanes are a first picture. A window of 256 x 256 has so few cells that its first round is long.
+        // Half of the lanes give a first picture. A window of 256 x 256 has so few cells that its first round is long.
         for (until, most, at_once) in [(lanes.len() / 2, 2, DEDICATED.at_once >> 6), (0, 12, at_once)] {
             gpu.policy.at_once = at_once;
             let mut pool = pollster::block_on(gpu.pool(&settings)).unwrap();
@@ -309,8 +309,8 @@ mod tests {
         }
     }
 
-    /// Runs lanes on a device that was changed before, and returns the error. Each of their rounds takes a software driver so
-    /// long that it has not ended when the host looks, even if the host is held up.
+    /// Runs lanes on a device that was changed before, and returns the error. Each round takes a software driver so long that it has not
+    /// ended when the host checks it, even if the host is delayed.
     fn error_after(change: impl FnOnce(&mut Gpu)) -> String {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
         change(&mut gpu);

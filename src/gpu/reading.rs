@@ -10,7 +10,7 @@ use crate::record::{Record, SymbolCode, joined, measures, valid};
 use rattlemap_dynamics::orbit::Quantities;
 use rattlemap_dynamics::word::Word;
 
-/// Growth per period, natural logarithms, below which all multipliers of a cycle are zero. WGSL has no infinity.
+/// Natural logarithm of the growth per period below which all multipliers of a cycle count as zero. WGSL has no infinity.
 const SUPERSTABLE_BELOW: f64 = -1e6;
 
 /// Results of a lane that has ended.
@@ -34,7 +34,7 @@ impl LaneResult {
         self.flow
     }
 
-    /// Returns what was measured along the motion.
+    /// Returns the quantities that were measured along the motion.
     pub fn quantities(&self, constants: &[Option<Constants>]) -> Option<Quantities> {
         measured::quantities(constants[self.flow as usize].as_ref()?, self.measured.as_deref()?)
     }
@@ -46,8 +46,8 @@ impl LaneResult {
         is_cycle.then(|| measured::multiplier(constants, measured))
     }
 
-    /// Returns its record. `constants` are those of the tables on which it ran. A million records take most of a
-    /// second: convert them on all cores.
+    /// Returns its record. `constants` belong to the tables with which the lane ran. A million records take most of a second: convert them
+    /// on all cores.
     pub fn record(&self, constants: &[Option<Constants>]) -> Record {
         let mut record = record(constants[self.flow as usize].as_ref(), &self.reading, &self.finding);
         if self.measured.is_some() {
@@ -58,7 +58,7 @@ impl LaneResult {
     }
 }
 
-/// Returns the record of a lane. A lane without constants was refused before it started.
+/// Returns the record of a lane. `None` for its constants means that the lane was refused before it started.
 fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -> Record {
     let status = finding.status;
     let Some(constants) = constants else { return Record { status, ..Record::default() } };
@@ -100,7 +100,8 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
     record
 }
 
-/// Returns the word at places of a spelling. If it is too long to be stored, returns its length and hash as an error.
+/// Returns the word that is stored at these places of a spelling. If the word is too long to be stored, returns its length and hash as an
+/// error.
 fn spelled(spelling: &[u32], symbols: usize, length: usize, gaps: usize) -> Result<Word, (u32, u64)> {
     let code = SymbolCode::of_gaps(gaps);
     let symbol = |i: usize| {

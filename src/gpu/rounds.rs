@@ -1,9 +1,9 @@
 //! Rounds of dispatches over the lanes under way, until few enough are left.
 //!
-//! Each part of a round lists the lanes that a variant has work for, in the order of the active list, and dispatches them
-//! a few times; the device decides how many workgroups they need. At its end the round counts the lanes that are left.
-//! The next round runs while the host checks the last one, and while it reads results. Rounds are short, because some
-//! drivers reset a device whose work takes seconds, and long enough that their overhead is small.
+//! Each part of a round lists the lanes for which a variant has work, in the order of the active list, and dispatches them a few times. The
+//! device computes how many workgroups they need. At its end the round counts the lanes that are left. The next round runs while the host
+//! checks the last one, and while it reads results. Rounds are short, because some drivers reset a device whose work takes seconds, and
+//! long enough that their overhead is small.
 
 use web_time::{Duration, Instant};
 
@@ -13,24 +13,24 @@ use super::stage::{Clock, DeviceTimes};
 use super::transfer::{Download, readback};
 use super::{Gpu, GpuError, Precision};
 
-/// Least iterations of a dispatch, and those of the first round: the overhead of a shorter dispatch exceeds its work.
+/// Least number of iterations of a dispatch, which the first round uses. The overhead of a shorter dispatch would exceed its work.
 pub(super) const FEWEST_ITERATIONS: u32 = 250;
 
-/// Number of lanes for which a round of so many iterations is short on every device. With many more lanes the minimum is
-/// lowered, so that the first round, whose duration is unknown, is no longer.
+/// Number of lanes for which a round of [`FEWEST_ITERATIONS`] is short on every device. With many more lanes fewer iterations are allowed,
+/// because the duration of the first round is unknown and must not be longer.
 const FEWEST_AT_ONCE: u32 = 1 << 14;
 
-/// Ratio by which hardware may be slower in f64 than in f32.
+/// Largest assumed ratio of the times of f64 and f32 on hardware.
 const SLOWER_IN_F64: u32 = 16;
 
 /// Longest time for which results are held back until the last lanes end.
 const LONGEST_HOLD: Duration = Duration::from_millis(500);
 
-/// Most variants of a pool.
+/// Largest number of variants of a pool.
 const VARIANTS: usize = 3;
 
-/// Byte offsets in a check. It begins with the lanes left for each variant; the counter of compactions and the
-/// timestamps follow.
+/// Byte offsets in a check. A check begins with the number of lanes left for each variant; the counter of compactions and the timestamps
+/// follow.
 const BEAT: u64 = 4 * VARIANTS as u64;
 const TIMES: u64 = 16;
 
@@ -48,7 +48,7 @@ pub(super) struct Rounds<'a> {
     pub(super) active_lanes: u32,
     /// Workgroups of a dispatch over the selected lanes, which the device has computed.
     pub(super) workgroups: &'a wgpu::Buffer,
-    /// Most iterations that one dispatch may spend on a lane.
+    /// Largest number of iterations that one dispatch may spend on a lane.
     pub(super) most_iterations: u32,
 }
 
@@ -62,19 +62,19 @@ struct BoundVariant<'a> {
 struct Round<'a> {
     check: &'a wgpu::Buffer,
     submission: wgpu::SubmissionIndex,
-    /// Which variants it dispatched.
+    /// The variants that it dispatched.
     ran: Vec<bool>,
     iterations: u32,
-    /// Bytes of its check.
+    /// Number of bytes of its check.
     bytes: u64,
 }
 
 impl Rounds<'_> {
-    /// Runs lanes until at most `until` are left. Also stops once some lanes have ended and a number of rounds, or
-    /// [`LONGEST_HOLD`] if `until` is zero, have passed since the call. Then calls `conclude`, which submits the copies of
-    /// results, and submits a further round for the time in which the host reads them. `iterations` are those of the first
-    /// dispatch, and of the last on return. `is_ahead` says whether such a further round was sent by the last call. Each variant continues lanes where the one before it stops. Returns the result
-    /// of `conclude`, and the device's times if a watcher measures.
+    /// Runs lanes until at most `until` are left. Also stops if some lanes have ended and the policy's number of rounds has passed since
+    /// the call; if `until` is zero, [`LONGEST_HOLD`] replaces this number. Then calls `conclude`, which submits the copies of results, and
+    /// submits a further round that runs while the host reads them. `iterations` is the number for the first dispatch; on return, for the
+    /// last one. `is_ahead` says whether the last call has sent such a further round. Each variant continues the lanes that the previous
+    /// variant leaves. Returns the result of `conclude`, and the device's times if a watcher measures.
     pub(super) async fn run<C>(
         &self,
         variants: &[&Pipelines],
@@ -92,7 +92,7 @@ impl Rounds<'_> {
             let checks = [(); 2].map(|()| readback(gpu, "check", TIMES + Clock::bytes(dispatches)));
             (clock, bound, checks)
         })?;
-        // Lanes that each variant may have work for, besides those that come from the variants before it.
+        // Number of lanes for which each variant may have work, without those that earlier variants pass on.
         let mut left = vec![0; variants.len()];
         left[0] = self.active_lanes;
         let most = self.most_iterations.max(1);
@@ -137,12 +137,12 @@ impl Rounds<'_> {
             if all_left <= until || gpu.is_halted() || has_waited && all_left < self.active_lanes {
                 break;
             }
-            // The first measured time includes the round that was sent ahead.
+            // The round that was sent ahead belongs to the first measured time.
             if checked > 1 || !*is_ahead {
                 *iterations = next_iterations(sent.iterations, took, gpu.policy.round).clamp(fewest, most);
             }
         }
-        // The last round belongs to the measured time, too; what follows waits for it anyway.
+        // The measured time includes the last round. All later work waits for this round anyway.
         if let (Some(clock), Some(sent)) = (&clock, before) {
             let take = |bytes: &[u8]| clock.times(&bytes[TIMES as usize..], &mut device_end);
             device = device.and(sent.check(gpu, take).await?);
@@ -167,8 +167,8 @@ impl Rounds<'_> {
         }
     }
 
-    /// Submits a round: for each variant its list of lanes and its dispatches, and then, if there is a check, a count of the
-    /// lanes that each has left.
+    /// Submits a round: for each variant, the list of its lanes and its dispatches. With a check, a count of the lanes that each variant
+    /// has left follows.
     fn send<'a>(
         &self,
         variants: &[BoundVariant<'_>],
@@ -180,7 +180,7 @@ impl Rounds<'_> {
         let gpu = self.gpu;
         gpu.write(self.settings, ITERATIONS, bytemuck::cast_slice(&[iterations, 0]));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        // A variant has work if one of the variants before it has: their lanes may reach it.
+        // If a variant has work, all later variants may receive lanes from it.
         let first = left.iter().position(|&left| left > 0).unwrap_or(0);
         let slot = check.map_or(0, |(slot, _)| slot);
         let mut dispatches = 0;
@@ -233,7 +233,7 @@ impl Round<'_> {
     }
 }
 
-/// Passes of the compaction after which the number of selected lanes is known.
+/// Number of passes of the compaction after which the number of selected lanes is known.
 const COUNTED: usize = 2;
 
 /// Returns the workgroups of a pass of the compaction.
@@ -241,7 +241,7 @@ pub(super) fn compacting(pass: usize, active_lanes: u32) -> Workgroups<'static> 
     Counted([if pass == 1 { 1 } else { active_lanes.div_ceil(BLOCK).min(65_535) }, 1])
 }
 
-/// Returns the number of lanes that a device integrates at once for [`FEWEST_ITERATIONS`].
+/// Returns the largest number of lanes that a device integrates with [`FEWEST_ITERATIONS`] in a short round.
 fn at_once(gpu: &Gpu) -> u32 {
     match gpu.precision {
         Precision::F32 => gpu.policy.at_once,
@@ -249,19 +249,19 @@ fn at_once(gpu: &Gpu) -> u32 {
     }
 }
 
-/// Returns the least iterations of a round with so many lanes.
+/// Returns the least number of iterations of a round with this number of lanes.
 fn fewest_iterations(lanes: u32, at_once: u32) -> u32 {
     (FEWEST_ITERATIONS * at_once / lanes.max(1)).clamp(1, FEWEST_ITERATIONS)
 }
 
-/// Returns the iterations of a round that should take `round`, from those of an earlier round and its duration.
-/// Results do not depend on them.
+/// Returns the number of iterations of a round that should take `round`, from an earlier round's iterations and duration. The number does
+/// not affect results.
 fn next_iterations(iterations: u32, took: Duration, round: Duration) -> u32 {
     let factor = round.as_secs_f64() / took.as_secs_f64().max(1e-6);
     (f64::from(iterations) * factor.clamp(0.25, 8.0)) as u32
 }
 
-/// Returns the workgroups in a row of the grid for so many lanes.
+/// Returns the number of workgroups in a row of the grid for this number of lanes.
 pub(super) fn row(gpu: &Gpu, lanes: usize, workgroup: u32) -> u32 {
     let groups = (lanes as u32).div_ceil(workgroup).max(1);
     let widest = gpu.device.limits().max_compute_workgroups_per_dimension;
@@ -288,7 +288,7 @@ pub(super) fn bind(
 pub(super) enum Workgroups<'a> {
     /// Columns and rows of workgroups.
     Counted([u32; 2]),
-    /// As many as the selected lanes need, as the device has computed.
+    /// The workgroups that the selected lanes need. The device has computed their number.
     Selected(&'a wgpu::Buffer),
 }
 
@@ -320,7 +320,7 @@ mod tests {
 
     #[test]
     fn rounds_approach_their_desired_duration() {
-        // 0.3 ms per iteration. The duration of a round is known when the next one already runs.
+        // 0.3 ms per iteration. The duration of a round becomes known while the next round runs.
         let (mut under_way, mut iterations) = (1000, 1000);
         for _ in 0..20 {
             let next = next_iterations(under_way, Duration::from_micros(300) * under_way, ROUND);

@@ -1,4 +1,4 @@
-//! Rules by which lanes judge their motion. The shaders are compiled with these numbers; validation uses them, too.
+//! Rules by which lanes judge their motion. Shaders are compiled with these numbers; validation also uses them.
 
 use super::precision::Precision;
 use rattlemap_dynamics::machine::LOWEST_FLIGHT;
@@ -15,28 +15,28 @@ use rattlemap_dynamics::stability::CORRELATION_MARGIN;
 /// the rate of free motion. At higher speeds short flights are too few to save time.
 pub(crate) const FOLLOWED_MESH_SPEED: f64 = 4e-4;
 
-/// Fewest blocks of growth after which a lane may stop as chaotic: fewer give no standard error.
+/// Fewest blocks of growth after which a lane may stop as chaotic. Fewer blocks give no standard error.
 pub(crate) const FEWEST_BLOCKS: u32 = 6;
 
-/// Resolution of recurrence distances, in parts of an octave below the size of the motion: 4 means half.
+/// Parts per octave in which recurrence distances are stored. A distance of 4 parts means half of the size of the motion.
 pub(crate) const PARTS_PER_OCTAVE: u32 = 4;
 
 /// Largest distance of a recurrence, in parts of an octave: 2^-6 of the motion.
 pub(crate) const RECURRENCE_LIMIT: u32 = 24;
 
-/// Length of a recurrence window: this fraction (one fifth) of the time that has passed.
+/// A recurrence window lasts this fraction (one fifth) of the elapsed time.
 pub(crate) const WINDOW_SHARE: u32 = 5;
 
-/// Most steps of Newton's method towards one cycle.
+/// Largest number of steps of Newton's method towards one cycle.
 pub(crate) const MOST_NEWTON_STEPS: u32 = 5;
 
-/// Longest Newton step, relative to the motion. From farther away, the strobe map may have a fold before the cycle.
+/// Longest Newton step, relative to the motion. On a longer way to the cycle, the strobe map may have a fold.
 pub(crate) const LONGEST_NEWTON_STEP: f64 = 3e-2;
 
 /// Number of last strobes by which a lane judges whether it approaches a cycle.
 pub(crate) const TRAIL: usize = 32;
 
-/// Failed Newton searches after which a lane makes no more.
+/// Number of failed Newton searches after which a lane makes no further ones.
 pub(crate) const MOST_FAILED_SEARCHES: u32 = 2;
 
 /// Largest distance of a symmetric cycle from its mirror image, and of equal states: 2^-12 of the motion.
@@ -45,8 +45,8 @@ pub(crate) const MIRROR_DISTANCE: f64 = 2.44e-4;
 /// Largest distance of a settled lane from its cycle, relative to the motion.
 pub(crate) const ON_CYCLE: f64 = 1e-4;
 
-/// Returns the largest distance from its cycle, relative to the motion, at which a motion counts as settled at the end of
-/// its budget. In f64 it is that of the reference.
+/// Returns the largest distance from its cycle, relative to the motion, at which a motion counts as settled at the end of its budget. In
+/// f64 it is the value of the reference.
 pub(crate) const fn settled_distance(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => ON_CYCLE,
@@ -75,7 +75,7 @@ pub(crate) const fn on_strobe(precision: Precision) -> f64 {
     }
 }
 
-/// Returns the scatter of a settled lane's strobes, relative to the motion, if nothing amplifies it.
+/// Returns the scatter of a settled lane's strobes by rounding, relative to the motion, without amplification.
 pub(crate) const fn noise(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 4e-6,
@@ -83,7 +83,7 @@ pub(crate) const fn noise(precision: Precision) -> f64 {
     }
 }
 
-/// Returns the recurrence distance that is rounding error, in parts of an octave: it need not shrink.
+/// Returns the recurrence distance, in parts of an octave, below which distances are rounding errors and need not shrink.
 pub(crate) const fn within_rounding(precision: Precision) -> u32 {
     match precision {
         Precision::F32 => 60,

@@ -7,9 +7,9 @@ use rattlemap_dynamics::model::{Form, GearPair, REST, State, state};
 /// Forcing periods from rest to the answers.
 const PERIODS: u32 = 20;
 
-/// Restitution and frequency of the paper's pair, and its state after [`PERIODS`] periods from rest, computed by the
-/// reference: meshing on both sides, impacts, long chatter, and no contact. Drivers that stop long loops or lose
-/// double precision fail at least one of them.
+/// Restitution and frequency of the paper's gear pair, and its state after [`PERIODS`] periods from rest, computed by the reference. The
+/// cases are meshing on both sides, impacts, long chatter, and no contact. Drivers that stop long loops or lose double precision fail at
+/// least one of them.
 const ANSWERS: [(f64, f64, State); 4] = [
     (0.06, 5.6, state(&[-1.1109238855820154, 2.276300122629451, -1.2325975673960383, -2.2388145312446635])),
     (0.605, 5.6, state(&[-1.1845082044663513, 2.232746822969534, -1.1056690234652184, -1.8839235166200696])),
@@ -90,7 +90,7 @@ mod tests {
             check(gpu, pool.variants, &settings).await
         };
         pollster::block_on(run_check(&mut gpu)).unwrap();
-        // The forcing's part in a step, 1 % too large.
+        // Makes the forcing's part in a step 1 % too large.
         gpu.rewrite_shaders(|source| source.replace("(m[4] * c +", "(1.01 * m[4] * c +"));
         let error = pollster::block_on(run_check(&mut gpu)).unwrap_err();
         assert!(matches!(error, GpuError::WrongAnswer { .. }), "{error}");

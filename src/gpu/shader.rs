@@ -1,4 +1,4 @@
-//! Shader variants: one source, composed of small files.
+//! Shader variants. Their sources are composed of the same small files.
 
 use super::Measures;
 use super::features::Features;
@@ -36,7 +36,7 @@ pub struct Variant {
     pub chatter: bool,
     /// Features that oscillators may have.
     pub features: Features,
-    /// What this variant measures on lanes whose class is decided; none in a variant that decides classes.
+    /// Quantities that this variant measures on lanes whose class is decided; `None` in a variant that decides classes.
     pub measures: Option<Measures>,
     /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
     pub keep: bool,
@@ -45,7 +45,7 @@ pub struct Variant {
 /// Default number of invocations per workgroup.
 pub(super) const WORKGROUP: u32 = 64;
 
-/// What both engines of motion have in common.
+/// Sources that both engines of motion share.
 const COMMON: &str = concat!(
     include_str!("../../shaders/layout.wgsl"),
     include_str!("../../shaders/turn.wgsl"),
@@ -64,7 +64,7 @@ const COMMON: &str = concat!(
     include_str!("../../shaders/record.wgsl"),
 );
 
-/// The motion of oscillators with one gap.
+/// Sources for the motion of oscillators with one gap.
 const OSCILLATOR: &str = concat!(
     include_str!("../../shaders/pair/tables.wgsl"),
     include_str!("../../shaders/pair/oscillator.wgsl"),
@@ -85,7 +85,7 @@ const OSCILLATOR: &str = concat!(
     include_str!("../../shaders/pair/measure.wgsl"),
 );
 
-/// The motion of machines.
+/// Sources for the motion of machines.
 const MACHINE: &str = concat!(
     include_str!("../../shaders/machine/layout.wgsl"),
     include_str!("../../shaders/machine/series.wgsl"),

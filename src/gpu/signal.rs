@@ -34,7 +34,7 @@ impl<T> Future for Signal<T> {
     type Output = T;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<T> {
-        // The callback only stores a value: the delivery of a poisoned lock is valid.
+        // The callback only stores a value, so the value behind a poisoned lock is valid.
         let mut delivery = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         match delivery.value.take() {
             Some(value) => Poll::Ready(value),

@@ -11,7 +11,7 @@ use super::transfer::{Download, buffer, from_reals, indirect, readback, upload};
 use super::{Gpu, GpuError, LaneSettings, Precision};
 use crate::record::limits::LONGEST_CYCLE;
 
-/// What lanes have returned: their averages, what was found out about them, and what was measured on them, if anything was.
+/// Results of lanes: averages, findings, and measured quantities if any were measured.
 pub(super) type Returned = (Vec<Reading>, Vec<Finding>, Vec<Box<[f64]>>);
 
 /// Byte offset, in the shader's settings, of the flag that selects lanes for compaction.
@@ -32,7 +32,7 @@ pub(super) struct Slots {
     blocks: wgpu::Buffer,
     readings: wgpu::Buffer,
     findings: wgpu::Buffer,
-    /// What was measured on lanes, and the buffer in which the host reads it; of one lane if nothing is measured.
+    /// Measured quantities of lanes, and the buffer in which the host reads them. If nothing is measured, both have room for one lane.
     measured: [wgpu::Buffer; 2],
     /// Workgroups of a dispatch over the lanes that a compaction has selected.
     pub(super) workgroups: wgpu::Buffer,
@@ -58,7 +58,7 @@ fn findings(bytes: &[u8], size: usize) -> Vec<Finding> {
     bytes.par_chunks_exact(size).map(widened).collect()
 }
 
-/// Separates the readings of lanes. Numbers that a state does not have are zero.
+/// Splits the readings into those of single lanes. Entries that a state does not have are zero.
 fn readings(numbers: &[f64], dim: usize) -> Vec<Reading> {
     let size = Reading::numbers(dim);
     let widened = |numbers: &[f64]| {
@@ -70,7 +70,7 @@ fn readings(numbers: &[f64], dim: usize) -> Vec<Reading> {
     numbers.par_chunks_exact(size).map(widened).collect()
 }
 
-/// Returns the bytes of device memory that so many slots take.
+/// Returns the number of bytes of device memory for a number of slots.
 pub(super) fn bytes(slots: usize, precision: Precision, settings: &LaneSettings) -> u64 {
     let dim = settings.features.dim();
     let measured = if settings.gathers() { 2 * Measured::numbers(dim) } else { 0 };
@@ -131,7 +131,7 @@ impl Slots {
         ]
     }
 
-    /// Returns the workgroups for so many lanes.
+    /// Returns the number of workgroups for a number of lanes.
     pub(super) fn grid(&self, lanes: u32) -> Workgroups<'static> {
         let groups = lanes.div_ceil(self.workgroup).max(1);
         Counted([groups.min(self.row), groups.div_ceil(self.row)])

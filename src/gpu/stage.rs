@@ -3,14 +3,14 @@
 /// A stage that lanes have reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stage {
-    /// The device has received them.
+    /// The device has received the lanes.
     Uploaded,
-    /// They have ended, or many of them have.
+    /// All or many of the lanes have ended.
     Integrated {
-        /// Times by the device's clock; `None` if it has none.
+        /// Times by the device's clock; `None` if the device has no clock.
         device: Option<DeviceTimes>,
     },
-    /// Their records have been read.
+    /// The records of the lanes have been read.
     Read,
 }
 
@@ -28,7 +28,7 @@ pub struct DeviceTimes {
 }
 
 impl DeviceTimes {
-    /// Returns the times of both, one after the other.
+    /// Returns the times of two successive measurements as one.
     pub fn and(self, other: DeviceTimes) -> DeviceTimes {
         DeviceTimes {
             busy: self.busy + other.busy,
@@ -51,17 +51,17 @@ pub(super) struct Clock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     seconds_per_tick: f64,
-    /// Most pairs of a submission.
+    /// Largest number of pairs of a submission.
     pairs: u32,
 }
 
 impl Clock {
-    /// Returns the bytes that [`Clock::copy`] writes for a submission with so many dispatches.
+    /// Returns the number of bytes that [`Clock::copy`] writes for a submission with this number of dispatches.
     pub(super) fn bytes(dispatches: u32) -> u64 {
         PAIR * u64::from(1 + dispatches)
     }
 
-    /// Creates the clock of submissions with at most so many dispatches; `None` if the device has no timestamps.
+    /// Creates the clock of submissions with at most this number of dispatches; `None` if the device has no timestamps.
     pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, dispatches: u32) -> Option<Clock> {
         if !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
@@ -82,7 +82,7 @@ impl Clock {
         Some(Clock { queries, resolved, seconds_per_tick, pairs })
     }
 
-    /// Returns the timestamps of a pass of submission `slot` (0 or 1). Only the first and the last pass have any.
+    /// Returns the timestamps of a pass of submission `slot` (0 or 1). Only the first and the last pass have timestamps.
     pub(super) fn writes(
         &self,
         slot: u32,
@@ -107,7 +107,7 @@ impl Clock {
         }
     }
 
-    /// Copies the timestamps of submission `slot` with so many dispatches to `readback`, from byte `at` on.
+    /// Copies the timestamps of submission `slot` with this number of dispatches to `readback`, from byte `at` on.
     pub(super) fn copy(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -121,8 +121,8 @@ impl Clock {
         encoder.copy_buffer_to_buffer(&self.resolved, from, readback, at, Clock::bytes(dispatches));
     }
 
-    /// Returns the times of a submission from its copied timestamps. `last_end` is the end of the one before, and
-    /// becomes the end of this one.
+    /// Returns the times of a submission from its copied timestamps. `last_end` is the end of the previous submission; it is set to the end
+    /// of this one.
     pub(super) fn times(&self, copied: &[u8], last_end: &mut Option<u64>) -> DeviceTimes {
         let tick = |at: usize| bytemuck::pod_read_unaligned::<u64>(&copied[at..at + 8]);
         let seconds = |from: u64, to: u64| to.saturating_sub(from) as f64 * self.seconds_per_tick;
@@ -143,7 +143,7 @@ impl Clock {
     }
 }
 
-/// Returns the bytes from one submission's timestamps to the other's, in wgpu's alignment.
+/// Returns the number of bytes between the timestamps of the two submissions, in wgpu's alignment.
 fn stride(pairs: u32) -> u64 {
     (PAIR * u64::from(pairs)).next_multiple_of(wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT)
 }

@@ -23,30 +23,30 @@ pub struct Tables {
     pub(super) constants: Vec<Option<Constants>>,
     /// Whether each law is the same at both walls.
     pub(super) is_even: Vec<bool>,
-    /// Different features of flows, each with the first flow that has them.
+    /// The different sets of features of flows, each with the first flow that has it.
     pub(super) features: Vec<(usize, Features)>,
-    /// The first page of each flow, then the further pages.
+    /// The first page of each flow, followed by the further pages of all flows.
     pub(super) flows: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
-    /// Zeros of a missing harmonic; phasors of the first harmonic, constants of the higher ones, and changes of stages.
+    /// Zeros for missing harmonics; phasors of the first harmonic; constants of the higher harmonics; changes of stages.
     pub(super) pairs: wgpu::Buffer,
     pub(super) laws: wgpu::Buffer,
 }
 
-/// Number of copies of all constants during an upload, at most: the host's in f64, that in the lanes' precision, the
-/// driver's, and the device's if it shares the host's memory.
+/// Largest number of copies of all constants during an upload: the host's copy in f64, its copy in the lanes' precision, the driver's, and
+/// the device's if it shares the host's memory.
 pub(crate) const COPIES: u64 = 4;
 
-/// Flows whose constants are rounded and given to the driver at a time, so that this memory is used again.
+/// Number of flows whose constants are rounded and given to the driver at a time, so that the same memory is used again.
 const FLOWS_AT_A_TIME: usize = 1024;
 
-/// Most flows that are uploaded at a time if there are too many for one upload, and most bytes that their constants
-/// then take. So many lanes keep hardware busy.
+/// Largest number of flows, and of bytes of their constants, in one upload if several uploads are needed. This number of lanes keeps
+/// hardware busy.
 pub(crate) const MOST_FLOWS: usize = 1 << 16;
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
-/// Returns the most bytes of memory that the constants of one flow take, and those of all phasors for its steps, which
-/// flows with equal steps share.
+/// Returns the largest number of bytes of memory for the constants of one flow, and for the phasors of its steps. Flows with equal steps
+/// share the phasors.
 pub(crate) fn bytes(oscillator: impl Into<Form>, steps: Option<u32>) -> [u64; 2] {
     let phasors = steps.map_or(0, |steps| u64::from(steps) + 1);
     let oscillator = match oscillator.into() {
@@ -69,7 +69,7 @@ pub(crate) fn bytes(oscillator: impl Into<Form>, steps: Option<u32>) -> [u64; 2]
 /// Returns the pairs that describe a change of the stage: whole free steps and the fraction of the next one, and the flow
 /// that begins.
 fn pairs_of(change: &Change, flow: u32, precision: Precision) -> [[f64; 2]; 2] {
-    // The fraction stays below 1 where it is rounded.
+    // Keeps the fraction below 1 when it is rounded.
     let rounding = match precision {
         Precision::F32 => f64::from(f32::EPSILON),
         Precision::F64 => f64::EPSILON,
@@ -88,7 +88,7 @@ impl Tables {
         [&self.flows, &self.shapes, &self.pairs, &self.laws].map(wgpu::Buffer::size).iter().sum()
     }
 
-    /// Returns the constants, for the next tables to overwrite.
+    /// Returns the vector of the constants, whose memory the next tables use again.
     pub(crate) fn into_constants(self) -> Vec<Option<Constants>> {
         self.constants
     }
@@ -186,7 +186,7 @@ impl Tables {
     ) -> Result<Tables, GpuError> {
         let count = constants.len();
         let (mut flows, mut shapes, mut table) = (Vec::new(), Vec::new(), Vec::new());
-        // Each machine has a law for each wall.
+        // Each machine has a law for each of its walls.
         let mut of_flows = Vec::new();
         let (mut grids, mut machines) = (HashMap::new(), HashMap::new());
         let mut features: Vec<(usize, Features)> = Vec::new();
@@ -235,12 +235,12 @@ impl Tables {
     }
 }
 
-/// Returns sizes that suffice for all machines; none if the flows are pairs.
+/// Returns sizes that suffice for all machines; `None` if the flows are pairs.
 fn machine_shape(constants: &[Option<Constants>]) -> Option<MachineShape> {
     constants.iter().flatten().filter_map(|constants| constants.features.machine).reduce(MachineShape::and)
 }
 
-/// Rounds the constants of flows and uploads them, those of further pages last; `size` is that of a flow in the lanes'
+/// Rounds the constants of flows and uploads them; further pages follow all first pages. `size` is the size of a flow in the lanes'
 /// precision.
 fn upload_flows(
     gpu: &Gpu,

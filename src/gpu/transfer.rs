@@ -54,7 +54,7 @@ pub(super) fn buffer(gpu: &Gpu, label: &'static str, size: usize) -> wgpu::Buffe
     })
 }
 
-/// Creates a buffer for the size of a dispatch, which the device computes.
+/// Creates a buffer for the number of workgroups of a dispatch, which the device computes.
 pub(super) fn indirect(gpu: &Gpu) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("workgroups"),
@@ -99,7 +99,7 @@ impl<'b> Download<'b> {
 
     /// Passes the bytes to `take`. Native drivers deliver them in [`Gpu::wait`].
     pub(super) async fn take<T>(self, gpu: &Gpu, take: impl FnOnce(&[u8]) -> T) -> Result<T, GpuError> {
-        // The buffer stays mapped, so that nothing can be copied into it any more.
+        // The buffer stays mapped, so no further copy into it is possible.
         let lost = |message: String| {
             gpu.trouble.note(message.clone());
             gpu.failure(GpuError::Lost { message })
@@ -113,7 +113,7 @@ impl<'b> Download<'b> {
     }
 }
 
-/// Work that a host has given to a device since it was opened.
+/// Amount of work that the host has given to a device since the device was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Dispatches of shaders.

@@ -1,7 +1,7 @@
 //! Unrolling of the shaders' series.
 //!
-//! Drivers keep an array in registers only if every index is a constant, and do not unroll loops with a variable
-//! bound. Loops over Taylor terms are therefore written with a marker,
+//! Drivers keep an array in registers only if every index is a constant. They do not unroll loops with a variable bound. Loops over Taylor
+//! terms are therefore written with a marker,
 //!
 //! ```text
 //! //% for k in FIRST..LAST      (or LAST-1 down to FIRST: "for k in FIRST..LAST down")
@@ -9,8 +9,8 @@
 //! //% end
 //! ```
 //!
-//! and are copied once per term before they are compiled. A loop with a name can be repeated over other terms in a
-//! function that uses the same variable names:
+//! and are copied once per term before compilation. A loop with a name can be repeated over other terms in a function that uses the same
+//! variable names:
 //!
 //! ```text
 //! //% for k in FIRST..LAST: NAME
@@ -21,7 +21,7 @@
 
 use std::collections::HashMap;
 
-/// Returns the source with every marked loop copied out. The bounds of loops may contain the constants in `names`.
+/// Returns the source with every marked loop unrolled. The bounds of loops may contain the constants in `names`.
 pub(super) fn unroll(source: &str, names: &[(&str, u32)]) -> String {
     let mut out = String::with_capacity(4 * source.len());
     let copies = |body: &[&str], range: &str| -> String {

@@ -1,4 +1,4 @@
-//! One cell and its computations on the reference.
+//! One cell of a finished map, and the computations of this cell on the reference.
 
 use std::sync::atomic::AtomicBool;
 
@@ -19,8 +19,8 @@ use rattlemap_dynamics::motion::{Allowance, Trajectory};
 use rattlemap_dynamics::orbit::{self, Budget, Class, Status, measure_until};
 use rattlemap_dynamics::stability::{UNIT, multipliers};
 
-/// Returns the smallest relative difference of a state or parameter that an engine of this precision resolves: several
-/// rounding units, because errors accumulate over the steps of a period.
+/// Returns the smallest relative difference of a state or parameter that an engine of this precision resolves: several rounding units,
+/// because errors accumulate over the steps of a period.
 pub(super) fn resolution(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 1e-6,
@@ -28,15 +28,16 @@ pub(super) fn resolution(precision: Precision) -> f64 {
     }
 }
 
-/// Largest relative change of the meshing speed that is attributed to rounding.
+/// Largest relative change of the meshing speed that rounding can explain.
 const MOST_OF_MESH_SPEED: f64 = 2e-3;
 
 /// Number of perturbed motions that measure the effect of rounding on a cycle.
 const TURNS: u64 = 6;
-/// Factor by which a lane may deviate farther than perturbed motions: a lane rounds at every step, not once per period.
+/// Factor by which a lane may deviate farther than perturbed motions. A lane rounds at every step; perturbed motions are changed once per
+/// period.
 pub(super) const ROUNDING_FACTOR: f64 = 8.0;
 
-/// Multiple of the budget for which a slow approach to a cycle is followed.
+/// Multiple of the budget over which a slow approach to a cycle is followed.
 const FOLLOWED: u32 = 8;
 
 /// A cell of a finished map.
@@ -101,7 +102,7 @@ impl<'a> Cell<'a> {
         budget
     }
 
-    /// Whether all numbers of a record that must be finite are finite.
+    /// Whether all numbers of the record are finite that must be finite.
     pub(super) fn is_finite(&self, record: &Record) -> bool {
         not_finite(record, &self.budget).is_none()
     }
@@ -111,13 +112,13 @@ impl<'a> Cell<'a> {
         self.budget.longest()
     }
 
-    /// Computes the cell with the reference as an engine does, with early stops.
+    /// Computes the cell with the reference and early stops, as an engine does.
     pub(super) fn again(&self, needs: &Needs) -> Record {
         let measured = measure_until(&self.flow, self.law, self.start, &self.budget, self.halt);
         measured.map_or(Record::default(), |measured| measured_record(&measured, needs))
     }
 
-    /// Computes the cell with early stops, and chaos for this number of further periods.
+    /// Computes the cell with early stops; chaos must last for this number of further periods.
     pub(super) fn followed(&self, periods: u32) -> Record {
         let confirm_chaos = self.budget.confirm_chaos.saturating_add(periods);
         let budget = Budget { early_stop: true, confirm_chaos, quantities: false, ..self.budget };
@@ -160,7 +161,7 @@ impl<'a> Cell<'a> {
         impact_walls(&mut oscillator).map(|wall| wall.mesh_speed).collect()
     }
 
-    /// Computes the cell with this multiple of all meshing speeds.
+    /// Computes the cell with all meshing speeds multiplied by this factor.
     pub(super) fn with_mesh_speeds(&self, factor: f64) -> Answer {
         let Ok(mut oscillator) = self.model.oscillator() else { return Answer::new(Record::default(), None) };
         impact_walls(&mut oscillator).for_each(|wall| wall.mesh_speed *= factor);
@@ -172,7 +173,7 @@ impl<'a> Cell<'a> {
         self.reached(&self.flow, self.law, start)
     }
 
-    /// Computes the `k`th perturbed cell. With `every_period` the state is perturbed after each transient period, too.
+    /// Computes the `k`th perturbed cell. With `every_period` the state is also perturbed after each transient period.
     pub(super) fn perturbed_truth(&self, k: u64, every_period: bool) -> Option<Answer> {
         let mut moved = self.perturbed(k)?;
         if every_period {
@@ -247,7 +248,7 @@ impl<'a> Cell<'a> {
         spread.is_finite() && earlier <= ROUNDING_FACTOR * spread
     }
 
-    /// Returns logarithms of the largest multiplier over `period` periods, for motions perturbed after each period.
+    /// Returns logarithms of the largest multiplier over `period` periods. The motions are perturbed after each period.
     pub(super) fn multipliers_from(&self, state: State, period: u32) -> Vec<f64> {
         let log_radius = |end: Trajectory<'_, 4>| {
             let [re, im] = *multipliers(&end.unit_images())?.first()?;
@@ -289,7 +290,7 @@ impl<'a> Cell<'a> {
         [position, largest(1).max(self.flow.omega * position)]
     }
 
-    /// Builds the `k`th perturbed cell: every parameter and the start move at random within the resolution.
+    /// Builds the `k`th perturbed cell: every parameter and the start change at random within the resolution.
     fn perturbed(&self, k: u64) -> Option<Perturbed<'_>> {
         let mut random = Random::new(self.seed ^ k);
         let mut model = self.model.clone();
@@ -338,7 +339,7 @@ fn impact_walls(oscillator: &mut Oscillator) -> impl Iterator<Item = &mut Wall> 
     walls.filter(|wall| !wall.contact.is_elastic())
 }
 
-/// Draws a relative change by rounding over one period.
+/// Draws a random relative change, as rounding over one period may cause it.
 fn share(random: &mut Random, resolution: f64) -> f64 {
     resolution * (2.0 * random.unit() - 1.0)
 }

@@ -1,9 +1,8 @@
 //! Averages of chaotic motion, compared as distributions over the class.
 //!
-//! The averages of one chaotic cell within its budget scatter. Therefore the reference computes each chaotic cell of the
-//! uniform sample twice more, over as many periods and from starts within the engine's resolution. If the engine is
-//! right, the differences of the record from the first result have the distribution of the differences of the second
-//! from the first. The two samples are compared by the Kolmogorov-Smirnov statistic.
+//! The averages of a chaotic cell over its budget scatter. Therefore the reference computes each chaotic cell of the uniform sample twice,
+//! over the same number of periods and from starts within the engine's resolution. If the engine is right, record and second result differ
+//! from the first result by numbers of the same distribution. The two samples are compared by the Kolmogorov-Smirnov statistic.
 
 use super::cell::Cell;
 use crate::record::classify::classify;
@@ -14,10 +13,11 @@ use rattlemap_dynamics::orbit::Class;
 /// Smallest number of cells for a test.
 const FEWEST: usize = 8;
 
-/// Probability that the test rejects a right map.
+/// Probability that the test rejects a correct map.
 const FALSE_ALARM_RATE: f64 = 1e-4;
 
-/// Number of compared averages: exponent, logarithm of its error, impacts, meshing, and the first number of each measured quantity.
+/// Number of compared averages: exponent, logarithm of its error, impacts, fraction of meshing, and the first number of each measured
+/// quantity.
 const COUNT: usize = NAMES.len() + GROUPS.len();
 const NAMES: [&str; 4] = ["lyapunov", "lyapunov_error", "impacts_per_period", "mesh_fraction"];
 
@@ -30,9 +30,9 @@ pub struct ChaosTest {
     pub cells: usize,
     /// Largest distance of the two distribution functions.
     pub distance: f64,
-    /// Distance that chance exceeds once in 10,000 tests; none if there are too few cells.
+    /// Distance that a correct map exceeds by chance once in 10,000 tests; none if there are too few cells.
     pub bar: Option<f64>,
-    /// Mean differences from the reference: of the map, and of the reference's second result.
+    /// Mean differences from the reference's first result: of the map, and of the reference's second result.
     pub means: [f64; 2],
 }
 
@@ -43,8 +43,8 @@ impl ChaosTest {
     }
 }
 
-/// Differences of one cell from the reference: of the record, and of the reference's second result. None for an average
-/// that one side lacks.
+/// Differences of one cell from the reference's first result: of the record, and of the reference's second result. None for an average that
+/// one side lacks.
 pub(super) type Differences = [Option<[f64; 2]>; COUNT];
 
 /// Computes the differences of one cell; none unless all three results are chaotic.
@@ -53,7 +53,7 @@ pub(super) fn differences(cell: &Cell<'_>) -> Option<Differences> {
     if classify(record) != Class::Chaotic {
         return None;
     }
-    // Large indices, because `explain` uses those from zero.
+    // Large indices, because `explain` uses small ones.
     let [first, second] = [1 << 16, 1 << 17].map(|k| cell.averages(k, record.periods_run));
     let (first, second) = (first?, second?);
     if [&first, &second].iter().any(|side| classify(side) != Class::Chaotic) {

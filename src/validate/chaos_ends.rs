@@ -18,7 +18,7 @@ use rattlemap_dynamics::orbit::Class;
 /// Default number of further periods.
 pub const CHAOS_PERIODS: u32 = 6000;
 
-/// Number of cells in a sample per cell that is followed.
+/// One cell is followed for this number of cells in the sample.
 const SAMPLES_PER_CELL: usize = 5;
 
 /// Result of the further periods.
@@ -43,7 +43,7 @@ pub struct ChaosEnd {
     pub indices: [usize; 2],
     /// Its class after the chaos.
     pub class: Class,
-    /// Number of periods, from the start, after which the class was known.
+    /// Number of periods from the start after which the class after the chaos was known.
     pub periods_run: u32,
 }
 

@@ -29,13 +29,13 @@ pub enum Field {
     Pattern,
     /// Whether the cycle is its own mirror image, if the periods agree.
     Symmetric,
-    /// The exponent. For cycles the largest multiplier is compared, otherwise the exponent with wide tolerances.
+    /// The exponent. For cycles the largest multiplier is compared instead. Otherwise the exponent is compared with wide tolerances.
     Exponent,
     /// The attractor of the start in a map of basins, if both are periodic.
     Attractor,
     /// Impacts per forcing period.
     Impacts,
-    /// Fraction of time spent meshing.
+    /// Fraction of the time spent meshing.
     Mesh,
     /// A measured quantity, by its index in the table of [`GROUPS`].
     Measured(usize),
@@ -113,7 +113,7 @@ pub struct Difference {
     pub judge: Value,
 }
 
-/// A compared field with its difference, if there is one.
+/// A compared field, and its difference if the two sides differ.
 pub(super) type Compared = (Field, Option<Difference>);
 
 /// Result of a computation of a cell.
@@ -128,7 +128,7 @@ pub(super) struct Answer {
 #[derive(Clone, Debug)]
 struct Either {
     own: Option<Spelling>,
-    /// None for a long word of which only a hash is known.
+    /// None for a long word, of which only the hash is known.
     mirrored: Option<Spelling>,
 }
 
@@ -142,7 +142,7 @@ impl Either {
         Either { own, mirrored }
     }
 
-    /// Whether a text is that of the word or of its mirror image.
+    /// Whether a text spells the word or its mirror image.
     fn is(&self, ours: &Spelling) -> bool {
         let length = |spelling: &Spelling| match spelling {
             Spelling::Whole(word) => word.len() as u32,
@@ -155,7 +155,7 @@ impl Either {
         }
     }
 
-    /// Compares with another text; none if one side has none.
+    /// Compares with another text. None if one side has no text.
     fn compare(&self, field: Field, ours: Option<&Spelling>) -> Option<Compared> {
         let (ours, theirs) = (ours?, self.own.as_ref()?);
         let shown = || (Value::Text(ours.text()), Value::Text(theirs.text()));
@@ -169,7 +169,7 @@ impl Answer {
         Answer { record, word: Either::new(record.spelling(), word), pattern }
     }
 
-    /// Whether another result has the same word, and whether it has the same pattern, up to mirror image.
+    /// Whether another result has the same word up to mirror image, and whether it has the same pattern up to mirror image.
     pub(super) fn is_spelled_as(&self, other: &Answer) -> [bool; 2] {
         let is = |own: &Either, other: &Either| own.own.as_ref().is_none_or(|own| other.is(own));
         [is(&self.word, &other.word), is(&self.pattern, &other.pattern)]
@@ -178,9 +178,9 @@ impl Answer {
 
 /// Tolerances of the comparison of numbers.
 ///
-/// Lanes compute the multipliers of a cycle at a state near it, in their own precision. Over the plane, multipliers of
-/// 99 % of the cycles agree with the reference within 3e-4 (f32) and 4e-6 (f64). All agree within 6e-3 and 3e-3, except
-/// where the multiplier is close to 1 or the motion has not settled. Fractions of meshing agree within 2e-6 and 3e-8.
+/// Lanes compute the multipliers of a cycle at a state near it, in their own precision. Over the plane, multipliers of 99 % of the cycles
+/// agree with the reference within 3e-4 (f32) and 4e-6 (f64). All multipliers agree within 6e-3 (f32) and 3e-3 (f64), unless a multiplier
+/// is close to 1 or the motion has not settled. Fractions of meshing agree within 2e-6 and 3e-8.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bars<'a> {
     /// Tolerance of the natural logarithm of the largest multiplier, per forcing period. Cycles of fewer than five
@@ -189,16 +189,16 @@ pub(super) struct Bars<'a> {
     /// Smallest multiplier that the monodromy matrix resolves; smaller ones count as zero.
     no_multiplier: f64,
     mesh: f64,
-    /// Tolerance of measured quantities of a cycle, as [`Group::distance`] has it.
+    /// Tolerance of measured quantities of a cycle, in the measure of [`Group::distance`].
     measured: f64,
-    /// Tolerance of averages, relative to the motion, for a record computed near the cycle: 0 if it was computed on it.
+    /// Tolerance of averages, relative to the motion, for a record that was computed near the cycle; 0 if it was computed on the cycle.
     off_cycle: f64,
     forcing_period: f64,
     budget: Budget,
     pub(super) labels: Option<Labels<'a>>,
 }
 
-/// The attractors of a map of basins, for one of its cells.
+/// For one cell of a map of basins: the known attractors, and the state that identifies the cell's own record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Labels<'a> {
     pub(super) basins: &'a Basins,
@@ -218,8 +218,8 @@ impl Labels<'_> {
     }
 }
 
-/// Logarithm of the growth or decay that takes a rounding error to the size of the motion. A motion that grows or decays
-/// less over its budget cannot be distinguished from a neutral one.
+/// Logarithm of the ratio between the size of the motion and a rounding error. A motion that grows or decays less over its budget cannot be
+/// distinguished from a neutral one.
 const DECISIVE_GROWTH: f64 = 40.0;
 
 /// Name of the quantity that only cycles have.
@@ -230,7 +230,7 @@ fn farther_apart(a: &[f64; 2], b: &[f64; 2]) -> Ordering {
     apart(a[0], a[1]).total_cmp(&apart(b[0], b[1]))
 }
 
-/// Largest error of an average that the distance from a cycle explains.
+/// Largest error of an average that the distance from a cycle can explain.
 const FARTHEST_OFF_CYCLE: f64 = 1e-4;
 
 /// Tolerance of impacts per period of a cycle. Impacts are counted, so only the division rounds.
@@ -260,14 +260,14 @@ impl Bars<'_> {
         }
     }
 
-    /// Returns the tolerances of a record whose averages were computed at this distance from its cycle, relative to the motion.
-    /// The averages may be wrong in proportion.
+    /// Returns the tolerances of a record whose averages were computed at this distance from its cycle, relative to the motion. The error
+    /// of the averages may be proportional to this distance.
     pub(super) fn off_cycle(&self, distance: f64) -> Self {
         let off_cycle = (ROUNDING_FACTOR * distance).min(FARTHEST_OFF_CYCLE);
         Bars { off_cycle, mesh: self.mesh.max(off_cycle), ..*self }
     }
 
-    /// Compares a record with its judge's, for all fields that both have.
+    /// Compares a record with the judge's record in all fields that both have.
     pub(super) fn compare(&self, record: &Record, answer: &Answer) -> Vec<Compared> {
         let judge = &answer.record;
         let [ours, theirs] = [record, judge].map(classify);
@@ -312,12 +312,11 @@ impl Bars<'_> {
         Some(compared(Field::Attractor, ours == theirs, || (shown(ours), shown(theirs))))
     }
 
-    /// Whether two statuses of one class agree. Lanes in f32 report `slow` at distances above 1e-4 from the cycle, other
-    /// engines above 1e-8, and a multiplier of 1 has a larger error in f32. So `ok`, `slow` and `neutral` agree for motion
-    /// that settles slowly.
+    /// Whether two statuses of one class agree. Lanes in f32 report `slow` at distances above 1e-4 from the cycle, and other engines above
+    /// 1e-8. In f32 a multiplier of 1 also has a larger error. So `ok`, `slow` and `neutral` agree for motion that settles slowly.
     fn is_same_status(&self, class: Class, statuses: [Status; 2], judge: &Record) -> bool {
         match class {
-            // For these classes the status adds nothing.
+            // For these classes the status gives no further information.
             Class::Chaotic | Class::QuasiPeriodic | Class::Undecided => true,
             _ => {
                 let graded = [Status::Ok, Status::Slow, Status::Neutral];
@@ -396,7 +395,7 @@ impl Bars<'_> {
 
     fn compare_averages(&self, record: &Record, judge: &Record, list: &mut Vec<Compared>) {
         let exponents = [record, judge].map(|side| side.lyapunov);
-        // Only the judge's error counts, so that a record cannot widen its own tolerance.
+        // Only the judge's error widens the tolerance, so that a record cannot widen its own tolerance.
         let own = if judge.lyapunov_error.is_finite() { judge.lyapunov_error } else { 0.0 };
         let bar = ERRORS * std::f64::consts::SQRT_2 * own + CHAOS_BARS[0] / self.forcing_period;
         let is_same = is_within(apart(exponents[0], exponents[1]), bar);
@@ -433,8 +432,7 @@ impl Bars<'_> {
         self.is_same_multiplier(logs[0], logs[1], period) && (is_same_argument || is_none)
     }
 
-    /// Adds the comparison of each measured quantity that both sides have. A difference shows the number that
-    /// differs most.
+    /// Adds the comparison of each measured quantity that both sides have. A difference contains the number that differs most.
     fn push_measured(
         &self,
         list: &mut Vec<Compared>,

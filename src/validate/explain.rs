@@ -11,11 +11,11 @@ use rattlemap_dynamics::orbit::{Class, Status};
 /// Number of perturbed cells.
 const PERTURBED: u64 = 12;
 
-/// Number of perturbed cells in a map of basins. Where basins are mixed on every scale, one start in a hundred may lead to
-/// an attractor.
+/// Number of perturbed cells in a map of basins. Where basins are mixed on every scale, only one start in a hundred may lead to the
+/// record's attractor.
 const PERTURBED_IN_BASINS: u64 = 512;
 
-/// Number of perturbed cells if the transient must be as long as the record's.
+/// Number of perturbed cells if the transient must be as long as the transient of the record.
 const MANY_PERTURBED: u64 = 48;
 
 /// Records of lanes that computed the cell again.
@@ -29,19 +29,19 @@ pub(super) struct RepeatedLanes<'a> {
     pub(super) double: Option<&'a Record>,
 }
 
-/// Returns the kind of a mismatch between `claim` and `truth`. The claim is the map's record, or the second judge's for a
-/// map that the reference computed. The truth is the reference's answer.
+/// Returns the kind of a mismatch between `claim` and `truth`. The claim is the map's record. For a map that the reference computed, it is
+/// the second judge's record. The truth is the reference's answer.
 pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: RepeatedLanes<'_>) -> Kind {
-    // No kind explains such numbers.
+    // NaN and unexpected infinities have no explanation.
     if claim.periods_run > cell.longest() || !cell.is_finite(claim) {
         return Kind::Unexplained;
     }
-    // Caps and the resolution are properties of lanes, so only a repeated lane can confirm them.
+    // Caps and the resolution are limits of lanes, so only a repeated lane can confirm them.
     let is_reproduced = lanes.again.is_some_and(|again| again.status == claim.status);
     if status(claim).is_failure() {
         return if is_reproduced { Kind::Cap } else { Kind::Unexplained };
     }
-    // With early stops a computation may end before the cap that its judge meets.
+    // With early stops, a computation may end before it reaches the cap that its judge reaches.
     if matches!(status(&truth.record), Status::TooStiff | Status::CapEvents) {
         let is_own = lanes.again.is_some_and(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(claim));
         return if is_own { Kind::Budget } else { Kind::Unexplained };
@@ -68,15 +68,15 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
     if agrees_on_cycle(cell, claim, truth) {
         return if status(claim) == Status::Slow { Kind::Budget } else { Kind::Border };
     }
-    // Rounding explains the claim only if the lane repeats it without early stops.
+    // Rounding explains the claim only if a lane without early stops gives the same answer.
     let repeats = |lane: Option<&Record>| lane.is_some_and(|lane| agrees(&Answer::new(*lane, None)));
     let is_right = lanes.double.is_some_and(|double| cell.bars.agree(double, truth));
     let is_rounding = is_right && repeats(lanes.again) && repeats(lanes.whole);
     if is_rounding { Kind::Border } else { Kind::Unexplained }
 }
 
-/// Whether the claim has the status `below_resolution` and the answer confirms it: by the same status, or because rounding in
-/// the claim's precision decides the period of the answer's cycle, or because that cycle closes earlier, within the effect of
+/// Whether the claim has the status `below_resolution` and the answer confirms it. The answer confirms it by the same status, or if
+/// rounding in the claim's precision decides the period of the answer's cycle, or if that cycle closes earlier within the effect of
 /// rounding.
 fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     let closes = |answer: &Answer| {
@@ -90,8 +90,8 @@ fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
             || closes(answer))
 }
 
-/// Whether the status of the second judge's claim, or of the reference's answer, says that rounding decides the period. Then
-/// neither side contradicts the other, unless one is chaotic.
+/// Whether one side's status says that rounding decides the period: the second judge's claim or the reference's answer. Then the sides do
+/// not contradict each other, unless one of them is chaotic.
 pub(super) fn is_unresolved(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     let sides = [claim, &truth.record];
     let is_open = |record: &Record| matches!(classify(record), Class::Periodic { .. } | Class::Undecided);
@@ -100,8 +100,8 @@ pub(super) fn is_unresolved(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> 
         && claim.periods_run <= cell.longest()
 }
 
-/// Whether a record agrees once its exponent and status are replaced by those of the cycle itself. Its averages may be wrong
-/// in proportion to the distance from the cycle.
+/// Whether a record agrees once its exponent and status are replaced by those of the cycle itself. The error of its averages may be
+/// proportional to the distance from the cycle.
 fn agrees_on_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     let cycle = &truth.record;
     let is_on_strobe =
@@ -113,7 +113,7 @@ fn agrees_on_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
             .is_some_and(|(claim, distance)| cell.bars.off_cycle(distance).agree(&claim, truth))
 }
 
-/// Whether two cycles agree except for their status, and except that one may repeat the other several times.
+/// Whether two cycles agree apart from their status. One of them may repeat the other several times.
 fn is_multiple(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     let record = &answer.record;
     let (Class::Periodic { period: ours }, Class::Periodic { period: theirs }) =
@@ -130,19 +130,19 @@ fn is_multiple(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
 
 /// Whether one side gives the other's answer with fewer or more periods, or neither side can decide within the budget.
 fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn(&Answer) -> bool) -> bool {
-    // A slow approach is not finished. Lanes and the reference have different limits for it.
+    // The motion is still approaching its cycle slowly. Lanes and the reference have different limits for this.
     let is_open = |record: &Record| {
         matches!(classify(record), Class::Chaotic | Class::Undecided) || status(record) == Status::Slow
     };
-    // An undecided claim contradicts nothing if the motion is too slow to be decided. A slow approach cannot distinguish
-    // a cycle from one that has just bifurcated from it.
+    // An undecided claim contradicts no answer if the motion is too slow to be decided. During a slow approach, a cycle cannot be
+    // distinguished from one that has just bifurcated from it.
     let is_undecided = match classify(claim) {
-        // The averages of an engine converge later than those of the other.
+        // The averages of one engine may converge later than those of the other.
         Class::QuasiPeriodic => classify(&truth.record) == Class::Undecided,
         class => class == Class::Undecided,
     };
     let cannot_decide = |answer: &Answer| {
-        // Far from the cycle, the exponent of several turns says little.
+        // Far from the cycle, an exponent over several turns is not accurate.
         let open = match claim.period == answer.record.period {
             true => *claim,
             false => Record { valid: claim.valid & !valid::LYAPUNOV, ..*claim },
@@ -153,7 +153,7 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
     };
     let stopped = || (0..MANY_PERTURBED).filter_map(|k| cell.perturbed_after(k, claim.periods_run));
     let later = || (0..PERTURBED).filter_map(|k| cell.perturbed_for_long(k));
-    // A search may find a cycle long before the motion is on it.
+    // A search may find a cycle long before the motion has reached it.
     let arrives = || {
         let answer = cell.followed_for_long();
         let arrived = Record { status: answer.record.status, ..*claim };

@@ -1,7 +1,7 @@
 //! Dependence of a map on the meshing speed.
 //!
-//! The meshing speed ends a series of ever smaller impacts. Its value is a choice of the modeller. Results that change
-//! when it is halved depend on this choice.
+//! The meshing speed ends a series of ever smaller impacts. The modeller chooses its value. Results that change when it is halved depend on
+//! this choice.
 
 use super::cell::Cell;
 use super::compare::Answer;
@@ -9,8 +9,8 @@ use super::rate::Rate;
 use crate::record::classify::classify;
 use rattlemap_dynamics::orbit::Class;
 
-/// Rates of change with half the meshing speed, among meshing cells. Periods, words and patterns are compared if the motion
-/// is periodic with both speeds.
+/// Rates at which cells that mesh change if the meshing speed is halved. Periods, words and patterns are compared if the motion is periodic
+/// with both speeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HalfMesh {
     /// The meshing speed, if it is the same at all walls of all compared cells.
@@ -26,14 +26,14 @@ pub struct HalfMesh {
 }
 
 impl HalfMesh {
-    /// Whether the map depends on the meshing speed: a class, period or pattern changes. Words always count the bounces
-    /// before meshing.
+    /// Whether the map depends on the meshing speed: a class, period or pattern changes. Words do not count, because they contain the
+    /// bounces before meshing.
     pub fn matters(&self) -> bool {
         [self.classes, self.periods, self.patterns].iter().any(|rate| rate.count > 0)
     }
 }
 
-/// Changes in one cell.
+/// What changes in one cell if the meshing speed is halved.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Changes {
     /// The meshing speed, if it is the same at all walls.
@@ -43,8 +43,8 @@ pub(super) struct Changes {
     cycle: Option<[bool; 3]>,
 }
 
-/// Compares a cell's answer `truth` with the answer for half the meshing speed; none if the motion does not mesh or the
-/// meshing speed is zero.
+/// Compares a cell's answer `truth` with the answer for half the meshing speed. None if the motion does not mesh, or if the meshing speed
+/// is zero.
 pub(super) fn changes(cell: &Cell<'_>, truth: &Answer) -> Option<Changes> {
     let speeds = cell.mesh_speeds();
     if truth.record.mesh_fraction <= 0.0 || speeds.iter().all(|&speed| speed <= 0.0) {
@@ -63,7 +63,7 @@ pub(super) fn changes(cell: &Cell<'_>, truth: &Answer) -> Option<Changes> {
     Some(Changes { mesh_speed, class: before.index() != after.index(), cycle })
 }
 
-/// Computes the rates over all meshing cells; none if there are none.
+/// Computes the rates over all meshing cells; none without meshing cells.
 pub(super) fn rates(changes: &[Changes]) -> Option<HalfMesh> {
     let cycles: Vec<[bool; 3]> = changes.iter().filter_map(|changes| changes.cycle).collect();
     let of = |k: usize| Rate::new(cycles.iter().filter(|cycle| cycle[k]).count(), cycles.len());

@@ -1,5 +1,5 @@
-//! Independent judge: an adaptive ODE solver with event location that shares only the description of the oscillator with
-//! the reference. All oscillators are judged as machines.
+//! Independent judge: an adaptive ODE solver with event location. It shares only the description of the oscillator with the reference. It
+//! treats all oscillators as machines.
 //!
 //! The motion is integrated over the whole budget. It is periodic if its strobe states recur and the cycle is stable;
 //! multipliers come from finite differences of neighbouring motions. It is chaotic if a neighbouring motion separates from
@@ -25,13 +25,13 @@ use rattlemap_dynamics::orbit::{Budget, Status};
 use rattlemap_dynamics::stability::{multipliers, standard_error};
 use rattlemap_dynamics::word::Word;
 
-/// Relative distance below which two strobe states are the same.
+/// Relative distance below which two strobe states count as equal.
 const RECURS: f64 = 1e-7;
 
-/// Relative distance below which two strobe states may still converge.
+/// Relative distance below which two strobe states may converge to each other.
 const NEARLY_RECURS: f64 = 1e-4;
 
-/// Largest distance from phase 0, in turns, of an event that rounding may put before or after the strobe. Then states at
+/// Distance from phase 0, in turns, within which rounding may put an event before or after the strobe. If there is such an event, states at
 /// another phase are compared.
 const ON_STROBE: f64 = 1e-7;
 
@@ -57,7 +57,7 @@ struct Strobed<'a> {
 #[derive(Clone, Debug, Default)]
 struct Tally {
     impacts: usize,
-    /// Whether an infinite series of impacts was cut off, so that `impacts` is too small.
+    /// Whether an infinite series of impacts was replaced by its limit, so that `impacts` is too small.
     series: bool,
     /// Time in contact, in radians of the forcing.
     meshing_time: f64,
@@ -73,7 +73,7 @@ impl Strobed<'_> {
         Strobed { flight: Flight::new(oscillator, &start), period: oscillator.period(), from: 0.0, halt }
     }
 
-    /// Advances by one forcing period; none if the solver fails or is halted.
+    /// Advances by one forcing period. None if the solver fails or is halted.
     fn advance(&mut self) -> Option<()> {
         if self.halt.load(Ordering::Relaxed) {
             return None;
@@ -83,7 +83,7 @@ impl Strobed<'_> {
         self.flight.advance(self.from, self.from + TAU)
     }
 
-    /// Returns the elements with dry friction that stuck all the time. Neighbouring motions keep their distance along these rows.
+    /// Returns the elements with dry friction that never slid. Along their rows, neighbouring motions keep their distance.
     fn stuck_for_good(&self) -> [bool; MOST_FRICTION] {
         let sticks = self.flight.sticks();
         std::array::from_fn(|i| sticks[i] && !self.flight.tally.slipped[i])
@@ -98,8 +98,8 @@ impl Strobed<'_> {
         Some(flight.state())
     }
 
-    /// Compares states in the middle of the longest flight from here on. Returns false if they are compared there already
-    /// or no event lies at phase 0.
+    /// Moves the phase at which states are compared to the middle of the longest flight. Returns false, and moves nothing, if the phase was
+    /// moved before or if no event lies at phase 0.
     fn leave_strobe(&mut self) -> Option<bool> {
         let mut phases = std::mem::take(&mut self.flight.tally.phases);
         if self.from > 0.0 || !phases.iter().any(|phase| (phase - phase.round()).abs() < ON_STROBE) {
@@ -141,7 +141,7 @@ fn follow(mut motion: Strobed<'_>, budget: &Budget) -> Option<Record> {
         return follow(motion, budget);
     }
     let window = &strobes[strobes.len().saturating_sub(stored)..];
-    // Displacements are in scales of length and rates per radian, so the least units are 1.
+    // Displacements are in scales of length, and rates are per radian. So the size of the motion counts as at least 1.
     let largest = |kind: usize| {
         window.iter().flat_map(|q| q[kind..].iter().step_by(2)).fold(0.0f64, |most, x| most.max(x.abs()))
     };
@@ -168,7 +168,7 @@ fn follow(mut motion: Strobed<'_>, budget: &Budget) -> Option<Record> {
     Some(Record { periods_run: budget.periods(), ..record })
 }
 
-/// Returns the motion displaced along a coordinate; none if what is at rest allows no displacement.
+/// Returns the motion displaced along a coordinate. None if elements or gaps at rest allow no displacement.
 fn displaced(flight: &Flight, coordinate: usize, by: f64, for_good: [bool; MOST_FRICTION]) -> Option<Flight> {
     let own = flight.coordinates();
     let mut direction = vec![0.0; own.len()];
@@ -220,7 +220,7 @@ fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
     };
     let word = Word::cyclic(&tally.symbols);
     record.set_pattern(&word.pattern());
-    // After an infinite series the number of impacts is unknown.
+    // If an infinite series of impacts was replaced by its limit, the number of impacts is unknown.
     if tally.series {
         record.valid &= !valid::IMPACTS;
     } else {
@@ -232,7 +232,7 @@ fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
     (radius < 1.0).then_some(record)
 }
 
-/// Builds the record of a chaotic motion; none unless a neighbouring motion separates from it on average.
+/// Builds the record of a chaotic motion. None if neighbouring motions do not separate from it on average.
 fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
     let for_good = motion.stuck_for_good();
     motion.flight.tally = Tally::default();

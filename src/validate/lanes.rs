@@ -1,4 +1,4 @@
-//! Lanes of a sample, computed again on a device.
+//! Computes the lanes of a sample again on a device.
 
 use std::collections::HashMap;
 
@@ -15,23 +15,23 @@ use rattlemap_dynamics::orbit::Status;
 /// Results of lanes that were computed again; empty without a device.
 #[derive(Clone, Debug, Default)]
 pub struct Lanes {
-    /// The device that ran the map's own lanes again. Only for maps that lanes computed.
+    /// The device that computed the map's lanes again. Only for maps that lanes computed.
     pub device: Option<String>,
-    /// The device that ran lanes in double precision for comparison.
+    /// The device that computed lanes in double precision for comparison.
     pub double_device: Option<String>,
     /// Records with the map's settings, by run. Only for maps that lanes computed.
     again: HashMap<u32, Record>,
     /// Records without early stops, by run. Only if there are lanes in double precision to compare with.
     whole: HashMap<u32, Record>,
-    /// Records in double precision without early stops, by run. They judge single precision and the reference.
+    /// Records in double precision without early stops, by run. Records in single precision and of the reference are compared with them.
     double: HashMap<u32, Record>,
     /// States after [`HORIZON`] periods by run; none for a lane that failed.
     states: Vec<(u32, Option<State>)>,
 }
 
 impl Lanes {
-    /// Computes the lanes of a sample again. `single` has the map's precision and is none for a map of the reference.
-    /// `double` is a device in f64, if the adapter supports it.
+    /// Computes the lanes of a sample again. `single` is a device in the map's precision; none for a map of the reference. `double` is a
+    /// device in f64, if the adapter supports it.
     ///
     /// # Errors
     /// [`GpuError`] if a device fails.

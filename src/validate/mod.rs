@@ -1,11 +1,10 @@
 //! Validation of a finished map: a sample of its cells is recomputed by another engine and compared.
 //!
-//! The reference computes each sampled cell over the plan's whole budget, without early stops. A record that differs is
-//! a mismatch of one of five kinds ([`Kind`]). Every kind except the last rests on a computation that explains the
-//! difference, or on a status by which an answer leaves it open. Averages of chaotic motion are compared as distributions over the class ([`ChaosTest`]). States of many
-//! lanes are compared a few periods after their start ([`StateCheck`]). Meshing cells are also computed with half the
-//! meshing speed ([`HalfMesh`]). The main result is a rate per kind with its 95 % interval ([`Rate`]), from cells drawn
-//! uniformly.
+//! The reference computes each sampled cell over the plan's whole budget, without early stops. A record that differs is a mismatch of one
+//! of five kinds ([`Kind`]). The last kind is `unexplained`. For the others, a computation explains the difference, or the status of an
+//! answer leaves the result open. Averages of chaotic motion are compared as distributions over the class ([`ChaosTest`]). States of many
+//! lanes are compared a few periods after their start ([`StateCheck`]). Meshing cells are also computed with half the meshing speed
+//! ([`HalfMesh`]). The main result is a rate per kind with its 95 % interval ([`Rate`]), from cells drawn uniformly.
 //!
 //! A map that the reference computed is also judged by lanes in f64, or by an adaptive ODE solver with event location
 //! (`independent`) where no adapter has f64. The result names the judge ([`Judge`]).
@@ -60,7 +59,7 @@ pub struct Subject<'a> {
     pub records: &'a dyn Records,
     /// Precision in which the records were computed.
     pub precision: Precision,
-    /// Whether lanes on a graphics device computed the records; otherwise the reference did.
+    /// Whether lanes on a graphics device computed the records. If not, the reference computed them.
     pub is_lane: bool,
 }
 
@@ -70,14 +69,14 @@ pub enum Kind {
     /// A start within the engine's resolution of the cell's start leads to the record's answer, and the reference stays on
     /// that attractor from the record's last state.
     Attractor,
-    /// The cell lies at a border that rounding can cross: the reference gives the record's answer when parameters and
-    /// start move within the engine's resolution; or the lane gives its answer in single precision and the reference's
-    /// in double precision, both without early stops; or its status says that the period is below the resolution.
+    /// The cell lies at a border that rounding can cross. The reference gives the record's answer if parameters and start change within the
+    /// engine's resolution; or the lane gives the record's answer in single precision and the reference's answer in double precision, both
+    /// without early stops; or the record's status says that the period is below the resolution.
     Border,
-    /// One engine gives the other's answer with fewer or with more periods, or the motion settles or separates too slowly
-    /// to be decided within the budget, or the second judge or the reference is undecided.
+    /// One engine gives the other's answer with fewer or more periods; or the motion settles or separates too slowly to be decided within
+    /// the budget; or the second judge or the reference is undecided.
     Budget,
-    /// A cap ended the lane, and ends it again when it is repeated.
+    /// A cap ended the lane, and ended it again when the lane was repeated.
     Cap,
     /// No computation explains the difference.
     Unexplained,
@@ -176,9 +175,9 @@ pub struct Validation {
     pub strata: Vec<StratumResult>,
     /// Number of distinct cells that were compared.
     pub replayed: usize,
-    /// Number of records that their engine reproduced to the bit, and number of cells that it computed again.
+    /// Number of records that their engine reproduced to the bit, and number of cells that the engine computed again.
     pub again: [usize; 2],
-    /// Whether a right record is always reproduced to the bit.
+    /// Whether the engine always reproduces a correct record to the bit.
     pub is_exact: bool,
     /// Agreement by field.
     pub agreement: Vec<Agreement>,
@@ -257,7 +256,7 @@ impl Validation {
 /// Result of one cell.
 struct Replayed {
     id: u32,
-    /// Whether the engine reproduced the record to the bit; none if it did not compute the cell again.
+    /// Whether the engine reproduced the record to the bit. None if it did not compute the cell again.
     again: Option<bool>,
     fields: Vec<Compared>,
     kind: Option<Kind>,
@@ -276,8 +275,8 @@ pub fn replay(
     replay_whole(subject, None, false, sample, lanes, report, &NEVER)
 }
 
-/// Like [`replay`], but returns `None` once `halt` is set. In a map of basins the attractors are compared, too. With
-/// `is_exact` the map fails if its engine does not reproduce a record to the bit.
+/// Like [`replay`], but returns `None` once `halt` is set. In a map of basins, attractors are also compared. With `is_exact` the map fails
+/// if its engine does not reproduce a record to the bit.
 pub fn replay_until(
     subject: &Subject<'_>,
     basins: Option<&Basins>,
@@ -321,7 +320,7 @@ fn replay_whole(
             let is_uniform = uniform.binary_search(&id).is_ok();
             let replayed = replay_cell(subject, &cell, id, judge, lanes, is_uniform, is_exact);
             (!is_halted()).then(|| {
-                // Reports are made under the lock, so that the number never falls.
+                // The lock is held during a report, so that the reported number never decreases.
                 let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
                 *done += 1;
                 report(*done);
@@ -421,7 +420,7 @@ fn replay_cell(
     let mut fields = cell.bars.compare(&cell.record, &truth);
     let differs = |fields: &[Compared]| fields.iter().any(|(_, differs)| differs.is_some());
     let ran = explain::RepeatedLanes { again, whole: lanes.whole(id), double: lanes.double(id) };
-    // A record that its engine cannot have returned needs no explanation.
+    // An engine cannot return such a record, so no explanation is searched for.
     let is_forged = is_exact && is_same == Some(false);
     let mut kind = match is_forged {
         true => Some(Kind::Unexplained),
@@ -430,12 +429,12 @@ fn replay_cell(
     if kind.is_none()
         && let Some(judged) = judged(subject, cell, id, judge, lanes)
     {
-        // A judge that is still approaching the cycle does not know its multipliers.
+        // A judge whose motion is still approaching the cycle does not know the cycle's multipliers.
         let is_slow = status(&judged) == Status::Slow;
         let judged = if is_slow { compare::without_multipliers(judged) } else { judged };
-        // The second judge is compared with the reference as a lane would be.
+        // The second judge is compared with the reference in the same way as a lane.
         fields = cell.bars.compare(&cell.record, &Answer::new(judged, None));
-        // An undecided answer of either side contradicts nothing.
+        // If one side is undecided, the sides do not contradict each other.
         let is_undecided = [&judged, &truth.record].iter().any(|side| classify(side) == Class::Undecided);
         kind = differs(&fields).then(|| match is_undecided {
             true => Kind::Budget,
@@ -455,8 +454,8 @@ fn replay_cell(
     }
 }
 
-/// Marks records that their engine does not reproduce to the bit as unexplained, if it must reproduce all of them or
-/// reproduces most of them. Returns the number of reproduced records and of repeated cells.
+/// Marks records as unexplained that their engine does not reproduce to the bit. This applies only if the engine must reproduce all
+/// records, or reproduces most of them. Returns the number of reproduced records and of repeated cells.
 fn again(replayed: &mut [Replayed], is_exact: bool) -> [usize; 2] {
     let count = |same| replayed.iter().filter(|cell| cell.again == Some(same)).count();
     let [same, other] = [count(true), count(false)];
@@ -508,7 +507,7 @@ mod tests {
         (0..).zip(again).map(cell).collect()
     }
 
-    /// Another processor may round differently. Then most records differ, and this is no fault.
+    /// Another processor may round differently. Then most records differ, which is not an error.
     #[test]
     fn a_record_that_its_engine_does_not_reproduce_is_unexplained_if_most_are_reproduced() {
         let mut one = replayed(&[true, true, false]);
@@ -518,7 +517,7 @@ mod tests {
         let mut most = replayed(&[true, false, false]);
         assert_eq!(again(&mut most, false), [1, 3]);
         assert!(most.iter().all(|cell| cell.kind.is_none() && cell.fields.is_empty()));
-        // The same program on the same processor does not.
+        // The same program on the same processor must not differ.
         assert_eq!(again(&mut most, true), [1, 3]);
         assert!(most[1..].iter().all(|cell| cell.kind == Some(Kind::Unexplained)));
     }

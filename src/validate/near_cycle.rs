@@ -1,8 +1,8 @@
 //! Records whose multipliers were computed near a cycle instead of on it.
 //!
-//! A lane computes multipliers at its present state, which is near the cycle, or still approaching it if the status is
-//! `slow`. Where the strobe map is strongly curved or amplifies rounding, these multipliers differ from those of the
-//! cycle. The record is right if the reference computes the same values at the same state.
+//! A lane computes multipliers at its present state. This state is near the cycle, or still approaches it if the status is `slow`. If the
+//! strobe map is strongly curved or amplifies rounding, these multipliers differ from those of the cycle. The record is correct if the
+//! reference computes the same values at the same state.
 
 use super::cell::{Cell, ROUNDING_FACTOR};
 use crate::gpu::rules;
@@ -14,8 +14,8 @@ use rattlemap_dynamics::motion::{Allowance, GapEvent, Observer, States, Trajecto
 use rattlemap_dynamics::orbit::{Class, Status};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
-/// Returns the record with the exponent of the cycle itself, if the reference confirms the record's exponent at the
-/// record's state, and the distance from the cycle; none otherwise.
+/// Returns the record with the exponent of the cycle itself, and the distance from the cycle. None unless the reference confirms the
+/// record's exponent at the record's state.
 pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<(Record, f64)> {
     let Class::Periodic { period } = classify(record) else { return None };
     let needed = valid::STROBE | valid::LYAPUNOV;
@@ -31,7 +31,7 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<(Record, 
     let is_there = distance <= ROUNDING_FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };
-    // The lane's window ends at the strobe state. With a negative multiplier it began on the other side of the cycle.
+    // The lane's averages end at the strobe state. With a negative multiplier they began on the other side of the cycle.
     let turns = cycle.multipliers.first().is_some_and(|[re, _]| *re < 0.0);
     let before = |i: usize| if turns { 2.0 * cycle.state[i] - record.strobe[i] } else { record.strobe[i] };
     let began = std::array::from_fn(before);
@@ -40,8 +40,8 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<(Record, 
         .then_some((settled, distance))
 }
 
-/// Whether rounding explains a multiplier: the logarithm `log_multiplier` lies in the range that the reference computes
-/// from this state when each period is perturbed by rounding.
+/// Whether rounding explains a multiplier. Its logarithm `log_multiplier` must lie in the range that the reference computes from this state
+/// if rounding perturbs the motion in each period.
 fn is_within_scatter(cell: &Cell<'_>, state: State, log_multiplier: f64, period: u32) -> bool {
     let mut read = cell.multipliers_from(state, period);
     // A multiplier of zero counts as the smallest that can be resolved.

@@ -1,12 +1,12 @@
 //! Rates with confidence intervals, and the limit for unexplained cells.
 
-/// Tolerated rate of unexplained cells: one in 10,000.
+/// Tolerated rate of unexplained cells.
 pub const TOLERATED: f64 = 1e-4;
 
-/// A stratum fails if its number of unexplained cells has less than this probability at the tolerated rate.
+/// A stratum fails if its number of unexplained cells, or more, is less probable than this at the tolerated rate.
 const SIGNIFICANCE: f64 = 0.01;
 
-/// Probability that an interval does not contain the true rate.
+/// Probability that a confidence interval does not contain the true rate.
 const OUTSIDE: f64 = 0.05;
 
 /// Share of randomly drawn cells with a property, and its 95 % interval (Clopper and Pearson 1934).
@@ -16,7 +16,7 @@ pub struct Rate {
     pub count: usize,
     /// Number of drawn cells.
     pub among: usize,
-    /// Ends of the interval, which is one-sided if `count` is 0 or `among`.
+    /// Ends of the interval. The interval is one-sided if `count` is 0 or `among`.
     pub interval: [f64; 2],
 }
 
@@ -80,14 +80,14 @@ fn at_least(count: usize, among: usize, p: f64) -> f64 {
         below += term.exp();
         term += ((among - k) as f64 / (k + 1) as f64).ln() + success - failure;
     }
-    // Near 1 the difference cancels, so the other tail is summed.
+    // A small result would lose its digits in `1 - below`, so it is summed directly.
     if below < 0.5 {
         return 1.0 - below;
     }
     let mut above = 0.0;
     for k in count..=among {
         above += term.exp();
-        // Later terms are smaller still. The trials may be as many as a map has forcing periods.
+        // All later terms are smaller. The sum must stop early, because there may be as many trials as a map has forcing periods.
         if term < SMALLEST_LN {
             break;
         }
@@ -131,7 +131,8 @@ mod tests {
         assert_eq!(Rate::new(2, 400).text(), "0.5 %, 0.061 to 1.8");
         assert_eq!(Rate::new(0, 400).text(), "below 0.75 %");
         assert_eq!(Rate::new(0, 0).interval, [0.0, 1.0]);
-        // A map has millions of trials. 260 events in 4 10^6: the interval of Poisson (exact tables: 229.4 and 293.6).
+        // A map has millions of trials. For 260 events in 4 10^6 trials, the interval is that of a Poisson distribution (exact tables:
+        // 229.4 and 293.6).
         let rate = Rate::new(260, 4_000_000);
         assert!((4e6 * rate.interval[0] - 229.4).abs() < 0.1 && (4e6 * rate.interval[1] - 293.6).abs() < 0.1);
         assert_eq!(rate.text_within(1000), "6.3 %, 5.6 to 7.1");
@@ -141,7 +142,7 @@ mod tests {
     #[test]
     fn a_stratum_fails_by_what_chance_does_not_allow() {
         let fails = |count, among| Rate::new(count, among).is_too_many();
-        // One in 100 is less likely than 1 % at a rate of 1e-4; of 200 cells one may be unexplained, not two.
+        // At a rate of 1e-4, one unexplained cell of 100 has a probability below 1 %. Of 200 cells, one may be unexplained, but not two.
         assert!(fails(1, 100) && !fails(1, 200) && fails(2, 200));
         assert!(!fails(0, 0) && !fails(4, 10_000) && fails(5, 10_000) && fails(262_144, 262_144));
     }

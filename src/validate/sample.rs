@@ -6,7 +6,7 @@ use crate::record::classify::{classify, status};
 use crate::record::{Records, valid};
 use rattlemap_dynamics::orbit::{Class, Status};
 
-/// Number of lanes whose states are compared, per cell of the sample. Each takes a few periods only.
+/// Number of lanes whose states are compared, per cell of the sample. Each lane takes only a few periods.
 const STATES_PER_CELL: usize = 10;
 
 /// The set from which a cell was drawn.
@@ -24,7 +24,7 @@ impl Stratum {
     /// All strata, the uniform one first.
     pub const ALL: [Stratum; 3] = [Stratum::Uniform, Stratum::Border, Stratum::Status];
 
-    /// Describes the cells of the stratum; `counted` is the noun for what is counted.
+    /// Describes the cells of the stratum. `counted` is the noun for the counted objects.
     pub fn describe(self, counted: &str) -> String {
         match self {
             Stratum::Uniform => format!("random {counted}"),
@@ -77,11 +77,11 @@ impl Sample {
     }
 }
 
-/// Draws `size` runs: half from all integrated runs, a quarter at borders of classes, and a quarter with a status other
-/// than `ok`. If a stratum has too few runs, the rest is drawn from all. A map with no more than `size` runs is validated
+/// Draws `size` runs: half from all integrated runs, a quarter at borders of classes, and a quarter with a status other than `ok`. If a
+/// stratum has too few runs, the missing ones are drawn from all integrated runs. A map with no more than `size` runs is validated
 /// completely. Equal maps, sizes and seeds give equal samples.
 pub fn sample(plan: &Plan, records: &dyn Records, size: usize, seed: u64) -> Sample {
-    // The audit of an adaptive map checks filled cells.
+    // Filled cells are not sampled, because the audit of an adaptive map checks them.
     let is_own = |id: &u32| records.record(*id as usize).valid & valid::FILLED == 0;
     let all: Vec<u32> = (0..records.count() as u32).filter(is_own).collect();
     let rare: [Vec<u32>; 2] = if size >= all.len() {

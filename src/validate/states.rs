@@ -1,9 +1,8 @@
 //! Comparison of lanes' states with the reference after a few periods.
 //!
-//! A lane that misses one impact in thousands reaches the same attractor, so its record is right. But its state a few
-//! periods after the start is wrong. Therefore many lanes are compared over a few periods. The effect of rounding is
-//! measured on the reference: parameters, start, and the state after each period are perturbed within the engine's
-//! resolution.
+//! A lane that misses one impact in thousands still reaches the same attractor, so its record is correct. But its state a few periods after
+//! the start is wrong. Therefore many lanes are compared over a few periods. The effect of rounding is measured on the reference:
+//! parameters, start, and the state after each period are perturbed within the engine's resolution.
 
 use super::Subject;
 use super::cell::{Cell, ROUNDING_FACTOR, resolution};
@@ -17,7 +16,7 @@ use rayon::prelude::*;
 /// Number of forcing periods after which states are compared, small enough that chaotic motion is still predictable.
 pub const HORIZON: u32 = 4;
 
-/// Numbers of perturbed motions: for every lane, and for a lane that seems wrong.
+/// Number of perturbed motions for every lane, and for a lane that seems wrong.
 const FEW: u64 = 6;
 const MANY: u64 = 200;
 
@@ -38,7 +37,7 @@ pub struct Off {
 /// Result of the comparison of states.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateCheck {
-    /// Number of compared lanes: neither side failed, and the motion is predictable.
+    /// Number of compared lanes. Lanes are compared if neither side failed and the motion is predictable.
     pub compared: usize,
     /// Lanes with a wrong state.
     pub off: Vec<Off>,

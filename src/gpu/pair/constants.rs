@@ -17,7 +17,7 @@ const STEP_ANGLE: f64 = 1.0;
 /// Position of a missing wall, in units of length. WGSL has no infinity, and the shaders square distances.
 const NOWHERE: f64 = 1e12;
 
-/// Terms of the matrix exponential over one step, in which the fastest mode turns by at most a radian.
+/// Number of terms of the matrix exponential over one step, in which the fastest mode turns by at most a radian.
 const EXPONENTIAL_TERMS: u32 = 30;
 
 /// Pairs of real numbers that the shader reads for each higher harmonic of a flow (`shaders/pair/harmonics.wgsl`).
@@ -29,7 +29,7 @@ pub(in crate::gpu) struct Change {
     /// Free steps since phase 0: whole ones, and the fraction of the next one.
     pub(in crate::gpu) step: u32,
     pub(in crate::gpu) theta: f64,
-    /// Page of the stage that begins, between the first walls.
+    /// Page of the interval between the first walls, in the stage that begins.
     pub(in crate::gpu) page: usize,
 }
 
@@ -47,18 +47,18 @@ pub(in crate::gpu) struct Page {
 /// Constants of one pair.
 #[derive(Clone, Debug)]
 pub struct PairConstants {
-    /// Constants that the shader reads in the first stage, between the first walls.
+    /// Constants that the shader reads in the first stage between the first walls, apart from those in `page`.
     pub flow: Flow,
     /// The rest of these constants.
     pub(in crate::gpu) page: Page,
     /// The intervals behind the first walls, from the inside to the outside, right ones first; then all intervals of the
     /// further stages. `flow` and `page` have number 0.
     pub(in crate::gpu) further: Vec<(Flow, Page)>,
-    /// Changes of the stage; none if the first stage holds always.
+    /// Changes of the stage; none if there is only one stage.
     pub(in crate::gpu) changes: Vec<Change>,
     /// Whether contact-free motion also requires that the displacement `x` rests at 0.
     pub(in crate::gpu) must_rest: bool,
-    /// Positions of rigid walls on the right and on the left; infinite without one.
+    /// Positions of the rigid walls on the right and on the left; infinite on a side without a rigid wall.
     bounds: [f64; 2],
     coordinates: Coordinates,
 }
@@ -122,7 +122,7 @@ impl PairConstants {
         Some(constants)
     }
 
-    /// Returns a state in lane units `(z, z', x, x')`, where `x` is the displacement that lanes use beside the gap.
+    /// Returns a state in lane units `(z, z', x, x')`, where `x` is the displacement that lanes use besides the gap.
     pub fn to_lane(&self, y: model::State) -> [f64; 4] {
         self.coordinates.to_lane(y, self.flow.h)
     }
@@ -140,7 +140,7 @@ impl PairConstants {
         self.coordinates.compliance()
     }
 
-    /// Returns the state from lane units.
+    /// Converts a state from lane units.
     pub fn to_state(&self, q: [f64; 4]) -> model::State {
         self.coordinates.to_state(q, self.flow.h)
     }
@@ -187,8 +187,8 @@ impl Common {
 
     fn domains(&self, oscillator: &Pair) -> [Domain; 3] {
         let behind = |side: usize| match self.is_passed[side] {
-            // Motion never enters this domain. Its share of a step belongs to contact with the last wall, whose time is counted in
-            // such steps.
+            // Motion never enters this domain. It stores the step of contact with the last wall, in which the time of that contact is
+            // counted.
             true => {
                 let substeps = self.substeps[side];
                 Domain { share: substeps.recip(), substeps, ..Domain::zeroed() }
@@ -208,7 +208,7 @@ impl Common {
     }
 }
 
-/// Returns the domains of contact with the `nth` wall of a side, from 0, in all stages.
+/// Returns the domains of contact with the `nth` wall of a side in all stages; `nth` counts from 0.
 fn behind_nth_wall(oscillator: &Pair, side: Side, nth: usize) -> impl Iterator<Item = &model::Domain> {
     let i = side.index();
     let first = oscillator.stages.iter().map(move |stage| &stage.meshing[i]).chain([&oscillator.meshing[i]]);
@@ -216,7 +216,7 @@ fn behind_nth_wall(oscillator: &Pair, side: Side, nth: usize) -> impl Iterator<I
     first.filter(move |_| nth == 0).chain(outer.into_iter().flatten())
 }
 
-/// Derives the constants of an oscillator's first stage, in all intervals between walls. Pages are numbered from `first`. `model` tells
+/// Derives the constants of an oscillator's first stage, in all intervals between walls. Pages are numbered from `first`. `model` says
 /// which walls only push.
 fn pages_of_stage(oscillator: &Pair, model: &Pair, common: &Common, first: usize) -> Vec<(Flow, Page)> {
     let [right, left] = oscillator.outer_walls.each_ref().map(Vec::len);
@@ -319,7 +319,7 @@ fn changes_of(oscillator: &Pair, steps: u32, intervals: usize) -> Vec<Change> {
     oscillator.schedule.iter().map(change).collect()
 }
 
-/// Returns the motion without contacts. It may require that `x` is at rest, which a lane knows exactly.
+/// Returns the motion without contacts. It may require that `x` is at rest; a lane can check this exactly.
 fn non_impacting(oscillator: &Pair) -> Option<model::NonImpacting> {
     let other = Coordinates::new(oscillator).other;
     let beside_rest =
@@ -335,9 +335,9 @@ pub(in crate::gpu) fn phasors(steps: u32) -> impl Iterator<Item = [f64; 2]> {
     })
 }
 
-/// Returns a bound on all rates of a domain: the forcing, and the spectral norms of the mass-scaled system. An
-/// overdamped mode can decay as fast as all of the damping. With half of the damping, the terms that single precision
-/// omits would keep 9e-6 of such a mode. A gyroscopic mode, and one on a hill, can be faster than both.
+/// Returns a bound on all rates of a domain, from the forcing and the spectral norms of the mass-scaled system. An overdamped mode can
+/// decay at the full damping rate. A bound with half of this rate would let single precision omit terms of 9e-6 of such a mode. Gyroscopic
+/// modes and modes of negative stiffness can be faster than damping and stiffness alone.
 fn rate(oscillator: &Pair, domain: &model::Domain) -> f64 {
     let (damping, frequency) = Coordinates::new(oscillator).norms(domain);
     let half = 0.5 * damping;
@@ -351,20 +351,19 @@ fn fastest_force(oscillator: &Pair) -> f64 {
     oscillator.omega * f64::from(oscillator.highest_order())
 }
 
-/// Returns the unit of speeds: the scale of length times the rate of free motion, the highest one of all stages.
+/// Returns the unit of speeds: the scale of length times the highest rate of free motion of all stages.
 pub(in crate::gpu) fn speed(oscillator: &Pair) -> f64 {
     let further = (1..oscillator.stage_count()).map(|stage| free_rate(&oscillator.in_stage(stage)));
     oscillator.length_scale() * further.fold(free_rate(oscillator), f64::max)
 }
 
-/// Returns the positions of the walls; a missing wall is out of reach.
+/// Returns the positions of the walls. A missing wall is at [`NOWHERE`].
 fn walls(oscillator: &Pair) -> [f64; 2] {
     let far = NOWHERE * oscillator.length_scale();
     oscillator.walls.map(|wall| wall.clamp(-far, far))
 }
 
-/// Returns the rate of free motion that thresholds refer to. It is the reference's rate, so that thresholds mean the
-/// same.
+/// Returns the rate of free motion by which thresholds are scaled. The reference uses the same rate, so thresholds mean the same.
 fn free_rate(oscillator: &Pair) -> f64 {
     let (damping, frequency) = Coordinates::new(oscillator).norms(&oscillator.free);
     (damping + frequency).max(fastest_force(oscillator))
@@ -442,16 +441,15 @@ fn held_force(oscillator: &Pair, interval: &Pair, h: f64) -> [f64; 3] {
     [stiffness * compliance * h * h, damping * compliance * h, constant * compliance * h * h]
 }
 
-/// Returns the domain of the other displacement while the gap sticks to a rigid wall. The wall takes up the gap's
-/// acceleration, of which the other displacement has its share. No rate exceeds those of free motion, so that the
-/// step is the same.
+/// Returns the domain of the other displacement while the gap sticks to a rigid wall. The wall's force cancels the gap's acceleration, and
+/// also acts on the other displacement. No rate exceeds those of free motion, so the step is the same.
 fn held(oscillator: &Pair, wall: f64, h: f64) -> Domain {
     let kick = Coordinates::new(oscillator).kick();
     let [gap, other] = rows(oscillator, &oscillator.free, wall, h);
     let shared: [f64; 7] = std::array::from_fn(|j| other[j] + kick * gap[j]);
     let x_row = [0.0, 0.0, shared[2], shared[3], shared[4], shared[5], shared[6]];
     let angle = oscillator.omega * h;
-    // Rounding could make them negative.
+    // Rounding could make these numbers negative.
     let passive = oscillator.growth_rate(&oscillator.free) == 0.0;
     Domain {
         step: step(&[0.0; 7], &x_row, angle),
@@ -470,7 +468,7 @@ fn held(oscillator: &Pair, wall: f64, h: f64) -> Domain {
     }
 }
 
-/// Returns the domain behind the other wall of a symmetric oscillator: there the load has the opposite sign.
+/// Returns the domain behind the other wall of a symmetric oscillator, where the load has the opposite sign.
 fn mirrored(mut domain: Domain) -> Domain {
     let rows = [&mut domain.gap_row[5], &mut domain.x_row[5]];
     let column = domain.step.iter_mut().skip(6).step_by(7);
@@ -491,7 +489,7 @@ fn step(gap_row: &[f64; 7], x_row: &[f64; 7], angle: f64) -> [f64; 28] {
         (0..2).for_each(|i| turn[i] += unit(i));
         let accelerated = |row: &[f64; 7]| {
             let motion = |half: usize| (0..4).fold(zero, |total, i| total + sum[i][half] * row[i]);
-            // A missing sine is +0, whatever the signs of the factors.
+            // Without a sine the result is +0, whatever the signs of the factors.
             let forced = motion(1) + turn[0] * row[4] + turn[1] * (row[6] + 0.0) + unit(2) * row[5];
             [motion(0) / n, forced / n]
         };
@@ -577,7 +575,7 @@ mod tests {
         pairs.into_iter().map(turned).flat_map(|one| [coupled(&one), one]).collect()
     }
 
-    /// By Padé approximants of the whole matrix.
+    /// Computes the exponential by Padé approximants of the whole matrix.
     #[test]
     fn steps_are_matrix_exponentials() {
         for oscillator in oscillators() {

@@ -54,7 +54,7 @@ impl Coordinates {
         self.along(self.gap)
     }
 
-    /// Returns the change of the rate of `x` per unit of gap rate that an impulse along the gap removes.
+    /// Returns the change of the rate of `x` by an impulse that reduces the gap's rate by 1.
     pub(super) fn kick(&self) -> f64 {
         -self.accelerated(self.gap)[self.other] / self.compliance()
     }
@@ -66,7 +66,7 @@ impl Coordinates {
         [g0 * y[0] + g1 * y[2], h * (g0 * y[1] + g1 * y[3]), x[0], h * x[1]]
     }
 
-    /// Returns the state from lane units.
+    /// Converts a state from lane units.
     pub(super) fn to_state(self, q: [f64; 4], h: f64) -> State {
         let (o, p) = (self.other, 1 - self.other);
         let (w, v) = (q[1] / h, q[3] / h);
@@ -130,7 +130,7 @@ impl Coordinates {
         (f[0] * a + f[1] * b).max(0.0).sqrt()
     }
 
-    /// Returns the spectral norm of a domain's mass-scaled damping, and the square root of that of its stiffness.
+    /// Returns the spectral norm of a domain's mass-scaled damping, and the square root of the norm of its mass-scaled stiffness.
     pub(super) fn norms(&self, domain: &Domain) -> (f64, f64) {
         let [[m1, m], [_, m2]] = self.mass;
         // Inverse `a 0; b c` of M's Cholesky factor.

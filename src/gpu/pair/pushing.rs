@@ -1,13 +1,14 @@
 //! Walls that only push, and walls with a preload, as further intervals of a lane.
 //!
-//! Behind such a wall a lane moves in an interval without another wall. Behind a wall that only pushes there are two of them, for closed
-//! and for open contact. Each ends at the wall, and where the force of spring, damper and preload changes its sign.
+//! Behind such a wall a lane moves in an interval without another wall. Behind a wall that only pushes there are two such intervals, for
+//! closed and for open contact. Each interval ends at the wall, and where the force of spring, damper and preload changes its sign.
 
 use std::borrow::Cow;
 
 use rattlemap_dynamics::model::{Contact, Domain, OuterWall, Pair, Side};
 
-/// Whether only the reference computes the oscillator: a wall that only pushes has a negative preload, so that contact begins behind it.
+/// Whether only the reference can compute the oscillator: a wall that only pushes has a negative preload, so contact begins behind the
+/// wall.
 pub(in crate::gpu) fn has_negative_preload(oscillator: &Pair) -> bool {
     Side::BOTH.into_iter().any(|side| {
         oscillator.last_wall(side).1 == Contact::Pushing
@@ -15,7 +16,7 @@ pub(in crate::gpu) fn has_negative_preload(oscillator: &Pair) -> bool {
     })
 }
 
-/// Returns the oscillator whose last walls are followed by intervals, where these only push or have a preload.
+/// Returns the oscillator with further intervals behind those last walls that only push or have a preload.
 pub(super) fn closed_pages(oscillator: &Pair) -> Cow<'_, Pair> {
     let mut whole = Cow::Borrowed(oscillator);
     for side in Side::BOTH.into_iter().filter(|&side| oscillator.is_pushing_or_preloaded(side)) {
@@ -51,7 +52,8 @@ fn last_wall(whole: &Pair, side: Side) -> (Domain, Domain, f64) {
     (domain(count - 1), domain(count), at)
 }
 
-/// Returns the oscillator of open contact with the last wall of a side, in the first stage. The wall lies on its other side.
+/// Returns the oscillator of open contact with the last wall of a side, in the first stage. In this interval the wall is on the other side
+/// of the gap.
 pub(super) fn open_page(whole: &Pair, side: Side) -> Pair {
     let (front, _, at) = last_wall(whole, side);
     let mut open = Pair {
@@ -73,7 +75,7 @@ pub(super) fn push(whole: &Pair, side: Side, h: f64) -> [f64; 3] {
     let last = Pair { free: behind, ..whole.clone() };
     let [stiffness, damping, _] = last.force_against(&front);
     if behind.damping == front.damping && behind.preload == 0.0 {
-        // It would never pull.
+        // The wall would never pull.
         return [0.0; 3];
     }
     let (unit, sign) = (whole.mobility(whole.gap), side.sign());

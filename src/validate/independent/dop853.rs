@@ -4,15 +4,15 @@
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 
-/// Shortest duration for the crate, whose first trial step underflows in a shorter one. For such durations one Euler step
-/// is exact.
+/// Shortest duration that the crate integrates; in shorter ones its first trial step underflows. For shorter durations one Euler step is
+/// exact within rounding.
 const SHORTEST: f64 = 1e-12;
 
 /// Largest number of steps of one integration.
 const MOST_STEPS: u32 = 100_000;
 
-/// The vector field of a state whose last entry is the time: the crate evaluates stage 12 at the wrong time (its table has 0 for
-/// `c_12 = 1`), which does not affect an autonomous system.
+/// Equations of motion of a state whose last entry is the time: the crate evaluates stage 12 at the wrong time (its table has 0 for `c_12 =
+/// 1`), which has no effect on an autonomous system.
 struct WatchedField<F, W> {
     /// Writes the derivative of a state.
     field: F,
@@ -41,7 +41,7 @@ pub struct Integration {
     pub tolerance: f64,
     /// Longest step.
     pub longest: f64,
-    /// Time between the returned samples; none returns the ends of steps.
+    /// Time between the returned samples. If none, the ends of steps are returned.
     pub samples: Option<f64>,
 }
 

@@ -1,8 +1,9 @@
-//! The motion of a machine for an integrator with time steps.
+//! The motion of a machine, integrated in time steps.
 //!
-//! Between events DOP853 integrates; in very short flights the first terms of the solution's Taylor series replace it, because a relative
-//! error of the time is needed there. A polynomial through the values and derivatives at both ends of a step shows whether a function
-//! that ends the modes falls below 0 on it; the integrator then gives the root its last digits.
+//! DOP853 integrates the motion between events. Very short flights use the first terms of the solution's Taylor series instead, because the
+//! relative error of their duration must be small. Functions end the present modes where they fall below 0. A polynomial through the values
+//! and derivatives at both ends of a step shows whether such a function does so in the step. The integrator then locates the root to the
+//! last digits.
 
 mod events;
 mod roots;
@@ -22,7 +23,7 @@ use system::{Constraints, Domain, Functional, Key, Numbers, PhasePoint, Slide, S
 /// Relative and absolute tolerance of one step.
 const TOLERANCE: f64 = 1e-12;
 
-/// Longest step in which no ending can be missed, in radians of the fastest rate.
+/// Longest step that cannot miss an ending, in radians of the fastest rate.
 const LONGEST: f64 = 0.7;
 
 /// Longest flight that a Taylor series of [`TERMS`] terms describes, in radians of the fastest rate.
@@ -32,11 +33,11 @@ const TERMS: usize = 10;
 /// Largest number of endings in one interval.
 const ENDINGS: u32 = 10_000;
 
-/// Number of Newton steps, and the size of the last one in radians of the fastest rate.
+/// Largest number of Newton steps, and size of the last one in radians of the fastest rate.
 const NEWTON_CAP: u32 = 6;
 const NEWTON_ENDS: f64 = 1e-7;
 
-/// Largest coordinate, in scales of length, of a motion that is followed.
+/// A motion is followed while its coordinates are at most this large, in scales of length.
 const ESCAPE: f64 = 1e12;
 
 /// A possible end of the present modes.
@@ -44,9 +45,9 @@ const ESCAPE: f64 = 1e12;
 enum Ending {
     /// A gap reaches the next wall in a direction.
     Reaches(usize, Side),
-    /// The gap of a contact onset comes back to its wall. This is no event.
+    /// The gap of a contact onset comes back to its wall. This does not count as an event.
     OnsetEnds(usize, Side),
-    /// The load stops pressing the gap of a contact onset to its wall.
+    /// In a contact onset, the load no longer presses the gap to its wall.
     PressingEnds(usize, Side),
     /// The load pulls a gap off the rigid wall on which it rests.
     PulledOff(usize, Side),
@@ -64,17 +65,17 @@ enum Ending {
 struct Watch {
     ending: Ending,
     row: Functional,
-    /// Order of the root with which the flight starts, or 0.
+    /// Order of the function's root at the start of the flight; 0 without a root.
     order: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
-    /// The springs of all walls act that the gap has crossed.
+    /// The springs of all crossed walls act.
     Plain,
-    /// Contact with the next wall has begun with a leaving speed; the gap is in front of it.
+    /// Contact with the next wall has lasted since an impact after which the gap still had a speed. The gap is in front of this wall.
     Onset(Side),
-    /// The gap is at rest on the next wall, a rigid one.
+    /// The gap is at rest on the next wall, which is rigid.
     Stuck(Side),
     /// The gap has crossed a wall that only pushes, and no force of this wall acts.
     Open,
@@ -90,11 +91,11 @@ struct Gap {
     on_wall: Option<(Side, usize)>,
     /// Order of the root of the pushing force, or of the pressing acceleration of a contact onset; 0 without a root.
     from_force: usize,
-    /// Side of the last event.
+    /// Side of the wall of the gap's last event.
     origin: Option<Side>,
 }
 
-/// Returns a number of walls with the sign of their side.
+/// Returns a number of walls with the sign of the side.
 fn signed(side: Side, count: usize) -> i8 {
     if side == Side::Right { count as i8 } else { -(count as i8) }
 }
@@ -113,7 +114,7 @@ impl Gap {
         }
     }
 
-    /// Returns the side of the contact that lasts.
+    /// Returns the side of a lasting contact.
     fn contact(&self) -> Option<Side> {
         match self.mode {
             Mode::Onset(side) | Mode::Stuck(side) => Some(side),
@@ -127,7 +128,7 @@ impl Gap {
 pub struct Event {
     /// Index of the gap.
     pub gap: usize,
-    /// What happened.
+    /// Kind of the event.
     pub kind: EventKind,
     /// Side of the wall.
     pub side: Side,
@@ -146,7 +147,7 @@ pub struct Slip {
     pub element: usize,
     /// Symbol `b'7'` if sticking ends, `b'0'` if sliding reverses without an impact.
     pub symbol: Option<u8>,
-    /// Number of listed events at walls before it.
+    /// Number of events at walls that are listed before this change.
     pub after: usize,
 }
 
@@ -157,10 +158,10 @@ pub struct Flight {
     stage: usize,
     gaps: [Gap; MOST_GAPS],
     slides: [Slide; MOST_FRICTION],
-    /// Orders of the roots of sliding rates with which the flight starts, or 0.
+    /// Orders of the roots of sliding rates at the start of the flight; 0 without a root.
     from_rate: [usize; MOST_FRICTION],
     y: Numbers,
-    /// What happened since the caller last took it.
+    /// Tally of the time since the caller last took it.
     pub(super) tally: Tally,
     /// Events at walls since the caller last took them.
     pub events: Vec<Event>,
@@ -193,17 +194,17 @@ impl Flight {
         self.system.to_state(&self.y)
     }
 
-    /// Whether an infinite series of impacts was cut off, so that not all impacts are listed.
+    /// Whether an infinite series of impacts was replaced by its limit, so that not all impacts are listed.
     pub fn cuts_series(&self) -> bool {
         self.tally.series
     }
 
-    /// Returns the side of the contact of a gap that lasts.
+    /// Returns the side of a gap's lasting contact.
     pub fn contact(&self, gap: usize) -> Option<Side> {
         self.gaps[gap].contact()
     }
 
-    /// Returns the coordinates and their rates, `(d1, w1, d2, w2, ...)`, without units.
+    /// Returns the dimensionless coordinates and rates `(d1, w1, d2, w2, ...)`.
     pub(super) fn coordinates(&self) -> Vec<f64> {
         let n = self.system.n;
         (0..2 * n).map(|i| self.y[i / 2 + n * (i % 2)]).collect()
@@ -219,8 +220,8 @@ impl Flight {
         std::array::from_fn(|i| i < self.system.elements.len() && self.slides[i] == Slide::Sticks)
     }
 
-    /// Returns a motion displaced by `by` in [`coordinates`](Self::coordinates). What is at rest stays at rest. Elements that stick
-    /// `for_good` are not displaced along their rows.
+    /// Returns a motion displaced by `by` in [`coordinates`](Self::coordinates). Gaps and elements at rest stay at rest. Elements that
+    /// stick `for_good` are not displaced along their rows.
     pub(super) fn displaced(&self, by: &[f64], for_good: [bool; MOST_FRICTION]) -> Flight {
         let (n, system, domain) = (self.system.n, &self.system, self.domain());
         let is_at_rest =
@@ -265,12 +266,12 @@ impl Flight {
         self.y[self.system.n + gap]
     }
 
-    /// Whether constraints keep a gap where it is.
+    /// Whether constraints keep a gap at its place.
     fn is_kept(&self, domain: &Domain, gap: usize) -> bool {
         domain.is_still[gap] && self.rate(gap) == 0.0
     }
 
-    /// Returns side and number of the next wall in a direction: in front of the gap, or a wall that it is behind.
+    /// Returns side and number of the next wall in a direction. This wall is in front of the gap, or the gap is behind it.
     fn next_wall(&self, gap: usize, direction: Side) -> Option<(Side, usize)> {
         let level = self.gaps[gap].level;
         let (side, nth) = match level * signed(direction, 1) {
@@ -292,7 +293,7 @@ impl Flight {
     fn watches(&self, domain: &Domain, point: &PhasePoint) -> Vec<Watch> {
         let mut watches = Vec::new();
         let mut add = |ending: Ending, row: Functional, order: usize| {
-            // A force that has just risen from 0 may be below it by rounding.
+            // A force that has just risen from 0 may be negative by rounding.
             let is_force = !matches!(ending, Ending::Reaches(..) | Ending::OnsetEnds(..));
             let rises = || {
                 dot(&row, point).abs() <= system::ROUNDING * size(&row, point)
@@ -353,8 +354,8 @@ impl Flight {
         watches
     }
 
-    /// Integrates from one time since phase 0 to another, in radians; none if the integration fails. A change of the stage at `until` is
-    /// made, one at `from` is not.
+    /// Integrates from one time since phase 0 to another, in radians. None if the integration fails. A change of the stage at `until` takes
+    /// place; a change at `from` has taken place before.
     pub fn advance(&mut self, from: f64, until: f64) -> Option<()> {
         let period = std::f64::consts::TAU;
         let periods = (from / period).floor().max(0.0);
@@ -371,7 +372,7 @@ impl Flight {
         for (change, stage) in changes {
             self.advance_in_stage(t, change)?;
             self.stage = stage;
-            // The phase of a whole period is 0 without rounding.
+            // At the end of a period, the phase is exactly 0.
             self.settle(&events::Exempt::default(), change % period, change);
             t = change;
         }
@@ -437,7 +438,7 @@ impl Flight {
         None
     }
 
-    /// Notes that a time has passed since the last event.
+    /// Adds a time without events to the tally. Afterwards gaps are off their walls, and the flight has no roots at its start.
     fn leave_walls(&mut self, domain: &Domain, time: f64) {
         if self.gaps.iter().take(self.system.gaps()).any(|gap| gap.contact().is_some()) {
             self.tally.meshing_time += time;
@@ -540,7 +541,7 @@ fn locate(
         if step.abs() <= NEWTON_ENDS * domain.radian {
             return Some((tau + step, taylor(domain, &point, step)));
         }
-        // Near a double root the polynomial's root is as good as any.
+        // Near a double root, the root of the polynomial is accurate enough.
         if step.is_nan() || step.abs() >= 0.1 * tau {
             return Some((tau, y));
         }

@@ -52,7 +52,7 @@ fn stage(stiffness: f64, load: f64) -> Stage {
     Stage { free: domain(stiffness, load), meshing: [domain(stiffness, load); 2] }
 }
 
-/// Integrates some periods and a part of the next. Returns the state, and the events of the last one.
+/// Integrates some periods and a part of the next one. Returns the state, and the events of the last period.
 fn run(oscillator: &Oscillator, start: State, turns: f64) -> (State, Vec<Event>) {
     oscillator.validate().unwrap();
     let mut flight = Flight::new(oscillator, &start);
@@ -125,7 +125,7 @@ fn oscillated([x, v]: [f64; 2], k: f64, t: f64) -> [f64; 2] {
 /// Meissner's equation: the stiffness alternates between two values.
 #[test]
 fn a_stiffness_that_alternates_is_integrated_piece_by_piece() {
-    // How often to repeat the list of stiffnesses and the turns that each holds.
+    // Number of repetitions of the list of stiffnesses and of the turns for which each of them holds.
     type Pieces = &'static [(f64, f64)];
     type Changes = &'static [(f64, usize)];
     let cases: [(Changes, u32, Pieces); 4] = [
@@ -158,8 +158,8 @@ fn check_events(events: &[Event], expected: &[(EventKind, f64)]) {
     }
 }
 
-/// A mass rests on the floor until a stage lifts it with 2, and falls with 20 in the next. It rises by `h = 2 (0.3 T)^2 / 2` and has
-/// the speed `v = 2 (0.3 T)` then; it reaches the floor `(v + sqrt(v^2 + 40 h)) / 20` later.
+/// A mass rests on the floor until a stage lifts it with the acceleration 2. In the next stage it falls with the acceleration 20. It rises
+/// by `h = 2 (0.3 T)^2 / 2` and has the speed `v = 2 (0.3 T)` then; it reaches the floor `(v + sqrt(v^2 + 40 h)) / 20` later.
 #[test]
 fn a_stage_releases_a_mass_at_rest() {
     let floor = mass(-20.0, [f64::INFINITY, 0.0], Contact::Rigid);
@@ -176,7 +176,7 @@ fn a_stage_releases_a_mass_at_rest() {
     }
 }
 
-/// The force at phase 0 is 0 and then presses: a gap at rest stays on the wall. With the other sign it leaves.
+/// The force at phase 0 is 0. If it then presses, a gap at rest stays on the wall; with the other sign the gap leaves.
 #[test]
 fn derivatives_of_the_force_decide_about_rest() {
     for (force_sin, stays) in [(-1.0, true), (1.0, false)] {

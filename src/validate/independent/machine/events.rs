@@ -1,4 +1,4 @@
-//! What happens at the events of a machine.
+//! Processes the events of a machine.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,26 +8,26 @@ use rattlemap_dynamics::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use rattlemap_dynamics::motion::EventKind;
 use rattlemap_dynamics::word;
 
-/// Height of a flight, in scales of length, that ends a series of impacts.
+/// A series of impacts ends if the height of a flight, in scales of length, is below this.
 const LOWEST_FLIGHT: f64 = 1e-13;
 
-/// Largest distance of a start from a wall that counts as rounding, relative to the terms of the gap.
+/// A start that is nearer to a wall than this counts as on the wall. The distance is relative to the terms of the gap.
 const GAP_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Decisions on what is at rest after one event.
+/// Largest number of decisions on gaps and elements at rest after one event.
 const MOST_DECISIONS: usize = 16;
 
-/// Order of the root when a gap leaves its wall gently: its acceleration is 0.
+/// Order of the root when a gap leaves its wall with an acceleration of 0.
 const RELEASE_ORDER: usize = 3;
 
-/// What an event has just decided: gaps and elements that are not decided again.
+/// Gaps and elements that an event has just decided, and that are not decided again.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Exempt {
     gaps: [bool; MOST_GAPS],
     elements: [bool; MOST_FRICTION],
 }
 
-/// What may change in a decision: gaps at rest on rigid walls on these sides, and elements without a rate.
+/// Gaps and elements whose modes a decision may change: gaps at rest on rigid walls on these sides, and elements without a sliding rate.
 #[derive(Clone, Copy, Debug)]
 struct AtRest {
     gaps: [Option<Side>; MOST_GAPS],
@@ -42,11 +42,11 @@ struct Kick {
     released: [bool; MOST_GAPS],
 }
 
-/// What an impact leads to: modes and coordinates.
+/// Modes and coordinates after an impact.
 struct Outcome {
     key: Key,
     y: Numbers,
-    /// How a contact of the gap lasts; none if it leaves the wall.
+    /// Mode of a contact that lasts; none if the gap leaves the wall.
     lasting: Option<Lasting>,
 }
 
@@ -179,7 +179,7 @@ impl Flight {
         self.gaps[gap].mode = Mode::Plain;
     }
 
-    /// Returns order and value of the first derivative of a gap, from the acceleration on, that is not 0.
+    /// Returns order and value of the first nonzero derivative of a gap, from the acceleration on.
     fn tendency(&self, gap: usize, t: f64) -> (usize, f64) {
         let domain = self.domain();
         domain.tendency(&domain.unit(gap), &self.point(&domain, t), 2)
@@ -190,13 +190,13 @@ impl Flight {
         direction.sign() * self.tendency(gap, t).1 > 0.0
     }
 
-    /// Notes that a gap lies on a wall and does not cross it.
+    /// Records that a gap lies on a wall and does not cross it.
     fn leave(&mut self, gap: usize, direction: Side, t: f64) {
         let order = if self.rate(gap) != 0.0 { 1 } else { self.tendency(gap, t).0.min(RELEASE_ORDER) };
         self.gaps[gap].on_wall = Some((direction, order));
     }
 
-    /// A gap reaches the next wall in a direction.
+    /// Processes a gap that reaches the next wall in a direction.
     fn reach(&mut self, gap: usize, direction: Side, t: f64) {
         let Some((side, nth)) = self.next_wall(gap, direction) else { return };
         self.put_on_wall(gap, direction);
@@ -234,8 +234,8 @@ impl Flight {
         self.gaps[gap] = Gap { origin: self.gaps[gap].origin, ..after };
     }
 
-    /// Returns the effect of an impact on all rates: gaps at rest on rigid walls stay there if their walls have to push, and those of
-    /// `kept` in any case.
+    /// Returns the effect of an impact on all rates. Gaps at rest on rigid walls stay there if their walls have to push; gaps in `kept`
+    /// stay in any case.
     fn kick(&self, gap: usize, side: Side, kept: [bool; MOST_GAPS]) -> Kick {
         let (system, held) = (&self.system, self.key().held);
         let resting: Vec<(usize, Side)> =
@@ -244,7 +244,7 @@ impl Flight {
             let is_released = |at: usize| set >> at & 1 == 1;
             let holding: Vec<(usize, Side)> =
                 (0..resting.len()).filter(|&at| !is_released(at)).map(|at| resting[at]).collect();
-            // Impulses along the gaps: those of the walls at rest, and that of the wall that is hit.
+            // Impulses along the gaps, of the walls on which gaps rest and of the wall that is hit.
             let gaps: Vec<usize> = holding.iter().map(|&(other, _)| other).chain([gap]).collect();
             let among = DMatrix::from_fn(gaps.len(), gaps.len(), |i, j| system.mobility[(gaps[i], gaps[j])]);
             let mut rates = DVector::zeros(gaps.len());
@@ -285,7 +285,7 @@ impl Flight {
         let outcome = loop {
             let kick = self.kick(gap, side, kept);
             let outcome = self.outcome(gap, side, wall, e, &kick, t);
-            // Released gaps whose flight would be too low rest on, or impacts in a corner would go on for ever.
+            // Gaps whose flight would be too low stay at rest. Otherwise impacts in a corner would go on for ever.
             let domain = system.domain(outcome.key);
             let point = domain.point(&outcome.y, t);
             let low = (0..system.gaps()).filter(|&other| kick.released[other]).find(|&other| {
@@ -302,7 +302,7 @@ impl Flight {
         let kind = if outcome.lasting.is_some() { EventKind::MeshStart } else { EventKind::Impact };
         self.y = outcome.y;
         self.record(gap, kind, side, t);
-        // Contact that begins faster than `mesh_speed` ends an infinite series of impacts.
+        // If contact begins with a speed above `mesh_speed`, it replaces an infinite series of impacts.
         self.tally.series |= outcome.lasting.is_some() && e * approach > wall.mesh_speed;
         match outcome.lasting {
             None => {}
@@ -375,7 +375,7 @@ impl Flight {
             if *y != self.y && moves > ROUNDING * most {
                 key.slides[i] = self.slide_at(i, &point);
             }
-            // An element that has only begun to slide is at rest, too.
+            // An element that has only just begun to slide also counts as at rest.
             at_rest.elements[i] = key.slides[i] == Slide::Sticks || self.slide_at(i, &point) == Slide::Sticks;
         }
         self.consistent(key, &at_rest, &point)
@@ -391,7 +391,7 @@ impl Flight {
         }
     }
 
-    /// Whether modes fit the forces on what is at rest.
+    /// Whether modes are consistent with the forces on gaps and elements at rest.
     fn is_consistent(&self, key: Key, at_rest: &AtRest, point: &PhasePoint) -> bool {
         let domain = self.system.domain(key);
         let gaps = (0..self.system.gaps()).all(|gap| match (at_rest.gaps[gap], domain.pushes[gap]) {
@@ -431,13 +431,13 @@ impl Flight {
         .find(|&tried| self.is_consistent(tried, at_rest, point))
     }
 
-    /// Returns what is at rest.
+    /// Returns the gaps and elements at rest.
     fn at_rest(&self, exempt: &Exempt) -> AtRest {
         let domain = self.domain();
         let gap = |gap: usize| match (self.gaps[gap].mode, self.gaps[gap].on_wall) {
             _ if exempt.gaps[gap] => None,
             (Mode::Stuck(side), _) => Some(side),
-            // Friction holds the gap on a rigid wall.
+            // Friction, not the wall, holds this gap.
             (Mode::Plain, Some((side, _))) if self.is_kept(&domain, gap) => {
                 let ahead = self.next_wall(gap, side).filter(|&(own, _)| own == side);
                 let is_rigid =
@@ -453,7 +453,7 @@ impl Flight {
         }
     }
 
-    /// Decides all modes again that depend on forces. `at` is the time for the forces, `t` that of events.
+    /// Decides all modes again that depend on forces. Forces are taken at the time `at`; events get the time `t`.
     pub(super) fn settle(&mut self, exempt: &Exempt, at: f64, t: f64) {
         for _ in 0..MOST_DECISIONS {
             if self.settle_contacts(at, t) {
@@ -476,7 +476,7 @@ impl Flight {
         }
     }
 
-    /// Decides contact onsets and walls that only push again. Returns whether a mode has changed.
+    /// Decides again the modes of contact onsets and of walls that only push. Returns whether a mode has changed.
     fn settle_contacts(&mut self, at: f64, t: f64) -> bool {
         let domain = self.domain();
         let point = self.point(&domain, at);
@@ -512,7 +512,8 @@ impl Flight {
         false
     }
 
-    /// Enters other modes of what is at rest, and records the changes: of friction first if the rate of the element `stopped` has vanished.
+    /// Enters new modes of gaps and elements at rest, and records the changes. Changes of friction come first if the rate of the element
+    /// `stopped` has vanished.
     fn change(&mut self, next: &Key, stopped: Option<usize>, t: f64) {
         if stopped.is_some() {
             self.change_slides(next.slides, stopped, t);
@@ -562,7 +563,7 @@ impl Flight {
         }
     }
 
-    /// Returns the order of the root of a sliding rate that is 0 now.
+    /// Returns the order of the root of a sliding rate that is 0 at this instant.
     fn order_of_rate(&self, i: usize, t: f64) -> usize {
         let domain = self.domain();
         let point = self.point(&domain, t);
@@ -572,7 +573,7 @@ impl Flight {
         domain.tendency(&self.system.sliding_rate(i), &point, 1).0.min(RELEASE_ORDER)
     }
 
-    /// Removes rounding errors from the rates of what is at rest.
+    /// Removes rounding errors from the rates of gaps and elements at rest.
     fn hold(&mut self) {
         let (system, key) = (self.system.clone(), self.key());
         let n = system.n;
@@ -591,14 +592,14 @@ impl Flight {
         constraints.project(&system.mobility, &mut w, &speeds);
         let domain = self.domain();
         for i in 0..n {
-            // A gap without a rate has none, so that it does not hit its wall.
+            // A gap at rest gets a rate of exactly 0, so that it does not hit its wall.
             let had_none = i < system.gaps() && self.y[n + i] == 0.0;
             let is_zero = (domain.is_still[i] || had_none) && w[i].abs() <= ROUNDING * largest;
             self.y[n + i] = if is_zero { 0.0 } else { w[i] };
         }
     }
 
-    /// A sliding rate has become 0.
+    /// Processes a sliding rate that has become 0.
     fn end_sliding(&mut self, i: usize, t: f64) {
         let mut at_rest = self.at_rest(&Exempt::default());
         at_rest.elements[i] = true;
@@ -612,7 +613,7 @@ impl Flight {
         }
     }
 
-    /// The force that holds an element has reached its limit.
+    /// Processes a holding force of an element that has reached its limit.
     fn begin_sliding(&mut self, i: usize, next: Slide, t: f64) {
         let before = self.domain();
         let kept: Vec<usize> = (0..self.system.gaps()).filter(|&gap| self.is_kept(&before, gap)).collect();
@@ -627,7 +628,7 @@ impl Flight {
                 && self.system.walls(gap, side)[nth].contact == Contact::Rigid
                 && side.sign() * domain.tendency(&domain.unit(gap), &point, 3).1 > 0.0
             {
-                // The wall holds the gap from here on.
+                // From here on, the wall holds the gap.
                 self.slides[i] = Slide::Sticks;
                 self.record(gap, EventKind::MeshStart, side, t);
                 (self.gaps[gap].mode, self.gaps[gap].on_wall) = (Mode::Stuck(side), None);
@@ -644,7 +645,7 @@ impl Flight {
         }
     }
 
-    /// Records an event at a wall. The modes are those before it.
+    /// Records an event at a wall. It must be called before the modes change.
     fn record(&mut self, gap: usize, kind: EventKind, side: Side, t: f64) {
         let Gap { origin, .. } = self.gaps[gap];
         let symbol = match (self.gaps[gap].contact(), origin) {
@@ -671,7 +672,7 @@ impl Flight {
     }
 }
 
-/// Returns the leaving speed of a flight that is not followed.
+/// Returns the leaving speed below which a flight is not followed.
 fn lowest_speed(domain: &Domain, gap: usize, point: &PhasePoint) -> f64 {
     (2.0 * LOWEST_FLIGHT * dot(&domain.accelerations[gap], point).abs()).sqrt()
 }

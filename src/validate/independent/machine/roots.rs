@@ -1,9 +1,9 @@
-//! First zero of a function on a step, from its values and three derivatives at both ends.
+//! Finds the first zero of a function on a step, from its values and three derivatives at both ends.
 
 /// Number of coefficients of the polynomial of degree 7 through both ends.
 const COEFFICIENTS: usize = 8;
 
-/// Relative size of values that are rounding errors.
+/// Relative size below which values are rounding errors.
 const ROUNDING: f64 = 1e-15;
 
 /// Largest number of halvings of a step in which several zeros may lie.
@@ -13,7 +13,7 @@ const HALVINGS: u32 = 40;
 const CHOOSE: [f64; COEFFICIENTS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
 
 /// Returns the share of a step of length `h` at which a function first falls below 0. `ends` are its values and derivatives at both ends.
-/// If `order` is above 0, the function starts from 0 with as many vanishing derivatives, and rises.
+/// If `order` is above 0, the function rises from a root of this order at the start.
 pub(super) fn first_fall(ends: [[f64; 4]; 2], h: f64, order: usize) -> Option<f64> {
     let mut scaled = ends;
     for end in &mut scaled {
@@ -45,8 +45,8 @@ pub(super) fn first_fall(ends: [[f64; 4]; 2], h: f64, order: usize) -> Option<f6
     fall_within(&bernstein[..=degree], 0.0, 1.0, least, HALVINGS)
 }
 
-/// Returns the first fall of a polynomial with these Bernstein coefficients on an interval. Where all are below `least`, only rounding
-/// decides, and there is none.
+/// Returns where a polynomial with these Bernstein coefficients first falls below 0 on an interval. None if all coefficients are below
+/// `least`, because only rounding would decide.
 fn fall_within(coefficients: &[f64], from: f64, width: f64, least: f64, halvings: u32) -> Option<f64> {
     let mut signs = coefficients.iter().filter(|x| **x != 0.0).map(|x| *x < 0.0);
     let mut is_negative = signs.next()?;
@@ -131,7 +131,7 @@ mod tests {
         assert!(near(fall(&[0.0, 0.3, -1.0], 2.0, 1), 0.3));
         assert!(near(fall(&[0.0, 0.0, 0.3, -1.0], 0.5, 2), 0.3));
         assert!(near(fall(&[0.0, 0.0, 0.0, 0.3, -1.0], 1.0, 3), 0.3));
-        // (x - 0.5)^2 + 1e-10 stays above 0, and falls for 1e-10 less.
+        // (x - 0.5)^2 + 1e-10 stays above 0; (x - 0.5)^2 - 1e-10 falls below it.
         assert_eq!(fall(&[0.25 + 1e-10, -1.0, 1.0], 1.0, 0), None);
         assert!((fall(&[0.25 - 1e-10, -1.0, 1.0], 1.0, 0).unwrap() - (0.5 - 1e-5)).abs() < 1e-9);
     }

@@ -1,4 +1,4 @@
-//! A machine without units, in coordinates whose first entries are its gaps, and its linear domains.
+//! A machine in dimensionless coordinates, of which the first are its gaps, and its linear domains.
 //!
 //! Lengths are in scales of length and times in radians of the forcing. The coordinates `d` are the gaps and some of the displacements,
 //! so that a gap can be set exactly to a wall; `w` are their rates. Functionals of the motion are rows of the point
@@ -21,19 +21,19 @@ pub(super) const WIDTH: usize = 2 * MOST_COORDINATES + 2 * (MOST_HARMONICS + 1) 
 /// Coordinates and rates, of which the first `2 n` are in use.
 pub(super) type Numbers = [f64; 2 * MOST_COORDINATES];
 
-/// What rows are applied to.
+/// A point `(d, w, cos and sin of each harmonic, 1)`, to which rows are applied.
 pub(super) type PhasePoint = [f64; WIDTH];
 
 /// A functional of the motion.
 pub(super) type Functional = [f64; WIDTH];
 
-/// Relative rounding error of sums, and of mobilities that vanish.
+/// Relative rounding error of sums. Mobilities of this relative size count as zero.
 pub(super) const ROUNDING: f64 = 1e-12;
 
-/// Length below which a machine has no scale of length.
+/// If all lengths of a machine are below this, it has no scale of length.
 const NO_LENGTH: f64 = 1e-100;
 
-/// How the surfaces of an element with dry friction move.
+/// Mode of an element with dry friction: how its surfaces move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) enum Slide {
     /// The sliding rate stays 0.
@@ -54,7 +54,7 @@ impl Slide {
     }
 }
 
-/// What determines the equations of motion.
+/// The modes that determine the equations of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Key {
     pub(super) stage: usize,
@@ -85,7 +85,7 @@ pub(super) struct Domain {
     pub(super) is_still: [bool; MOST_COORDINATES],
     /// Forces by which rigid walls push the gaps that rest on them.
     pub(super) pushes: [Option<Functional>; MOST_GAPS],
-    /// Forces that hold elements. An element whose row others hold has none.
+    /// Forces that hold elements. None for an element whose row is already held by others.
     pub(super) holds: [Option<Functional>; MOST_FRICTION],
     /// Time in which the fastest rate turns by one radian.
     pub(super) radian: f64,
@@ -95,7 +95,7 @@ pub(super) fn dot(row: &[f64], point: &[f64]) -> f64 {
     row.iter().zip(point).map(|(a, b)| a * b).sum()
 }
 
-/// Returns the sum of the sizes of the terms of [`dot`].
+/// Returns the sum of the absolute values of the terms of [`dot`].
 pub(super) fn size(row: &Functional, point: &PhasePoint) -> f64 {
     row.iter().zip(point).map(|(a, b)| (a * b).abs()).sum()
 }
@@ -167,7 +167,8 @@ impl Domain {
         rate
     }
 
-    /// Returns order and value of the first derivative, from `first` on, that is not 0 but for rounding; the value 0 if four are 0.
+    /// Returns order and value of the first derivative, from `first` on, that is not 0 within rounding. If four derivatives are 0, the
+    /// value is 0.
     pub(super) fn tendency(&self, row: &Functional, point: &PhasePoint, first: usize) -> (usize, f64) {
         let mut row = *row;
         for order in 0..first + 4 {
@@ -183,9 +184,9 @@ impl Domain {
 
 /// Constraints on rates.
 pub(super) struct Constraints {
-    /// Rows of `w` that are held, without those that others hold.
+    /// Rows of `w` that are held, without rows that are combinations of others.
     pub(super) rows: DMatrix<f64>,
-    /// Which of the given rows these are.
+    /// Indices of these rows among the given rows.
     pub(super) kept: Vec<usize>,
     /// Inverse of `rows mobility rows^T`.
     pub(super) inverse: DMatrix<f64>,
@@ -209,20 +210,20 @@ impl Constraints {
         Constraints { rows, kept, inverse, mobility: left }
     }
 
-    /// Removes the part of rates that the constraints forbid. They hold their rows at these `speeds`.
+    /// Removes the part of rates that the constraints forbid. The constraints hold their rows at these `speeds`.
     pub(super) fn project(&self, mobility: &DMatrix<f64>, w: &mut DVector<f64>, speeds: &[f64]) {
         let speeds = DVector::from_fn(self.kept.len(), |i, _| speeds[self.kept[i]]);
         *w -= mobility * self.rows.transpose() * &self.inverse * (&self.rows * &*w - speeds);
     }
 }
 
-/// A machine with the domains that motions have met.
+/// A machine, and the domains that its motions have met.
 #[derive(Debug)]
 pub(super) struct System {
-    /// The machine without units, in the coordinates `d`.
+    /// The dimensionless machine, in the coordinates `d`.
     pub(super) machine: Oscillator,
     pub(super) n: usize,
-    /// Displacements over `units[0]` are these combinations of coordinates.
+    /// Combinations of coordinates that give the displacements, divided by `units[0]`.
     from_coordinates: DMatrix<f64>,
     to_coordinates: DMatrix<f64>,
     /// Units of displacements and velocities.
@@ -239,7 +240,7 @@ impl System {
     pub(super) fn new(machine: &Oscillator, start: &State) -> System {
         let to_coordinates = coordinates(machine);
         let from_coordinates = to_coordinates.clone().try_inverse().expect("the rows are independent");
-        // A machine without walls and loads has no length, so its start gives one.
+        // A machine without walls and loads has no length, so its start defines the scale of length.
         let of_start = start.iter().step_by(2).fold(0.0f64, |most, x| most.max(x.abs()));
         let length = match machine.length_scale() {
             scale if scale > NO_LENGTH => scale,
@@ -304,8 +305,8 @@ impl System {
         row
     }
 
-    /// Returns the row of the force, positive away from it, of the last wall of a side if this wall only pushes. There is none if the
-    /// force never pulls behind the wall.
+    /// Returns the row of the force of a side's last wall, positive away from the wall, if this wall only pushes. None if the force never
+    /// pulls behind the wall.
     pub(super) fn pushing(&self, gap: usize, side: Side, stage: usize) -> Option<Functional> {
         let wall = self.walls(gap, side).last()?;
         let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
@@ -407,8 +408,8 @@ impl System {
     }
 }
 
-/// Returns the rows of the coordinates: the gaps, and displacements that complete them. For each gap the displacement is left out that has
-/// the largest part in the mobility of what is left of its row.
+/// Returns the rows of the coordinates: the gaps, and displacements that complete them. Each gap replaces one displacement. It is the
+/// displacement with the largest share in the mobility of the gap's row, after previous gaps are eliminated from this row.
 fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
     let n = machine.degrees();
     let mut rest: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
@@ -430,8 +431,8 @@ fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |i, j| rows[i][j])
 }
 
-/// Returns a machine in units of displacement and velocity, and in other coordinates. Forces are those along the coordinates, over the unit
-/// of displacement.
+/// Returns a machine in units of displacement and velocity, and in other coordinates. Forces act along the coordinates, and are divided by
+/// the unit of displacement.
 fn transformed(machine: &Oscillator, [length, speed]: [f64; 2], from: &DMatrix<f64>) -> Oscillator {
     let (back, omega) = (from.transpose(), machine.omega);
     let matrix = |m: &DMatrix<f64>, factor: f64| &back * m * from * factor;

@@ -62,7 +62,7 @@ fn record_of(oscillator: &Oscillator, start: State) -> Option<Record> {
     follow(Strobed::new(oscillator, start, &halt), &budget)
 }
 
-/// Half swings are shorter by `2 f / k`, until a turn at which the spring does not overcome friction.
+/// Each half swing is shorter by `2 f / k`, until the spring does not overcome friction at a turning point.
 #[test]
 fn half_swings_become_shorter_and_end_for_ever() {
     let mut oscillator = block(4.0, 0.48, 0.0);
@@ -73,7 +73,7 @@ fn half_swings_become_shorter_and_end_for_ever() {
     check_slips(&flight.slips, &turns, "half swings");
     assert_near(&flight.state(), &[0.04, 0.0, 0.0, 0.0], 1e-10, "rest");
     assert_eq!(flight.state()[1], 0.0);
-    // A force below the friction does not move it: a cycle without multipliers and events.
+    // A force below the friction does not move the mass. This is a cycle without multipliers and events.
     let mut pushed = oscillator;
     (pushed.omega, pushed.force) = (1.0, [0.2, 0.0]);
     let record = record_of(&pushed.described(Law::both(0.5, 0.0)), state(&[1.0])).unwrap();
@@ -113,7 +113,7 @@ fn a_belt_carries_a_block_until_it_slips() {
     check_slips(&flight.slips, &[(None, sticks), (Some(b'7'), slips)], "belt");
     let exact = [0.5 + 0.25 * 2f64.sin(), 0.5 * 2f64.cos()];
     assert_near(&flight.state()[..2], &exact, 1e-10, "after the slip");
-    // The start can be on the belt.
+    // The block can also start at rest on the belt.
     let flight = motion(&oscillator.described(Law::both(0.5, 0.0)), state(&[-0.5, 0.5]), 1.0);
     assert_near(&flight.state(), &[0.0, 0.5, 0.0, 0.0], 1e-13, "on the belt");
 }
@@ -150,7 +150,7 @@ fn an_impact_sets_a_mass_sliding() {
     assert_near(&flight.state(), &[0.75, 0.25, 0.9375, 0.0], 1e-11, "after the impact");
 }
 
-/// A wall carries the load first, and friction after it.
+/// A wall carries the load first, and friction carries it afterwards.
 #[test]
 fn a_rigid_wall_lets_go_before_friction() {
     let floor = mass(-1.0, [f64::INFINITY, 0.0], Contact::Rigid);
@@ -168,7 +168,7 @@ fn a_rigid_wall_lets_go_before_friction() {
     let v = 3.0 * (slips.cos() - 1.5f64.cos()) - 1.5 * dt;
     let x = 3.0 * (slips.cos() * dt - (1.5f64.sin() - slips.sin())) - 0.75 * dt * dt;
     assert_near(&flight.state()[..2], &[x, v], 1e-11, "lifted");
-    // Friction holds the smaller force, and gives the load back to the wall at its limit.
+    // Friction holds while the force is small. At the limit of friction, the wall carries the load again.
     let flight = motion(&loaded(1.2).described(law), REST, TAU);
     let kinds = kinds(&flight);
     assert_eq!(kinds[1..], [(EventKind::MeshEnd, Side::Left), (EventKind::MeshStart, Side::Left)]);
