@@ -729,7 +729,7 @@ pub(crate) struct Models {
 /// Half of the sample is drawn from all integrated cells, a quarter from cells at borders between classes, a quarter from
 /// cells whose status is not ok. The rates of differing cells come from the first half. The event-driven reference
 /// computes each cell over the whole budget, without early stops. Maps that the reference computed are compared with
-/// lanes in f64, or with the ODE solver DOP853 if no adapter has f64. Each difference is of one of five kinds: another
+/// lanes in f64, or with the ODE solver DOP853 if no hardware adapter has f64. Each difference is of one of five kinds: another
 /// attractor, a border within rounding, a budget too short, a limit of the engine, or unexplained. Averages over chaotic
 /// motions are compared as distributions. Chaotic cells, one per five cells of the sample, are followed on the reference for
 /// further periods; the result says in how many of them chaos ends, and where. The exit code is 1 if significantly more than one cell in 10,000 is unexplained.

@@ -82,6 +82,7 @@ mod tests {
     use crate::gpu::AdapterChoice;
 
     #[test]
+    #[ignore = "compiles shaders of its own; scripts/test.sh --all"]
     fn a_driver_with_wrong_arithmetic_is_rejected() {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
         let settings = LaneSettings::default();

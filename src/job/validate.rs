@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::gpu::{AdapterChoice, Gpu, Precision};
+use crate::gpu::{AdapterChoice, Gpu, Precision, is_hardware};
 use crate::job::check::CheckedFolder;
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap};
@@ -107,7 +107,7 @@ impl ValidateJob {
     }
 
     /// Computes the sample's lanes again: on the device that made the map, else on the best adapter; also in f64 if an
-    /// adapter has it. `halt` has no effect while a driver compiles.
+    /// adapter has it, for maps of the reference a hardware adapter. `halt` has no effect while a driver compiles.
     ///
     /// # Errors
     /// [`JobError::Failed`] if a device fails.
@@ -129,7 +129,11 @@ impl ValidateJob {
             true => None,
             // The ODE solver is the second judge then.
             false if subject.plan.needs_reference() => None,
-            false => open(Precision::F64, &own).or_else(|_| open(Precision::F64, &any)).ok(),
+            // A software driver takes minutes to compile shaders, longer than the solver needs for a sample.
+            false => open(Precision::F64, &own)
+                .or_else(|_| open(Precision::F64, &any))
+                .ok()
+                .filter(|gpu| subject.is_lane || is_hardware(gpu.adapter())),
         };
         gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.stop_on(halt));
         let lanes = pollster::block_on(Lanes::run(&subject, &self.sample, gpu.as_mut(), double.as_mut()));

@@ -268,10 +268,29 @@ fn bars(precision: Precision) -> [f64; 3] {
     }
 }
 
-/// Compares lanes of pairs, or of machines, with their closed forms. Returns these.
-fn check_lanes(gpu: &mut Gpu, machines: bool) -> Vec<&'static Known> {
-    let is_asked = |known: &&Known| Features::of(&known.oscillator).machine.is_some() == machines;
-    let group: Vec<&Known> = KNOWN.iter().filter(is_asked).collect();
+/// Which closed forms lanes are compared with: each group needs a shader of its own.
+#[derive(Clone, Copy, PartialEq)]
+enum Group {
+    /// Pairs with one wall on a side and a force of one harmonic, without stages.
+    Plain,
+    Pairs,
+    Machines,
+}
+
+impl Group {
+    fn has(self, known: &Known) -> bool {
+        let Features { machine, harmonics, stages, intervals, .. } = Features::of(&known.oscillator);
+        match self {
+            Group::Plain => machine.is_none() && harmonics == 0 && !stages && !intervals,
+            Group::Pairs => machine.is_none(),
+            Group::Machines => machine.is_some(),
+        }
+    }
+}
+
+/// Compares lanes with the closed forms of a group. Returns these.
+fn check_lanes(gpu: &mut Gpu, group: Group) -> Vec<&'static Known> {
+    let group: Vec<&Known> = KNOWN.iter().filter(|known| group.has(known)).collect();
     let cells: Vec<_> =
         group.iter().map(|known| (known.oscillator.clone(), known.law, start(known))).collect();
     let settings = settings(cells.iter().map(|cell| &cell.0), LaneSettings::within(&budget()));
@@ -314,26 +333,26 @@ fn check_chain(gpu: &mut Gpu, bar: f64) {
 }
 
 #[test]
-fn lanes_in_f32_find_known_cycles() {
-    let mut gpu = open(Precision::F32);
-    let pairs = check_lanes(&mut gpu, false);
-    check_borders(&mut gpu, &pairs);
+fn lanes_find_known_cycles() {
+    check_lanes(&mut open(Precision::F32), Group::Plain);
 }
 
 #[test]
 #[ignore = "compiles shaders of its own; scripts/test.sh --all"]
-fn lanes_in_f64_find_known_cycles() {
-    let mut gpu = open(Precision::F64);
-    let pairs = check_lanes(&mut gpu, false);
-    check_borders(&mut gpu, &pairs);
+fn lanes_find_known_cycles_of_all_pairs() {
+    for precision in Precision::ALL {
+        let mut gpu = open(precision);
+        let pairs = check_lanes(&mut gpu, Group::Pairs);
+        check_borders(&mut gpu, &pairs);
+    }
 }
 
 #[test]
 #[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn lanes_find_known_cycles_of_machines() {
-    check_lanes(&mut open(Precision::F32), true);
+    check_lanes(&mut open(Precision::F32), Group::Machines);
     let mut gpu = open(Precision::F64);
-    check_lanes(&mut gpu, true);
+    check_lanes(&mut gpu, Group::Machines);
     // Impacts amplify errors of the chain by more than 1e4, so that single precision would show nothing.
     check_chain(&mut gpu, bars(Precision::F64)[0]);
 }

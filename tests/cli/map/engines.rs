@@ -5,10 +5,20 @@ use crate::common::with_scene;
 
 #[test]
 fn lanes_give_the_same_files_and_classes() {
+    check_lanes(&["f32"]);
+}
+
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn lanes_in_double_precision_give_the_same_files_and_classes() {
+    check_lanes(&["f32", "f64"]);
+}
+
+fn check_lanes(precisions: &[&str]) {
     let folder = folder();
     map(&folder, "--quiet --out cpu").success();
     let (header, expected) = rows(&folder.path().join("cpu/cells.csv"));
-    for precision in ["f32", "f64"] {
+    for precision in precisions {
         let out = folder.path().join(precision);
         let run = map(&folder, &format!("--engine gpu --precision {precision} --out {precision}"));
         run.success().stdout("").stderr(says(&[
@@ -25,7 +35,7 @@ fn lanes_give_the_same_files_and_classes() {
         let differing = lanes.iter().zip(&expected).filter(|(a, b)| a[4..6] != b[4..6]).count();
         assert!(differing <= 6, "{precision}: {differing} cells differ");
         let manifest = json(&out.join("manifest.json"));
-        assert_eq!((&manifest["engine"], &manifest["precision"]), (&"gpu".into(), &precision.into()));
+        assert_eq!((&manifest["engine"], &manifest["precision"]), (&"gpu".into(), &(*precision).into()));
         let integration = &manifest["integration"];
         let [least, most] =
             ["least_steps_used", "most_steps_used"].map(|name| integration[name].as_u64().unwrap());

@@ -17,7 +17,7 @@ fn interrupted(folder: &TempDir, arguments: &str, delay: u64, signal: &str) -> (
 #[test]
 fn killed_runs_are_resumed_to_the_same_bytes() {
     let slow = "--set integration.early_stop=false";
-    for (engine, longest) in [("--engine cpu", 300), ("--engine gpu --precision f64", 2500)] {
+    for (engine, longest) in [("--engine cpu", 300), ("--engine gpu --precision f32", 2500)] {
         let folder = folder();
         let arguments = format!("{engine} {slow}");
         map(&folder, &format!("{arguments} --quiet --out whole")).success();
