@@ -3,7 +3,7 @@
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
-use crate::common::linear::{Linear, with_preload, with_wall};
+use crate::common::linear::Linear;
 use crate::common::pairs::{AsPair, Friction, Rubbing};
 use crate::common::{BUDGET, apart};
 use crate::kinds::draw::{Numbers, random_cell};
@@ -15,9 +15,7 @@ use rattlemap::map::plan::Needs;
 use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, Model, OuterWall, Pair, REST, Side, Stage, state,
-};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Model, OuterWall, Pair, REST, Stage, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Class, measure};
 use rayon::prelude::*;
@@ -437,10 +435,6 @@ fn excluded_features_are_refused() {
     let error = kinds::run(Precision::F32, &walled_cells()[..1], &LaneSettings::only(1)).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "intervals", .. }), "{error}");
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 2.1 };
-    let pushing = with_wall(free.oscillator(), Side::Right, 0.1, Contact::Pushing, [24.0, 1.5]);
-    let cells = [(with_preload(pushing, Side::Right, -0.1), Law::both(0.5, 0.0), REST)];
-    let error = kinds::run(Precision::F32, &cells, &settings(&cells)).unwrap_err();
-    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "negative_preload", .. }), "{error}");
     let friction = vec![Friction { row: [1.0, 0.0], force: 0.1, speed: 0.0 }];
     let machine = Rubbing { pair: free.oscillator(), friction }.described(Law::both(0.5, 0.0));
     let (mut gpu, laws) = (crate::common::gpu::open(Precision::F32), [Law::both(0.0, 0.0)]);

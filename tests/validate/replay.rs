@@ -336,16 +336,24 @@ fn validate_lanes(plan: &Plan, precision: Precision, rewrite: Option<fn(String) 
 
 #[test]
 fn a_correct_map_of_lanes_passes() {
+    check_correct_map(Precision::F32);
+}
+
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn a_correct_map_of_lanes_in_double_precision_passes() {
+    check_correct_map(Precision::F64);
+}
+
+fn check_correct_map(precision: Precision) {
     let plan = Plan::new(&scene(20, 20));
-    for precision in Precision::ALL {
-        let (found, cells) = (validate_lanes(&plan, precision, None), plan.cell_count());
-        assert_eq!(found.faults(), Vec::<String>::new(), "{:?}", found.mismatches);
-        assert!(found.mismatches.len() * 20 < cells, "{precision:?}: many differ");
-        let states = found.states.unwrap();
-        // Most states can be compared, and not all are exact: a bound that no error comes near would find nothing.
-        assert!(states.compared * 10 > 9 * cells && states.off.is_empty() && states.distances[1] > 0.0);
-        assert_eq!(found.again, [cells, cells]);
-    }
+    let (found, cells) = (validate_lanes(&plan, precision, None), plan.cell_count());
+    assert_eq!(found.faults(), Vec::<String>::new(), "{:?}", found.mismatches);
+    assert!(found.mismatches.len() * 20 < cells, "many differ");
+    let states = found.states.unwrap();
+    // Most states can be compared, and not all are exact: a bound that no error comes near would find nothing.
+    assert!(states.compared * 10 > 9 * cells && states.off.is_empty() && states.distances[1] > 0.0);
+    assert_eq!(found.again, [cells, cells]);
 }
 
 /// The processor measures machines, also when their lanes are computed again.
@@ -360,10 +368,20 @@ fn a_map_of_a_machine_with_quantities_passes() {
     assert_eq!(found.again, [plan.cell_count(); 2]);
 }
 
-/// The shader skips the contact law at one contact in ten thousand. Lanes reach the same attractors, and most records
-/// are right.
 #[test]
 fn a_lane_that_misses_one_impact_in_ten_thousand_is_found() {
+    check_missed_impacts(Precision::F32);
+}
+
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn a_lane_in_double_precision_that_misses_one_impact_in_ten_thousand_is_found() {
+    check_missed_impacts(Precision::F64);
+}
+
+/// The shader skips the contact law at one contact in ten thousand. Lanes reach the same attractors, and most records
+/// are right.
+fn check_missed_impacts(precision: Precision) {
     let rewrite = |source: String| {
         let law = "    motion.q = after;\n    if pressed && leaving";
         let miss = "    if ((bitcast<u32>(f32(closing)) * 2654435761u) >> 8u) % 10000u == 0u {\n\
@@ -372,17 +390,15 @@ fn a_lane_that_misses_one_impact_in_ten_thousand_is_found() {
         source.replace(law, &format!("{miss}{law}"))
     };
     let plan = plan_between([0.1, 0.9], [1.0, 8.0], 96, &["integration.transient_periods=60"]);
-    for precision in Precision::ALL {
-        let mut gpu = open(precision);
-        gpu.rewrite_shaders(rewrite);
-        let ids: Vec<u32> = (0..plan.cell_count() as u32).collect();
-        let records = vec![Record::default(); ids.len()];
-        let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
-        let selection = Sample { states: ids, ..sample_of(Vec::new()) };
-        let lanes = pollster::block_on(Lanes::run(&subject, &selection, Some(&mut gpu), None)).unwrap();
-        let states = replay(&subject, &selection, &lanes, &|_| {}).states.unwrap();
-        assert!(states.rate().is_too_many(), "{precision:?}: {states:?}");
-    }
+    let mut gpu = open(precision);
+    gpu.rewrite_shaders(rewrite);
+    let ids: Vec<u32> = (0..plan.cell_count() as u32).collect();
+    let records = vec![Record::default(); ids.len()];
+    let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
+    let selection = Sample { states: ids, ..sample_of(Vec::new()) };
+    let lanes = pollster::block_on(Lanes::run(&subject, &selection, Some(&mut gpu), None)).unwrap();
+    let states = replay(&subject, &selection, &lanes, &|_| {}).states.unwrap();
+    assert!(states.rate().is_too_many(), "{states:?}");
 }
 
 /// With early stops the cells stay within their allowance of work. The judge has no early stops and exceeds it.
