@@ -282,6 +282,7 @@ mod tests {
     /// A map takes few rounds, although its slowest lanes take ten times as long as most. The first round is as short as that of a map of
     /// 1,024 x 1,024 cells. Iterations have the simulated duration of a card, so the speed of the test machine does not affect the counts.
     #[test]
+    #[ignore = "compiles shaders of its own; scripts/test.sh --all"]
     fn a_map_on_a_card_is_waited_for_a_few_times() {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
         let at_once = DEDICATED.at_once >> 10;

@@ -182,14 +182,13 @@ impl Plan {
     /// parameter outside its range can prevent it.
     ///
     /// # Errors
-    /// [`NoMotion`] for one of the cells without motion.
+    /// [`NoMotion`] for the first cell without motion.
     pub fn check(&self) -> Result<(), NoMotion> {
-        let verdict = |parts: &Parts| {
+        let first = |parts: &Parts| {
             let each = (0..parts.count() as u32).into_par_iter();
-            each.try_for_each(|part| checked(&self.points, parts.cell(part)))
+            each.find_map_first(|part| checked(&self.points, parts.cell(part)).err())
         };
-        verdict(&self.flows)?;
-        verdict(&self.laws)
+        first(&self.flows).or_else(|| first(&self.laws)).map_or(Ok(()), Err)
     }
 
     /// Returns a plan of the same cells with at most `periods` forcing periods each, half of them observed, for trials.

@@ -40,6 +40,7 @@ fn rows(summary: &str) -> Vec<HashMap<&str, &str>> {
 }
 
 #[test]
+#[ignore = "takes half a minute; scripts/test.sh --all"]
 fn a_measurement_writes_a_table() {
     let out = tempfile::tempdir().unwrap();
     let summary = measure(&software().unwrap_or_else(|| "vulkan".to_owned()), &out, 240, 8, &["classes"]);
@@ -60,6 +61,7 @@ fn a_measurement_writes_a_table() {
 }
 
 #[test]
+#[ignore = "takes half a minute; scripts/test.sh --all"]
 fn runs_on_a_slow_card_are_stopped_and_reported() {
     let Some(adapter) = software() else {
         // The test harness hides the output of `println!` in passing tests.

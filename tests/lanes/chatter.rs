@@ -67,6 +67,7 @@ fn bar(pair: &GearPair, precision: Precision) -> f64 {
 
 /// Lanes have the reference's impacts, and states within rounding: as accurate as without short flights.
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn chatter_agrees_with_the_reference() {
     let cells = cells();
     let expected: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap()).collect();

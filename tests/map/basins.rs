@@ -232,37 +232,42 @@ fn adaptive_basins_do_not_depend_on_the_order_and_agree_with_the_whole_map() {
     assert!(first.audits.last().unwrap().rate() <= 0.02, "{first:?}");
 }
 
-/// Lanes and reference give equal labels, except at borders of basins.
 #[test]
 fn lanes_label_as_the_reference_does() {
+    check_labels(Precision::F32);
+}
+
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn lanes_in_double_precision_label_as_the_reference_does() {
+    check_labels(Precision::F64);
+}
+
+/// Lanes and reference give equal labels, except at borders of basins.
+fn check_labels(precision: Precision) {
     const SIDE: usize = 32;
     let scene = gears(coexisting(), SIDE as u32).build().unwrap();
     let plan = Plan::new(&scene);
     let reference = job::run(&scene, Processor::Cpu).unwrap();
     let expected = reference.basins().unwrap();
-    for precision in Precision::ALL {
-        let records = crate::computed(&plan, &mut gpu::engine(&plan, precision), plan.cell_count());
-        let lanes = attractors::basins(&plan, &records, &[]).unwrap();
-        check_counts(&lanes);
-        let mut differing = 0;
-        for (id, record) in records.iter().enumerate() {
-            // Labels depend on shares, so the attractor of the record in the reference's map is compared.
-            let own = expected.label(id, record);
-            let label = Some(expected.labels()[id]).filter(|&label| label != NONE);
-            if own != label {
-                let (i, j) = (id % SIDE, id / SIDE);
-                let at = |i: usize, j: usize| expected.labels()[j.min(SIDE - 1) * SIDE + i.min(SIDE - 1)];
-                let neighbours =
-                    [at(i + 1, j), at(i.saturating_sub(1), j), at(i, j + 1), at(i, j.saturating_sub(1))];
-                assert!(
-                    neighbours.iter().any(|&other| Some(other) != label),
-                    "{precision:?} {id}: no border"
-                );
-                differing += 1;
-            }
+    let records = crate::computed(&plan, &mut gpu::engine(&plan, precision), plan.cell_count());
+    let lanes = attractors::basins(&plan, &records, &[]).unwrap();
+    check_counts(&lanes);
+    let mut differing = 0;
+    for (id, record) in records.iter().enumerate() {
+        // Labels depend on shares, so the attractor of the record in the reference's map is compared.
+        let own = expected.label(id, record);
+        let label = Some(expected.labels()[id]).filter(|&label| label != NONE);
+        if own != label {
+            let (i, j) = (id % SIDE, id / SIDE);
+            let at = |i: usize, j: usize| expected.labels()[j.min(SIDE - 1) * SIDE + i.min(SIDE - 1)];
+            let neighbours =
+                [at(i + 1, j), at(i.saturating_sub(1), j), at(i, j + 1), at(i, j.saturating_sub(1))];
+            assert!(neighbours.iter().any(|&other| Some(other) != label), "{precision:?} {id}: no border");
+            differing += 1;
         }
-        assert!(differing <= 8, "{precision:?}: {differing} of 1024");
     }
+    assert!(differing <= 8, "{precision:?}: {differing} of 1024");
 }
 
 /// If a parameter is swept, an attractor keeps its label from value to value.

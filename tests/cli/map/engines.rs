@@ -84,6 +84,7 @@ fn devices_says_what_there_is_and_what_auto_takes() {
 
 /// The manifest has both the requested number and the numbers in use.
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn too_few_steps_are_raised_with_a_message() {
     let folder = folder();
     let steps = |engine: &str, steps: u32, out: &str| {

@@ -16,28 +16,41 @@ fn interrupted(folder: &TempDir, arguments: &str, delay: u64, signal: &str) -> (
 #[cfg(unix)]
 #[test]
 fn killed_runs_are_resumed_to_the_same_bytes() {
+    check_killed_runs("--engine cpu", 300);
+}
+
+#[cfg(unix)]
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn killed_runs_of_lanes_are_resumed_to_the_same_bytes() {
+    for precision in ["f32", "f64"] {
+        check_killed_runs(&format!("--engine gpu --precision {precision}"), 2500);
+    }
+}
+
+/// Ends runs of an engine after at most `longest` milliseconds, and resumes them.
+#[cfg(unix)]
+fn check_killed_runs(engine: &str, longest: u64) {
     let slow = "--set integration.early_stop=false";
-    for (engine, longest) in [("--engine cpu", 300), ("--engine gpu --precision f32", 2500)] {
-        let folder = folder();
-        let arguments = format!("{engine} {slow}");
-        map(&folder, &format!("{arguments} --quiet --out whole")).success();
-        let expected = records::bytes(&folder.path().join("whole"));
-        for signal in ["-KILL", "-INT", "-KILL"] {
-            let delay = moment() % longest;
-            let (code, text) = interrupted(&folder, &arguments, delay, signal);
-            if signal == "-INT" && code != Some(0) {
-                assert_eq!(code, Some(130), "{text}");
-                let resume = format!(
-                    "of 320 cells are kept; go on with: rattlemap map s.toml --out cut {arguments} --resume"
-                );
-                assert!(text.trim_end().ends_with(&resume), "{text}");
-            }
-            // Without --engine a run resumes with the engine of its records.
-            succeeds(&folder, &format!("map s.toml {slow} --quiet --out cut --resume"));
-            let cut = folder.path().join("cut");
-            assert!(records::bytes(&cut) == expected, "{engine}: {signal} after {delay} ms");
-            fs::remove_dir_all(cut).unwrap();
+    let folder = folder();
+    let arguments = format!("{engine} {slow}");
+    map(&folder, &format!("{arguments} --quiet --out whole")).success();
+    let expected = records::bytes(&folder.path().join("whole"));
+    for signal in ["-KILL", "-INT", "-KILL"] {
+        let delay = moment() % longest;
+        let (code, text) = interrupted(&folder, &arguments, delay, signal);
+        if signal == "-INT" && code != Some(0) {
+            assert_eq!(code, Some(130), "{text}");
+            let resume = format!(
+                "of 320 cells are kept; go on with: rattlemap map s.toml --out cut {arguments} --resume"
+            );
+            assert!(text.trim_end().ends_with(&resume), "{text}");
         }
+        // Without --engine a run resumes with the engine of its records.
+        succeeds(&folder, &format!("map s.toml {slow} --quiet --out cut --resume"));
+        let cut = folder.path().join("cut");
+        assert!(records::bytes(&cut) == expected, "{engine}: {signal} after {delay} ms");
+        fs::remove_dir_all(cut).unwrap();
     }
 }
 
