@@ -141,8 +141,7 @@ impl Validated<'_> {
         let Some(double) = self.double_lanes else {
             return match (self.validation.judge, self.is_gpu()) {
                 (Judge::Independent, _) => format!(
-                    "Judges: {reference}, and DOP853, an ODE program with event location that shares no code with it. No \
-                     device computes in f64."
+                    "Judges: {reference}, and DOP853, an ODE program with event location that shares no code with it."
                 ),
                 (_, true) => format!("Judge: {reference}, on the processor."),
                 (_, false) => format!(

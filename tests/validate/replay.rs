@@ -568,7 +568,7 @@ fn a_map_is_validated_and_its_report_says_so() {
     for part in [
         " of 576 random cells: 0 differ (below ",
         " cells next to another class or period: ",
-        "without early stops, and lanes in f64 on ",
+        "without early stops, and ",
         "ran again on the same kind of processor, ",
         "are the same to the bit",
         "o: validation.json, report.html",
@@ -584,11 +584,11 @@ fn a_map_is_validated_and_its_report_says_so() {
     let found = json(&out);
     assert_eq!((&found["verdict"], &found["requested"]), (&verdict.into(), &150.into()));
     assert_eq!((&found["again_on"], &found["same_device"]), (&found["processor"], &true.into()));
-    assert_ne!(found["lanes_f64_on"], found["again_on"]);
-    assert_eq!(
-        (&found["seed"], &found["cells"], &found["judge"]),
-        (&3.into(), &576.into(), &"lanes_f64".into())
-    );
+    // The second judge is graphics hardware, if there is any, otherwise the ODE solver.
+    let judge = found["judge"].as_str().unwrap();
+    assert_eq!(found["lanes_f64_on"].is_string(), judge == "lanes_f64", "{judge}");
+    assert!(["lanes_f64", "dop853"].contains(&judge), "{judge}");
+    assert_eq!((&found["seed"], &found["cells"]), (&3.into(), &576.into()));
     assert_eq!((&found["faults"], &found["identical"]), (&serde_json::json!([]), &found["samples"]));
     let uniform = &found["strata"][0];
     assert_eq!((&uniform["name"], &uniform["kinds"]["unexplained"]["count"]), (&"uniform".into(), &0.into()));
