@@ -12,6 +12,7 @@ pub(super) fn rows(path: &std::path::Path) -> Vec<Row> {
 }
 
 #[test]
+#[ignore = "takes half a minute; scripts/test.sh --all"]
 fn work_precision_measures_every_method() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {

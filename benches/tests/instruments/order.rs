@@ -99,6 +99,7 @@ const WALK: f64 = 50.0;
 
 /// At any number of steps the errors are rounding, amplified by the motion.
 #[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
 fn errors_of_lanes_do_not_depend_on_their_steps() {
     let subjects = subjects(5);
     for (precision, unit) in [(Precision::F64, f64::EPSILON / 2.0), (Precision::F32, 6e-8)] {
