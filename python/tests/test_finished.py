@@ -111,8 +111,9 @@ def test_models_and_their_parameters_are_listed(program: Program) -> None:
     assert all(summary in line for summary, line in zip(rm.models()["summary"], lines, strict=True))
     table, page = rm.models("gear-pair"), program("models", "gear-pair").stdout
     assert table.index.tolist() == [*rm.gear_pair().parameters, *rm.gear_pair().state_names]
+    parameters = page.partition("\nParameters\n")[2]
     for name, row in table[table["kind"] == "parameter"].iterrows():
-        line = next(line for line in page.splitlines() if line.startswith(f"    {name} "))
+        line = next(line for line in parameters.splitlines() if line.startswith(f"    {name} "))
         default = "-" if np.isnan(row["default"]) else f"{row['default']:g}"
         assert line.endswith(row["meaning"]) and row["range"] in line and f" {default} " in line
     with pytest.raises(rm.ModelError, match="no model is called `gear`"):
