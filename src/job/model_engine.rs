@@ -7,8 +7,8 @@ pub fn described(oscillator: &Oscillator) -> String {
     match oscillator.needs_machine() {
         None => "pair, for up to two coordinates and one gap: about 0.3 us for a forcing period and 0.15 us for an event"
             .to_owned(),
-        Some(reason) => format!(
-            "machine, because of {reason}: about 0.6 us for an event of two coordinates, up to 1.7 us for one of eight"
-        ),
+        Some(reason) => {
+            format!("machine, because of {reason}: 0.6 to 1.7 us for an event, by coordinates")
+        }
     }
 }
