@@ -595,7 +595,9 @@ fn a_map_is_validated_and_its_report_says_so() {
     let sampled: u64 =
         found["strata"].as_array().unwrap().iter().map(|s| s["sampled"].as_u64().unwrap()).sum();
     assert_eq!(sampled, 150);
-    assert_eq!(found["states"]["off"]["count"], 0);
+    // States of lanes are compared where there are lanes.
+    let off = &found["states"]["off"]["count"];
+    assert!(if judge == "lanes_f64" { *off == 0 } else { off.is_null() }, "{off}");
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("\"validation\":{\"format\":2,\"command\":\"validate\""), "no section");
     // An equal seed gives equal bytes.
