@@ -50,11 +50,10 @@ fn scenes() -> Vec<String> {
     ]
 }
 
-const ORBITS: [&str; 5] = [
+const ORBITS: [&str; 4] = [
     "rattlemap orbit --set e=0.06 --transient 500 --start 0.1,0,-0.25,1",
     "rattlemap orbit --set e=0.605 --transient 400",
     "rattlemap orbit --set omega=1.0 --set e=0.6 --transient 400 --model two-masses",
-    "rattlemap orbit --transient 400 --model two-loose-gears",
     "rattlemap orbit --set e=2",
 ];
 
