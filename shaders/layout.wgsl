@@ -1,6 +1,6 @@
-// Structs in the buffers, and the buffers' bindings. src/gpu/layout.rs declares the same structs for the host; a test
-// compares names, offsets and sizes. A struct holds either Reals or 32-bit numbers alone, so that it has the same
-// shape in both precisions. src/gpu/shader.rs puts the constants that no shader declares in front of the source.
+// Structs in the buffers, and the buffers' bindings. A struct holds either Reals or 32-bit numbers alone, so that it has the same shape in
+// both precisions. src/gpu/layout.rs declares the structs that the host writes or reads: cells, settings and results; and the constants of
+// oscillators with one gap. src/gpu/shader.rs puts them and the constants that no shader declares in front of the source.
 //
 // The observers, which search for cycles and chaos, serve two engines of motion: oscillators with one gap (pair/oscillator.wgsl) and
 // machines (machine/machine.wgsl). Both files define the functions that the observers call.
@@ -8,57 +8,6 @@
 // A state lists COORDINATES displacements, each followed by its rate. A matrix has such states as columns.
 alias State = array<Real, DIM>;
 alias Matrix = array<Real, MATRIX>;
-
-// Flow, law and start conditions of one lane.
-struct Cell {
-    flow_index: u32,
-    law_index: u32,
-    // Status (STATUS_*) of a lane that the host refuses; 0 otherwise.
-    refused: u32,
-    // 1 if the mirror image of a motion obeys the same equations and contact law.
-    mirror: u32,
-}
-
-// Settings of one dispatch.
-struct Settings {
-    // Number of lanes for which the buffers have room.
-    slots: u32,
-    // Length of the active list, and the place of its first lane that has not begun.
-    active_lanes: u32,
-    first_new: u32,
-    // Largest number of forcing periods: of any lane, of an undecided lane, and of a chaotic lane.
-    periods: u32,
-    decided_by: u32,
-    longest: u32,
-    // First period at which a lane may stop as chaotic.
-    chaos_from: u32,
-    // Number of standard errors by which the exponent of such a lane must exceed zero.
-    chaos_errors: f32,
-    // Loop iterations that one dispatch may spend on a lane.
-    iterations: u32,
-    // 1: compaction selects the lanes that have ended. 0: it selects those that this variant has work for.
-    ended: u32,
-    // Passes (scan steps and careful steps) allowed in one period.
-    passes_per_period: u32,
-    // Events allowed in one period, and in all periods together.
-    events_per_period: u32,
-    most_events: u32,
-    // Invocations in one row of the dispatch grid.
-    row: u32,
-    // Periods before averages begin.
-    transient_periods: u32,
-    // Period at which lanes without a tangent vector wait for the variant that carries it.
-    growth_from: u32,
-    // Periods before the exponent is accumulated, and periods per block of its average.
-    exponent_from: u32,
-    exponent_block: u32,
-    // Longest period that is searched for; 0 searches for none.
-    max_period: u32,
-    // 1: lanes end once they are decided.
-    early_stop: u32,
-    // Periods over which aperiodic motion is measured; 0 measures nothing.
-    measured_periods: u32,
-}
 
 // State that a lane carries between dispatches. `MotionNow` and `TallyNow` are used by every step and event; a lane
 // keeps them in registers. `Measures` and `Search` are used at strobes alone and are loaded there (sweep.wgsl), so
@@ -280,44 +229,6 @@ struct Tally {
     // The counters of a lane before it was measured. `is_measured`: 1 if the lane is being measured or was measured.
     ended: TallyNow,
     is_measured: u32,
-}
-
-// Results of a lane: real numbers.
-struct Reading {
-    // Exponent per period as a natural logarithm, and its standard error.
-    growth: Real,
-    growth_error: Real,
-    mesh_fraction: Real,
-    // Gap, its rate per free step, x, its rate; or displacements and rates of a machine.
-    strobe: State,
-}
-
-// What was measured on a lane, and the columns of its monodromy matrix.
-struct Measured {
-    totals: array<Real, SUMS>,
-    highs: array<Real, EXTREMES>,
-    lows: array<Real, EXTREMES>,
-    // 1 if a cycle was read; otherwise the columns have no meaning.
-    has_read: Real,
-    tangents: Matrix,
-}
-
-// Results of a lane: whole numbers.
-struct Finding {
-    // Bits VALID_*. A field without its bit is zero.
-    valid: u32,
-    // Slot of the lane.
-    slot: u32,
-    status: u32,
-    // 0 if the motion has no period.
-    period: u32,
-    periods_run: u32,
-    impacts: u32,
-    // Periods over which impacts were counted.
-    counted: u32,
-    symmetric: u32,
-    // Word and pattern, at the places SPELLED_*; one unused number if neither is requested.
-    spelling: array<u32, SPELLING>,
 }
 
 // Lists of slots. The first `slots` entries are the active list: the lanes under way, in the order in which they began. The next entries

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::layout::{Motion, Tally};
+use super::layout::length_of;
 use super::panics::catch_panic;
 use super::{GpuError, Precision};
 
@@ -149,7 +149,8 @@ const MOST_SLOTS: usize = 1 << 20;
 
 /// Returns the largest number of slots that an adapter's limits allow.
 pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
-    let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
+    let motion = length_of("Motion", 4) * size_of::<f64>();
+    let largest = motion.max(length_of("Tally", 4) * size_of::<u32>()) as u64;
     let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
     let by_grid = u64::from(limits.max_compute_workgroups_per_dimension).pow(2);
     by_binding.min(by_grid).clamp(1, MOST_SLOTS as u64) as usize

@@ -1,34 +1,26 @@
-//! The structs of `shaders/layout.wgsl` as the host reads and writes them, and other numbers that host and shaders share.
+//! Structs in the buffers that host and shaders share, and other numbers that both know.
 //!
-//! `shaders/layout.wgsl` describes the fields; a test compares their names, offsets and sizes. A struct holds real numbers or 32-bit
-//! numbers alone. Real numbers are f64 here and are converted one by one for the f32 variant, so both precisions have the same shape.
+//! This file declares the structs that the host writes or reads, for both sides; `shaders/layout.wgsl` declares those that only lanes use.
+//! A struct holds real numbers or 32-bit numbers alone. Real numbers are f64 here and are converted one by one for the f32 variant, so both
+//! precisions have the same shape.
 
-use std::mem::offset_of;
+use std::sync::LazyLock;
 
 use bytemuck::{Pod, Zeroable};
 
 use super::rules::TRAIL;
 use rattlemap_dynamics::model::{Contact, STATE};
 
-/// Layout of one struct, for the comparison with the shader.
-#[derive(Clone, Copy, Debug)]
-pub struct StructLayout {
-    /// Name of the struct.
-    pub name: &'static str,
-    /// Names and byte offsets of its fields.
-    pub fields: &'static [(&'static str, usize)],
-    /// Size in bytes.
-    pub size: usize,
-    /// Whether its numbers are real. The size of real numbers depends on the precision.
-    pub is_real: bool,
-}
-
-/// Declares the structs, and lists their layouts in `STRUCTS`.
+/// Declares structs for the host, and a function that returns their declarations in WGSL. Lengths of arrays have names that the shader
+/// knows, too. A field behind a semicolon exists in the shader only.
 macro_rules! structs {
-    ($($(#[$doc:meta])* $name:ident of $number:ident { $($field:ident: $type:ty,)* })*) => {
+    (
+        $(#[$of_all:meta])* fn $declarations:ident;
+        $($(#[$doc:meta])* $name:ident { $($field:ident: $type:ty,)* $(; $last:ident: $more:ident,)? })*
+    ) => {
         $(
             $(#[$doc])*
-            #[allow(missing_docs, reason = "shaders/layout.wgsl describes the fields")]
+            #[allow(missing_docs, reason = "comments describe the fields, some of them together")]
             #[repr(C)]
             #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
             pub struct $name {
@@ -36,300 +28,277 @@ macro_rules! structs {
             }
         )*
 
-        /// Layouts of all structs that the shader shares with the host.
-        pub const STRUCTS: &[StructLayout] = &[$(StructLayout {
-            name: stringify!($name),
-            fields: &[$((stringify!($field), offset_of!($name, $field))),*],
-            size: size_of::<$name>(),
-            is_real: size_of::<$number>() == size_of::<f64>(),
-        }),*];
+        $(#[$of_all])*
+        pub(super) fn $declarations() -> String {
+            let structs = [$((
+                stringify!($name),
+                vec![
+                    $((stringify!($field), in_wgsl(stringify!($type))),)*
+                    $((stringify!($last), stringify!($more).to_owned()),)?
+                ],
+            )),*];
+            let declared = structs.map(|(name, fields)| {
+                let fields: String = fields.iter().map(|(name, of)| format!("    {name}: {of},\n")).collect();
+                format!("struct {name} {{\n{fields}}}\n\n")
+            });
+            declared.concat()
+        }
     };
 }
 
+/// Returns a type in WGSL.
+fn in_wgsl(of: &str) -> String {
+    match of.strip_prefix('[').and_then(|list| list.strip_suffix(']')?.rsplit_once("; ")) {
+        Some((of, length)) => format!("array<{}, {length}>", in_wgsl(of)),
+        None if of == "f64" => "Real".to_owned(),
+        None => of.to_owned(),
+    }
+}
+
 structs! {
-    /// One linear domain in units of its own step.
-    Domain of f64 {
-        step: [f64; 28],
-        gap_row: [f64; 7],
-        x_row: [f64; 7],
-        energy: [f64; 6],
-        growth: f64,
-        swell: f64,
-        angle: f64,
-        turn_half: f64,
-        turn_sin: f64,
-        damping: [f64; 3],
-        share: f64,
-        substeps: f64,
-    }
+    /// Returns the declarations of the structs that both engines of motion use.
+    fn shared;
 
-    /// Constants that lanes share if they differ only in the contact law.
-    Flow of f64 {
-        domains: [Domain; 3],
-        walls: [f64; 2],
-        kick: f64,
-        h: f64,
-        length: f64,
-        speed: f64,
-        closing: f64,
-        escape: f64,
-        steady: [f64; 4],
-        contact_free_size: f64,
-        transient_growth: f64,
-        pressing: [[f64; 7]; 2],
-        damper: [[f64; 2]; 2],
-        springs: [[f64; 2]; 2],
-        displacements: [[f64; 2]; 2],
-        held: [f64; 3],
-        push: [f64; 3],
-        preload: [[f64; 2]; 2],
-    }
-
-    /// Whole numbers of a [`Flow`].
-    FlowShape of u32 {
-        steps: u32,
-        phasors: u32,
-        degrees: u32,
-        must_rest: u32,
-        contacts: [u32; 2],
-        harmonics: u32,
-        harmonic_count: u32,
-        schedule: u32,
-        changes: u32,
-        behind: [u32; 2],
-    }
-
-    /// Contact law of the right and of the left wall.
-    Law of f64 {
-        restitution: [f64; 2],
-        mesh_speed: [f64; 2],
-    }
-
-    /// Flow, law and start conditions of a lane.
-    Cell of u32 {
+    /// Flow, law and start conditions of one lane.
+    Cell {
         flow_index: u32,
         law_index: u32,
+        // Status (STATUS_*) of a lane that the host refuses; 0 otherwise.
         refused: u32,
+        // 1 if the mirror image of a motion obeys the same equations and contact law.
         mirror: u32,
     }
 
     /// Settings of one dispatch.
-    Settings of u32 {
+    Settings {
+        // Number of lanes for which the buffers have room.
         slots: u32,
+        // Length of the active list, and the place of its first lane that has not begun.
         active_lanes: u32,
         first_new: u32,
+        // Largest number of forcing periods: of any lane, of an undecided lane, and of a chaotic lane.
         periods: u32,
         decided_by: u32,
         longest: u32,
+        // First period at which a lane may stop as chaotic.
         chaos_from: u32,
+        // Number of standard errors by which the exponent of such a lane must exceed zero.
         chaos_errors: f32,
+        // Loop iterations that one dispatch may spend on a lane.
         iterations: u32,
+        // 1: compaction selects the lanes that have ended. 0: it selects those that this variant has work for.
         ended: u32,
+        // Passes (scan steps and careful steps) allowed in one period.
         passes_per_period: u32,
+        // Events allowed in one period, and in all periods together.
         events_per_period: u32,
         most_events: u32,
+        // Invocations in one row of the dispatch grid.
         row: u32,
+        // Periods before averages begin.
         transient_periods: u32,
+        // Period at which lanes without a tangent vector wait for the variant that carries it.
         growth_from: u32,
+        // Periods before the exponent is accumulated, and periods per block of its average.
         exponent_from: u32,
         exponent_block: u32,
+        // Longest period that is searched for; 0 searches for none.
         max_period: u32,
+        // 1: lanes end once they are decided.
         early_stop: u32,
+        // Periods over which aperiodic motion is measured; 0 measures nothing.
         measured_periods: u32,
     }
 
-    /// Real numbers that a lane carries between dispatches.
-    Motion of f64 {
-        q: [f64; 4],
-        phasor: [f64; 2],
-        theta: f64,
-        bound: f64,
-        bend: f64,
-        mesh_part: f64,
-        block_growth: f64,
-        growth_sum: f64,
-        growth_squares: f64,
-        growth_products: f64,
-        first_block: f64,
-        last_block: f64,
-        anchor: [f64; 4],
-        position_scale: f64,
-        early_scale: f64,
-        early_rate_scale: f64,
-        rate_scale: f64,
-        cycle_growth: f64,
-        cycle_stretch: f64,
-        earlier_growth: f64,
-        earlier_distance: f64,
-        tangents: [f64; 16],
-        vector: [f64; 4],
-        stretch: [f64; 3],
-        trail: [[f64; 4]; TRAIL],
-        averages: [f64; 3],
-        average_centre: [f64; 4],
-        ended: [f64; 11],
-        sums: [f64; SUMS],
-        totals: [f64; SUMS],
-        highs: [f64; EXTREMES],
-        lows: [f64; EXTREMES],
-    }
-
-    /// Counters and flags that a lane carries between dispatches.
-    Tally of u32 {
-        step: u32,
-        is_scan_interrupted: u32,
-        mode: u32,
-        origin: u32,
-        order: u32,
-        period: u32,
-        status: u32,
-        passes_in_period: u32,
-        events_in_period: u32,
-        impacts: u32,
-        events: u32,
-        mesh_right: u32,
-        mesh_left: u32,
-        mesh_whole: u32,
-        grazes: u32,
-        stage: u32,
-        candidate: u32,
-        periods_to_read: u32,
-        tangent_count: u32,
-        carries_growth: u32,
-        word_length: u32,
-        hash_low: u32,
-        hash_high: u32,
-        recent: u32,
-        strobe_distance: u32,
-        itinerary: u32,
-        next_change: u32,
-        interval: u32,
-        has_read: u32,
-        cycle: u32,
-        failed_readings: u32,
-        counting_start: u32,
-        blocks: u32,
-        block_periods: u32,
-        anchor_period: u32,
-        window: u32,
-        streak: u32,
-        known_lags: u32,
-        is_settled: u32,
-        mirror: u32,
-        return_distance: u32,
-        earlier_return_distance: u32,
-        newton_steps: u32,
-        branch: u32,
-        branch_period: u32,
-        newton_start_mode: u32,
-        newton_start_origin: u32,
-        newton_start_interval: u32,
-        divisor: u32,
-        divisor_distance: u32,
-        failed_searches: u32,
-        checks_divisor: u32,
-        rejected_divisor: u32,
-        linear_distance: u32,
-        motion_distance: u32,
-        nearest: u32,
-        earlier_branch: u32,
-        is_uncertain: u32,
-        strobe_count: u32,
-        matching_cycles: u32,
-        all_events: u32,
-        confirms_chaos: u32,
-        average_start: u32,
-        average_length: u32,
-        recurrence: u32,
-        is_neutral: u32,
-        distances: [u32; 16],
-        last_distances: [u32; 16],
-        itineraries: [u32; TRAIL],
-        column_scalings: u32,
-        is_superstable: u32,
-        has_overflowed: u32,
-        word: [u32; 7],
-        pattern: [u32; 7],
-        pattern_length: u32,
-        pattern_hash: [u32; 2],
-        pattern_recent: u32,
-        ended: [u32; 28],
-        is_measured: u32,
-    }
-
     /// Results of a lane: real numbers.
-    Reading of f64 {
+    Reading {
+        // Exponent per period as a natural logarithm, and its standard error.
         growth: f64,
         growth_error: f64,
         mesh_fraction: f64,
-        strobe: [f64; MOST_NUMBERS],
+        // Gap, its rate per free step, x, its rate; or displacements and rates of a machine.
+        strobe: [f64; DIM],
     }
 
-    /// What was measured on a lane. The columns of the monodromy matrix follow.
-    Measured of f64 {
+    /// What was measured on a lane, and the columns of its monodromy matrix.
+    Measured {
         totals: [f64; SUMS],
         highs: [f64; EXTREMES],
         lows: [f64; EXTREMES],
+        // 1 if a cycle was read; otherwise the columns have no meaning.
         has_read: f64,
+        ;
+        tangents: Matrix,
     }
 
     /// Results of a lane: whole numbers.
-    Finding of u32 {
+    Finding {
+        // Bits VALID_*. A field without its bit is zero.
         valid: u32,
+        // Slot of the lane.
         slot: u32,
         status: u32,
+        // 0 if the motion has no period.
         period: u32,
         periods_run: u32,
         impacts: u32,
+        // Periods over which impacts were counted.
         counted: u32,
         symmetric: u32,
+        // Word and pattern, at the places SPELLED_*; one unused number if neither is requested.
         spelling: [u32; SPELLING],
     }
 }
 
-/// Largest number of entries of a lane's state.
-const MOST_NUMBERS: usize = STATE;
+structs! {
+    /// Returns the declarations of the constants of oscillators with one gap.
+    fn of_pairs;
 
-/// Returns the size on the host of a struct in variants whose lanes have `dim` numbers.
-pub fn size_with(host: &StructLayout, dim: usize) -> usize {
-    let numbers = match host.name {
-        "Motion" => Motion::numbers(dim),
-        "Reading" => Reading::numbers(dim),
-        "Measured" => Measured::numbers(dim),
-        _ => return host.size,
-    };
-    numbers * size_of::<f64>()
-}
+    /// A linear domain in units of its own step: time tau = t / h, rates per step.
+    Domain {
+        // Propagator of one step minus the identity. Rows: gap, its rate, x, its rate. Columns: these four, then cos,
+        // sin, 1.
+        step: [f64; 28],
+        // Accelerations of the gap and of x: factors of gap, rate, x, rate, cos, 1, sin. Only variants with SINE read the last.
+        gap_row: [f64; 7],
+        x_row: [f64; 7],
+        // Quadratic form in the n-th derivatives of the motion. It bounds the square of the (n+1)-th derivative of the gap. Factors of rate^2,
+        // rate * x_rate, x_rate^2, gap^2, gap * x, x^2.
+        energy: [f64; 6],
+        // Growth of this bound per step: the part that the force adds, for n = 5, and the factor by negative damping and stiffness.
+        growth: f64,
+        swell: f64,
+        // Forcing angle of one step; tan of half of it; sin of it.
+        angle: f64,
+        turn_half: f64,
+        turn_sin: f64,
+        // Power of the dampers as a quadratic form in the rates, in the units of measure.wgsl: factors of rate^2, rate * x_rate, x_rate^2.
+        damping: [f64; 3],
+        // Free steps per step of this domain: a power of two, at most 1.
+        share: f64,
+        // Steps of this domain per free step.
+        substeps: f64,
+    }
 
-/// Numbers of the structs whose size depends on the number `dim` of a lane's state.
-impl Motion {
-    pub(super) fn numbers(dim: usize) -> usize {
-        // These fields depend on `dim`: the states in `now` and `ended`, the anchor, the vector, the trail, the averages and their centre,
-        // and the matrix.
-        let of_dim = |dim: usize| dim * (5 + TRAIL) + dim / 2 + dim * dim;
-        size_of::<Motion>() / size_of::<f64>() + of_dim(dim) - of_dim(4)
+    /// Constants that lanes share if they differ only in the contact law. Each stage and each interval between walls has such a struct.
+    Flow {
+        // Free motion, meshing on the right, meshing on the left. Meshing domains measure the gap from their wall.
+        domains: [Domain; 3],
+        // Positions of the right and of the left wall.
+        walls: [f64; 2],
+        // Change of the rate of x if the contact impulse reduces the gap's rate by 1.
+        kick: f64,
+        // Length of a free step in time units.
+        h: f64,
+        // Scale of length: with two first walls, half of their distance.
+        length: f64,
+        // Unit of speeds: the scale of length times the rate of free motion, per free step.
+        speed: f64,
+        // Longest duration of an infinite series of impacts that its limit replaces, in free steps.
+        closing: f64,
+        // Motion has escaped if the sum of the sizes of gap and x exceeds this. Negative if only the force can raise the energy.
+        escape: f64,
+        // Contact-free motion. `steady`: steady state at phase 0, in lane units. `contact_free_size`: if the transient is smaller than this by
+        // the free domain's energy form, no contact will follow; negative if no transient is small enough. `transient_growth`: growth of the
+        // transient per period, in octaves.
+        steady: [f64; 4],
+        contact_free_size: f64,
+        transient_growth: f64,
+        // Acceleration of a gap that rests on the right and on the left wall: a `gap_row` with the gap measured from that wall.
+        pressing: [[f64; 7]; 2],
+        // Where the motion enters an elastic wall, tangent vectors change: change of their rates of gap and x per displacement of their gap.
+        damper: [[f64; 2]; 2],
+        // Contact force of the right and of the left wall per displacement and per rate of the gap, in the units of
+        // measure.wgsl.
+        springs: [[f64; 2]; 2],
+        // Both displacements of the model as factors of gap and x.
+        displacements: [[f64; 2]; 2],
+        // Contact force of the walls that the gap has passed, positive to the left: factors of gap, rate and 1, in the units of
+        // measure.wgsl.
+        held: [f64; 3],
+        // Force of a wall that only pushes, positive inside the interval that it bounds: factors of gap, rate and 1, in the units of
+        // measure.wgsl.
+        push: [f64; 3],
+        // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters the wall.
+        preload: [[f64; 2]; 2],
+    }
+
+    /// Whole numbers of a flow.
+    FlowShape {
+        // Free steps per forcing period.
+        steps: u32,
+        // Index in `pairs` of its first phasor.
+        phasors: u32,
+        // Number of displacements. With one displacement, x rests at 0.
+        degrees: u32,
+        // 1 if contact-free motion also requires that x rests at 0.
+        must_rest: u32,
+        // CONTACT_* of the right and of the left wall.
+        contacts: [u32; 2],
+        // Index in `pairs` of its harmonics beside the first (harmonics.wgsl), and their number.
+        harmonics: u32,
+        harmonic_count: u32,
+        // Index in `pairs` of the changes of its stage (stages.wgsl), and their number; 0 if there are none.
+        schedule: u32,
+        changes: u32,
+        // Flows of the intervals behind the right and behind the left wall, or NO_FLOW (intervals.wgsl).
+        behind: [u32; 2],
+    }
+
+    /// Contact law of the right and of the left wall: restitution, and the largest leaving speed at which contact lasts under a pressing load.
+    Law {
+        restitution: [f64; 2],
+        mesh_speed: [f64; 2],
     }
 }
 
-impl Reading {
-    pub(super) fn numbers(dim: usize) -> usize {
-        size_of::<Reading>() / size_of::<f64>() - MOST_NUMBERS + dim
+/// Returns how many numbers a struct has that both engines of motion use, in variants whose lanes have `dim` numbers.
+pub fn length_of(name: &str, dim: usize) -> usize {
+    static DECLARED: LazyLock<String> =
+        LazyLock::new(|| shared() + include_str!("../../shaders/layout.wgsl"));
+    let (_, from) = DECLARED.split_once(&format!("struct {name} {{")).expect("the struct is declared");
+    let (fields, _) = from.split_once('}').expect("a struct ends");
+    let fields = fields.lines().map(str::trim).filter(|line| !line.starts_with("//"));
+    let types = fields.filter_map(|field| field.strip_suffix(',')?.split_once(": "));
+    types.map(|(_, of)| length_of_type(of, dim)).sum()
+}
+
+/// Returns how many numbers a type has.
+fn length_of_type(of: &str, dim: usize) -> usize {
+    match of {
+        "u32" | "f32" | "Real" => 1,
+        "State" => dim,
+        "Matrix" => dim * dim,
+        _ => match of.strip_prefix("array<").and_then(|list| list.strip_suffix('>')?.rsplit_once(", ")) {
+            Some((of, length)) => length_of_type(of, dim) * entries(length, dim),
+            None => length_of(of, dim),
+        },
+    }
+}
+
+/// Returns the length of an array.
+fn entries(length: &str, dim: usize) -> usize {
+    match length {
+        "DIM" => dim,
+        "COORDINATES + 1" => dim / 2 + 1,
+        "EXTREMES" => EXTREMES,
+        "SPELLING" => SPELLING,
+        "SUMS" => SUMS,
+        "TRAIL" => TRAIL,
+        number => number.parse().expect("a length is a number or has a known name"),
     }
 }
 
 impl Measured {
-    pub(super) fn numbers(dim: usize) -> usize {
-        Self::BEFORE_COLUMNS + dim * dim
-    }
-
-    const BEFORE_COLUMNS: usize = size_of::<Measured>() / size_of::<f64>();
-
     /// Splits off the columns of the monodromy matrix, which come last.
     pub(super) fn split(numbers: &[f64]) -> (&Measured, &[f64]) {
-        let (fixed, columns) = numbers.split_at(Self::BEFORE_COLUMNS);
+        let (fixed, columns) = numbers.split_at(size_of::<Measured>() / size_of::<f64>());
         (bytemuck::from_bytes(bytemuck::cast_slice(fixed)), columns)
     }
 }
+
+/// Largest number of entries of a lane's state. Each variant of the shader has its own.
+const DIM: usize = STATE;
 
 /// Sums and extremes that a lane measures; `shaders/pair/measure.wgsl` has their places.
 pub(super) const SUMS: usize = 16;

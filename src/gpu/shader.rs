@@ -3,7 +3,7 @@
 use super::Measures;
 use super::features::Features;
 use super::layout::{
-    BLOCK, CONTACTS, EXTREMES, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD,
+    self, BLOCK, CONTACTS, EXTREMES, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD,
     SPELLED_WORD_LENGTH, SPELLING, SUMS, symbols_per_number,
 };
 use super::pair::PAIRS_PER_HARMONIC;
@@ -136,8 +136,11 @@ impl Variant {
             machine_sizes = shape.sizes();
             machine_sizes.extend([("SERIES", (terms + 1) * width), ("COEFFICIENTS", terms + 1)]);
         }
-        let body =
-            unroll(COMMON, &names) + &unroll(if machine.is_some() { MACHINE } else { OSCILLATOR }, &names);
+        let (structs, motion) = match machine {
+            Some(_) => (layout::shared(), MACHINE),
+            None => (layout::shared() + &layout::of_pairs(), OSCILLATOR),
+        };
+        let body = unroll(COMMON, &names) + &unroll(motion, &names);
         let valid = VALID.map(|(name, bits)| (format!("VALID_{name}"), bits));
         let status = Status::ALL.map(|s| (format!("STATUS_{}", s.name().to_uppercase()), s.code()));
         let contacts = CONTACTS.map(|(name, code)| (format!("CONTACT_{name}"), code));
@@ -191,7 +194,7 @@ impl Variant {
         ]
         .map(|(name, value)| format!("const {name}: bool = {value};\n"))
         .concat();
-        format!("{real}\n{options}{numbers}{}{body}", rules::declarations(self.precision))
+        format!("{real}\n{options}{numbers}{}{structs}{body}", rules::declarations(self.precision))
     }
 }
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::averaging::Averaging;
 use super::device::{COMPACT, CONCLUDE, GATHER, Pipelines};
-use super::layout::{COUNT_AT, Cell, Finding, Measured, Motion, QUEUE_HEAD, Reading, Settings, Tally};
+use super::layout::{COUNT_AT, Cell, Finding, QUEUE_HEAD, Reading, Settings, length_of};
 use super::rounds::{Counted, Selected, Workgroups, bind, compacting, dispatch, row};
 use super::tables::Tables;
 use super::transfer::{Download, buffer, from_reals, indirect, readback, upload};
@@ -43,6 +43,11 @@ pub(super) struct Slots {
     row: u32,
 }
 
+/// Returns the size of a lane's counters on the device.
+fn tally_bytes() -> usize {
+    length_of("Tally", 0) * size_of::<u32>()
+}
+
 /// Returns the size of a lane's findings on the device.
 fn finding_bytes(settings: &LaneSettings) -> usize {
     Finding::length(settings.word || settings.pattern) * size_of::<u32>()
@@ -60,7 +65,7 @@ fn findings(bytes: &[u8], size: usize) -> Vec<Finding> {
 
 /// Splits the readings into those of single lanes. Entries that a state does not have are zero.
 fn readings(numbers: &[f64], dim: usize) -> Vec<Reading> {
-    let size = Reading::numbers(dim);
+    let size = length_of("Reading", dim);
     let widened = |numbers: &[f64]| {
         let mut reading = Reading::default();
         let all: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut reading));
@@ -73,11 +78,13 @@ fn readings(numbers: &[f64], dim: usize) -> Vec<Reading> {
 /// Returns the number of bytes of device memory for a number of slots.
 pub(super) fn bytes(slots: usize, precision: Precision, settings: &LaneSettings) -> u64 {
     let dim = settings.features.dim();
-    let measured = if settings.gathers() { 2 * Measured::numbers(dim) } else { 0 };
-    let reals =
-        2 * Reading::numbers(dim) + settings.features.start_numbers() + Motion::numbers(dim) + measured;
+    let measured = if settings.gathers() { 2 * length_of("Measured", dim) } else { 0 };
+    let reals = 2 * length_of("Reading", dim)
+        + settings.features.start_numbers()
+        + length_of("Motion", dim)
+        + measured;
     let reals = reals * precision.bytes();
-    let counts = 2 * finding_bytes(settings) + size_of::<Cell>() + size_of::<Tally>() + 3 * size_of::<u32>();
+    let counts = 2 * finding_bytes(settings) + size_of::<Cell>() + tally_bytes() + 3 * size_of::<u32>();
     (slots * (reals + counts)) as u64
 }
 
@@ -86,18 +93,18 @@ impl Slots {
         let workgroup = settings.workgroup;
         let dim = settings.features.dim();
         let of_reals = |label, numbers: usize| buffer(gpu, label, numbers * gpu.precision.bytes());
-        let readings = of_reals("readings", slots * Reading::numbers(dim));
+        let readings = of_reals("readings", slots * length_of("Reading", dim));
         let findings = buffer(gpu, "findings", slots * finding_bytes(settings));
         let places = if settings.gathers() { slots } else { 1 };
-        let measured = of_reals("measured", places * Measured::numbers(dim));
+        let measured = of_reals("measured", places * length_of("Measured", dim));
         Slots {
             count: slots,
             workgroup,
             settings: upload(gpu, "settings", bytemuck::bytes_of(&Settings::default())),
             cells: buffer(gpu, "cells", slots * size_of::<Cell>()),
             starts: of_reals("starts", slots * settings.features.start_numbers()),
-            motions: of_reals("motions", slots * Motion::numbers(dim)),
-            tallies: buffer(gpu, "tallies", slots * size_of::<Tally>()),
+            motions: of_reals("motions", slots * length_of("Motion", dim)),
+            tallies: buffer(gpu, "tallies", slots * tally_bytes()),
             queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
             blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
             readbacks: [&readings, &findings].map(|buffer| readback(gpu, "results", buffer.size())),
@@ -158,9 +165,9 @@ impl Slots {
         let gathers = settings.gathers();
         let dim = settings.features.dim();
         let reals = |numbers: usize| (active_lanes * numbers * gpu.precision.bytes()) as u64;
-        let sizes = [reals(Reading::numbers(dim)), (active_lanes * finding_bytes(settings)) as u64];
+        let sizes = [reals(length_of("Reading", dim)), (active_lanes * finding_bytes(settings)) as u64];
         let [on_device, measured] = &self.measured;
-        let size_of_measured = if gathers { reals(Measured::numbers(dim)) } else { 0 };
+        let size_of_measured = if gathers { reals(length_of("Measured", dim)) } else { 0 };
         let submission = gpu.call(|| {
             gpu.write(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -226,7 +233,7 @@ impl Conclusion<'_> {
                 measured
                     .take(gpu, |all| {
                         let numbers = from_reals(&all[..first(all.len())], gpu.precision);
-                        numbers.chunks_exact(Measured::numbers(self.dim)).map(Box::from).collect()
+                        numbers.chunks_exact(length_of("Measured", self.dim)).map(Box::from).collect()
                     })
                     .await?
             }
