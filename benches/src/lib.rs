@@ -4,7 +4,6 @@ pub mod host_cost;
 pub mod machines;
 pub mod phase;
 pub mod shapes;
-pub mod stress;
 pub mod work_precision;
 
 use std::io::Write;

@@ -13,7 +13,7 @@ use super::cells::{
 use super::grazing::{contact_speed, swing};
 use super::lanes::{Lanes, Start};
 use super::{Checks, SEED, readout};
-use rattlemap::gpu::{Constants, GpuError, LaneSettings};
+use rattlemap::gpu::{Constants, LaneSettings};
 use rattlemap::map::random::Random;
 use rattlemap::record::classify::status;
 use rattlemap::record::limits::MOST_STEPS;
@@ -48,15 +48,12 @@ const SWINGS: usize = 64;
 
 /// Compares swings and motions with every number of steps: no contact is missed, no motion differs by more than rounding at
 /// every step explains, and no cell takes fewer steps than requested.
-///
-/// # Errors
-/// [`GpuError`].
-pub fn check(lanes: &mut Lanes) -> Result<Checks, GpuError> {
+pub(super) fn check(lanes: &mut Lanes) -> Checks {
     let powers = |last: u32| (0..=last).map(|k| 1 << k);
     let mut checks = Checks::default();
-    compare_swings(powers(14), lanes, &mut checks)?;
-    compare_motions(powers(12).chain([FINEST]), lanes, &mut checks)?;
-    Ok(checks)
+    compare_swings(powers(14), lanes, &mut checks);
+    compare_motions(powers(12).chain([FINEST]), lanes, &mut checks);
+    checks
 }
 
 /// Returns settings for some periods of at least `steps` steps.
@@ -64,11 +61,7 @@ fn settings(steps: u32, periods: u32) -> LaneSettings {
     LaneSettings { steps_per_period: Some(steps), ..LaneSettings::only(periods) }
 }
 
-fn compare_swings(
-    grids: impl Iterator<Item = u32> + Clone,
-    lanes: &mut Lanes,
-    checks: &mut Checks,
-) -> Result<(), GpuError> {
+fn compare_swings(grids: impl Iterator<Item = u32> + Clone, lanes: &mut Lanes, checks: &mut Checks) {
     let mut random = Random::new(SEED);
     let starts: Vec<Start> = DEPTHS
         .iter()
@@ -77,7 +70,7 @@ fn compare_swings(
     lanes.rewrite(readout::first_contact);
     for precision in lanes.precisions() {
         for requested in grids.clone() {
-            let records = lanes.run(precision, &starts, &settings(requested, 1))?;
+            let records = lanes.run(precision, &starts, &settings(requested, 1));
             let cells = starts.iter().zip(&records);
             let missed = cells
                 .filter(|(start, record)| contact_speed(start, record, Some(requested)).is_none())
@@ -90,7 +83,6 @@ fn compare_swings(
         }
     }
     lanes.rewrite(readout::whole);
-    Ok(())
 }
 
 /// Returns the free steps per forcing period of each lane if `requested` are requested.
@@ -99,18 +91,14 @@ fn lane_steps(starts: &[Start], requested: u32) -> Vec<u32> {
     starts.iter().map(|start| constants(start).map_or(0, |constants| constants.steps)).collect()
 }
 
-fn compare_motions(
-    grids: impl Iterator<Item = u32> + Clone,
-    lanes: &mut Lanes,
-    checks: &mut Checks,
-) -> Result<(), GpuError> {
+fn compare_motions(grids: impl Iterator<Item = u32> + Clone, lanes: &mut Lanes, checks: &mut Checks) {
     let starts = MOTIONS.map(|(e, omega)| (paper(e, omega), REST));
     let exact = starts.map(|(pair, start)| run_reference(&pair, start, PERIODS).0.expect("an ordinary cell"));
     for precision in lanes.precisions() {
         let engine = EngineName::from(precision);
         let sensitivities = starts.map(|(pair, start)| sensitivity(&pair, start, PERIODS, engine));
         for requested in grids.clone() {
-            let records = lanes.run(precision, &starts, &settings(requested, PERIODS))?;
+            let records = lanes.run(precision, &starts, &settings(requested, PERIODS));
             let steps = lane_steps(&starts, requested);
             let cells = starts.par_iter().zip(&steps);
             let perturbed: Vec<Perturbed> = cells
@@ -129,7 +117,6 @@ fn compare_motions(
             }
         }
     }
-    Ok(())
 }
 
 /// The effect of rounding at every step, measured on perturbed motions of the reference.

@@ -19,7 +19,7 @@ use rattlemap_dynamics::orbit::{Budget, Settings, measure};
 const LONGEST: f64 = 2_000.0;
 
 /// Compares the time of each of `count` cells with that of a typical one, on all cores.
-pub fn check(count: usize) -> Checks {
+pub(super) fn check(count: usize) -> Checks {
     let mut checks = Checks::default();
     let times: Vec<[f64; 2]> = (0..count).into_par_iter().with_max_len(1).map(|n| time(n as u64)).collect();
     let mut typical: Vec<f64> = times.iter().map(|time| time[1]).collect();

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::Checks;
 use super::cells::{REST, flow_of, run_reference};
 use super::lanes::{Lanes, Start};
-use rattlemap::gpu::{GpuError, LaneSettings, Precision};
+use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::{Needs, Plan};
 use rattlemap::map::scene::{self, Integration, Quantity, Scene};
@@ -40,10 +40,7 @@ const CAPS: [Status; 3] = [Status::CapEvents, Status::CapRoot, Status::TooStiff]
 
 /// Compares `count` bounded cells on every engine, and runs a tenth as many wild cells: all numbers are finite, wild cells end
 /// in time, and no more differences lack an explanation than validation tolerates.
-///
-/// # Errors
-/// [`GpuError`].
-pub fn check(count: usize, lanes: &mut Lanes) -> Result<Checks, GpuError> {
+pub(super) fn check(count: usize, lanes: &mut Lanes) -> Checks {
     let mut checks = Checks::default();
     let mut cells = space::all_bounded(count);
     // Lanes with similar numbers of steps run together.
@@ -52,7 +49,7 @@ pub fn check(count: usize, lanes: &mut Lanes) -> Result<Checks, GpuError> {
     checks.require(judges.iter().all(is_finite), "a record of the reference is not finite");
     let (mut unexplained, mut among) = (Vec::new(), 0);
     for precision in lanes.precisions() {
-        let records = lanes.run(precision, &cells, &LaneSettings::within(&budget()))?;
+        let records = lanes.run(precision, &cells, &LaneSettings::within(&budget()));
         checks.require(records.iter().all(is_finite), format!("a record in {precision:?} is not finite"));
         let different: Vec<usize> =
             (0..count).filter(|&i| contradicts(precision, &cells[i].0, &records[i], &judges[i])).collect();
@@ -69,7 +66,7 @@ pub fn check(count: usize, lanes: &mut Lanes) -> Result<Checks, GpuError> {
         checks.require(is_finite, format!("{pair:?} is not finite"));
         checks.add(time.as_secs_f64(), LONGEST.as_secs_f64(), format!("seconds of {pair:?}"));
     }
-    Ok(checks)
+    checks
 }
 
 /// Computes `of` for each item in parallel. Costs differ a thousandfold, so each task has one item.

@@ -13,7 +13,7 @@ use super::cells::{
     EngineName, UNPREDICTABLE, paper, run_reference, sensitivity, sensitivity_to, state_after, state_distance,
 };
 use super::lanes::{Lanes, Start};
-use rattlemap::gpu::{GpuError, LaneSettings};
+use rattlemap::gpu::LaneSettings;
 use rattlemap::record::classify::status;
 use rattlemap_dynamics::model::{GearPair, State, state};
 use rattlemap_dynamics::motion::{EVENTS_PER_PERIOD_CAP, Stop};
@@ -53,17 +53,14 @@ struct End<'c> {
 
 /// Compares every restitution on every engine: a series ends in meshing, with an error within rounding, or in `cap_events` if
 /// it has more impacts than the engine's cap.
-///
-/// # Errors
-/// [`GpuError`].
-pub fn check(lanes: &mut Lanes) -> Result<Checks, GpuError> {
+pub(super) fn check(lanes: &mut Lanes) -> Checks {
     let mut checks = Checks::default();
     let starts: Vec<Start> =
         BELOW_ONE.iter().flat_map(|&less| [0.01, 0.0].map(|mesh_speed| cell(less, mesh_speed))).collect();
     let cases: Vec<Case> = starts.par_iter().map(|&start| case(start)).collect();
     let mut ends: Vec<End<'_>> = cases.par_iter().map(on_reference).collect();
     for precision in lanes.precisions() {
-        let records = lanes.run(precision, &starts, &LaneSettings::only(1))?;
+        let records = lanes.run(precision, &starts, &LaneSettings::only(1));
         let lane = |(case, record): (_, &_)| {
             let state = (status(record) == Status::Ok).then_some(record.strobe);
             end(case, precision.into(), status(record), state)
@@ -92,7 +89,7 @@ pub fn check(lanes: &mut Lanes) -> Result<Checks, GpuError> {
         }
     }
     checks.require(comparable > ends.len() / 3, "a third of the series can be compared");
-    Ok(checks)
+    checks
 }
 
 /// Returns the cell with restitution `1 - less`.

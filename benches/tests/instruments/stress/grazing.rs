@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::cells::{EngineName, flow_of, paper};
 use super::lanes::{Lanes, Start};
 use super::{Checks, SEED, readout};
-use rattlemap::gpu::{GpuError, LaneSettings};
+use rattlemap::gpu::LaneSettings;
 use rattlemap::map::random::Random;
 use rattlemap::record::Record;
 use rattlemap::record::distance::farther;
@@ -55,10 +55,7 @@ fn law(distance: f64, eps: f64) -> f64 {
 
 /// Compares every distance on every engine: errors obey the square-root law, and beyond rounding no contact is missed and none
 /// is reported for a swing that misses the wall.
-///
-/// # Errors
-/// [`GpuError`].
-pub fn check(lanes: &mut Lanes) -> Result<Checks, GpuError> {
+pub(super) fn check(lanes: &mut Lanes) -> Checks {
     let mut checks = Checks::default();
     let mut random = Random::new(SEED);
     let distances = (0..=HALF_DECADES).map(|k| 0.03 * 10f64.powf(-0.5 * f64::from(k)));
@@ -73,12 +70,12 @@ pub fn check(lanes: &mut Lanes) -> Result<Checks, GpuError> {
     compare(EngineName::Reference, &distances, &starts, &speeds, &mut checks);
     lanes.rewrite(readout::first_contact);
     for precision in lanes.precisions() {
-        let records = lanes.run(precision, &starts, &LaneSettings::only(1))?;
+        let records = lanes.run(precision, &starts, &LaneSettings::only(1));
         let speeds = starts.iter().zip(&records).map(|(start, record)| contact_speed(start, record, None));
         compare(precision.into(), &distances, &starts, &speeds.collect::<Vec<_>>(), &mut checks);
     }
     lanes.rewrite(readout::whole);
-    Ok(checks)
+    checks
 }
 
 /// Returns the speed of the reference's first contact, which must be with the right wall.
