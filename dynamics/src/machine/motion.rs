@@ -18,6 +18,9 @@ use crate::motion::{
     Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, STEPS_PER_PERIOD_CAP, Slip, Slips, Stop, Work,
 };
 
+/// Largest distance of a gap from its wall that counts as rounding, relative to the wall's position and to the scale of length.
+const ON_WALL: f64 = 1e-9;
+
 /// The motion of a machine, with any number of tangent vectors.
 #[derive(Clone, Debug)]
 pub struct MachineMotion<'s> {
@@ -142,7 +145,7 @@ impl<'s> MachineMotion<'s> {
     pub(crate) fn is_in_modes_of(&self, other: &MachineMotion<'_>) -> bool {
         let is_on_wall = |gap: usize, side: Side| {
             let wall = self.system.last_wall(gap, side).at;
-            (self.point[gap] - wall).abs() <= 1e-9 * wall.abs().max(self.system.length)
+            (self.point[gap] - wall).abs() <= ON_WALL * wall.abs().max(self.system.length)
         };
         self.modes.slips == other.modes.slips
             && (0..self.system.gaps()).all(|gap| {
