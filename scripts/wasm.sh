@@ -21,5 +21,5 @@ rm -rf "$out"
     --remove-name-section --remove-producers-section --out-dir "$out"
 report=src/show/report
 gzip -9 --no-name --stdout "$out/rattlemap_web_bg.wasm" > "$report/engine.wasm.gz"
-# Comments have addresses of web sites; the page must have none.
-sed '/^ *\/\/ /d' "$out/rattlemap_web.js" > "$report/engine.js"
+# Comments have addresses of web sites; the page must have none. The others are those of web/src.
+sed '/^ *\/\/ /d; /^ *\/\*\*/,/\*\//d' "$out/rattlemap_web.js" > "$report/engine.js"

@@ -4,10 +4,6 @@ let wasm_bindgen = (function(exports) {
         script_src = new URL(document.currentScript.src, location.href).toString();
     }
 
-    /**
-     * A graphics device, and the window that it computes. A window computes the same records on it as the program does in f32 on
-     * the same device.
-     */
     class Lanes {
         static __wrap(ptr) {
             const obj = Object.create(Lanes.prototype);
@@ -25,15 +21,6 @@ let wasm_bindgen = (function(exports) {
             const ptr = this.__destroy_into_raw();
             wasm.__wbg_lanes_free(ptr, 0);
         }
-        /**
-         * Computes runs of the prepared window. Returns the bytes of their records, in the same order.
-         *
-         * # Errors
-         * If the device fails, or no window was prepared.
-         * @param {Window} window
-         * @param {Uint32Array | number[]} runs
-         * @returns {Promise<Uint8Array>}
-         */
         compute(window, runs) {
             _assertClass(window, Window);
             const ptr0 = passArray32ToWasm0(runs, wasm.__wbindgen_malloc);
@@ -41,35 +28,14 @@ let wasm_bindgen = (function(exports) {
             const ret = wasm.lanes_compute(this.__wbg_ptr, window.__wbg_ptr, ptr0, len0);
             return ret;
         }
-        /**
-         * Whether the device is hardware, not a program on the processor.
-         * @returns {boolean}
-         */
         is_hardware() {
             const ret = wasm.lanes_is_hardware(this.__wbg_ptr);
             return ret !== 0;
         }
-        /**
-         * Opens the first adapter of the browser.
-         *
-         * # Errors
-         * If the browser has no adapter, or the adapter's limits are too low.
-         * @returns {Promise<Lanes>}
-         */
         static open() {
             const ret = wasm.lanes_open();
             return ret;
         }
-        /**
-         * Prepares the device for a window. The first window with certain quantities compiles shaders, and computes known answers
-         * with them.
-         *
-         * # Errors
-         * If the driver refuses a shader, a known answer is wrong, or the flows of the window need too much memory. The device
-         * cannot be used afterwards.
-         * @param {Window} window
-         * @returns {Promise<void>}
-         */
         prepare(window) {
             _assertClass(window, Window);
             const ret = wasm.lanes_prepare(this.__wbg_ptr, window.__wbg_ptr);
@@ -79,9 +45,6 @@ let wasm_bindgen = (function(exports) {
     if (Symbol.dispose) Lanes.prototype[Symbol.dispose] = Lanes.prototype.free;
     exports.Lanes = Lanes;
 
-    /**
-     * The runs of a scene, which may be computed in parts by several workers.
-     */
     class Window {
         __destroy_into_raw() {
             const ptr = this.__wbg_ptr;
@@ -93,14 +56,6 @@ let wasm_bindgen = (function(exports) {
             const ptr = this.__destroy_into_raw();
             wasm.__wbg_window_free(ptr, 0);
         }
-        /**
-         * Computes runs. Returns the bytes of their records, in the same order.
-         *
-         * # Panics
-         * If there is no such run.
-         * @param {Uint32Array | number[]} runs
-         * @returns {Uint8Array}
-         */
         compute(runs) {
             const ptr0 = passArray32ToWasm0(runs, wasm.__wbindgen_malloc);
             const len0 = WASM_VECTOR_LEN;
@@ -109,14 +64,6 @@ let wasm_bindgen = (function(exports) {
             wasm.__wbindgen_free(ret[0], ret[1] * 1, 1);
             return v2;
         }
-        /**
-         * Returns the data of a page that shows these records, as JSON. `records` has the bytes of one record per run.
-         *
-         * # Errors
-         * If `records` does not have one record per run.
-         * @param {Uint8Array | number[]} records
-         * @returns {string}
-         */
         data(records) {
             let deferred3_0;
             let deferred3_1;
@@ -137,15 +84,6 @@ let wasm_bindgen = (function(exports) {
                 wasm.__wbindgen_free(deferred3_0, deferred3_1, 1);
             }
         }
-        /**
-         * Draws a layer of these records as an SVG figure.
-         *
-         * # Errors
-         * As for [`Window::data`], or if no layer has this name.
-         * @param {Uint8Array | number[]} records
-         * @param {string} layer
-         * @returns {string}
-         */
         figure(records, layer) {
             let deferred4_0;
             let deferred4_1;
@@ -175,14 +113,6 @@ let wasm_bindgen = (function(exports) {
                 wasm.__wbindgen_free(deferred4_0, deferred4_1, 1);
             }
         }
-        /**
-         * Returns two bytes per run: the index of its class, and its period, which is 0 if there is none.
-         *
-         * # Panics
-         * If there is no such run.
-         * @param {Uint32Array | number[]} runs
-         * @returns {Uint8Array}
-         */
         labels(runs) {
             const ptr0 = passArray32ToWasm0(runs, wasm.__wbindgen_malloc);
             const len0 = WASM_VECTOR_LEN;
@@ -191,16 +121,6 @@ let wasm_bindgen = (function(exports) {
             wasm.__wbindgen_free(ret[0], ret[1] * 1, 1);
             return v2;
         }
-        /**
-         * Reads a scene. `model` is the text of its model file; it is empty for a built-in model. `sets` has one `NAME=VALUE` per
-         * line, which override the scene.
-         *
-         * # Errors
-         * The scene's first error, or a cell without motion.
-         * @param {string} scene
-         * @param {string} model
-         * @param {string} sets
-         */
         constructor(scene, model, sets) {
             let ptr0, len0, ptr1, len1, ptr2, len2;
             try {
@@ -224,10 +144,6 @@ let wasm_bindgen = (function(exports) {
             WindowFinalization.register(this, this.__wbg_ptr, this);
             return this;
         }
-        /**
-         * Number of runs: one per cell and start.
-         * @returns {number}
-         */
         runs() {
             const ret = wasm.window_runs(this.__wbg_ptr);
             return ret >>> 0;
@@ -236,16 +152,6 @@ let wasm_bindgen = (function(exports) {
     if (Symbol.dispose) Window.prototype[Symbol.dispose] = Window.prototype.free;
     exports.Window = Window;
 
-    /**
-     * Computes the motion of a `rattlemap orbit` command, and draws it.
-     *
-     * `command` is the text that a report shows for a cell. `model` is the text of the map's own model file; it is empty for a
-     * built-in model. Returns a JSON object: `summary`, the text that the command prints, and `figures`, SVG images, keyed by
-     * the figure's name; or `error`, a message.
-     * @param {string} command
-     * @param {string} model
-     * @returns {string}
-     */
     function orbit(command, model) {
         let deferred3_0;
         let deferred3_1;
@@ -271,15 +177,6 @@ let wasm_bindgen = (function(exports) {
     }
     exports.orbit = orbit;
 
-    /**
-     * Chooses ticks, as JSON: see [`report::ticks`]. `scale` is the scale's name in a scene.
-     * @param {string} scale
-     * @param {Float64Array | number[]} ends
-     * @param {Float64Array | number[]} listed
-     * @param {number} length
-     * @param {number} spacing
-     * @returns {string}
-     */
     function ticks(scale, ends, listed, length, spacing) {
         let deferred6_0;
         let deferred6_1;
