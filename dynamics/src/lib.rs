@@ -14,6 +14,7 @@
 #![warn(clippy::print_stderr, clippy::print_stdout, reason = "a library writes nothing to the terminal")]
 
 pub mod fused;
+mod named;
 pub mod number;
 
 pub mod model;

@@ -41,6 +41,7 @@ pub use section::Section;
 pub use trace::trace;
 
 use crate::model::{Side, State};
+use crate::named;
 use crate::word::Word;
 
 pub use crate::motion::{DISPLACEMENTS, EventKind, place_of_displacement, place_of_gap};
@@ -105,66 +106,35 @@ impl Class {
     }
 }
 
-/// How the integration of a cell ended. `Failed` cells have a status that is a [failure](Status::is_failure).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Status {
-    /// No remarks.
-    Ok,
-    /// The motion converges so slowly that its class rests on Newton's method, or it is undecided.
-    Slow,
-    /// An event is so near to grazing that the linearisation is not reliable.
-    NearGrazing,
-    /// An event lies on the strobe phase.
-    StrobeOnEvent,
-    /// More events in one period than the cap allows.
-    CapEvents,
-    /// More steps or root iterations than the cap allows.
-    CapRoot,
-    /// Too stiff for this engine.
-    TooStiff,
-    /// The state is not finite.
-    NonFinite,
-    /// Rounding decides the period: rounding errors grow to the distance between points of the cycle.
-    BelowResolution,
-    /// A Floquet multiplier of the cycle has modulus 1 within its error: perturbations neither decay nor grow.
-    Neutral,
-    /// The motion grows without bound: the oscillator has negative damping or stiffness, and no contact stops it.
-    Escape,
+named! {
+    /// How the integration of a cell ended. `Failed` cells have a status that is a [failure](Status::is_failure).
+    pub enum Status {
+        /// No remarks.
+        Ok = "ok",
+        /// The motion converges so slowly that its class rests on Newton's method, or it is undecided.
+        Slow = "slow",
+        /// An event is so near to grazing that the linearisation is not reliable.
+        NearGrazing = "near_grazing",
+        /// An event lies on the strobe phase.
+        StrobeOnEvent = "strobe_on_event",
+        /// More events in one period than the cap allows.
+        CapEvents = "cap_events",
+        /// More steps or root iterations than the cap allows.
+        CapRoot = "cap_root",
+        /// Too stiff for this engine.
+        TooStiff = "too_stiff",
+        /// The state is not finite.
+        NonFinite = "non_finite",
+        /// Rounding decides the period: rounding errors grow to the distance between points of the cycle.
+        BelowResolution = "below_resolution",
+        /// A Floquet multiplier of the cycle has modulus 1 within its error: perturbations neither decay nor grow.
+        Neutral = "neutral",
+        /// The motion grows without bound: the oscillator has negative damping or stiffness, and no contact stops it.
+        Escape = "escape",
+    }
 }
 
 impl Status {
-    /// Every status, in the order of its code in records and tables.
-    pub const ALL: [Status; 11] = [
-        Status::Ok,
-        Status::Slow,
-        Status::NearGrazing,
-        Status::StrobeOnEvent,
-        Status::CapEvents,
-        Status::CapRoot,
-        Status::TooStiff,
-        Status::NonFinite,
-        Status::BelowResolution,
-        Status::Neutral,
-        Status::Escape,
-    ];
-
-    /// Returns the name in tables and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Status::Ok => "ok",
-            Status::Slow => "slow",
-            Status::NearGrazing => "near_grazing",
-            Status::StrobeOnEvent => "strobe_on_event",
-            Status::CapEvents => "cap_events",
-            Status::CapRoot => "cap_root",
-            Status::TooStiff => "too_stiff",
-            Status::NonFinite => "non_finite",
-            Status::BelowResolution => "below_resolution",
-            Status::Neutral => "neutral",
-            Status::Escape => "escape",
-        }
-    }
-
     /// Whether the integration could not be continued.
     pub fn is_failure(self) -> bool {
         matches!(

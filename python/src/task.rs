@@ -26,8 +26,8 @@ pub(crate) fn request(
     adapter: Option<&str>,
 ) -> Result<EngineRequest, Problem> {
     let named = |name: &str| {
-        let known = Precision::ALL.into_iter().find(|precision| precision.name() == name);
-        known.ok_or_else(|| Problem::engine(format!("unknown precision {name:?}; it must be f32 or f64")))
+        Precision::named(name)
+            .ok_or_else(|| Problem::engine(format!("unknown precision {name:?}; it must be f32 or f64")))
     };
     let on = |text: &str| {
         text.parse()

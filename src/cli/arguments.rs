@@ -455,8 +455,7 @@ impl EngineOptions {
 }
 
 fn precision(text: &str) -> Result<Precision, String> {
-    let named = Precision::ALL.into_iter().find(|precision| precision.name() == text);
-    named.ok_or_else(|| "it must be f32 or f64".to_owned())
+    Precision::named(text).ok_or_else(|| "it must be f32 or f64".to_owned())
 }
 
 /// Engines by name.

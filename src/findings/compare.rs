@@ -7,26 +7,25 @@
 use crate::record::classify::classify;
 use crate::record::distance::apart;
 use crate::record::{Record, Records, Spelling, valid};
+use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::Class;
 use rattlemap_dynamics::word::Word;
 
-/// Kinds of differences between two motions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Different classes.
-    Class,
-    /// Different periods.
-    Period,
-    /// Cycles of one period with different patterns.
-    Pattern,
-    /// Cycles of one period with different words, if patterns are unknown.
-    Word,
+named! {
+    /// Kinds of differences between two motions.
+    pub enum Kind {
+        /// Different classes.
+        Class = "class",
+        /// Different periods.
+        Period = "period",
+        /// Cycles of one period with different patterns.
+        Pattern = "pattern",
+        /// Cycles of one period with different words, if patterns are unknown.
+        Word = "word",
+    }
 }
 
 impl Kind {
-    /// All kinds, in the order of tables.
-    pub const ALL: [Kind; 4] = [Kind::Class, Kind::Period, Kind::Pattern, Kind::Word];
-
     /// Returns the difference between two classes; none if they are equal.
     pub fn of(a: Class, b: Class) -> Option<Kind> {
         match (a, b) {
@@ -39,16 +38,6 @@ impl Kind {
     /// Whether class or period differ. Other kinds are counted separately.
     pub fn is_decisive(self) -> bool {
         matches!(self, Kind::Class | Kind::Period)
-    }
-
-    /// Returns the name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Class => "class",
-            Kind::Period => "period",
-            Kind::Pattern => "pattern",
-            Kind::Word => "word",
-        }
     }
 }
 

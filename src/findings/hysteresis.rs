@@ -22,7 +22,7 @@ pub struct Hysteresis {
 /// Compares the two passes of a diagram; none if it has one pass.
 pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
     let pass = |direction| columns.iter().filter(move |column| column.direction == Some(direction));
-    let [up, down] = Direction::BOTH.map(pass);
+    let [up, down] = Direction::ALL.map(pass);
     let (mut differing, mut by_pattern) = (Runs::default(), Runs::default());
     for (up, down) in up.zip(down) {
         let differs = Kind::of(up.class, down.class).is_some();

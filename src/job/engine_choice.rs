@@ -9,6 +9,7 @@ use thiserror::Error;
 use crate::gpu::{self, AdapterChoice, AdapterReport, GpuError, Precision};
 use crate::map::engine::{Cpu, Engine, EngineError, Gpu, Prepared};
 use crate::map::plan::Plan;
+use rattlemap_dynamics::named;
 
 pub use adapters::{AdapterError, AdapterRequest, AdapterTextError};
 
@@ -24,16 +25,18 @@ pub struct EngineRequest {
     pub adapter: Option<AdapterRequest>,
 }
 
-/// Kind of engine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EngineKind {
-    /// A hardware GPU if there is one, else the processor. A software GPU is never chosen.
-    #[default]
-    Auto,
-    /// Lanes on a graphics device.
-    Gpu,
-    /// The event-driven reference on all processor cores, in f64.
-    Cpu,
+named! {
+    /// Kind of engine.
+    #[derive(Default)]
+    pub enum EngineKind {
+        /// A hardware GPU if there is one, else the processor. A software GPU is never chosen.
+        #[default]
+        Auto = "auto",
+        /// Lanes on a graphics device.
+        Gpu = "gpu",
+        /// The event-driven reference on all processor cores, in f64.
+        Cpu = "cpu",
+    }
 }
 
 /// An open engine and the reason for its choice.
@@ -110,12 +113,7 @@ impl FromStr for EngineKind {
     type Err = ChoiceError;
 
     fn from_str(name: &str) -> Result<EngineKind, ChoiceError> {
-        match name {
-            "auto" => Ok(EngineKind::Auto),
-            "gpu" => Ok(EngineKind::Gpu),
-            "cpu" => Ok(EngineKind::Cpu),
-            _ => Err(ChoiceError::UnknownEngine { name: name.to_owned() }),
-        }
+        EngineKind::named(name).ok_or_else(|| ChoiceError::UnknownEngine { name: name.to_owned() })
     }
 }
 

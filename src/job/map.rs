@@ -150,7 +150,7 @@ impl<'a> MapJob<'a> {
                 EngineRequest { kind: EngineKind::Cpu, ..request }
             }
             Ok(Some(identity)) => {
-                let precision = Precision::ALL.into_iter().find(|p| p.name() == identity.precision());
+                let precision = Precision::named(identity.precision());
                 EngineRequest { kind: EngineKind::Gpu, precision, ..request }
             }
             // `OpenMap::begin` reports an unreadable file.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::map::scene::Start;
 use crate::record::measures::{MEASURES, Measured};
 use rattlemap_dynamics::model::{MOST_COORDINATES, Model, ModelError, Oscillator, REST, Side, State};
+use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Settings, Status};
 use rattlemap_dynamics::word::Word;
 
@@ -54,25 +55,13 @@ impl Column {
     }
 }
 
-/// Direction in which an attractor is followed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    /// From the first value to the last.
-    Up,
-    /// From the last value to the first.
-    Down,
-}
-
-impl Direction {
-    /// Both directions, in the order of the columns.
-    pub const BOTH: [Direction; 2] = [Direction::Up, Direction::Down];
-
-    /// Returns the name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Direction::Up => "up",
-            Direction::Down => "down",
-        }
+named! {
+    /// Direction in which an attractor is followed.
+    pub enum Direction {
+        /// From the first value to the last.
+        Up = "up",
+        /// From the last value to the first.
+        Down = "down",
     }
 }
 

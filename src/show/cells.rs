@@ -15,27 +15,16 @@ use crate::record::{Record, Records, valid};
 use crate::show::numbers::Number;
 use crate::validate::Rate;
 use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::{Class, Status};
 
-/// Origin of a cell's values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// The cell was integrated.
-    Integrated,
-    /// The cell was filled from its neighbours, which agree.
-    Filled,
-}
-
-impl Source {
-    /// All sources. Their positions are their codes in tables.
-    pub const ALL: [Source; 2] = [Source::Integrated, Source::Filled];
-
-    /// Returns the name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Source::Integrated => "integrated",
-            Source::Filled => "filled",
-        }
+named! {
+    /// Origin of a cell's values.
+    pub enum Source {
+        /// The cell was integrated.
+        Integrated = "integrated",
+        /// The cell was filled from its neighbours, which agree.
+        Filled = "filled",
     }
 }
 

@@ -50,41 +50,37 @@ pub enum Field {
 }
 
 impl Field {
+    /// Returns all fields with their names, in the order in which they are reported.
+    fn named() -> impl Iterator<Item = (Field, &'static str)> {
+        let before = [
+            (Field::Class, "class"),
+            (Field::Period, "period"),
+            (Field::Word, "word"),
+            (Field::Pattern, "pattern"),
+            (Field::Symmetric, "symmetric"),
+            (Field::Exponent, "lyapunov"),
+            (Field::Attractor, "attractor"),
+            (Field::Impacts, "impacts_per_period"),
+            (Field::Mesh, "mesh_fraction"),
+        ];
+        let measured = GROUPS.iter().enumerate().map(|(index, group)| (Field::Measured(index), group.name));
+        let after = [
+            (Field::Status, "status"),
+            (Field::Periods, "periods_run"),
+            (Field::Finite, "finite"),
+            (Field::Again, "again"),
+        ];
+        before.into_iter().chain(measured).chain(after)
+    }
+
     /// Returns all fields, in the order in which they are reported.
     pub fn all() -> Vec<Field> {
-        let before = [
-            Field::Class,
-            Field::Period,
-            Field::Word,
-            Field::Pattern,
-            Field::Symmetric,
-            Field::Exponent,
-            Field::Attractor,
-            Field::Impacts,
-            Field::Mesh,
-        ];
-        let after = [Field::Status, Field::Periods, Field::Finite, Field::Again];
-        before.into_iter().chain((0..GROUPS.len()).map(Field::Measured)).chain(after).collect()
+        Field::named().map(|(field, _)| field).collect()
     }
 
     /// Returns the name in files, which is the record's field name if there is one.
     pub fn name(self) -> &'static str {
-        match self {
-            Field::Class => "class",
-            Field::Period => "period",
-            Field::Word => "word",
-            Field::Pattern => "pattern",
-            Field::Symmetric => "symmetric",
-            Field::Exponent => "lyapunov",
-            Field::Attractor => "attractor",
-            Field::Impacts => "impacts_per_period",
-            Field::Mesh => "mesh_fraction",
-            Field::Measured(group) => GROUPS[group].name,
-            Field::Status => "status",
-            Field::Periods => "periods_run",
-            Field::Finite => "finite",
-            Field::Again => "again",
-        }
+        Field::named().find(|&(field, _)| field == self).map_or("", |(_, name)| name)
     }
 }
 

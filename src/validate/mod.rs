@@ -45,6 +45,7 @@ use crate::record::classify::{classify, status};
 use crate::record::{Record, Records, valid};
 use cell::Cell;
 use compare::{Answer, Bars, Compared};
+use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::{Budget, Class, Status};
 
 /// Default number of cells in a sample.
@@ -63,38 +64,23 @@ pub struct Subject<'a> {
     pub is_lane: bool,
 }
 
-/// Explanation of a mismatch between a record and its judge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
-    /// A start within the engine's resolution of the cell's start leads to the record's answer, and the reference stays on
-    /// that attractor from the record's last state.
-    Attractor,
-    /// The cell lies at a border that rounding can cross. The reference gives the record's answer if parameters and start change within the
-    /// engine's resolution; or the lane gives the record's answer in single precision and the reference's answer in double precision, both
-    /// without early stops; or the record's status says that the period is below the resolution.
-    Border,
-    /// One engine gives the other's answer with fewer or more periods; or the motion settles or separates too slowly to be decided within
-    /// the budget; or the second judge or the reference is undecided.
-    Budget,
-    /// A cap ended the lane, and ended it again when the lane was repeated.
-    Cap,
-    /// No computation explains the difference.
-    Unexplained,
-}
-
-impl Kind {
-    /// All kinds, in the order in which they are reported.
-    pub const ALL: [Kind; 5] = [Kind::Attractor, Kind::Border, Kind::Budget, Kind::Cap, Kind::Unexplained];
-
-    /// Returns the kind's name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Attractor => "other_attractor",
-            Kind::Border => "border",
-            Kind::Budget => "budget_too_short",
-            Kind::Cap => "engine_cap",
-            Kind::Unexplained => "unexplained",
-        }
+named! {
+    /// Explanation of a mismatch between a record and its judge.
+    pub enum Kind {
+        /// A start within the engine's resolution of the cell's start leads to the record's answer, and the reference stays on
+        /// that attractor from the record's last state.
+        Attractor = "other_attractor",
+        /// The cell lies at a border that rounding can cross. The reference gives the record's answer if parameters and start change within the
+        /// engine's resolution; or the lane gives the record's answer in single precision and the reference's answer in double precision, both
+        /// without early stops; or the record's status says that the period is below the resolution.
+        Border = "border",
+        /// One engine gives the other's answer with fewer or more periods; or the motion settles or separates too slowly to be decided within
+        /// the budget; or the second judge or the reference is undecided.
+        Budget = "budget_too_short",
+        /// A cap ended the lane, and ended it again when the lane was repeated.
+        Cap = "engine_cap",
+        /// No computation explains the difference.
+        Unexplained = "unexplained",
     }
 }
 

@@ -4,41 +4,31 @@ use crate::map::plan::Plan;
 use crate::map::random::Random;
 use crate::record::classify::{classify, status};
 use crate::record::{Records, valid};
+use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::{Class, Status};
 
 /// Number of lanes whose states are compared, per cell of the sample. Each lane takes only a few periods.
 const STATES_PER_CELL: usize = 10;
 
-/// The set from which a cell was drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Stratum {
-    /// All integrated runs. Only this stratum gives rates of the map.
-    Uniform,
-    /// Runs with a neighbour of another class or period.
-    Border,
-    /// Runs whose status is not `ok`.
-    Status,
+named! {
+    /// The set from which a cell was drawn.
+    pub enum Stratum {
+        /// All integrated runs. Only this stratum gives rates of the map.
+        Uniform = "uniform",
+        /// Runs with a neighbour of another class or period.
+        Border = "border",
+        /// Runs whose status is not `ok`.
+        Status = "status",
+    }
 }
 
 impl Stratum {
-    /// All strata, the uniform one first.
-    pub const ALL: [Stratum; 3] = [Stratum::Uniform, Stratum::Border, Stratum::Status];
-
     /// Describes the cells of the stratum. `counted` is the noun for the counted objects.
     pub fn describe(self, counted: &str) -> String {
         match self {
             Stratum::Uniform => format!("random {counted}"),
             Stratum::Border => format!("{counted} next to another class or period"),
             Stratum::Status => format!("{counted} with a status other than ok"),
-        }
-    }
-
-    /// Returns the name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Stratum::Uniform => "uniform",
-            Stratum::Border => "border",
-            Stratum::Status => "status",
         }
     }
 }

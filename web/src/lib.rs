@@ -44,8 +44,7 @@ pub fn orbit(command: &str, model: &str) -> String {
 /// Chooses ticks, as JSON: see [`report::ticks`]. `scale` is the scale's name in a scene.
 #[wasm_bindgen]
 pub fn ticks(scale: &str, ends: &[f64], listed: &[f64], length: f64, spacing: f64) -> String {
-    let scale =
-        [Scale::Log, Scale::Values].into_iter().find(|each| each.name() == scale).unwrap_or(Scale::Linear);
+    let scale = Scale::named(scale).unwrap_or(Scale::Linear);
     report::ticks(scale, [ends[0], ends[1]], listed, length, spacing).to_string()
 }
 

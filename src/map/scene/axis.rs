@@ -8,6 +8,7 @@ use super::keys;
 use super::limits::MAX_COUNT;
 use super::section::{Field, Section};
 use rattlemap_dynamics::model::{Model, Parameter, Range, Shapes, State};
+use rattlemap_dynamics::named;
 
 const EXAMPLE: &str = "write [[axis]] with parameter, min, max and count, or with parameter and values";
 
@@ -51,25 +52,15 @@ impl Target {
     }
 }
 
-/// Spacing of the values of an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// Equal differences.
-    Linear,
-    /// Equal ratios.
-    Log,
-    /// Listed one by one.
-    Values,
-}
-
-impl Scale {
-    /// Returns the name in scenes and manifests.
-    pub fn name(self) -> &'static str {
-        match self {
-            Scale::Linear => "linear",
-            Scale::Log => "log",
-            Scale::Values => "values",
-        }
+named! {
+    /// Spacing of the values of an axis.
+    pub enum Scale {
+        /// Equal differences.
+        Linear = "linear",
+        /// Equal ratios.
+        Log = "log",
+        /// Listed one by one.
+        Values = "values",
     }
 }
 

@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use super::document;
 use super::error::Place;
 use super::list::FileText;
-use super::settings::{Continuous, Format, Integration, Quantity, Refine, Steps};
+use super::settings::{Format, Integration, Quantity, Refine, Steps};
 use super::{Draw, Purpose, Scene, SceneError, Start};
 use rattlemap_dynamics::model::Model;
 
@@ -135,14 +135,10 @@ impl SceneBuilder {
 
     /// Makes the map adaptive.
     pub fn refine(mut self, refine: Refine) -> SceneBuilder {
-        let continuous = match refine.continuous {
-            Continuous::Interpolated => "interpolated",
-            Continuous::Empty => "empty",
-        };
         self.set("refine", "minimum_grid", refine.minimum_grid);
         self.set("refine", "max_error", number(refine.max_error));
         self.set("refine", "word", refine.word);
-        self.set("refine", "continuous", quoted(continuous));
+        self.set("refine", "continuous", quoted(refine.continuous.name()));
         for (key, value) in [("rounds", refine.rounds), ("audit", refine.audit)] {
             self.fields.remove(&("refine", key.to_owned()));
             value.iter().for_each(|value| self.set("refine", key, value));

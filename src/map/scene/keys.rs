@@ -1,6 +1,7 @@
 //! Table of every key of a scene. The parser takes its names from here, and `docs/scenes.md` lists it.
 
 use super::limits::{LONGEST_TITLE, MAX_COUNT, MAX_PERIODS, MAX_STARTS};
+use super::{Continuous, Format, Quantity};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 
 /// A key of a scene.
@@ -94,9 +95,9 @@ pub const KEYS: &[Key] = &[
     key("refine", "max_error", Value("0.003"), Takes::Fraction, "accepted share of wrong filled cells; if the audit finds more, the map is refined further"),
     key("refine", "audit", Words("2000, or a quarter of the filled cells"), Takes::Whole(1, 10_000_000), "number of filled cells that the first audit integrates"),
     key("refine", "word", Value("false"), Takes::Flag, "also refine where only the word changes (only the pattern, if the scene requests patterns)"),
-    key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts, mesh fraction and measured quantities of filled cells"),
-    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern", "impact_speed", "impact_speed_max", "impact_energy", "impact_rate", "contact_force_max", "contact_force_rms", "amplitude", "rms", "harmonic", "dissipated", "multiplier", "stick_fraction", "friction_energy", "state"]), "quantities to compute"),
-    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "files to write; png, svg and pdf are figures. `bifurcation` accepts figures and csv; a list of cells accepts csv and npy"),
+    key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&Continuous::NAMES), "exponent, impacts, mesh fraction and measured quantities of filled cells"),
+    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&Quantity::NAMES), "quantities to compute"),
+    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&Format::NAMES), "files to write; png, svg and pdf are figures. `bifurcation` accepts figures and csv; a list of cells accepts csv and npy"),
     key("figure", "width", Words("depends on the figure"), Takes::Words("\"60mm\" to \"300mm\"; also cm, in, pt"), "width of all figures. PNG files then have 600 dots per inch"),
     key("figure", "font_size", Words("7.4"), Takes::Words("7 to 24, and at most width / 21"), "size of tick labels and legends, in points. Exponents are smaller; headings and names of axes are at least as large"),
     key("figure", "title", Words("the scene's title"), Takes::Text(LONGEST_TITLE), "title of figures; \"\" removes the heading, with its lines below the title"),

@@ -8,6 +8,7 @@ use super::limits::{LONGEST_TITLE, MAX_PERIODS};
 use super::section::{Field, Section};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 use crate::record::measures::Group;
+use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit;
 
 /// Resolution of the lanes' time grid.
@@ -112,77 +113,81 @@ impl Refine {
     }
 }
 
-/// Values of continuous quantities in filled cells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Continuous {
-    /// The bilinear average of the corners of the block.
-    Interpolated,
-    /// None.
-    Empty,
+named! {
+    /// Values of continuous quantities in filled cells.
+    pub enum Continuous {
+        /// The bilinear average of the corners of the block.
+        Interpolated = "interpolated",
+        /// None.
+        Empty = "empty",
+    }
 }
 
-/// Quantities of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quantity {
-    /// Periodic, chaotic, undecided or failed, and the period.
-    Class,
-    /// Largest Lyapunov exponent.
-    Lyapunov,
-    /// Impacts per forcing period.
-    Impacts,
-    /// Fraction of the time spent meshing.
-    Mesh,
-    /// Whether a periodic orbit is its own mirror image.
-    Symmetric,
-    /// Mapping word.
-    Word,
-    /// Mapping word with each run of one symbol counted once.
-    Pattern,
-    /// Mean approach speed of impacts.
-    ImpactSpeed,
-    /// Largest approach speed of impacts.
-    ImpactSpeedMax,
-    /// Energy lost in impacts per unit time.
-    ImpactEnergy,
-    /// Impacts per unit time.
-    ImpactRate,
-    /// Largest force of compliant contacts.
-    ContactForceMax,
-    /// Root mean square force of compliant contacts over the contact time.
-    ContactForceRms,
-    /// Amplitude and mean of each displacement and of the gap.
-    Amplitude,
-    /// Root mean square of each displacement and of the gap.
-    Rms,
-    /// Amplitude and phase of the first harmonic of each displacement and of the gap.
-    Harmonic,
-    /// Energy that dampers take per unit time.
-    Dissipated,
-    /// Modulus and argument of the largest Floquet multiplier.
-    Multiplier,
-    /// Share of the time in which dry friction sticks.
-    StickFraction,
-    /// Energy that dry friction takes per unit time.
-    FrictionEnergy,
-    /// Last state at phase 0.
-    State,
+named! {
+    /// Quantities of a cell.
+    #[derive(PartialOrd, Ord)]
+    pub enum Quantity {
+        /// Periodic, chaotic, undecided or failed, and the period.
+        Class = "class",
+        /// Largest Lyapunov exponent.
+        Lyapunov = "lyapunov",
+        /// Impacts per forcing period.
+        Impacts = "impacts",
+        /// Fraction of the time spent meshing.
+        Mesh = "mesh",
+        /// Whether a periodic orbit is its own mirror image.
+        Symmetric = "symmetric",
+        /// Mapping word.
+        Word = "word",
+        /// Mapping word with each run of one symbol counted once.
+        Pattern = "pattern",
+        /// Mean approach speed of impacts.
+        ImpactSpeed = "impact_speed",
+        /// Largest approach speed of impacts.
+        ImpactSpeedMax = "impact_speed_max",
+        /// Energy lost in impacts per unit time.
+        ImpactEnergy = "impact_energy",
+        /// Impacts per unit time.
+        ImpactRate = "impact_rate",
+        /// Largest force of compliant contacts.
+        ContactForceMax = "contact_force_max",
+        /// Root mean square force of compliant contacts over the contact time.
+        ContactForceRms = "contact_force_rms",
+        /// Amplitude and mean of each displacement and of the gap.
+        Amplitude = "amplitude",
+        /// Root mean square of each displacement and of the gap.
+        Rms = "rms",
+        /// Amplitude and phase of the first harmonic of each displacement and of the gap.
+        Harmonic = "harmonic",
+        /// Energy that dampers take per unit time.
+        Dissipated = "dissipated",
+        /// Modulus and argument of the largest Floquet multiplier.
+        Multiplier = "multiplier",
+        /// Share of the time in which dry friction sticks.
+        StickFraction = "stick_fraction",
+        /// Energy that dry friction takes per unit time.
+        FrictionEnergy = "friction_energy",
+        /// Last state at phase 0.
+        State = "state",
+    }
 }
 
-/// Kinds of output files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Text table.
-    Csv,
-    /// Structured array.
-    Npy,
-    /// Figures as bitmaps.
-    Png,
-    /// Figures as vector graphics; maps in them are bitmaps.
-    Svg,
-    /// Figures as vector graphics; maps in them are bitmaps.
-    Pdf,
-    /// Interactive report.
-    Html,
+named! {
+    /// Kinds of output files.
+    pub enum Format {
+        /// Text table.
+        Csv = "csv",
+        /// Structured array.
+        Npy = "npy",
+        /// Figures as bitmaps.
+        Png = "png",
+        /// Figures as vector graphics; maps in them are bitmaps.
+        Svg = "svg",
+        /// Figures as vector graphics; maps in them are bitmaps.
+        Pdf = "pdf",
+        /// Interactive report.
+        Html = "html",
+    }
 }
 
 /// Quantities that are computed and files that are written.
@@ -194,49 +199,12 @@ pub struct Outputs {
     pub files: Vec<Format>,
 }
 
-const QUANTITIES: [(&str, Quantity); 21] = [
-    ("class", Quantity::Class),
-    ("lyapunov", Quantity::Lyapunov),
-    ("impacts", Quantity::Impacts),
-    ("mesh", Quantity::Mesh),
-    ("symmetric", Quantity::Symmetric),
-    ("word", Quantity::Word),
-    ("pattern", Quantity::Pattern),
-    ("impact_speed", Quantity::ImpactSpeed),
-    ("impact_speed_max", Quantity::ImpactSpeedMax),
-    ("impact_energy", Quantity::ImpactEnergy),
-    ("impact_rate", Quantity::ImpactRate),
-    ("contact_force_max", Quantity::ContactForceMax),
-    ("contact_force_rms", Quantity::ContactForceRms),
-    ("amplitude", Quantity::Amplitude),
-    ("rms", Quantity::Rms),
-    ("harmonic", Quantity::Harmonic),
-    ("dissipated", Quantity::Dissipated),
-    ("multiplier", Quantity::Multiplier),
-    ("stick_fraction", Quantity::StickFraction),
-    ("friction_energy", Quantity::FrictionEnergy),
-    ("state", Quantity::State),
-];
-const FORMATS: [(&str, Format); 6] = [
-    ("csv", Format::Csv),
-    ("npy", Format::Npy),
-    ("png", Format::Png),
-    ("svg", Format::Svg),
-    ("pdf", Format::Pdf),
-    ("html", Format::Html),
-];
-
 impl Quantity {
-    /// Returns the name in scenes.
-    pub fn name(self) -> &'static str {
-        name(&QUANTITIES, self)
-    }
-
     /// Returns the quantities that describe the size of a motion, its contacts and its energy.
     pub fn measured() -> Vec<Quantity> {
         let is_measured =
             |quantity: &Quantity| quantity.group().is_some() || *quantity == Quantity::ImpactRate;
-        QUANTITIES.iter().map(|&(_, quantity)| quantity).filter(is_measured).collect()
+        Quantity::ALL.into_iter().filter(is_measured).collect()
     }
 
     /// Returns the names of its columns for a model with these state components and names of several gaps, if it is a measured quantity or the state.
@@ -260,15 +228,6 @@ impl Quantity {
 impl Format {
     /// The kinds of files that contain figures.
     pub const FIGURES: [Format; 3] = [Format::Png, Format::Svg, Format::Pdf];
-
-    /// Returns the name in scenes, which is also the extension of figures.
-    pub fn name(self) -> &'static str {
-        name(&FORMATS, self)
-    }
-}
-
-fn name<T: PartialEq>(names: &[(&'static str, T)], thing: T) -> &'static str {
-    names.iter().find(|(_, named)| *named == thing).map_or("", |&(name, _)| name)
 }
 
 /// Reads the heading of figures and reports.
@@ -353,9 +312,7 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
     let audit = section.get("audit").map(|field| field.whole(1..=10_000_000)).transpose()?;
     let word = section.get("word").map_or(Ok(default.word), |field| field.flag())?;
     let continuous = match section.get("continuous") {
-        Some(field) => {
-            field.choice(&[("interpolated", Continuous::Interpolated), ("empty", Continuous::Empty)])?
-        }
+        Some(field) => field.choice(&Continuous::ALL.map(|continuous| (continuous.name(), continuous)))?,
         None => default.continuous,
     };
     Ok(Some(Refine { minimum_grid, rounds, max_error, audit, word, continuous }))
@@ -368,7 +325,7 @@ pub(super) fn read_outputs(
 ) -> Result<Outputs, SceneError> {
     let section = root.section("outputs", &keys::names("outputs"))?;
     let quantities = match section.get("quantities") {
-        Some(field) => field.choices(&QUANTITIES)?,
+        Some(field) => field.choices(&Quantity::ALL.map(|quantity| (quantity.name(), quantity)))?,
         None => vec![Quantity::Class, Quantity::Lyapunov],
     };
     // The columns of a diagram have different numbers of points, so it has no array. A list of cells has no figure.
@@ -386,7 +343,7 @@ pub(super) fn read_outputs(
         }
     };
     let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: usual }) };
-    let files = field.choices(&FORMATS)?;
+    let files = field.choices(&Format::ALL.map(|format| (format.name(), format)))?;
     if let Some(i) = files.iter().position(|format| !figures.contains(format) && !usual.contains(format)) {
         let name = files[i].name();
         return Err(field.conflict(format!("{remedy}; remove \"{name}\"")));

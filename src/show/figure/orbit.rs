@@ -17,6 +17,7 @@ use crate::show::drawing::{Canvas, svg, write_figure};
 use crate::show::error::WriteError;
 use plot::ORBIT_WIDTH;
 pub use plot::OrbitPlot;
+use rattlemap_dynamics::named;
 
 /// Name of the file of [`write_history`] without its extension.
 pub const HISTORY: &str = "history";
@@ -37,30 +38,19 @@ pub(super) fn draw_history(style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas 
     canvas
 }
 
-/// A figure of an orbit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OrbitFigure {
-    /// Phase planes.
-    PhasePlane,
-    /// Displacements and velocities against time.
-    TimeHistory,
-    /// The gap against time.
-    Gap,
+named! {
+    /// A figure of an orbit.
+    pub enum OrbitFigure {
+        /// Phase planes.
+        PhasePlane = "phase_plane",
+        /// Displacements and velocities against time.
+        TimeHistory = "time_history",
+        /// The gap against time.
+        Gap = "gap",
+    }
 }
 
 impl OrbitFigure {
-    /// All figures.
-    pub const ALL: [OrbitFigure; 3] = [OrbitFigure::PhasePlane, OrbitFigure::TimeHistory, OrbitFigure::Gap];
-
-    /// Returns the name of the figure's file without its extension.
-    pub fn name(self) -> &'static str {
-        match self {
-            OrbitFigure::PhasePlane => "phase_plane",
-            OrbitFigure::TimeHistory => "time_history",
-            OrbitFigure::Gap => "gap",
-        }
-    }
-
     /// Draws the figure of an orbit and writes it.
     pub fn write(
         self,

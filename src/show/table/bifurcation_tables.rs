@@ -243,7 +243,7 @@ mod tests {
                  0.5,chaotic,,,,0.25,0.30000000000000004,2.0,0.125,,ok,578\n1.0,failed,,,,,,,,,too_stiff,578\n"
             )
         );
-        let both = Direction::BOTH
+        let both = Direction::ALL
             .map(|direction| Column { direction: Some(direction), ..column(0.5, Class::Chaotic) });
         let text = text(|out| write_columns(out, "e", &[], &both));
         assert!(text.starts_with("e,direction,class,"), "{text}");
