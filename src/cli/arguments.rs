@@ -17,6 +17,7 @@ use crate::text::printable::is_printable;
 use crate::text::shell::quoted;
 use crate::validate::{CHAOS_PERIODS, DEFAULT_SAMPLES};
 use anyhow::anyhow;
+use clap::builder::PossibleValue;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -314,7 +315,7 @@ pub(crate) struct SceneOptions {
     /// Formats of figures, instead of those in the scene (outputs.files): png, svg, pdf. Figures of other formats that the
     /// folder has are drawn again, too. Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
-    pub(crate) format: Vec<FigureFormat>,
+    pub(crate) format: Vec<Format>,
 
     #[command(flatten)]
     pub(crate) figure: FigureOptions,
@@ -395,41 +396,42 @@ impl FigureOptions {
     }
 }
 
-/// Formats of figures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FigureFormat {
-    /// Pixels
-    Png,
-    /// Vector graphics for browsers and editors; a map has one pixel per cell
-    Svg,
-    /// Vector graphics for papers; a map has one pixel per cell
-    Pdf,
+/// The formats of figures.
+impl ValueEnum for Format {
+    fn value_variants<'a>() -> &'a [Format] {
+        &Format::FIGURES
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self {
+            Format::Svg => "Vector graphics for browsers and editors; a map has one pixel per cell",
+            Format::Pdf => "Vector graphics for papers; a map has one pixel per cell",
+            _ => "Pixels",
+        };
+        Some(PossibleValue::new(self.name()).help(help))
+    }
 }
 
-impl FigureFormat {
-    /// The formats of a scene, each once.
-    pub(crate) fn scene(formats: &[FigureFormat]) -> Vec<Format> {
-        let [png, svg, pdf] = Format::FIGURES;
-        let all = [(FigureFormat::Png, png), (FigureFormat::Svg, svg), (FigureFormat::Pdf, pdf)];
-        all.into_iter().filter(|(named, _)| formats.contains(named)).map(|(_, format)| format).collect()
-    }
+/// The requested formats of figures, each once.
+pub(crate) fn figures(formats: &[Format]) -> Vec<Format> {
+    Format::FIGURES.into_iter().filter(|format| formats.contains(format)).collect()
+}
 
-    /// The formats of a command without a scene: the requested ones and those that the command has written into its folder
-    /// before. Without a request, png.
-    pub(crate) fn added(formats: &[FigureFormat], folder: &Path, command: &str) -> Vec<Format> {
-        if formats.is_empty() {
-            return vec![Format::Png];
-        }
-        [FigureFormat::scene(formats), figure_formats(folder, command)].concat()
+/// The formats of a command without a scene: the requested ones and those that the command has written into its folder before.
+/// Without a request, png.
+pub(crate) fn figures_and_added(formats: &[Format], folder: &Path, command: &str) -> Vec<Format> {
+    if formats.is_empty() {
+        return vec![Format::Png];
     }
+    [figures(formats), figure_formats(folder, command)].concat()
 }
 
 /// The engine and its precision.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct EngineOptions {
     /// Engine that computes the map
-    #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
-    pub(crate) engine: EngineChoice,
+    #[arg(long, value_enum, default_value_t = EngineKind::Auto)]
+    pub(crate) engine: EngineKind,
 
     /// Precision of the motion: f32 or f64 [default: f32 on a GPU, f64 on the processor]. The CPU engine computes in f64.
     /// Some GPUs do not support f64
@@ -445,12 +447,7 @@ pub(crate) struct EngineOptions {
 impl EngineOptions {
     /// The engine that these options request.
     pub(crate) fn request(&self) -> EngineRequest {
-        let kind = match self.engine {
-            EngineChoice::Auto => EngineKind::Auto,
-            EngineChoice::Gpu => EngineKind::Gpu,
-            EngineChoice::Cpu => EngineKind::Cpu,
-        };
-        EngineRequest { kind, precision: self.precision, adapter: self.adapter.clone() }
+        EngineRequest { kind: self.engine, precision: self.precision, adapter: self.adapter.clone() }
     }
 }
 
@@ -458,15 +455,19 @@ fn precision(text: &str) -> Result<Precision, String> {
     Precision::named(text).ok_or_else(|| "it must be f32 or f64".to_owned())
 }
 
-/// Engines by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum EngineChoice {
-    /// A hardware GPU if there is one, else the processor
-    Auto,
-    /// A graphics device
-    Gpu,
-    /// All processor cores, in f64
-    Cpu,
+impl ValueEnum for EngineKind {
+    fn value_variants<'a>() -> &'a [EngineKind] {
+        &EngineKind::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self {
+            EngineKind::Auto => "A hardware GPU if there is one, else the processor",
+            EngineKind::Gpu => "A graphics device",
+            EngineKind::Cpu => "All processor cores, in f64",
+        };
+        Some(PossibleValue::new(self.name()).help(help))
+    }
 }
 
 /// Compute one motion: class, word, Lyapunov exponent, Floquet multipliers and events
@@ -534,7 +535,7 @@ pub(crate) struct Orbit {
     /// Formats of figures: png, svg, pdf [default: png]. Figures of other formats that the folder has are drawn again, too.
     /// Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', requires = "out")]
-    pub(crate) format: Vec<FigureFormat>,
+    pub(crate) format: Vec<Format>,
 
     #[command(flatten)]
     pub(crate) figure: FigureOptions,
@@ -793,7 +794,7 @@ pub(crate) struct Compare {
     /// Formats of the figure: png, svg, pdf [default: png]. Figures of other formats that the folder has are drawn again, too.
     /// Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
-    pub(crate) format: Vec<FigureFormat>,
+    pub(crate) format: Vec<Format>,
 
     #[command(flatten)]
     pub(crate) figure: FigureOptions,

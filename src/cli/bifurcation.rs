@@ -6,7 +6,7 @@ use std::time::Instant;
 use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::Class;
 
-use super::arguments::{Bifurcation, FigureFormat};
+use super::arguments::{Bifurcation, figures};
 use super::failure::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::progress::Progress;
@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     let (along, options) = (arguments.along(), &arguments.run);
     let along = along.as_ref();
     let file = SceneFile { purpose: Purpose::Bifurcation, along, ..SceneFile::map(&options.scene) };
-    let (out, figures) = (arguments.out(), FigureFormat::scene(&options.format));
+    let (out, figures) = (arguments.out(), figures(&options.format));
     let stored = if figures.is_empty() { Vec::new() } else { figure_formats(&out, "bifurcation") };
     let sets = file.with_formats([options.set.clone(), options.figure.sets()].concat(), &figures, &stored)?;
     let scene = file.load(&sets)?;

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 
-use super::arguments::{Compare, FigureFormat};
+use super::arguments::{Compare, figures_and_added};
 use super::console::Console;
 use super::failure::Failure;
 use super::interrupt::Interrupt;
@@ -34,7 +34,7 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let Some(result) = result.filter(|_| interrupt.wait_for(None)) else { return Err(stopped()) };
     let cells = result.cells();
     let pair = result.pair(&cells);
-    let formats = FigureFormat::added(&arguments.format, folder.path(), "compare");
+    let formats = figures_and_added(&arguments.format, folder.path(), "compare");
     let files = store::compare::write(&folder, &pair, (&formats, &style), clock.elapsed())?;
     if !arguments.quiet {
         let files = format!("{}: {}", say::path(folder.path()), files.join(", "));

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use rattlemap_dynamics::orbit::Class;
 
-use crate::cli::arguments::{FigureFormat, Map};
+use crate::cli::arguments::{Map, figures};
 use crate::cli::console::Console;
 use crate::cli::failure::{Failure, fail_if};
 use crate::cli::interrupt::Interrupt;
@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     let file = SceneFile { list_copy: list_copy.as_deref(), ..SceneFile::map(&options.scene) };
     let sets = file.with_formats(
         [options.set.clone(), options.figure.sets()].concat(),
-        &FigureFormat::scene(&options.format),
+        &figures(&options.format),
         &formats_of_folder(arguments, &out),
     )?;
     let scene = file.load(&sets)?;

@@ -8,7 +8,7 @@ use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
-use super::arguments::{FigureFormat, Orbit};
+use super::arguments::{Orbit, figures_and_added};
 use super::failure::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::progress::Progress;
@@ -100,7 +100,7 @@ fn finish(
     write: impl FnOnce(&Folder, Figures<'_>) -> Result<Vec<&'static str>, OutputError>,
 ) -> Result<(), Failure> {
     if let Some(folder) = folder {
-        let formats = FigureFormat::added(&arguments.format, folder.path(), "orbit");
+        let formats = figures_and_added(&arguments.format, folder.path(), "orbit");
         let files = write(&folder, (&formats, style))?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
         say::removed(&folder);

@@ -44,30 +44,17 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
 };
 
 /// Hardware that shares the processor's memory and draws the screen. The amount of work matters as it does for software.
-const INTEGRATED: DispatchPolicy = DispatchPolicy {
-    parts: 1,
-    dispatches: 4,
-    round: Duration::from_millis(10),
-    at_once: 1 << 14,
-    patience: 4,
-    late_tangent: true,
-    keep: false,
-    longest_wait: LONGEST_WAIT,
-    simulated: None,
-};
+const INTEGRATED: DispatchPolicy =
+    DispatchPolicy { round: Duration::from_millis(10), patience: 4, keep: false, ..SOFTWARE };
 
 /// Hardware with room for more lanes than a map has. A round costs the host more time than the first lanes of a map cost the device, so
 /// rounds are few and long. A part is about 64 periods of a lane, and all lanes run side by side.
 pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
     parts: 4,
-    dispatches: 4,
     round: Duration::from_millis(32),
     at_once: 1 << 17,
-    patience: 4,
     late_tangent: false,
-    keep: false,
-    longest_wait: LONGEST_WAIT,
-    simulated: None,
+    ..INTEGRATED
 };
 
 /// Hardware behind a browser: a card, or the integrated graphics of a laptop.

@@ -934,7 +934,7 @@ fn one_row_with_a_name_is_the_row_without_one() {
     let (motion, _) = TWO_DEGREES.split_once("[[contact]]").unwrap();
     let motion = motion.replace(r#"gap = ["1", "-2"]"#, r#"gap = { teeth = ["1", "-2"] }"#);
     let free = read(&format!("{motion}[[friction]]\nrow = [1, 0]\nforce = 1\n"));
-    assert_eq!(free.oscillator().unwrap().wall_count(0, Side::Right), 0);
+    assert!(free.oscillator().unwrap().gaps[0].walls[Side::Right.index()].is_empty());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::map::scene::Format;
 use rattlemap_dynamics::model::Side;
-use rattlemap_dynamics::orbit::{Class, EventKind};
+use rattlemap_dynamics::orbit::Class;
 
 /// Returns the name of a figure's file.
 pub fn figure(what: &str, format: Format) -> String {
@@ -19,15 +19,6 @@ pub fn period(class: Class) -> Option<u32> {
     match class {
         Class::Periodic { period } => Some(period),
         _ => None,
-    }
-}
-
-/// Returns the name of a kind of event.
-pub fn kind(kind: EventKind) -> &'static str {
-    match kind {
-        EventKind::Impact => "impact",
-        EventKind::MeshStart => "mesh_start",
-        EventKind::MeshEnd => "mesh_end",
     }
 }
 

@@ -59,7 +59,7 @@ fn events(model: &dyn Model, events: &[Event]) -> Vec<Value> {
     let gaps = several_gaps(model);
     let event = |(event, impulse): (&Event, Option<f64>)| {
         let mut object = json!({
-            "kind": names::kind(event.kind),
+            "kind": event.kind.name(),
             "side": names::side_code(event.side),
             "t": event.t,
             "t_mod_period": event.t_mod_period,

@@ -221,7 +221,7 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
     let row = |(event, impulse): &(&Event, Option<f64>)| -> Vec<String> {
         let side = names::side(event.side);
         let side = gaps.as_ref().map_or(side.to_owned(), |gaps| format!("{} {side}", gaps[event.gap]));
-        let head = [names::kind(event.kind).to_owned(), side];
+        let head = [event.kind.name().to_owned(), side];
         let times = [event.t, event.t_mod_period].map(significant);
         let impulse = impulse.map_or("-".to_owned(), significant);
         let states = event.before[..count].iter().chain(&event.after[..count]).copied();

@@ -9,8 +9,7 @@ use crate::show::replay;
 use crate::show::validation::Validated;
 use crate::store::manifest::{Head, joined};
 use crate::validate::{
-    ChaosEnd, ChaosEnds, ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck,
-    StratumResult,
+    ChaosEnd, ChaosEnds, ChaosTest, HORIZON, HalfMesh, Kind, Mismatch, Off, Rate, StateCheck, StratumResult,
 };
 use rattlemap_dynamics::orbit::Class;
 
@@ -35,11 +34,7 @@ pub(crate) fn object(cells: &Cells<'_>, validated: &Validated<'_>) -> Value {
             "again_on": validated.again_on(),
             "same_device": validated.is_same_device(),
             "lanes_f64_on": double_lanes,
-            "judge": match validation.judge {
-                Judge::Reference => "reference",
-                Judge::Lanes => "lanes_f64",
-                Judge::Independent => "dop853",
-            },
+            "judge": validation.judge.name(),
             "seed": validation.seed,
             "cells": cells.count(),
             "counted": validation.counted(),

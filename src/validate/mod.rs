@@ -84,15 +84,16 @@ named! {
     }
 }
 
-/// The engines that judged the records.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judge {
-    /// The event-driven reference without early stops.
-    Reference,
-    /// The reference and lanes in f64.
-    Lanes,
-    /// The reference and an adaptive ODE solver with event location.
-    Independent,
+named! {
+    /// The engines that judged the records.
+    pub enum Judge {
+        /// The event-driven reference without early stops.
+        Reference = "reference",
+        /// The reference and lanes in f64.
+        Lanes = "lanes_f64",
+        /// The reference and an adaptive ODE solver with event location.
+        Independent = "dop853",
+    }
 }
 
 /// Agreement of one field over all compared cells.
@@ -258,7 +259,7 @@ pub fn replay(
     lanes: &Lanes,
     report: &(dyn Fn(usize) + Sync),
 ) -> Validation {
-    replay_whole(subject, None, false, sample, lanes, report, &NEVER)
+    replay_until(subject, None, false, sample, lanes, report, &NEVER).expect("the flag is never set")
 }
 
 /// Like [`replay`], but returns `None` once `halt` is set. In a map of basins, attractors are also compared. With `is_exact` the map fails
@@ -272,24 +273,8 @@ pub fn replay_until(
     report: &(dyn Fn(usize) + Sync),
     halt: &AtomicBool,
 ) -> Option<Validation> {
-    let validation = replay_whole(subject, basins, is_exact, sample, lanes, report, halt);
-    (!halt.load(Ordering::Relaxed)).then_some(validation)
-}
-
-/// A halt flag that is never set.
-static NEVER: AtomicBool = AtomicBool::new(false);
-
-/// Validates a sample. The result is incomplete once `halt` is set.
-fn replay_whole(
-    subject: &Subject<'_>,
-    basins: Option<&Basins>,
-    is_exact: bool,
-    sample: &Sample,
-    lanes: &Lanes,
-    report: &(dyn Fn(usize) + Sync),
-    halt: &AtomicBool,
-) -> Validation {
     let judge = judge(subject, lanes);
+    let is_halted = || halt.load(Ordering::Relaxed);
     let (done, ids) = (Mutex::new(0), sample.ids());
     let uniform = &sample.draws.iter().find(|draw| draw.stratum == Stratum::Uniform);
     let uniform: &[u32] = uniform.map_or(&[], |draw| &draw.ids);
@@ -298,7 +283,6 @@ fn replay_whole(
         // The cost of cells varies by a factor of 1,000, so each is a task of its own.
         .with_max_len(1)
         .filter_map(|&id| {
-            let is_halted = || halt.load(Ordering::Relaxed);
             if is_halted() {
                 return None;
             }
@@ -328,7 +312,7 @@ fn replay_whole(
     let chaos: Vec<chaos::Differences> = replayed.iter().filter_map(|cell| cell.chaos).collect();
     let mismatches: Vec<Mismatch> = replayed.into_iter().filter_map(mismatch).collect();
     let has_states = !lanes.states().is_empty();
-    Validation {
+    let validation = Validation {
         seed: sample.seed,
         requested: sample.requested,
         runs: subject.records.count(),
@@ -346,8 +330,12 @@ fn replay_whole(
         states: has_states.then(|| states::check(subject, lanes.states(), halt)),
         mismatches,
         not_finite: not_finite(subject),
-    }
+    };
+    (!is_halted()).then_some(validation)
 }
+
+/// A halt flag that is never set.
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// Lists runs whose records contain NaN or an unexpected infinity.
 fn not_finite(subject: &Subject<'_>) -> Vec<u32> {

@@ -189,45 +189,34 @@ impl Flight {
         q1: &Gap,
         after: impl Fn(f64) -> Gap,
     ) -> Option<Sighting> {
-        let find = |ending| self.find(ending, first, q0, t, h, q1, &after);
+        let find = |ending: Ending| {
+            let starts_there = first && self.from.is_some_and(|(from, _)| from == ending);
+            let left = self.distance(ending, q0, t);
+            if !starts_there && left.0 <= 0.0 {
+                return Some(Sighting { ending, within: 0.0, guess: 0.0 });
+            }
+            let right = self.distance(ending, q1, t + h);
+            // The gap leaves its wall slowly.
+            let is_rounding = ending.is_of_gap() && right.1 > 0.0 && right.0 >= -ROUNDING * q1[0].abs();
+            if right.0 < 0.0 && !(starts_there && is_rounding) {
+                let share =
+                    if starts_there { second_root(left, right, h) } else { left.0 / (left.0 - right.0) };
+                return Some(Sighting { ending, within: h, guess: h * share.clamp(0.01, 0.99) });
+            }
+            if right.1 <= 0.0 {
+                return None;
+            }
+            let left = if starts_there { (0.0, left.1) } else { left };
+            let mut turn = h * turning_point(left, right, h)?;
+            // The polynomial only predicts the minimum; the equations decide.
+            let q = after(turn);
+            let [acceleration, _] = self.field().accelerations(&q, self.cos(t + turn));
+            turn = (turn - q[1] / acceleration).clamp(0.0, h);
+            let is_beyond = self.distance(ending, &after(turn), t + turn).0 < 0.0;
+            is_beyond.then_some(Sighting { ending, within: turn, guess: 0.5 * turn })
+        };
         let sightings = self.endings().into_iter().filter_map(find);
         sightings.min_by(|a, b| a.guess.total_cmp(&b.guess))
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "a step")]
-    fn find(
-        &self,
-        ending: Ending,
-        first: bool,
-        q0: &Gap,
-        t: f64,
-        h: f64,
-        q1: &Gap,
-        after: impl Fn(f64) -> Gap,
-    ) -> Option<Sighting> {
-        let starts_there = first && self.from.is_some_and(|(from, _)| from == ending);
-        let left = self.distance(ending, q0, t);
-        if !starts_there && left.0 <= 0.0 {
-            return Some(Sighting { ending, within: 0.0, guess: 0.0 });
-        }
-        let right = self.distance(ending, q1, t + h);
-        // The gap leaves its wall slowly.
-        let is_rounding = ending.is_of_gap() && right.1 > 0.0 && right.0 >= -ROUNDING * q1[0].abs();
-        if right.0 < 0.0 && !(starts_there && is_rounding) {
-            let share = if starts_there { second_root(left, right, h) } else { left.0 / (left.0 - right.0) };
-            return Some(Sighting { ending, within: h, guess: h * share.clamp(0.01, 0.99) });
-        }
-        if right.1 <= 0.0 {
-            return None;
-        }
-        let left = if starts_there { (0.0, left.1) } else { left };
-        let mut turn = h * turning_point(left, right, h)?;
-        // The polynomial only predicts the minimum; the equations decide.
-        let q = after(turn);
-        let [acceleration, _] = self.field().accelerations(&q, self.cos(t + turn));
-        turn = (turn - q[1] / acceleration).clamp(0.0, h);
-        let is_beyond = self.distance(ending, &after(turn), t + turn).0 < 0.0;
-        is_beyond.then_some(Sighting { ending, within: turn, guess: 0.5 * turn })
     }
 
     /// Locates an ending: Newton's method on the integrator with the root at the start divided out, and bisection if it

@@ -291,11 +291,6 @@ impl Oscillator {
         if self.gaps.len() == 1 { jump(0) / self.mobility(0) } else { self.impulses(jump)[gap] }
     }
 
-    /// Returns the number of walls on a side of a gap.
-    pub fn wall_count(&self, gap: usize, side: Side) -> usize {
-        self.gaps[gap].walls[side.index()].len()
-    }
-
     /// Returns `row M^-1 row` for a gap, the change of its rate by a unit impulse along its row.
     pub fn mobility(&self, gap: usize) -> f64 {
         let row = &self.gaps[gap].row;
@@ -315,7 +310,7 @@ impl Oscillator {
         mobility.cholesky().map_or(DVector::from_element(count, f64::NAN), |factors| factors.solve(&jumps))
     }
 
-    /// Returns the stage that holds at phase 0.
+    /// Returns the stage at phase 0: the stage that begins there, or else the last stage of the schedule.
     pub fn first_stage(&self) -> usize {
         match self.schedule.first() {
             Some(&(0.0, stage)) => stage,

@@ -186,14 +186,6 @@ impl Pair {
         1 + self.stages.len()
     }
 
-    /// Returns the stage at phase 0: the stage that begins there, or else the last stage of the schedule.
-    pub fn first_stage(&self) -> usize {
-        match self.schedule.first() {
-            Some(&(0.0, stage)) => stage,
-            _ => self.schedule.last().map_or(0, |&(_, stage)| stage),
-        }
-    }
-
     /// Returns the domains of a stage.
     pub fn stage(&self, stage: usize) -> Stage {
         match stage {
@@ -276,11 +268,6 @@ impl Pair {
             Some(wall) => (wall.at, wall.contact),
             None => (self.wall(side), self.contacts[side.index()]),
         }
-    }
-
-    /// Returns the number of walls on a side.
-    pub fn wall_count(&self, side: Side) -> usize {
-        usize::from(self.wall(side).is_finite()) + self.outer_walls[side.index()].len()
     }
 
     /// Returns the highest order of the force's harmonics, 1 or more.

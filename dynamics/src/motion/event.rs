@@ -4,6 +4,7 @@ use std::ops::AddAssign;
 
 use super::{Slips, Sums};
 use crate::model::{Side, State};
+use crate::named;
 
 /// Largest number of events in one forcing period.
 pub const EVENTS_PER_PERIOD_CAP: u64 = 1_000_000;
@@ -34,15 +35,16 @@ pub enum Stop {
     Escape,
 }
 
-/// The kind of an event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum EventKind {
-    /// A contact after which motion stays free.
-    Impact,
-    /// A contact after which the teeth mesh.
-    MeshStart,
-    /// Meshing ends and free motion follows.
-    MeshEnd,
+named! {
+    /// The kind of an event.
+    pub enum EventKind {
+        /// A contact after which motion stays free.
+        Impact = "impact",
+        /// A contact after which the teeth mesh.
+        MeshStart = "mesh_start",
+        /// Meshing ends and free motion follows.
+        MeshEnd = "mesh_end",
+    }
 }
 
 /// An event at a wall of a gap.

@@ -162,7 +162,8 @@ pub(crate) fn described(pair: &Pair, law: Law) -> Oscillator {
                 springs: stages.iter().map(|stage| spring(stage, nth)).collect(),
             }
         };
-        (0..pair.wall_count(side)).map(wall).collect()
+        let count = usize::from(pair.walls[i].is_finite()) + pair.outer_walls[i].len();
+        (0..count).map(wall).collect()
     };
     Oscillator {
         omega: pair.omega,

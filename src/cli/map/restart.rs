@@ -1,9 +1,8 @@
 //! Messages of a run that stops before its end: what is stored, and the command that continues.
 
-use clap::ValueEnum;
-
-use crate::cli::arguments::{EngineChoice, EngineOptions, Map};
+use crate::cli::arguments::{EngineOptions, Map};
 use crate::cli::failure::Failure;
+use crate::job::engine_choice::EngineKind;
 use crate::job::error::JobError;
 use crate::job::map::MapJob;
 use crate::map::plan::Plan;
@@ -63,12 +62,12 @@ impl Restart<'_> {
     /// because records of another engine cannot be continued.
     pub(super) fn with_the_cpu(&self) -> String {
         match self.arguments.engine.engine {
-            EngineChoice::Auto => {
-                let cpu = EngineOptions { engine: EngineChoice::Cpu, precision: None, adapter: None };
+            EngineKind::Auto => {
+                let cpu = EngineOptions { engine: EngineKind::Cpu, precision: None, adapter: None };
                 let command = self.command_with(&cpu, "--force");
                 format!("; the CPU engine can compute the map, too, from its first cell: {command}")
             }
-            EngineChoice::Cpu | EngineChoice::Gpu => String::new(),
+            EngineKind::Cpu | EngineKind::Gpu => String::new(),
         }
     }
 
@@ -80,10 +79,8 @@ impl Restart<'_> {
         let Map { run: options, shard, json, .. } = self.arguments;
         let mut words = vec!["rattlemap map".to_owned(), quoted(&options.scene.display().to_string())];
         words.extend(options.out.as_ref().map(|out| format!("--out {}", quoted(&out.display().to_string()))));
-        if let Some(name) = engine.engine.to_possible_value().filter(|_| engine.engine != EngineChoice::Auto)
-        {
-            words.push(format!("--engine {}", name.get_name()));
-        }
+        let named = Some(engine.engine).filter(|engine| *engine != EngineKind::Auto);
+        words.extend(named.map(|engine| format!("--engine {}", engine.name())));
         words.extend(engine.precision.map(|precision| format!("--precision {}", precision.name())));
         words.extend(shard.map(|shard| format!("--shard {shard}")));
         let adapter = engine.adapter.as_ref();

@@ -42,7 +42,7 @@ pub fn write_points(
     write_rows(out, axis, fields.collect(), columns, |column| {
         let states = |point: &SectionPoint| [point.before, point.after].map(|state| texts(state, names));
         let row = |point: &SectionPoint| {
-            let head = [names::side_code(point.side).to_string(), names::kind(point.kind).to_owned()];
+            let head = [names::side_code(point.side).to_string(), point.kind.name().to_owned()];
             let head = head.into_iter().chain([float(point.t_mod_period)]);
             let gap = gaps.map(|gaps| gaps[point.gap].clone());
             head.chain(states(point).concat()).chain(gap).collect()

@@ -58,7 +58,7 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
     for (i, sample) in samples.iter().enumerate() {
         while let Some(event) = events.next_if(|event| is_reached(event.t, sample.t)) {
             let phase = event.t_mod_period / forcing_period;
-            let (kind, side) = (names::kind(event.kind), names::side_code(event.side));
+            let (kind, side) = (event.kind.name(), names::side_code(event.side));
             let mark = |moment| Some((kind, side, moment, event.gap));
             add(event.t, phase, &event.before, &contacts, mark("before"));
             contacts[event.gap] = event.meshing;
@@ -89,7 +89,7 @@ pub fn write_events(out: impl Write, model: &dyn Model, events: &[Event]) -> Res
     let of_gap = gaps.as_ref().map(|_| "gap".to_owned());
     table.write_record(head.chain(["impulse".to_owned()]).chain(of_gap))?;
     for (event, impulse) in events.iter().zip(orbit_quantities::impulses(model, events)) {
-        let texts = [names::kind(event.kind).to_owned(), names::side_code(event.side).to_string()];
+        let texts = [event.kind.name().to_owned(), names::side_code(event.side).to_string()];
         let states = [&event.before, &event.after].into_iter().flat_map(|state| &state[..names.len()]);
         let numbers = [event.t, event.t_mod_period].into_iter().chain(states.copied());
         let texts = texts.into_iter().chain(numbers.map(|x| format!("{x:?}")));
