@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rattlemap::store::in_memory::{self, SharedColors};
+use rattlemap::show::layers::{SharedColors, shared_colors};
+use rattlemap::store::in_memory;
 
 use crate::arrays::columns;
 use crate::scene::Scene;
@@ -80,7 +81,7 @@ type Rgb = (u8, u8, u8);
 /// Returns the colours of the program's figures: those with names, and the sequence for other items.
 #[pyfunction]
 pub(crate) fn colors() -> (BTreeMap<&'static str, Rgb>, Vec<Rgb>) {
-    let SharedColors { named, in_a_row } = in_memory::colors();
+    let SharedColors { named, in_a_row } = shared_colors();
     let parts = |[red, green, blue]: [u8; 3]| (red, green, blue);
     (
         named.into_iter().map(|(name, color)| (name, parts(color))).collect(),

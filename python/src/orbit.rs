@@ -8,7 +8,7 @@ use rattlemap::model::{Model as _, REST, State};
 use rattlemap::model_file::FileModel;
 use rattlemap::motion::Flow;
 use rattlemap::orbit::{self as analysis, Settings};
-use rattlemap::store;
+use rattlemap::show::orbit_json::to_json;
 use rattlemap::store::in_memory;
 use rattlemap::store::orbit::HistoryRequest;
 
@@ -28,7 +28,7 @@ pub(crate) struct Orbit {
 impl Orbit {
     /// Returns the JSON object that `orbit --json` prints.
     fn json(&self) -> String {
-        store::orbit::json(&*self.model, &self.orbit, None)
+        to_json(&*self.model, &self.orbit, None)
     }
 
     /// Number of forcing periods that the events span.

@@ -16,7 +16,7 @@ use super::stdout::print;
 use crate::cli::say;
 use crate::job::model_choice;
 use crate::map::scene::{self, Format};
-use crate::show::orbit_json::history_to_json;
+use crate::show::orbit_json::{history_to_json, to_json};
 use crate::show::orbit_summary::{history_summary, summary};
 use crate::store;
 use crate::store::error::OutputError;
@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     }
     let orbit = orbit?.ok_or_else(stopped)?;
     print(&match arguments.json {
-        true => store::orbit::json(&*model, &orbit, instant),
+        true => to_json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),
     })?;
     let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };

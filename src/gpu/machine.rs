@@ -221,7 +221,7 @@ impl MachineConstants {
 
     /// Returns the numbers of the shader's flow.
     pub(super) fn flow(&self) -> [f64; FLOW] {
-        let (length, speed, escape) = self.system.scales();
+        let (length, speed, escape) = self.system.units();
         let escape = if escape.is_finite() { escape } else { -1.0 };
         let omega = self.system.machine().omega;
         let mut flow = [0.0; FLOW];

@@ -8,13 +8,12 @@ use crate::map::scene::Scene;
 use crate::model_file::several_gaps;
 use crate::show::cells::Cells;
 use crate::show::error::WriteError;
-pub use crate::show::layers::SharedColors;
 use crate::show::map_pair::MapPair;
 use crate::show::numbers::Number;
 use crate::show::table::cell_columns::{self, Values};
 use crate::show::table::words_csv::WordRows;
 use crate::show::table::{attractors_csv, bifurcation_tables, compare_csv, orbit_tables};
-use crate::show::{layers, words};
+use crate::show::words;
 use crate::store::compare;
 use crate::store::error::OutputError;
 use crate::store::manifest::bifurcation::{DiagramArguments, bifurcation};
@@ -51,11 +50,6 @@ pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
         texts: rows.texts().to_vec(),
         attractors,
     })
-}
-
-/// Returns the colours of the program's figures.
-pub fn colors() -> SharedColors {
-    layers::shared_colors()
 }
 
 /// A bifurcation diagram in memory.

@@ -225,8 +225,3 @@ pub(crate) fn moments(
     };
     orbit_tables::moments(model, &history)
 }
-
-/// Returns the object that `orbit --json` prints.
-pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
-    to_json(model, orbit, instant)
-}

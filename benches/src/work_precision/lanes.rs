@@ -45,7 +45,7 @@ impl Device {
     ) -> Result<Device, GpuError> {
         let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::from_environment()))?;
         gpu.rewrite_shaders(match form {
-            Form::Exact => shaders::lane,
+            Form::Exact => shaders::with_event_times,
             Form::RungeKutta => shaders::runge_kutta,
             Form::RungeKuttaPhased => shaders::runge_kutta_phased,
         });

@@ -1,10 +1,5 @@
 //! Variants of the lane's shader for measurements, derived from its text.
 
-/// Returns the lane's shader. Records contain the times of the last two events in fields that are not requested.
-pub(super) fn lane(source: String) -> String {
-    with_event_times(&source)
-}
-
 /// Returns the shader with classical Runge-Kutta in place of the exact propagator, in one loop as in papers: step, check for
 /// events, apply the contact law.
 pub(super) fn runge_kutta(source: String) -> String {
@@ -17,14 +12,14 @@ pub(super) fn runge_kutta_phased(source: String) -> String {
     let start = source.find("fn fly_to_stop_phase()").expect("the shader has this function");
     let (before, after) = source.split_at(start);
     let (_, after) = after.split_at(after.find("\n}\n").expect("a function ends") + 3);
-    with_event_times(&format!("{before}{BASELINE}{after}"))
+    with_event_times(format!("{before}{BASELINE}{after}"))
 }
 
-/// Stores the step and the fraction of a step of the last two events. The steps plus one replace the count of impacts, the
+/// Returns the lane's shader with the times of events in the records: the step and the fraction of a step of the last two events. The steps plus one replace the count of impacts, the
 /// latest in its lower half; zero means no event. The fractions replace the exponent and its error. This overwrites growth
 /// within a block and the time of meshing, which are not requested.
-fn with_event_times(source: &str) -> String {
-    let without_impacts = replace(source, "    tally.impacts += 1u;\n", "");
+pub(super) fn with_event_times(source: String) -> String {
+    let without_impacts = replace(&source, "    tally.impacts += 1u;\n", "");
     let with_events = replace(
         &without_impacts,
         "fn count_event(side: u32) {\n",

@@ -161,7 +161,7 @@ impl Frame {
     }
 
     /// Returns the scales of length and speed, and the displacement beyond which the motion has escaped.
-    pub(crate) fn units(&self) -> (f64, f64, f64) {
+    pub fn units(&self) -> (f64, f64, f64) {
         (self.length, self.speed, self.escape)
     }
 

@@ -182,11 +182,6 @@ impl Frame {
         }
         self.to_state(&y)
     }
-
-    /// Returns the scales of length and speed, and the displacement beyond which the motion has escaped.
-    pub fn scales(&self) -> (f64, f64, f64) {
-        self.units()
-    }
 }
 
 impl System {

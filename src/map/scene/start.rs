@@ -1,5 +1,7 @@
 //! `[start]`: the states in which cells begin.
 
+use std::mem::discriminant;
+
 use super::error::SceneError;
 use super::keys;
 use super::limits::MAX_STARTS;
@@ -33,14 +35,9 @@ const POLICIES: [(&str, Start); 5] = [
 
 impl Start {
     /// Returns the name of the policy in scenes.
-    pub(super) fn policy(&self) -> &'static str {
-        match self {
-            Start::Rest => "rest",
-            Start::State(_) => "state",
-            Start::Up => "up",
-            Start::Down => "down",
-            Start::Both => "both",
-        }
+    pub(crate) fn policy(&self) -> &'static str {
+        let is_own = |(_, other): &&(&str, Start)| discriminant(self) == discriminant(other);
+        POLICIES.iter().find(is_own).map_or("", |&(name, _)| name)
     }
 
     /// Describes the start for the end of a title: it decides which attractor is shown.

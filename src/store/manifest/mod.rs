@@ -121,14 +121,14 @@ pub(crate) fn derived(scene: &Scene) -> Option<BTreeMap<String, Value>> {
 
 /// Describes the initial states of a scene and their phase; `count` and `seed` belong to random states.
 pub(crate) fn start(scene: &Scene) -> Value {
-    let (policy, state) = match scene.start() {
-        Start::Rest => ("rest", None),
-        Start::State(state) => ("state", Some(state[..scene.base().state_names().len()].to_vec())),
-        Start::Up => ("up", None),
-        Start::Down => ("down", None),
-        Start::Both => ("both", None),
+    let state = match scene.start() {
+        Start::State(state) => Some(state[..scene.base().state_names().len()].to_vec()),
+        _ => None,
     };
     let drawn = scene.draw().map(|draw| json!({ "count": draw.count, "seed": draw.seed }));
     let phase = scene.base().start_phase();
-    joined([json!({ "policy": policy, "state": state, "phase": phase }), drawn.unwrap_or_default()])
+    joined([
+        json!({ "policy": scene.start().policy(), "state": state, "phase": phase }),
+        drawn.unwrap_or_default(),
+    ])
 }
