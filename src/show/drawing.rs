@@ -31,7 +31,7 @@ use crate::map::scene::Format;
 use crate::show::error::WriteError;
 
 /// Returns a picture as SVG.
-pub(crate) fn svg(canvas: &Canvas) -> String {
+pub fn svg(canvas: &Canvas) -> String {
     let mut image = Vec::new();
     // Writing to memory cannot fail.
     let _ = svg::write(&mut image, canvas);

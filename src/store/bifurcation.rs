@@ -7,6 +7,7 @@ use crate::map::bifurcation::{Column, fixed};
 use crate::map::scene::{self, Along, Format, Scene};
 use crate::model_file::several_gaps;
 use crate::show::drawing::axis::Scale;
+use crate::show::drawing::write_figure;
 use crate::show::figure;
 use crate::show::figure::bifurcation::Panels;
 use crate::show::numbers::Number;
@@ -78,9 +79,8 @@ pub fn write(
             scene::Scale::Values => Scale::Listed,
         };
         let (texts, style) = ([&*title, &*subtitle], scene.figure_style());
-        folder.replace(name, |out| {
-            figure::bifurcation::write(out, *format, style, texts, (&label, scale), &panels, columns)
-        })?;
+        let figure = figure::bifurcation::draw(style, texts, (&label, scale), &panels, columns);
+        folder.replace(name, |out| write_figure(out, *format, &figure))?;
         files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;

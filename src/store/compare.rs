@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::findings::compare::{Kind, Tally};
 use crate::map::scene::{FigureStyle, Format};
+use crate::show::drawing::write_figure;
 use crate::show::figure;
 use crate::show::map_pair::MapPair;
 use crate::show::names;
@@ -87,7 +88,7 @@ pub fn write(
     let mut files = vec![DIFFERENCES];
     let has_figure = compared.sides[0].cells.scene().list().is_none();
     for (format, name) in FIGURES.iter().filter(|(format, _)| has_figure && formats.contains(format)) {
-        folder.replace(name, |out| figure::compare::write(out, *format, style, compared))?;
+        folder.replace(name, |out| write_figure(out, *format, &figure::compare::draw(style, compared)))?;
         files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;

@@ -12,6 +12,7 @@ use serde_json::Value;
 use crate::map::scene::{Format, List, Scene};
 use crate::model_file::FileModel;
 use crate::show::cells::Cells;
+use crate::show::drawing::write_figure;
 use crate::show::error::WriteError;
 use crate::show::figure;
 use crate::show::layers::Layer;
@@ -287,7 +288,7 @@ fn write_pictures(
             .flat_map(|layer| names(&layer.name).into_iter().map(move |(f, name)| (layer, f, name)));
         let figures: Vec<_> = figures.filter(|(.., name)| wanted(name)).collect();
         let draw = |(layer, format, name): &(&Layer, Format, String)| {
-            folder.replace(name, |out| figure::map::write(out, *format, cells, layer))
+            folder.replace(name, |out| write_figure(out, *format, &figure::map::draw(cells, layer)))
         };
         match cells.count() > SIDE_BY_SIDE {
             true => figures.iter().try_for_each(draw)?,

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant as Clock};
 use serde_json::{Value, json};
 
 use crate::map::scene::{FigureStyle, Format};
+use crate::show::drawing::write_figure;
 use crate::show::figure::orbit::{self as figure, OrbitFigure, OrbitPlot, spectrum};
 pub use crate::show::instant::Instant;
 use crate::show::names;
@@ -86,7 +87,7 @@ pub fn write(
         let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
         let plot = OrbitPlot::new(model, orbit, &trace)?;
         for (figure, format, name) in FIGURES.iter().filter(|(_, format, _)| formats.contains(format)) {
-            folder.replace(name, |out| figure.write(out, *format, style, &plot))?;
+            folder.replace(name, |out| write_figure(out, *format, &figure.draw(style, &plot)))?;
             files.push(name);
         }
         write_trajectory(folder, model, orbit)?;
@@ -94,8 +95,9 @@ pub fn write(
         if let Some(spectrum) = Spectrum::of(model, orbit)? {
             folder.replace(SPECTRUM, |out| orbit_tables::write_spectrum(out, model, &spectrum))?;
             files.push(SPECTRUM);
+            let figure = spectrum::draw(style, model, orbit, &spectrum);
             for (format, name) in SPECTRUM_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {
-                folder.replace(name, |out| spectrum::write(out, *format, style, model, orbit, &spectrum))?;
+                folder.replace(name, |out| write_figure(out, *format, &figure))?;
                 files.push(name);
             }
         }
@@ -192,8 +194,9 @@ pub fn write_history(
     folder.replace(EVENTS, |out| orbit_tables::write_events(out, model, &history.events))?;
     let mut files = vec![TRAJECTORY, EVENTS];
     let plot = OrbitPlot::of_history(model, &request.start, history)?;
+    let figure = figure::draw_history(style, &plot);
     for (format, name) in HISTORY_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {
-        folder.replace(name, |out| figure::write_history(out, *format, style, &plot))?;
+        folder.replace(name, |out| write_figure(out, *format, &figure))?;
         files.push(name);
     }
     let settings = json!({ "from_start": request.periods, "to_period": request.last() });

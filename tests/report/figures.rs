@@ -8,6 +8,7 @@ use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap::map::scene::{FigureStyle, Format};
 use rattlemap::model_file::FileModel;
 use rattlemap::show::drawing::axis::Scale;
+use rattlemap::show::drawing::write_figure;
 use rattlemap::show::figure::bifurcation::{self, Panels};
 use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
 use rattlemap_dynamics::model::{self, GearPair, Model, REST, Side, State};
@@ -25,7 +26,8 @@ fn diagram(format: Format, title: [&str; 2], axis: (&str, Scale), columns: &[Col
     let mut bytes = Vec::new();
     let panels = Panels::of(&GearPair::paper(0.5), None, &[]);
     let style = FigureStyle::default();
-    bifurcation::write(&mut bytes, format, &style, title, axis, &panels, columns).unwrap();
+    let figure = bifurcation::draw(&style, title, axis, &panels, columns);
+    write_figure(&mut bytes, format, &figure).unwrap();
     bytes
 }
 
@@ -44,7 +46,7 @@ fn orbit_figures(model: &dyn Model, orbit: &Orbit, trace: &[Sample], format: For
     let plot = OrbitPlot::new(model, orbit, trace).unwrap();
     OrbitFigure::ALL.map(|figure| {
         let mut bytes = Vec::new();
-        figure.write(&mut bytes, format, &FigureStyle::default(), &plot).unwrap();
+        write_figure(&mut bytes, format, &figure.draw(&FigureStyle::default(), &plot)).unwrap();
         bytes
     })
 }

@@ -13,6 +13,7 @@ use std::sync::atomic::AtomicBool;
 
 use rattlemap::map::scene::{FigureStyle, Scale, single_cell};
 use rattlemap::model_file::{DEFAULT, FileModel};
+use rattlemap::show::drawing::svg;
 use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
 use rattlemap::show::orbit_spectrum::samples_per_period;
 use rattlemap::show::orbit_summary::summary;
@@ -89,7 +90,7 @@ fn computed(command: &str, text: &str) -> Result<Value, String> {
             FigureStyle { width: Some(ASIDE), title: Some(String::new()), legend: false, ..wide.clone() };
         for figure in OrbitFigure::ALL {
             let style = if figure == OrbitFigure::TimeHistory { &wide } else { &narrow };
-            figures.insert(figure.name().to_owned(), json!(figure.svg(style, &plot)));
+            figures.insert(figure.name().to_owned(), json!(svg(&figure.draw(style, &plot))));
         }
     }
     Ok(json!({ "summary": summary(&*cell, &motion, None), "figures": figures }))

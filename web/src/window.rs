@@ -2,10 +2,11 @@
 
 use rattlemap::map::engine::Cpu;
 use rattlemap::map::plan::{Cell, Plan};
-use rattlemap::map::scene::{FileText, Format, Purpose, Scene};
+use rattlemap::map::scene::{FileText, Purpose, Scene};
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
 use rattlemap::show::cells::{Cells, Survey};
+use rattlemap::show::drawing::svg;
 use rattlemap::show::layers::Layer;
 use rattlemap::show::provenance::Provenance;
 use rattlemap::show::words::MapWords;
@@ -97,9 +98,7 @@ impl Window {
     pub fn figure(&self, records: &[u8], layer: &str) -> Result<String, String> {
         self.shown(records, |cells, layers, _| {
             let layer = layers.iter().find(|each| each.name() == layer).ok_or("no such layer")?;
-            let mut svg = Vec::new();
-            figure::map::write(&mut svg, Format::Svg, cells, layer).map_err(|error| error.to_string())?;
-            String::from_utf8(svg).map_err(|error| error.to_string())
+            Ok(svg(&figure::map::draw(cells, layer)))
         })?
     }
 

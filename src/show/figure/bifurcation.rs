@@ -5,16 +5,13 @@ mod coloring;
 mod exponents;
 mod panels;
 
-use std::io::Write;
-
 use crate::map::bifurcation::{Column, Direction};
-use crate::map::scene::{FigureStyle, Format};
+use crate::map::scene::FigureStyle;
 use crate::show::color::Color;
 use crate::show::drawing::axis::{Axis, Scale};
 use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
-use crate::show::drawing::{Bitmap, Canvas, FAINT, Marker, Rect, wall_color, write_figure};
-use crate::show::error::WriteError;
+use crate::show::drawing::{Bitmap, Canvas, FAINT, Marker, Rect, wall_color};
 use coloring::{Coloring, STROBE, both_directions, class_color, direction_color, mixed};
 use panels::Panel;
 pub use panels::Panels;
@@ -41,25 +38,13 @@ const POINT_DOT: (f64, f64) = (0.7, 2.2);
 const CURVE_POINTS: usize = 24;
 const CURVE_DOT: f64 = 1.3;
 
-/// Draws the section points, one panel per displacement, measured quantities, and the largest Lyapunov exponent, and writes the figure.
+/// Draws the section points, one panel per displacement, measured quantities, and the largest Lyapunov exponent.
 ///
 /// Points are coloured by wall. Where they overlap, opacity increases with the logarithm of their number and shows the density
 /// of a chaotic band. In a diagram of two passes they are coloured by direction, and grey where both passes agree. Columns that
 /// are undecided or failed have a mark at the lower edge. There may be no columns and no points; values that are not finite are
 /// skipped. `axis` is the label and the scale of the parameter.
-pub fn write(
-    out: impl Write,
-    format: Format,
-    style: &FigureStyle,
-    texts: [&str; 2],
-    axis: (&str, Scale),
-    panels: &Panels,
-    columns: &[Column],
-) -> Result<(), WriteError> {
-    write_figure(out, format, &draw(style, texts, axis, panels, columns))
-}
-
-pub(super) fn draw(
+pub fn draw(
     style: &FigureStyle,
     [title, subtitle]: [&str; 2],
     axis: (&str, Scale),

@@ -1,13 +1,10 @@
 //! The differences of two maps as a picture. Cells that agree have pale colours.
 
-use std::io::Write;
-
 use crate::findings::compare::Kind;
-use crate::map::scene::{FigureStyle, Format};
+use crate::map::scene::FigureStyle;
 use crate::show::caption;
 use crate::show::color::Color;
-use crate::show::drawing::{Canvas, write_figure};
-use crate::show::error::WriteError;
+use crate::show::drawing::Canvas;
 use crate::show::figure::map_layout::{LegendKey, LegendRow, MapFigure};
 use crate::show::layers::colors::QUASI_PERIODIC;
 use crate::show::map_pair::{MapPair, MapSide, SceneDifference};
@@ -64,17 +61,8 @@ fn color_index(classes: [Class; 2]) -> usize {
     }
 }
 
-/// Draws the comparison and writes it.
-pub fn write(
-    out: impl Write,
-    format: Format,
-    style: &FigureStyle,
-    pair: &MapPair<'_>,
-) -> Result<(), WriteError> {
-    write_figure(out, format, &draw(style, pair))
-}
-
-pub(super) fn draw(style: &FigureStyle, pair: &MapPair<'_>) -> Canvas {
+/// Draws the comparison.
+pub fn draw(style: &FigureStyle, pair: &MapPair<'_>) -> Canvas {
     let index = |(classes, kind): ([Class; 2], &Option<Kind>)| match kind {
         Some(kind) if !kind.is_decisive() => OTHER_PATTERN,
         _ => color_index(classes),

@@ -1,14 +1,11 @@
 //! A layer of a map as a picture: cells, lines, attractors, legend, colour bar.
 
-use std::io::Write;
-
-use crate::map::scene::{Axis, Format, Target};
+use crate::map::scene::{Axis, Target};
 use crate::show::caption;
 use crate::show::cells::Cells;
 use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::Key;
-use crate::show::drawing::{Canvas, Color, DARK, Marker, Point, WHITE, wall_color, write_figure};
-use crate::show::error::WriteError;
+use crate::show::drawing::{Canvas, Color, DARK, Marker, Point, WHITE, wall_color};
 use crate::show::figure::map_layout::{LegendRow, MapFigure};
 use crate::show::figure::map_lines;
 use crate::show::layers::{Layer, NamedColor, share};
@@ -25,12 +22,8 @@ const ATTRACTOR: Marker = Marker { hollow: true, ..Marker::dot(DARK, 8.0) };
 /// Largest distance of an attractor from the plane of the starts, relative to its size.
 const IN_PLANE: f64 = 1e-9;
 
-/// Draws a layer and writes it.
-pub fn write(out: impl Write, format: Format, cells: &Cells<'_>, layer: &Layer) -> Result<(), WriteError> {
-    write_figure(out, format, &draw(cells, layer))
-}
-
-pub(super) fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
+/// Draws a layer.
+pub fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
     let scene = cells.scene();
     let subtitle = format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
     let row =
@@ -109,8 +102,9 @@ pub(crate) fn attractors(cells: &Cells<'_>) -> Vec<Point> {
 mod tests {
     use super::*;
     use crate::map::plan::Plan;
-    use crate::map::scene::{Purpose, Scene};
+    use crate::map::scene::{Format, Purpose, Scene};
     use crate::record::Record;
+    use crate::show::drawing::write_figure;
     use crate::show::figure::map_layout::{ARROW, BAR_HEIGHT, BAR_WIDTH};
     use crate::show::layers::Bar;
 
@@ -128,7 +122,7 @@ mod tests {
         let records = vec![Record::default(); plan.run_count()];
         let cells = Cells::new(&scene, &plan, &records);
         let mut bytes = Vec::new();
-        write(&mut bytes, format, &cells, layer).unwrap();
+        write_figure(&mut bytes, format, &draw(&cells, layer)).unwrap();
         bytes
     }
 

@@ -10,29 +10,17 @@ mod plot;
 pub mod spectrum;
 mod time_history;
 
-use std::io::Write;
-
-use crate::map::scene::{FigureStyle, Format};
-use crate::show::drawing::{Canvas, svg, write_figure};
-use crate::show::error::WriteError;
+use crate::map::scene::FigureStyle;
+use crate::show::drawing::Canvas;
 use plot::ORBIT_WIDTH;
 pub use plot::OrbitPlot;
 use rattlemap_dynamics::named;
 
-/// Name of the file of [`write_history`] without its extension.
+/// Name of the file of [`draw_history`] without its extension.
 pub const HISTORY: &str = "history";
 
-/// Draws the gap and the displacements of a motion from the start against time, and writes the figure.
-pub fn write_history(
-    out: impl Write,
-    format: Format,
-    style: &FigureStyle,
-    plot: &OrbitPlot<'_>,
-) -> Result<(), WriteError> {
-    write_figure(out, format, &draw_history(style, plot))
-}
-
-pub(super) fn draw_history(style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {
+/// Draws the gap and the displacements of a motion from the start against time.
+pub fn draw_history(style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {
     let canvas = Canvas::new(style, ORBIT_WIDTH);
     plot.draw_history(&canvas);
     canvas
@@ -51,24 +39,8 @@ named! {
 }
 
 impl OrbitFigure {
-    /// Draws the figure of an orbit and writes it.
-    pub fn write(
-        self,
-        out: impl Write,
-        format: Format,
-        style: &FigureStyle,
-        plot: &OrbitPlot<'_>,
-    ) -> Result<(), WriteError> {
-        write_figure(out, format, &self.draw(style, plot))
-    }
-
-    /// Draws the figure of an orbit and returns it as SVG. WebAssembly calls this, because [`OrbitFigure::write`] would add the
-    /// writers of PNG and PDF to it.
-    pub fn svg(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> String {
-        svg(&self.draw(style, plot))
-    }
-
-    pub(super) fn draw(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {
+    /// Draws the figure of an orbit.
+    pub fn draw(self, style: &FigureStyle, plot: &OrbitPlot<'_>) -> Canvas {
         let canvas = Canvas::new(style, ORBIT_WIDTH);
         match self {
             OrbitFigure::PhasePlane => plot.draw_phase_planes(&canvas),

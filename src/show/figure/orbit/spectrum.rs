@@ -1,14 +1,11 @@
 //! The spectra of each gap and its velocity, one below the other.
 
-use std::io::Write;
-
-use crate::map::scene::{FigureStyle, Format};
+use crate::map::scene::FigureStyle;
 use crate::model_file::{gap_names, several_gaps};
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::draw_head;
-use crate::show::drawing::{Canvas, DARK, GEAR_2, Marker, write_figure};
-use crate::show::error::WriteError;
+use crate::show::drawing::{Canvas, DARK, GEAR_2, Marker};
 use crate::show::figure::orbit::heading;
 use crate::show::figure::orbit::plot::{FREE_LINE, ORBIT_LEFT, ORBIT_WIDTH};
 use crate::show::orbit_spectrum::Spectrum;
@@ -29,19 +26,8 @@ const HEIGHT: f64 = 1050.0;
 /// Name of the figure's file without its extension.
 pub const NAME: &str = "spectrum";
 
-/// Draws a spectrum and writes it.
-pub fn write(
-    out: impl Write,
-    format: Format,
-    style: &FigureStyle,
-    model: &dyn Model,
-    orbit: &Orbit,
-    spectrum: &Spectrum,
-) -> Result<(), WriteError> {
-    write_figure(out, format, &draw(style, model, orbit, spectrum))
-}
-
-pub(crate) fn draw(style: &FigureStyle, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Canvas {
+/// Draws a spectrum.
+pub fn draw(style: &FigureStyle, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Canvas {
     let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
     let canvas = Canvas::new(style, ORBIT_WIDTH);
     let top = draw_head(&canvas, &heading::parameters(model), &subtitle, &[]) + 14.0;
