@@ -220,7 +220,7 @@ impl Basins {
             Class::Chaotic => self.aperiodic[0],
             Class::QuasiPeriodic => self.aperiodic[1],
             Class::Periodic { period } => {
-                let nth = group.catalogue.nearest(&record.strobe, period)?;
+                let nth = group.catalogue.nearest(&record.strobe(), period)?;
                 Some(group.labels[nth as usize]).filter(|&label| label != NONE)
             }
             Class::Undecided | Class::Failed => None,

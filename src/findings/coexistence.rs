@@ -60,11 +60,11 @@ impl CellAttractors {
         match classify(record) {
             Class::Chaotic => self.chaos = true,
             Class::QuasiPeriodic => self.torus = true,
-            Class::Periodic { period } if record.strobe.iter().all(|x| x.is_finite()) => {
-                if self.cycles.iter().any(|cycle| cycle.passes(flow, &record.strobe, period)) {
+            Class::Periodic { period } if record.strobe().iter().all(|x| x.is_finite()) => {
+                if self.cycles.iter().any(|cycle| cycle.passes(flow, &record.strobe(), period)) {
                     return;
                 }
-                let other = StrobeCycle::from(flow, self.law, record.strobe, period);
+                let other = StrobeCycle::from(flow, self.law, record.strobe(), period);
                 let is_known = |cycle: &StrobeCycle| {
                     cycle.is_non_impacting && other.is_non_impacting
                         || cycle.passes(flow, &other.last, period)

@@ -284,7 +284,7 @@ mod tests {
 
     #[test]
     fn attractors_are_compared_where_both_maps_count_them() {
-        let records = [chaos(); 3];
+        let records = [(); 3].map(|()| chaos());
         let [a, b] = [&[1u8, 2, 3], &[1u8, 1, 3]];
         let side = |attractors| Side { records: &records, attractors, has_exponents: true };
         assert_eq!(compare(3, side(Some(a)), side(Some(b))).attractors, Tally { compared: 3, differing: 1 });

@@ -134,7 +134,7 @@ mod tests {
     fn filled_cells_and_cells_that_follow_are_ignored() {
         let same = vec![record(1, -1.0); 6];
         let filled = Record { valid: valid::FILLED | record(1, -1.0).valid, ..record(1, -1.0) };
-        assert!(named(&plan("[refine]\n"), &[filled; 6]).is_empty());
+        assert!(named(&plan("[refine]\n"), &vec![filled.clone(); 6]).is_empty());
         let mut some = same.clone();
         some[4] = Record { period: 2, ..filled };
         assert_eq!(named(&plan("[refine]\n"), &some), ["e", "k"]);

@@ -73,7 +73,7 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
     };
     let is_valid = |bits: u32| finding.valid & bits != 0;
     if is_valid(valid::STROBE) {
-        record.strobe = constants.strobe(&reading.strobe);
+        record.strobe = constants.strobe(&reading.strobe).into();
     }
     if is_valid(valid::IMPACTS) {
         record.impacts_per_period = f64::from(finding.impacts) / f64::from(finding.counted);

@@ -67,7 +67,7 @@ pub(super) async fn check(
     for ended in ended {
         let (e, omega, answer) = ANSWERS[ended.number() as usize];
         let record = ended.record(tables.constants());
-        let error = record.strobe.iter().zip(answer).map(|(&a, b)| apart(a, b)).fold(0.0, farther);
+        let error = record.strobe().iter().zip(answer).map(|(&a, b)| apart(a, b)).fold(0.0, farther);
         if record.status != 0 || !is_within(error, bar) {
             let adapter = gpu.info.name.clone();
             return Err(GpuError::WrongAnswer { adapter, e, omega, error });

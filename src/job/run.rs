@@ -117,7 +117,7 @@ impl Map {
         let indices = self.plan.indices(id);
         let record = self.records.record(id as usize);
         let values = self.plan.points().values(id as usize);
-        MapCell { indices, values, record, class: classify(&record) }
+        MapCell { indices, values, class: classify(&record), record }
     }
 
     /// The model with the parameters of a cell.

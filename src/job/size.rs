@@ -378,7 +378,6 @@ mod tests {
     use crate::map::scene::{FileText, Purpose};
     use crate::record::measures;
     use crate::record::{RecordStore, RecordsMut};
-    use rattlemap_dynamics::model::state;
     use rattlemap_dynamics::motion::Flow;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2], sets: &[&str]) -> Scene {
@@ -464,7 +463,7 @@ mod tests {
                 lyapunov_error: number(needs.exponent),
                 impacts_per_period: number(needs.impacts),
                 mesh_fraction: number(needs.mesh),
-                strobe: state(&[1.0; 4]),
+                strobe: [1.0; 4].into(),
                 period: 1,
                 periods_run: 100,
                 ..Record::default()

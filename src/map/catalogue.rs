@@ -108,10 +108,12 @@ impl Catalogue {
             Class::Undecided => Ok(Outcome::Undecided),
             Class::Chaotic => Ok(Outcome::Chaos),
             Class::QuasiPeriodic => Ok(Outcome::Torus),
-            Class::Periodic { .. } if !record.strobe.iter().all(|x| x.is_finite()) => Ok(Outcome::Undecided),
+            Class::Periodic { .. } if !record.strobe().iter().all(|x| x.is_finite()) => {
+                Ok(Outcome::Undecided)
+            }
             Class::Periodic { period } => {
-                let free = self.free.filter(|_| self.is_contact_free(&record.strobe));
-                free.or_else(|| self.within(SETTLED_TOLERANCE, &record.strobe, period))
+                let free = self.free.filter(|_| self.is_contact_free(&record.strobe()));
+                free.or_else(|| self.within(SETTLED_TOLERANCE, &record.strobe(), period))
                     .map(Outcome::Cycle)
                     .ok_or(period)
             }
@@ -139,11 +141,11 @@ impl Catalogue {
 
     /// Returns the cycle that a record approaches, with its smallest period.
     fn refined(&self, flow: &Flow, law: Law, record: &Record, period: u32) -> Option<StrobeCycle> {
-        if self.is_contact_free(&record.strobe) {
+        if self.is_contact_free(&record.strobe()) {
             let steady = self.contact_free.as_ref()?.steady();
             return Some(StrobeCycle::through(flow, law, steady, 1));
         }
-        let cycle = StrobeCycle::refined(flow, law, record.strobe, period)?;
+        let cycle = StrobeCycle::refined(flow, law, record.strobe(), period)?;
         let units = cycle.units(flow);
         let closes = |turn: &u32| {
             let later = cycle.points.get(*turn as usize);
@@ -209,7 +211,7 @@ pub(crate) fn learn(
     // Records without a cycle get the nearest one, or add their own motion as a cycle.
     for (found, &id) in all.iter_mut().zip(ids) {
         if let Outcome::Unresolved(period) = *found {
-            let state = records.record(id).strobe;
+            let state = records.record(id).strobe();
             let known = catalogue.nearest(&state, period);
             *found = Outcome::Cycle(match known {
                 Some(nth) => nth,

@@ -265,6 +265,6 @@ impl Engine<'_> {
             ended.into_iter().for_each(|(id, record)| records[places[id as usize - first]] = record);
         }
         // A cell may occur twice in the list; both occurrences get the record of the last.
-        Ok(ids().map(|id| records[places[id - first]]).collect())
+        Ok(ids().map(|id| records[places[id - first]].clone()).collect())
     }
 }

@@ -174,7 +174,7 @@ impl Record {
 }
 
 impl Group {
-    const fn places(&self) -> usize {
+    pub(crate) const fn places(&self) -> usize {
         self.numbers.len() * if self.of_displacements { FIRST_DISPLACEMENTS } else { 1 }
     }
 
@@ -380,7 +380,7 @@ impl Record {
         for measure in all() {
             match measure.read(motion) {
                 // The sum turns minus zero into zero, so that columns of zeros take no memory.
-                Some(value) => self.measures[measure.place] = value + 0.0,
+                Some(value) => self.measures.set(measure.place, value + 0.0),
                 None => self.valid &= !measure.group.bit,
             }
         }
@@ -399,13 +399,13 @@ impl Record {
     pub fn clear_measures(&mut self, is_cleared: impl Fn(&Group) -> bool) {
         for measure in all().filter(|measure| is_cleared(measure.group)) {
             self.valid &= !measure.group.bit;
-            self.measures[measure.place] = 0.0;
+            self.measures.set(measure.place, 0.0);
         }
     }
 
     /// Returns the last strobe state, if the record has it.
     pub fn state(&self) -> Option<State> {
-        (self.valid & valid::STROBE != 0).then_some(self.strobe)
+        (self.valid & valid::STROBE != 0).then(|| self.strobe())
     }
 }
 
@@ -446,7 +446,8 @@ mod tests {
     #[test]
     fn a_quantity_that_the_motion_does_not_have_is_cleared() {
         let quantities = Quantities { impact_energy: -0.0, dissipated: 2.0, ..Quantities::default() };
-        let mut record = Record { measures: [7.0; MEASURES], valid: valid::PERIOD, ..Record::default() };
+        let mut record =
+            Record { measures: [7.0; MEASURES].into(), valid: valid::PERIOD, ..Record::default() };
         record.set_measures(&Measured { quantities: Some(&quantities), multiplier: Some([0.5, f64::NAN]) });
         let value = |name: &str| Group::named(name).unwrap().measures().next().unwrap().of(&record);
         let absent = ["impact_speed", "impact_speed_max", "contact_force_max", "multiplier"];
@@ -460,8 +461,8 @@ mod tests {
         let distance = |name: &str, change: fn(&mut Record, usize)| {
             let group = Group::named(name).unwrap();
             let first = group.measures().next().unwrap().place;
-            let record = Record { measures: [0.5; MEASURES], ..Record::default() };
-            let mut other = record;
+            let record = Record { measures: [0.5; MEASURES].into(), ..Record::default() };
+            let mut other = record.clone();
             change(&mut other, first);
             group.distance(&other, &record, 0.0)
         };
@@ -482,9 +483,9 @@ mod tests {
     fn a_wrong_small_number_is_seen_beside_a_large_one() {
         let group = Group::named("amplitude").unwrap();
         let first = group.measures().next().unwrap().place;
-        let mut right = Record { measures: [1.0; MEASURES], ..Record::default() };
+        let mut right = Record { measures: [1.0; MEASURES].into(), ..Record::default() };
         right.measures[first] = 1e-3;
-        let mut wrong = right;
+        let mut wrong = right.clone();
         wrong.measures[first] = 2e-3;
         assert!(group.distance(&wrong, &right, SMALL) > 0.09);
         assert!(group.distance(&wrong, &right, 1.0) < 1.1e-3);

@@ -2,20 +2,21 @@
 
 pub mod classify;
 pub mod distance;
+pub mod fields;
 pub mod limits;
 pub mod measures;
+mod numbers;
 mod spelling;
 mod store;
 
+pub use numbers::Numbers;
 pub use spelling::{Spelling, word_hash};
 #[cfg(feature = "gpu")]
 pub(crate) use spelling::{SymbolCode, joined};
 pub use store::{RecordStore, Records, RecordsMut};
 
-use bytemuck::{Pod, Zeroable};
-
-use measures::MEASURES;
-use rattlemap_dynamics::model::State;
+use measures::{FURTHER, MEASURES};
+use rattlemap_dynamics::model::{STATE, State};
 
 /// Layout version of [`Record`], stored in files that hold records.
 pub const RECORD_VERSION: u32 = 3;
@@ -52,11 +53,10 @@ pub mod valid {
 
 /// Results of one cell, in one fixed layout for all engines, precisions and variants.
 ///
-/// 792 bytes, no padding, little-endian. Files contain the entries of the strobe state that the model has, but four at least: 376
-/// bytes for one or two coordinates, and 16 more for each further one; and 320 bytes of measured quantities only of models with more
-/// displacements or gaps.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+/// 392 bytes for models of one or two coordinates with one gap. Those of larger models have further strobe states and measured quantities
+/// in memory of their own. Files contain the entries of the strobe state that the model has, but four at least: 376 bytes for one or
+/// two coordinates, and 16 more for each further one; and 320 bytes of measured quantities only of models with more displacements or gaps.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Record {
     /// Largest Lyapunov exponent per unit time.
     pub lyapunov: f64,
@@ -67,7 +67,7 @@ pub struct Record {
     /// Fraction of time spent meshing.
     pub mesh_fraction: f64,
     /// Last strobe state `(x1, v1, x2, v2, ...)`.
-    pub strobe: State,
+    pub strobe: Numbers<4, { STATE - 4 }>,
     /// All symbols, the first one lowest: 21 of 3 bits to a `u64`, at most 64; or 12 of 5 bits, at most 42, if bit 63 of the first
     /// number is set, because they have letters of gaps. A longer word has no symbols here.
     pub word: [u64; 4],
@@ -91,22 +91,19 @@ pub struct Record {
     pub pattern_hash: u64,
     /// Number of symbols of the pattern.
     pub pattern_length: u32,
-    /// Reserved; zero.
-    pub reserved: u32,
     /// Measured quantities, at the places of [`measures::all`].
-    pub measures: [f64; MEASURES],
-}
-
-impl Default for Record {
-    fn default() -> Self {
-        Zeroable::zeroed()
-    }
+    pub measures: Numbers<FURTHER, { MEASURES - FURTHER }>,
 }
 
 /// Rounding error of a mesh fraction of 1. Lanes count whole steps, without error.
 const MESH_ROUNDING: f64 = 1e-9;
 
 impl Record {
+    /// Returns the last strobe state.
+    pub fn strobe(&self) -> State {
+        std::array::from_fn(|place| self.strobe[place])
+    }
+
     /// Whether the cell had neither impacts nor meshing. Both must be in the record.
     pub fn is_contact_free(&self) -> bool {
         self.is_without_impacts() && self.mesh_fraction == 0.0

@@ -306,7 +306,9 @@ fn live(cells: &Cells<'_>) -> Option<Value> {
     let can = scene.list().is_none()
         && !scene.start().follows()
         && scene.base().downcast_ref::<FileModel>().is_some();
-    can.then(|| json!({ "starts": cells.runs() / cells.count(), "record_bytes": size_of::<Record>(), "at_once": false }))
+    can.then(
+        || json!({ "starts": cells.runs() / cells.count(), "record_bytes": Record::BYTES, "at_once": false }),
+    )
 }
 
 /// Returns a parameter that the page can change. `min` or `max` is null if the range has no limit on that side.

@@ -89,7 +89,7 @@ impl<'a> Cell<'a> {
 
     /// Adds the attractors of a map of basins.
     pub(super) fn in_basins(mut self, basins: Option<&'a Basins>, id: u32) -> Cell<'a> {
-        self.bars.labels = basins.map(|basins| Labels { basins, id: id as usize, own: self.record.strobe });
+        self.bars.labels = basins.map(|basins| Labels { basins, id: id as usize, own: self.record.strobe() });
         self
     }
 
@@ -227,7 +227,7 @@ impl<'a> Cell<'a> {
         };
         let allowance = Allowance::UNLIMITED.until(self.halt);
         let epsilon = ROUNDING_FACTOR * epsilon;
-        orbit::rounding_decides(&self.flow, self.law, record.strobe, period, epsilon, allowance)
+        orbit::rounding_decides(&self.flow, self.law, record.strobe(), period, epsilon, allowance)
     }
 
     /// Whether a cycle of `period` periods closes after fewer periods, within the effect of rounding.
@@ -294,7 +294,7 @@ impl<'a> Cell<'a> {
     fn perturbed(&self, k: u64) -> Option<Perturbed<'_>> {
         let mut random = Random::new(self.seed ^ k);
         let mut model = self.model.clone();
-        let units = self.units(&self.record.strobe);
+        let units = self.units(&self.record.strobe());
         for index in 0..self.model.parameters().len() {
             let value = self.model.value(index);
             // A parameter at the end of its range keeps its value.

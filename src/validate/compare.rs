@@ -162,7 +162,7 @@ impl Either {
 impl Answer {
     pub(super) fn new(record: Record, word: Option<&Word>) -> Answer {
         let pattern = Either::new(record.pattern(), word.map(Word::pattern).as_ref());
-        Answer { record, word: Either::new(record.spelling(), word), pattern }
+        Answer { word: Either::new(record.spelling(), word), pattern, record }
     }
 
     /// Whether another result has the same word up to mirror image, and whether it has the same pattern up to mirror image.
@@ -207,7 +207,7 @@ impl Labels<'_> {
     /// Returns the attractor of a record: the map's label for the map's own record, else the known attractor that the
     /// record's state belongs to.
     fn of(&self, record: &Record) -> Option<u16> {
-        match record.strobe == self.own {
+        match record.strobe() == self.own {
             true => Some(self.basins.labels()[self.id]).filter(|&label| label != NONE),
             false => self.basins.label(self.id, record),
         }

@@ -43,7 +43,7 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
     }
     // With early stops, a computation may end before it reaches the cap that its judge reaches.
     if matches!(status(&truth.record), Status::TooStiff | Status::CapEvents) {
-        let is_own = lanes.again.is_some_and(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(claim));
+        let is_own = lanes.again.is_some_and(|again| again.to_bytes() == claim.to_bytes());
         return if is_own { Kind::Budget } else { Kind::Unexplained };
     }
     let is_hidden = |answer: &Answer| is_reproduced && hides_period(cell, claim, answer);
@@ -58,8 +58,8 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
         .any(|answer| agrees(&answer))
     {
         let stays = claim.valid & valid::STROBE != 0
-            && claim.strobe.iter().all(|x| x.is_finite())
-            && agrees(&cell.starting_at(claim.strobe));
+            && claim.strobe().iter().all(|x| x.is_finite())
+            && agrees(&cell.starting_at(claim.strobe()));
         return if stays { Kind::Attractor } else { Kind::Border };
     }
     if is_too_short(cell, claim, truth, &agrees) {
@@ -69,7 +69,7 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
         return if status(claim) == Status::Slow { Kind::Budget } else { Kind::Border };
     }
     // Rounding explains the claim only if a lane without early stops gives the same answer.
-    let repeats = |lane: Option<&Record>| lane.is_some_and(|lane| agrees(&Answer::new(*lane, None)));
+    let repeats = |lane: Option<&Record>| lane.is_some_and(|lane| agrees(&Answer::new(lane.clone(), None)));
     let is_right = lanes.double.is_some_and(|double| cell.bars.agree(double, truth));
     let is_rounding = is_right && repeats(lanes.again) && repeats(lanes.whole);
     if is_rounding { Kind::Border } else { Kind::Unexplained }
@@ -82,7 +82,7 @@ fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     let closes = |answer: &Answer| {
         claim.period.is_multiple_of(answer.record.period.max(1))
             && is_multiple(cell, claim, answer)
-            && cell.closes_earlier(answer.record.strobe, claim.period)
+            && cell.closes_earlier(answer.record.strobe(), claim.period)
     };
     status(claim) == Status::BelowResolution
         && (status(&answer.record) == Status::BelowResolution
@@ -105,9 +105,9 @@ pub(super) fn is_unresolved(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> 
 fn agrees_on_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     let cycle = &truth.record;
     let is_on_strobe =
-        status(claim) == Status::StrobeOnEvent && meets_strobe(cell, cycle.strobe, cycle.period);
+        status(claim) == Status::StrobeOnEvent && meets_strobe(cell, cycle.strobe(), cycle.period);
     let status = if is_on_strobe { cycle.status } else { claim.status };
-    let claim = Record { status, ..*claim };
+    let claim = Record { status, ..claim.clone() };
     cell.bars.agree(&claim, truth)
         || on_its_cycle(cell, &claim)
             .is_some_and(|(claim, distance)| cell.bars.off_cycle(distance).agree(&claim, truth))
@@ -124,7 +124,7 @@ fn is_multiple(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     // The word, pattern and symmetry of a repetition differ from those of the cycle.
     let repeated = if ours == theirs { 0 } else { valid::WORD | valid::PATTERN | valid::SYMMETRIC };
     let valid = claim.valid & !repeated;
-    let once = Record { period: theirs, status: record.status, valid, ..*claim };
+    let once = Record { period: theirs, status: record.status, valid, ..claim.clone() };
     (ours % theirs == 0 || theirs % ours == 0) && cell.bars.agree(&once, answer)
 }
 
@@ -144,8 +144,8 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
     let cannot_decide = |answer: &Answer| {
         // Far from the cycle, an exponent over several turns is not accurate.
         let open = match claim.period == answer.record.period {
-            true => *claim,
-            false => Record { valid: claim.valid & !valid::LYAPUNOV, ..*claim },
+            true => claim.clone(),
+            false => Record { valid: claim.valid & !valid::LYAPUNOV, ..claim.clone() },
         };
         let claims_nothing =
             is_undecided || status(claim) == Status::Slow && is_multiple(cell, &open, answer);
@@ -156,7 +156,7 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
     // A search may find a cycle long before the motion has reached it.
     let arrives = || {
         let answer = cell.followed_for_long();
-        let arrived = Record { status: answer.record.status, ..*claim };
+        let arrived = Record { status: answer.record.status, ..claim.clone() };
         matches!(classify(&answer.record), Class::Periodic { .. }) && cell.bars.agree(&arrived, &answer)
     };
     let approaches = matches!(classify(claim), Class::Periodic { .. }) && status(claim) == Status::Slow;

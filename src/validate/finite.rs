@@ -24,7 +24,7 @@ pub(super) fn not_finite(record: &Record, budget: &Budget) -> Option<(&'static s
         (valid::MESH, "mesh_fraction", record.mesh_fraction, None),
     ];
     let strobe =
-        STATE_NAMES.into_iter().zip(record.strobe).map(|(name, value)| (valid::STROBE, name, value, None));
+        STATE_NAMES.into_iter().zip(record.strobe()).map(|(name, value)| (valid::STROBE, name, value, None));
     let measured = measures::all()
         .map(|measure| (measure.group.bit, measure.group.name, record.measures[measure.place], None));
     let is_wrong = |&(bit, _, value, answer): &(u32, &str, f64, Option<f64>)| {
@@ -53,23 +53,23 @@ mod tests {
         let all = valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH | valid::STROBE;
         let right = Record { periods_run: 44, valid: all, ..Record::default() };
         let named = |record: Record| not_finite(&record, &BUDGET).map(|(name, _)| name);
-        assert_eq!(named(right), None);
-        let superstable = Record { period: 2, lyapunov: f64::NEG_INFINITY, ..right };
-        assert_eq!(named(superstable), None);
-        assert_eq!(named(Record { period: 0, ..superstable }), Some("lyapunov"));
+        assert_eq!(named(right.clone()), None);
+        let superstable = Record { period: 2, lyapunov: f64::NEG_INFINITY, ..right.clone() };
+        assert_eq!(named(superstable.clone()), None);
+        assert_eq!(named(Record { period: 0, ..superstable.clone() }), Some("lyapunov"));
         assert_eq!(named(Record { lyapunov: f64::INFINITY, ..superstable }), Some("lyapunov"));
-        let unsure = Record { lyapunov_error: f64::INFINITY, periods_run: 19, ..right };
-        assert_eq!(named(unsure), None);
+        let unsure = Record { lyapunov_error: f64::INFINITY, periods_run: 19, ..right.clone() };
+        assert_eq!(named(unsure.clone()), None);
         for wrong in [
-            Record { periods_run: 20, ..unsure },
-            Record { period: 1, ..unsure },
+            Record { periods_run: 20, ..unsure.clone() },
+            Record { period: 1, ..unsure.clone() },
             Record { lyapunov_error: f64::NAN, ..unsure },
         ] {
             assert_eq!(named(wrong), Some("lyapunov_error"));
         }
-        let unclaimed = Record { strobe: [f64::NAN; STATE], ..right };
+        let unclaimed = Record { strobe: [f64::NAN; STATE].into(), ..right };
         assert_eq!(
-            (named(unclaimed), named(Record { valid: valid::PERIOD, ..unclaimed })),
+            (named(unclaimed.clone()), named(Record { valid: valid::PERIOD, ..unclaimed })),
             (Some("x1"), None)
         );
     }

@@ -213,7 +213,7 @@ fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
         lyapunov: radius.ln() / (f64::from(period) * on.period),
         impacts_per_period: tally.impacts as f64 / f64::from(period),
         mesh_fraction: tally.meshing_time / (f64::from(period) * TAU),
-        strobe: on.strobe()?,
+        strobe: on.strobe()?.into(),
         status: Status::Ok.code(),
         valid: valid::PERIOD | valid::IMPACTS | valid::MESH | valid::STROBE,
         ..Record::default()

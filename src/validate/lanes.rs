@@ -98,7 +98,7 @@ async fn states(
     settings: &LaneSettings,
 ) -> Result<Vec<(u32, Option<State>)>, GpuError> {
     let records = run_lanes(gpu, subject.plan, subject.records, ids, settings).await?;
-    let state = |record: &Record| (record.status == Status::Ok.code()).then_some(record.strobe);
+    let state = |record: &Record| (record.status == Status::Ok.code()).then_some(record.strobe());
     Ok(ids.iter().copied().zip(records.iter().map(state)).collect())
 }
 

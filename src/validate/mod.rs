@@ -352,7 +352,8 @@ pub fn differences(
     forcing_period: f64,
     budget: &Budget,
 ) -> Vec<Difference> {
-    let compared = Bars::new(precision, forcing_period, budget).compare(record, &Answer::new(*judge, None));
+    let compared =
+        Bars::new(precision, forcing_period, budget).compare(record, &Answer::new(judge.clone(), None));
     compared.into_iter().filter_map(|(_, differs)| differs).collect()
 }
 
@@ -370,7 +371,7 @@ fn judge(subject: &Subject<'_>, lanes: &Lanes) -> Judge {
 fn judged(subject: &Subject<'_>, cell: &Cell<'_>, id: u32, judge: Judge, lanes: &Lanes) -> Option<Record> {
     match judge {
         Judge::Reference => None,
-        Judge::Lanes => lanes.double(id).copied(),
+        Judge::Lanes => lanes.double(id).cloned(),
         #[cfg(feature = "independent")]
         Judge::Independent => independent::record_until(subject.plan, id, subject.records, cell.halt),
         #[cfg(not(feature = "independent"))]
@@ -389,7 +390,7 @@ fn replay_cell(
 ) -> Replayed {
     let own = (!subject.is_lane).then(|| cell.again(subject.plan.needs()));
     let again = own.as_ref().or(lanes.again(id));
-    let is_same = again.map(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(&cell.record));
+    let is_same = again.map(|again| again.to_bytes() == cell.record.to_bytes());
     let truth = cell.truth();
     let mut fields = cell.bars.compare(&cell.record, &truth);
     let differs = |fields: &[Compared]| fields.iter().any(|(_, differs)| differs.is_some());
@@ -407,7 +408,7 @@ fn replay_cell(
         let is_slow = status(&judged) == Status::Slow;
         let judged = if is_slow { compare::without_multipliers(judged) } else { judged };
         // The second judge is compared with the reference in the same way as a lane.
-        fields = cell.bars.compare(&cell.record, &Answer::new(judged, None));
+        fields = cell.bars.compare(&cell.record, &Answer::new(judged.clone(), None));
         // If one side is undecided, the sides do not contradict each other.
         let is_undecided = [&judged, &truth.record].iter().any(|side| classify(side) == Class::Undecided);
         kind = differs(&fields).then(|| match is_undecided {

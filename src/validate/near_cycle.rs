@@ -19,15 +19,15 @@ use rattlemap_dynamics::stability::{StrobeMap, refine};
 pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<(Record, f64)> {
     let Class::Periodic { period } = classify(record) else { return None };
     let needed = valid::STROBE | valid::LYAPUNOV;
-    if record.valid & needed != needed || !record.strobe.iter().all(|x| x.is_finite()) {
+    if record.valid & needed != needed || !record.strobe().iter().all(|x| x.is_finite()) {
         return None;
     }
-    let seed = Trajectory::<0>::new(&cell.flow, cell.law, record.strobe)
+    let seed = Trajectory::<0>::new(&cell.flow, cell.law, record.strobe())
         .allowing(Allowance::UNLIMITED.until(cell.halt));
     let cycle = refine(&seed, StrobeMap::Periods(period))?;
     let is_slow = status(record) == Status::Slow;
     let reach = if is_slow { rules::recurrence_distance() } else { rules::ON_CYCLE };
-    let distance = cell.apart(&record.strobe, &cycle.state);
+    let distance = cell.apart(&record.strobe(), &cycle.state);
     let is_there = distance <= ROUNDING_FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };
@@ -35,7 +35,7 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<(Record, 
     let turns = cycle.multipliers.first().is_some_and(|[re, _]| *re < 0.0);
     let before = |i: usize| if turns { 2.0 * cycle.state[i] - record.strobe[i] } else { record.strobe[i] };
     let began = std::array::from_fn(before);
-    let settled = Record { lyapunov: cycle.exponent(cell.flow.period), status, ..*record };
+    let settled = Record { lyapunov: cycle.exponent(cell.flow.period), status, ..record.clone() };
     (is_there && is_within_scatter(cell, began, record.lyapunov * time, period))
         .then_some((settled, distance))
 }

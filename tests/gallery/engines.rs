@@ -205,7 +205,7 @@ fn off(known: &Known, record: &Record) -> [f64; 2] {
     let impacts = known.impacts / f64::from(known.period);
     assert!((record.impacts_per_period - impacts).abs() < 1e-9, "{}: {record:?}", known.what);
     assert_eq!(record.is_always_in_contact(), known.stays, "{}: {record:?}", known.what);
-    let apart = |at: State| distance(&record.strobe, &at, known.unit);
+    let apart = |at: State| distance(&record.strobe(), &at, known.unit);
     let near = images(known).into_iter().map(apart).fold(f64::INFINITY, f64::min);
     let size = distance(&known.strobe, &state(&[]), known.unit);
     let span = f64::from(known.period) * TAU / omega_of(&known.oscillator);
@@ -322,10 +322,10 @@ fn check_chain(gpu: &mut Gpu, bar: f64) {
     let (machine, start, end, impacts) = machines::chain(CHAIN_PERIODS);
     let (omega, flow) = (machine.omega, Form::Machine(machine));
     let settings = settings([&flow].into_iter(), LaneSettings::only(CHAIN_PERIODS));
-    let [record] = run(gpu, &[(flow, Law::both(0.0, 0.0), start)], &settings)[..] else {
+    let [record] = &run(gpu, &[(flow, Law::both(0.0, 0.0), start)], &settings)[..] else {
         unreachable!("one lane has one record")
     };
-    let off = distance(&record.strobe, &end, omega) / distance(&end, &state(&[]), omega);
+    let off = distance(&record.strobe(), &end, omega) / distance(&end, &state(&[]), omega);
     println!("chain: state {off:.1e} after {impacts} impacts");
     let found = (record.impacts_per_period * f64::from(CHAIN_PERIODS)).round();
     assert_eq!((record.status, found), (0, f64::from(impacts)));

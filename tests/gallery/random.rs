@@ -169,7 +169,7 @@ fn check_ends(seeds: std::ops::Range<u32>) {
             let superstable = record.lyapunov == f64::NEG_INFINITY && record.period > 0;
             let numbers = [record.lyapunov_error, record.impacts_per_period, record.mesh_fraction];
             let is_finite = (record.lyapunov.is_finite() || superstable)
-                && numbers.iter().chain(&record.strobe).all(|x| x.is_finite());
+                && numbers.iter().chain(&record.strobe()).all(|x| x.is_finite());
             (seed, status(&record), is_finite, time)
         })
         .collect();
@@ -264,7 +264,7 @@ fn is_bounded(cell: &RandomCell) -> bool {
 fn validate(
     cell: &RandomCell,
     precision: Precision,
-    record: Record,
+    record: &Record,
     lanes: impl FnOnce(&Subject<'_>, &Sample) -> Lanes,
 ) -> Option<Kind> {
     let integration = Integration {
@@ -290,7 +290,7 @@ fn validate(
         .build();
     let plan = Plan::new(&scene.expect("a valid scene"));
     assert_eq!(plan.form(plan.cell(0).flow), Form::Pair(cell.oscillator.clone()));
-    let subject = Subject { plan: &plan, records: &[record], precision, is_lane: true };
+    let subject = Subject { plan: &plan, records: &std::slice::from_ref(record), precision, is_lane: true };
     let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
     let sample = Sample { seed: 0, requested: 1, draws, states: Vec::new() };
     let validation = replay(&subject, &sample, &lanes(&subject, &sample), &|_| ());
@@ -308,30 +308,30 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
     let settings = LaneSettings::within(&budget());
     let mut gpu = open(precision);
     let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &settings)).unwrap();
-    let is_wrong = |record: &&Record| !record.strobe.iter().all(|x| x.is_finite());
+    let is_wrong = |record: &&Record| !record.strobe().iter().all(|x| x.is_finite());
     assert_eq!(records.iter().filter(is_wrong).count(), 0, "not finite");
     let mut kinds: Vec<(usize, Option<Kind>)> = cells
         .par_iter()
         .with_max_len(1)
         .enumerate()
         .filter_map(|(i, cell)| {
-            let record = records[i];
-            let reference = measured_record(&measured(cell).0, &Needs::EVERYTHING);
-            let [ours, theirs] = [record, reference].map(|record| classify(&record));
+            let record = &records[i];
+            let reference = &measured_record(&measured(cell).0, &Needs::EVERYTHING);
+            let [ours, theirs] = [record, reference].map(classify);
             let is_silent = ours == Class::Undecided || ours == Class::Failed;
             // Undecided and failed records are not compared.
             if is_silent || theirs == Class::Undecided && ours == Class::Undecided {
                 return None;
             }
             let differs =
-                !differences(&record, &reference, precision, cell.oscillator.period(), &budget()).is_empty();
+                !differences(record, reference, precision, cell.oscillator.period(), &budget()).is_empty();
             differs.then(|| (i, validate(cell, precision, record, |_, _| Lanes::default())))
         })
         .collect();
     // Differences that the reference does not explain are examined with further lanes, also in f64.
     let mut double = (precision == Precision::F32).then(|| open(Precision::F64));
     for (i, kind) in kinds.iter_mut().filter(|(_, kind)| *kind == Some(Kind::Unexplained)) {
-        *kind = validate(&cells[*i], precision, records[*i], |subject, sample| {
+        *kind = validate(&cells[*i], precision, &records[*i], |subject, sample| {
             pollster::block_on(Lanes::run(subject, sample, Some(&mut gpu), double.as_deref_mut())).unwrap()
         });
     }
@@ -350,11 +350,11 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
     }
     let unexplained: Vec<_> = kinds.iter().filter(|(_, kind)| *kind == Some(Kind::Unexplained)).collect();
     for (i, _) in &unexplained {
-        let reference = measured_record(&measured(&cells[*i]).0, &Needs::EVERYTHING);
+        let reference = &measured_record(&measured(&cells[*i]).0, &Needs::EVERYTHING);
         println!("{}\nfrom {:?}", cells[*i].model.definition().text, cells[*i].start);
         println!(
             "{i}: {:?}",
-            differences(&records[*i], &reference, precision, cells[*i].oscillator.period(), &budget())
+            differences(&records[*i], reference, precision, cells[*i].oscillator.period(), &budget())
         );
         println!("{:?}\n{:?}", records[*i], reference);
     }

@@ -87,11 +87,11 @@ fn chatter_agrees_with_the_reference() {
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             let counted = (record.impacts_per_period * f64::from(HORIZON)).round() as u64;
             assert_eq!(counted, impacts, "{at}: impacts");
-            let error = apart(record.strobe, end);
+            let error = apart(record.strobe(), end);
             assert!(error <= bars[i], "{at}: off by {error:.2e}, rounding may make {:.2e}", bars[i]);
             if follows_chatter(&pair.pair(), mesh_speed) {
                 errors[0].push(error / bars[i]);
-                errors[1].push(apart(ordinary[i].strobe, end) / bars[i]);
+                errors[1].push(apart(ordinary[i].strobe(), end) / bars[i]);
             }
             short[i % MESH_SPEEDS.len()] += (followed[i].impacts_per_period * f64::from(HORIZON)).round();
             all[i % MESH_SPEEDS.len()] += impacts as f64;
@@ -215,7 +215,7 @@ fn errors_stay_below_the_stated_bound() {
         let mut beyond = 0;
         for ((record, shipped), pair) in records.iter().zip(&shipped).zip(&cells) {
             let end = reference(pair).unwrap().0;
-            let [error, usual] = [record, shipped].map(|record| apart(record.strobe, end));
+            let [error, usual] = [record, shipped].map(|record| apart(record.strobe(), end));
             let share = left_out / (1.0 - pair.e.powi(power));
             let bound = sensitivity(pair, share) + bar(pair, precision);
             let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
@@ -261,7 +261,7 @@ fn errors_fall_by(order: f64, forms: [fn(String) -> String; 2]) {
     let errors = forms.map(|form| {
         gpu.rewrite_shaders(form);
         let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
-        records.iter().zip(&expected).map(|(r, expected)| apart(r.strobe, *expected)).collect::<Vec<_>>()
+        records.iter().zip(&expected).map(|(r, expected)| apart(r.strobe(), *expected)).collect::<Vec<_>>()
     });
     let slopes: Vec<f64> =
         errors[0].iter().zip(&errors[1]).map(|(long, short)| 0.5 * (long / short).log2()).collect();

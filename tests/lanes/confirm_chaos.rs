@@ -49,7 +49,7 @@ fn check(precision: Option<Precision>) {
                 lasting += 1;
             }
             Class::Chaotic => {}
-            _ => assert_eq!(bytemuck::bytes_of(before), bytemuck::bytes_of(after), "{precision:?}"),
+            _ => assert_eq!(before.to_bytes(), after.to_bytes(), "{precision:?}"),
         }
     }
     assert!(lasting > 5, "{precision:?}: chaos lasts in {lasting} cells");

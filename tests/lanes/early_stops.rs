@@ -72,7 +72,7 @@ fn judged(pair: &GearPair, record: &Record) -> Option<Kind> {
         draws: vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }],
         states: Vec::new(),
     };
-    let records = [*record; 4];
+    let records = vec![record.clone(); 4];
     let subject = Subject { plan: &plan, records: &records, precision: Precision::F64, is_lane: true };
     let found = replay(&subject, &sample, &Lanes::default(), &|_| {});
     found.mismatches.first().map(|mismatch| mismatch.kind)
@@ -233,8 +233,8 @@ fn every_budget_is_respected() {
                     "integration.max_period=1".to_owned(),
                 ];
                 let sets = [&periods[0], &periods[1], &periods[2], quantities];
-                let [record] = run(By::Reference, side, &[id], &sets)[..] else { panic!("one record") };
-                assert!(matches!(classify(&record), Class::Chaotic | Class::Undecided), "{sets:?}");
+                let [record] = &run(By::Reference, side, &[id], &sets)[..] else { panic!("one record") };
+                assert!(matches!(classify(record), Class::Chaotic | Class::Undecided), "{sets:?}");
                 assert!(record.periods_run <= transient + observed, "{sets:?}: {}", record.periods_run);
             }
         }

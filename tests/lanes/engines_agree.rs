@@ -66,9 +66,9 @@ fn check(cells: &[(GearPair, State)], horizon: u32, measured: [f64; 2]) {
             let at = format!("{precision:?}, e = {}, omega = {} from {start:?}", pair.e, pair.omega);
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             assert_eq!(record.periods_run, horizon, "{at}");
-            let error = apart(record.strobe, *expected);
+            let error = apart(record.strobe(), *expected);
             let bar = bar(measured, precision);
-            assert!(error < bar, "{at}: off by {error:.2e}: {:?} {expected:?}", record.strobe);
+            assert!(error < bar, "{at}: off by {error:.2e}: {:?} {expected:?}", record.strobe());
             worst = worst.max(error);
         }
         println!("{precision:?}: {} cells after {horizon} periods, worst {worst:.2e}", cells.len());
@@ -103,7 +103,7 @@ fn stable_cells_of_the_plane_agree() {
             .iter()
             .zip(&expected)
             .zip(&cells)
-            .map(|((record, expected), (pair, _))| (apart(record.strobe, *expected), pair.e, pair.omega))
+            .map(|((record, expected), (pair, _))| (apart(record.strobe(), *expected), pair.e, pair.omega))
             .collect();
         errors.sort_by(|a, b| a.0.total_cmp(&b.0));
         let at = |share: usize| errors[(errors.len() - 1) * share / 100];
@@ -229,8 +229,8 @@ fn grazing_contacts_are_found_exactly() {
             let start = if sign > 0.0 { REST } else { start };
             let expected = reference(&grazing, start, 2)[0];
             for precision in Precision::ALL {
-                let record = run(&mut open(precision), &[(grazing, start)], &LaneSettings::only(2))[0];
-                let error = apart(record.strobe, expected);
+                let record = &run(&mut open(precision), &[(grazing, start)], &LaneSettings::only(2))[0];
+                let error = apart(record.strobe(), expected);
                 assert!(
                     error < bar([1.7e-6, 2.7e-15], precision),
                     "{precision:?}, {hair} {sign}: {error:.2e}"
@@ -298,7 +298,7 @@ fn impossible_parameters_end_in_a_status() {
         for (i, (pair, _, status)) in hostile.iter().enumerate() {
             let record = &together[2 * i + 1];
             assert_eq!(record.status, status.code(), "{precision:?}: {pair:?}");
-            assert!(record.strobe.iter().all(|x| x.is_finite()), "{precision:?}: {pair:?}");
+            assert!(record.strobe().iter().all(|x| x.is_finite()), "{precision:?}: {pair:?}");
         }
     }
 }
@@ -329,7 +329,7 @@ fn one_wall_agrees_with_the_reference() {
             let mut trajectory = Trajectory::<0>::new(&flow, *law, REST);
             (0..horizon).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
             impacts += trajectory.work().impacts;
-            let off = apart(record.strobe, trajectory.state());
+            let off = apart(record.strobe(), trajectory.state());
             println!(
                 "{}: omega = {}, e = {}: {off:.1e}",
                 precision.name(),

@@ -210,7 +210,7 @@ fn check(what: &str, cells: &[Cell], precisions: &[(Precision, f64, usize)]) {
             let Class::Periodic { period, .. } = classes[1] else { continue };
             cycles += 1;
             // Longer cycles may end at another of their strobes.
-            let error = if period == 1 { apart(ours.strobe, theirs.strobe) } else { 0.0 };
+            let error = if period == 1 { apart(ours.strobe(), theirs.strobe()) } else { 0.0 };
             let contact = (ours.mesh_fraction - theirs.mesh_fraction).abs();
             let growth =
                 if ours.lyapunov == theirs.lyapunov { 0.0 } else { (ours.lyapunov - theirs.lyapunov).abs() };
@@ -283,7 +283,7 @@ fn equal_stages_give_the_motion_without_stages() {
             assert_eq!(classify(plain), classify(staged), "{precision:?}, seed {seed}");
             // Longer cycles may end at another of their strobes, and motion without contact before it is steady.
             if plain.period == 1 && !plain.is_contact_free() {
-                let off = apart(plain.strobe, staged.strobe);
+                let off = apart(plain.strobe(), staged.strobe());
                 assert!(off < bar, "{precision:?}, seed {seed}: off by {off:e}");
                 assert_eq!(plain.spelling(), staged.spelling(), "{precision:?}, seed {seed}");
             }
@@ -317,7 +317,7 @@ fn a_force_of_second_order_has_twice_the_frequency() {
         assert_eq!(slow, expected, "seed {seed}");
         // Longer cycles may end at another of their strobes, and motion without contact before it is steady.
         if period == 1 && !plain.is_contact_free() {
-            let off = apart(plain.strobe, slower.strobe);
+            let off = apart(plain.strobe(), slower.strobe());
             assert!(off < 1e-8, "seed {seed}: off by {off:e}");
             compared += 1;
         }
@@ -368,7 +368,7 @@ fn a_change_of_the_stage_releases_a_gap_at_rest() {
             assert_eq!(classify(ours), classify(theirs), "{at}");
             assert!(theirs.mesh_fraction > 0.05, "{at}");
             assert!((ours.mesh_fraction - theirs.mesh_fraction).abs() < bar, "{at}");
-            assert!(apart(ours.strobe, theirs.strobe) < bar, "{at}");
+            assert!(apart(ours.strobe(), theirs.strobe()) < bar, "{at}");
             assert_eq!(ours.spelling(), theirs.spelling(), "{at}");
         }
     }

@@ -89,7 +89,7 @@ fn compare(shape: Shape, seeds: u64, least: [u64; 2]) {
         for (seed, (record, exact)) in records.iter().zip(&exact).enumerate() {
             let Some(exact) = exact else { continue };
             assert_eq!(record.status, 0, "{precision:?}, seed {seed}");
-            let error = distance(&record.strobe, &exact.state, cases[seed].machine.omega) / exact.size;
+            let error = distance(&record.strobe(), &exact.state, cases[seed].machine.omega) / exact.size;
             let allowed = rounding * exact.amplification;
             assert!(error < allowed, "{precision:?}, seed {seed}: error {error:.1e}, allowed {allowed:.1e}");
             // Single precision ends a series of impacts a few impacts earlier.

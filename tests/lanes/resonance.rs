@@ -54,7 +54,7 @@ fn check(records: &[Record], within: f64) {
         assert_ne!(status(record), Status::StrobeOnEvent, "at {at}, e {e}: {record:?}");
         assert_eq!(classify(record), Class::Periodic { period: 1 }, "at {at}, e {e}: {record:?}");
         if record.word().is_some_and(|word| word.to_string() == "2") {
-            let [x, v, ..] = record.strobe;
+            let [x, v, ..] = record.strobe();
             assert!((record.lyapunov - e.ln() / TAU).abs() < within, "at {at}, e {e}: {}", record.lyapunov);
             assert!((x - at).abs() < within && (v + e * PI / (1.0 + e)).abs() < within, "{at} {e}: {x} {v}");
             shown += 1;

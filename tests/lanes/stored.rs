@@ -39,7 +39,7 @@ fn row(record: &Record) -> String {
     let numbers = [record.lyapunov, record.lyapunov_error, record.impacts_per_period, record.mesh_fraction];
     let bits: String = numbers
         .into_iter()
-        .chain(record.strobe[..4].iter().copied())
+        .chain(record.strobe.iter().take(4))
         .map(|x| format!(",{:016x}", x.to_bits()))
         .collect();
     let Record { status, period, periods_run, symmetric, word_hash, pattern_hash, .. } = record;

@@ -14,7 +14,7 @@ fn a_lane_ends_at_its_limit_of_events() {
     let chatters = paper(0.3, 1.5);
     let settings = LaneSettings { early_stop: false, most_events: 1_000, ..LaneSettings::default() };
     for precision in Precision::ALL {
-        let record = run(&mut open(precision), &[(chatters, REST)], &settings)[0];
+        let record = &run(&mut open(precision), &[(chatters, REST)], &settings)[0];
         assert_eq!(record.status, Status::CapEvents.code(), "{precision:?}: {record:?}");
         assert!((10..200).contains(&record.periods_run), "{precision:?}: {record:?}");
     }

@@ -43,7 +43,7 @@ fn adaptive(audited: usize) -> (Vec<Record>, Audit) {
     let mut records = vec![Record::default(); whole.len()];
     while !schedule.is_finished() {
         for cell in schedule.next(&plan, usize::MAX) {
-            records[cell.id as usize] = whole[cell.id as usize];
+            records[cell.id as usize] = whole[cell.id as usize].clone();
             schedule.take(cell.id, &records);
         }
     }

@@ -181,7 +181,7 @@ fn refined(plan: &Plan, mut next: impl FnMut(&mut Vec<u32>) -> u32) -> (Vec<Reco
     while !schedule.is_finished() {
         waiting.extend(schedule.next(plan, usize::MAX).iter().map(|cell| cell.id));
         let id = next(&mut waiting);
-        records[id as usize] = WHOLE[id as usize];
+        records[id as usize] = WHOLE[id as usize].clone();
         schedule.take(id, &records);
     }
     let refined = schedule.finish(&mut records).unwrap();

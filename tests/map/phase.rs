@@ -162,7 +162,7 @@ fn engines_agree_on_a_sine_and_on_a_start_phase() {
             assert!(matches!(classify(record), Class::Periodic { period: 1 }), "{record:?}");
             let is_same = record.impacts_per_period == expected.impacts_per_period;
             parted += usize::from(!is_same);
-            assert!(!is_same || off(record.strobe, expected.strobe) < bar, "{record:?} {expected:?}");
+            assert!(!is_same || off(record.strobe(), expected.strobe()) < bar, "{record:?} {expected:?}");
         }
         assert!(parted as f64 <= most_parted * reference.len() as f64, "{parted} starts part");
     };

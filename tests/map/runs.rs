@@ -52,7 +52,7 @@ fn flows_of_later_uploads_belong_to_their_cells() {
             assert_eq!(records[cell.id as usize], alone, "cell {}", cell.id);
         }
     }
-    let strobes: BTreeSet<_> = records.iter().map(|record| record.strobe.map(f64::to_bits)).collect();
+    let strobes: BTreeSet<_> = records.iter().map(|record| record.strobe().map(f64::to_bits)).collect();
     assert!(strobes.len() > records.len() * 9 / 10, "cells have states of their own");
 }
 
@@ -221,7 +221,7 @@ fn a_compact_store_holds_the_records_that_a_schedule_reads() {
         let mut engine = Engine::Cpu(Cpu::new(&plan));
         let Swept { schedule, mut records, stored, .. } = swept(&plan, &mut engine, &[]);
         let half: Vec<(u32, Record)> =
-            stored[..stored.len() / 2].iter().map(|&id| (id, records[id as usize])).collect();
+            stored[..stored.len() / 2].iter().map(|&id| (id, records[id as usize].clone())).collect();
         let (mut again, mut store) = (Schedule::new(&plan), RecordStore::new(plan.run_count(), true));
         assert!(sweep::replay(&mut again, &mut store, &half));
         let ignore = |_: Vec<(u32, Record)>, _: usize| Ok(());
@@ -293,7 +293,7 @@ fn refinement_waits_less_for_slow_cells_than_rounds_would() {
             now = wait(now, &under_way);
             let left = under_way.split_off(&(now + 1, 0));
             for (_, id) in std::mem::replace(&mut under_way, left) {
-                records[id as usize] = measured[id as usize];
+                records[id as usize] = measured[id as usize].clone();
                 schedule.take(id, &records);
             }
         }

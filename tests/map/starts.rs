@@ -74,7 +74,12 @@ fn period(record: &Record) -> u32 {
 fn record_of_start(cell: &Cell) -> Record {
     let [x1, _, x2, _, ..] = cell.start;
     let strobe = state(&[x1 + 1.0, 0.0, x2 + f64::from(cell.id), 0.5]);
-    Record { strobe, periods_run: 1, valid: valid::STROBE | valid::PERIOD, ..Record::default() }
+    Record {
+        strobe: strobe.into(),
+        periods_run: 1,
+        valid: valid::STROBE | valid::PERIOD,
+        ..Record::default()
+    }
 }
 
 #[test]
@@ -87,7 +92,7 @@ fn cells_start_in_the_last_state_of_their_neighbour() {
             for (nth, j) in order.into_iter().enumerate() {
                 let id = j * 3 + i;
                 sum += f64::from(id);
-                let strobe = records[id as usize].strobe;
+                let strobe = records[id as usize].strobe();
                 assert_eq!((strobe[0], strobe[2]), (nth as f64 + 1.0, sum), "{policy}: cell {id}");
                 let start = plan.start(id, &records);
                 assert_eq!((start[0], start[2]), (nth as f64, sum - f64::from(id)), "{policy}: cell {id}");
@@ -214,14 +219,14 @@ fn counted(omega: f64, e: f64, runs: &[Record]) -> u8 {
     ];
     let plan = plan(&sets.each_ref().map(String::as_str));
     let mut records = vec![Record::default(); plan.run_count()];
-    runs.iter().enumerate().for_each(|(k, run)| records[k * plan.cell_count()] = *run);
+    runs.iter().enumerate().for_each(|(k, run)| records[k * plan.cell_count()] = run.clone());
     let found = attractors(&plan, &records).unwrap();
     assert_eq!(found[1..], [0, 0, 0]);
     found[0]
 }
 
 fn cycle(period: u32, strobe: State) -> Record {
-    Record { period, strobe, valid: valid::PERIOD | valid::STROBE, ..Record::default() }
+    Record { period, strobe: strobe.into(), valid: valid::PERIOD | valid::STROBE, ..Record::default() }
 }
 
 /// Returns the state of a motion after `periods` periods and `turns` of the next.
@@ -276,14 +281,14 @@ fn attractors_are_distinguished_by_their_states() {
     // Period 3, reached from above.
     let plan = plan(&["start.policy=down"]);
     let records = on_cpu(&plan);
-    let three = settled(records[2 * 25].strobe, 3);
+    let three = settled(records[2 * 25].strobe(), 3);
     let chaos = Record {
         lyapunov: 0.3,
         lyapunov_error: 0.01,
         valid: valid::PERIOD | valid::LYAPUNOV,
         ..Record::default()
     };
-    let failed = Record { status: Status::CapEvents.code(), ..chaos };
+    let failed = Record { status: Status::CapEvents.code(), ..chaos.clone() };
     let mirrored = |from| later(omega, e, from, 1, 0.5).map(|x| -x);
     let perturbed = |y: State| {
         let mut moved = y;
@@ -307,8 +312,8 @@ fn attractors_are_distinguished_by_their_states() {
         (1, vec![cycle(3, three), cycle(3, perturbed(three))]),
         // A multiple of the period, as near a period doubling.
         (1, vec![cycle(3, three), cycle(6, perturbed(three))]),
-        (1, vec![chaos, chaos, failed]),
-        (3, vec![chaos, cycle(2, two), chaos, cycle(3, three)]),
+        (1, vec![chaos.clone(), chaos.clone(), failed.clone()]),
+        (3, vec![chaos.clone(), cycle(2, two), chaos, cycle(3, three)]),
         (0, vec![failed, Record::default()]),
     ] {
         assert_eq!(counted(omega, e, &runs), expected, "{runs:?}");

@@ -69,14 +69,14 @@ pub(crate) fn validate_all(
 }
 
 /// Validates a lane's record of a plan's first run.
-pub(crate) fn validate_first(plan: &Plan, record: Record, precision: Precision) -> Validation {
+pub(crate) fn validate_first(plan: &Plan, record: &Record, precision: Precision) -> Validation {
     let mut records = vec![Record::default(); plan.run_count()];
-    records[0] = record;
+    records[0].clone_from(record);
     validate_runs(&Subject { plan, records: &records, precision, is_lane: true }, vec![0])
 }
 
 /// Returns the explanation of a lane's record of a plan's first run; `None` if the record is right.
-pub(crate) fn kind(plan: &Plan, record: Record, precision: Precision) -> Option<Kind> {
+pub(crate) fn kind(plan: &Plan, record: &Record, precision: Precision) -> Option<Kind> {
     kinds(&validate_first(plan, record, precision)).first().copied()
 }
 

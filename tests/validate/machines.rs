@@ -47,7 +47,7 @@ fn a_map_of_a_machine_is_judged_and_a_falsified_record_is_found() {
     assert!(cycles.len() >= 4 && 4 * wrong > cycles.len(), "{wrong} of {}", cycles.len());
     // A record of another cell.
     let (id, other) = (cycles[0].0, cycles[1].0);
-    records[id as usize] = others[other as usize];
+    records[id as usize] = others[other as usize].clone();
     let found = validate_all(&plan, &records, Precision::F64, false);
     assert_eq!(unexplained(&found), [id]);
 }

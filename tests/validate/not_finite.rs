@@ -1,6 +1,5 @@
 //! A validation must report every number of a record that is not finite.
 
-use rattlemap_dynamics::model::state;
 use std::fs;
 
 use crate::fixtures::{cpu_identity, cpu_records, read_records, unexplained, validate_all, validate_runs};
@@ -115,7 +114,7 @@ fn the_command_fails_for_a_map_of_states_that_are_not_numbers() {
     run(&["map", "s.toml", "--engine", "cpu", "--out", "o", "--quiet"]).success();
     let (path, identity) = (folder.path().join("o").join(RECORDS), cpu_identity(&scene()));
     let mut records = read_records(&path, &identity);
-    records.iter_mut().for_each(|(_, record)| record.strobe = state(&[f64::NAN; 4]));
+    records.iter_mut().for_each(|(_, record)| record.strobe = [f64::NAN; 4].into());
     RecordFile::create(&path, &identity).unwrap().append(&records).unwrap();
     let failed = run(&["validate", "o", "--samples", "4", "--quiet"]).code(1).stdout("");
     let message = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();

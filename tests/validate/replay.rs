@@ -98,7 +98,7 @@ const PLANTED: [Planted; 20] = [
     ("class", chaotic, |record| (record.status, record.periods_run) = (Status::Slow.code(), 528)),
     ("class", settled, |record| {
         (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01);
-        (record.periods_run, record.strobe) = (400, REST);
+        (record.periods_run, record.strobe) = (400, Default::default());
     }),
 ];
 
@@ -224,7 +224,7 @@ fn cycles_that_the_start_never_reaches_are_found() {
         };
         for precision in Precision::ALL {
             let expected = if precision == Precision::F32 { single } else { Kind::Unexplained };
-            let found = validate_first(&plan, record, precision);
+            let found = validate_first(&plan, &record, precision);
             assert_eq!(kinds(&found), [expected], "{precision:?}: {e} {omega}: {:?}", found.mismatches);
             assert_eq!(found.faults().is_empty(), expected == Kind::Border, "{precision:?}: {e} {omega}");
         }
@@ -237,7 +237,7 @@ fn a_motion_near_a_cycle_need_not_reach_it() {
     let plan = plan_at(0.4637964774951076, 1.7749510763209393, &[]);
     let (status, valid) = (Status::Slow.code(), valid::PERIOD);
     let record = Record { period: 1, status, periods_run: 528, valid, ..Record::default() };
-    let found = validate_first(&plan, record, Precision::F64);
+    let found = validate_first(&plan, &record, Precision::F64);
     assert_eq!(found.mismatches.len(), 1, "{:?}", found.agreement);
 }
 
@@ -256,7 +256,7 @@ fn a_cycle_after_period_doubling_has_its_own_word() {
     };
     record.set_word(&Word::cyclic(b"223556223556"));
     record.set_pattern(&Word::cyclic(b"23562356"));
-    assert_eq!(kind(&plan, record, Precision::F32), Some(Kind::Budget));
+    assert_eq!(kind(&plan, &record, Precision::F32), Some(Kind::Budget));
 }
 
 /// The approach is slow and the strobe map is curved. Where the lane computes the multiplier, it differs from that of the
@@ -277,19 +277,19 @@ fn a_multiplier_is_compared_at_the_state_where_it_was_computed() {
         period,
         status: Status::Slow.code(),
         lyapunov: re.hypot(im).ln() / (f64::from(period) * flow.period),
-        strobe,
+        strobe: strobe.into(),
         periods_run: run,
         valid: valid::PERIOD | valid::LYAPUNOV | valid::STROBE,
         ..Record::default()
     };
-    let kind_of = |record| kind(&plan, record, Precision::F32);
-    assert_eq!(kind_of(record), Some(Kind::Budget), "{record:?}");
-    let steeper = Record { lyapunov: 4.0 * record.lyapunov, ..record };
-    assert_eq!(kind_of(steeper), Some(Kind::Unexplained), "the reference has another multiplier there");
-    let elsewhere = Record { strobe: strobe.map(|x| 1.3 * x), ..record };
-    assert_eq!(kind_of(elsewhere), Some(Kind::Unexplained), "there is no cycle near this state");
-    let near = Record { status: Status::Ok.code(), strobe: strobe.map(|x| 1.01 * x), ..record };
-    assert_eq!(kind_of(near), Some(Kind::Unexplained), "the motion has not settled");
+    let kind_of = |record: &Record| kind(&plan, record, Precision::F32);
+    assert_eq!(kind_of(&record), Some(Kind::Budget), "{record:?}");
+    let steeper = Record { lyapunov: 4.0 * record.lyapunov, ..record.clone() };
+    assert_eq!(kind_of(&steeper), Some(Kind::Unexplained), "the reference has another multiplier there");
+    let elsewhere = Record { strobe: strobe.map(|x| 1.3 * x).into(), ..record.clone() };
+    assert_eq!(kind_of(&elsewhere), Some(Kind::Unexplained), "there is no cycle near this state");
+    let near = Record { status: Status::Ok.code(), strobe: strobe.map(|x| 1.01 * x).into(), ..record };
+    assert_eq!(kind_of(&near), Some(Kind::Unexplained), "the motion has not settled");
 }
 
 // ---- a whole map
@@ -486,8 +486,8 @@ fn a_slow_lane_may_have_twice_the_period_and_another_exponent() {
         .build();
     let plan = Plan::new(&scene.unwrap());
     assert_eq!(cpu_records(&plan)[0].period, 24);
-    let lane = map(&plan, &mut open(Precision::F64))[0];
-    assert_eq!((lane.period, status(&lane)), (48, Status::Slow), "{lane:?}");
+    let lane = &map(&plan, &mut open(Precision::F64))[0];
+    assert_eq!((lane.period, status(lane)), (48, Status::Slow), "{lane:?}");
     assert_eq!(kind(&plan, lane, Precision::F64), Some(Kind::Budget));
 }
 

@@ -50,5 +50,5 @@ pub(crate) fn plan(pair: GearPair, start: State) -> Plan {
 
 /// Returns the lane's record of a plan's first cell.
 pub(crate) fn lane(plan: &Plan, precision: Precision) -> Record {
-    map(plan, &mut open(precision))[0]
+    map(plan, &mut open(precision)).swap_remove(0)
 }

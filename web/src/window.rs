@@ -58,7 +58,7 @@ impl Window {
     /// If there is no such run.
     pub fn compute(&self, runs: &[u32]) -> Vec<u8> {
         let cells: Vec<Cell> = runs.iter().map(|&run| self.plan.cell(run)).collect();
-        bytemuck::pod_collect_to_vec(&Cpu::new(&self.plan).compute(&cells))
+        Cpu::new(&self.plan).compute(&cells).iter().flat_map(Record::to_bytes).collect()
     }
 
     /// Returns two bytes per run: the index of its class, and its period, which is 0 if there is none.
@@ -108,10 +108,10 @@ impl Window {
         records: &[u8],
         use_them: impl FnOnce(&Cells<'_>, &[Layer], &MapWords) -> T,
     ) -> Result<T, String> {
-        if records.len() != self.runs() * size_of::<Record>() {
+        if records.len() != self.runs() * Record::BYTES {
             return Err(format!("{} bytes are not the records of {} runs", records.len(), self.runs()));
         }
-        let records: Vec<Record> = bytemuck::pod_collect_to_vec(records);
+        let records: Vec<Record> = records.chunks(Record::BYTES).map(Record::from_bytes).collect();
         let survey = Survey::of(&self.plan, &records, None);
         let cells = Cells::new(&self.scene, &self.plan, &records).surveyed(&survey);
         let words = words::read(&cells);

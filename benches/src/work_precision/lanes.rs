@@ -120,7 +120,7 @@ impl Device {
             let step = (packed >> (16 * i)) & 0xffff;
             if step == 0 { f64::NAN } else { (f64::from(step - 1) + fractions[i]) / steps * period }
         };
-        Outcome { state: record.strobe, events: std::array::from_fn::<f64, EVENTS, _>(time) }
+        Outcome { state: record.strobe(), events: std::array::from_fn::<f64, EVENTS, _>(time) }
     }
 }
 

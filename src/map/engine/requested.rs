@@ -7,7 +7,7 @@ use rattlemap_dynamics::orbit::Measurement;
 /// Converts a measurement to a record with the requested quantities.
 pub fn measured_record(measured: &Measurement, needs: &Needs) -> Record {
     let mut record = Record {
-        strobe: measured.strobe,
+        strobe: measured.strobe.into(),
         periods_run: measured.periods_run,
         status: measured.status.code(),
         valid: valid::STROBE,
@@ -82,11 +82,11 @@ mod tests {
             pattern_hash: 1,
             pattern_length: 1,
             symmetric: 1,
-            measures: [1.0; MEASURES],
+            measures: [1.0; MEASURES].into(),
             valid: !valid::FILLED & (u32::MAX >> 13),
             ..Record::default()
         };
-        let whole = record;
+        let whole = record.clone();
         drop_unrequested(&mut record, &Needs::EVERYTHING);
         assert_eq!(record, whole);
         drop_unrequested(

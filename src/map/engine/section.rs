@@ -43,7 +43,7 @@ pub(crate) async fn compare_at_sections(
         let (oscillator, law) = is_on_strobe(record).then(|| of(*number))?;
         let period = if record.period > 0 { record.period } else { 2 };
         let flow = Flow::new(&oscillator);
-        let section = Section::of(&flow, law, record.strobe, period, Allowance::UNLIMITED)?;
+        let section = Section::of(&flow, law, record.strobe(), period, Allowance::UNLIMITED)?;
         let features = settings.features.and(Features::of(section.flow.form()));
         Some(SecondRun { place, section, law, features })
     };
@@ -62,14 +62,14 @@ pub(crate) async fn compare_at_sections(
             let seconds = gpu.run(&flows, &laws, &lanes.collect::<Vec<_>>(), &settings).await?;
             for (run, mut second) in batch.iter().zip(seconds) {
                 let first = &mut records[run.place].1;
-                let strobe = run.section.strobe(run.law, second.strobe, tolerance);
+                let strobe = run.section.strobe(run.law, second.strobe(), tolerance);
                 let (Class::Periodic { .. }, Some((strobe, _))) = (classify(&second), strobe) else {
                     open.push(run.place);
                     continue;
                 };
                 if replaces(&second, first) {
                     second.turn_harmonics(|phase| run.section.harmonic_phase(phase));
-                    *first = Record { strobe, periods_run: first.periods_run, ..second };
+                    *first = Record { strobe: strobe.into(), periods_run: first.periods_run, ..second };
                 }
             }
         }

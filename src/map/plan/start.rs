@@ -114,9 +114,9 @@ pub(crate) fn followed(record: Option<&Record>) -> State {
     let usable = |record: &&Record| {
         record.valid & valid::STROBE != 0
             && !status(record).is_failure()
-            && record.strobe.iter().all(|x| x.is_finite())
+            && record.strobe().iter().all(|x| x.is_finite())
     };
-    record.filter(usable).map_or(REST, |record| record.strobe)
+    record.filter(usable).map_or(REST, |record| record.strobe())
 }
 
 #[cfg(test)]
@@ -194,10 +194,10 @@ mod tests {
     #[test]
     fn runs_start_at_rest_if_the_neighbour_has_no_last_state() {
         let end = state(&[1.0, 2.0, 3.0, 4.0]);
-        let record = Record { strobe: end, valid: valid::STROBE, ..Record::default() };
+        let record = Record { strobe: end.into(), valid: valid::STROBE, ..Record::default() };
         assert_eq!(followed(Some(&record)), end);
-        let failed = Record { status: Status::CapEvents.code(), ..record };
-        let infinite = Record { strobe: state(&[f64::NAN; 4]), ..record };
+        let failed = Record { status: Status::CapEvents.code(), ..record.clone() };
+        let infinite = Record { strobe: [f64::NAN; 4].into(), ..record };
         for record in [None, Some(&failed), Some(&infinite), Some(&Record::default())] {
             assert_eq!(followed(record), REST, "{record:?}");
         }

@@ -36,7 +36,7 @@ impl BasinLabels {
 
     /// Labels records that are accepted next, in parallel, because some need Newton's method.
     pub(super) fn prepare(&mut self, records: &[(u32, Record)]) {
-        let found = self.catalogue.learn(&self.flow, self.law, records.len(), |nth| records[nth].1);
+        let found = self.catalogue.learn(&self.flow, self.law, records.len(), |nth| records[nth].1.clone());
         let ids = records.iter().map(|(id, _)| *id);
         self.prepared.extend(ids.zip(found.into_iter().map(label)));
     }
@@ -44,7 +44,7 @@ impl BasinLabels {
     pub(super) fn label(&mut self, id: u32, record: &Record) -> Label {
         let prepared = self.prepared.remove(&id);
         prepared.unwrap_or_else(|| {
-            let found = self.catalogue.learn(&self.flow, self.law, 1, |_| *record);
+            let found = self.catalogue.learn(&self.flow, self.law, 1, |_| record.clone());
             found.into_iter().next().map_or(Label::default(), label)
         })
     }

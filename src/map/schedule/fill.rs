@@ -5,8 +5,7 @@ use super::errors::same_count;
 use super::label::{pattern_of, word_of};
 use crate::record::classify::classify;
 use crate::record::measures::{self, GROUPS, MEASURES};
-use crate::record::{Record, valid};
-use rattlemap_dynamics::model::REST;
+use crate::record::{Numbers, Record, valid};
 use rattlemap_dynamics::orbit::Class;
 
 /// Returns the bit by which a record is quasi-periodic. Like the class of other motion, it is that of the nearest corner.
@@ -37,7 +36,7 @@ impl Filling {
             valid &= !valid::PATTERN;
         }
         let averages = corners.each_ref().map(|nearest| {
-            let class = classify(&Record { valid: valid | torus(nearest), ..*nearest });
+            let class = classify(&Record { valid: valid | torus(nearest), ..nearest.clone() });
             // An average exponent could turn undecided cells into decided ones.
             let decided = !matches!(class, Class::Undecided | Class::Failed);
             decided && corners.iter().all(|corner| classify(corner) == class)
@@ -57,7 +56,12 @@ impl Filling {
             let weighted = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
             weighted.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
         };
-        let mut filled = Record { periods_run: 0, strobe: REST, valid: self.valid, ..self.corners[nearest] };
+        let mut filled = Record {
+            periods_run: 0,
+            strobe: Numbers::default(),
+            valid: self.valid,
+            ..self.corners[nearest].clone()
+        };
         filled.valid |= torus(&self.corners[nearest]);
         filled.clear_measures(|group| self.valid & group.bit == 0);
         if !self.averages[nearest] {
@@ -68,8 +72,8 @@ impl Filling {
             lyapunov_error: average(|corner| corner.lyapunov_error),
             impacts_per_period: average(|corner| corner.impacts_per_period),
             mesh_fraction: average(|corner| corner.mesh_fraction),
-            measures: self.measures(weights),
-            ..filled
+            measures: self.measures(weights).into(),
+            ..filled.clone()
         };
         if !matches!(classify(&filled), Class::Periodic { .. }) {
             return averaged;
@@ -114,7 +118,7 @@ mod tests {
         let block = Block { i: [0, 4], j: [0, 2] };
         let corners = [0.0, 4.0, 2.0, 6.0].map(corner);
         for [i, j] in block.cells() {
-            let record = Filling::new(&block, corners).record([i, j]);
+            let record = Filling::new(&block, corners.clone()).record([i, j]);
             assert!((record.lyapunov - (i + j) as f64).abs() < 1e-12);
             assert_eq!((record.period, record.periods_run), (2, 0));
             assert_eq!(record.valid, valid::PERIOD | valid::LYAPUNOV | valid::FILLED);
@@ -133,13 +137,13 @@ mod tests {
             record.measures[phase.place] = if value > 2.5 { -value } else { value + 1.0 };
             record
         });
-        let filled = |corners: &[Record; 4]| Filling::new(&block, *corners).record([2, 1]);
+        let filled = |corners: &[Record; 4]| Filling::new(&block, corners.clone()).record([2, 1]);
         let record = filled(&corners);
         assert_eq!(
             (speed.of(&record), record.measures[phase.place].abs()),
             (Some(2.5), std::f64::consts::PI)
         );
-        let mut lacking = corners;
+        let mut lacking = corners.clone();
         lacking[3].valid &= !speed.group.bit;
         let record = filled(&lacking);
         assert_eq!((speed.of(&record), record.measures[speed.place]), (None, 0.0));
@@ -149,7 +153,7 @@ mod tests {
     fn a_superstable_corner_contributes_only_with_weight() {
         let block = Block { i: [0, 2], j: [0, 2] };
         let corners = [-1.0, f64::NEG_INFINITY, -3.0, -4.0].map(corner);
-        let exponent = |at| Filling::new(&block, corners).record(at).lyapunov;
+        let exponent = |at| Filling::new(&block, corners.clone()).record(at).lyapunov;
         assert_eq!([exponent([0, 0]), exponent([0, 1]), exponent([1, 2])], [-1.0, -2.0, -3.5]);
         assert_eq!([exponent([1, 0]), exponent([1, 1])], [f64::NEG_INFINITY; 2]);
     }
@@ -159,7 +163,7 @@ mod tests {
         let block = Block { i: [0, 2], j: [0, 2] };
         let mut corners = [0.0; 4].map(corner);
         corners[3].valid &= !valid::LYAPUNOV;
-        assert_eq!(Filling::new(&block, corners).record([0, 0]).valid & valid::LYAPUNOV, 0);
+        assert_eq!(Filling::new(&block, corners.clone()).record([0, 0]).valid & valid::LYAPUNOV, 0);
     }
 
     /// On an edge only the corners of that edge count.
@@ -174,15 +178,15 @@ mod tests {
             ..Record::default()
         };
         let impacts = |corners: &[Record; 4], at| {
-            let record = Filling::new(&block, *corners).record(at);
+            let record = Filling::new(&block, corners.clone()).record(at);
             (record.valid & valid::IMPACTS != 0).then_some(record.impacts_per_period)
         };
-        let mut corners = [impacting(7.0, valid::PERIOD); 4];
+        let mut corners = [7.0; 4].map(|count| impacting(count, valid::PERIOD));
         assert_eq!(impacts(&corners, [1, 1]), Some(7.0 / 3.0));
         corners[3] = impacting(8.0, valid::PERIOD);
         assert_eq!(impacts(&corners, [1, 1]), None);
         assert_eq!(impacts(&corners, [1, 0]), Some(7.0 / 3.0));
-        let record = Filling::new(&block, corners).record([1, 1]);
+        let record = Filling::new(&block, corners.clone()).record([1, 1]);
         assert_eq!((record.mesh_fraction, record.impacts_per_period), (29.0 / 64.0, 0.0));
         // Impacts of chaos are means, not counts, and are averaged.
         let chaos = |count| Record { period: 0, lyapunov: 1.0, ..impacting(count, valid::LYAPUNOV) };
@@ -202,10 +206,10 @@ mod tests {
             record
         };
         let filled = |corners: &[Record; 4]| {
-            let record = Filling::new(&block, *corners).record([1, 1]);
+            let record = Filling::new(&block, corners.clone()).record([1, 1]);
             (record.spelling(), record.pattern())
         };
-        let mut corners = [spelled(b"25"); 4];
+        let mut corners = [b"25"; 4].map(|symbols| spelled(symbols));
         let [word, pattern] = [corners[0].spelling(), corners[0].pattern()];
         assert_eq!(filled(&corners), (word, pattern.clone()));
         corners[2] = spelled(b"255");

@@ -192,7 +192,8 @@ fn basins_fit_a_page_and_mark_their_attractors() {
         let plan = Plan::new(&scene);
         let orbit = orbit::analyse(scene.base(), REST, &Settings::default()).unwrap();
         let orbit::Class::Periodic { period } = orbit.class else { panic!("{:?}", orbit.class) };
-        let record = Record { period, strobe: orbit.strobe, valid: valid::PERIOD, ..Record::default() };
+        let record =
+            Record { period, strobe: orbit.strobe.into(), valid: valid::PERIOD, ..Record::default() };
         let records = vec![record; plan.run_count()];
         let survey = Survey::of(&plan, &records[..], None);
         let cells = Cells::new(&scene, &plan, &records).surveyed(&survey);

@@ -46,14 +46,13 @@ impl Victim {
             .of_coordinates(MOST_COORDINATES);
         let mut random = Random::new(3);
         let mut cell = |id: u32| {
-            let mut record: Record =
-                bytemuck::cast(std::array::from_fn::<u64, { size_of::<Record>() / 8 }, _>(|_| match random
-                    .below(3)
-                {
-                    0 => 0,
-                    1 => f64::NAN.to_bits(),
-                    _ => random.bits(),
-                }));
+            let mut bits = || match random.below(3) {
+                0 => 0,
+                1 => f64::NAN.to_bits(),
+                _ => random.bits(),
+            };
+            let bytes: Vec<u8> = (0..Record::BYTES / 8).flat_map(|_| bits().to_le_bytes()).collect();
+            let mut record = Record::from_bytes(&bytes);
             record.valid &= !valid::FILLED;
             (id * 577 % 1009, record)
         };
@@ -71,9 +70,7 @@ impl Victim {
 
     /// Compares records bit for bit; NaN would differ otherwise.
     fn is_same(a: &[(u32, Record)], b: &[(u32, Record)]) -> bool {
-        let same = |(a, b): (&(u32, Record), &(u32, Record))| {
-            a.0 == b.0 && bytemuck::bytes_of(&a.1) == bytemuck::bytes_of(&b.1)
-        };
+        let same = |(a, b): (&(u32, Record), &(u32, Record))| a.0 == b.0 && a.1.to_bytes() == b.1.to_bytes();
         a.len() == b.len() && a.iter().zip(b).all(same)
     }
 
@@ -90,7 +87,7 @@ impl Victim {
             RecordFile::resume(&self.path, &self.identity, order, take).map_err(|error| error.to_string())?;
         let (count, damage) = (resumed.len(), file.damage().cloned());
         let is_there = |id: u32| resumed.iter().any(|cell| cell.0 == id);
-        let missing: Vec<_> = self.cells.iter().filter(|(id, _)| !is_there(*id)).copied().collect();
+        let missing: Vec<_> = self.cells.iter().filter(|(id, _)| !is_there(*id)).cloned().collect();
         if !missing.is_empty() {
             file.append(&missing).map_err(|error| text(&error))?;
         }

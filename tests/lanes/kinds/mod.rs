@@ -92,7 +92,7 @@ fn check_motion(cells: &[Cell], least: [u64; 2]) {
         for (seed, ((record, cell), expected)) in records.iter().zip(cells).zip(&expected).enumerate() {
             let at = format!("{precision:?}, seed {seed}, {cell:?}");
             assert_eq!(record.status, Status::Ok.code(), "{at}");
-            let error = apart(record.strobe, expected.end);
+            let error = apart(record.strobe(), expected.end);
             errors.push(error);
             if error > bar {
                 // Chaos: a rounding error of the start must change the reference as much.
@@ -127,7 +127,7 @@ fn multipliers_agree_with_finite_differences() {
     let of = |(seed, (record, cell)): (usize, (&Record, &Cell))| {
         let Class::Periodic { period, .. } = classify(record) else { return None };
         let is_clear = (0..2).all(|side| {
-            let [x1, _, x2, _, ..] = record.strobe;
+            let [x1, _, x2, _, ..] = record.strobe();
             (cell.0.gap[0] * x1 + cell.0.gap[1] * x2 - cell.0.walls[side]).abs() > 1e-3
         });
         // Neighbours of a cycle that is on a rigid wall at the strobe follow another motion.
@@ -139,7 +139,7 @@ fn multipliers_agree_with_finite_differences() {
         let columns: Vec<[f64; 4]> = (0..displacements)
             .map(|i| {
                 let end = |by: f64| {
-                    let mut start = record.strobe;
+                    let mut start = record.strobe();
                     start[i] += by;
                     followed(cell, start, period).end
                 };
@@ -268,9 +268,9 @@ fn units_change_no_bit() {
         let [records, others] = [&cells, &others].map(|cells| run(precision, cells, &settings).unwrap());
         for (seed, (record, other)) in records.iter().zip(&others).enumerate() {
             let (size, rate) = (2f64.powi(length), 2f64.powi(-time));
-            let [x1, v1, x2, v2, ..] = record.strobe;
+            let [x1, v1, x2, v2, ..] = record.strobe();
             let strobe = state(&[x1 * size, v1 * size * rate, x2 * size, v2 * size * rate]);
-            assert_eq!(other.strobe, strobe, "{precision:?}, seed {seed}");
+            assert_eq!(other.strobe(), strobe, "{precision:?}, seed {seed}");
             assert_eq!(other.impacts_per_period, record.impacts_per_period, "{precision:?}, seed {seed}");
             assert_eq!(other.mesh_fraction, record.mesh_fraction, "{precision:?}, seed {seed}");
         }

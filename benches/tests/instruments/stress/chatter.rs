@@ -62,7 +62,7 @@ pub(super) fn check(lanes: &mut Lanes) -> Checks {
     for precision in lanes.precisions() {
         let records = lanes.run(precision, &starts, &LaneSettings::only(1));
         let lane = |(case, record): (_, &_)| {
-            let state = (status(record) == Status::Ok).then_some(record.strobe);
+            let state = (status(record) == Status::Ok).then_some(record.strobe());
             end(case, precision.into(), status(record), state)
         };
         ends.par_extend(cases.par_iter().zip(&records).map(lane));

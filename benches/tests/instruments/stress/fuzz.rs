@@ -53,7 +53,7 @@ pub(super) fn check(count: usize, lanes: &mut Lanes) -> Checks {
         checks.require(records.iter().all(is_finite), format!("a record in {precision:?} is not finite"));
         let different: Vec<usize> =
             (0..count).filter(|&i| contradicts(precision, &cells[i].0, &records[i], &judges[i])).collect();
-        let explained = |&i: &usize| is_explained(precision, cells[i], records[i]);
+        let explained = |&i: &usize| is_explained(precision, cells[i], &records[i]);
         let explained = each(&different, explained);
         let left = different.iter().zip(explained).filter(|(_, explained)| !explained);
         unexplained.extend(left.map(|(&i, _)| (precision, cells[i])));
@@ -104,7 +104,7 @@ fn is_finite(record: &Record) -> bool {
     let numbers = [record.lyapunov_error, record.impacts_per_period, record.mesh_fraction];
     let superstable = record.lyapunov == f64::NEG_INFINITY && record.period > 0;
     (record.lyapunov.is_finite() || superstable)
-        && numbers.iter().chain(&record.strobe).all(|number| number.is_finite())
+        && numbers.iter().chain(&record.strobe()).all(|number| number.is_finite())
 }
 
 /// Whether a lane differs from the reference. One that is undecided or stopped by a cap claims nothing, and if neither engine
@@ -120,10 +120,10 @@ fn contradicts(precision: Precision, pair: &GearPair, lane: &Record, judge: &Rec
 }
 
 /// Validates a lane's record as that of the first cell of a map. Returns whether it is right or its difference is explained.
-fn is_explained(precision: Precision, (pair, start): Start, record: Record) -> bool {
+fn is_explained(precision: Precision, (pair, start): Start, record: &Record) -> bool {
     let plan = plan(&pair, start);
     let mut records = vec![Record::default(); plan.cell_count()];
-    records[0] = record;
+    records[0].clone_from(record);
     let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
     let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
     let sample = Sample { seed: 0, requested: 1, draws, states: Vec::new() };

@@ -113,7 +113,7 @@ fn compare_motions(grids: impl Iterator<Item = u32> + Clone, lanes: &mut Lanes, 
                 checks.require((least..=most).contains(&impacts), what("impacts"));
                 checks.require(steps[i] >= requested, what("fewer than requested"));
                 let bar = FACTOR * sensitivities[i] + SCATTER * perturbed[i].distance;
-                checks.add(state_distance(&records[i].strobe, &exact[i]), bar, what("error"));
+                checks.add(state_distance(&records[i].strobe(), &exact[i]), bar, what("error"));
             }
         }
     }

@@ -98,7 +98,7 @@ pub(super) fn check(lanes: &mut Lanes) -> Checks {
         for (horizon, exact) in HORIZONS.into_iter().zip(&exact) {
             let records = lanes.run(precision, &starts, &LaneSettings::only(horizon));
             let error = |k: usize| match status(&records[k]) {
-                Status::Ok => state_distance(&records[k].strobe, &exact[k]),
+                Status::Ok => state_distance(&records[k].strobe(), &exact[k]),
                 _ => f64::INFINITY,
             };
             for (i, of_cell) in errors.iter_mut().enumerate() {

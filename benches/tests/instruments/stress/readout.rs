@@ -45,7 +45,7 @@ pub(super) fn contact((pair, _): &Start, record: &Record, steps: Option<u32>) ->
     let constants = Constants::new(&pair.oscillator().ok()?, steps)?;
     let constants = constants.pair()?;
     // The shader wrote the rates where a state in lane units has (z, z', x2, x2').
-    let [w, w_after, v, v_after] = constants.to_lane(record.strobe);
+    let [w, w_after, v, v_after] = constants.to_lane(record.strobe());
     let [w, v] = [w, v].map(|rate| rate / constants.flow.h);
     let [w_after, v_after] = [w_after, v_after].map(|rate| rate / constants.flow.h);
     Some(Contact { w: [w, w_after], v2: [v, v_after] })

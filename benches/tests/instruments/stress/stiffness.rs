@@ -63,8 +63,8 @@ pub(super) fn check(lanes: &mut Lanes) -> Checks {
             let finest = domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
             let steps = f64::from(constants[i].steps) * finest * f64::from(PERIODS);
             let rounding = bar(conditioning, steps);
-            let distance = |from| state_distance(&records[i].strobe, from);
-            checks.add(distance(&finer[i].strobe), rounding, what("twice the steps"));
+            let distance = |from: &_| state_distance(&records[i].strobe(), from);
+            checks.add(distance(&finer[i].strobe()), rounding, what("twice the steps"));
             checks.add(distance(&exact), rounding + 2.0 * scatter[i], what("the reference"));
             compared += 1;
         }
