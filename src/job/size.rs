@@ -7,10 +7,10 @@ use crate::gpu::{self, Constants};
 use crate::job::engine_choice::EngineKind;
 use crate::job::error::JobError;
 use crate::job::processor;
+use crate::map::engine::{LARGEST_BATCH, largest_batch};
 use crate::map::plan::{Cell, Parts, stores_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
-use crate::map::sweep::LARGEST_BATCH;
 use crate::model_file::several_gaps;
 use crate::record::Record;
 use crate::store::folder::Folder;
@@ -21,6 +21,8 @@ use crate::text::size::bytes;
 const PROGRAM: u64 = 30_000_000;
 /// Memory per run without its record, in bytes: its place in the order, and its state.
 const RUN: u64 = 5;
+/// Memory of the numbers that only records of larger models have, in bytes.
+const FURTHER: u64 = 450;
 /// Memory per cell of an adaptive map, in bytes: label, request, blocks.
 const REFINED: u64 = 40;
 /// Memory per cell of a list, in bytes: values, their text, flow and law.
@@ -58,37 +60,42 @@ impl Size {
     /// the map, and all records if cells follow their neighbours.
     pub fn of(scene: &Scene, shard: Option<Shard>) -> Size {
         let (cells, runs) = (scene.cell_count(), scene.run_count());
-        let record = size_of::<(u32, Record)>() as u64;
+        let is_larger = scene.coordinates() > 2 || several_gaps(scene.base()).is_some();
+        let record = size_of::<(u32, Record)>() as u64 + if is_larger { FURTHER } else { 0 };
         // Cells that wait for an engine and those that it has, the records of one batch that is computed, and of one on its way
         // to the disk.
-        let under_way = |runs: u64| {
-            let most = LARGEST_BATCH as u64;
+        let under_way = |runs: u64, most: usize| {
+            let most = most as u64;
             runs.min(most) * 2 * size_of::<Cell>() as u64 + runs.min(2 * most) * record
         };
         let [record_on_disk, files] = disk(scene);
-        let (memory, disk) = match shard {
-            None => {
-                // Files are written when no cell is under way.
-                let memory = runs.saturating_mul(held_run(scene, false)) + under_way(runs).max(drawn(scene));
-                (memory, runs.saturating_mul(record_on_disk) + cells * files + page(scene))
-            }
-            Some(shard) => {
-                let own = runs.div_ceil(u64::from(shard.count()));
+        let own = shard.map_or(runs, |shard| runs.div_ceil(u64::from(shard.count())));
+        let memory = |most: usize| match shard {
+            // Files are written when no cell is under way.
+            None => runs.saturating_mul(held_run(scene, false)) + under_way(runs, most).max(drawn(scene)),
+            Some(_) => {
                 let kept = if scene.start().follows() { 1 + stored_run(scene, false) } else { 1 };
-                (runs.saturating_mul(kept) + own * RUN + under_way(own), own * record_on_disk)
+                runs.saturating_mul(kept) + own * RUN + under_way(own, most)
             }
+        };
+        let disk = match shard {
+            None => runs.saturating_mul(record_on_disk) + cells * files + page(scene),
+            Some(_) => own * record_on_disk,
         };
         let settings = scene.orbit_settings();
         let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
         let flows = Parts::flows(scene.points());
-        let memory = PROGRAM + memory + list_rows(scene);
+        let memory = |most: usize| PROGRAM + memory(most) + list_rows(scene);
+        let cores = processor::cores();
         // Results of lanes on their way to records.
         let results = 2 * runs.min(LARGEST_BATCH as u64) * size_of::<gpu::LaneResult>() as u64;
         Size {
             cells,
             runs,
-            cpu_memory: memory + kept_flows(&flows, runs) + periods * PERIOD * processor::cores() as u64,
-            gpu_memory: memory + lane_tables(scene, &flows, runs) + results,
+            cpu_memory: memory(largest_batch(cores))
+                + kept_flows(&flows, runs)
+                + periods * PERIOD * cores as u64,
+            gpu_memory: memory(LARGEST_BATCH) + lane_tables(scene, &flows, runs) + results,
             disk,
         }
     }

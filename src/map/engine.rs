@@ -20,6 +20,7 @@ use std::time::Duration;
 use thiserror::Error;
 
 pub use cpu::Cpu;
+pub(crate) use cpu::largest_batch;
 pub use fake::Fake;
 pub(crate) use flows::Flows;
 #[cfg(feature = "gpu")]
@@ -36,6 +37,9 @@ pub(crate) use section::{compare_at_sections, measure_machines};
 use crate::gpu::AdapterId;
 use crate::map::plan::Cell;
 use crate::record::Record;
+
+/// Largest number of cells under way.
+pub(crate) const LARGEST_BATCH: usize = 1 << 20;
 
 /// Why a batch was not computed.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -112,6 +116,10 @@ trait Device {
         self.least_batch()
     }
 
+    fn largest_batch(&self) -> usize {
+        LARGEST_BATCH
+    }
+
     fn lane_steps(&self) -> Option<u64> {
         None
     }
@@ -179,6 +187,11 @@ impl Engine<'_> {
     /// Returns the number of cells to begin first.
     pub fn first_batch(&self) -> usize {
         self.properties().first_batch()
+    }
+
+    /// Returns the largest number of cells under way. It bounds the memory that a fast engine uses.
+    pub fn largest_batch(&self) -> usize {
+        self.properties().largest_batch()
     }
 
     /// Returns the number of free steps that lanes have taken so far; none without a time grid.

@@ -20,13 +20,10 @@ const BATCH_SECONDS: f64 = 1.0;
 const STORE_INTERVAL: Duration = Duration::from_millis(500);
 
 /// A batch of at least this many records is not joined to others, because joining would copy it.
-const LARGE: usize = 1 << 16;
+const LARGE: usize = 1 << 14;
 
 /// Cells per core in an engine's smallest batch.
 const ROUNDS_OF_CORES: usize = 64;
-
-/// Largest number of cells under way. It bounds the memory that a fast engine uses.
-pub(crate) const LARGEST_BATCH: usize = 1 << 20;
 
 /// Why a sweep ended early.
 #[derive(Debug, thiserror::Error)]
@@ -60,7 +57,7 @@ pub async fn run(
     let mut pace = Pace {
         cells: engine.first_batch(),
         least: (engine.least_batch() / ROUNDS_OF_CORES).max(1),
-        most: LARGEST_BATCH,
+        most: engine.largest_batch(),
     };
     let mut under_way = 0;
     let mut unstored = Vec::new();

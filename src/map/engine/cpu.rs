@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use web_time::Instant;
 
 use super::flows::Flows;
-use super::{Device, measured_record};
+use super::{Device, LARGEST_BATCH, measured_record};
 use crate::map::plan::{Cell, Plan};
 use crate::record::Record;
 use rattlemap_dynamics::motion::Flow;
@@ -17,8 +17,16 @@ use rattlemap_dynamics::orbit::measure_until;
 /// Time after which a batch begins no more cells and returns those that have ended.
 const BATCH_TIME: Duration = Duration::from_secs(2);
 
+/// Cells under way per core at most. It bounds the memory for cells that take little time.
+const MOST_PER_CORE: usize = 1 << 13;
+
 /// Number in place of that of a cell that waits for the next batch. A map has fewer runs.
 const LEFT: u32 = u32::MAX;
+
+/// Returns the largest number of cells under way.
+pub(crate) fn largest_batch(cores: usize) -> usize {
+    LARGEST_BATCH.min(MOST_PER_CORE * cores)
+}
 
 /// The event-driven reference.
 pub struct Cpu<'p> {
@@ -67,6 +75,7 @@ impl<'p> Cpu<'p> {
                 )
             })
             .collect();
+        self.flows.keep(&cells);
         // Records are large: none is read or moved if all cells have ended.
         if are_left.into_inner() {
             let left = cells.iter().zip(&ended).filter(|(_, (id, _))| *id == LEFT);
@@ -99,5 +108,9 @@ impl Device for Cpu<'_> {
 
     fn least_batch(&self) -> usize {
         64 * rayon::current_num_threads()
+    }
+
+    fn largest_batch(&self) -> usize {
+        largest_batch(rayon::current_num_threads())
     }
 }

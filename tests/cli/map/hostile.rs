@@ -244,6 +244,37 @@ fn a_machine_that_starts_no_thread_causes_a_message() {
     assert!(code == 0 && text.is_empty(), "{text}");
 }
 
+/// All cells share twenty oscillators and have no contact, so that each takes little time.
+#[cfg(target_os = "linux")]
+#[test]
+fn further_cells_of_a_map_of_classes_take_little_memory() {
+    let folder = folder();
+    let line = "map s.toml --engine cpu --force --quiet --set outputs.quantities=['class'] --set outputs.files=['npy'] \
+                --set parameters.F=1e-4 --set axis.1.count=20 --set integration.transient_periods=1 \
+                --set integration.observed_periods=2 --set integration.max_period=1";
+    let peak = |columns: usize| {
+        let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"))
+            .args(format!("{line} --set axis.0.count={columns}").split_whitespace())
+            .env("RAYON_NUM_THREADS", "2")
+            .current_dir(folder.path())
+            .spawn()
+            .unwrap();
+        let status = format!("/proc/{}/status", run.id());
+        let mut peak = 0;
+        while run.try_wait().unwrap().is_none() {
+            let text = fs::read_to_string(&status).unwrap_or_default();
+            let size = text.lines().find_map(|line| line.strip_prefix("VmHWM:")?.strip_suffix("kB"));
+            peak = size.map_or(peak, |size| 1024 * size.trim().parse::<usize>().unwrap());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(run.wait().unwrap().success());
+        peak
+    };
+    let [few, many] = [4_000, 12_000];
+    let bytes = (peak(many) - peak(few)) / (20 * (many - few));
+    assert!(bytes < 64, "{bytes} bytes per cell");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_limit_for_memory_causes_a_message() {
