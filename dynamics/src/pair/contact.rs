@@ -50,11 +50,7 @@ impl<const N: usize> PairMotion<'_, N> {
             Crossing::MeshEnds(side) if self.flow.contacts[side.index()].is_elastic() => {
                 self.come_out(side, observer);
             }
-            Crossing::ForceEnds(side) => self.open(side, observer),
-            Crossing::ForceBegins(side) => self.close(side, observer),
-            Crossing::Returns(side) => {
-                self.come_back(side, observer);
-            }
+            Crossing::ForceChanges(side) => self.change_force(side, observer),
             Crossing::MeshEnds(side) => {
                 self.q[0] = self.flow.wall(side);
                 let rate = self.q[1];
@@ -274,24 +270,15 @@ impl<const N: usize> PairMotion<'_, N> {
                 let Some(side) = Side::BOTH.into_iter().find(|&side| beyond(side)) else { return false };
                 self.touch(side, observer);
             }
-            Mode::Open(side) => {
-                if side.sign() * (self.q[0] - self.flow.wall(side)) <= 0.0 {
-                    self.act(Crossing::Returns(side), observer);
-                } else if self.closes(side) {
-                    self.act(Crossing::ForceBegins(side), observer);
-                } else {
-                    return false;
-                }
-            }
-            Mode::Sustained(side) => {
+            Mode::Sustained(side) | Mode::Open(side) => {
                 if side.sign() * (self.q[0] - self.flow.wall(side)) > 0.0 {
-                    if self.closes(side) {
+                    if self.closes(side) != self.is_open() {
                         return false;
                     }
-                    self.act(Crossing::ForceEnds(side), observer);
+                    self.act(Crossing::ForceChanges(side), observer);
                     return true;
                 }
-                if side.sign() * self.q[1] > 0.0 {
+                if side.sign() * self.q[1] > 0.0 && !self.is_open() {
                     self.act(Crossing::OnsetEnds(side), observer);
                 } else {
                     self.act(Crossing::MeshEnds(side), observer);

@@ -54,6 +54,14 @@ impl<const N: usize> PairMotion<'_, N> {
     #[inline(never)]
     pub(super) fn come_out(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
+        if self.is_open() {
+            // Open contact exerts no force, so its end is no event.
+            return if side.sign() * self.q[1] < 0.0 {
+                self.leave(side)
+            } else {
+                self.go_behind(side, observer)
+            };
+        }
         if self.q[1] == 0.0 && self.presses(DomainKind::Meshing(side), side, &self.q) {
             self.from_wall = Some((side, self.rest_order(DomainKind::Meshing(side))));
             return;

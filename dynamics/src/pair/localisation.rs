@@ -68,11 +68,11 @@ impl<const N: usize> PairMotion<'_, N> {
             Crossing::Contact(side) | Crossing::OnsetEnds(side) => {
                 side.sign() * (q[0] - self.flow.wall(side)) < 0.0
             }
-            Crossing::MeshEnds(side) | Crossing::Returns(side) => {
-                side.sign() * (q[0] - self.flow.wall(side)) > 0.0
+            Crossing::MeshEnds(side) => side.sign() * (q[0] - self.flow.wall(side)) > 0.0,
+            Crossing::ForceChanges(side) => {
+                let force = self.wall_force(side, linear, q, phasor)[0];
+                if self.is_open() { force < 0.0 } else { force > 0.0 }
             }
-            Crossing::ForceEnds(side) => self.wall_force(side, linear, q, phasor)[0] > 0.0,
-            Crossing::ForceBegins(side) => self.wall_force(side, linear, q, phasor)[0] < 0.0,
             Crossing::Through(side) => side.sign() * (q[0] - self.flow.wall(side.mirrored())) > 0.0,
             Crossing::PressingEnds(side) => side.sign() * linear.acceleration(q, phasor) > 0.0,
         }
@@ -97,10 +97,7 @@ impl<const N: usize> PairMotion<'_, N> {
             self.work.root_iterations += 1;
             let expansion = linear.grid.expansion(&self.q, &self.phasor, u);
             let root = match crossing {
-                Crossing::Contact(side)
-                | Crossing::OnsetEnds(side)
-                | Crossing::MeshEnds(side)
-                | Crossing::Returns(side) => {
+                Crossing::Contact(side) | Crossing::OnsetEnds(side) | Crossing::MeshEnds(side) => {
                     let mut series = expansion.gap();
                     series[0] += self.q[0] - self.flow.wall(side);
                     root_near(&series, u - expansion.start, u)
@@ -113,7 +110,7 @@ impl<const N: usize> PairMotion<'_, N> {
                 Crossing::PressingEnds(_) => {
                     root_of(linear, &expansion, u, |q, phasor| linear.acceleration_rates(q, phasor))
                 }
-                Crossing::ForceEnds(side) | Crossing::ForceBegins(side) => {
+                Crossing::ForceChanges(side) => {
                     root_of(linear, &expansion, u, |q, phasor| self.wall_force(side, linear, q, phasor))
                 }
             };

@@ -3,15 +3,17 @@
 //! The state alone determines whether contact is open. The force is continuous where contact opens and closes, so tangents do not jump
 //! there.
 
-use super::step_verdict::{Crossing, StepVerdict, first_of};
+use super::step_verdict::{Crossing, StepVerdict};
 use super::{Mode, PairMotion};
 use crate::model::Side;
 use crate::motion::{EventKind, Observer};
 use crate::pair::certificate::{Verdict, judge};
-use crate::pair::flow::{DomainKind, Gap, LinearFlow, Phasor, Step};
+use crate::pair::flow::{DomainKind, Gap, LinearFlow, Phasor, PushingForce, Step};
 
 impl<const N: usize> PairMotion<'_, N> {
     /// Returns the force of a pushing wall and its first two derivatives in a domain.
+    #[cold]
+    #[inline(never)]
     pub(super) fn wall_force(&self, side: Side, linear: &LinearFlow, q: &Gap, phasor: &Phasor) -> [f64; 3] {
         let force = self.flow.pushing[side.index()].as_deref();
         force.map_or([f64::INFINITY; 3], |force| force.rates(linear, q, phasor))
@@ -36,61 +38,45 @@ impl<const N: usize> PairMotion<'_, N> {
         };
     }
 
-    /// Compares the crossing of a wall with the next change of sign of the wall's force.
+    /// Checks whether the force of a pushing wall changes its sign.
+    #[cold]
     #[inline(never)]
-    pub(super) fn earlier_of_force(
+    pub(super) fn force_ahead(
         &self,
-        at_wall: StepVerdict,
-        is_closed: bool,
-        side: Side,
+        force: &PushingForce,
         linear: &LinearFlow,
         step: &Step,
+        side: Side,
     ) -> StepVerdict {
-        let Some(force) = &self.flow.pushing[side.index()] else { return at_wall };
-        let (sign, crossing) =
-            if is_closed { (1.0, Crossing::ForceEnds(side)) } else { (-1.0, Crossing::ForceBegins(side)) };
-        let (force, remainder) = force.ahead(is_closed, linear, step, &self.q, &self.phasor);
-        let of_force = match judge(&force, 0.0, sign, self.from_force, remainder) {
+        let (force, remainder) = force.ahead(!self.is_open(), linear, step, &self.q, &self.phasor);
+        let sign = if self.is_open() { -1.0 } else { 1.0 };
+        match judge(&force, 0.0, sign, self.from_force, remainder) {
             Verdict::Clear { roomy } => StepVerdict::Clear { roomy },
-            Verdict::Crossing(bracket) => StepVerdict::Crossing(crossing, bracket),
+            Verdict::Crossing(bracket) => StepVerdict::Crossing(Crossing::ForceChanges(side), bracket),
             Verdict::Unclear => StepVerdict::Unclear,
+        }
+    }
+
+    /// Whether contact is open.
+    pub(super) fn is_open(&self) -> bool {
+        matches!(self.mode, Mode::Open(_))
+    }
+
+    /// Ends or begins contact behind a wall that only pushes.
+    #[inline(never)]
+    pub(super) fn change_force(&mut self, side: Side, observer: &mut impl Observer) {
+        let (kind, mode) = if self.is_open() {
+            (EventKind::MeshStart, Mode::Sustained(side))
+        } else {
+            (EventKind::MeshEnd, Mode::Open(side))
         };
-        first_of(at_wall, of_force)
-    }
-
-    /// Ends contact behind a wall that only pushes.
-    #[inline(never)]
-    pub(super) fn open(&mut self, side: Side, observer: &mut impl Observer) {
-        self.record(EventKind::MeshEnd, side, self.q, observer);
-        self.mode = Mode::Open(side);
-        self.change_force(side, 0);
-    }
-
-    /// Begins contact behind a wall that only pushes.
-    #[inline(never)]
-    pub(super) fn close(&mut self, side: Side, observer: &mut impl Observer) {
-        self.record(EventKind::MeshStart, side, self.q, observer);
-        self.mode = Mode::Sustained(side);
-        self.change_force(side, 1);
-    }
-
-    /// Prepares a flight that begins where the force of a wall has just changed its sign.
-    fn change_force(&mut self, side: Side, slot: usize) {
-        let linear = self.flow.domain(self.mode.domain());
+        self.record(kind, side, self.q, observer);
+        self.mode = mode;
+        let linear = self.flow.domain(mode.domain());
         let levels = linear.levels;
         let rate = self.wall_force(side, linear, &self.q, &self.phasor)[1];
+        let slot = usize::from(!self.is_open());
         self.level[slot] = self.level[slot].min(levels - 1);
         self.from_force = if rate == 0.0 { 2 } else { 1 };
-    }
-
-    /// Returns from open contact to the wall, and to free motion if the gap leaves the wall.
-    #[inline(never)]
-    pub(super) fn come_back(&mut self, side: Side, observer: &mut impl Observer) {
-        self.q[0] = self.flow.wall(side);
-        if side.sign() * self.q[1] < 0.0 {
-            self.leave(side);
-        } else {
-            self.go_behind(side, observer);
-        }
     }
 }

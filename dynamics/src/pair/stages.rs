@@ -33,12 +33,8 @@ impl<'f, const N: usize> PairMotion<'f, N> {
                     self.from_wall = self.from_wall.map(|_| (side, 1));
                 }
             }
-            Mode::Sustained(side) if !self.closes(side) => {
-                self.open(side, observer);
-                self.start_from_force(side);
-            }
-            Mode::Open(side) if self.closes(side) => {
-                self.close(side, observer);
+            Mode::Sustained(side) | Mode::Open(side) if self.closes(side) == self.is_open() => {
+                self.change_force(side, observer);
                 self.start_from_force(side);
             }
             _ => {}

@@ -22,14 +22,10 @@ pub(super) enum Crossing {
     PressingEnds(Side),
     /// The contact onset reaches the opposite wall.
     Through(Side),
-    /// Sustained contact ends at its wall.
+    /// Sustained or open contact ends at its wall.
     MeshEnds(Side),
-    /// The force of a wall that only pushes vanishes: contact ends behind the wall.
-    ForceEnds(Side),
-    /// Spring and damper of a wall that only pushes begin to push: contact begins behind the wall.
-    ForceBegins(Side),
-    /// Motion in open contact returns to its wall; this is not an event.
-    Returns(Side),
+    /// Spring and damper of a wall that only pushes begin or cease to push: contact begins or ends behind the wall.
+    ForceChanges(Side),
 }
 
 /// The verdict on a step.
@@ -54,10 +50,11 @@ impl<const N: usize> PairMotion<'_, N> {
         let [right, left] = self.flow.walls;
         let (floor, ceiling) = match self.mode {
             Mode::Free => (left, right),
-            Mode::Sustained(side) if self.flow.pushing[side.index()].is_some() => UNREACHABLE,
-            Mode::Sustained(Side::Right) => (right, f64::INFINITY),
-            Mode::Sustained(Side::Left) => (f64::NEG_INFINITY, left),
-            Mode::Onset(_) | Mode::Open(_) | Mode::Stuck(_) => UNREACHABLE,
+            Mode::Sustained(side) if self.flow.pushing[side.index()].is_none() => match side {
+                Side::Right => (right, f64::INFINITY),
+                Side::Left => (f64::NEG_INFINITY, left),
+            },
+            _ => UNREACHABLE,
         };
         let [above, below] = gap.between(order, remainder, floor, ceiling);
         if above && below {
@@ -75,13 +72,12 @@ impl<const N: usize> PairMotion<'_, N> {
                 self.wall_ahead(&gap, Side::Right, remainder),
                 self.wall_ahead(&gap, Side::Left, remainder),
             ),
-            Mode::Sustained(side) => {
+            Mode::Sustained(side) | Mode::Open(side) => {
                 let ends = self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side));
-                self.earlier_of_force(ends, true, side, linear, step)
-            }
-            Mode::Open(side) => {
-                let returns = self.judge(&gap, side, 1.0, remainder, Crossing::Returns(side));
-                self.earlier_of_force(returns, false, side, linear, step)
+                match &self.flow.pushing[side.index()] {
+                    Some(force) => first_of(ends, self.force_ahead(force, linear, step, side)),
+                    None => ends,
+                }
             }
             // `step_at_rest` decides.
             Mode::Stuck(_) => StepVerdict::Unclear,
@@ -154,7 +150,7 @@ impl<const N: usize> PairMotion<'_, N> {
 
 /// Returns the earlier of two crossings on a step, if that is certain.
 #[inline(always)]
-pub(super) fn first_of(a: StepVerdict, b: StepVerdict) -> StepVerdict {
+fn first_of(a: StepVerdict, b: StepVerdict) -> StepVerdict {
     match (a, b) {
         (StepVerdict::Clear { roomy: a }, StepVerdict::Clear { roomy: b }) => {
             StepVerdict::Clear { roomy: a && b }
