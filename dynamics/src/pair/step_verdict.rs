@@ -57,7 +57,7 @@ impl<const N: usize> PairMotion<'_, N> {
             _ => UNREACHABLE,
         };
         let [above, below] = gap.between(order, remainder, floor, ceiling);
-        if above && below {
+        if above & below {
             let room = ROOMY * remainder;
             let roomy = gap.between(order, remainder, floor + room, ceiling - room) == [true; 2];
             return StepVerdict::Clear { roomy };
