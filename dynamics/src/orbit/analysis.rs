@@ -119,6 +119,9 @@ pub(super) fn neutral_growth(from: u32, periods: f64) -> f64 {
 /// Whether a motion grows because of negative damping or stiffness, or is too short to tell. Its tangents then grow without chaos.
 /// `exponent` is the tangents' exponent per forcing period.
 pub(super) fn is_growing(flow: &Flow, strobes: &[State], exponent: f64) -> bool {
+    if !flow.escape.is_finite() {
+        return false;
+    }
     let (first, second) = strobes.split_at(strobes.len() / 2);
     let expected = SHARED_GROWTH * exponent * second.len() as f64;
     let largest = |part: &[State]| {
@@ -128,7 +131,7 @@ pub(super) fn is_growing(flow: &Flow, strobes: &[State], exponent: f64) -> bool 
     // Between two walls only the rates can grow.
     let [before, after] = [first, second].map(largest);
     let grows = [0, 1].into_iter().any(|i| (after[i] / before[i]).ln() > expected);
-    flow.escape.is_finite() && (grows || expected < PLAIN_GROWTH)
+    grows || expected < PLAIN_GROWTH
 }
 
 /// Returns the status of a motion that a stop has ended.

@@ -67,7 +67,7 @@ fn stays_among<const N: usize>(
         strobe(back).map(|y| std::array::from_fn(|i| y[i] - cycle.state[i]))
     };
     let Some(present) = deviation(0) else { return false };
-    let (mut after, mut earlier) = (present, Vec::new());
+    let (mut after, mut earlier) = (present, Vec::with_capacity(HULL_CYCLES));
     for back in 1..=HULL_CYCLES {
         let Some(before) = deviation(back).filter(|_| is_on_branch(back)) else { break };
         let error = difference(&after, &image_of(&cycle.monodromy, &before));
@@ -102,12 +102,13 @@ fn is_in_hull<const N: usize>(point: &[f64; N], corners: &[[f64; N]], metric: &M
             return true;
         }
         let along = |corner: &[f64; N]| dot(corner, &nearest);
-        let farthest = corners
+        let (least, farthest) = corners
             .iter()
-            .fold(origin, |best, corner| if along(corner) < along(&best) { *corner } else { best });
-        let step = difference(&farthest, &nearest);
+            .map(|corner| (along(corner), corner))
+            .fold((along(&origin), &origin), |best, other| if other.0 < best.0 { other } else { best });
+        let step = difference(farthest, &nearest);
         let gain = -dot(&nearest, &step);
-        if along(&farthest) > allowed * square.sqrt() || gain <= f64::EPSILON * square {
+        if least > allowed * square.sqrt() || gain <= f64::EPSILON * square {
             return false;
         }
         nearest = sum(&nearest, &step, (gain / dot(&step, &step)).min(1.0));

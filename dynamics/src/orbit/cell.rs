@@ -231,7 +231,7 @@ impl<'a> CellRun<'a> {
         let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start).allowing(self.allowance);
         while bare.period() < u64::from(turning_from) {
             if let Some(measured) = self.period(&mut bare, &mut next_check, last)? {
-                return Ok(measured);
+                return Ok(*measured);
             }
         }
         let mut carrier = bare.carrying([FRESH_TANGENT]);
@@ -240,19 +240,20 @@ impl<'a> CellRun<'a> {
                 self.exponent.reset();
             }
             if let Some(measured) = self.period(&mut carrier, &mut next_check, last)? {
-                return Ok(measured);
+                return Ok(*measured);
             }
         }
         unreachable!("the last period is checked")
     }
 
-    /// Integrates one forcing period. Checks the class if a check is due, and returns the results if it is decided.
+    /// Integrates one forcing period. Checks the class if a check is due, and returns the results if it is decided. They are boxed, because
+    /// most periods have none.
     fn period<const N: usize>(
         &mut self,
         trajectory: &mut Trajectory<'a, N>,
         next_check: &mut u32,
         last: u32,
-    ) -> Result<Option<Measurement>, Stop> {
+    ) -> Result<Option<Box<Measurement>>, Stop> {
         let mut recorder = Recorder::new(self.analysis.flow);
         trajectory.advance_period(&mut recorder)?;
         self.itineraries.push(recorder.itinerary);
@@ -263,7 +264,7 @@ impl<'a> CellRun<'a> {
         let work = trajectory.work();
         self.counts.push([work.impacts as f64, trajectory.meshing_time(), work.events as f64]);
         if self.budget.early_stop && self.is_non_impacting(trajectory) {
-            return Ok(Some(self.non_impacting()));
+            return Ok(Some(Box::new(self.non_impacting())));
         }
         if now < *next_check {
             return Ok(None);
@@ -277,7 +278,7 @@ impl<'a> CellRun<'a> {
         let is_last = [budget, decided_by, last].contains(&now);
         if let Some(orbit) = self.confirmed_orbit(&trajectory.carrying([]), is_last)? {
             let strobe = if is_last { trajectory.state() } else { orbit.strobe };
-            return Ok(Some(self.periodic(orbit, strobe)));
+            return Ok(Some(Box::new(self.periodic(orbit, strobe))));
         }
         let mut work = trajectory.work();
         work += self.newton.work();
@@ -301,7 +302,8 @@ impl<'a> CellRun<'a> {
             None => {
                 Measurement { quantities: self.analysis.quantities(&trajectory.carrying([])), ..measured }
             }
-        }))
+        })
+        .map(Box::new))
     }
 
     /// Whether an event stays near phase 0. It may alternate between the sides of the strobe; then every second period has no such event.
