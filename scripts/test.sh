@@ -245,8 +245,11 @@ fi
 phase "compilation of tests" compile_tests
 phase "tests" timed_tests "${ignored[@]}"
 phase "examples in docs" cargo test --workspace --doc
-phase "benchmarks at tiny sizes" cargo test --quiet --workspace --bench reference --bench lane
-if $all; then phase "the Python package, installed" scripts/python.sh; fi
+phase "benchmarks at tiny sizes" cargo test --quiet --workspace --bench reference
+if $all; then
+    phase "benchmarks of lanes at tiny sizes" cargo test --quiet --workspace --bench lane
+    phase "the Python package, installed" scripts/python.sh
+fi
 say "time by phase"
 printf '%s\n' "${phases[@]}"
 say "the ten slowest tests"

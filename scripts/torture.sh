@@ -40,7 +40,7 @@ attack() {
 }
 
 echo "== building"
-cargo test --quiet -p rattlemap -p rattlemap-bench --test cli --test core --test instruments --no-run
+cargo test --quiet -p rattlemap -p rattlemap-bench --test cli --test library --test instruments --no-run
 echo "== kills"
 attack $((60 * scale)) rattlemap cli killed_runs_can_be_resumed
 echo "== corruptions and cuts"
@@ -49,7 +49,7 @@ attack $((5000 * scale)) rattlemap cli a_file_may_end_anywhere
 echo "== faults of the graphics driver"
 attack $((100 * scale)) rattlemap cli a_failing_driver
 echo "== scenes"
-attack $((40000 * scale)) rattlemap core scene_fuzz
+attack $((40000 * scale)) rattlemap library scene_fuzz
 echo "== cells"
 attack $((100000 * scale)) rattlemap-bench instruments every_cell_ends_soon
 

@@ -264,7 +264,7 @@ fn start(constants: &[Option<Constants>], is_even: &[bool], lane: &Lane) -> (Cel
 mod tests {
     use super::*;
     use crate::gpu::dispatch_policy::{DEDICATED, DispatchPolicy};
-    use crate::gpu::{AdapterChoice, Precision};
+    use crate::gpu::{AdapterChoice, Features, Precision};
     use rattlemap_dynamics::model::GearPair;
     use std::time::Duration;
 
@@ -318,7 +318,16 @@ mod tests {
         let pair = GearPair::paper(0.5);
         let lanes = vec![Lane { flow: 0, law: 0, start: REST }; 1 << 14];
         let flows = [pair.oscillator().unwrap()];
-        let settings = LaneSettings::default();
+        // The smallest shader, because drivers compile it fastest.
+        let settings = LaneSettings {
+            word: false,
+            pattern: false,
+            mesh: false,
+            symmetry: false,
+            chatter: false,
+            features: Features::default(),
+            ..LaneSettings::only(1 << 16)
+        };
         let error = pollster::block_on(gpu.run(&flows, &[pair.law()], &lanes, &settings)).unwrap_err();
         assert!(matches!(error, GpuError::Lost { .. }), "{error}");
         error.to_string()

@@ -261,7 +261,7 @@ fn the_keys_of_scenes_are_those_of_the_parser() {
             &rest[..end],
             expected,
             "docs/scenes.md differs from src/map/scene/keys.rs; \
-             `REGENERATE=1 cargo test --test core the_keys_of_scenes` writes it again"
+             `REGENERATE=1 cargo test --test library the_keys_of_scenes` writes it again"
         );
     }
 }

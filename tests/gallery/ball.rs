@@ -9,7 +9,7 @@
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{first_block, followed, multipliers_apart, off_the_judge};
+use crate::gallery::cycle::{first_block, followed, multipliers_apart, off_the_judge};
 use rattlemap_dynamics::model::{REST, State, state};
 use rattlemap_dynamics::motion::EventKind;
 

@@ -17,7 +17,7 @@ use nalgebra::{Complex, Matrix2, Matrix4, Vector2, Vector4};
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{followed, multipliers, off_the_judge};
+use crate::gallery::cycle::{followed, multipliers, off_the_judge};
 use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, State, state};
 use rattlemap_dynamics::motion::EventKind;
 

@@ -5,8 +5,8 @@ use rattlemap_dynamics::model::Form;
 
 use crate::common::apart;
 use crate::common::closed_form::Linear;
-use crate::cycle::followed;
-use crate::models::Cycle;
+use crate::gallery::cycle::followed;
+use crate::gallery::models::Cycle;
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::model::{Model, REST, state};
 

@@ -3,7 +3,7 @@
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{first_block, followed, off_the_judge};
+use crate::gallery::cycle::{first_block, followed, off_the_judge};
 use rattlemap_dynamics::model::{State, state};
 use rattlemap_dynamics::motion::EventKind;
 

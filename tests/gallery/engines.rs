@@ -8,18 +8,18 @@ use std::sync::LazyLock;
 
 use nalgebra::Matrix4;
 
-use crate::ball::{ball, bounce, window};
-use crate::clearance;
-use crate::clutch;
 use crate::common::closed_form::Walled;
 use crate::common::gpu::open;
-use crate::cycle::{eigenvalues, followed, multipliers};
-use crate::elastic::{backlash, bilinear, soft};
-use crate::loose_gear::gear;
-use crate::machines;
-use crate::meissner;
-use crate::models;
-use crate::single_impact::stable;
+use crate::gallery::ball::{ball, bounce, window};
+use crate::gallery::clearance;
+use crate::gallery::clutch;
+use crate::gallery::cycle::{eigenvalues, followed, multipliers};
+use crate::gallery::elastic::{backlash, bilinear, soft};
+use crate::gallery::loose_gear::gear;
+use crate::gallery::machines;
+use crate::gallery::meissner;
+use crate::gallery::models;
+use crate::gallery::single_impact::stable;
 use rattlemap::gpu::{Features, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;

@@ -1,12 +1,12 @@
 //! The files in `models/` define the models of the closed forms.
 
-use crate::ball::ball;
-use crate::clearance;
 use crate::common::closed_form::Walled;
 use crate::common::pairs::AsPair;
-use crate::elastic::{backlash, bilinear, soft};
-use crate::loose_gear;
-use crate::single_impact::{COCO, STOP};
+use crate::gallery::ball::ball;
+use crate::gallery::clearance;
+use crate::gallery::elastic::{backlash, bilinear, soft};
+use crate::gallery::loose_gear;
+use crate::gallery::single_impact::{COCO, STOP};
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::model::{Contact, Domain, Law, Model, Pair};
 

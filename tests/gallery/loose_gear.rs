@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{followed, off_the_judge};
+use crate::gallery::cycle::{followed, off_the_judge};
 use rattlemap_dynamics::motion::EventKind;
 
 /// Two fluctuations per revolution at 900 revolutions per minute.

@@ -15,11 +15,11 @@ use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, SlipEvent, States};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse_flow};
 
-use crate::ball::{self, bounce};
 use crate::common::apart;
 use crate::common::closed_form::{self, Linear, Walled};
-use crate::cycle::{eigenvalues, off_the_judge};
-use crate::pieces;
+use crate::gallery::ball::{self, bounce};
+use crate::gallery::cycle::{eigenvalues, off_the_judge};
+use crate::gallery::pieces;
 
 /// Returns the machine of a model in `models/`.
 fn machine(name: &str, values: &[(&str, f64)]) -> Oscillator {

@@ -7,9 +7,9 @@ use rattlemap_dynamics::model::{Law, Model, Pair, state};
 
 use crate::common::apart;
 use crate::common::closed_form::Linear;
-use crate::cycle::{eigenvalues, followed};
-use crate::elastic;
-use crate::pieces::{self, End, Field, Pieces, rubbing};
+use crate::gallery::cycle::{eigenvalues, followed};
+use crate::gallery::elastic;
+use crate::gallery::pieces::{self, End, Field, Pieces, rubbing};
 
 /// A cycle.
 pub(crate) struct Cycle {

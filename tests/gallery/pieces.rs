@@ -6,7 +6,7 @@ use rattlemap_dynamics::model::Form;
 use rattlemap_dynamics::model::{Law, state};
 
 use crate::common::closed_form::Linear;
-use crate::cycle::followed;
+use crate::gallery::cycle::followed;
 
 /// Instants per period at which a motion is compared with the ends of its mode.
 const PLACES: usize = 4000;

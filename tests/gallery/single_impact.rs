@@ -15,7 +15,7 @@
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
-use crate::cycle::{eigenvalues, first_block, followed, multipliers_apart, off_the_judge};
+use crate::gallery::cycle::{eigenvalues, first_block, followed, multipliers_apart, off_the_judge};
 use rattlemap_dynamics::model::{NonImpacting, State, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::{EventKind, Trajectory};

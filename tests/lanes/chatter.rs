@@ -4,7 +4,7 @@
 use crate::common::gpu::{open, run_from_rest as run};
 use crate::common::pairs::AsPair;
 use crate::common::{REST, apart, flow_of, paper};
-use crate::counting::counting;
+use crate::lanes::counting::counting;
 use rattlemap::gpu::{LaneSettings, Precision, follows_chatter};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, Spelling, WORD_SYMBOLS};
@@ -117,6 +117,16 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Cells that chatter: class, word, impacts and exponent. Tangent vectors pass every short flight.
 #[test]
 fn chattering_cells_agree_with_the_reference() {
+    check_chatter(&[Precision::F32]);
+}
+
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn chattering_cells_in_f64_agree_with_the_reference() {
+    check_chatter(&[Precision::F64]);
+}
+
+fn check_chatter(precisions: &[Precision]) {
     let plane = [(0.3, 1.3), (0.5, 1.0), (0.56, 1.5), (0.72, 1.5), (0.2, 2.0), (0.5, 2.4), (0.8, 1.2)];
     let cells: Vec<_> = plane
         .into_iter()
@@ -128,7 +138,7 @@ fn chattering_cells_agree_with_the_reference() {
         pairs.par_iter().map(|pair| analyse(pair, REST, &Settings::default()).unwrap()).collect();
     let periodic = expected.iter().filter(|orbit| matches!(orbit.class, Class::Periodic { .. })).count();
     assert!(periodic >= 20 && periodic < cells.len(), "{periodic} cycles, and chaos");
-    for precision in Precision::ALL {
+    for &precision in precisions {
         let exponent_bar = match precision {
             Precision::F32 => 1e-5,
             Precision::F64 => 1e-9,
@@ -166,12 +176,22 @@ fn chattering_cells_agree_with_the_reference() {
 /// cycle, within a run or between two.
 #[test]
 fn hashes_of_long_patterns_agree() {
+    check_long_patterns(&[Precision::F32]);
+}
+
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn hashes_of_long_patterns_in_f64_agree() {
+    check_long_patterns(&[Precision::F64]);
+}
+
+fn check_long_patterns(precisions: &[Precision]) {
     let plane = [(114, 3), (94, 6), (109, 8), (45, 9), (111, 15), (72, 20), (101, 23), (77, 44), (52, 65)];
     let on = |(i, j): (u32, u32)| paper(0.6 + 0.2 * f64::from(i) / 119.0, 1.0 + 0.4 * f64::from(j) / 79.0);
     let pairs = plane.map(on).to_vec();
     let expected: Vec<_> =
         pairs.par_iter().map(|pair| analyse(pair, REST, &Settings::default()).unwrap()).collect();
-    for precision in Precision::ALL {
+    for &precision in precisions {
         let records = run(&mut open(precision), &pairs, &LaneSettings::default());
         let mut alike = 0;
         for ((record, orbit), place) in records.iter().zip(&expected).zip(plane) {

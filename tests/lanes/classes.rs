@@ -5,7 +5,7 @@
 use crate::common::gpu::{open, run, run_from_rest};
 use crate::common::pairs::AsPair;
 use crate::common::{REST, paper as pair};
-use crate::kinds;
+use crate::lanes::kinds;
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;

@@ -1,7 +1,7 @@
 //! Counts of work, which do not depend on the speed of the machine.
 //!
 //! A snapshot that differs is a change in cost. If it is intended, accept it with `INSTA_UPDATE=always cargo test
-//! --test lanes counters` (or `cargo insta review`) and give the reason in the commit. Counts are means over 100
+//! --test library counters` (or `cargo insta review`) and give the reason in the commit. Counts are means over 100
 //! forcing periods of settled cycles, to three significant digits. Other drivers and processors give the same counts,
 //! but 2 % more work shows.
 
@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 use crate::common::gpu::{open, run_from_rest};
 use crate::common::{REST, flow_of, paper, work_since};
-use crate::counting::{LOOPS, counting};
+use crate::lanes::counting::{LOOPS, counting};
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::motion::Trajectory;

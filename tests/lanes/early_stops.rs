@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::common::{REST, flow_of, gpu};
-use crate::kinds::draw::Numbers;
+use crate::lanes::kinds::draw::Numbers;
 use rattlemap::gpu::Precision;
 use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::{Cell, Plan};

@@ -6,9 +6,9 @@
 use crate::common::linear::Linear;
 use crate::common::pairs::{AsPair, Friction, Rubbing};
 use crate::common::{BUDGET, apart};
-use crate::kinds::draw::{Numbers, random_cell};
-use crate::kinds::{self, Cell};
-use crate::measures::{self, MEASURES};
+use crate::lanes::kinds::draw::{Numbers, random_cell};
+use crate::lanes::kinds::{self, Cell};
+use crate::lanes::measures::{self, MEASURES};
 use rattlemap::gpu::{Features, GpuError, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;

@@ -4,7 +4,7 @@
 
 use crate::common::BUDGET;
 use crate::common::pairs::AsPair;
-use crate::kinds::{self, Cell};
+use crate::lanes::kinds::{self, Cell};
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;

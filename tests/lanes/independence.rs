@@ -29,8 +29,8 @@ struct Cut {
     turn: usize,
 }
 
-fn cut() -> impl Strategy<Value = Cut> {
-    (1..40usize, 60..4000u32, prop::sample::select(vec![32, 64]), 0..24usize)
+fn cut(workgroups: &[u32]) -> impl Strategy<Value = Cut> + use<> {
+    (1..40usize, 60..4000u32, prop::sample::select(workgroups.to_vec()), 0..24usize)
         .prop_map(|(batch, iterations, workgroup, turn)| Cut { batch, iterations, workgroup, turn })
 }
 
@@ -45,22 +45,22 @@ fn records(
 
 #[test]
 fn records_do_not_depend_on_how_the_work_is_cut() {
-    check_cuts(Precision::F32);
+    check_cuts(Precision::F32, &[64]);
 }
 
 /// The layout of f64 differs; `engines_agree` divides its work as well.
 #[test]
 #[ignore = "compiles a dozen shaders; scripts/test.sh --all"]
-fn records_in_f64_do_not_depend_on_how_the_work_is_cut() {
-    check_cuts(Precision::F64);
+fn records_do_not_depend_on_the_workgroup() {
+    Precision::ALL.into_iter().for_each(|precision| check_cuts(precision, &[32, 64]));
 }
 
 /// Compares all fields of all records, to the bit, over batch sizes, dispatch lengths, workgroup sizes and
 /// neighbours.
-fn check_cuts(precision: Precision) {
+fn check_cuts(precision: Precision, workgroups: &[u32]) {
     let mut runner = TestRunner::new(ProptestConfig { cases: 10, ..ProptestConfig::default() });
     let device = RefCell::new(gpu::open(precision));
-    let cases = (prop::collection::vec(cell(), 24), cut(), any::<bool>(), any::<bool>());
+    let cases = (prop::collection::vec(cell(), 24), cut(workgroups), any::<bool>(), any::<bool>());
     runner
         .run(&cases, |(cells, cut, early_stop, exponent)| {
             let (flows, laws, mut lanes) = gpu::lanes(&cells);
@@ -89,14 +89,23 @@ fn check_cuts(precision: Precision) {
 /// of lanes that run together. With the dispatch policy of a card, rounds have several parts and there is one variant.
 #[test]
 fn records_do_not_depend_on_when_lanes_begin() {
+    check_begins(&[(Precision::F32, false)]);
+}
+
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn records_of_each_dispatch_policy_do_not_depend_on_when_lanes_begin() {
+    check_begins(&[(Precision::F64, false), (Precision::F32, true)]);
+}
+
+/// Checks devices of these precisions, each with the policy of a card or of a software driver.
+fn check_begins(devices: &[(Precision, bool)]) {
     let pair = |i: u32| paper(f64::from(i * 23 % 60) / 60.0, 1.0 + f64::from(i * 37 % 60) / 6.0);
     let cells: Vec<_> = (0..60).map(|i| (pair(i), REST)).collect();
     let (flows, laws, together) = gpu::lanes(&cells);
     let lanes: Vec<(u32, Lane)> = (1000..).zip(together.iter().copied()).collect();
     let settings = LaneSettings { iterations: 500, ..LaneSettings::default() };
-    for (precision, is_dedicated) in
-        [(Precision::F32, false), (Precision::F64, false), (Precision::F32, true)]
-    {
+    for &(precision, is_dedicated) in devices {
         let mut device = gpu::open(precision);
         if is_dedicated {
             device.drive_as_dedicated();

@@ -32,7 +32,7 @@ fn plan(refine: &str) -> Plan {
 /// Records of the map in which every cell is integrated.
 static WHOLE: LazyLock<Vec<Record>> = LazyLock::new(|| {
     let plan = plan("");
-    crate::computed(&plan, &mut Engine::Cpu(Cpu::new(&plan)), plan.cell_count())
+    crate::map::computed(&plan, &mut Engine::Cpu(Cpu::new(&plan)), plan.cell_count())
 });
 
 /// Computes the adaptive map with `audited` cells in its only audit.

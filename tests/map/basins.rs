@@ -250,7 +250,7 @@ fn check_labels(precision: Precision) {
     let plan = Plan::new(&scene);
     let reference = job::run(&scene, Processor::Cpu).unwrap();
     let expected = reference.basins().unwrap();
-    let records = crate::computed(&plan, &mut gpu::engine(&plan, precision), plan.cell_count());
+    let records = crate::map::computed(&plan, &mut gpu::engine(&plan, precision), plan.cell_count());
     let lanes = attractors::basins(&plan, &records, &[]).unwrap();
     check_counts(&lanes);
     let mut differing = 0;

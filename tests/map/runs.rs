@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::common::gpu;
-use crate::{Swept, computed, swept};
+use crate::map::{Swept, computed, swept};
 use rattlemap::gpu::Precision;
 use rattlemap::map::engine::{Cpu, Engine, EngineError, Fake};
 use rattlemap::map::plan::{Cell, Plan};

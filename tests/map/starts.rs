@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use crate::common::{REST, apart, gpu, pair_at};
-use crate::swept;
+use crate::map::swept;
 use assert_cmd::Command;
 use rattlemap::findings::coexistence::attractors;
 use rattlemap::gpu::Precision;

@@ -11,7 +11,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::page::{WITHOUT_GRAPHICS, between, chromium, hashed, skipped, visit};
+use crate::report::page::{WITHOUT_GRAPHICS, between, chromium, hashed, skipped, visit};
 
 /// Functions for scripts that wait for workers. The browser's virtual time does not wait for them, so each step takes some
 /// real time.

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use crate::fixtures::cpu_records;
+use crate::validate::fixtures::cpu_records;
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};

@@ -1,6 +1,6 @@
 //! The rates that a validation reports at half the meshing speed must equal those that two maps give.
 
-use crate::fixtures::{cpu_records, validate_all};
+use crate::validate::fixtures::{cpu_records, validate_all};
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Quantity, Scene};

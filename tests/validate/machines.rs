@@ -1,6 +1,6 @@
 //! Maps of machines, judged by the ODE solver.
 
-use crate::fixtures::{cpu_records, unexplained, validate_all};
+use crate::validate::fixtures::{cpu_records, unexplained, validate_all};
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};

@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use crate::fixtures::{cpu_identity, cpu_records, read_records, unexplained, validate_all, validate_runs};
+use crate::validate::fixtures::{
+    cpu_identity, cpu_records, read_records, unexplained, validate_all, validate_runs,
+};
 use assert_cmd::Command;
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::common::gpu::{map, open};
-use crate::fixtures::{
+use crate::validate::fixtures::{
     EVERYTHING, cpu_identity, cpu_records, kind, kinds, read_records, sample_of, unexplained, validate_all,
     validate_first,
 };

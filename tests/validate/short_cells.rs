@@ -1,7 +1,7 @@
 //! Cells of random parameters, which run for 64 periods: the rows of `data/short_cells.csv`.
 
 use crate::common::gpu::{map, open};
-use crate::fixtures::EVERYTHING;
+use crate::validate::fixtures::EVERYTHING;
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Integration, Scene, Start};
@@ -44,7 +44,7 @@ pub(crate) fn plan(pair: GearPair, start: State) -> Plan {
         .axis("mesh_speed", pair.mesh_speed..=2.0 * pair.mesh_speed + 1.0, 2)
         .integration(integration)
         .start(Start::State(start))
-        .quantities(&EVERYTHING[..6]);
+        .quantities(&EVERYTHING);
     Plan::new(&scene.build().unwrap())
 }
 

@@ -3,8 +3,8 @@
 //! The lanes need an adapter; the tests fail without one: see `scripts/test.sh`.
 
 use crate::common::pair_at;
-use crate::fixtures::kind;
-use crate::short_cells::{first_plan, lane, plan, plans};
+use crate::validate::fixtures::kind;
+use crate::validate::short_cells::{first_plan, lane, plan, plans};
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::record::classify::{classify, status};

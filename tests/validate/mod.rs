@@ -1,7 +1,5 @@
 //! Tests of the validation of finished maps, of correct maps and of maps with planted errors.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod fixtures;
 mod short_cells;
 

@@ -1,8 +1,5 @@
 //! Lanes on a device, compared with the reference and with each other.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 /// Random machines and numbers, as the tests of the reference draw them.
 #[path = "../../dynamics/tests/core"]
 mod random_models {

@@ -8,9 +8,6 @@ use rattlemap::map::schedule::Schedule;
 use rattlemap::map::sweep::{self, SweepError};
 use rattlemap::record::Record;
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod audit;
 mod axes;
 mod basins;

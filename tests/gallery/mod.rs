@@ -3,8 +3,6 @@
 //!
 //! Each file contains one kind of model, with equations of its own. A test compares them with the files in `models/`.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod cycle;
 
 mod backlash;
