@@ -1,6 +1,7 @@
 //! One coordinate between walls in closed form: `m x'' + c x' + k x = F cos(omega t) + load` from event to event.
 //! Only the times of events are searched for, by bisection. Written from the equations of motion, for tests alone.
 
+use super::linear::unforced;
 use rattlemap_dynamics::model::{Contact, Domain, Law, Pair};
 use rattlemap_dynamics::motion::EventKind;
 
@@ -106,6 +107,18 @@ const SIGNS: [f64; 2] = [1.0, -1.0];
 /// Points per period at which signs are compared.
 const PLACES: usize = 4000;
 
+/// Returns the first time up to `rest` at which a condition holds, by steps of `h` and bisection.
+pub(crate) fn first_time(h: f64, rest: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
+    let mut steps = (1..).map(|j| h * f64::from(j)).take_while(|&tau| tau < rest).chain([rest]);
+    let mut hi = steps.find(|&tau| holds(tau))?;
+    let mut lo = (hi - h).max(0.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (lo + hi);
+        if holds(middle) { hi = middle } else { lo = middle }
+    }
+    Some(hi)
+}
+
 impl Walled {
     /// Returns the oscillator and its law for the library.
     pub(crate) fn oscillator(&self) -> (Pair, Law) {
@@ -119,20 +132,13 @@ impl Walled {
             _ => 0.0,
         };
         let oscillator = Pair {
-            degrees: 1,
             mass: [[self.free.m, 0.0], [0.0, 1.0]],
-            gap: [1.0, 0.0],
             walls: [at(0), at(1)],
             contacts: [contact(0), contact(1)],
             omega: self.free.omega,
             force: [self.free.force, 0.0],
-            force_sin: [0.0; 2],
-            harmonics: Vec::new(),
-            stages: Vec::new(),
-            schedule: Vec::new(),
-            outer_walls: Default::default(),
-            free: self.free.domain(),
             meshing: [self.behind(0).domain(), self.behind(1).domain()],
+            ..unforced(1, self.free.domain())
         };
         (oscillator, Law { restitution: [restitution(0), restitution(1)], mesh_speed: [0.0; 2] })
     }
@@ -176,19 +182,14 @@ impl Walled {
                     Mode::Behind(0) | Mode::Stuck(0) => &[0],
                     _ => &[1],
                 };
-                let steps = (1..).map(|j| h * f64::from(j)).take_while(|&tau| tau < rest).chain([rest]);
-                let first = |tau: f64| watched.iter().find(|&&i| left(i, tau) < 0.0).map(|&i| (i, tau));
-                let Some((i, mut hi)) = steps.into_iter().find_map(first) else {
+                let ended = |tau: f64| watched.iter().copied().find(|&i| left(i, tau) < 0.0);
+                let Some(flown) = first_time(h, rest, |tau| ended(tau).is_some()) else {
                     y = state(rest);
                     break;
                 };
-                let mut lo = (hi - h).max(0.0);
-                for _ in 0..60 {
-                    let middle = 0.5 * (lo + hi);
-                    if left(i, middle) < 0.0 { hi = middle } else { lo = middle }
-                }
-                y = state(hi);
-                t += hi;
+                let i = ended(flown).expect("a wall");
+                y = state(flown);
+                t += flown;
                 let s = SIGNS[i];
                 assert!(events.len() < 1000, "infinitely many impacts");
                 let wall = self.walls[i].expect("reached");

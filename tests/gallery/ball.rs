@@ -67,25 +67,6 @@ fn the_orbit_of_one_bounce_agrees_with_the_closed_form() {
     }
 }
 
-/// The ball sticks until the table's downward acceleration is that of gravity: `G cos(omega t) = 1`.
-#[test]
-fn sticking_ends_at_the_acceleration_of_gravity() {
-    for shaking in [1.2, 1.5, 1.9] {
-        let (oscillator, law) = ball(shaking, 0.0).oscillator();
-        // The ball starts at rest on the table.
-        let found = followed(&oscillator, law, REST, 3);
-        let ends: Vec<_> = found.events.iter().filter(|event| event.kind == EventKind::MeshEnd).collect();
-        assert!(ends.len() >= 2, "{:?}", found.events);
-        for end in ends {
-            let off = (shaking * end.t.cos() - 1.0).abs();
-            assert!(off < 1e-12 && end.after[..2] == [0.0; 2], "G = {shaking}: {end:?}");
-        }
-        assert!(off_the_judge(&oscillator, law, REST, 3) < 1e-10);
-        // Sticking removes all perturbations.
-        assert!(found.monodromy.iter().all(|&x| x == 0.0));
-    }
-}
-
 /// Bouncing on a table at rest ends after the time `2 w/(1 - e)`.
 #[test]
 fn infinitely_many_bounces_end_at_the_computed_time() {

@@ -17,8 +17,9 @@ use nalgebra::{Complex, Matrix2, Matrix4, Vector2, Vector4};
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
+use crate::common::linear::unforced;
 use crate::gallery::cycle::{followed, multipliers, off_the_judge};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, State, state};
+use rattlemap_dynamics::model::{Domain, Law, Pair, State, state};
 use rattlemap_dynamics::motion::EventKind;
 
 const MU: f64 = 0.05;
@@ -37,20 +38,12 @@ pub(crate) fn pair(omega: f64) -> (Pair, Law) {
         preload: 0.0,
     };
     let oscillator = Pair {
-        degrees: 2,
         mass: [[1.0, 0.0], [0.0, MU]],
         gap: [1.0, -1.0],
         walls: [DELTA, -DELTA],
-        contacts: [Contact::Rigid; 2],
         omega,
         force: [1.0, 0.0],
-        force_sin: [0.0; 2],
-        harmonics: Vec::new(),
-        stages: Vec::new(),
-        schedule: Vec::new(),
-        outer_walls: Default::default(),
-        free: domain,
-        meshing: [domain; 2],
+        ..unforced(2, domain)
     };
     (oscillator, Law::both(E, 0.0))
 }
@@ -102,20 +95,12 @@ impl Damper {
             preload: 0.0,
         };
         let oscillator = Pair {
-            degrees: 2,
             mass: [[self.mass, 0.0], [0.0, self.free_mass]],
             gap: [1.0, -1.0],
             walls: [0.5 * self.clearance, -0.5 * self.clearance],
-            contacts: [Contact::Rigid; 2],
             omega: self.omega,
             force: [self.force, 0.0],
-            force_sin: [0.0; 2],
-            harmonics: Vec::new(),
-            stages: Vec::new(),
-            schedule: Vec::new(),
-            outer_walls: Default::default(),
-            free: domain,
-            meshing: [domain; 2],
+            ..unforced(2, domain)
         };
         (oscillator, Law::both(self.e, 0.0))
     }

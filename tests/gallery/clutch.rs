@@ -1,13 +1,13 @@
 //! A clutch disc with two spring stages and stops: cycles in closed form, from piece to piece of the spring's characteristic.
 
+use crate::common::built_in;
 use nalgebra::Matrix2;
 use rattlemap_dynamics::model::Form;
 
 use crate::common::apart;
-use crate::common::closed_form::Linear;
+use crate::common::closed_form::{Linear, first_time};
 use crate::gallery::cycle::followed;
 use crate::gallery::models::Cycle;
-use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::model::{Model, REST, state};
 
 /// `x'' + 2 zeta x' + f(x) = F_m + F cos(omega t)`: f has the slope 0 up to |x| = 1, `SLOPES[1]` up to 2 and `SLOPES[2]` up to the
@@ -57,19 +57,8 @@ fn run(omega: f64, force: f64, start: [f64; 2], periods: u32) -> End {
                 let inner = if n == 0 { x + ENDS[0] } else { x - ENDS[n - 1] };
                 inner.min(ENDS[n] - x)
             };
-            let steps = (1..).map(|j| h * f64::from(j)).take_while(|&tau| tau < rest).chain([rest]);
-            let left = steps.into_iter().find(|&tau| inside(tau) < 0.0);
-            let flown = match left {
-                None => rest,
-                Some(mut hi) => {
-                    let mut lo = (hi - h).max(0.0);
-                    for _ in 0..60 {
-                        let middle = 0.5 * (lo + hi);
-                        if inside(middle) < 0.0 { hi = middle } else { lo = middle }
-                    }
-                    hi
-                }
-            };
+            let left = first_time(h, rest, |tau| inside(tau) < 0.0);
+            let flown = left.unwrap_or(rest);
             y = field.after(t, y, flown);
             t += flown;
             let [[a, b], [c, d]] = field.propagator(flown);
@@ -102,10 +91,7 @@ pub(crate) fn cycles() -> Vec<Cycle> {
     [(0.9, 0.3), (0.8, 0.25), (1.1, 0.2), (1.5, 0.5), (0.5, 1.2), (0.7, 1.3), (1.0, 2.5)]
         .into_iter()
         .map(|(omega, force)| {
-            let mut model = FileModel::built_in("clutch").expect("built in");
-            [("omega", omega), ("F", force)]
-                .into_iter()
-                .for_each(|(name, value)| model.set(name, value).expect("a parameter"));
+            let model = built_in("clutch", &[("omega", omega), ("F", force)]);
             let (oscillator, law) = (Form::from(&model.oscillator().unwrap()), model.law());
             let [x, v, ..] = followed(&oscillator, law, REST, 1200).end;
             let closes = |&period: &u32| {

@@ -8,6 +8,7 @@ use std::sync::LazyLock;
 
 use nalgebra::Matrix4;
 
+use crate::common::BUDGET;
 use crate::common::closed_form::Walled;
 use crate::common::gpu::open;
 use crate::gallery::ball::{ball, bounce, window};
@@ -51,59 +52,33 @@ static KNOWN: LazyLock<Vec<Known>> = LazyLock::new(known_cycles);
 
 fn known_cycles() -> Vec<Known> {
     let mut list = Vec::new();
+    let without_rest = |what, (oscillator, law), period, strobe, radius, impacts| {
+        let oscillator = Form::Pair(oscillator);
+        Known { what, oscillator, law, period, strobe, radius, impacts, stays: false, unit: 1.0 }
+    };
     for (stop, period) in stable() {
-        let (orbit, (oscillator, law)) = (stop.orbits(period)[0], stop.walled().oscillator());
+        let orbit = stop.orbits(period)[0];
         let radius = eigenvalues(orbit.monodromy)[0].norm();
         let what = format!("one stop, omega = {}, n = {period}", stop.omega);
-        list.push(Known {
-            what,
-            oscillator: Form::Pair(oscillator),
-            law,
-            period,
-            strobe: orbit.strobe,
-            radius,
-            impacts: 1.0,
-            stays: false,
-            unit: 1.0,
-        });
+        list.push(without_rest(what, stop.walled().oscillator(), period, orbit.strobe, radius, 1.0));
     }
     for e in [0.3, 0.5, 0.8] {
         let [born, doubles] = window(e);
         for share in [0.2, 0.5, 0.8] {
             let shaking = born + share * (doubles - born);
             // Below G = 1 a ball that sticks is never released.
-            let ((strobe, matrix), (oscillator, law)) = (bounce(shaking, e), ball(shaking, e).oscillator());
+            let (strobe, matrix) = bounce(shaking, e);
             let (radius, what) = (eigenvalues(matrix)[0].norm(), format!("ball, e = {e}, G = {shaking:.3}"));
-            list.push(Known {
-                what,
-                oscillator: Form::Pair(oscillator),
-                law,
-                period: 1,
-                strobe,
-                radius,
-                impacts: 1.0,
-                stays: false,
-                unit: 1.0,
-            });
+            list.push(without_rest(what, ball(shaking, e).oscillator(), 1, strobe, radius, 1.0));
         }
     }
-    for (what, (oscillator, law)) in clearance::clearances() {
-        for orbit in clearance::symmetric(&(oscillator.clone(), law)) {
+    for (what, model) in clearance::clearances() {
+        for orbit in clearance::symmetric(&model) {
             let monodromy: Matrix4<f64> = orbit.half * orbit.half;
             let [re, im] = multipliers(&monodromy).unwrap()[0];
             let radius = re.hypot(im);
             if orbit.is_free_between && radius < 1.0 {
-                list.push(Known {
-                    what: what.clone(),
-                    oscillator: Form::Pair(oscillator.clone()),
-                    law,
-                    period: 1,
-                    strobe: orbit.strobe,
-                    radius,
-                    impacts: 2.0,
-                    stays: false,
-                    unit: 1.0,
-                });
+                list.push(without_rest(what.clone(), model.clone(), 1, orbit.strobe, radius, 2.0));
             }
         }
     }
@@ -160,15 +135,7 @@ fn settled(walled: &Walled, [x, v]: [f64; 2]) -> ([f64; 2], u32) {
 const SETTINGS: Settings = Settings { transient_periods: 400, observed_periods: 128, max_period: 16 };
 
 fn budget() -> Budget {
-    Budget {
-        settings: SETTINGS,
-        early_stop: true,
-        undecided_periods: 0,
-        confirm_chaos: 0,
-        exponent: true,
-        shows_exponent: true,
-        quantities: false,
-    }
+    Budget { settings: SETTINGS, undecided_periods: 0, ..BUDGET }
 }
 
 /// Returns a start near the cycle.

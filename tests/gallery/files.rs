@@ -1,5 +1,6 @@
 //! The files in `models/` define the models of the closed forms.
 
+use crate::common::built_in;
 use crate::common::closed_form::Walled;
 use crate::common::pairs::AsPair;
 use crate::gallery::ball::ball;
@@ -20,8 +21,7 @@ fn is_near(ours: &[f64], theirs: &[f64]) -> bool {
 }
 
 fn agrees(name: &str, sets: &[(&str, f64)], (ours, law): (Pair, Law)) {
-    let mut model = FileModel::built_in(name).expect("built in");
-    sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
+    let model = built_in(name, sets);
     let theirs = model.pair();
     let flat = |o: &Pair| {
         [o.mass.as_flattened(), &o.gap, &o.walls, &[o.omega], &o.force, &numbers(&o.free)].concat()

@@ -1,13 +1,12 @@
 //! Dry friction: Den Hartog's border of stops, the border of rattle of a gear that sticks to its shaft, and a closed valve.
 
-use rattlemap::model_file::FileModel;
+use crate::common::built_in;
 use rattlemap_dynamics::model::{Model, REST, State};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse_flow};
 
 fn motion(name: &str, values: &[(&str, f64)], start: State) -> Orbit {
-    let mut model = FileModel::built_in(name).expect("built in");
-    values.iter().for_each(|&(name, value)| model.set(name, value).unwrap());
+    let model = built_in(name, values);
     analyse_flow(&Flow::of(&model).unwrap(), model.law(), start, &Settings::default(), 8)
 }
 

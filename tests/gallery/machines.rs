@@ -1,11 +1,11 @@
 //! Machines: two loose gears on a heavy shaft, a chain between impacts in closed form, harmonics and their phase, restitution that depends
 //! on the speed, and the balance of energy.
 
+use crate::common::built_in;
 use crate::common::pairs::AsPair;
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2};
 use rattlemap_dynamics::model::Form;
 
-use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{
     Contact, Drive, DryFriction, Forces, GapRow, Law, Model, Oscillator, REST, Restitution, Side, Spring,
@@ -16,16 +16,14 @@ use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, SlipEvent, State
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse_flow};
 
 use crate::common::apart;
-use crate::common::closed_form::{self, Linear, Walled};
+use crate::common::closed_form::{self, Linear, Walled, first_time};
 use crate::gallery::ball::{self, bounce};
 use crate::gallery::cycle::{eigenvalues, off_the_judge};
 use crate::gallery::pieces;
 
 /// Returns the machine of a model in `models/`.
 fn machine(name: &str, values: &[(&str, f64)]) -> Oscillator {
-    let mut model = FileModel::built_in(name).expect("built in");
-    values.iter().for_each(|&(name, value)| model.set(name, value).expect("a parameter"));
-    model.oscillator().unwrap()
+    built_in(name, values).oscillator().unwrap()
 }
 
 /// An event at a wall, and the states before and after it.
@@ -339,19 +337,13 @@ impl Chain {
         for _ in 0..periods {
             let mut t = 0.0;
             loop {
-                let steps = (1..).map(|j| h * f64::from(j)).take_while(|&tau| tau < period - t);
-                let Some(mut hi) = steps.chain([period - t]).find(|&tau| is_outside(&self.after(t, &y, tau)))
-                else {
+                let hits = |tau: f64| is_outside(&self.after(t, &y, tau));
+                let Some(flown) = first_time(h, period - t, hits) else {
                     y = self.after(t, &y, period - t);
                     break;
                 };
-                let mut lo = (hi - h).max(0.0);
-                for _ in 0..60 {
-                    let middle = 0.5 * (lo + hi);
-                    if is_outside(&self.after(t, &y, middle)) { hi = middle } else { lo = middle }
-                }
-                y = self.after(t, &y, hi);
-                t += hi;
+                y = self.after(t, &y, flown);
+                t += flown;
                 y[2 * LINKS] = y[2 * LINKS - 2] + gap(&y).clamp(-0.5, 0.5);
                 let rate = y[2 * LINKS + 1] - y[2 * LINKS - 1];
                 let impulse = -(1.0 + e) * rate / (1.0 / self.mass + 1.0 / ball);
@@ -442,8 +434,7 @@ fn a_chain_moves_in_its_normal_modes_until_the_ball_hits_it() {
 #[test]
 fn turbine_gears_with_three_harmonics_agree_with_the_integrator() {
     for (omega, load) in [(2e4, 3800.0), (4e4, 800.0), (6e4, 300.0), (9e4, 100.0)] {
-        let mut model = FileModel::built_in("turbine-gears").unwrap();
-        [("omega", omega), ("T", load)].into_iter().for_each(|(name, value)| model.set(name, value).unwrap());
+        let model = built_in("turbine-gears", &[("omega", omega), ("T", load)]);
         let (oscillator, law) = (model.pair(), model.law());
         // In units of the half backlash and of the time, as the tolerances of the integrator are.
         let start = state(&[1.2e-4, 0.0]);

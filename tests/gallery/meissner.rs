@@ -3,10 +3,11 @@
 //! E. Meissner, Schweizerische Bauzeitung 72 (1918) 95: rest is stable if the modulus of the trace of the matrix of one period is
 //! less than 1 plus its determinant.
 
+use crate::common::built_in;
 use nalgebra::{Complex, Matrix2};
 
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::model::{Model, state};
+use rattlemap_dynamics::model::state;
 use rattlemap_dynamics::orbit::{Class, Settings, analyse};
 
 const ZETA: f64 = 0.01;
@@ -32,10 +33,7 @@ pub(crate) fn points() -> Vec<Point> {
     let point = |(delta, epsilon): (f64, f64)| {
         let matrix = half(delta - epsilon) * half(delta + epsilon);
         let margin = 1.0 + matrix.determinant() - matrix.trace().abs();
-        let mut model = FileModel::built_in("meissner").expect("built in");
-        [("delta", delta), ("epsilon", epsilon), ("zeta", ZETA)]
-            .into_iter()
-            .for_each(|(name, value)| model.set(name, value).unwrap());
+        let model = built_in("meissner", &[("delta", delta), ("epsilon", epsilon), ("zeta", ZETA)]);
         let what = format!("delta = {delta}, epsilon = {epsilon}, {margin}");
         (margin.abs() >= 0.05).then_some(Point { what, model, is_stable: margin > 0.0 })
     };

@@ -5,7 +5,6 @@
 
 mod cycle;
 
-mod backlash;
 mod ball;
 mod clearance;
 mod clutch;

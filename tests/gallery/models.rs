@@ -1,7 +1,7 @@
 //! Cycles of models in `models/` whose equations of motion are linear in pieces. Their equations are written here again.
 
+use crate::common::built_in;
 use crate::common::pairs::omega_of;
-use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::model::Form;
 use rattlemap_dynamics::model::{Law, Model, Pair, state};
 
@@ -37,8 +37,7 @@ struct Case {
 
 impl Case {
     fn new(name: &str, values: &[(&str, f64)], pieces: Pieces, start: [f64; 2]) -> Case {
-        let mut model = FileModel::built_in(name).expect("built in");
-        values.iter().for_each(|&(name, value)| model.set(name, value).expect("a parameter"));
+        let model = built_in(name, values);
         let values: Vec<_> = values.iter().map(|(name, value)| format!("{name} = {value:.4}")).collect();
         Case {
             what: format!("{name}, {}", values.join(", ")),

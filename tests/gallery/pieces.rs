@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, RowVector2, Vector2};
 use rattlemap_dynamics::model::Form;
 use rattlemap_dynamics::model::{Law, state};
 
-use crate::common::closed_form::Linear;
+use crate::common::closed_form::{Linear, first_time};
 use crate::gallery::cycle::followed;
 
 /// Instants per period at which a motion is compared with the ends of its mode.
@@ -126,16 +126,7 @@ impl Pieces {
                     (end.y, last(stage) - t, mode.fields.as_ref().map(|fields| &fields[stage]));
                 let after = |tau: f64| field.map_or(from, |field| field.after(t, from, tau));
                 let left = |tau: f64| mode.exits.iter().find(|exit| (exit.within)(t + tau, after(tau)) < 0.0);
-                let steps = (1..).map(|j| h * f64::from(j)).take_while(|&tau| tau < rest).chain([rest]);
-                let first = steps.into_iter().find(|&tau| left(tau).is_some());
-                let flown = first.map_or(rest, |mut hi| {
-                    let mut lo = (hi - h).max(0.0);
-                    for _ in 0..60 {
-                        let middle = 0.5 * (lo + hi);
-                        if left(middle).is_some() { hi = middle } else { lo = middle }
-                    }
-                    hi
-                });
+                let flown = first_time(h, rest, |tau| left(tau).is_some()).unwrap_or(rest);
                 let exit = left(flown);
                 end.y = after(flown);
                 if let Some(field) = field {

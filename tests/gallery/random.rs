@@ -12,7 +12,7 @@ use rattlemap::gpu::{Constants, Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::{Needs, Plan};
 use rattlemap::map::random::Random;
-use rattlemap::map::scene::{Integration, Quantity, Scene, Start};
+use rattlemap::map::scene::{Integration, Scene, Start};
 use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::{classify, status};
@@ -25,8 +25,9 @@ use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Budget, Class, Measurement, Settings, Status, measure};
 
-use crate::common::apart;
 use crate::common::gpu::open;
+use crate::common::{BUDGET, apart};
+use crate::validate::fixtures::EVERYTHING;
 
 /// Longest time for one cell.
 const LONGEST_TIME: Duration = Duration::from_secs(60);
@@ -140,15 +141,7 @@ pub(crate) const SETTINGS: Settings =
     Settings { transient_periods: 32, observed_periods: 32, max_period: 16 };
 
 pub(crate) fn budget() -> Budget {
-    Budget {
-        settings: SETTINGS,
-        early_stop: true,
-        undecided_periods: 0,
-        confirm_chaos: 0,
-        exponent: true,
-        shows_exponent: true,
-        quantities: false,
-    }
+    Budget { settings: SETTINGS, undecided_periods: 0, ..BUDGET }
 }
 
 /// Computes a cell with the reference and measures the time.
@@ -273,20 +266,11 @@ fn validate(
         max_period: SETTINGS.max_period,
         ..Integration::default()
     };
-    let quantities = [
-        Quantity::Class,
-        Quantity::Lyapunov,
-        Quantity::Impacts,
-        Quantity::Mesh,
-        Quantity::Symmetric,
-        Quantity::Word,
-        Quantity::Pattern,
-    ];
     let scene = Scene::builder(cell.model.clone())
         .cells(["omega"], &[[cell.oscillator.omega]])
         .start(Start::State(cell.start))
         .integration(integration)
-        .quantities(&quantities)
+        .quantities(&EVERYTHING)
         .build();
     let plan = Plan::new(&scene.expect("a valid scene"));
     assert_eq!(plan.form(plan.cell(0).flow), Form::Pair(cell.oscillator.clone()));
@@ -363,15 +347,9 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
 }
 
 #[test]
-#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
-fn lanes_in_f32_agree_on_random_models() {
-    lanes_agree(Precision::F32, 0..400, TOLERATED);
-}
-
-#[test]
 #[ignore = "takes minutes; scripts/test.sh --all"]
-fn lanes_in_f64_agree_on_random_models() {
-    lanes_agree(Precision::F64, 0..400, TOLERATED);
+fn lanes_agree_on_random_models() {
+    Precision::ALL.into_iter().for_each(|precision| lanes_agree(precision, 0..400, TOLERATED));
 }
 
 /// Tolerated share of unexplained models. Only 64 periods are computed, so that more models than cells of a map are about to
@@ -379,13 +357,7 @@ fn lanes_in_f64_agree_on_random_models() {
 const MOST_UNEXPLAINED: f64 = 1e-3;
 
 #[test]
-#[ignore = "two minutes"]
-fn lanes_in_f32_agree_on_twenty_thousand_models() {
-    lanes_agree(Precision::F32, 0..20_000, MOST_UNEXPLAINED);
-}
-
-#[test]
-#[ignore = "two minutes"]
-fn lanes_in_f64_agree_on_twenty_thousand_models() {
-    lanes_agree(Precision::F64, 0..20_000, MOST_UNEXPLAINED);
+#[ignore = "four minutes"]
+fn lanes_agree_on_twenty_thousand_models() {
+    Precision::ALL.into_iter().for_each(|precision| lanes_agree(precision, 0..20_000, MOST_UNEXPLAINED));
 }

@@ -97,14 +97,6 @@ impl Stop {
             [[-self.e * e11, -self.e * e12], [shear * e11 - self.e * e21, shear * e12 - self.e * e22]];
         Orbit { leaving, phase, strobe: state(&[x, v]), monodromy }
     }
-
-    /// Returns the position of the stop at which both orbits of one impact coincide.
-    fn fold(&self, n: u32) -> f64 {
-        let ([_, b], [square, ..]) = self.ellipse(n);
-        let [amplitude, _] = self.response();
-        // The discriminant: a^2 sigma^2 = square (sigma^2 - P^2), square - a^2 = (b/omega)^2.
-        amplitude * square.sqrt() / (b / self.omega).abs()
-    }
 }
 
 /// The impact oscillator of the gallery.
@@ -186,30 +178,5 @@ fn grazing_agrees_with_the_response() {
             NonImpacting::new(&oscillator).is_some()
         };
         assert!(!is_clear(1.0 - 1e-8) && is_clear(1.0 + 1e-7));
-    }
-}
-
-/// Without damping (Budd and Dux), both orbits coincide at the ends of the ellipse, where a multiplier is 1.
-#[test]
-fn the_ends_of_the_ellipse_are_folds() {
-    for (omega, n) in [(1.3, 1), (1.6, 1), (1.9, 1), (3.4, 2), (3.7, 2)] {
-        let stop = Stop { c: 0.0, omega, ..STOP };
-        let fold = stop.fold(n);
-        assert!(Stop { sigma: fold * (1.0 + 1e-10), ..stop }.orbits(n).is_empty());
-        let just = Stop { sigma: fold * (1.0 - 1e-10), ..stop };
-        let orbit = just.orbits(n)[0];
-        let from_one = |m: [[f64; 2]; 2]| {
-            let (trace, det) = (m[0][0] + m[1][1], m[0][0] * m[1][1] - m[0][1] * m[1][0]);
-            (1.0 - trace + det).abs()
-        };
-        let (oscillator, law) = just.walled().oscillator();
-        let found = followed(&oscillator, law, orbit.strobe, n);
-        assert_eq!(found.events.len(), 1, "{stop:?}");
-        let ours = first_block(&found.monodromy);
-        let off = multipliers_apart(ours, orbit.monodromy);
-        println!("n = {n}, omega = {omega}: fold at {fold}, {:.1e} from 1, off by {off:.1e}", from_one(ours));
-        assert!(off < 1e-11 && from_one(ours) < 1e-4);
-        // The other multiplier is e^2, from the impact.
-        assert!((ours[0][0] + ours[1][1] - 1.64).abs() < 1e-4);
     }
 }

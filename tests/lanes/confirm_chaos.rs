@@ -62,12 +62,6 @@ fn chaos_that_ends_gets_a_new_class_on_the_reference() {
 
 #[test]
 #[ignore = "takes minutes; scripts/test.sh --all"]
-fn chaos_that_ends_gets_a_new_class_on_lanes_in_f32() {
-    check(Some(Precision::F32));
-}
-
-#[test]
-#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
-fn chaos_that_ends_gets_a_new_class_on_lanes_in_f64() {
-    check(Some(Precision::F64));
+fn chaos_that_ends_gets_a_new_class_on_lanes() {
+    Precision::ALL.into_iter().for_each(|precision| check(Some(precision)));
 }

@@ -254,21 +254,6 @@ fn every_row_of_the_table_agrees() {
     check(&periodic, 300, [2.9e-5, 1.3e-13]);
 }
 
-/// Batch size, dispatch length and workgroup size change no bit; `independence` tests more divisions in f32.
-#[test]
-#[ignore = "takes minutes; scripts/test.sh --all"]
-fn records_in_f64_do_not_depend_on_how_the_work_is_cut() {
-    let cells: Vec<_> = rows().iter().map(|row| (row.pair(), REST)).collect();
-    let mut gpu = open(Precision::F64);
-    let everything = LaneSettings { periods: 80, transient_periods: 20, ..LaneSettings::default() };
-    let settings = LaneSettings { exponent_from: 10, ..everything };
-    let whole = run(&mut gpu, &cells, &settings);
-    for (batch, iterations, workgroup) in [(Some(7), 4000, 64), (None, 333, 64), (Some(33), 1000, 32)] {
-        let cut = run(&mut gpu, &cells, &LaneSettings { batch, iterations, workgroup, ..settings });
-        assert!(whole == cut, "batch {batch:?}, iterations {iterations}, workgroup {workgroup}");
-    }
-}
-
 /// Lanes with impossible parameters end in a status and do not change their neighbours.
 #[test]
 fn impossible_parameters_end_in_a_status() {

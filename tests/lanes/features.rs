@@ -5,14 +5,13 @@
 
 use crate::common::linear::Linear;
 use crate::common::pairs::{AsPair, Friction, Rubbing};
-use crate::common::{BUDGET, apart};
+use crate::common::{BUDGET, apart, built_in};
 use crate::lanes::kinds::draw::{Numbers, random_cell};
 use crate::lanes::kinds::{self, Cell};
 use crate::lanes::measures::{self, MEASURES};
 use rattlemap::gpu::{Features, GpuError, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
-use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
 use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Model, OuterWall, Pair, REST, Stage, state};
@@ -163,10 +162,7 @@ fn walled_cells() -> Vec<Cell> {
 /// Clutches whose hub comes to rest on a stop by many impacts, while the springs in front of the stop stay in contact.
 fn chattering_clutches() -> impl Iterator<Item = Cell> {
     [(0.197, 2.496), (0.148, 3.0)].into_iter().map(|(omega, force)| {
-        let mut model = FileModel::built_in("clutch").unwrap();
-        [("omega", omega), ("F", force)]
-            .into_iter()
-            .for_each(|(name, value)| model.set(name, value).unwrap());
+        let model = built_in("clutch", &[("omega", omega), ("F", force)]);
         (model.pair(), model.law(), REST)
     })
 }
@@ -186,7 +182,8 @@ fn cells_with_everything() -> Vec<Cell> {
     walled.chain(pushing).chain(chattering_clutches()).collect()
 }
 
-fn reference((oscillator, law, start): &Cell) -> Record {
+/// Returns the reference's record of a cell.
+pub(crate) fn reference((oscillator, law, start): &Cell) -> Record {
     measured_record(&measure(&Flow::new(oscillator), *law, *start, &BUDGET), &Needs::EVERYTHING)
 }
 
@@ -229,40 +226,28 @@ fn check(what: &str, cells: &[Cell], precisions: &[(Precision, f64, usize)]) {
     }
 }
 
-#[test]
-#[ignore = "compiles large shaders; scripts/test.sh --all"]
-fn harmonics_agree_with_the_reference() {
-    check("harmonics", &harmonic_cells(), &[IN_F64, IN_F32]);
+/// Cells with one feature each.
+fn features() -> [(&'static str, Vec<Cell>); 4] {
+    [
+        ("pushing", pushing_cells()),
+        ("harmonics", harmonic_cells()),
+        ("stages", staged_cells()),
+        ("walls", walled_cells()),
+    ]
 }
 
 #[test]
 #[ignore = "compiles large shaders; scripts/test.sh --all"]
-fn stages_agree_with_the_reference() {
-    check("stages", &staged_cells(), &[IN_F64, IN_F32]);
+fn each_feature_agrees_with_the_reference() {
+    for (what, cells) in features() {
+        check(what, &cells, &[IN_F64, IN_F32]);
+    }
 }
 
 #[test]
-#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+#[ignore = "compiles large shaders; scripts/test.sh --all"]
 fn everything_together_agrees_with_the_reference() {
-    check("everything", &cells_with_everything(), &[IN_F64]);
-}
-
-#[test]
-#[ignore = "compiles large shaders; scripts/test.sh --all"]
-fn everything_together_agrees_with_the_reference_in_f32() {
-    check("everything", &cells_with_everything(), &[IN_F32]);
-}
-
-#[test]
-#[ignore = "compiles large shaders; scripts/test.sh --all"]
-fn several_walls_agree_with_the_reference() {
-    check("walls", &walled_cells(), &[IN_F64, IN_F32]);
-}
-
-#[test]
-#[ignore = "compiles large shaders; scripts/test.sh --all"]
-fn walls_that_only_push_agree_with_the_reference() {
-    check("pushing", &pushing_cells(), &[IN_F64, IN_F32]);
+    check("everything", &cells_with_everything(), &[IN_F64, IN_F32]);
 }
 
 /// Where all stages are equal, only the changes' instants interrupt the motion.
@@ -381,10 +366,7 @@ fn decaying_motion_with_stages_is_decided() {
     let cells: Vec<Cell> = [(0.6, 0.1), (1.7, 0.12), (2.4, 0.6), (2.0, 1.1), (0.18, 0.06)]
         .into_iter()
         .map(|(delta, epsilon)| {
-            let mut model = FileModel::built_in("meissner").unwrap();
-            [("delta", delta), ("epsilon", epsilon)]
-                .into_iter()
-                .for_each(|(name, value)| model.set(name, value).unwrap());
+            let model = built_in("meissner", &[("delta", delta), ("epsilon", epsilon)]);
             (model.pair(), model.law(), state(&[0.01]))
         })
         .collect();
@@ -402,12 +384,7 @@ fn decaying_motion_with_stages_is_decided() {
 #[ignore = "compiles large shaders; scripts/test.sh --all"]
 fn quantities_agree_with_the_reference() {
     let budget = Budget { quantities: true, ..BUDGET };
-    for (what, cells) in [
-        ("pushing", pushing_cells()),
-        ("harmonics", harmonic_cells()),
-        ("stages", staged_cells()),
-        ("walls", walled_cells()),
-    ] {
+    for (what, cells) in features() {
         let measured =
             |(oscillator, law, start): &Cell| measure(&Flow::new(oscillator), *law, *start, &budget);
         let expected: Vec<_> = cells.par_iter().map(measured).collect();
@@ -428,12 +405,12 @@ fn quantities_agree_with_the_reference() {
 
 #[test]
 fn excluded_features_are_refused() {
-    let error = kinds::run(Precision::F32, &harmonic_cells()[..1], &LaneSettings::only(1)).unwrap_err();
-    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "harmonics", .. }), "{error}");
-    let error = kinds::run(Precision::F32, &staged_cells()[..1], &LaneSettings::only(1)).unwrap_err();
-    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "stages", .. }), "{error}");
-    let error = kinds::run(Precision::F32, &walled_cells()[..1], &LaneSettings::only(1)).unwrap_err();
-    assert!(matches!(error, GpuError::NotCompiled { flow: 0, setting: "intervals", .. }), "{error}");
+    let cells = [("harmonics", harmonic_cells()), ("stages", staged_cells()), ("intervals", walled_cells())];
+    for (excluded, cells) in cells {
+        let error = kinds::run(Precision::F32, &cells[..1], &LaneSettings::only(1)).unwrap_err();
+        let is_named = matches!(error, GpuError::NotCompiled { flow: 0, setting, .. } if setting == excluded);
+        assert!(is_named, "{excluded}: {error}");
+    }
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 2.1 };
     let friction = vec![Friction { row: [1.0, 0.0], force: 0.1, speed: 0.0 }];
     let machine = Rubbing { pair: free.oscillator(), friction }.described(Law::both(0.5, 0.0));

@@ -2,18 +2,15 @@
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
-use crate::common::BUDGET;
 use crate::common::pairs::AsPair;
+use crate::lanes::features::reference;
 use crate::lanes::kinds::{self, Cell};
 use rattlemap::gpu::{LaneSettings, Precision};
-use rattlemap::map::engine::measured_record;
-use rattlemap::map::plan::Needs;
 use rattlemap::model_file::FileModel;
 use rattlemap::record::Record;
 use rattlemap::record::classify::{classify, status};
 use rattlemap_dynamics::model::{Model, state};
-use rattlemap_dynamics::motion::Flow;
-use rattlemap_dynamics::orbit::{Class, Status, measure};
+use rattlemap_dynamics::orbit::{Class, Status};
 use rayon::prelude::*;
 
 /// Equations and contacts of one coordinate: `c` is the damping and `k` the stiffness.
@@ -48,10 +45,6 @@ fn cell(model: &FileModel, sets: &[(&str, f64)]) -> Cell {
     sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
     // On top of a hill, rounding would choose the side.
     (model.pair(), model.law(), state(&[0.5]))
-}
-
-fn reference((oscillator, law, start): &Cell) -> Record {
-    measured_record(&measure(&Flow::new(oscillator), *law, *start, &BUDGET), &Needs::EVERYTHING)
 }
 
 /// `most` is the number of cells of 64 that may differ: two more than measured. They lie near bifurcations, in transient chaos or

@@ -48,7 +48,7 @@ fn records_do_not_depend_on_how_the_work_is_cut() {
     check_cuts(Precision::F32, &[64]);
 }
 
-/// The layout of f64 differs; `engines_agree` divides its work as well.
+/// The layout of f64 differs.
 #[test]
 #[ignore = "compiles a dozen shaders; scripts/test.sh --all"]
 fn records_do_not_depend_on_the_workgroup() {

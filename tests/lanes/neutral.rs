@@ -2,13 +2,13 @@
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
+use crate::common::built_in;
 use crate::common::pairs::AsPair;
 use crate::common::{BUDGET, REST, paper};
 use crate::lanes::kinds::{self, Cell};
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
-use rattlemap::model_file::FileModel;
 use rattlemap::record::classify::{classify, status};
 use rattlemap_dynamics::model::{GearPair, Model, State, Stops, state};
 use rattlemap_dynamics::motion::Flow;
@@ -22,8 +22,7 @@ fn undamped(omega: f64, start: State) -> Cell {
 
 /// Returns a cell of a model of the gallery, from rest.
 fn gallery(name: &str, sets: [(&str, f64); 2]) -> Cell {
-    let mut model = FileModel::built_in(name).unwrap();
-    sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
+    let model = built_in(name, &sets);
     (model.pair(), model.law(), REST)
 }
 

@@ -44,11 +44,7 @@ fn stated_errors_of_the_reference_equal_the_scatter() {
 #[test]
 #[ignore = "takes minutes; scripts/test.sh --all"]
 fn stated_errors_of_lanes_equal_the_scatter() {
-    assert_calibrated(|plan| map(plan, &mut open(Precision::F32)));
-}
-
-#[test]
-#[ignore = "takes a minute; scripts/test.sh --all"]
-fn stated_errors_of_lanes_in_double_precision_equal_the_scatter() {
-    assert_calibrated(|plan| map(plan, &mut open(Precision::F64)));
+    for precision in Precision::ALL {
+        assert_calibrated(|plan| map(plan, &mut open(precision)));
+    }
 }

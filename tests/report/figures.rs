@@ -1,12 +1,12 @@
 //! Figures of orbits and bifurcation diagrams: what they show, and that they accept incomplete data.
 
+use crate::common::built_in;
 use std::f64::consts::TAU;
 use std::io::Read;
 
 use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap::map::scene::{FigureStyle, Format};
-use rattlemap::model_file::FileModel;
 use rattlemap::show::drawing::axis::Scale;
 use rattlemap::show::drawing::write_figure;
 use rattlemap::show::figure::bifurcation::{self, Panels};
@@ -166,8 +166,7 @@ fn orbits_without_contact_without_samples_or_with_infinite_numbers_are_drawn() {
 
 /// Returns phase plane, time history and gap of the attractor of a built-in model from rest, as SVG.
 fn attractor_figures(name: &str, values: &[(&str, f64)]) -> [String; 3] {
-    let mut model = FileModel::built_in(name).unwrap();
-    values.iter().for_each(|(name, value)| model.set(name, *value).unwrap());
+    let model = built_in(name, values);
     let orbit = orbit::analyse(&model, REST, &Settings::default()).unwrap();
     assert!(matches!(orbit.class, Class::Periodic { .. }), "{name} {values:?}: {:?}", orbit.class);
     let trace = orbit::trace(&model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, 100).unwrap();

@@ -1,6 +1,6 @@
 //! Tests of the validation of finished maps, of correct maps and of maps with planted errors.
 
-mod fixtures;
+pub(crate) mod fixtures;
 mod short_cells;
 
 mod chaos_ends;

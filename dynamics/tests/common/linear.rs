@@ -57,22 +57,27 @@ impl Linear {
             load: [self.load, 0.0],
             preload: 0.0,
         };
-        Pair {
-            degrees: 1,
-            mass: [[1.0, 0.0], [0.0, 1.0]],
-            gap: [1.0, 0.0],
-            walls: [f64::INFINITY, f64::NEG_INFINITY],
-            contacts: [Contact::Rigid; 2],
-            omega: self.omega,
-            force: [self.force, 0.0],
-            force_sin: [0.0; 2],
-            harmonics: Vec::new(),
-            stages: Vec::new(),
-            schedule: Vec::new(),
-            outer_walls: Default::default(),
-            free,
-            meshing: [free; 2],
-        }
+        Pair { omega: self.omega, force: [self.force, 0.0], ..unforced(1, free) }
+    }
+}
+
+/// Returns an oscillator of unit masses without force and walls. Its gap is the first displacement.
+pub(crate) fn unforced(degrees: usize, free: Domain) -> Pair {
+    Pair {
+        degrees,
+        mass: [[1.0, 0.0], [0.0, 1.0]],
+        gap: [1.0, 0.0],
+        walls: [f64::INFINITY, f64::NEG_INFINITY],
+        contacts: [Contact::Rigid; 2],
+        omega: 1.0,
+        force: [0.0; 2],
+        force_sin: [0.0; 2],
+        harmonics: Vec::new(),
+        stages: Vec::new(),
+        schedule: Vec::new(),
+        outer_walls: Default::default(),
+        free,
+        meshing: [free; 2],
     }
 }
 

@@ -1,6 +1,6 @@
 //! Invariants of all oscillators: any masses, any gap row, any walls with any contacts and laws, harmonics and stages.
 
-use crate::common::linear::{transformed, with_wall};
+use crate::common::linear::{transformed, unforced, with_wall};
 use crate::common::pairs::OfPair;
 use crate::common::pairs::described;
 use crate::common::{departure, size};
@@ -122,22 +122,8 @@ fn cases() -> impl Strategy<Value = Case> {
             (harmonics, stages, phases),
         )| {
             let free = Domain { damping, stiffness, load, preload: 0.0 };
-            let mut oscillator = Pair {
-                degrees: 2,
-                mass,
-                gap,
-                walls: [f64::INFINITY, f64::NEG_INFINITY],
-                contacts,
-                omega,
-                force,
-                force_sin,
-                free,
-                meshing: [free; 2],
-                harmonics,
-                stages: Vec::new(),
-                schedule: Vec::new(),
-                outer_walls: Default::default(),
-            };
+            let mut oscillator =
+                Pair { mass, gap, contacts, omega, force, force_sin, harmonics, ..unforced(2, free) };
             let mut start = state(&[y[0], 3.0 * y[1], y[2], 3.0 * y[3]]);
             if is_single {
                 let first = |m: Matrix| [[m[0][0], 0.0], [0.0, 0.0]];
@@ -600,22 +586,7 @@ fn forces_with_different_phases_have_the_closed_form_response() {
     };
     let (force, force_sin, omega) = ([3.0, -1.5], [-2.0, 4.0], 1.7);
     let mass = [[2.0, 0.3], [0.3, 1.0]];
-    let oscillator = Pair {
-        degrees: 2,
-        mass,
-        gap: [1.0, -1.0],
-        walls: [f64::INFINITY, f64::NEG_INFINITY],
-        contacts: [Contact::Rigid; 2],
-        omega,
-        force,
-        force_sin,
-        free,
-        meshing: [free; 2],
-        harmonics: Vec::new(),
-        stages: Vec::new(),
-        schedule: Vec::new(),
-        outer_walls: Default::default(),
-    };
+    let oscillator = Pair { mass, gap: [1.0, -1.0], omega, force, force_sin, ..unforced(2, free) };
     let entry = |i: usize, j: usize| {
         Complex::new(free.stiffness[i][j] - omega * omega * mass[i][j], omega * free.damping[i][j])
     };

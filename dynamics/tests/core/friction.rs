@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::common::linear::unforced;
 use crate::common::pairs::{AsPair, Friction, Rubbing};
 use crate::common::{REST, apart, near, paper};
 use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, state};
@@ -12,22 +13,7 @@ use rattlemap_dynamics::orbit::{Class, Orbit, Settings, Status, analyse_flow};
 fn block(omega: f64, drive: f64, friction: f64) -> Rubbing {
     let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
     let free = Domain { damping: first(0.0), stiffness: first(1.0), load: [0.0; 2], preload: 0.0 };
-    let pair = Pair {
-        degrees: 1,
-        mass: [[1.0, 0.0], [0.0, 1.0]],
-        gap: [1.0, 0.0],
-        walls: [f64::INFINITY, f64::NEG_INFINITY],
-        contacts: [Contact::Elastic; 2],
-        omega,
-        force: [drive, 0.0],
-        force_sin: [0.0; 2],
-        free,
-        meshing: [free; 2],
-        harmonics: Vec::new(),
-        stages: Vec::new(),
-        schedule: Vec::new(),
-        outer_walls: Default::default(),
-    };
+    let pair = Pair { contacts: [Contact::Elastic; 2], omega, force: [drive, 0.0], ..unforced(1, free) };
     Rubbing { pair, friction: vec![Friction { row: [1.0, 0.0], force: friction, speed: 0.0 }] }
 }
 

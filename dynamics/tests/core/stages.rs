@@ -168,48 +168,6 @@ fn a_period_of_half_the_frequency_is_two_periods() {
     }
 }
 
-#[test]
-fn a_motion_does_not_depend_on_the_phase_that_counts_as_zero() {
-    let mut compared = 0;
-    for (oscillator, law) in gear_pairs() {
-        let flow = Flow::new(&oscillator);
-        for turns in [0.1, 0.37, 0.6, 0.85] {
-            let mut trajectory = Trajectory::<0>::new(&flow, law, REST);
-            trajectory.advance_period(&mut ()).unwrap();
-            trajectory.advance_to(turns * flow.period, &mut ()).unwrap();
-            let later = flow.at_phase(turns);
-            // A contact onset is not determined by the state alone.
-            if trajectory.meshing().is_some() {
-                continue;
-            }
-            let mut turned = Trajectory::<0>::new(&later, law, trajectory.state());
-            trajectory.advance_period(&mut ()).unwrap();
-            turned.advance_to((1.0 - turns) * flow.period, &mut ()).unwrap();
-            let off = apart(trajectory.state(), turned.state());
-            assert!(off < 1e-11, "{off:e} at {turns}: {oscillator:?}");
-            compared += 1;
-        }
-    }
-    assert!(compared > 10, "{compared}");
-}
-
-#[test]
-fn equal_stages_do_not_change_a_motion() {
-    for (e, omega) in [(0.06, 5.6), (0.72, 1.5), (0.3, 3.0)] {
-        let pair = paper(e, omega);
-        let plain = pair.pair();
-        let stage = Stage { free: plain.free, meshing: plain.meshing };
-        let staged = Pair {
-            stages: vec![stage],
-            schedule: vec![(0.0, 0), (0.3, 1), (0.5, 0), (0.8, 1)],
-            ..plain.clone()
-        };
-        let [a, b] = [&plain, &staged].map(|o| measure(&Flow::new(o), pair.law(), REST, &BUDGET));
-        assert_eq!((a.period, a.word, a.symmetric), (b.period, b.word, b.symmetric), "{e} {omega}");
-        assert!(apart(a.strobe, b.strobe) < 1e-9, "{e} {omega}: {:?} {:?}", a.strobe, b.strobe);
-    }
-}
-
 /// Mirror images need odd harmonics, and stages that recur after half a period.
 #[test]
 fn mirror_images_need_odd_harmonics_and_stages_of_half_a_period() {

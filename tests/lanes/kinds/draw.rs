@@ -1,5 +1,6 @@
 //! Random oscillators of every kind, by seed.
 
+use crate::common::linear::unforced;
 use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, State, state};
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
@@ -82,22 +83,8 @@ pub(crate) fn random_cell(seed: u64) -> (Pair, Law, State) {
     };
     let omega = draw.between(0.6, 4.0);
     let force_sin = [0.0; 2];
-    let oscillator = Pair {
-        degrees,
-        mass,
-        gap,
-        walls,
-        contacts,
-        omega,
-        force,
-        force_sin,
-        free,
-        meshing,
-        harmonics: Vec::new(),
-        stages: Vec::new(),
-        schedule: Vec::new(),
-        outer_walls: Default::default(),
-    };
+    let oscillator =
+        Pair { mass, gap, walls, contacts, omega, force, force_sin, meshing, ..unforced(degrees, free) };
     let mut start = [0; 4].map(|_| draw.between(-0.4, 0.4));
     if degrees == 1 {
         start[2..].fill(0.0);

@@ -3,7 +3,7 @@
 use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, OuterWall, Pair, Side, Stage, State, state};
 
 use super::super::machines::random as machines;
-use crate::common::linear::with_wall;
+use crate::common::linear::{unforced, with_wall};
 use crate::common::pairs::{Friction, Rubbing};
 
 /// A reproducible sequence of numbers: SplitMix64.
@@ -133,7 +133,6 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         _ => [right, left],
     };
     let mut oscillator = Pair {
-        degrees: 2,
         mass,
         gap,
         walls,
@@ -141,12 +140,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         omega,
         force: pair(random, 10.0),
         force_sin: if random.chance(0.5) { none } else { pair(random, 10.0) },
-        free,
-        meshing: [free; 2],
-        harmonics: Vec::new(),
-        stages: Vec::new(),
-        schedule: Vec::new(),
-        outer_walls: Default::default(),
+        ..unforced(2, free)
     };
     if shape.harmonics {
         let count = 1 + random.below(4);

@@ -245,12 +245,6 @@ mod program {
     }
 
     #[test]
-    #[ignore = "takes 6 s"]
-    fn three_hundred_machines_agree_with_matrix_exponentials() {
-        check_program(0..300, MACHINES, any_case);
-    }
-
-    #[test]
     #[ignore = "minutes"]
     fn ten_thousand_machines_agree_with_matrix_exponentials() {
         check_program(300..10_300, MACHINES, any_case);

@@ -118,12 +118,6 @@ fn cycles_of_machines_agree_with_matrix_exponentials() {
 }
 
 #[test]
-#[ignore = "takes 15 s"]
-fn cycles_of_two_hundred_machines_agree_with_matrix_exponentials() {
-    check(0..200);
-}
-
-#[test]
 #[ignore = "takes minutes; scripts/test.sh --all"]
 fn cycles_of_two_hundred_machines_of_each_shape_agree_with_matrix_exponentials() {
     check(0..2_000);
