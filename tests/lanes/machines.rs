@@ -3,7 +3,7 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::gpu::{all_records, map, open};
-use crate::lanes::random_models::machines::random::{Shape, case};
+use crate::reference_tests::machines::random::{Shape, case};
 use rattlemap::gpu::{Features, Lane, LaneSettings, MachineShape, Precision};
 use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::Plan;

@@ -1,18 +1,5 @@
 //! Lanes on a device, compared with the reference and with each other.
 
-/// Random machines and numbers, as the tests of the reference draw them.
-#[path = "../../dynamics/tests/core"]
-mod random_models {
-    pub(crate) mod independent {
-        #[allow(dead_code, reason = "machines need the numbers alone")]
-        pub(crate) mod random;
-    }
-    pub(crate) mod machines {
-        #[allow(dead_code, reason = "the tests of the reference use the rest")]
-        pub(crate) mod random;
-    }
-}
-
 mod chatter;
 mod classes;
 mod confirm_chaos;

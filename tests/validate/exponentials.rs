@@ -1,17 +1,15 @@
 //! Compares the judge with an integrator by matrix exponentials, on random models of one gap with harmonics, stages, further walls and
 //! dry friction, and on random machines.
 
-mod integrators;
-
 use rattlemap::validate::independent::machine::Flight;
 use rattlemap_dynamics::model::{STATE, Side, state};
 use rattlemap_dynamics::motion::EventKind;
 use rayon::prelude::*;
 
-use integrators::independent::random::{self as one_gap, PLAIN, Shape};
-use integrators::machines::motion::{Motion, What};
-use integrators::machines::random::{Case, any_case, apart};
-use integrators::machines::system::{ANGLE, System};
+use crate::reference_tests::independent::random::{self as one_gap, PLAIN, Shape};
+use crate::reference_tests::machines::motion::{Motion, What};
+use crate::reference_tests::machines::random::{Case, any_case, apart};
+use crate::reference_tests::machines::system::{ANGLE, System};
 
 /// Largest difference of states, relative to the size of the motion.
 const AGREEMENT: f64 = 1e-9;
