@@ -60,6 +60,6 @@ impl Lanes {
         let engine = self.engine.as_mut().ok_or("no window was prepared")?;
         let cells: Vec<Cell> = runs.iter().map(|&run| window.plan.cell(run)).collect();
         let records = engine.run(&cells).await.map_err(|error| error.to_string())?;
-        Ok(records.iter().flat_map(Record::to_bytes).collect())
+        Ok(records.iter().flat_map(|record| record.to_bytes()).collect())
     }
 }
