@@ -166,21 +166,10 @@ fn judge_cycle() {
     // has approached the cycle by itself.
     let helps = is_smooth && search.failed_searches < MOST_FAILED_SEARCHES;
     if is_stable && helps && settings.early_stop == 1u && !is_last && distance_to_cycle() > NEWTON_CONVERGED && refine(to) {
-        tally.stage = STAGE_READING;
         return;
     }
     let is_found = is_stable && is_on_branch() && is_on_cycle(to, is_last);
     let is_cycle = is_found && (rests_on_cycle(to, is_last) || stays_near_cycle(to));
-    if is_found && !is_cycle {
-        // Newton's method has found a cycle.
-        search.failed_searches = 0u;
-        return_to_start();
-        if !is_last {
-            continue_search();
-            search.checks_divisor = 0u;
-        }
-        return;
-    }
     if is_cycle && (!is_multiple() || is_rejected()) {
         search.cycle = tally.candidate;
         return;
@@ -190,19 +179,17 @@ fn judge_cycle() {
     }
     // Newton's method has left the branch of the motion. If the lane returned to its start, it would repeat the same search.
     let is_lost = search.newton_steps > 0u && !is_on_branch();
-    if is_stable && !is_lost && search.newton_steps > 0u {
+    let is_approached = is_found && !is_cycle;
+    if is_approached {
+        // Newton's method has found a cycle.
+        search.failed_searches = 0u;
+    } else if is_stable && !is_lost && search.newton_steps > 0u {
         search.failed_searches += 1u;
     }
     return_to_start();
-    if is_last {
-        return;
+    if !is_last {
+        search_again(is_approached || (is_stable && !is_lost));
     }
-    if is_stable && !is_lost {
-        continue_search();
-    } else {
-        restart_search();
-    }
-    search.checks_divisor = 0u;
 }
 
 // Largest relative error of the exponent of a cycle whose status is ok.
@@ -235,7 +222,7 @@ fn is_slow() -> bool {
     return !is_near_cycle() || search.is_uncertain == 1u || at_last > log2(SETTLED_DISTANCE);
 }
 
-// Starts to read the divisor of the period. Returns false if too few periods are left.
+// Decides to read the divisor of the period (`begin_reading` follows). Returns false if too few periods are left.
 fn reads_divisor() -> bool {
     if tally.period + search.divisor > last_period() {
         return false;
@@ -243,22 +230,37 @@ fn reads_divisor() -> bool {
     tally.candidate = search.divisor;
     search.checks_divisor = 1u;
     search.is_settled = 0u;
-    begin_reading();
+    tally.stage = STAGE_READING;
     return true;
 }
 
-// Continues the search if the cycle is stable but too far away. Recurrences found so far still count.
-fn continue_search() {
+// Searches for recurrences again. The average of the exponent continues. If the cycle is stable but too far away (`continues`), recurrences
+// found so far still count.
+fn search_again(continues: bool) {
+    if continues {
+        search.rejected_divisor = 0u;
+    } else {
+        give_up_cycle();
+    }
     tally.stage = STAGE_RUNNING;
     search.has_read = 0u;
-    search.rejected_divisor = 0u;
+    search.checks_divisor = 0u;
     begin_counting();
     resume_growth();
-    begin_window(strobe_state(), search.window);
+    if continues {
+        begin_window(strobe_state(), search.window);
+        return;
+    }
+    search.window = 0u;
+    tally.candidate = 0u;
+    search.streak = 0u;
+    search.known_lags = 0u;
+    search.is_settled = 0u;
+    tallies[lane].last_distances = array<u32, 16>();
 }
 
-// Restarts the search for recurrences. The average of the exponent continues.
-fn restart_search() {
+// Leaves the cycle that was read.
+fn give_up_cycle() {
     // Rounding can hold a lane on an unstable cycle, so the lane is moved off it.
     let is_unstable = measures.cycle_growth > NEUTRAL * Real(tally.candidate);
     if is_unstable && search.return_distance >= AT_REST && is_free() {
@@ -273,20 +275,10 @@ fn restart_search() {
         measures.growth_sum = 0.0;
         measures.growth_squares = 0.0;
     }
-    tally.stage = STAGE_RUNNING;
-    search.has_read = 0u;
     search.failed_readings += 1u;
     // A stable divisor may still be the lane's cycle, even if the lane has not come near to it.
     let is_stable = measures.cycle_growth < -NEUTRAL * Real(tally.candidate);
     search.rejected_divisor = select(0u, tally.candidate, search.checks_divisor == 1u && !is_stable);
-    begin_counting();
-    resume_growth();
-    search.window = 0u;
-    tally.candidate = 0u;
-    search.streak = 0u;
-    search.known_lags = 0u;
-    search.is_settled = 0u;
-    tallies[lane].last_distances = array<u32, 16>();
 }
 
 // Whether the cycle closes after a divisor of its period, within rounding and the lane's distance from the cycle.

@@ -131,13 +131,12 @@ fn check_columns() {
     let size = size_of_columns();
     if size >= OUT_OF_RANGE {
         tallies[lane].has_overflowed = 1u;
-        begin_columns();
-        return;
-    }
-    if size == 0.0 {
+    } else if size == 0.0 {
         // All neighbouring motions have become the same motion. From here on, only new perturbations grow.
         tallies[lane].is_superstable = 1u;
         motions[lane].stretch[0] = 1.0;
+    }
+    if size >= OUT_OF_RANGE || size == 0.0 {
         begin_columns();
         return;
     }

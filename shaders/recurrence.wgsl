@@ -22,29 +22,30 @@ const LAGS_PER_CYCLE: u32 = 4u;
 fn recurs() -> bool {
     let q = strobe_state();
     widen_scales(q);
-    if search.window == 0u {
-        begin_window(q, widest());
-        return false;
+    var lags = widest();
+    var settled = false;
+    if search.window > 0u {
+        let lag = tally.period - search.anchor_period;
+        let distance = octaves(distance_between(q, measures.anchor));
+        tallies[lane].distances[(lag - 1u) / 4u] |= distance << (8u * ((lag - 1u) % 4u));
+        if lag < search.window {
+            return false;
+        }
+        let found = contracting_lag();
+        let is_fast = found > 0u && shrinks(found);
+        settled = judge_lag(found);
+        search.known_lags = search.window;
+        tallies[lane].last_distances = tallies[lane].distances;
+        keep_recurrence();
+        // The next anchor lies at the same point of the cycle, because distances at other points are not comparable. The points of a cycle
+        // may be so close together that a lag shorter than its period seems to recur.
+        let cycle = max(closest_lag(), 1u);
+        // Short windows suffice to find a short lag that contracts.
+        let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
+        lags = select(lags, min(enough, lags), is_fast && search.failed_readings == 0u);
+        lags = max(lags - lags % cycle, 1u);
     }
-    let lag = tally.period - search.anchor_period;
-    let distance = octaves(distance_between(q, measures.anchor));
-    tallies[lane].distances[(lag - 1u) / 4u] |= distance << (8u * ((lag - 1u) % 4u));
-    if lag < search.window {
-        return false;
-    }
-    let found = contracting_lag();
-    let is_fast = found > 0u && shrinks(found);
-    let settled = judge_lag(found);
-    search.known_lags = search.window;
-    tallies[lane].last_distances = tallies[lane].distances;
-    keep_recurrence();
-    // The next anchor lies at the same point of the cycle, because distances at other points are not comparable. The points of a cycle may
-    // be so close together that a lag shorter than its period seems to recur.
-    let cycle = max(closest_lag(), 1u);
-    // Short windows suffice to find a short lag that contracts.
-    let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
-    let lags = select(widest(), min(enough, widest()), is_fast && search.failed_readings == 0u);
-    begin_window(q, max(lags - lags % cycle, 1u));
+    begin_window(q, lags);
     return settled;
 }
 

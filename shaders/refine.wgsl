@@ -1,8 +1,8 @@
 // Newton's method on the strobe map: leads a motion that approaches a cycle to the cycle.
 
-// Moves the lane to `to`, the fixed point of the linearised strobe map, and reads the cycle from there. The monodromy matrix has been read
-// along one candidate cycle, from the anchor to the present strobe. Returns false if the last step has not brought the lane closer, or if
-// this step would leave the domain.
+// Moves the lane to `to`, the fixed point of the linearised strobe map, to read the cycle from there (`begin_reading` follows). The monodromy
+// matrix has been read along one candidate cycle, from the anchor to the present strobe. Returns false if the last step has not brought the
+// lane closer, or if this step would leave the domain.
 fn refine(to: State) -> bool {
     if search.newton_steps == 0u {
         keep_modes();
@@ -18,7 +18,7 @@ fn refine(to: State) -> bool {
     place(to);
     search.newton_steps += 1u;
     search.earlier_return_distance = search.return_distance;
-    begin_reading();
+    tally.stage = STAGE_READING;
     return true;
 }
 

@@ -135,6 +135,9 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     if tally.stage == STAGE_READ {
         load_strobe_state();
         judge_cycle();
+        if tally.stage == STAGE_READING {
+            begin_reading();
+        }
         store_strobe_state();
     }
     if settings.measured_periods > 0u && tally.stage == STAGE_DONE && tally.status == STATUS_OK && !MEASURE {
