@@ -19,9 +19,6 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     motions[lane].vector = initial_tangent();
     tallies[lane].now = tally;
     tallies[lane].search = search;
-    tallies[lane].distances = array<u32, 16>();
-    tallies[lane].last_distances = array<u32, 16>();
-    tallies[lane].word = array<u32, 7>();
     tallies[lane].is_measured = 0u;
     begin_pattern();
 }

@@ -256,7 +256,6 @@ fn search_again(continues: bool) {
     search.streak = 0u;
     search.known_lags = 0u;
     search.is_settled = 0u;
-    tallies[lane].last_distances = array<u32, 16>();
 }
 
 // Leaves the cycle that was read.

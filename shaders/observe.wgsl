@@ -102,9 +102,6 @@ fn begin_counting() {
     tally.hash_low = 0u;
     tally.hash_high = 0u;
     tally.recent = 0u;
-    if WORD {
-        tallies[lane].word = array<u32, 7>();
-    }
     if PATTERN {
         begin_pattern();
     }

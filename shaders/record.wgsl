@@ -121,7 +121,7 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     }
     (*finding).valid |= VALID_WORD;
     for (var n = 0u; n < 7u; n++) {
-        spell(finding, SPELLED_WORD + n, tallies[lane].word[n]);
+        spell(finding, SPELLED_WORD + n, select(0u, tallies[lane].word[n], n * SYMBOLS_PER_NUMBER < tally.word_length));
     }
     spell(finding, SPELLED_WORD_LENGTH, tally.word_length);
     if tally.word_length > WORD_SYMBOLS {
@@ -138,7 +138,8 @@ fn spell(finding: ptr<function, Finding>, place: u32, number: u32) {
 }
 
 fn read_pattern(finding: ptr<function, Finding>) {
-    var length = tallies[lane].pattern_length;
+    let whole = tallies[lane].pattern_length;
+    var length = whole;
     var recent = tallies[lane].pattern_recent;
     var hash = vec2<u32>(tallies[lane].pattern_hash[0], tallies[lane].pattern_hash[1]);
     let first = tallies[lane].pattern[0];
@@ -152,7 +153,7 @@ fn read_pattern(finding: ptr<function, Finding>) {
     }
     (*finding).valid |= VALID_PATTERN;
     for (var n = 0u; n < 7u; n++) {
-        spell(finding, SPELLED_PATTERN + n, tallies[lane].pattern[n]);
+        spell(finding, SPELLED_PATTERN + n, select(0u, tallies[lane].pattern[n], n * SYMBOLS_PER_NUMBER < whole));
     }
     spell(finding, SPELLED_PATTERN_LENGTH, length);
     if length > WORD_SYMBOLS {

@@ -27,7 +27,10 @@ fn recurs() -> bool {
     if search.window > 0u {
         let lag = tally.period - search.anchor_period;
         let distance = octaves(distance_between(q, measures.anchor));
-        tallies[lane].distances[(lag - 1u) / 4u] |= distance << (8u * ((lag - 1u) % 4u));
+        let place = (lag - 1u) / 4u;
+        let before = (lag - 1u) % 4u;
+        // The first distance of a number replaces those of an earlier window.
+        tallies[lane].distances[place] = select(tallies[lane].distances[place], 0u, before == 0u) | (distance << (8u * before));
         if lag < search.window {
             return false;
         }
@@ -130,7 +133,6 @@ fn begin_window(q: State, lags: u32) {
     measures.anchor = q;
     search.anchor_period = tally.period;
     search.window = min(lags, settings.max_period);
-    tallies[lane].distances = array<u32, 16>();
 }
 
 // Returns a distance in quarter octaves below 1, at most 255.

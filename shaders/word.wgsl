@@ -4,7 +4,8 @@
 fn add_symbol(symbol: u32) {
     let n = tally.word_length;
     if WORD && n < 7u * SYMBOLS_PER_NUMBER {
-        tallies[lane].word[n / SYMBOLS_PER_NUMBER] |= symbol << (SYMBOL_BITS * (n % SYMBOLS_PER_NUMBER));
+        let place = n / SYMBOLS_PER_NUMBER;
+        tallies[lane].word[place] = with_symbol(tallies[lane].word[place], n, symbol);
     }
     tally.word_length = n + 1u;
     if PATTERN && (n == 0u || symbol != (tally.recent & LATEST_SYMBOL)) {
@@ -16,8 +17,13 @@ fn add_symbol(symbol: u32) {
     }
 }
 
+// Adds symbol `n` of a word to its number. The first symbol of a number replaces what an earlier word has left there.
+fn with_symbol(number: u32, n: u32, symbol: u32) -> u32 {
+    let before = n % SYMBOLS_PER_NUMBER;
+    return select(number, 0u, before == 0u) | (symbol << (SYMBOL_BITS * before));
+}
+
 fn begin_pattern() {
-    tallies[lane].pattern = array<u32, 7>();
     tallies[lane].pattern_length = 0u;
     tallies[lane].pattern_hash = array<u32, 2>();
     tallies[lane].pattern_recent = 0u;
@@ -27,7 +33,8 @@ fn begin_pattern() {
 fn add_run(symbol: u32) {
     let n = tallies[lane].pattern_length;
     if n < 7u * SYMBOLS_PER_NUMBER {
-        tallies[lane].pattern[n / SYMBOLS_PER_NUMBER] |= symbol << (SYMBOL_BITS * (n % SYMBOLS_PER_NUMBER));
+        let place = n / SYMBOLS_PER_NUMBER;
+        tallies[lane].pattern[place] = with_symbol(tallies[lane].pattern[place], n, symbol);
     }
     let recent = append_symbol(tallies[lane].pattern_recent, symbol);
     tallies[lane].pattern_length = n + 1u;
