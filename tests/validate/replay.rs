@@ -543,10 +543,10 @@ fn rattlemap(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
     command.current_dir(folder).args(arguments).assert()
 }
 
-/// Returns a folder with a finished map `o` of 24 x 24 cells, and the map's folder.
+/// Returns a folder with a finished map `o` of 16 x 16 cells, and the map's folder.
 fn finished() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("s.toml"), scene_text(24, 24)).unwrap();
+    fs::write(folder.path().join("s.toml"), scene_text(16, 16)).unwrap();
     rattlemap(folder.path(), &["map", "s.toml", "--engine", "cpu", "--out", "o", "--quiet"]).success();
     let out = folder.path().join("o");
     (folder, out)
@@ -564,9 +564,9 @@ fn json(out: &Path) -> serde_json::Value {
 fn a_map_is_validated_and_its_report_says_so() {
     let (folder, out) = finished();
     let run = |arguments: &[&str]| rattlemap(folder.path(), &[&["validate", "o"], arguments].concat());
-    let text = said(&run(&["--samples", "150", "--seed", "3"]).success().stdout(""));
+    let text = said(&run(&["--samples", "60", "--seed", "3"]).success().stdout(""));
     for part in [
-        " of 576 random cells: 0 differ (below ",
+        " of 256 random cells: 0 differ (below ",
         " cells next to another class or period: ",
         "without early stops, and ",
         "ran again on the same kind of processor, ",
@@ -582,19 +582,19 @@ fn a_map_is_validated_and_its_report_says_so() {
         "{verdict}"
     );
     let found = json(&out);
-    assert_eq!((&found["verdict"], &found["requested"]), (&verdict.into(), &150.into()));
+    assert_eq!((&found["verdict"], &found["requested"]), (&verdict.into(), &60.into()));
     assert_eq!((&found["again_on"], &found["same_device"]), (&found["processor"], &true.into()));
     // The second judge is graphics hardware, if there is any, otherwise the ODE solver.
     let judge = found["judge"].as_str().unwrap();
     assert_eq!(found["lanes_f64_on"].is_string(), judge == "lanes_f64", "{judge}");
     assert!(["lanes_f64", "dop853"].contains(&judge), "{judge}");
-    assert_eq!((&found["seed"], &found["cells"]), (&3.into(), &576.into()));
+    assert_eq!((&found["seed"], &found["cells"]), (&3.into(), &256.into()));
     assert_eq!((&found["faults"], &found["identical"]), (&serde_json::json!([]), &found["samples"]));
     let uniform = &found["strata"][0];
     assert_eq!((&uniform["name"], &uniform["kinds"]["unexplained"]["count"]), (&"uniform".into(), &0.into()));
     let sampled: u64 =
         found["strata"].as_array().unwrap().iter().map(|s| s["sampled"].as_u64().unwrap()).sum();
-    assert_eq!(sampled, 150);
+    assert_eq!(sampled, 60);
     // States of lanes are compared where there are lanes.
     let off = &found["states"]["off"]["count"];
     assert!(if judge == "lanes_f64" { *off == 0 } else { off.is_null() }, "{off}");
@@ -602,9 +602,9 @@ fn a_map_is_validated_and_its_report_says_so() {
     assert!(page.contains("\"validation\":{\"format\":2,\"command\":\"validate\""), "no section");
     // An equal seed gives equal bytes.
     let first = fs::read(out.join("validation.json")).unwrap();
-    run(&["--samples", "150", "--seed", "3", "--quiet"]).success().stderr("");
+    run(&["--samples", "60", "--seed", "3", "--quiet"]).success().stderr("");
     assert!(fs::read(out.join("validation.json")).unwrap() == first);
-    run(&["--samples", "150", "--seed", "4", "--quiet"]).success();
+    run(&["--samples", "60", "--seed", "4", "--quiet"]).success();
     assert!(fs::read(out.join("validation.json")).unwrap() != first);
     // Writing the map again keeps the validation; computing it again removes it.
     let map = |last: &str| rattlemap(folder.path(), &["map", "s.toml", "--out", "o", last]).success();
@@ -618,22 +618,22 @@ fn a_map_is_validated_and_its_report_says_so() {
 #[test]
 fn planted_records_fail_the_validation_by_name() {
     let (folder, out) = finished();
-    let scene = scene(24, 24);
+    let scene = scene(16, 16);
     let plan = Plan::new(&scene);
     let (path, identity) = (out.join(RECORDS), cpu_identity(&scene));
     let mut records = vec![Record::default(); plan.cell_count()];
     let stored = read_records(&path, &identity);
-    assert_eq!(stored.len(), 576);
+    assert_eq!(stored.len(), 256);
     stored.into_iter().for_each(|(id, record)| records[id as usize] = record);
     let wrong = plant(&mut records, &[]);
     let spoilt: Vec<(u32, Record)> = (0..).zip(records).collect();
     RecordFile::create(&path, &identity).unwrap().append(&spoilt).unwrap();
 
-    let run = rattlemap(folder.path(), &["validate", "o", "--samples", "576", "--quiet"]).code(1).stdout("");
+    let run = rattlemap(folder.path(), &["validate", "o", "--samples", "256", "--quiet"]).code(1).stdout("");
     let text = said(&run);
     assert!(
         text.contains("do not trust this map: ")
-            && text.contains(&format!("; {} of all 576 cells are wrong;", PLANTED.len())),
+            && text.contains(&format!("; {} of all 256 cells are wrong;", PLANTED.len())),
         "{text}"
     );
     // The message names the first cells.
@@ -789,7 +789,7 @@ fn a_folder_without_a_finished_map_is_refused() {
     fs::write(out.join("manifest.json"), &manifest).unwrap();
     let records = fs::read(out.join(RECORDS)).unwrap();
     fs::write(out.join(RECORDS), &records[..records.len() - 1]).unwrap();
-    ends(1, &["o"], &["records.bin is damaged: it has", "of 576 cells", "--resume"]);
+    ends(1, &["o"], &["records.bin is damaged: it has", "of 256 cells", "--resume"]);
     let mut bad = records.clone();
     bad[20] ^= 0x10;
     fs::write(out.join(RECORDS), bad).unwrap();
