@@ -10,6 +10,9 @@
 #                 short)
 #     main        the main map: 512 x 512 cells, all quantities and files
 #     classes     SIDE x SIDE cells (1024 by default) with their classes only
+#     sizes       the main map with 32, 100, 316, 1,000 and 3,162 cells along each axis, classes only
+#     window      a window of 256 x 256 cells of the main map, all quantities
+#     basin       a map of basins of attraction
 #     brute       the main map with SIDE x SIDE cells and without early stops
 #     own_flow    as many cells, each with its own flow: meshing stiffness against frequency
 #     adaptive    the adaptive map of the main plane, classes only
@@ -17,14 +20,14 @@
 #     compile     the time from start to files of 2 x 2 cells, with an empty shader cache (cold) and with a filled one (warm)
 #     engines     the main plane on every engine, from 10^3 lanes (`rattlemap bench engines`): utilisation of the device,
 #                 longest dispatch, idle gaps
-#     again       each timed run a second and a third time
+#     again       each timed run a second and a third time. The table has the run with the middle time from start to files
 #
 # Everything takes at most MEASURE_SECONDS (480), even on a slow card: each run has a time limit, and steps without time are
 # reported as missing. The script measures the first hardware adapter, or the adapter named by WGPU_ADAPTER_NAME, which may be
 # a software driver. PRECISIONS selects f32 or f64 instead of both. OUT is updated after every run, so a killed script leaves
 # its results:
 #
-#     summary.md              the table: medians, and the hardware
+#     summary.md              the table: the run with the middle time of each row, and the hardware
 #     speed.csv               one row per timed run
 #     validation_*.json       correctness, per precision
 #     engines/                throughput against lanes on every engine: tables and figures
@@ -38,7 +41,7 @@ binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
 steps=("${@:4}")
-all=(right main classes brute own_flow adaptive latency compile engines again)
+all=(right main classes sizes window basin brute own_flow adaptive latency compile engines again)
 ((${#steps[@]})) || steps=("${all[@]}")
 for step in "${steps[@]}"; do
     [[ " ${all[*]} " == *" $step "* ]] || { echo "error: there is no step $step; the steps are ${all[*]}" >&2; exit 2; }
@@ -185,19 +188,21 @@ timed() {
     limited "$longest_run" "$binary" map "$scene" --engine gpu --precision "$precision" --out "$work/timed" --force "$@" \
         2>"$work/messages" || code=$?
     wall="$(since "$began")"
-    # "N cells in S s on gpu (f32): C cells/s, P forcing periods/s, K ns per step; files written in O s"
+    # "N cells in S s on gpu (f32): C cells/s, P forcing periods/s, K ns per step; files written in O s", and
+    # "time in seconds: plan A, device B, flows C, compile D, integrate S (records R), files O"
     result="$(grep -E '^[0-9]+ cells.* on gpu' "$work/messages" |
         sed -E 's/^([0-9]+) cells.* in ([0-9.]+) s on .*: ([0-9]+) cells\/s, ([0-9]+) forcing periods\/s, ([0-9.]+) ns per step; files written in ([0-9.]+) s.*/\1,\2,\3,\4,\5,\6/' || true)"
+    [[ -z "$result" ]] || result+=",$(sed -nE 's/^time in seconds:.* device ([0-9.]+), .* compile ([0-9.]+), .*/\1,\2/p' "$work/messages")"
     case $code in
-        0) [[ -n "$result" ]] || { failed "map: $what, $precision prints no times" && result=",,,,,,prints no times"; } ;;
+        0) [[ -n "$result" ]] || { failed "map: $what, $precision prints no times" && result=",,,,,,,,prints no times"; } ;;
         124 | 137)
             result="$(grep -oE '[0-9]+ of (at most )?[0-9]+ cells' "$work/messages" | tail -n 1 || true)"
-            result=",,,,,,stopped after ${wall%.*} s${result:+ at $result}"
+            result=",,,,,,,,stopped after ${wall%.*} s${result:+ at $result}"
             ;;
-        125) wall="" result=",,,,,,no time was left" ;;
-        *) failed "map: $what, $precision: $(tail -n 1 "$work/messages")" && result=",,,,,,failed" ;;
+        125) wall="" result=",,,,,,,,no time was left" ;;
+        *) failed "map: $what, $precision: $(tail -n 1 "$work/messages")" && result=",,,,,,,,failed" ;;
     esac
-    [[ "$result" == *,*,*,*,*,*,* ]] || result="$result,"
+    [[ "$result" == *,*,*,*,*,*,*,*,* ]] || result="$result,"
     echo "$what,$precision,$run,$wall,$result" >>"$out/speed.csv"
 }
 
@@ -208,6 +213,12 @@ settings() {
     case $1 in
         main) ((side >= 512)) || square "$side" ;;
         classes) square "$side" && sets+=("${classes[@]}") ;;
+        size_*) square "${1#size_}" && sets+=("${classes[@]}") ;;
+        window)
+            square 256
+            sets+=(--set axis.0.min=0.5 --set axis.0.max=0.7 --set axis.1.min=5 --set axis.1.max=6.5)
+            ;;
+        basin) scene="$scenes/basin.toml" ;;
         brute) square "$side" && sets+=(--set integration.early_stop=false) ;;
         own_flow)
             square "$side"
@@ -219,6 +230,13 @@ settings() {
             sets+=(--set integration.early_stop=false --set integration.transient_periods=1984 --set integration.observed_periods=128)
             ;;
     esac
+}
+
+sizes() {
+    local precision="$1" cells
+    for cells in 32 100 316 1000 3162; do
+        settings "size_$cells" && timed "size_$cells" "$precision" 1 "${sets[@]}"
+    done
 }
 
 compile() {
@@ -257,35 +275,37 @@ again() {
             settings "$what"
             timed "$what" "$precision" "$run" "${sets[@]}"
             summary
-        done < <(grep -E '^[a-z_]+,f(32|64),1,[0-9.]+,[0-9]' "$out/speed.csv" | grep -v ^compile)
+        done < <(grep -E '^[a-z_0-9]+,f(32|64),1,[0-9.]+,[0-9]' "$out/speed.csv" | grep -v ^compile)
     done
 }
 
-# Prints medians of the runs that ended, else the reason.
+# Prints the whole run with the middle time from start to files of each row, else the reason why no run ended.
 speed_table() {
-    echo "| what | precision | runs | cells | start to files, s | integration, s | cells/s | lane-periods/s | ns per lane-step | outputs, s |"
-    echo "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    local header="| what | precision | runs | cells | start to files, s | opening, s | compilation, s | integration, s | outputs, s"
+    echo "$header | cells/s | lane-periods/s | ns per lane-step |"
+    sed 's/[^|]\+/ --- /g' <<<"$header | | | |"
     tail -n +2 "$out/speed.csv" | awk -F, '
-        # The middle of the values of a row and a field; both ends follow if `is_spread`.
-        function median(key, field, is_spread,   i, j, n, x, list) {
-            n = count[key]
-            for (i = 1; i <= n; i++) {
-                x = value[key, i, field]
-                for (j = i; j > 1 && list[j - 1] + 0 > x + 0; j--) list[j] = list[j - 1]
-                list[j] = x
+        # Sorts the runs of a row by their time from start to files.
+        function sort(key,   i, j) {
+            for (i = 1; i <= count[key]; i++) {
+                for (j = i; j > 1 && value[key, list[j - 1], 4] + 0 > value[key, i, 4] + 0; j--) list[j] = list[j - 1]
+                list[j] = i
             }
-            x = list[int((n + 1) / 2)]
-            return is_spread && n > 1 ? x " (" list[1] ", " list[n] ")" : x
         }
         { key = $1 "," $2
           if (!(key in known)) { known[key] = 1; order[++keys] = key }
-          if ($5 == "") { note[key] = $11 == "" ? "failed" : $11; next }
+          if ($5 == "") { note[key] = $13 == "" ? "failed" : $13; next }
           count[key]++
-          for (field = 4; field <= 10; field++) value[key, count[key], field] = $field }
+          for (field = 4; field <= 12; field++) value[key, count[key], field] = $field }
         END { for (i = 1; i <= keys; i++) { key = order[i]; split(key, name, ",")
-              if (!count[key]) { printf "| %s | %s | 0 | %s | | | | | | |\n", name[1], name[2], note[key]; continue }
-              printf "| %s | %s | %d | %s | %s | %s | %s | %s | %s | %s |\n", name[1], name[2], count[key], median(key, 5),
-                     median(key, 4, 1), median(key, 6, 1), median(key, 7), median(key, 8), median(key, 9), median(key, 10) } }'
+              if (!count[key]) { printf "| %s | %s | 0 | %s | | | | | | | | |\n", name[1], name[2], note[key]; continue }
+              sort(key)
+              n = count[key]; middle = list[int((n + 1) / 2)]
+              wall = value[key, middle, 4] (n > 1 ? " (" value[key, list[1], 4] ", " value[key, list[n], 4] ")" : "")
+              printf "| %s | %s | %d | %s | %s", name[1], name[2], n, value[key, middle, 5], wall
+              split("11 12 6 10 7 8 9", fields, " ")
+              for (k = 1; k <= 7; k++) printf " | %s", value[key, middle, fields[k]]
+              print " |" } }'
 }
 
 # Prints the device times of the largest map of each precision. Device names contain commas and are removed first.
@@ -307,7 +327,7 @@ summary() {
         echo "# rattlemap on a GPU"
         echo
         echo "$WGPU_ADAPTER_NAME, measured for $SECONDS of $((deadline + 7)) s; $side x $side cells by default."
-        echo "Medians (smallest, largest). scripts/measure_gpu.sh describes the rows."
+        echo "Each row is one run, with the middle time of (smallest, largest). scripts/measure_gpu.sh describes the rows."
         echo
         [[ ! -s "$out/right.txt" ]] || { sed 's/^/- /' "$out/right.txt" && echo; }
         speed_table
@@ -326,7 +346,7 @@ summary() {
     mv "$out/summary.md.new" "$out/summary.md"
 }
 
-echo "what,precision,run,start_to_files_s,cells,integration_s,cells_per_s,lane_periods_per_s,ns_per_lane_step,outputs_s,note" >"$out/speed.csv"
+echo "what,precision,run,start_to_files_s,cells,integration_s,cells_per_s,lane_periods_per_s,ns_per_lane_step,outputs_s,opening_s,compilation_s,note" >"$out/speed.csv"
 report
 disk
 summary
@@ -336,7 +356,7 @@ for step in "${steps[@]}"; do
         *)
             for precision in "${precisions[@]}"; do
                 case $step in
-                    right | compile) "$step" "$precision" ;;
+                    right | sizes | compile) "$step" "$precision" ;;
                     *) settings "$step" && timed "$step" "$precision" 1 "${sets[@]}" ;;
                 esac
                 summary
