@@ -48,7 +48,7 @@ def map(  # noqa: A001
         Axes and single values by name, for parameters whose names are keywords of this function, such as ``force`` or
         ``out``: ``axes={"force": (0, 1, 64)}``, ``parameters={"out": 2.0}``. Axes of ``axes`` precede those of keywords.
     engine
-        ``"auto"``: a hardware GPU if there is one, else the processor; ``"cpu"``; ``"gpu"``.
+        ``"auto"``: a hardware GPU if the map has enough cells, else the processor; ``"cpu"``; ``"gpu"``.
     precision
         ``"f32"`` or ``"f64"``. By default f32 on a GPU and f64 on the processor.
     adapter

@@ -462,7 +462,7 @@ impl ValueEnum for EngineKind {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         let help = match self {
-            EngineKind::Auto => "A hardware GPU if there is one, else the processor",
+            EngineKind::Auto => "A hardware GPU if the map has enough cells, else the processor",
             EngineKind::Gpu => "A graphics device",
             EngineKind::Cpu => "All processor cores, in f64",
         };

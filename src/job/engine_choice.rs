@@ -7,8 +7,10 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use crate::gpu::{self, AdapterChoice, AdapterReport, GpuError, Precision};
+use crate::job::processor;
 use crate::map::engine::{Cpu, Engine, EngineError, Gpu, Prepared};
 use crate::map::plan::Plan;
+use rattlemap_dynamics::model::Form;
 use rattlemap_dynamics::named;
 
 pub use adapters::{AdapterError, AdapterRequest, AdapterTextError};
@@ -29,7 +31,7 @@ named! {
     /// Kind of engine.
     #[derive(Default)]
     pub enum EngineKind {
-        /// A hardware GPU if there is one, else the processor. A software GPU is never chosen.
+        /// A hardware GPU for maps that it computes sooner than the processor, else the processor. A software GPU is never chosen.
         #[default]
         Auto = "auto",
         /// Lanes on a graphics device.
@@ -129,7 +131,8 @@ pub fn check(request: &EngineRequest) -> Result<(), ChoiceError> {
     }
 }
 
-/// Opens the requested engine. `auto` takes a hardware GPU if there is one that has the precision, else the processor.
+/// Opens the requested engine. `auto` takes a hardware GPU that has the precision if the map has enough cells, else the processor.
+/// It decides by the number of cells and cores, and by the kind of card; by a short measurement only on a card that is not known.
 ///
 /// # Errors
 /// [`ChoiceError`] if the engine cannot be opened.
@@ -165,9 +168,11 @@ async fn choose<'p>(
 ) -> Result<ChosenEngine<'p>, ChoiceError> {
     let reason = match selection {
         Ok(adapter) if gpu::is_hardware(&adapter.info) => {
-            match open_gpu(plan, precision, adapter.number, "a hardware GPU").await {
+            let preferred =
+                preferred(Load::of(plan), processor::cores(), precision, is_known(&adapter.info.name));
+            match on_card(plan, precision, adapter.number, preferred).await {
                 Ok(chosen) => return Ok(chosen),
-                Err(error) => error.to_string(),
+                Err(reason) => reason,
             }
         }
         Err(AdapterError::NoCardHas { precision, cards, .. }) => {
@@ -181,6 +186,108 @@ async fn choose<'p>(
         }
     };
     Ok(ChosenEngine::cpu(plan, format!("{reason}; using the processor")))
+}
+
+/// What decides between a card and the processor.
+#[derive(Clone, Copy, Debug)]
+struct Load {
+    /// Number of cells that can be under way together.
+    cells: usize,
+    is_machine: bool,
+}
+
+impl Load {
+    fn of(plan: &Plan) -> Load {
+        let is_machine = plan.flow_count() > 0 && matches!(plan.form(0), Form::Machine(_));
+        let cells = match plan.policy().follows() {
+            true => plan.counts()[0],
+            // Most cells of an adaptive map are filled.
+            false if plan.refine().is_some() => plan.run_count() / REFINED,
+            false => plan.run_count(),
+        };
+        Load { cells, is_machine }
+    }
+}
+
+/// An adaptive map integrates about one cell of this many.
+const REFINED: usize = 8;
+
+/// Number of cells per processor core below which the processor computes a map sooner. The main map of 262,144 cells takes an H200
+/// 3.6 s and sixteen cores 3.0 s; a card with that many lanes waits for its slowest ones (results/h200).
+const CELLS_PER_CORE: usize = 19_000;
+
+/// Largest ratio of the times of lanes in f64 and in f32 on cards that compute f64 fast.
+const SLOWER_IN_F64: usize = 2;
+
+/// Cards for which [`CELLS_PER_CORE`] was measured.
+const KNOWN: [&str; 1] = ["H200"];
+
+/// Returns a number with its thousands apart.
+fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let groups = digits.as_bytes().rchunks(3).rev();
+    groups.map(String::from_utf8_lossy).collect::<Vec<_>>().join(",")
+}
+
+fn is_known(name: &str) -> bool {
+    name.split_whitespace().any(|word| KNOWN.contains(&word))
+}
+
+/// The engine that `auto` prefers on a machine with a card, and the reason.
+#[derive(Debug, PartialEq, Eq)]
+enum Preferred {
+    Processor(String),
+    Card(String),
+    /// The card, if a trial shows that it is much faster.
+    Trial,
+}
+
+fn preferred(load: Load, cores: usize, precision: Precision, is_known: bool) -> Preferred {
+    if load.is_machine {
+        let reason = "the processor is faster for models that are not one or two coordinates with one gap";
+        return Preferred::Processor(reason.to_owned());
+    }
+    let least = CELLS_PER_CORE * cores * if precision == Precision::F64 { SLOWER_IN_F64 } else { 1 };
+    let (cells, bound) = (grouped(load.cells), grouped(least));
+    match (load.cells < least, is_known) {
+        (true, _) => Preferred::Processor(format!(
+            "{cells} cells at a time: the processor is faster below about {bound}"
+        )),
+        (false, true) => {
+            Preferred::Card(format!("{cells} cells at a time: the card is faster from about {bound} on"))
+        }
+        (false, false) => Preferred::Trial,
+    }
+}
+
+/// Speed of lanes on an unknown card, relative to the processor, from which on `auto` takes the card. The measured speed varies, and the
+/// choice should not.
+const MUCH_FASTER: f64 = 2.0;
+
+/// Opens a card if `preferred` says so. Otherwise returns why the processor computes the map.
+async fn on_card<'p>(
+    plan: &'p Plan,
+    precision: Precision,
+    number: usize,
+    preferred: Preferred,
+) -> Result<ChosenEngine<'p>, String> {
+    let reason = match preferred {
+        Preferred::Processor(reason) => return Err(reason),
+        Preferred::Card(reason) => Some(reason),
+        Preferred::Trial => None,
+    };
+    let opened = open_gpu(plan, precision, number, reason.as_deref().unwrap_or_default()).await;
+    let mut chosen = opened.map_err(|error| error.to_string())?;
+    if let (None, Engine::Gpu(lanes)) = (reason, &mut chosen.engine) {
+        let ratio = lanes.speed().await.map_err(|error| error.to_string())?;
+        if ratio < MUCH_FASTER {
+            return Err(format!(
+                "a trial on the card was {ratio:.1} times as fast, and less than {MUCH_FASTER} does not count"
+            ));
+        }
+        chosen.reason = format!("a trial on the card was {ratio:.1} times as fast as the processor");
+    }
+    Ok(chosen)
 }
 
 async fn open_gpu<'p>(
@@ -208,6 +315,33 @@ async fn open_device(precision: Precision, number: usize) -> Result<gpu::Gpu, Ch
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::plan::test_plan;
+
+    #[test]
+    fn a_card_needs_many_cells() {
+        let map = |cells| Load { cells, is_machine: false };
+        let choose = |load, cores, precision, is_known| preferred(load, cores, precision, is_known);
+        let small = choose(map(10_000), 16, Precision::F32, true);
+        let Preferred::Processor(reason) = small else { panic!("{small:?}") };
+        assert_eq!(reason, "10,000 cells at a time: the processor is faster below about 304,000");
+        assert!(matches!(choose(map(1 << 20), 16, Precision::F32, true), Preferred::Card(_)));
+        assert_eq!(choose(map(1 << 20), 16, Precision::F32, false), Preferred::Trial);
+        // Fewer cores take longer; f64 needs more cells.
+        assert!(matches!(choose(map(50_000), 2, Precision::F32, true), Preferred::Card(_)));
+        assert!(matches!(choose(map(50_000), 2, Precision::F64, true), Preferred::Processor(_)));
+        let machine = Load { is_machine: true, ..map(1 << 24) };
+        assert!(matches!(choose(machine, 1, Precision::F32, true), Preferred::Processor(_)));
+        assert!(is_known("NVIDIA H200") && !is_known("NVIDIA GH200"));
+    }
+
+    /// Rows that depend on each other, and adaptive maps, keep fewer cells under way.
+    #[test]
+    fn only_cells_that_can_run_together_count() {
+        let load = |more: &str| Load::of(&test_plan([("e", 8), ("omega", 100)], more)).cells;
+        assert_eq!(load(""), 800);
+        assert_eq!(load("[start]\npolicy = \"up\"\n"), 8);
+        assert_eq!(load("[refine]\n"), 100);
+    }
 
     #[test]
     fn errors_of_the_request_are_told_from_failures_of_a_device() {
