@@ -214,6 +214,11 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         machine.gaps.push(GapRow { row: row.clone(), walls });
     }
     add_friction(random, &mut machine, shape.friction, &rows, speeds);
+    if machine.friction.len() > 1 {
+        // Two elements of friction and a rigid wall are refused.
+        let walls = machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten());
+        walls.filter(|wall| wall.contact == Contact::Rigid).for_each(|wall| wall.contact = Contact::Impact);
+    }
     machine.validate().unwrap_or_else(|error| panic!("{seed}: {error}: {machine:?}"));
     let forces = &machine.stages[0];
     let x = forces.stiffness.clone().lu().solve(&forces.load).expect("a stiffness");
