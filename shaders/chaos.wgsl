@@ -15,10 +15,6 @@ fn is_chaos() -> bool {
     if tally.period < search.counting_start + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
-    // Chaos that is confirmed later needs no early stop.
-    if settings.longest > settings.decided_by {
-        return false;
-    }
     return is_chaotic(select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods));
 }
 

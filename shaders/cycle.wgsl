@@ -138,7 +138,9 @@ fn judge_cycle() {
     restore_columns();
     carry_vector();
     confirm_chaos();
-    let is_last = tally.period >= last_period();
+    // The reference continues a lane that hands over, so its last cycle is judged as strictly as others. If the cycle is none, the next
+    // period shows whether the motion is chaotic.
+    let is_last = tally.period >= last_period() && settings.hands_over == 0u;
     store_branch();
     let to = fixed_point();
     search.linear_distance = octaves(distance_between(strobe_state(), to));

@@ -81,7 +81,7 @@ fn carry_vector() {
     }
     let length = unit(&image, size);
     motions[lane].vector = image;
-    if GROWTH && tally.period - tally.candidate >= settings.exponent_from {
+    if tally.carries_growth == 1u && tally.period - tally.candidate >= settings.exponent_from {
         count_growth(Real(log2(f32(size)) + log2(f32(length))), tally.candidate);
     }
 }
@@ -106,7 +106,7 @@ fn scaled(u: State, factor: Real) -> State {
 
 // Continues with the saved vector.
 fn resume_growth() {
-    tally.tangent_count = select(0u, 1u, GROWTH);
+    tally.tangent_count = tally.carries_growth;
     tangent_now = motions[lane].vector;
 }
 

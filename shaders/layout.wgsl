@@ -118,7 +118,7 @@ struct TallyNow {
     // Smallest lag that recurs and contracts, and periods of its cycle still to be read.
     candidate: u32,
     periods_to_read: u32,
-    // Number of tangent vectors. `carries_growth`: 1 once the lane belongs to the variant that carries a vector for the exponent.
+    // Number of tangent vectors. `carries_growth`: 1 once the lane belongs to the kernel that carries a vector for the exponent.
     tangent_count: u32,
     carries_growth: u32,
     // The word: number of symbols, halves of its rotation-invariant hash, and the eight latest symbols, three bits
@@ -232,11 +232,13 @@ struct Tally {
 }
 
 // Lists of slots. The first `slots` entries are the active list: the lanes under way, in the order in which they began. The next entries
-// are the lanes that compaction selected.
+// are the lists of the kernels, one after the other (lists.wgsl).
 struct Queue {
-    // Number of selected lanes. `beat` counts compactions; the host notices by it that a device no longer works.
-    count: u32,
+    // Number of lanes of each list, and their first places. `beat` counts how often lists were made; the host notices by it that a device
+    // no longer works.
+    counts: array<u32, LISTS>,
     beat: u32,
+    begins: array<u32, LISTS>,
     lanes: array<u32>,
 }
 
@@ -259,4 +261,4 @@ const STAGE_MEASURING: u32 = 4u; // the lane is decided, and its motion is measu
 @group(0) @binding(11) var<storage, read_write> findings: array<Finding>;
 @group(0) @binding(12) var<storage, read_write> block_starts: array<u32>;
 @group(0) @binding(13) var<storage, read_write> measured: array<Measured>;
-@group(0) @binding(14) var<storage, read_write> workgroups: array<u32, 3>;
+@group(0) @binding(14) var<storage, read_write> workgroups: array<array<u32, 3>, LISTS>;

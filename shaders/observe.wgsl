@@ -75,6 +75,11 @@ fn confirm_chaos() {
     }
 }
 
+// Whether the reference continues this lane, which has ended: its class is undecided at the end of the budget.
+fn is_handed_over() -> bool {
+    return settings.hands_over == 1u && search.cycle == 0u && !is_chaos() && !is_quasi_periodic();
+}
+
 // Returns the period after which an undecided lane ends.
 fn last_period() -> u32 {
     return select(settings.decided_by, settings.longest, search.confirms_chaos == 1u);

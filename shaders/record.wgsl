@@ -2,11 +2,11 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.y * settings.row + id.x;
-    if i >= queue.count {
+    let i = place_in_list(LIST_ENDED, id);
+    if i == queue.counts[LIST_ENDED] {
         return;
     }
-    load_lane(selected_lane(i));
+    load_lane(listed_lane(LIST_ENDED, i));
     load_strobe_state();
     if tallies[lane].is_measured == 1u {
         motion = motions[lane].ended;
@@ -36,6 +36,9 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         if is_near_strobe() {
             finding.valid |= VALID_NEAR_STROBE;
+        }
+        if is_handed_over() {
+            finding.valid |= VALID_OPEN;
         }
         if search.cycle > 0u {
             read_cycle(&reading, &finding);
@@ -177,11 +180,11 @@ fn close_hash() {
 // Copies what was measured to the place of each result.
 @compute @workgroup_size(WORKGROUP)
 fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.y * settings.row + id.x;
-    if i >= queue.count {
+    let i = place_in_list(LIST_ENDED, id);
+    if i == queue.counts[LIST_ENDED] {
         return;
     }
-    let slot = selected_lane(i);
+    let slot = listed_lane(LIST_ENDED, i);
     var result: Measured;
     if tallies[slot].is_measured == 1u && tallies[slot].now.status == STATUS_OK {
         result.totals = motions[slot].totals;

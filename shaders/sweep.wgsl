@@ -1,4 +1,4 @@
-// The main loop of a lane. One invocation is one lane.
+// The main loop of a lane. One invocation has at most one lane.
 
 var<private> cell: Cell;
 // State that steps and events use, in registers.
@@ -40,23 +40,9 @@ fn check_finite() {
     }
 }
 
-fn is_over() -> bool {
-    return tally.status != STATUS_OK || tally.stage == STAGE_READ || tally.stage == STAGE_DONE;
-}
-
-// Whether this variant has work for the lane. The variant without the exponent's tangent vector moves a lane until it needs the vector; a
-// reading in progress is finished first. From then on the lane belongs to the other variant. The choice must not depend on where a dispatch
-// ends, because the variants round differently.
+// Whether this kernel continues the lane.
 fn has_work() -> bool {
-    let measures = tally.stage == STAGE_MEASURING;
-    if MEASURE || measures {
-        return MEASURE && measures && tally.status == STATUS_OK;
-    }
-    if is_over() || !EXPONENT {
-        return !is_over();
-    }
-    let grows = tally.carries_growth == 1u || (tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from);
-    return grows == GROWTH;
+    return list_of_lane() == OWN_LIST;
 }
 
 // Loads lane `i` into registers.
@@ -104,46 +90,70 @@ fn next_stop_phase() -> u32 {
     return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
 }
 
+// Integrates lanes over some whole periods. A lane with very many events may need several dispatches for a period.
 @compute @workgroup_size(WORKGROUP)
 fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.y * settings.row + id.x;
-    if i >= queue.count {
+    let i = place_in_list(OWN_LIST, id);
+    if i == queue.counts[OWN_LIST] {
         return;
     }
-    load_lane(selected_lane(i));
+    load_lane(listed_lane(OWN_LIST, i));
     resume_motion();
     load_tangent();
     prepare_motion();
+    var periods = 0u;
     // Scans, events and strobes have separate loops, so that lanes do the same work at the same time.
-    while has_work() && iterations < settings.iterations {
+    while has_work() && iterations < settings.iterations && periods < settings.whole_periods {
         if fly_to_stop_phase() {
             if MEASURE {
                 measure_period();
                 begin_schedule();
+                periods += 1u;
                 continue;
             }
             load_strobe_state();
             if tally.step >= shape.steps {
                 begin_period();
                 begin_schedule();
+                periods += 1u;
             } else {
                 compare_mirror();
             }
             store_strobe_state();
         }
     }
-    if tally.stage == STAGE_READ {
-        load_strobe_state();
-        judge_cycle();
-        if tally.stage == STAGE_READING {
-            begin_reading();
-        }
-        store_strobe_state();
-    }
-    if settings.measured_periods > 0u && tally.stage == STAGE_DONE && tally.status == STATUS_OK && !MEASURE {
-        begin_measuring();
+    if !MEASURE {
+        measure_if_decided();
     }
     store_tangent_now();
     suspend_motion();
     store_lane();
+}
+
+// Decides what follows for the lanes that have read a cycle.
+@compute @workgroup_size(WORKGROUP)
+fn judge_cycles(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = place_in_list(LIST_JUDGE, id);
+    if i == queue.counts[LIST_JUDGE] {
+        return;
+    }
+    load_lane(listed_lane(LIST_JUDGE, i));
+    resume_motion();
+    load_strobe_state();
+    judge_cycle();
+    if tally.stage == STAGE_READING {
+        begin_reading();
+    }
+    store_strobe_state();
+    measure_if_decided();
+    store_tangent_now();
+    suspend_motion();
+    store_lane();
+}
+
+// Begins to measure the motion of a lane whose class is decided, if the settings ask for it.
+fn measure_if_decided() {
+    if settings.measured_periods > 0u && tally.stage == STAGE_DONE && tally.status == STATUS_OK && !is_handed_over() {
+        begin_measuring();
+    }
 }

@@ -29,7 +29,7 @@ pub use analysis::{
 };
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
-pub use cell::{Measurement, measure, measure_until};
+pub use cell::{Measurement, measure, measure_at_section, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;
@@ -37,7 +37,7 @@ pub use quantities::{Approaches, Displacement, FrictionQuantities, Quantities, q
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};
 pub use resolution::rounding_decides;
-pub use section::Section;
+use section::Section;
 pub use trace::trace;
 
 use crate::model::{Side, State};

@@ -22,7 +22,7 @@ Array = npt.NDArray[Any]
 #: Columns that are row numbers of a table of texts.
 TEXT_COLUMNS = ("word", "pattern")
 #: Columns whose codes become text. Codes of ``symmetric`` stay: -1 absent, 0 false, 1 true.
-CODE_COLUMNS = ("class", "status", "source")
+CODE_COLUMNS = ("class", "status", "source", "finished")
 #: Indices along the axes, which a Dataset does not need.
 INDICES = ("i", "j")
 #: Dimension of a list of cells.
@@ -41,6 +41,7 @@ _LONG_NAMES = {
     "status": "how the integration ended",
     "periods_run": "forcing periods integrated",
     "source": "integrated or filled",
+    "finished": "engine that finished the cell",
     "attractors": "attractors found",
     "attractor": "label of the attractor",
 }

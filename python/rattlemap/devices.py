@@ -21,7 +21,7 @@ class Devices:
     adapters
         Graphics adapters, the best one first, indexed by ``number``, which the keyword ``adapter`` accepts. Columns: ``name``;
         ``is_hardware``, False for a program on the processor; ``precisions``, such as ``"f32 f64"``; ``interface``; ``pci``,
-        the address of the card or None; ``largest_binding`` in bytes; ``most_lanes``, the largest batch.
+        the address of the card or None; ``largest_binding`` in bytes; ``most_lanes``, the largest number of lanes under way.
     engine, precision
         Choice of ``auto``: ``"cpu"`` or ``"gpu"``, and ``"f32"`` or ``"f64"``.
     reason

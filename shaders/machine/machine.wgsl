@@ -254,7 +254,7 @@ fn mesh_fraction(periods: u32) -> Real {
     return (Real(tally.mesh_whole) + motion.mesh_part) / (Real(periods) * Real(shape.steps));
 }
 
-// The processor measures machines (src/map/engine/section.rs).
+// The processor measures machines (src/map/engine/finish.rs).
 fn measure_period() {}
 
 fn begin_measuring() {}

@@ -75,7 +75,7 @@ impl AdapterReport {
             info: adapter.get_info(),
             precisions: Precision::ALL.into_iter().filter(|&p| has(adapter, p)).collect(),
             largest_binding: adapter.limits().max_storage_buffer_binding_size,
-            most_lanes: most_slots(&adapter.limits()),
+            most_lanes: most_slots(&adapter.limits()).min(MOST_UNDER_WAY),
         }
     }
 
@@ -139,10 +139,8 @@ pub fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
     info.device_type != wgpu::DeviceType::Cpu
 }
 
-/// Whether an adapter is a card with memory of its own.
-pub fn is_card(info: &wgpu::AdapterInfo) -> bool {
-    matches!(info.device_type, wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::VirtualGpu)
-}
+/// Largest number of lanes under way, unless settings ask for more.
+pub(super) const MOST_UNDER_WAY: usize = 1 << 16;
 
 /// Largest number of slots of a pool. They take about 2 GB on the device in f32, 3 GB in f64.
 const MOST_SLOTS: usize = 1 << 20;

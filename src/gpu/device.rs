@@ -17,7 +17,7 @@ const WRITES: [bool; 14] =
 /// An entry point of the shader and its storage bindings. There are at most eight, because every adapter supports eight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EntryPoint {
-    name: &'static str,
+    pub(super) name: &'static str,
     pub(super) storage: &'static [u32],
 }
 
@@ -25,11 +25,13 @@ pub(super) struct EntryPoint {
 pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 2, 5, 6, 7, 8, 9] };
 /// Integrates lanes.
 pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
-/// Lists the lanes that a variant has work for, in three passes.
-pub(super) const COMPACT: [EntryPoint; 3] = [
-    EntryPoint { name: "count_selected", storage: &[7, 8, 12] },
-    EntryPoint { name: "sum_selected", storage: &[8, 12, 14] },
-    EntryPoint { name: "move_selected", storage: &[7, 8, 12] },
+/// Decides what follows for lanes that have read a cycle.
+pub(super) const JUDGE: EntryPoint = EntryPoint { name: "judge_cycles", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
+/// Makes the lists of lanes, in three passes.
+pub(super) const LIST: [EntryPoint; 3] = [
+    EntryPoint { name: "count_lanes", storage: &[7, 8, 12] },
+    EntryPoint { name: "sum_lanes", storage: &[8, 12, 14] },
+    EntryPoint { name: "place_lanes", storage: &[7, 8, 12] },
 ];
 /// Writes the results of lanes.
 pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 8, 10, 11] };
@@ -37,14 +39,8 @@ pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: 
 /// Copies what was measured on lanes.
 pub(super) const GATHER: EntryPoint = EntryPoint { name: "gather", storage: &[6, 7, 8, 13] };
 
-/// The pipelines of one variant.
-pub(super) struct Pipelines {
-    pub(super) begin: wgpu::ComputePipeline,
-    pub(super) sweep: wgpu::ComputePipeline,
-    pub(super) compact: [wgpu::ComputePipeline; 3],
-    pub(super) conclude: wgpu::ComputePipeline,
-    pub(super) gather: wgpu::ComputePipeline,
-}
+/// An entry point of a variant.
+pub(super) type Kernel = (Variant, &'static str);
 
 /// First failure of a device outside any error scope: its loss, or a refused command. It is stored by callbacks, without which wgpu would
 /// panic.
@@ -140,36 +136,34 @@ fn bind_group_layout(device: &wgpu::Device, entry_point: EntryPoint) -> wgpu::Bi
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries })
 }
 
-/// Compiles variants.
+/// Compiles entry points of variants.
 ///
 /// # Errors
 /// [`GpuError::Refused`] if the driver does not compile one of them.
-pub(super) async fn pipelines(gpu: &Gpu, variants: &[Variant]) -> Result<Vec<Pipelines>, GpuError> {
-    let mut modules = Vec::with_capacity(variants.len());
-    for variant in variants {
+pub(super) async fn pipelines(
+    gpu: &Gpu,
+    kernels: &[(Variant, EntryPoint)],
+) -> Result<Vec<(Kernel, wgpu::ComputePipeline)>, GpuError> {
+    let mut modules = HashMap::new();
+    for (variant, _) in kernels {
+        if modules.contains_key(variant) {
+            continue;
+        }
         let source = gpu.rewrite.map_or_else(|| variant.source(), |rewrite| rewrite(variant.source()));
         let descriptor = || wgpu::ShaderModuleDescriptor {
             label: Some("lane"),
             source: wgpu::ShaderSource::Wgsl(source.as_str().into()),
         };
-        modules.push(compiling(gpu, &|| gpu.device.create_shader_module(descriptor())).await?);
+        modules.insert(*variant, compiling(gpu, &|| gpu.device.create_shader_module(descriptor())).await?);
     }
-    // Starts with the largest entry points, which take longest to compile.
-    let entry_points = [SWEEP, CONCLUDE, BEGIN, GATHER].into_iter().chain(COMPACT);
-    let jobs: Vec<_> =
-        entry_points.flat_map(|entry| modules.iter().map(move |module| (module, entry))).collect();
-    let compiled =
-        side_by_side(&jobs, |&(module, entry_point)| compiling(gpu, &|| pipeline(gpu, module, entry_point)));
-    let mut made = Vec::with_capacity(jobs.len());
-    for pipeline in compiled {
-        made.push(pipeline.await?);
+    let compiled = side_by_side(kernels, |(variant, entry_point)| {
+        compiling(gpu, &|| pipeline(gpu, &modules[variant], *entry_point))
+    });
+    let mut made = Vec::with_capacity(kernels.len());
+    for ((variant, entry_point), pipeline) in kernels.iter().zip(compiled) {
+        made.push(((*variant, entry_point.name), pipeline.await?));
     }
-    let of = |nth: usize| {
-        let get = |entry: usize| made[entry * variants.len() + nth].clone();
-        let [sweep, conclude, begin, gather] = [0, 1, 2, 3].map(get);
-        Pipelines { begin, sweep, compact: [4, 5, 6].map(get), conclude, gather }
-    };
-    Ok((0..variants.len()).map(of).collect())
+    Ok(made)
 }
 
 /// Creates a part of a shader's program immediately, not when the future is polled. The future returns this part or the driver's error.

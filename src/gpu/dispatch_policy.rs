@@ -5,15 +5,15 @@ use web_time::Duration;
 /// Settings by which the host dispatches lanes. Only `late_tangent` and `keep` affect records, by rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DispatchPolicy {
-    /// Number of parts of a round. Each part first lists the lanes that have work.
-    pub(super) parts: u32,
-    /// Number of dispatches of a part. A lane that has read a cycle continues in the next dispatch.
+    /// Number of times that a round makes the lists of lanes and dispatches all kernels.
     pub(super) dispatches: u32,
     /// Desired duration of a round, from one check to the next.
     pub(super) round: Duration,
-    /// Largest number of lanes with which a round of [`FEWEST_ITERATIONS`](super::rounds::FEWEST_ITERATIONS) certainly takes less than a
+    /// Largest number of lanes with which a round of [`FEWEST_ITERATIONS`](super::rounds) certainly takes less than a
     /// second.
     pub(super) at_once: u32,
+    /// Number of periods of the first dispatches, unless there are very many lanes.
+    pub(super) first_periods: u32,
     /// Number of rounds after which results of ended lanes are read even if few lanes have ended, provided that further lanes can begin.
     pub(super) patience: u32,
     /// Whether lanes begin in a variant without the tangent vector and change to the other variant when they need it. This reduces the
@@ -21,6 +21,8 @@ pub(super) struct DispatchPolicy {
     pub(super) late_tangent: bool,
     /// Whether lanes keep copies of all their constants.
     pub(super) keep: bool,
+    /// If a list has at most this many lanes, each gets a warp of its own.
+    pub(super) few_lanes: u32,
     /// Longest time to wait for a submission. A device that takes longer counts as lost.
     pub(super) longest_wait: Duration,
     /// Duration of one iteration of a dispatch on a simulated device, for tests; `None` measures the rounds of a real device.
@@ -32,13 +34,14 @@ const LONGEST_WAIT: Duration = Duration::from_secs(300);
 
 /// Software: the duration of a round grows with the number of lanes, and only the amount of work matters.
 const SOFTWARE: DispatchPolicy = DispatchPolicy {
-    parts: 1,
     dispatches: 4,
     round: Duration::from_millis(100),
     at_once: 1 << 14,
+    first_periods: 1,
     patience: 8,
     late_tangent: true,
     keep: true,
+    few_lanes: 0,
     longest_wait: LONGEST_WAIT,
     simulated: None,
 };
@@ -47,13 +50,15 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
 const INTEGRATED: DispatchPolicy =
     DispatchPolicy { round: Duration::from_millis(10), patience: 4, keep: false, ..SOFTWARE };
 
-/// Hardware with room for more lanes than a map has. A round costs the host more time than the first lanes of a map cost the device, so
-/// rounds are few and long. A part is about 64 periods of a lane, and all lanes run side by side.
+/// Hardware that runs all lanes under way side by side. A round costs the host more time than the first lanes of a map cost the device, so
+/// rounds are few and long.
 pub(super) const DEDICATED: DispatchPolicy = DispatchPolicy {
-    parts: 4,
+    dispatches: 16,
     round: Duration::from_millis(32),
     at_once: 1 << 17,
+    first_periods: 4,
     late_tangent: false,
+    few_lanes: 1 << 10,
     ..INTEGRATED
 };
 

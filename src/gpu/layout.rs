@@ -10,6 +10,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::rules::TRAIL;
 use rattlemap_dynamics::model::{Contact, STATE};
+use rattlemap_dynamics::named;
 
 /// Declares structs for the host, and a function that returns their declarations in WGSL. Lengths of arrays have names that the shader
 /// knows, too. A field behind a semicolon exists in the shader only.
@@ -80,14 +81,17 @@ structs! {
         periods: u32,
         decided_by: u32,
         longest: u32,
+        // 1: undecided lanes end after `periods` with VALID_OPEN.
+        hands_over: u32,
         // First period at which a lane may stop as chaotic.
         chaos_from: u32,
         // Number of standard errors by which the exponent of such a lane must exceed zero.
         chaos_errors: f32,
-        // Loop iterations that one dispatch may spend on a lane.
+        // A dispatch ends for a lane after this number of loop iterations, or of whole periods.
         iterations: u32,
-        // 1: compaction selects the lanes that have ended. 0: it selects those that this variant has work for.
-        ended: u32,
+        whole_periods: u32,
+        // Largest length of a list whose lanes get a warp each.
+        few_lanes: u32,
         // Passes (scan steps and careful steps) allowed in one period.
         passes_per_period: u32,
         // Events allowed in one period, and in all periods together.
@@ -97,7 +101,7 @@ structs! {
         row: u32,
         // Periods before averages begin.
         transient_periods: u32,
-        // Period at which lanes without a tangent vector wait for the variant that carries it.
+        // Period at which lanes without a tangent vector wait for the kernel that carries it.
         growth_from: u32,
         // Periods before the exponent is accumulated, and periods per block of its average.
         exponent_from: u32,
@@ -321,14 +325,33 @@ impl Finding {
     }
 }
 
-/// Number of lanes per workgroup of a compaction.
+named! {
+    /// A list of lanes. Each kernel has one.
+    pub(super) enum List {
+        /// Lanes that are integrated without the exponent's tangent vector.
+        Plain = "plain",
+        /// Lanes that are integrated with this vector.
+        Growth = "growth",
+        /// Lanes that are measured.
+        Measure = "measure",
+        /// Lanes that have read a cycle.
+        Judge = "judge",
+        /// Lanes that have ended.
+        Ended = "ended",
+    }
+}
+
+/// Number of lists.
+pub(super) const LISTS: usize = List::ALL.len();
+
+/// Number of keys by which lanes are sorted (shaders/lists.wgsl).
+pub(super) const KEYS: usize = 8 * LISTS;
+
+/// Number of lanes of a workgroup that makes lists.
 pub(super) const BLOCK: u32 = 256;
 
-/// Number of entries of the queue in front of its slots, and the byte offsets of these two entries: the number of selected lanes, and the
-/// counter of compactions.
-pub(super) const QUEUE_HEAD: usize = 2;
-pub(super) const COUNT_AT: u64 = 0;
-pub(super) const BEAT_AT: u64 = 4;
+/// Number of entries of the queue in front of its slots. The first ones are the lengths of the lists; the counter of lists follows.
+pub(super) const QUEUE_HEAD: usize = 2 * LISTS + 1;
 
 /// Returns the number of symbols that one number of a word or a pattern holds.
 pub(super) fn symbols_per_number(bits: usize) -> usize {

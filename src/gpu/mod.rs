@@ -1,7 +1,7 @@
 //! The GPU engine: runs WGSL lanes on a graphics adapter.
 //!
-//! [`Gpu::open`] opens an adapter for one precision. [`Gpu::run`] integrates lanes and returns one [`Record`] per lane. It runs as many
-//! lanes at a time as the adapter's limits allow, in short dispatches; the lanes' state stays on the device. In a [`Pool`], lanes can begin
+//! [`Gpu::open`] opens an adapter for one precision. [`Gpu::run`] integrates lanes and returns one [`Record`] per lane. It keeps up
+//! to 65,536 lanes under way, in short dispatches; the lanes' state stays on the device. In a [`Pool`], lanes can begin
 //! and end at any time. The engine uses no files. It uses several threads only to compile shaders.
 //!
 //! Lanes are independent of [`rattlemap_dynamics::motion`]: they use only the description of the model ([`rattlemap_dynamics::model`]). A
@@ -41,8 +41,7 @@ use std::time::Duration;
 
 pub(crate) use adapter::no_adapter;
 pub use adapter::{
-    AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_card, is_hardware,
-    narrowed_by,
+    AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
 };
 pub use constants::Constants;
 pub use error::GpuError;
@@ -62,6 +61,7 @@ use panics::{PanicFree, catch_panic};
 
 use crate::record::Record;
 use crate::record::limits::MOST_STEPS;
+use device::{BEGIN, CONCLUDE, EntryPoint, GATHER, JUDGE, Kernel, LIST, SWEEP};
 use dispatch_policy::DispatchPolicy;
 use rattlemap_dynamics::model::{Form, Law, Pair, State};
 use rattlemap_dynamics::orbit::Budget;
@@ -102,6 +102,9 @@ pub struct LaneSettings {
     pub undecided_periods: u32,
     /// Further periods for lanes that are still chaotic after all other periods; only with exponents.
     pub confirm_chaos: u32,
+    /// Whether a lane that is undecided after `periods` ends with the bit [`valid::OPEN`](crate::record::valid::OPEN), instead of running
+    /// `undecided_periods` and `confirm_chaos`.
+    pub hands_over: bool,
     /// Whether records contain exponents.
     pub exponent: bool,
     /// Whether records contain words.
@@ -130,7 +133,7 @@ pub struct LaneSettings {
     /// Least number of free steps per period; `None` for the number that the motion needs. More steps do not improve results: rounding
     /// errors add up like a random walk, and a short flight that spans several steps loses the relative accuracy of its gap.
     pub steps_per_period: Option<u32>,
-    /// Largest number of lanes under way; `None` for as many as the adapter's limits allow.
+    /// Largest number of lanes under way; `None` for as many as keep a device busy (65,536 at most).
     pub batch: Option<usize>,
     /// Loop iterations that one dispatch may spend on a lane. Some drivers stop loops after 65,535 iterations.
     pub iterations: u32,
@@ -177,6 +180,7 @@ impl Default for LaneSettings {
             early_stop: true,
             undecided_periods: 0,
             confirm_chaos: 0,
+            hands_over: false,
             exponent: true,
             word: true,
             pattern: true,
@@ -248,6 +252,26 @@ impl Drop for Gpu {
     }
 }
 
+/// The kernels of a pool.
+#[derive(Clone, Debug)]
+struct Kernels {
+    /// Variants that integrate lanes, one for each list that can have lanes.
+    sweeps: Vec<Variant>,
+    /// The variant of all other kernels.
+    common: Variant,
+    /// Whether lanes read cycles.
+    judges: bool,
+}
+
+impl Kernels {
+    /// Returns all entry points, those first that take longest to compile.
+    fn entry_points(&self) -> impl Iterator<Item = (Variant, EntryPoint)> + '_ {
+        let sweeps = self.sweeps.iter().rev().map(|&variant| (variant, SWEEP));
+        let common = self.judges.then_some(JUDGE).into_iter().chain([CONCLUDE, BEGIN, GATHER]).chain(LIST);
+        sweeps.chain(common.map(|entry_point| (self.common, entry_point)))
+    }
+}
+
 /// A device that integrates lanes in one precision.
 pub struct Gpu {
     device: wgpu::Device,
@@ -256,7 +280,7 @@ pub struct Gpu {
     number: usize,
     info: wgpu::AdapterInfo,
     precision: Precision,
-    pipelines: HashMap<Variant, device::Pipelines>,
+    pipelines: HashMap<Kernel, wgpu::ComputePipeline>,
     trouble: device::Trouble,
     rewrite: Option<fn(String) -> String>,
     policy: DispatchPolicy,
@@ -313,7 +337,12 @@ impl Gpu {
         self.halt = Arc::clone(halt);
     }
 
-    fn is_halted(&self) -> bool {
+    /// Returns the flag of [`Gpu::stop_on`].
+    pub(crate) fn halt(&self) -> &Arc<AtomicBool> {
+        &self.halt
+    }
+
+    pub(crate) fn is_halted(&self) -> bool {
         self.halt.load(Ordering::Relaxed)
     }
 
@@ -483,23 +512,35 @@ impl Gpu {
             chatter: false,
             ..variant(false)
         });
-        let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).chain(measuring).collect();
-        let missing: Vec<Variant> =
-            variants.iter().copied().filter(|variant| !self.pipelines.contains_key(variant)).collect();
+        let sweeps: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).chain(measuring).collect();
+        let kernels = Kernels { sweeps, common: variant(exponent), judges: settings.max_period > 0 };
+        let is_missing = |(variant, entry_point): &(Variant, EntryPoint)| {
+            !self.pipelines.contains_key(&(*variant, entry_point.name))
+        };
+        let missing: Vec<_> = kernels.entry_points().filter(is_missing).collect();
         let compiled = device::pipelines(self, &missing).await?;
-        self.pipelines.extend(missing.iter().copied().zip(compiled));
+        self.pipelines.extend(compiled);
         if !missing.is_empty() && self.rewrite.is_none() {
             let watcher = self.watcher.take();
-            let checked = self_test::check(self, variants.clone(), settings).await;
+            let checked = self_test::check(self, kernels.clone(), settings).await;
             self.watcher = watcher;
-            checked
-                .inspect_err(|_| missing.iter().for_each(|variant| drop(self.pipelines.remove(variant))))?;
+            checked.inspect_err(|_| {
+                missing
+                    .iter()
+                    .for_each(|(variant, entry)| drop(self.pipelines.remove(&(*variant, entry.name))));
+            })?;
         }
-        Ok(Pool::new(self, variants, settings))
+        Ok(Pool::new(self, kernels, settings))
+    }
+
+    /// Returns a compiled entry point.
+    fn pipeline(&self, variant: &Variant, entry_point: EntryPoint) -> &wgpu::ComputePipeline {
+        &self.pipelines[&(*variant, entry_point.name)]
     }
 
     /// Returns the largest number of bytes of device memory for this number of lanes.
     pub(crate) fn bytes_of_lanes(&self, lanes: usize, settings: &LaneSettings) -> u64 {
-        slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision, settings)
+        let most = slots::most(&self.device.limits(), self.precision, settings);
+        slots::bytes(lanes.min(most), self.precision, settings)
     }
 }

@@ -5,19 +5,17 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-use super::adapter::most_slots;
 use super::constants::Constants;
-use super::device::{BEGIN, Pipelines};
+use super::device::BEGIN;
 use super::guard::with_error_scopes;
 use super::layout::Cell;
 use super::reading::LaneResult;
-use super::rounds::{Rounds, bind, dispatch};
-use super::shader::Variant;
-use super::slots::Slots;
+use super::rounds::{Length, Rounds, bind, dispatch};
+use super::slots::{self, Slots};
 use super::stage::Stage;
 use super::tables::Tables;
 use super::transfer::reals;
-use super::{Gpu, GpuError, Lane, LaneSettings};
+use super::{Gpu, GpuError, Kernels, Lane, LaneSettings};
 use rattlemap_dynamics::model::REST;
 use rattlemap_dynamics::orbit::Status;
 
@@ -28,7 +26,7 @@ const WIDEST_GAP: usize = 1024;
 /// waiting for the slowest lane.
 pub struct Pool {
     pub(super) settings: LaneSettings,
-    pub(super) variants: Vec<Variant>,
+    pub(super) kernels: Kernels,
     /// Largest number of slots.
     most: usize,
     buffers: Option<Slots>,
@@ -41,26 +39,25 @@ pub struct Pool {
     /// Contents of the buffers, by slot.
     cells: Vec<Cell>,
     starts: Vec<f64>,
-    /// Iterations of the next round.
-    iterations: u32,
+    /// Length of the dispatches of the next round.
+    length: Length,
     /// Whether a round is under way that was sent ahead, while the host reads results.
     is_ahead: bool,
 }
 
 impl Pool {
-    pub(super) fn new(gpu: &Gpu, variants: Vec<Variant>, settings: &LaneSettings) -> Pool {
-        let most = most_slots(&gpu.device.limits());
+    pub(super) fn new(gpu: &Gpu, kernels: Kernels, settings: &LaneSettings) -> Pool {
         Pool {
             settings: *settings,
-            variants,
-            most: settings.batch.unwrap_or(most).clamp(1, most),
+            kernels,
+            most: slots::most(&gpu.device.limits(), gpu.precision, settings),
             buffers: None,
             active_list: Vec::new(),
             free: Vec::new(),
             lanes: Vec::new(),
             cells: Vec::new(),
             starts: Vec::new(),
-            iterations: 0,
+            length: Length::default(),
             is_ahead: false,
         }
     }
@@ -103,9 +100,9 @@ impl Pool {
             }
         }
         self.make_room(gpu, lanes.len()).await?;
-        // The number of iterations was chosen for fewer lanes. With many more lanes, such dispatches would take too long.
-        self.iterations = (u64::from(self.iterations) * self.active_list.len() as u64
-            / (self.active_list.len() + lanes.len()) as u64) as u32;
+        // The length was chosen for fewer lanes. With many more lanes, such dispatches would take too long.
+        let share = self.active_list.len() as f64 / (self.active_list.len() + lanes.len()) as f64;
+        self.length = self.length.scaled(share);
         // Takes the lowest slots, so that lanes that begin together are adjacent.
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.free.split_off(self.free.len() - lanes.len());
@@ -130,17 +127,16 @@ impl Pool {
                 gpu.write(&buffers.starts, of_starts as u64, &starts);
             }
             buffers.call(gpu, &self.active_list, self.active_list.len() - lanes.len(), &self.settings);
-            let first = &gpu.pipelines[&self.variants[0]];
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            let bindings = bind(gpu, &first.begin, BEGIN, &buffers.bindings(tables));
-            dispatch(gpu, &mut encoder, &first.begin, &bindings, buffers.grid(lanes.len() as u32), None);
+            let begin = bind(gpu, &self.kernels.common, BEGIN, &buffers.bindings(tables));
+            dispatch(gpu, &mut encoder, &begin, buffers.grid(lanes.len() as u32), None);
             gpu.submit(encoder);
         })?;
         gpu.report(Stage::Uploaded);
         Ok(())
     }
 
-    /// Integrates until at most `until` lanes are under way, or until some ended lanes have waited long enough for others. Returns the
+    /// Integrates until at most `until` lanes are under way, and fewer than before, or until some ended lanes have waited long enough for others. Returns the
     /// lanes that have ended; none only if a flag has stopped the device.
     ///
     /// # Errors
@@ -154,6 +150,7 @@ impl Pool {
         let Some(buffers) = self.buffers.as_ref().filter(|_| !self.active_list.is_empty()) else {
             return Ok(Vec::new());
         };
+        let until = until.min(self.active_list.len() - 1);
         let bindings = buffers.bindings(tables);
         let rounds = Rounds {
             gpu,
@@ -164,14 +161,11 @@ impl Pool {
             workgroups: &buffers.workgroups,
             most_iterations: self.settings.iterations,
         };
-        let variants: Vec<&Pipelines> = self.variants.iter().map(|variant| &gpu.pipelines[variant]).collect();
         gpu.call(|| buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings))?;
-        // Keeps the last of the variants that decide classes.
-        let decided = self.variants.iter().rposition(|variant| variant.measures.is_none()).unwrap_or(0);
-        let (active_lanes, settings) = (self.active_list.len(), &self.settings);
-        let conclude = || buffers.conclude(gpu, variants[decided], &bindings, active_lanes, settings);
+        let (active_lanes, settings, common) = (self.active_list.len(), &self.settings, &self.kernels.common);
+        let conclude = || buffers.conclude(gpu, common, &bindings, active_lanes, settings);
         let (concluding, device) =
-            rounds.run(&variants, until as u32, &mut self.iterations, &mut self.is_ahead, conclude).await?;
+            rounds.run(&self.kernels, until as u32, &mut self.length, &mut self.is_ahead, conclude).await?;
         gpu.report(Stage::Integrated { device });
         let (readings, findings, measured) = concluding.read(gpu).await?;
         if findings.is_empty() && !gpu.is_halted() {

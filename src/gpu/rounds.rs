@@ -1,24 +1,29 @@
 //! Rounds of dispatches over the lanes under way, until few enough are left.
 //!
-//! Each part of a round lists the lanes for which a variant has work, in the order of the active list, and dispatches them a few times. The
-//! device computes how many workgroups they need. At its end the round counts the lanes that are left. The next round runs while the host
-//! checks the last one, and while it reads results. Rounds are short, because some drivers reset a device whose work takes seconds, and
-//! long enough that their overhead is small.
+//! Before each dispatch the device makes the lists of lanes anew (shaders/lists.wgsl), and computes how many workgroups each kernel needs.
+//! At its end a round counts the lanes of each list. The next round runs while the host checks the last one, and while it reads results.
+//! Rounds are short, because some drivers reset a device whose work takes seconds, and long enough that their overhead is small.
 
 use web_time::{Duration, Instant};
 
-use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP};
-use super::layout::{BEAT_AT, BLOCK, COUNT_AT, Settings};
+use super::device::{EntryPoint, JUDGE, LIST, SWEEP};
+use super::layout::{BLOCK, LISTS, List, Settings};
 use super::stage::{Clock, DeviceTimes};
 use super::transfer::{Download, readback};
-use super::{Gpu, GpuError, Precision};
+use super::{Gpu, GpuError, Kernels, Precision, Variant};
 
-/// Least number of iterations of a dispatch, which the first round uses. The overhead of a shorter dispatch would exceed its work.
-pub(super) const FEWEST_ITERATIONS: u32 = 250;
+/// Least number of iterations that a dispatch allows a lane, unless it has very many lanes.
+const FEWEST_ITERATIONS: u32 = 250;
 
-/// Number of lanes for which a round of [`FEWEST_ITERATIONS`] is short on every device. With many more lanes fewer iterations are allowed,
-/// because the duration of the first round is unknown and must not be longer.
+/// Number of lanes for which a round of [`FEWEST_ITERATIONS`] is short on every device. With many more lanes less is allowed, because the
+/// duration of the first round is unknown and must not be longer.
 const FEWEST_AT_ONCE: u32 = 1 << 14;
+
+/// Largest number of whole periods after which a dispatch ends for a lane. A lane that has read a cycle waits for the end.
+const MOST_PERIODS: u32 = 16;
+
+/// Desired longest duration of a dispatch. The allowed number of iterations grows while dispatches are shorter.
+const LONGEST_DISPATCH: Duration = Duration::from_millis(250);
 
 /// Largest assumed ratio of the times of f64 and f32 on hardware.
 const SLOWER_IN_F64: u32 = 16;
@@ -26,16 +31,56 @@ const SLOWER_IN_F64: u32 = 16;
 /// Longest time for which results are held back until the last lanes end.
 const LONGEST_HOLD: Duration = Duration::from_millis(500);
 
-/// Largest number of variants of a pool.
-const VARIANTS: usize = 3;
+/// Byte offsets in a check, which begins as the queue does: with the length of each list. The counter of lists and the timestamps follow.
+const BEAT: u64 = 4 * LISTS as u64;
+const TIMES: u64 = BEAT + 4;
 
-/// Byte offsets in a check. A check begins with the number of lanes left for each variant; the counter of compactions and the timestamps
-/// follow.
-const BEAT: u64 = 4 * VARIANTS as u64;
-const TIMES: u64 = 16;
+/// Byte offset of the length of a dispatch in the shader's settings.
+const LENGTH: u64 = std::mem::offset_of!(Settings, iterations) as u64;
 
-/// Byte offset of the iterations in the shader's settings; `ended` follows.
-const ITERATIONS: u64 = std::mem::offset_of!(Settings, iterations) as u64;
+/// Length of a dispatch. It ends for a lane after a number of whole forcing periods. Lanes of neighbouring places then stand at the same
+/// place of the period. For a lane with very many events it ends after a number of loop iterations.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Length {
+    periods: u32,
+    iterations: u32,
+}
+
+impl Length {
+    /// Returns the length for a number of lanes of which this length is for a share.
+    pub(super) fn scaled(self, share: f64) -> Length {
+        let scaled = |number: u32| (f64::from(number) * share) as u32;
+        Length { periods: scaled(self.periods), iterations: scaled(self.iterations) }
+    }
+
+    /// Returns the length for rounds that should take `round`, after a round of this length and number of dispatches that `took` a time.
+    /// Lengths do not affect results.
+    fn next(self, took: Duration, round: Duration, dispatches: u32) -> Length {
+        let scaled = |number: u32, target: Duration| {
+            let factor = target.as_secs_f64() / took.as_secs_f64().max(1e-6);
+            (f64::from(number) * factor.clamp(0.25, 8.0)) as u32
+        };
+        Length {
+            periods: scaled(self.periods, round),
+            iterations: scaled(self.iterations, LONGEST_DISPATCH * dispatches),
+        }
+    }
+
+    fn within(self, least: Length, most_iterations: u32) -> Length {
+        let fewest = least.iterations.min(most_iterations);
+        Length {
+            periods: self.periods.clamp(least.periods, MOST_PERIODS),
+            iterations: self.iterations.clamp(fewest, most_iterations),
+        }
+    }
+
+    /// Returns the duration of a dispatch on a simulated device.
+    fn simulated(self, iteration: Duration) -> Duration {
+        /// Iterations of a gear pair per forcing period.
+        const PER_PERIOD: u32 = 80;
+        iteration * self.iterations.min(PER_PERIOD * self.periods)
+    }
+}
 
 /// Parts of a pool that its rounds use.
 pub(super) struct Rounds<'a> {
@@ -46,25 +91,24 @@ pub(super) struct Rounds<'a> {
     pub(super) buffers: &'a [&'a wgpu::Buffer],
     /// Length of the active list.
     pub(super) active_lanes: u32,
-    /// Workgroups of a dispatch over the selected lanes, which the device has computed.
+    /// Workgroups of dispatches over the lists, which the device has computed.
     pub(super) workgroups: &'a wgpu::Buffer,
     /// Largest number of iterations that one dispatch may spend on a lane.
     pub(super) most_iterations: u32,
 }
 
-/// A variant with its buffers.
-struct BoundVariant<'a> {
-    sweep: (&'a wgpu::ComputePipeline, wgpu::BindGroup),
-    compact: Vec<(&'a wgpu::ComputePipeline, wgpu::BindGroup)>,
+/// The kernels of a pool with their buffers.
+struct BoundKernels<'a> {
+    lists: [(Bound<'a>, Workgroups<'static>); 3],
+    /// The kernels that continue lanes, with their lists.
+    lanes: Vec<(Bound<'a>, List)>,
 }
 
 /// A round that has been submitted.
 struct Round<'a> {
     check: &'a wgpu::Buffer,
     submission: wgpu::SubmissionIndex,
-    /// The variants that it dispatched.
-    ran: Vec<bool>,
-    iterations: u32,
+    length: Length,
     /// Number of bytes of its check.
     bytes: u64,
 }
@@ -72,60 +116,53 @@ struct Round<'a> {
 impl Rounds<'_> {
     /// Runs lanes until at most `until` are left. Also stops if some lanes have ended and the policy's number of rounds has passed since
     /// the call; if `until` is zero, [`LONGEST_HOLD`] replaces this number. Then calls `conclude`, which submits the copies of results, and
-    /// submits a further round that runs while the host reads them. `iterations` is the number for the first dispatch; on return, for the
-    /// last one. `is_ahead` says whether the last call has sent such a further round. Each variant continues the lanes that the previous
-    /// variant leaves. Returns the result of `conclude`, and the device's times if a watcher measures.
+    /// submits a further round that runs while the host reads them. `length` is that of the first dispatches; on return, of the last ones.
+    /// `is_ahead` says whether the last call has sent such a further round. Returns the result of `conclude`, and the device's times if a
+    /// watcher measures.
     pub(super) async fn run<C>(
         &self,
-        variants: &[&Pipelines],
+        kernels: &Kernels,
         until: u32,
-        iterations: &mut u32,
+        length: &mut Length,
         is_ahead: &mut bool,
         conclude: impl FnOnce() -> Result<C, GpuError>,
     ) -> Result<(C, Option<DeviceTimes>), GpuError> {
         let gpu = self.gpu;
-        let dispatches = gpu.policy.parts * gpu.policy.dispatches * variants.len() as u32;
         let (clock, bound, checks) = gpu.call(|| {
+            let bound = self.bound(kernels);
+            let dispatches = gpu.policy.dispatches * bound.lanes.len() as u32;
             let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue, dispatches));
-            let bound: Vec<BoundVariant<'_>> =
-                variants.iter().map(|pipelines| self.bound(pipelines)).collect();
             let checks = [(); 2].map(|()| readback(gpu, "check", TIMES + Clock::bytes(dispatches)));
             (clock, bound, checks)
         })?;
-        // Number of lanes for which each variant may have work, without those that earlier variants pass on.
-        let mut left = vec![0; variants.len()];
-        left[0] = self.active_lanes;
         let most = self.most_iterations.max(1);
-        let fewest = fewest_iterations(self.active_lanes, at_once(gpu)).min(most);
-        *iterations = (*iterations).clamp(fewest, most);
+        let least = least_length(self.active_lanes, at_once(gpu), gpu.policy.first_periods);
+        *length = length.within(least, most);
         let (mut device, mut device_end) = (DeviceTimes::default(), None);
         let mut last_beat = 0;
         let mut before: Option<Round<'_>> = None;
         let mut last_end = Instant::now();
         let mut elapsed = Duration::ZERO;
         let mut checked = 0;
+        let mut left = self.active_lanes;
         for (slot, check) in (0..2).zip(&checks).cycle() {
-            let sent =
-                gpu.call(|| self.send(&bound, &left, *iterations, Some((slot, check)), clock.as_ref()))?;
+            let sent = gpu.call(|| self.send(&bound, *length, Some((slot, check)), clock.as_ref()))?;
             let Some(sent) = sent.and_then(|sent| before.replace(sent)) else { continue };
             let take = |bytes: &[u8]| {
                 if let Some(clock) = &clock {
                     device = device.and(clock.times(&bytes[TIMES as usize..], &mut device_end));
                 }
-                bytemuck::pod_read_unaligned::<[u32; VARIANTS + 1]>(&bytes[..TIMES as usize])
+                bytemuck::pod_read_unaligned::<[u32; LISTS + 1]>(&bytes[..TIMES as usize])
             };
             let [counts @ .., beat] = sent.check(gpu, take).await?;
             if beat <= last_beat {
                 return Err(gpu.failure(GpuError::Lost { message: "it executes no commands".into() }));
             }
             last_beat = beat;
-            for (left, (now, ran)) in left.iter_mut().zip(counts.into_iter().zip(sent.ran)) {
-                *left = if ran { now } else { 0 };
-            }
-            let all_left = left.iter().sum::<u32>();
+            left = self.active_lanes.saturating_sub(counts[List::Ended as usize]);
             checked += 1;
             let took = match gpu.policy.simulated {
-                Some(iteration) => iteration * (sent.iterations * dispatches),
+                Some(iteration) => sent.length.simulated(iteration) * gpu.policy.dispatches,
                 None => last_end.elapsed(),
             };
             last_end = Instant::now();
@@ -134,12 +171,12 @@ impl Rounds<'_> {
                 0 => elapsed >= LONGEST_HOLD,
                 _ => checked >= gpu.policy.patience,
             };
-            if all_left <= until || gpu.is_halted() || has_waited && all_left < self.active_lanes {
+            if left <= until || gpu.is_halted() || has_waited && left < self.active_lanes {
                 break;
             }
             // The round that was sent ahead belongs to the first measured time.
             if checked > 1 || !*is_ahead {
-                *iterations = next_iterations(sent.iterations, took, gpu.policy.round).clamp(fewest, most);
+                *length = sent.length.next(took, gpu.policy.round, gpu.policy.dispatches).within(least, most);
             }
         }
         // The measured time includes the last round. All later work waits for this round anyway.
@@ -149,78 +186,66 @@ impl Rounds<'_> {
         }
         let concluding = conclude()?;
         // While times are measured, no work may follow the last measured round.
-        *is_ahead = gpu.watcher.is_none() && !gpu.is_halted() && left.iter().any(|&left| left > 0);
+        *is_ahead = gpu.watcher.is_none() && !gpu.is_halted() && left > 0;
         if *is_ahead {
-            gpu.call(|| self.send(&bound, &left, *iterations, None, None))?;
+            gpu.call(|| self.send(&bound, *length, None, None))?;
         }
         Ok((concluding, clock.map(|_| device)))
     }
 
-    fn bound<'a>(&self, pipelines: &'a Pipelines) -> BoundVariant<'a> {
-        let with = |pipeline: &'a wgpu::ComputePipeline, entry_point| {
-            (pipeline, bind(self.gpu, pipeline, entry_point, self.buffers))
-        };
-        let compact = COMPACT.into_iter().zip(&pipelines.compact);
-        BoundVariant {
-            sweep: with(&pipelines.sweep, SWEEP),
-            compact: compact.map(|(entry_point, pipeline)| with(pipeline, entry_point)).collect(),
+    fn bound<'a>(&'a self, kernels: &Kernels) -> BoundKernels<'a> {
+        let sweep = |variant: &Variant| (bind(self.gpu, variant, SWEEP, self.buffers), variant.list());
+        let judge = kernels.judges.then(|| bind(self.gpu, &kernels.common, JUDGE, self.buffers));
+        let sweeps = kernels.sweeps.iter().map(sweep);
+        BoundKernels {
+            lists: making_lists(self.gpu, &kernels.common, self.buffers, self.active_lanes),
+            lanes: sweeps.chain(judge.map(|judge| (judge, List::Judge))).collect(),
         }
     }
 
-    /// Submits a round: for each variant, the list of its lanes and its dispatches. With a check, a count of the lanes that each variant
-    /// has left follows.
+    /// Submits a round. With a check, the lengths of the lists follow.
     fn send<'a>(
         &self,
-        variants: &[BoundVariant<'_>],
-        left: &[u32],
-        iterations: u32,
+        kernels: &BoundKernels<'_>,
+        length: Length,
         check: Option<(u32, &'a wgpu::Buffer)>,
         clock: Option<&Clock>,
     ) -> Option<Round<'a>> {
         let gpu = self.gpu;
-        gpu.write(self.settings, ITERATIONS, bytemuck::cast_slice(&[iterations, 0]));
+        gpu.write(self.settings, LENGTH, bytemuck::cast_slice(&[length.iterations, length.periods]));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        // If a variant has work, all later variants may receive lanes from it.
-        let first = left.iter().position(|&left| left > 0).unwrap_or(0);
         let slot = check.map_or(0, |(slot, _)| slot);
         let mut dispatches = 0;
-        for part in 0..gpu.policy.parts {
-            for (n, variant) in variants.iter().enumerate().skip(first) {
-                for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate() {
-                    let is_first = part == 0 && n == first && nth == 0;
+        for _ in 0..gpu.policy.dispatches {
+            for (nth, (kernel, list)) in kernels.lanes.iter().enumerate() {
+                // The judge has lists of its own: otherwise a lane would wait for it during the next dispatch.
+                let renews = nth == 0 || *list == List::Judge;
+                for (pass, (kernel, groups)) in kernels.lists.iter().enumerate().filter(|_| renews) {
+                    let is_first = dispatches == 0 && pass == 0;
                     let writes = clock.and_then(|clock| clock.writes(slot, is_first, false));
-                    let groups = compacting(nth, self.active_lanes);
-                    dispatch(gpu, &mut encoder, pipeline, bindings, groups, writes);
+                    dispatch(gpu, &mut encoder, kernel, *groups, writes);
                 }
-                let (pipeline, bindings) = &variant.sweep;
-                for _ in 0..gpu.policy.dispatches {
-                    let writes = clock.map(|clock| clock.dispatch_writes(slot, dispatches));
-                    dispatch(gpu, &mut encoder, pipeline, bindings, Selected(self.workgroups), writes);
-                    dispatches += 1;
-                }
+                let writes = clock.map(|clock| clock.dispatch_writes(slot, dispatches));
+                dispatch(gpu, &mut encoder, kernel, Listed(self.workgroups, *list), writes);
+                dispatches += 1;
             }
         }
         let Some((_, check)) = check else {
             gpu.submit(encoder);
             return None;
         };
-        for (n, variant) in variants.iter().enumerate().skip(first) {
-            for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate().take(COUNTED) {
-                let is_last = n + 1 == variants.len() && nth + 1 == COUNTED;
-                let writes = clock.and_then(|clock| clock.writes(slot, false, is_last));
-                dispatch(gpu, &mut encoder, pipeline, bindings, compacting(nth, self.active_lanes), writes);
-            }
-            encoder.copy_buffer_to_buffer(self.queue, COUNT_AT, check, 4 * n as u64, 4);
+        for (pass, (kernel, groups)) in kernels.lists.iter().take(COUNTED).enumerate() {
+            let writes = clock.and_then(|clock| clock.writes(slot, false, pass + 1 == COUNTED));
+            dispatch(gpu, &mut encoder, kernel, *groups, writes);
         }
-        encoder.copy_buffer_to_buffer(self.queue, BEAT_AT, check, BEAT, 4);
+        encoder.copy_buffer_to_buffer(self.queue, 0, check, 0, TIMES);
         let mut bytes = TIMES;
         if let Some(clock) = clock {
             clock.copy(&mut encoder, (slot, dispatches), check, TIMES);
             bytes += Clock::bytes(dispatches);
         }
         let submission = gpu.submit(encoder);
-        let ran = (0..variants.len()).map(|n| n >= first).collect();
-        Some(Round { check, submission, ran, iterations, bytes })
+        Some(Round { check, submission, length, bytes })
     }
 }
 
@@ -233,12 +258,24 @@ impl Round<'_> {
     }
 }
 
-/// Number of passes of the compaction after which the number of selected lanes is known.
+/// Number of passes after which the lengths of the lists are known.
 const COUNTED: usize = 2;
 
-/// Returns the workgroups of a pass of the compaction.
-pub(super) fn compacting(pass: usize, active_lanes: u32) -> Workgroups<'static> {
-    Counted([if pass == 1 { 1 } else { active_lanes.div_ceil(BLOCK).min(65_535) }, 1])
+/// Returns the passes that make the lists of this number of lanes, and their workgroups.
+pub(super) fn making_lists<'g>(
+    gpu: &'g Gpu,
+    common: &Variant,
+    buffers: &[&wgpu::Buffer],
+    active_lanes: u32,
+) -> [(Bound<'g>, Workgroups<'static>); 3] {
+    let blocks = active_lanes.div_ceil(BLOCK).min(65_535);
+    let [count, sum, place] = LIST.map(|entry_point| bind(gpu, common, entry_point, buffers));
+    [(count, Counted([blocks, 1])), (sum, Counted([1, 1])), (place, Counted([blocks, 1]))]
+}
+
+/// Returns the byte offset of the length of a list in the queue.
+pub(super) const fn count_at(list: List) -> u64 {
+    4 * list as u64
 }
 
 /// Returns the largest number of lanes that a device integrates with [`FEWEST_ITERATIONS`] in a short round.
@@ -249,16 +286,11 @@ fn at_once(gpu: &Gpu) -> u32 {
     }
 }
 
-/// Returns the least number of iterations of a round with this number of lanes.
-fn fewest_iterations(lanes: u32, at_once: u32) -> u32 {
-    (FEWEST_ITERATIONS * at_once / lanes.max(1)).clamp(1, FEWEST_ITERATIONS)
-}
-
-/// Returns the number of iterations of a round that should take `round`, from an earlier round's iterations and duration. The number does
-/// not affect results.
-fn next_iterations(iterations: u32, took: Duration, round: Duration) -> u32 {
-    let factor = round.as_secs_f64() / took.as_secs_f64().max(1e-6);
-    (f64::from(iterations) * factor.clamp(0.25, 8.0)) as u32
+/// Returns the least length of dispatches of this number of lanes, which the first round uses.
+fn least_length(lanes: u32, at_once: u32, first_periods: u32) -> Length {
+    let share = f64::from(at_once) / f64::from(lanes.max(1));
+    let scaled = |most: u32| ((f64::from(most) * share) as u32).clamp(1, most);
+    Length { periods: scaled(first_periods), iterations: scaled(FEWEST_ITERATIONS) }
 }
 
 /// Returns the number of workgroups in a row of the grid for this number of lanes.
@@ -268,46 +300,54 @@ pub(super) fn row(gpu: &Gpu, lanes: usize, workgroup: u32) -> u32 {
     groups.div_ceil(groups.div_ceil(widest))
 }
 
-/// Binds the buffers of an entry point.
-pub(super) fn bind(
-    gpu: &Gpu,
-    pipeline: &wgpu::ComputePipeline,
+/// A kernel with its buffers.
+pub(super) struct Bound<'g> {
+    pipeline: &'g wgpu::ComputePipeline,
+    bindings: wgpu::BindGroup,
+}
+
+/// Binds the buffers of a kernel.
+pub(super) fn bind<'g>(
+    gpu: &'g Gpu,
+    variant: &Variant,
     entry_point: EntryPoint,
     buffers: &[&wgpu::Buffer],
-) -> wgpu::BindGroup {
+) -> Bound<'g> {
+    let pipeline = gpu.pipeline(variant, entry_point);
     let entry = |&binding: &u32| wgpu::BindGroupEntry {
         binding,
         resource: buffers[binding as usize].as_entire_binding(),
     };
     let entries: Vec<_> = [0].iter().chain(entry_point.storage).map(entry).collect();
     let layout = &pipeline.get_bind_group_layout(0);
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+    let descriptor = wgpu::BindGroupDescriptor { label: None, layout, entries: &entries };
+    Bound { pipeline, bindings: gpu.device.create_bind_group(&descriptor) }
 }
 
 /// Size of a dispatch.
+#[derive(Clone, Copy)]
 pub(super) enum Workgroups<'a> {
     /// Columns and rows of workgroups.
     Counted([u32; 2]),
-    /// The workgroups that the selected lanes need. The device has computed their number.
-    Selected(&'a wgpu::Buffer),
+    /// The workgroups that the lanes of a list need. The device has computed their number.
+    Listed(&'a wgpu::Buffer, List),
 }
 
-pub(super) use Workgroups::{Counted, Selected};
+pub(super) use Workgroups::{Counted, Listed};
 
 pub(super) fn dispatch(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
-    pipeline: &wgpu::ComputePipeline,
-    bindings: &wgpu::BindGroup,
+    kernel: &Bound<'_>,
     workgroups: Workgroups<'_>,
     timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
 ) {
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
-    pass.set_pipeline(pipeline);
-    pass.set_bind_group(0, bindings, &[]);
+    pass.set_pipeline(kernel.pipeline);
+    pass.set_bind_group(0, &kernel.bindings, &[]);
     match workgroups {
         Counted([columns, rows]) => pass.dispatch_workgroups(columns, rows, 1),
-        Selected(count) => pass.dispatch_workgroups_indirect(count, 0),
+        Listed(count, list) => pass.dispatch_workgroups_indirect(count, 12 * list as u64),
     }
     gpu.traffic.add_dispatch();
 }
@@ -320,17 +360,27 @@ mod tests {
 
     #[test]
     fn rounds_approach_their_desired_duration() {
-        // 0.3 ms per iteration. The duration of a round becomes known while the next round runs.
-        let (mut under_way, mut iterations) = (1000, 1000);
+        // 3 ms per period and dispatch. The duration of a round becomes known while the next round runs.
+        let least = Length { periods: 1, iterations: 250 };
+        let first = Length { periods: 16, iterations: 250 };
+        let (mut under_way, mut length) = (first, first);
         for _ in 0..20 {
-            let next = next_iterations(under_way, Duration::from_micros(300) * under_way, ROUND);
-            (under_way, iterations) = (iterations, next);
+            let took = Duration::from_millis(3) * under_way.periods * 4;
+            (under_way, length) = (length, under_way.next(took, ROUND, 4).within(least, 4000));
         }
-        assert!((300..=340).contains(&iterations), "{iterations}");
-        assert!((300..=340).contains(&under_way), "{under_way}");
-        assert_eq!(next_iterations(1000, Duration::ZERO, ROUND), 8000);
-        assert_eq!(next_iterations(1000, Duration::from_secs(100), ROUND), 250);
-        let fewest = |lanes| fewest_iterations(lanes, 1 << 14);
-        assert_eq!([1, 1 << 14, 1 << 15, 1 << 20].map(fewest), [250, 250, 125, 3]);
+        assert!((7..=9).contains(&length.periods), "{length:?}");
+        assert_eq!(length.iterations, 4000);
+        let long = Length { periods: 10, iterations: 1000 };
+        let longest = Length { periods: 16, iterations: 4000 };
+        assert_eq!(long.next(Duration::ZERO, ROUND, 4).within(least, 4000), longest);
+        let slow = long.next(Duration::from_secs(100), ROUND, 4).within(least, 4000);
+        assert_eq!(slow, Length { periods: 2, iterations: 250 });
+        assert_eq!(long.scaled(0.01).within(least, 200), Length { periods: 1, iterations: 200 });
+        let numbers = |lanes| {
+            let Length { periods, iterations } = least_length(lanes, 1 << 14, 16);
+            [periods, iterations]
+        };
+        let expected = [[16, 250], [16, 250], [8, 125], [1, 3]];
+        assert_eq!([1, 1 << 14, 1 << 15, 1 << 20].map(numbers), expected);
     }
 }

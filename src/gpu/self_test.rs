@@ -1,6 +1,6 @@
 //! Known answers: newly compiled shaders must reproduce them before they are used.
 
-use super::{Constants, Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
+use super::{Constants, Gpu, GpuError, Kernels, Lane, LaneSettings, Pool, Precision};
 use crate::record::distance::{apart, farther, is_within};
 use rattlemap_dynamics::model::{Form, GearPair, REST, State, state};
 
@@ -17,15 +17,11 @@ const ANSWERS: [(f64, f64, State); 4] = [
     (0.5, 11.5, state(&[-0.21607397150986443, 0.2323746135365504])),
 ];
 
-/// Computes the known answers with variants that have just been compiled for these settings.
+/// Computes the known answers with kernels that have just been compiled for these settings.
 ///
 /// # Errors
 /// [`GpuError::WrongAnswer`] if the device computes something else; other errors of the device.
-pub(super) async fn check(
-    gpu: &Gpu,
-    variants: Vec<Variant>,
-    settings: &LaneSettings,
-) -> Result<(), GpuError> {
+pub(super) async fn check(gpu: &Gpu, kernels: Kernels, settings: &LaneSettings) -> Result<(), GpuError> {
     let pairs = ANSWERS.map(|(e, omega, _)| GearPair { omega, ..GearPair::paper(e) });
     let laws = pairs.map(|pair| pair.law());
     let as_machine = settings.features.machine.is_some();
@@ -51,7 +47,7 @@ pub(super) async fn check(
         ..*settings
     };
     let tables = gpu.load_constants(constants, &laws).await?;
-    let mut pool = Pool::new(gpu, variants, &settings);
+    let mut pool = Pool::new(gpu, kernels, &settings);
     pool.begin(gpu, &tables, &lanes).await?;
     let bar = match gpu.precision {
         Precision::F32 => 1e-3,
@@ -88,7 +84,7 @@ mod tests {
         let settings = LaneSettings::default();
         let run_check = async |gpu: &mut Gpu| {
             let pool = gpu.pool(&settings).await?;
-            check(gpu, pool.variants, &settings).await
+            check(gpu, pool.kernels, &settings).await
         };
         pollster::block_on(run_check(&mut gpu)).unwrap();
         // Makes the forcing's part in a step 1 % too large.

@@ -3,8 +3,8 @@
 use super::Measures;
 use super::features::Features;
 use super::layout::{
-    self, BLOCK, CONTACTS, EXTREMES, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH, SPELLED_WORD,
-    SPELLED_WORD_LENGTH, SPELLING, SUMS, symbols_per_number,
+    self, BLOCK, CONTACTS, EXTREMES, KEYS, LISTS, List, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH,
+    SPELLED_WORD, SPELLED_WORD_LENGTH, SPELLING, SUMS, symbols_per_number,
 };
 use super::pair::PAIRS_PER_HARMONIC;
 use super::precision::Precision;
@@ -59,7 +59,7 @@ const COMMON: &str = concat!(
     include_str!("../../shaders/refine.wgsl"),
     include_str!("../../shaders/approach.wgsl"),
     include_str!("../../shaders/sweep.wgsl"),
-    include_str!("../../shaders/compact.wgsl"),
+    include_str!("../../shaders/lists.wgsl"),
     include_str!("../../shaders/begin.wgsl"),
     include_str!("../../shaders/record.wgsl"),
 );
@@ -114,6 +114,15 @@ impl Variant {
         }
     }
 
+    /// Returns the list of the lanes that it integrates.
+    pub(super) fn list(&self) -> List {
+        match (self.measures, self.growth) {
+            (Some(_), _) => List::Measure,
+            (None, true) => List::Growth,
+            (None, false) => List::Plain,
+        }
+    }
+
     /// Returns its WGSL source.
     pub fn source(&self) -> String {
         let real = declarations_of(self.precision);
@@ -144,9 +153,13 @@ impl Variant {
         let valid = VALID.map(|(name, bits)| (format!("VALID_{name}"), bits));
         let status = Status::ALL.map(|s| (format!("STATUS_{}", s.name().to_uppercase()), s.code()));
         let contacts = CONTACTS.map(|(name, code)| (format!("CONTACT_{name}"), code));
+        let lists = List::ALL.map(|list| (format!("LIST_{}", list.name().to_uppercase()), list as u32));
         let sizes = [
             ("WORKGROUP", self.workgroup),
             ("BLOCK", BLOCK),
+            ("LISTS", LISTS as u32),
+            ("KEYS", KEYS as u32),
+            ("OWN_LIST", self.list() as u32),
             ("SUMS", SUMS as u32),
             ("SPELLING", if self.word || self.pattern { SPELLING as u32 } else { 1 }),
             ("SPELLED_WORD", SPELLED_WORD as u32),
@@ -171,7 +184,7 @@ impl Variant {
         .into_iter()
         .chain(machine_sizes)
         .map(|(name, value)| (name.to_owned(), value));
-        let numbers = valid.into_iter().chain(status).chain(contacts).chain(sizes);
+        let numbers = valid.into_iter().chain(status).chain(contacts).chain(lists).chain(sizes);
         let numbers: String =
             numbers.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
         let options = [
@@ -199,7 +212,7 @@ impl Variant {
 }
 
 /// The records' validity bits, by their names in the shader.
-const VALID: [(&str, u32); 10] = [
+const VALID: [(&str, u32); 11] = [
     ("PERIOD", valid::PERIOD),
     ("LYAPUNOV", valid::LYAPUNOV),
     ("IMPACTS", valid::IMPACTS),
@@ -209,6 +222,7 @@ const VALID: [(&str, u32); 10] = [
     ("STROBE", valid::STROBE),
     ("PATTERN", valid::PATTERN),
     ("QUASI_PERIODIC", valid::QUASI_PERIODIC),
+    ("OPEN", valid::OPEN),
     ("NEAR_STROBE", valid::NEAR_STROBE),
 ];
 

@@ -2,20 +2,19 @@
 
 use rayon::prelude::*;
 
+use super::adapter::{MOST_UNDER_WAY, most_slots};
 use super::averaging::Averaging;
-use super::device::{COMPACT, CONCLUDE, GATHER, Pipelines};
-use super::layout::{COUNT_AT, Cell, Finding, QUEUE_HEAD, Reading, Settings, length_of};
-use super::rounds::{Counted, Selected, Workgroups, bind, compacting, dispatch, row};
+use super::device::{CONCLUDE, GATHER};
+use super::dispatch_policy::DispatchPolicy;
+use super::layout::{BLOCK, Cell, Finding, KEYS, List, QUEUE_HEAD, Reading, Settings, length_of};
+use super::rounds::{Counted, Listed, Workgroups, bind, count_at, dispatch, making_lists, row};
 use super::tables::Tables;
 use super::transfer::{Download, buffer, from_reals, indirect, readback, upload};
-use super::{Gpu, GpuError, LaneSettings, Precision};
+use super::{Gpu, GpuError, LaneSettings, Precision, Variant};
 use crate::record::limits::LONGEST_CYCLE;
 
 /// Results of lanes: averages, findings, and measured quantities if any were measured.
 pub(super) type Returned = (Vec<Reading>, Vec<Finding>, Vec<Box<[f64]>>);
-
-/// Byte offset, in the shader's settings, of the flag that selects lanes for compaction.
-const ENDED: u64 = std::mem::offset_of!(Settings, ended) as u64;
 
 const COUNT_BYTES: u64 = size_of::<u32>() as u64;
 
@@ -34,7 +33,7 @@ pub(super) struct Slots {
     findings: wgpu::Buffer,
     /// Measured quantities of lanes, and the buffer in which the host reads them. If nothing is measured, both have room for one lane.
     measured: [wgpu::Buffer; 2],
-    /// Workgroups of a dispatch over the lanes that a compaction has selected.
+    /// Workgroups of dispatches over the lists.
     pub(super) workgroups: wgpu::Buffer,
     /// Buffers in which the host reads `readings` and `findings`; and the number of results.
     readbacks: [wgpu::Buffer; 2],
@@ -88,6 +87,17 @@ pub(super) fn bytes(slots: usize, precision: Precision, settings: &LaneSettings)
     (slots * (reals + counts)) as u64
 }
 
+/// Largest number of bytes of a pool's lanes. A card is busy with far fewer lanes than it has memory for, and new lanes take the places of
+/// those that have ended.
+const MOST_BYTES: u64 = 110_000_000;
+
+/// Returns the largest number of slots of a pool, unless the settings ask for another number.
+pub(super) fn most(limits: &wgpu::Limits, precision: Precision, settings: &LaneSettings) -> usize {
+    let fitting = (MOST_BYTES / bytes(1, precision, settings)) as usize;
+    let most = most_slots(limits);
+    settings.batch.unwrap_or(fitting.min(MOST_UNDER_WAY)).clamp(1, most)
+}
+
 impl Slots {
     pub(super) fn new(gpu: &Gpu, slots: usize, settings: &LaneSettings) -> Slots {
         let workgroup = settings.workgroup;
@@ -106,7 +116,7 @@ impl Slots {
             motions: of_reals("motions", slots * length_of("Motion", dim)),
             tallies: buffer(gpu, "tallies", slots * tally_bytes()),
             queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
-            blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
+            blocks: buffer(gpu, "blocks", KEYS * slots.div_ceil(BLOCK as usize) * size_of::<u32>()),
             readbacks: [&readings, &findings].map(|buffer| readback(gpu, "results", buffer.size())),
             workgroups: indirect(gpu),
             count_readback: readback(gpu, "count", COUNT_BYTES),
@@ -147,7 +157,7 @@ impl Slots {
     /// Uploads the active list, in the order in which its lanes began, and the settings. Lanes from place `first_new`
     /// on have yet to begin.
     pub(super) fn call(&self, gpu: &Gpu, active_list: &[u32], first_new: usize, settings: &LaneSettings) {
-        let called = uniform(self, active_list.len(), first_new, settings, gpu.policy.late_tangent);
+        let called = uniform(self, active_list.len(), first_new, settings, &gpu.policy);
         gpu.write(&self.settings, 0, bytemuck::bytes_of(&called));
         let head = (QUEUE_HEAD * size_of::<u32>()) as u64;
         gpu.write(&self.queue, head, bytemuck::cast_slice(active_list));
@@ -157,7 +167,7 @@ impl Slots {
     pub(super) fn conclude(
         &self,
         gpu: &Gpu,
-        pipelines: &Pipelines,
+        common: &Variant,
         bindings: &[&wgpu::Buffer],
         active_lanes: usize,
         settings: &LaneSettings,
@@ -169,18 +179,16 @@ impl Slots {
         let [on_device, measured] = &self.measured;
         let size_of_measured = if gathers { reals(length_of("Measured", dim)) } else { 0 };
         let submission = gpu.call(|| {
-            gpu.write(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            for (pass, (entry_point, pipeline)) in COMPACT.into_iter().zip(&pipelines.compact).enumerate() {
-                let compact = bind(gpu, pipeline, entry_point, bindings);
-                dispatch(gpu, &mut encoder, pipeline, &compact, compacting(pass, active_lanes as u32), None);
+            for (pass, groups) in making_lists(gpu, common, bindings, active_lanes as u32) {
+                dispatch(gpu, &mut encoder, &pass, groups, None);
             }
-            let ends = [(&pipelines.conclude, CONCLUDE), (&pipelines.gather, GATHER)];
-            for (pipeline, entry_point) in ends.into_iter().take(1 + usize::from(gathers)) {
-                let concluding = bind(gpu, pipeline, entry_point, bindings);
-                dispatch(gpu, &mut encoder, pipeline, &concluding, Selected(&self.workgroups), None);
+            for entry_point in [CONCLUDE, GATHER].into_iter().take(1 + usize::from(gathers)) {
+                let concluding = bind(gpu, common, entry_point, bindings);
+                dispatch(gpu, &mut encoder, &concluding, Listed(&self.workgroups, List::Ended), None);
             }
-            encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_readback, 0, COUNT_BYTES);
+            let at = count_at(List::Ended);
+            encoder.copy_buffer_to_buffer(&self.queue, at, &self.count_readback, 0, COUNT_BYTES);
             // The host does not know yet how many results there are.
             let results = [&self.readings, &self.findings].into_iter().zip(&self.readbacks).zip(sizes);
             for ((from, to), size) in
@@ -248,10 +256,10 @@ fn uniform(
     active_lanes: usize,
     first_new: usize,
     settings: &LaneSettings,
-    late_tangent: bool,
+    policy: &DispatchPolicy,
 ) -> Settings {
-    let LaneSettings { periods, early_stop, .. } = *settings;
-    let more = if early_stop { settings.undecided_periods } else { 0 };
+    let LaneSettings { periods, early_stop, hands_over, .. } = *settings;
+    let more = if early_stop && !hands_over { settings.undecided_periods } else { 0 };
     let decided_by = periods.saturating_add(more);
     let confirm_chaos = if settings.exponent { settings.confirm_chaos } else { 0 };
     // Lanes that stop early may stop before a long transient is over.
@@ -267,8 +275,10 @@ fn uniform(
         first_new: first_new as u32,
         periods,
         decided_by,
-        longest: decided_by.saturating_add(confirm_chaos),
-        chaos_from: settings.chaos_from,
+        longest: if hands_over { decided_by } else { decided_by.saturating_add(confirm_chaos) },
+        hands_over: u32::from(hands_over),
+        // Chaos that is confirmed later needs no early stop.
+        chaos_from: if confirm_chaos > 0 { u32::MAX } else { settings.chaos_from },
         chaos_errors: settings.chaos_errors,
         iterations: settings.iterations,
         passes_per_period: settings.passes_per_period,
@@ -276,12 +286,13 @@ fn uniform(
         most_events: settings.most_events,
         row: slots.row * settings.workgroup,
         transient_periods,
-        growth_from: if late_tangent { averaging.growth_from } else { 0 },
+        growth_from: if policy.late_tangent { averaging.growth_from } else { 0 },
         exponent_from: averaging.exponent_from,
         exponent_block: averaging.block,
         max_period: settings.max_period.min(LONGEST_CYCLE),
         early_stop: u32::from(early_stop),
         measured_periods: settings.measured_on_lanes().map_or(0, |measures| measures.periods.max(1)),
-        ended: 0,
+        whole_periods: u32::MAX,
+        few_lanes: policy.few_lanes,
     }
 }

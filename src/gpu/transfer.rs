@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
+use super::layout::LISTS;
 use super::precision::Precision;
 use super::signal::Signal;
 use super::{Gpu, GpuError};
@@ -58,7 +59,7 @@ pub(super) fn buffer(gpu: &Gpu, label: &'static str, size: usize) -> wgpu::Buffe
 pub(super) fn indirect(gpu: &Gpu) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("workgroups"),
-        size: 16,
+        size: (12 * LISTS) as u64,
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
         mapped_at_creation: false,
     })

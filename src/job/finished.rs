@@ -26,6 +26,8 @@ pub(crate) fn scene(map: &FinishedMap) -> Result<Scene, JobError> {
 pub(crate) struct LoadedMap {
     pub(crate) plan: Plan,
     pub(crate) stored: StoredRecords,
+    /// Name of the engine that computed the records.
+    engine: String,
 }
 
 impl LoadedMap {
@@ -44,7 +46,7 @@ impl LoadedMap {
         if let Some(warning) = &stored.warning {
             observer.warn(warning);
         }
-        Ok(LoadedMap { plan, stored })
+        Ok(LoadedMap { plan, stored, engine: map.manifest().engine.clone() })
     }
 
     /// Analyses all records together.
@@ -54,7 +56,7 @@ impl LoadedMap {
 
     /// The cells, for tables and figures.
     pub(crate) fn cells<'a>(&'a self, scene: &'a Scene, survey: &'a Survey) -> Cells<'a> {
-        Cells::new(scene, &self.plan, &self.stored.records).surveyed(survey)
+        Cells::new(scene, &self.plan, &self.stored.records).surveyed(survey).computed_by(&self.engine)
     }
 }
 

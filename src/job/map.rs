@@ -377,7 +377,9 @@ pub struct ComputedMap<'p> {
 impl ComputedMap<'_> {
     /// The cells, for tables and figures.
     pub fn cells(&self) -> Cells<'_> {
-        Cells::new(self.run.open.job.scene, self.run.work.plan, &self.run.work.records).surveyed(&self.survey)
+        let MapRun { open, work, .. } = &self.run;
+        let cells = Cells::new(open.job.scene, work.plan, &work.records).surveyed(&self.survey);
+        cells.computed_by(open.engine.name())
     }
 
     /// Describes the run for the manifest.

@@ -6,12 +6,12 @@
 
 mod cpu;
 mod fake;
+#[cfg(feature = "gpu")]
+mod finish;
 mod flows;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod requested;
-#[cfg(feature = "gpu")]
-mod section;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -22,6 +22,8 @@ use thiserror::Error;
 pub use cpu::Cpu;
 pub(crate) use cpu::largest_batch;
 pub use fake::Fake;
+#[cfg(feature = "gpu")]
+pub(crate) use finish::{Completion, Ended};
 pub(crate) use flows::Flows;
 #[cfg(feature = "gpu")]
 pub(crate) use gpu::lane_settings;
@@ -30,8 +32,6 @@ pub use gpu::{Gpu, Prepared};
 #[cfg(feature = "gpu")]
 pub(crate) use requested::drop_unrequested;
 pub use requested::measured_record;
-#[cfg(feature = "gpu")]
-pub(crate) use section::{compare_at_sections, measure_machines};
 
 #[cfg(feature = "gpu")]
 use crate::gpu::AdapterId;
@@ -112,10 +112,6 @@ trait Device {
 
     fn least_batch(&self) -> usize;
 
-    fn first_batch(&self) -> usize {
-        self.least_batch()
-    }
-
     fn largest_batch(&self) -> usize {
         LARGEST_BATCH
     }
@@ -179,14 +175,9 @@ impl Engine<'_> {
         self.properties().device_bytes()
     }
 
-    /// Returns the smallest number of cells that keeps the engine busy.
+    /// Returns the smallest number of cells that keeps the engine busy. A map begins with so many.
     pub fn least_batch(&self) -> usize {
         self.properties().least_batch()
-    }
-
-    /// Returns the number of cells to begin first.
-    pub fn first_batch(&self) -> usize {
-        self.properties().first_batch()
     }
 
     /// Returns the largest number of cells under way. It bounds the memory that a fast engine uses.

@@ -55,7 +55,7 @@ pub async fn run(
 ) -> Result<bool, SweepError> {
     engine.stop_on(halt);
     let mut pace = Pace {
-        cells: engine.first_batch(),
+        cells: engine.least_batch(),
         least: (engine.least_batch() / ROUNDS_OF_CORES).max(1),
         most: engine.largest_batch(),
     };

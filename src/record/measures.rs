@@ -162,17 +162,6 @@ impl Subject {
     }
 }
 
-impl Record {
-    /// Replaces the phases of harmonics.
-    pub(crate) fn turn_harmonics(&mut self, turned: impl Fn(f64) -> f64) {
-        for phase in all().filter(|measure| measure.group.name == "harmonic" && measure.is_angle()) {
-            if let Some(angle) = phase.of(self) {
-                self.measures[phase.place] = turned(angle);
-            }
-        }
-    }
-}
-
 impl Group {
     pub(crate) const fn places(&self) -> usize {
         self.numbers.len() * if self.of_displacements { FIRST_DISPLACEMENTS } else { 1 }

@@ -44,9 +44,13 @@ pub mod valid {
     pub const FILLED: u32 = 1 << 7;
     /// `pattern`, `pattern_length` and `pattern_hash`.
     pub const PATTERN: u32 = 1 << 8;
+    // The bits from 9 on belong to the groups of [`measures`](super::measures::GROUPS).
+    /// A lane began the cell, and the reference finished it.
+    pub const BY_REFERENCE: u32 = 1 << 28;
+    /// Set by lanes, cleared by engines: the lane has ended before its class is decided, so that the reference continues it.
+    pub const OPEN: u32 = 1 << 29;
     /// Set by lanes, cleared by engines: an event near phase 0 makes a period above 1, or an undecided lane, uncertain.
     pub const NEAR_STROBE: u32 = 1 << 30;
-    // The bits from 9 on belong to the groups of [`measures`](super::measures::GROUPS).
     /// Motion without a period is quasi-periodic.
     pub const QUASI_PERIODIC: u32 = 1 << 31;
 }

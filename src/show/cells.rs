@@ -28,6 +28,16 @@ named! {
     }
 }
 
+named! {
+    /// The engine that finished a cell of a map of lanes.
+    pub enum Finished {
+        /// Its lane, on the device.
+        Device = "device",
+        /// The reference, from a state of the lane.
+        Reference = "reference",
+    }
+}
+
 /// Values of one cell except word and pattern, which need allocations. Values that the scene does not request or the cell does
 /// not have are absent.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,10 +57,18 @@ pub(crate) struct Row {
     pub(crate) status: Status,
     pub(crate) periods_run: u32,
     pub(crate) source: Source,
+    /// Absent if the cell was filled.
+    pub(crate) finished: Option<Finished>,
     /// Number of attractors that several starts reached.
     pub(crate) attractors: Option<u8>,
     /// Label of the attractor that the start leads to, in a map of basins.
     pub(crate) attractor: Option<u16>,
+}
+
+impl Finished {
+    fn of(record: &Record) -> Finished {
+        if record.valid & valid::BY_REFERENCE == 0 { Finished::Device } else { Finished::Reference }
+    }
 }
 
 /// Results that depend on all records of a map.
@@ -91,6 +109,7 @@ pub struct Cells<'a> {
     plan: &'a Plan,
     records: &'a dyn Records,
     survey: Option<&'a Survey>,
+    of_lanes: bool,
 }
 
 impl<'a> Cells<'a> {
@@ -100,7 +119,18 @@ impl<'a> Cells<'a> {
     /// If the numbers of records and runs differ.
     pub fn new(scene: &'a Scene, plan: &'a Plan, records: &'a dyn Records) -> Cells<'a> {
         assert_eq!(plan.run_count(), records.count(), "one record per run");
-        Cells { scene, plan, records, survey: None }
+        Cells { scene, plan, records, survey: None, of_lanes: false }
+    }
+
+    /// Says whether an engine of this name computes lanes. Tables of lanes say which engine finished a cell.
+    #[must_use]
+    pub fn computed_by(self, engine: &str) -> Cells<'a> {
+        Cells { of_lanes: engine == "gpu", ..self }
+    }
+
+    /// Whether lanes computed the cells.
+    pub(crate) fn are_of_lanes(&self) -> bool {
+        self.of_lanes
     }
 
     /// Adds the results that depend on all records.
@@ -170,6 +200,17 @@ impl<'a> Cells<'a> {
     /// Returns the status of every cell, by id.
     pub fn statuses(&self) -> impl Iterator<Item = Status> + '_ {
         self.first_runs().map(|record| status(&record))
+    }
+
+    /// Returns how many integrated cells of lanes each engine finished; none if no lanes computed the cells.
+    pub fn finished(&self) -> Option<[usize; 2]> {
+        if !self.of_lanes {
+            return None;
+        }
+        let mut counts = [0; 2];
+        let integrated = self.first_runs().filter(|record| record.valid & valid::FILLED == 0);
+        integrated.for_each(|record| counts[Finished::of(&record) as usize] += 1);
+        Some(counts)
     }
 
     /// Returns the number of integrated forcing periods of all runs.
@@ -277,6 +318,7 @@ impl<'a> Cells<'a> {
             status: status(record),
             periods_run: record.periods_run,
             source: if is_filled { Source::Filled } else { Source::Integrated },
+            finished: (!is_filled).then(|| Finished::of(record)),
             attractors: self.attractors().and_then(|list| list.get(id).copied()),
             attractor: self
                 .basins()

@@ -23,7 +23,7 @@ use crate::map::scene::{Axis, Quantity, Rule, Scale, Scene, Target};
 use crate::map::schedule::{Audit, Refined};
 use crate::model_file::FileModel;
 use crate::record::Record;
-use crate::show::cells::{Cells, Row, Source};
+use crate::show::cells::{Cells, Finished, Row, Source};
 use crate::show::color::{Color, hex};
 use crate::show::error::WriteError;
 use crate::show::layers::{Bar, Layer, NamedColor, share};
@@ -108,6 +108,7 @@ pub fn data(
         "classes": Class::NAMES,
         "statuses": Status::ALL.iter().map(|status| status.name()).collect::<Vec<_>>(),
         "sources": Source::ALL.map(Source::name),
+        "finishers": Finished::ALL.map(Finished::name),
         "words": spellings(&words.words),
         "patterns": spellings(&words.patterns),
         "attractors": attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect::<Vec<_>>(),
@@ -276,6 +277,9 @@ fn values(cells: &Cells<'_>, words: &MapWords) -> Value {
     }
     if cells.refinement().is_some() {
         object["source"] = bytes(|row| row.source as u8);
+    }
+    if cells.are_of_lanes() {
+        object["finished"] = bytes(|row| row.finished.map_or(u8::MAX, |finished| finished as u8));
     }
     if let Some(basins) = cells.basins() {
         let labels: Vec<u32> = basins.labels().iter().map(|&label| label.into()).collect();

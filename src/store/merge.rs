@@ -411,7 +411,7 @@ impl MapRecords {
         let MapRecords { parts, plan, records, .. } = self;
         let first = parts.parts[0].map.manifest();
         let survey = Survey::of(plan, records, None);
-        let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey);
+        let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey).computed_by(&first.engine);
         let processor = parts.processors();
         let made = Provenance { commit: OWN_COMMIT, ..first.provenance() };
         // Adapters and cards are in the manifests of the parts.

@@ -118,13 +118,19 @@ impl Strobed<'_> {
 
 /// Computes the record of a run; none if the judge gives no answer.
 pub fn record(plan: &Plan, id: u32, records: &dyn Records) -> Option<Record> {
-    record_until(plan, id, records, &super::NEVER)
+    record_until(plan, id, records, plan.budget(), &super::NEVER)
 }
 
-/// Like [`record`], but returns `None` once `halt` is set.
-pub(super) fn record_until(plan: &Plan, id: u32, records: &dyn Records, halt: &AtomicBool) -> Option<Record> {
+/// Like [`record`], within another budget, but returns `None` once `halt` is set.
+pub(super) fn record_until(
+    plan: &Plan,
+    id: u32,
+    records: &dyn Records,
+    budget: &Budget,
+    halt: &AtomicBool,
+) -> Option<Record> {
     let (oscillator, start) = (plan.model(id).oscillator().ok()?, plan.start(id, records));
-    follow(Strobed::new(&oscillator, start, halt), plan.budget())
+    follow(Strobed::new(&oscillator, start, halt), budget)
 }
 
 fn follow(mut motion: Strobed<'_>, budget: &Budget) -> Option<Record> {

@@ -2,15 +2,17 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use super::Subject;
 use super::sample::Sample;
 use super::states::HORIZON;
 use crate::gpu::{self, Features, Gpu, GpuError, Lane, LaneSettings};
-use crate::map::engine::{compare_at_sections, drop_unrequested, lane_settings, measure_machines};
+use crate::map::engine::{Completion, Ended, lane_settings};
 use crate::map::plan::Plan;
-use crate::record::{Record, Records};
+use crate::record::{Record, Records, valid};
 use rattlemap_dynamics::model::State;
-use rattlemap_dynamics::orbit::Status;
+use rattlemap_dynamics::orbit::{Budget, Status};
 
 /// Results of lanes that were computed again; empty without a device.
 #[derive(Clone, Debug, Default)]
@@ -49,8 +51,8 @@ impl Lanes {
         let mut lanes = Lanes::default();
         if let Some(gpu) = single {
             lanes.device = Some(gpu::describe(gpu.adapter()));
-            let mut again = run_lanes(gpu, plan, records, &ids, &own).await?;
-            again.iter_mut().for_each(|record| drop_unrequested(record, plan.needs()));
+            let as_in_map = LaneSettings { hands_over: Completion::hands_over(plan.budget()), ..own };
+            let again = run_lanes(gpu, plan, records, &ids, &as_in_map).await?;
             lanes.again = ids.iter().copied().zip(again).collect();
             if double.is_some() {
                 let records = run_lanes(gpu, plan, records, &ids, &whole).await?;
@@ -60,8 +62,17 @@ impl Lanes {
         }
         if let Some(gpu) = double {
             lanes.double_device = Some(gpu::describe(gpu.adapter()));
-            let records = run_lanes(gpu, plan, records, &ids, &whole).await?;
-            lanes.double = ids.iter().copied().zip(records).collect();
+            let by_reference = |id: &u32| records.record(*id as usize).valid & valid::BY_REFERENCE != 0;
+            let (finished, others): (Vec<u32>, Vec<u32>) = ids.iter().copied().partition(by_reference);
+            // The lane of a cell that the reference finished was undecided after the usual periods.
+            let budget = all_periods(plan.budget());
+            let periods = budget.periods();
+            let longer =
+                LaneSettings { periods, transient_periods: budget.settings.transient_periods, ..whole };
+            for (ids, settings) in [(others, &whole), (finished, &longer)] {
+                let records = run_lanes(gpu, plan, records, &ids, settings).await?;
+                lanes.double.extend(ids.into_iter().zip(records));
+            }
             if lanes.states.is_empty() {
                 lanes.states = states(gpu, subject, &sample.states, &brief).await?;
             }
@@ -77,8 +88,9 @@ impl Lanes {
         self.whole.get(&id)
     }
 
+    /// Returns the record of a lane in double precision, unless the reference has finished it.
     pub(super) fn double(&self, id: u32) -> Option<&Record> {
-        self.double.get(&id)
+        self.double.get(&id).filter(|record| record.valid & valid::BY_REFERENCE == 0)
     }
 
     pub(super) fn states(&self) -> &[(u32, Option<State>)] {
@@ -140,12 +152,20 @@ pub async fn run_lanes(
         ..*settings
     };
     let records = gpu.run(&flows, &laws, &lanes, settings).await?;
-    let mut numbered: Vec<_> = (0..).zip(records).collect();
-    let of = |i: u32| {
-        let lane = &lanes[i as usize];
-        (flows[lane.flow as usize].clone(), laws[lane.law as usize])
-    };
-    compare_at_sections(gpu, &mut numbered, of, settings).await?;
-    measure_machines(&mut numbered, of, settings);
-    Ok(numbered.into_iter().map(|(_, record)| record).collect())
+    let completion = Completion::of(plan, settings.early_stop, gpu.halt());
+    let completed = (0..lanes.len()).into_par_iter().zip(records).map(|(i, record)| {
+        let lane = &lanes[i];
+        let (form, law) = (flows[lane.flow as usize].clone(), laws[lane.law as usize]);
+        completion.completed(Ended { record, form, law })
+    });
+    completed.collect::<Option<Vec<_>>>().ok_or(GpuError::Halted)
+}
+
+/// Returns the budget of a cell that stays undecided, as one span.
+pub(super) fn all_periods(budget: &Budget) -> Budget {
+    let mut all = *budget;
+    all.settings.transient_periods =
+        budget.settings.transient_periods.saturating_add(budget.undecided_periods);
+    all.undecided_periods = 0;
+    all
 }

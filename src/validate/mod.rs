@@ -366,16 +366,27 @@ fn judge(subject: &Subject<'_>, lanes: &Lanes) -> Judge {
     }
 }
 
-/// Computes a cell with the second judge of a map that the reference computed.
+/// Computes a cell with another judge than the reference, if the reference computed the cell or finished it.
 #[cfg_attr(not(feature = "independent"), expect(unused_variables, reason = "used by the ODE solver only"))]
 fn judged(subject: &Subject<'_>, cell: &Cell<'_>, id: u32, judge: Judge, lanes: &Lanes) -> Option<Record> {
+    let is_by_reference = cell.record.valid & valid::BY_REFERENCE != 0;
+    if judge == Judge::Reference && !is_by_reference {
+        return None;
+    }
+    #[cfg(feature = "independent")]
+    let independent = || {
+        let budget = subject.plan.budget();
+        let budget = if is_by_reference { lanes::all_periods(budget) } else { *budget };
+        independent::record_until(subject.plan, id, subject.records, &budget, cell.halt)
+    };
+    #[cfg(not(feature = "independent"))]
+    let independent = || None;
     match judge {
-        Judge::Reference => None,
-        Judge::Lanes => lanes.double(id).cloned(),
-        #[cfg(feature = "independent")]
-        Judge::Independent => independent::record_until(subject.plan, id, subject.records, cell.halt),
-        #[cfg(not(feature = "independent"))]
-        Judge::Independent => None,
+        Judge::Independent => independent(),
+        Judge::Lanes | Judge::Reference => {
+            let decided = |record: &&Record| !is_by_reference || classify(record) != Class::Undecided;
+            lanes.double(id).filter(decided).cloned().or_else(independent)
+        }
     }
 }
 

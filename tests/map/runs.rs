@@ -19,8 +19,9 @@ use rattlemap_dynamics::motion::Trajectory;
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse};
 use rayon::prelude::*;
 
+/// Those for which tests of validation compile shaders, too.
 const QUANTITIES: &str =
-    "outputs.quantities=[\"class\",\"lyapunov\",\"impacts\",\"mesh\",\"symmetric\",\"word\"]";
+    "outputs.quantities=[\"class\",\"lyapunov\",\"impacts\",\"mesh\",\"symmetric\",\"word\",\"pattern\"]";
 
 /// Reads a map over restitution and frequency with `count` cells along each axis.
 fn scene(count: usize, sets: &[&str]) -> Scene {
@@ -54,6 +55,51 @@ fn flows_of_later_uploads_belong_to_their_cells() {
     }
     let strobes: BTreeSet<_> = records.iter().map(|record| record.strobe().map(f64::to_bits)).collect();
     assert!(strobes.len() > records.len() * 9 / 10, "cells have states of their own");
+}
+
+/// The reference finishes lanes that are undecided after all other periods, by a rule of the cell alone. Its answer is that of the reference
+/// from the lane's state, and it is the motion that the reference follows from the start.
+#[test]
+fn the_reference_finishes_lanes_that_are_undecided() {
+    let budget = ["integration.transient_periods=24", "integration.observed_periods=16"];
+    let of = |periods: u32| {
+        let undecided = format!("integration.undecided_periods={periods}");
+        Plan::new(&scene(12, &[&budget[..], &[&undecided]].concat()))
+    };
+    let is_finished = |record: &Record| record.valid & valid::BY_REFERENCE != 0;
+    let (plan, brief) = (of(600), of(0));
+    let mut device = gpu::open(Precision::F32);
+    let [records, ended] = [&plan, &brief].map(|plan| gpu::map(plan, &mut device));
+    assert!(!ended.iter().any(is_finished), "without undecided periods nothing is handed over");
+    let finished: Vec<usize> = (0..records.len()).filter(|&id| is_finished(&records[id])).collect();
+    assert!((8..100).contains(&finished.len()), "{} cells", finished.len());
+    let (mut decided, mut differing) = (0, 0);
+    for (id, (record, ended)) in records.iter().zip(&ended).enumerate() {
+        if !is_finished(record) {
+            assert_eq!(record, ended, "cell {id}");
+            continue;
+        }
+        assert!(record.periods_run > 40 && record.periods_run <= 640, "{record:?}");
+        let class = classify(record);
+        decided += usize::from(class != Class::Undecided);
+        let from_start = Cpu::new(&plan).compute(&[plan.cell(id as u32)]);
+        differing += usize::from(classify(&from_start[0]) != class);
+    }
+    assert!(10 * decided > 9 * finished.len() && 10 * differing <= finished.len(), "{decided} {differing}");
+    // The rule does not depend on other cells.
+    let mut engine = gpu::engine(&plan, Precision::F32);
+    for &id in finished.iter().step_by(4) {
+        let alone = pollster::block_on(engine.run(&[plan.cell(id as u32)])).unwrap();
+        assert_eq!(alone[0], records[id], "cell {id}");
+    }
+    // In maps whose cells depend on others, few lanes wait for cells that the reference finishes.
+    for more in ["start.policy=\"up\"", "refine.minimum_grid=4"] {
+        let sets = [&budget[..], &["integration.undecided_periods=600", more]].concat();
+        let plan = Plan::new(&scene(12, &sets));
+        let map = swept(&plan, &mut gpu::engine(&plan, Precision::F32), &[]);
+        assert!(matches!(map.end, Ok(true)), "{more}: {:?}", map.end);
+        assert!(map.schedule.is_finished() && map.records.iter().any(is_finished), "{more}");
+    }
 }
 
 fn on_cpu(scene: &Scene) -> Vec<Record> {

@@ -150,11 +150,11 @@ impl Flow {
         2 * self.degrees.max(2)
     }
 
-    /// Moves a pair's gap that lies less than `rounding` behind a wall to `distance` in front of it, because a gap behind a wall means
-    /// lasting contact. Both distances are relative to the wall's position or the scale of length.
-    pub(crate) fn in_front(&self, y: State, rounding: f64, distance: f64) -> State {
+    /// Moves the gap of a lane's state to the front of a wall if it lies behind the wall by a rounding error: a gap of a pair behind a
+    /// wall means lasting contact.
+    pub fn in_front(&self, y: State) -> State {
         match &self.engine {
-            Engine::Pair(flow) => state(&flow.in_front(first_four(&y), rounding, distance)),
+            Engine::Pair(flow) => state(&flow.in_front(first_four(&y))),
             Engine::Machine(_) => y,
         }
     }

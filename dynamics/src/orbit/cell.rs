@@ -122,18 +122,32 @@ fn measure_within(
         return first;
     }
     let by_section = || {
-        let section = Section::of(flow, law, first.strobe, first.period.unwrap_or(2), allowance)?;
-        let (second, _) = measure_by_strobes(&section.flow, law, section.start, budget, allowance);
-        second.period?;
-        Some(Measurement {
-            quantities: second.quantities.map(|quantities| section.quantities(quantities)),
-            strobe: section.strobe(law, second.strobe, ON_STROBE_TURNS)?.0,
-            periods_run: first.periods_run,
-            search_periods: first.search_periods + second.periods_run + second.search_periods,
-            ..second
-        })
+        let second = measure_at_section(flow, law, first.strobe, first.period, budget, allowance)?;
+        let search_periods = first.search_periods + second.periods_run + second.search_periods;
+        Some(Measurement { periods_run: first.periods_run, search_periods, ..second })
     };
     by_section().unwrap_or(first)
+}
+
+/// Continues a motion with an event at phase 0 from its state `strobe` there, and compares its states at another phase. `period` is the
+/// period that the comparison at phase 0 has found, if any. Returns none if this comparison finds none, or if the motion cannot be
+/// continued within the allowance.
+pub fn measure_at_section(
+    flow: &Flow,
+    law: Law,
+    strobe: State,
+    period: Option<u32>,
+    budget: &Budget,
+    allowance: Allowance<'_>,
+) -> Option<Measurement> {
+    let section = Section::of(flow, law, strobe, period.unwrap_or(2), allowance)?;
+    let (measured, _) = measure_by_strobes(&section.flow, law, section.start, budget, allowance);
+    measured.period?;
+    Some(Measurement {
+        quantities: measured.quantities.map(|quantities| section.quantities(quantities)),
+        strobe: section.strobe(law, measured.strobe, ON_STROBE_TURNS)?.0,
+        ..measured
+    })
 }
 
 /// Integrates one cell and compares its states at phase 0. Also returns whether an event at phase 0 makes that

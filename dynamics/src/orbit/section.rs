@@ -4,6 +4,8 @@
 //! states alternate between both sides of the jump. States at another phase have no jump nearby, and the class, the
 //! period, the word and the multipliers do not depend on the phase.
 
+use std::f64::consts::TAU;
+
 use super::Event;
 use super::instant::after_events;
 use super::quantities::Quantities;
@@ -15,19 +17,13 @@ use crate::motion::{Allowance, Trajectory};
 /// States are compared at half a turn if no event is nearer to it than this, in turns. Half a turn adds no sine to the force.
 const CLEARANCE: f64 = 1.0 / 16.0;
 
-/// Largest rounding error of a lane's gap, relative to the wall's position or the scale of length.
-const STROBE_ON_WALL: f64 = 1e-5;
-
-/// A gap behind a wall by less is moved to this distance in front of it, about a rounding error of f64, in the same unit.
-const IN_FRONT: f64 = 1e-15;
-
 /// A phase far from the events of a motion, and the motion's state there.
 #[derive(Clone, Debug)]
-pub struct Section {
+pub(super) struct Section {
     /// The flow whose phase 0 is this phase.
-    pub flow: Box<Flow>,
+    pub(super) flow: Box<Flow>,
     /// The state of the motion at this phase.
-    pub start: State,
+    pub(super) start: State,
     /// The phase, in turns.
     turns: f64,
 }
@@ -35,15 +31,14 @@ pub struct Section {
 impl Section {
     /// Finds the phase from the events of the `periods` forcing periods that follow the state `strobe` at phase 0; none
     /// if the motion cannot be continued, or if the state at the phase does not determine the kind of contact.
-    pub fn of(
+    pub(super) fn of(
         flow: &Flow,
         law: Law,
         strobe: State,
         periods: u32,
         allowance: Allowance<'_>,
     ) -> Option<Section> {
-        let mut trajectory = Trajectory::<0>::new(flow, law, flow.in_front(strobe, STROBE_ON_WALL, IN_FRONT))
-            .allowing(allowance);
+        let mut trajectory = Trajectory::<0>::new(flow, law, flow.in_front(strobe)).allowing(allowance);
         let mut log = EventLog::new(flow, 0);
         for _ in 0..periods {
             trajectory.advance_period(&mut log).ok()?;
@@ -62,22 +57,17 @@ impl Section {
 
     /// Converts a state at this phase to the state at the next phase 0. Also returns the wall of the lasting contact there. If an event
     /// lies within `tolerance` turns of phase 0, the state is that after the event.
-    pub fn strobe(&self, law: Law, state: State, tolerance: f64) -> Option<(State, Option<Side>)> {
+    pub(super) fn strobe(&self, law: Law, state: State, tolerance: f64) -> Option<(State, Option<Side>)> {
         let mut trajectory = Trajectory::<0>::new(&self.flow, law, state);
         trajectory.advance_to(self.time_to_strobe(), &mut ()).ok()?;
         Some(after_events(&trajectory, tolerance * self.flow.period))
     }
 
-    /// Converts the phase of a harmonic from times since this phase to times since phase 0.
-    pub fn harmonic_phase(&self, phase: f64) -> f64 {
-        let turned = phase - self.turns * std::f64::consts::TAU;
-        turned.sin().atan2(turned.cos())
-    }
-
-    /// Converts quantities whose time begins at this phase.
+    /// Converts quantities whose time begins at this phase to times since phase 0.
     pub(super) fn quantities(&self, mut quantities: Quantities) -> Quantities {
         for displacement in &mut quantities.displacements {
-            displacement.harmonic[1] = self.harmonic_phase(displacement.harmonic[1]);
+            let turned = displacement.harmonic[1] - self.turns * TAU;
+            displacement.harmonic[1] = turned.sin().atan2(turned.cos());
         }
         quantities
     }

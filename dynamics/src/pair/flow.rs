@@ -77,6 +77,12 @@ pub enum DomainKind {
     Meshing(Side),
 }
 
+/// Largest rounding error of a gap in f32, relative to the wall's position or the scale of length.
+const BEHIND_WALL: f64 = 1e-5;
+
+/// Distance of a gap that [`PairFlow::in_front`] has moved from its wall, about a rounding error of f64, in the same unit.
+const IN_FRONT: f64 = 1e-15;
+
 /// The exact flow of one pair in all three domains.
 ///
 /// It does not depend on the contact law, so cells that differ only in restitution or meshing speed share one flow.
@@ -365,15 +371,14 @@ impl PairFlow {
         }
     }
 
-    /// Moves a gap that lies less than `rounding` behind a wall to `distance` in front of it. Both distances are relative to the wall's
-    /// position or the scale of length.
-    pub(crate) fn in_front(&self, y: PairState, rounding: f64, distance: f64) -> PairState {
+    /// Moves a gap that lies behind a wall by a rounding error of f32 to the front of the wall.
+    pub(crate) fn in_front(&self, y: PairState) -> PairState {
         let mut q = self.to_gap(y);
         for side in Side::BOTH {
             let (wall, sign) = (self.wall(side), side.sign());
             let unit = wall.abs().max(self.length);
-            if (0.0..rounding * unit).contains(&(sign * (q[0] - wall))) {
-                q[0] = wall - sign * distance * unit;
+            if (0.0..BEHIND_WALL * unit).contains(&(sign * (q[0] - wall))) {
+                q[0] = wall - sign * IN_FRONT * unit;
                 return self.to_state(q);
             }
         }

@@ -27,7 +27,9 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, lane_steps: Option<u64>, fin
     format!(
         "{integrated} {unit}{speed}; files written in {finishing:.3} s\n{}{}",
         refinement::lines(cells).into_iter().map(|line| line + "\n").collect::<String>(),
-        classes(count_classes(cells.classes())) + &cells.chaos_ends().map_or(String::new(), chaos_ends),
+        classes(count_classes(cells.classes()))
+            + &cells.finished().map_or(String::new(), finished)
+            + &cells.chaos_ends().map_or(String::new(), chaos_ends),
     )
 }
 
@@ -46,6 +48,14 @@ pub(super) fn times(run: &Run<'_>, finishing: Duration, files: BTreeMap<String, 
         phase("files", finishing) + &slowest,
     ];
     format!("\ntime in seconds: {}", phases.join(", "))
+}
+
+/// Says how many cells of lanes the reference finished; nothing if it finished none.
+fn finished([_, by_reference]: [usize; 2]) -> String {
+    match by_reference {
+        0 => String::new(),
+        count => format!("\nfinished by the reference (undecided lanes, contacts at phase 0): {count}"),
+    }
 }
 
 /// Says at which rate chaos ends.

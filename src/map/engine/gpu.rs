@@ -3,16 +3,16 @@
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::panic;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use rayon::prelude::*;
 use web_time::Instant;
 
-use super::section::is_on_strobe;
-use super::{Device, EngineError, Preparation, compare_at_sections, drop_unrequested, measure_machines};
+use super::finish::{Completion, Ended, Finishing, is_unfinished};
+use super::{Device, EngineError, Preparation, drop_unrequested};
 use crate::gpu::{
     self, AdapterId, Constants, Features, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables,
     Traffic,
@@ -21,16 +21,20 @@ use crate::map::plan::{Cell, Plan};
 use crate::map::scene::{Quantity, Steps};
 use crate::record::Record;
 use rattlemap_dynamics::model::{Form, Pair, Side};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::orbit::{Budget, Settings, measure};
 
 /// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
-/// First batch on a card: less than a second of work, unless motions are expensive.
-const FIRST_ON_A_CARD: usize = 1 << 20;
 /// Smallest batch on a software device: about a second of work.
 const LEAST_IN_SOFTWARE: usize = 256;
 
 /// Largest number of cells with distinct flows per batch on a software device: some seconds of work.
 const FLOWS_IN_SOFTWARE: usize = 8_192;
+
+/// Cells of a trial that are neighbours, and forcing periods of each.
+const TRIAL_BLOCK: usize = 64;
+const TRIAL_PERIODS: u32 = 32;
 
 /// The engine of a plan's lanes on one device, in one precision.
 pub struct Gpu<'p> {
@@ -54,6 +58,8 @@ pub struct Gpu<'p> {
     /// Memory for the constants of such a batch, used again: touching fresh memory takes more than half of the time of
     /// deriving them.
     constants: Vec<Option<Constants>>,
+    /// Cells that the reference finishes beside the lanes.
+    finishing: Finishing,
     preparation: Preparation,
 }
 
@@ -107,7 +113,9 @@ impl<'p> Gpu<'p> {
         if let Some(feature) = survey.features.needing_reference() {
             return Err(EngineError::NotOnLanes { feature });
         }
-        let settings = settings_after(&plan, &survey);
+        let hands_over = Completion::hands_over(plan.budget());
+        let settings = LaneSettings { hands_over, ..settings_after(&plan, &survey) };
+        let completion = Completion::of(&plan, plan.budget().early_stop, &Arc::default());
         let mut engine = Gpu {
             plan,
             device,
@@ -120,6 +128,7 @@ impl<'p> Gpu<'p> {
             next: None,
             most_waiting: gpu::MOST_FLOWS,
             constants: Vec::new(),
+            finishing: Finishing::new(completion),
             preparation: Preparation::default(),
         };
         if !engine.is_hardware() {
@@ -147,6 +156,59 @@ impl<'p> Gpu<'p> {
         self.device.traffic()
     }
 
+    /// Measures how many times as fast as the reference the lanes integrate some cells of the plan. Their results are thrown away.
+    ///
+    /// # Errors
+    /// [`EngineError`] if the device fails.
+    pub async fn speed(&mut self) -> Result<f64, EngineError> {
+        let runs = self.plan.run_count();
+        let cells_of = |count: usize| -> Vec<Cell> {
+            // Neighbours share flows, so blocks of them are spread over the map.
+            let blocks = count.div_ceil(TRIAL_BLOCK);
+            let begins = (0..blocks).map(|nth| runs / blocks * nth);
+            begins.flat_map(|at| self.plan.cells(at..(at + TRIAL_BLOCK).min(runs))).collect()
+        };
+        let settings = LaneSettings {
+            periods: TRIAL_PERIODS,
+            transient_periods: 0,
+            early_stop: false,
+            hands_over: false,
+            confirm_chaos: 0,
+            measures: None,
+            multiplier: false,
+            ..self.settings
+        };
+        let few = cells_of(TRIAL_BLOCK * rayon::current_num_threads());
+        let most = if self.tables.is_some() { LEAST_ON_HARDWARE } else { gpu::MOST_FLOWS };
+        let (flows, laws, lanes) = renumbered(&cells_of(most.min(runs)));
+        let constants =
+            flows.par_iter().map(|&flow| Constants::new(self.plan.form(flow), settings.steps_per_period));
+        let tables = self.load(constants.collect(), &laws).await.map_err(|error| self.error(error, runs))?;
+        let mut clock = Instant::now();
+        for _ in 0..2 {
+            // The first run makes buffers.
+            clock = Instant::now();
+            let ran = self.device.run_on(&tables, &lanes, &settings).await;
+            ran.map_err(|error| self.error(error, lanes.len()))?;
+        }
+        let of_lanes = lanes.len() as f64 / clock.elapsed().as_secs_f64();
+        clock = Instant::now();
+        let lengths =
+            Settings { transient_periods: 0, observed_periods: TRIAL_PERIODS, ..self.plan.budget().settings };
+        let budget = Budget {
+            settings: lengths,
+            early_stop: false,
+            confirm_chaos: 0,
+            quantities: false,
+            ..*self.plan.budget()
+        };
+        few.par_iter().with_max_len(1).for_each(|cell| {
+            measure(&Flow::new(self.plan.form(cell.flow)), self.plan.law(cell.law), cell.start, &budget);
+        });
+        let of_reference = few.len() as f64 / clock.elapsed().as_secs_f64();
+        Ok(of_lanes / of_reference)
+    }
+
     /// Returns the device for another plan.
     pub fn into_device(self) -> gpu::Gpu {
         self.device
@@ -171,6 +233,23 @@ impl<'p> Gpu<'p> {
     }
 
     pub(super) async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
+        loop {
+            let lanes = self.pool.as_ref().map_or(0, Pool::under_way) + self.waiting.len();
+            let is_on_device = lanes > 0 || self.next.is_some();
+            let mut ended = Vec::new();
+            if is_on_device {
+                ended = self.advance_lanes(until.saturating_sub(self.finishing.pending())).await?;
+            }
+            ended.extend(self.finishing.take(!is_on_device));
+            let is_over = !is_on_device && self.finishing.pending() == 0;
+            if !ended.is_empty() || is_over || self.device.is_halted() {
+                return Ok(ended);
+            }
+        }
+    }
+
+    /// Returns the records of lanes that have ended, and lets the reference finish some.
+    async fn advance_lanes(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
         let ended = match (&self.tables, &mut self.pool) {
             (Some(tables), Some(pool)) => match pool.advance(&self.device, tables, until).await {
                 Ok(ended) => {
@@ -188,19 +267,20 @@ impl<'p> Gpu<'p> {
             },
             _ => self.run_waiting().await,
         };
-        let mut ended = ended.map_err(|error| self.error(error, self.waiting.len()))?;
-        let plan = &*self.plan;
-        let of = |id| {
-            let cell = plan.cell(id);
-            (plan.form(cell.flow), plan.law(cell.law))
-        };
-        match compare_at_sections(&mut self.device, &mut ended, &of, &self.settings).await {
-            // These cells have not ended.
-            Err(GpuError::Halted) => ended.retain(|(_, record)| !is_on_strobe(record)),
-            compared => compared.map_err(|error| self.error(error, ended.len()))?,
+        let ended = ended.map_err(|error| {
+            self.finishing.discard();
+            self.error(error, self.waiting.len())
+        })?;
+        let needs = self.plan.needs();
+        let is_measured_here = self.settings.features.machine.is_some() && needs.measures_motion();
+        let (unfinished, mut ended): (Vec<_>, Vec<_>) =
+            ended.into_iter().partition(|(_, record)| is_measured_here || is_unfinished(record));
+        ended.par_iter_mut().for_each(|(_, record)| drop_unrequested(record, needs));
+        for (id, record) in unfinished {
+            let cell = self.plan.cell(id);
+            let (form, law) = (self.plan.form(cell.flow), self.plan.law(cell.law));
+            self.finishing.begin(id, Ended { record, form, law });
         }
-        measure_machines(&mut ended, of, &self.settings);
-        ended.par_iter_mut().for_each(|(_, record)| drop_unrequested(record, plan.needs()));
         Ok(ended)
     }
 
@@ -245,7 +325,11 @@ impl<'p> Gpu<'p> {
         lanes.truncate(fitting(lanes.iter().map(bytes), self.most_waiting));
         forms.truncate(lanes.iter().map(|lane| lane.flow as usize + 1).max()?);
         let cells = self.waiting.split_off(self.waiting.len() - lanes.len());
-        let constants = Deriving::new(forms, steps, std::mem::take(&mut self.constants));
+        let mut memory = std::mem::take(&mut self.constants);
+        let constants = Task::new(move || {
+            forms.par_iter().map(|flow| Constants::new(flow, steps)).collect_into_vec(&mut memory);
+            memory
+        });
         Some(Chunk { cells, laws, lanes, constants })
     }
 
@@ -289,6 +373,7 @@ impl Device for Gpu<'_> {
     }
 
     fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        self.finishing.stop_on(halt);
         self.device.stop_on(halt);
     }
 
@@ -302,10 +387,6 @@ impl Device for Gpu<'_> {
 
     fn least_batch(&self) -> usize {
         if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
-    }
-
-    fn first_batch(&self) -> usize {
-        if gpu::is_card(self.device.adapter()) { FIRST_ON_A_CARD } else { self.least_batch() }
     }
 
     fn device_bytes(&self) -> Option<u64> {
@@ -336,48 +417,36 @@ struct Chunk {
     laws: Vec<u32>,
     /// Lanes of the cells, the last one first.
     lanes: Vec<Lane>,
-    constants: Deriving,
+    constants: Task<Vec<Option<Constants>>>,
 }
 
-/// Constants of flows, which other threads derive.
-enum Deriving {
-    Thread(JoinHandle<Vec<Option<Constants>>>),
-    Done(Vec<Option<Constants>>),
+/// Work of another thread beside the device.
+enum Task<T> {
+    Thread(JoinHandle<T>),
+    Done(T),
 }
 
-impl Deriving {
-    /// Derives the constants of oscillators into `memory`.
-    fn new(forms: Vec<Form>, steps: Option<u32>, mut memory: Vec<Option<Constants>>) -> Deriving {
-        let flows = Arc::new(forms);
-        let derive = move |flows: &[Form], memory: &mut Vec<Option<Constants>>| {
-            flows.par_iter().map(|flow| Constants::new(flow, steps)).collect_into_vec(memory);
-        };
+impl<T: Send + 'static> Task<T> {
+    /// Starts a thread. Where none can be started, as in a browser, the work is done at once.
+    fn new(work: impl FnOnce() -> T + Send + 'static) -> Task<T> {
+        fn run<T>(work: &Mutex<Option<impl FnOnce() -> T>>) -> T {
+            let work = work.lock().unwrap_or_else(PoisonError::into_inner).take();
+            work.map(|work| work()).expect("the work is done once")
+        }
+        let work = Arc::new(Mutex::new(Some(work)));
         // A worker of the pool that waited for the thread might be the one that the thread waits for.
         if rayon::current_thread_index().is_some() {
-            derive(&flows, &mut memory);
-            return Deriving::Done(memory);
+            return Task::Done(run(&work));
         }
-        let own = Arc::clone(&flows);
-        // In a browser, a thread cannot be started like this.
-        let thread = thread::Builder::new().spawn(move || {
-            derive(&own, &mut memory);
-            memory
-        });
-        thread.map_or_else(
-            |_| {
-                let mut memory = Vec::new();
-                derive(&flows, &mut memory);
-                Deriving::Done(memory)
-            },
-            Deriving::Thread,
-        )
+        let own = Arc::clone(&work);
+        thread::Builder::new().spawn(move || run(&own)).map_or_else(|_| Task::Done(run(&work)), Task::Thread)
     }
 
-    /// Waits for the constants.
-    fn take(self) -> Vec<Option<Constants>> {
+    /// Waits for the result.
+    fn take(self) -> T {
         match self {
-            Deriving::Thread(thread) => thread.join().unwrap_or_else(|panic| panic::resume_unwind(panic)),
-            Deriving::Done(constants) => constants,
+            Task::Thread(thread) => thread.join().unwrap_or_else(|panic| panic::resume_unwind(panic)),
+            Task::Done(result) => result,
         }
     }
 }

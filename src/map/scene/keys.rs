@@ -82,7 +82,7 @@ pub const KEYS: &[Key] = &[
     key("integration", "transient_periods", Value("400"), Takes::Whole(1, MAX_PERIODS), "forcing periods before the motion is analysed; with early stops, the maximum"),
     key("integration", "observed_periods", Value("128"), Takes::Whole(2, MAX_PERIODS), "forcing periods in which the motion is analysed; with early stops, the maximum"),
     key("integration", "early_stop", Value("true"), Takes::Flag, "stop a cell as soon as its class is decided"),
-    key("integration", "undecided_periods", Value("0"), Takes::Whole(0, MAX_PERIODS), "additional periods for undecided cells; needs early_stop"),
+    key("integration", "undecided_periods", Value("0"), Takes::Whole(0, MAX_PERIODS), "additional periods for undecided cells; needs early_stop. If they are as many as all others, the processor computes them, also with --engine gpu, and those of confirm_chaos"),
     key("integration", "confirm_chaos", Value("0"), Takes::Whole(0, MAX_PERIODS), "additional periods for chaotic cells, after all others; a cell whose chaos ends in them gets its new class. Needs the quantity class or lyapunov"),
     key("integration", "max_period", Value("64"), Takes::Whole(1, LONGEST_CYCLE), "longest period that is searched for, at most half of observed_periods; the default is lowered to that half"),
     key("start", "policy", Value("\"rest\""), Takes::OneOf(&["rest", "state", "up", "down", "both"]), "rest or state: every cell starts there; up or down: a cell starts from the final state of its neighbour along the last axis; both: up and down in one `bifurcation`"),

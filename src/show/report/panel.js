@@ -26,6 +26,7 @@ function facts(cell) {
     ...computed("attractor", "attractor", (label) => data.attractors[label]),
     ["status", data.statuses[at("status")]],
     ...computed("source", "source", () => source),
+    ...computed("finished", "finished by", (index) => data.finishers[index] ?? "nobody"),
     ["periods run", at("periods_run")],
     ["cell", `${i}, ${j}`],
   ];

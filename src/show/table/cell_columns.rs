@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt::{self, Display, Write};
 
 use crate::map::scene::Quantity;
-use crate::show::cells::{Cells, Row, Source};
+use crate::show::cells::{Cells, Finished, Row, Source};
 use crate::show::table::words_csv::WordRows;
 use rattlemap_dynamics::orbit::Class;
 
@@ -213,6 +213,8 @@ fn all(cells: &Cells<'_>) -> Vec<CellColumn> {
         column("source", None, |c| Some(c.row.source.name()),
             TypedValue::I8(Box::new(|c, _| c.row.source as i8))),
     ]);
+    columns.extend(cells.are_of_lanes().then(|| column("finished", None, |c| c.row.finished.map(Finished::name),
+        TypedValue::I8(Box::new(|c, _| c.row.finished.map_or(ABSENT, |finished| finished as i8))))));
     // The number of attractors, in maps whose cells have several starts.
     columns.extend(cells.attractors().map(|_| column("attractors", None, |c| c.row.attractors,
         TypedValue::U8(Box::new(|c, _| c.row.attractors.unwrap_or(0))))));
@@ -238,11 +240,12 @@ pub(super) fn all_names() -> Vec<String> {
     let names = all(&Cells::new(&scene, &plan, &records)).into_iter().map(|column| column.name.into_owned());
     let fixed =
         names.filter(|name| !["x1", "v1", "x2", "v2"].iter().any(|of| name.ends_with(&format!("_{of}"))));
-    fixed.chain(["attractors".to_owned(), "attractor".to_owned()]).collect()
+    fixed.chain(["finished", "attractors", "attractor"].map(str::to_owned)).collect()
 }
 
-// `Source::ALL` gives the codes.
+// `ALL` gives the codes.
 const _: () = assert!(Source::Integrated as i8 == 0 && Source::Filled as i8 == 1);
+const _: () = assert!(Finished::Device as i8 == 0 && Finished::Reference as i8 == 1);
 
 /// Returns the columns of `cells.csv`. The first quantities have a column even where the scene does not request them.
 pub(crate) fn of_csv(cells: &Cells<'_>) -> Vec<CellColumn> {

@@ -11,7 +11,7 @@ use crate::map::engine::{Engine, Preparation};
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
 use crate::map::shard::Shard;
-use crate::show::cells::{Cells, Source};
+use crate::show::cells::{Cells, Finished, Source};
 use crate::show::names;
 use crate::show::parameters::Parameters;
 use crate::show::provenance::Provenance;
@@ -217,7 +217,7 @@ pub(crate) fn timings(run: &Run<'_>, writing: Duration, files: BTreeMap<String, 
     })
 }
 
-/// Counts the cells by class, status and number of attractors, and describes the basins.
+/// Counts the cells by class, status, the engine that finished them and number of attractors, and describes the basins.
 pub(crate) fn counts(cells: &Cells<'_>) -> Value {
     let classes = Class::NAMES.into_iter().zip(count_classes(cells.classes()));
     let mut statuses: BTreeMap<_, usize> = Status::ALL.iter().map(|status| (status.name(), 0)).collect();
@@ -229,9 +229,11 @@ pub(crate) fn counts(cells: &Cells<'_>) -> Value {
         list.iter().for_each(|&count| *counts.entry(count).or_default() += 1);
         counts
     });
+    let names = Finished::ALL.map(Finished::name);
+    let finished = cells.finished().map(|counts| names.into_iter().zip(counts).collect::<BTreeMap<_, _>>());
     joined([
         json!({ "classes": classes.collect::<BTreeMap<_, _>>(), "statuses": statuses }),
-        without_nulls(json!({ "attractors": attractors, "basins": basins(cells) })),
+        without_nulls(json!({ "finished": finished, "attractors": attractors, "basins": basins(cells) })),
     ])
 }
 
@@ -259,6 +261,7 @@ fn codes() -> Value {
         "class": class,
         "status": numbered(Status::ALL.iter().map(|status| status.name()).collect()),
         "source": numbered(Source::ALL.map(Source::name).to_vec()),
+        "finished": BTreeMap::from([("device", 0), ("reference", 1), ("absent", ABSENT)]),
         "symmetric": BTreeMap::from([("false", 0), ("true", 1), ("absent", ABSENT)]),
     })
 }
