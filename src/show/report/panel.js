@@ -26,7 +26,7 @@ function facts(cell) {
     ...computed("attractor", "attractor", (label) => data.attractors[label]),
     ["status", data.statuses[at("status")]],
     ...computed("source", "source", () => source),
-    ...computed("finished", "finished by", (index) => data.finishers[index] ?? "nobody"),
+    ...computed("finished", "finished by", (index) => data.finishers[index] ?? "no engine: filled in"),
     ["periods run", at("periods_run")],
     ["cell", `${i}, ${j}`],
   ];
