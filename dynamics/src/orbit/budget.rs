@@ -74,6 +74,15 @@ impl Budget {
         self.decided_by().saturating_add(more)
     }
 
+    /// Returns the budget for continuing motion that is undecided after a number of periods. The transient is cut to the periods in which a
+    /// new tangent vector turns.
+    pub fn after(&self, periods_run: u32) -> Budget {
+        let transient_periods = self.settings.transient_periods.min(TANGENT_PERIODS);
+        let mut rest = Budget { settings: Settings { transient_periods, ..self.settings }, ..*self };
+        rest.undecided_periods = self.decided_by().saturating_sub(periods_run).saturating_sub(rest.periods());
+        rest
+    }
+
     /// Returns the work that one cell may take, including searches for cycles.
     pub fn allowance(&self) -> Allowance<'static> {
         let longest = u64::from(self.longest());

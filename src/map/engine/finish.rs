@@ -75,7 +75,7 @@ impl Completion {
         let (strobe, bits, periods_run) = (record.strobe(), record.valid, record.periods_run);
         record.valid &= !(valid::OPEN | valid::NEAR_STROBE);
         let second = if bits & valid::OPEN != 0 {
-            let rest = rest_of(&self.budget, periods_run);
+            let rest = self.budget.after(periods_run);
             let measured = measure_until(flow, law, flow.in_front(strobe), &rest, &self.halt);
             // If the continuation fails, the rounding of the lane's state is the cause.
             measured
@@ -96,11 +96,6 @@ impl Completion {
             *record = Record { valid: second.valid | valid::BY_REFERENCE, ..second };
         }
     }
-}
-
-/// Returns the budget of a lane that is undecided after a number of periods. Its motion is decided by the same rules as that of a new cell.
-fn rest_of(budget: &Budget, periods_run: u32) -> Budget {
-    Budget { undecided_periods: budget.undecided_periods.saturating_sub(periods_run), ..*budget }
 }
 
 /// Whether the reference must finish the record of a lane.
