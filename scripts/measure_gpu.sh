@@ -14,6 +14,8 @@
 #     window      a window of 256 x 256 cells of the main map, all quantities
 #     basin       a map of basins of attraction
 #     brute       the main map with SIDE x SIDE cells and without early stops
+#     no_events   like brute, with a small force, so that no gap meets a wall. The difference from brute is the cost of events
+#     no_tangents like brute, with impacts and contact time alone. The difference from brute is the cost of tangent vectors and classes
 #     own_flow    as many cells, each with its own flow: meshing stiffness against frequency
 #     adaptive    the adaptive map of the main plane, classes only
 #     latency     four lanes, for as many periods as the slowest lane of a map may take
@@ -41,7 +43,7 @@ binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
 steps=("${@:4}")
-all=(right main classes sizes window basin brute own_flow adaptive latency compile engines again)
+all=(right main classes sizes window basin brute no_events no_tangents own_flow adaptive latency compile engines again)
 ((${#steps[@]})) || steps=("${all[@]}")
 for step in "${steps[@]}"; do
     [[ " ${all[*]} " == *" $step "* ]] || { echo "error: there is no step $step; the steps are ${all[*]}" >&2; exit 2; }
@@ -220,6 +222,8 @@ settings() {
             ;;
         basin) scene="$scenes/basin.toml" ;;
         brute) square "$side" && sets+=(--set integration.early_stop=false) ;;
+        no_events) square "$side" && sets+=(--set integration.early_stop=false --set F=0.1) ;;
+        no_tangents) square "$side" && sets+=(--set integration.early_stop=false --set 'outputs.quantities=["impacts", "mesh"]') ;;
         own_flow)
             square "$side"
             sets+=("${classes[@]}" --set e=0.6 --set axis.0.parameter=k --set axis.0.min=500 --set axis.0.max=2000)
