@@ -6,9 +6,10 @@ const LEAST_COUNTED: u32 = 32u;
 // A lane that has not settled on its cycle is doubted if growth exceeds zero by this number of standard errors.
 const DOUBT: Real = 1.0;
 
-// Whether growth is certain and no recurrence contracts. Checked when a block is complete.
+// Whether growth is certain and no recurrence contracts. Checked when a block is complete, and at the end of the budget.
 fn is_chaos() -> bool {
-    if search.block_periods > 0u || search.blocks < FEWEST_BLOCKS || search.streak >= STREAK || tally.period < settings.chaos_from {
+    let is_last = tally.period >= last_period();
+    if (search.block_periods > 0u && !is_last) || search.blocks < FEWEST_BLOCKS || search.streak >= STREAK || tally.period < settings.chaos_from {
         return false;
     }
     // A cycle that was read without success has interrupted the averages.

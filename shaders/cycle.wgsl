@@ -65,9 +65,27 @@ fn nearly_triangular(m: Matrix, inverse: Real) -> Matrix {
     return r;
 }
 
-// Returns the binary logarithm of the spectral radius of the monodromy matrix. Its columns are the tangent vectors,
-// which started as unit vectors. With `n = 2^SQUARINGS`, the modulus of the largest multiplier is `|M^n|^(1/n)` up to
-// a factor of `kappa^(1/n)`, where kappa is the condition of the eigenvectors.
+// Returns the modulus of the largest root of `x^2 - t x + d`, where t is the trace of the matrix and d the sum of the products of two
+// eigenvalues. This is the spectral radius if all eigenvalues but two vanish.
+fn radius_of_two(m: Matrix) -> Real {
+    var trace: Real = 0.0;
+    var of_square: Real = 0.0;
+    for (var k = 0u; k < MATRIX; k++) {
+        of_square += m[k] * m[k % DIM * DIM + k / DIM];
+        trace += select(Real(0.0), m[k], k % (DIM + 1u) == 0u);
+    }
+    let product = 0.5 * (trace * trace - of_square);
+    let rest = 0.25 * trace * trace - product;
+    return select(sqrt(max(product, Real(0.0))), 0.5 * abs(trace) + sqrt(max(rest, Real(0.0))), rest > 0.0);
+}
+
+// Number of squarings before estimates by `radius_of_two` are compared.
+const LEAST_SQUARINGS: u32 = 3u;
+
+// Returns the binary logarithm of the spectral radius of the monodromy matrix. Its columns are the tangent vectors, which started as unit
+// vectors. Repeated squaring leaves the two largest eigenvalues. They may be a complex pair. `radius_of_two` then gives the radius. Without a
+// gap below them, `|M^n|^(1/n)` with `n = 2^SQUARINGS` is the radius up to a factor of `kappa^(1/n)`, where kappa is the condition of the
+// eigenvectors.
 fn spectral_growth() -> Real {
     var m = motions[lane].tangents;
     let whole = largest_entry(m);
@@ -82,10 +100,21 @@ fn spectral_growth() -> Real {
     var growth = octaves_of(whole);
     let unresolved = growth + octaves_of(ULP);
     var weight: Real = 1.0;
+    var estimate: Real = HUGE;
+    var equal = 0u;
     for (var n = 0u; n <= SQUARINGS; n++) {
         let size = largest_entry(m);
         if !(size > 1e-30) {
             return SUPERSTABLE_GROWTH;
+        }
+        if n >= LEAST_SQUARINGS {
+            let next = growth + weight * octaves_of(max(radius_of_two(m), Real(1e-30)));
+            equal = select(0u, equal + 1u, abs(next - estimate) <= 16.0 * ULP * (1.0 + abs(next)));
+            estimate = next;
+            if equal == 2u {
+                growth = estimate;
+                break;
+            }
         }
         growth += weight * octaves_of(size);
         weight *= 0.5;
@@ -248,7 +277,6 @@ fn search_again(continues: bool) {
     search.has_read = 0u;
     search.checks_divisor = 0u;
     begin_counting();
-    resume_growth();
     if continues {
         begin_window(strobe_state(), search.window);
         return;

@@ -1,12 +1,28 @@
-// Growth of tangent vectors. Only shader variants with an exponent contain this file.
+// Growth of tangent vectors.
 
-// The tangent vector for the exponent. The columns of the monodromy matrix stay in the buffer; they are carried while a cycle is read.
+// A kernel carries VECTORS tangent vectors: none, one for the exponent (GROWTH), or the columns of the monodromy matrix (COLUMNS). The
+// columns stay in the buffer.
 var<private> tangent_now: State;
 
 fn tangent(i: u32) -> State {
-    if tally.tangent_count == 1u {
+    if GROWTH {
         return tangent_now;
     }
+    return column(i);
+}
+
+fn set_tangent(i: u32, u: State) {
+    if GROWTH {
+        tangent_now = u;
+        return;
+    }
+    //% for k in 0..DIM
+    motions[lane].tangents[DIM * i + $ku] = u[$ku];
+    //% end
+}
+
+// Returns a column of the monodromy matrix.
+fn column(i: u32) -> State {
     var u: State;
     //% for k in 0..DIM
     u[$ku] = motions[lane].tangents[DIM * i + $ku];
@@ -14,31 +30,17 @@ fn tangent(i: u32) -> State {
     return u;
 }
 
-fn set_tangent(i: u32, u: State) {
-    if tally.tangent_count == 1u {
-        tangent_now = u;
-        return;
-    }
-    store_tangent(i, u);
-}
-
-fn store_tangent(i: u32, u: State) {
-    //% for k in 0..DIM
-    motions[lane].tangents[DIM * i + $ku] = u[$ku];
-    //% end
-}
-
-// Loads the tangent vector at the start of a dispatch. The first dispatch with the vector initialises it.
+// Loads the tangent vector at the start of a dispatch.
 fn load_tangent() {
     if GROWTH {
         tally.carries_growth = 1u;
-        if tally.tangent_count == 0u {
-            resume_growth();
-            store_tangent_now();
-        }
-        //% for k in 0..DIM
-        tangent_now[$ku] = motions[lane].tangents[$ku];
-        //% end
+        tangent_now = motions[lane].vector;
+    }
+}
+
+fn store_tangent_now() {
+    if GROWTH {
+        motions[lane].vector = tangent_now;
     }
 }
 
@@ -51,14 +53,7 @@ fn initial_tangent() -> State {
     return u;
 }
 
-// Saves the vector while a cycle is read.
-fn save_vector() {
-    if tally.tangent_count == 1u {
-        motions[lane].vector = tangent_now;
-    }
-}
-
-// Multiplies the saved vector by the monodromy matrix of the cycle that was read along the motion. A new vector would first turn into the
+// Multiplies the vector by the monodromy matrix of the cycle that was read along the motion. A new vector would first turn into the
 // direction of growth, which adds growth: 0.2 per period for motion with an exponent of zero whose cycles are read again and again.
 fn carry_vector() {
     if search.newton_steps > 0u {
@@ -102,18 +97,6 @@ fn scaled(u: State, factor: Real) -> State {
     v[$ku] = factor * u[$ku];
     //% end
     return v;
-}
-
-// Continues with the saved vector.
-fn resume_growth() {
-    tally.tangent_count = tally.carries_growth;
-    tangent_now = motions[lane].vector;
-}
-
-fn store_tangent_now() {
-    if GROWTH && tally.tangent_count == 1u {
-        store_tangent(0u, tangent_now);
-    }
 }
 
 // Starts to carry the columns of the monodromy matrix. With one displacement, x is always 0 and has no tangent.
@@ -171,7 +154,7 @@ fn size_of_columns() -> Real {
     var are_in_range = true;
     for (var i = 0u; i < DIM; i++) {
         iterations += 1u;
-        let u = tangent(i);
+        let u = column(i);
         are_in_range = are_in_range && is_in_range(u);
         let size = max(largest_displacement(u), largest_rate(u) / angle);
         most = max(most, size * select(Real(1.0), angle, i % 2u == 1u));
@@ -187,9 +170,9 @@ fn cycle_stretch() -> Real {
 }
 
 fn check_range() {
-    if tally.tangent_count == 1u {
+    if GROWTH {
         rescale_tangent();
-    } else if tally.tangent_count > 1u {
+    } else if COLUMNS {
         check_columns();
     }
 }
@@ -216,26 +199,26 @@ fn largest(u: State) -> Real {
 
 // Returns the growth of the exponent's vector since the last strobe, in octaves, and scales the vector to unit length.
 fn renormalise() -> Real {
-    var u = tangent(0u);
+    var u = motions[lane].vector;
     let size = largest(u);
     if !is_in_range(u) {
         // The vector is lost: returns a large growth, and starts with a new vector.
-        set_tangent(0u, initial_tangent());
+        motions[lane].vector = initial_tangent();
         return 100.0;
     }
     if !(size > 1e-30) {
         // The cycle is superstable: returns a large decrease, and starts with a new vector.
-        set_tangent(0u, initial_tangent());
+        motions[lane].vector = initial_tangent();
         return -100.0;
     }
     let length = unit(&u, size);
-    set_tangent(0u, u);
+    motions[lane].vector = u;
     // Single precision is enough for averages, and f64 has no logarithm.
     return Real(log2(f32(size)) + log2(f32(length)));
 }
 
 fn accumulate_growth() {
-    if !GROWTH {
+    if tally.carries_growth == 0u {
         return;
     }
     let growth = renormalise();

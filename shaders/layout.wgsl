@@ -10,7 +10,7 @@ alias State = array<Real, DIM>;
 alias Matrix = array<Real, MATRIX>;
 
 // State that a lane carries between dispatches. `MotionNow` and `TallyNow` are used by every step and event; a lane
-// keeps them in registers. `Measures` and `Search` are used at strobes alone and are loaded there (sweep.wgsl), so
+// keeps them in registers. `Measures` and `Search` are used by `observe` and `judge_cycles` alone, so
 // that they take no registers from the steps. Arrays that are indexed stay in the buffer: an indexed array would move
 // its whole struct out of registers.
 
@@ -20,7 +20,7 @@ struct MotionNow {
     q: State,
     // cos and sin of the forcing phase.
     phasor: array<Real, 2>,
-    // Fraction of the present free step that has passed.
+    // Fraction of the present free step that has passed; during an interrupted scan, at the scan's start.
     theta: Real,
     // Bound on the sixth derivative of the gap; time in steps of the present domain.
     bound: Real,
@@ -62,9 +62,9 @@ struct Measures {
 struct Motion {
     now: MotionNow,
     measures: Measures,
-    // Tangent vectors in lane units: one for the exponent, or the columns of the monodromy matrix.
+    // Columns of the monodromy matrix in lane units.
     tangents: Matrix,
-    // The exponent's tangent vector while the matrix takes its place.
+    // Tangent vector of the exponent.
     vector: State,
     // Growth of perturbations on the cycle that is read (check_columns in growth.wgsl): smallest size of the columns so far, largest ratio
     // of a size to an earlier one, and largest size.
@@ -86,10 +86,10 @@ struct Motion {
 
 // Counters and flags.
 struct TallyNow {
-    // Free steps since phase 0.
+    // Free steps since phase 0; during an interrupted scan, at the scan's start.
     step: u32,
-    // 1 if the end of a dispatch interrupted a scan.
-    is_scan_interrupted: u32,
+    // Steps of a scan that the end of a dispatch interrupted.
+    scanned: u32,
     // MODE_*.
     mode: u32,
     // Wall of the last event: SIDE_*.
@@ -118,8 +118,7 @@ struct TallyNow {
     // Smallest lag that recurs and contracts, and periods of its cycle still to be read.
     candidate: u32,
     periods_to_read: u32,
-    // Number of tangent vectors. `carries_growth`: 1 once the lane belongs to the kernel that carries a vector for the exponent.
-    tangent_count: u32,
+    // 1 once the lane belongs to the kernel that carries a vector for the exponent.
     carries_growth: u32,
     // The word: number of symbols, halves of its rotation-invariant hash, and the eight latest symbols, three bits
     // each.
@@ -133,6 +132,8 @@ struct TallyNow {
     itinerary: u32,
     // Number of changes of the stage in the present period so far.
     next_change: u32,
+    // 1 if the lane is at a stop phase and has not been observed there.
+    at_stop: u32,
     // The present interval between walls (pair/intervals.wgsl).
     interval: u32,
 }

@@ -1,12 +1,12 @@
-// Lists of lanes, made anew before every dispatch. Each kernel has a list of the lanes that it continues, and a further list has the lanes
-// that have ended. Lanes of a list are sorted by their key, so that neighbours do similar work. Lanes with equal keys keep the order of the
-// active list, in which neighbours have similar parameters.
+// Lists of lanes, made anew every few periods and before cycles are judged. Each kernel has a list of the lanes that it continues, and a
+// further list has the lanes that have ended. LIST_OBSERVE overlaps the three lists in front of it: it has all their lanes. Lanes of a list
+// are sorted by their key, so that neighbours do similar work. Lanes with equal keys keep the order of the active list, in which neighbours
+// have similar parameters.
 //
 // This is a counting sort in three passes: count the lanes of each block of the active list by key, sum the counts, and write each lane to
 // its place.
 
-// Number of sizes that keys distinguish, and number of keys of a list.
-const STEPS_OF_KEY: u32 = 4u;
+// Number of keys of a list.
 const KEYS_OF_LIST: u32 = KEYS / LISTS;
 
 // Words of a set of lanes of a block, one bit for each lane.
@@ -42,8 +42,8 @@ fn place_in_list(list: u32, id: vec3<u32>) -> u32 {
     return select(count, min(i / spread(list), count), i % spread(list) == 0u);
 }
 
-// Returns the list to which the lane belongs. The kernel without the exponent's tangent vector moves a lane until it needs the vector; a
-// reading in progress is finished first. The choice must not depend on where a dispatch ends, because kernels round differently.
+// Returns the list to which the lane belongs. The kernel without the exponent's tangent vector moves a lane until it needs the vector, or
+// reads a cycle with the columns of its monodromy matrix. The choice must not depend on where a dispatch ends, because kernels round differently.
 fn list_of_lane() -> u32 {
     if tally.status != STATUS_OK || tally.stage == STAGE_DONE {
         return LIST_ENDED;
@@ -54,11 +54,14 @@ fn list_of_lane() -> u32 {
     if tally.stage == STAGE_MEASURING {
         return LIST_MEASURE;
     }
-    let grows = tally.carries_growth == 1u || (tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from);
+    if EXPONENT && tally.stage == STAGE_READING {
+        return LIST_READING;
+    }
+    let grows = tally.carries_growth == 1u || tally.period >= settings.growth_from;
     return select(LIST_PLAIN, LIST_GROWTH, EXPONENT && grows);
 }
 
-// Returns the key of a lane of the active list: its list, whether it reads a cycle, and the size of its number of events per period. Lanes
+// Returns the key of a lane of the active list: its list, and the size of its number of events per period. Lanes
 // without early stops keep their order: in a map in which no lane ends, neighbours are more alike (benches/warps).
 fn key_of(i: u32) -> u32 {
     let slot = active_lane(i);
@@ -68,10 +71,9 @@ fn key_of(i: u32) -> u32 {
     tally.carries_growth = tallies[slot].now.carries_growth;
     let list = list_of_lane();
     var key = list * KEYS_OF_LIST;
-    if settings.early_stop == 1u && (list == LIST_PLAIN || list == LIST_GROWTH) {
+    if settings.early_stop == 1u && list < LIST_MEASURE {
         let events = tallies[slot].search.all_events / max(tally.period, 1u);
-        key += min(firstLeadingBit(max(events, 2u)) - 1u, STEPS_OF_KEY - 1u);
-        key += select(0u, STEPS_OF_KEY, tally.stage == STAGE_READING);
+        key += min(firstLeadingBit(max(events, 2u)) - 1u, KEYS_OF_LIST - 1u);
     }
     return key;
 }
@@ -152,7 +154,8 @@ fn sum_lanes(@builtin(local_invocation_index) k: u32) {
     }
     storageBarrier();
     if k < LISTS {
-        let begins = block_starts[k * KEYS_OF_LIST * blocks];
+        // No key belongs to LIST_OBSERVE.
+        let begins = select(block_starts[k * KEYS_OF_LIST * blocks], 0u, k == LIST_OBSERVE);
         var ends = settings.active_lanes;
         if k + 1u < LISTS {
             ends = block_starts[(k + 1u) * KEYS_OF_LIST * blocks];

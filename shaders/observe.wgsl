@@ -128,8 +128,6 @@ fn begin_reading() {
     measures.anchor = strobe_state();
     narrow_scales(measures.anchor);
     if EXPONENT {
-        save_vector();
-        tally.tangent_count = DIM;
         begin_columns();
         begin_cycle();
         motions[lane].stretch = array<Real, 3>(1.0, 1.0, 1.0);

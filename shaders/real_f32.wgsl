@@ -39,3 +39,11 @@ const NEUTRAL: Real = 1e-3;
 const NEWTON_CONVERGED: f32 = 1e-5;
 // Number of squarings of the monodromy matrix. With more squarings, the smaller entries of a Jordan block would underflow.
 const SQUARINGS: u32 = 20u;
+
+// Returns cos - 1 and sin of an angle of up to about a radian.
+fn small_turn(angle: Real) -> vec2<Real> {
+    let s = angle * angle;
+    let c = -1.0 / 2.0 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * (1.0 / 40320.0 + s * (-1.0 / 3628800.0 + s * (1.0 / 479001600.0)))));
+    let sine = 1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0 + s * (1.0 / 362880.0 - s * (1.0 / 39916800.0)))));
+    return vec2<Real>(s * c, angle * sine);
+}

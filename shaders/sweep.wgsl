@@ -1,4 +1,5 @@
-// The main loop of a lane. One invocation has at most one lane.
+// The kernels that continue lanes. One invocation has at most one lane. A dispatch of `sweep` takes lanes to their next stop phase, and a
+// dispatch of `observe` follows.
 
 var<private> cell: Cell;
 // State that steps and events use, in registers.
@@ -40,11 +41,6 @@ fn check_finite() {
     }
 }
 
-// Whether this kernel continues the lane.
-fn has_work() -> bool {
-    return list_of_lane() == OWN_LIST;
-}
-
 // Loads lane `i` into registers.
 fn load_lane(i: u32) {
     lane = i;
@@ -52,34 +48,21 @@ fn load_lane(i: u32) {
     motion = motions[i].now;
     tally = tallies[i].now;
     iterations = 0u;
-    if KEEP {
-        measures = motions[i].measures;
-        search = tallies[i].search;
-    }
 }
 
 fn store_lane() {
     motions[lane].now = motion;
     tallies[lane].now = tally;
-    if KEEP {
-        motions[lane].measures = measures;
-        tallies[lane].search = search;
-    }
 }
 
-// Loads the state that strobes use. It stays in memory between strobes, because the steps need the registers.
 fn load_strobe_state() {
-    if !KEEP {
-        measures = motions[lane].measures;
-        search = tallies[lane].search;
-    }
+    measures = motions[lane].measures;
+    search = tallies[lane].search;
 }
 
 fn store_strobe_state() {
-    if !KEEP {
-        motions[lane].measures = measures;
-        tallies[lane].search = search;
-    }
+    motions[lane].measures = measures;
+    tallies[lane].search = search;
 }
 
 // Returns the step at which the lane must stop. This is phase 0; half-way through a cycle of odd period that may be its own mirror image,
@@ -90,7 +73,7 @@ fn next_stop_phase() -> u32 {
     return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
 }
 
-// Integrates lanes over some whole periods. A lane with very many events may need several dispatches for a period.
+// Integrates lanes to their next stop phase. A lane with very many events may need several dispatches.
 @compute @workgroup_size(WORKGROUP)
 fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = place_in_list(OWN_LIST, id);
@@ -98,36 +81,47 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     load_lane(listed_lane(OWN_LIST, i));
+    // An earlier dispatch may have moved the lane to another list since the lists were made.
+    if list_of_lane() != OWN_LIST || tally.at_stop == 1u {
+        return;
+    }
     resume_motion();
     load_tangent();
     prepare_motion();
-    var periods = 0u;
-    // Scans, events and strobes have separate loops, so that lanes do the same work at the same time.
-    while has_work() && iterations < settings.iterations && periods < settings.whole_periods {
-        if fly_to_stop_phase() {
-            if MEASURE {
-                measure_period();
-                begin_schedule();
-                periods += 1u;
-                continue;
-            }
-            load_strobe_state();
-            if tally.step >= shape.steps {
-                begin_period();
-                begin_schedule();
-                periods += 1u;
-            } else {
-                compare_mirror();
-            }
-            store_strobe_state();
+    if fly_to_stop_phase() {
+        if MEASURE {
+            measure_period();
+            begin_schedule();
+        } else {
+            tally.at_stop = 1u;
         }
-    }
-    if !MEASURE {
-        measure_if_decided();
     }
     store_tangent_now();
     suspend_motion();
     store_lane();
+}
+
+// Observes lanes that are at their stop phase.
+@compute @workgroup_size(WORKGROUP)
+fn observe(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = place_in_list(LIST_OBSERVE, id);
+    if i == queue.counts[LIST_OBSERVE] {
+        return;
+    }
+    load_lane(listed_lane(LIST_OBSERVE, i));
+    if tally.at_stop == 0u {
+        return;
+    }
+    tally.at_stop = 0u;
+    resume_motion();
+    load_strobe_state();
+    if tally.step >= shape.steps {
+        begin_period();
+        begin_schedule();
+    } else {
+        compare_mirror();
+    }
+    finish_observing();
 }
 
 // Decides what follows for the lanes that have read a cycle.
@@ -144,16 +138,15 @@ fn judge_cycles(@builtin(global_invocation_id) id: vec3<u32>) {
     if tally.stage == STAGE_READING {
         begin_reading();
     }
-    store_strobe_state();
-    measure_if_decided();
-    store_tangent_now();
-    suspend_motion();
-    store_lane();
+    finish_observing();
 }
 
-// Begins to measure the motion of a lane whose class is decided, if the settings ask for it.
-fn measure_if_decided() {
+// Stores a lane after an observation. Begins to measure its motion if its class is decided and the settings ask for it.
+fn finish_observing() {
     if settings.measured_periods > 0u && tally.stage == STAGE_DONE && tally.status == STATUS_OK && !is_handed_over() {
         begin_measuring();
     }
+    store_strobe_state();
+    suspend_motion();
+    store_lane();
 }

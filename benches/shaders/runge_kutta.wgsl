@@ -285,7 +285,7 @@ fn careful_step() {
 // steps and events are separate: otherwise hardware that runs lanes in lockstep pays for events at every step.
 fn fly_to_stop_phase() -> bool {
     fetch_pull();
-    while has_work() && iterations < settings.iterations {
+    while tally.status == STATUS_OK && iterations < settings.iterations {
         let verdict = scan_steps();
         if verdict == SCAN_BUDGET {
             break;

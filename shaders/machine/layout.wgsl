@@ -90,7 +90,7 @@ var<private> wall_order: array<u32, GAPS>;
 // Orders of the roots of pushing forces and of sliding rates; 0 without a root.
 var<private> from_force: array<u32, GAPS>;
 var<private> from_rate: array<u32, ELEMENT_SLOTS>;
-// Bit mask of the elements that have slid since the cycle's start. It is stored in the counter `is_scan_interrupted`, which machines do not
+// Bit mask of the elements that have slid since the cycle's start. It is stored in the counter `scanned`, which machines do not
 // need.
 var<private> slid: u32;
 // Bit of `slid`: the columns of the monodromy matrix are new.
@@ -118,12 +118,12 @@ fn unpack_modes() {
         from_rate[i] = (tally.order >> (18u + 3u * i)) & 7u;
     }
     stage = tally.mode >> 19u;
-    slid = tally.is_scan_interrupted;
+    slid = tally.scanned;
 }
 
 fn pack_modes() {
     tally.mode = stage << 19u;
-    tally.is_scan_interrupted = slid;
+    tally.scanned = slid;
     tally.origin = 0u;
     tally.order = 0u;
     for (var i = 0u; i < GAPS; i++) {

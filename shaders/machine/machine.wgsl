@@ -96,7 +96,7 @@ fn conclude_motion() {
 }
 
 fn fly_to_stop_phase() -> bool {
-    while has_work() && iterations < settings.iterations {
+    while tally.status == STATUS_OK && iterations < settings.iterations {
         if step() {
             return true;
         }

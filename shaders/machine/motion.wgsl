@@ -189,9 +189,9 @@ fn change_theta() -> Real {
 // Takes one step to the first event, or as far as the series or the grid allow. Returns whether the step ends at a stop phase.
 fn step() -> bool {
     tally.passes_in_period += 1u;
-    if EXPONENT && (slid & NEW_COLUMNS) != 0u {
+    if COLUMNS && (slid & NEW_COLUMNS) != 0u {
         slid ^= NEW_COLUMNS;
-        for (var n = 0u; n < tally.tangent_count; n++) {
+        for (var n = 0u; n < VECTORS; n++) {
             set_tangent(n, constrained(tangent(n)));
         }
     }
@@ -275,8 +275,8 @@ fn note_touch(touched: Watch) {
 // Moves state, tangents and phase over a part of a step.
 fn advance(domain: u32, share: Real, time: Real) {
     motion.q = state_after(share);
-    if EXPONENT {
-        for (var i = 0u; i < tally.tangent_count; i++) {
+    if VECTORS > 0u {
+        for (var i = 0u; i < VECTORS; i++) {
             load_vector(tangent(i));
             expand(domain, time);
             set_tangent(i, state_after(1.0));
@@ -395,14 +395,14 @@ fn cross(event: Watch, domain: u32) {
     }
     var before: State;
     var rate: Real = 0.0;
-    if EXPONENT {
+    if VECTORS > 0u {
         before = field(domain);
         rate = value_of(event.line, 1u);
     }
     kick_factor = 0.0;
     act(event);
     count_notes();
-    if EXPONENT && event.kind != BEGINS_STAGE {
+    if VECTORS > 0u && event.kind != BEGINS_STAGE {
         saltate(event.line, select(Real(0.0), NO_SPEED * flow.speed, is_at_wall), before, rate,
             event.kind == ENDS_AT_WALL || event.kind == LEAVES);
     }
@@ -419,7 +419,7 @@ fn saltate(line: Line, least: Real, before: State, rate: Real, is_passed: bool) 
     for (var i = 0u; i < shape.dim; i++) {
         change[i] = (change[i] - carried[i]) * inverse;
     }
-    for (var n = 0u; n < tally.tangent_count; n++) {
+    for (var n = 0u; n < VECTORS; n++) {
         let u = tangent(n);
         load_vector(u);
         let along = value_of(line, 0u);

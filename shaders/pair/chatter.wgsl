@@ -45,7 +45,7 @@ fn close_chatter(side: u32, u: Real) {
     let forced = with_sine(unforced - (across[4] + kick * row[4]) * here.angle * motion.phasor[1], across[6] + kick * row[6], sine_rate);
     let of_gap = kick * with_derivative(0.0, place_of_gap(0u), here.angle, 1u);
     let v_jerk = with_term(with_derivative(forced, place_of_x(0u), here.angle, 1u), of_gap);
-    if EXPONENT {
+    if VECTORS > 0u {
         // A neighbouring motion leaves the wall at another time, with another speed and pressing acceleration. Its sequence ends later by
         // `late_by`.
         let per_speed = (1.0 - 2.0 * (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole) * whole / u;
@@ -148,7 +148,7 @@ fn follow_chatter(side: u32) {
         tally.passes_in_period += 1u;
         tally.impacts += 1u;
         count_event(side);
-        if EXPONENT {
+        if VECTORS > 0u {
             carry_over_short(t, end, removed);
         }
         if tally.status != STATUS_OK {
@@ -163,16 +163,19 @@ fn expand_short() {
     let q = motion.q;
     let g = here.gap_row;
     let r = here.x_row;
-    let angle = here.angle;
-    var c = motion.phasor[0];
-    var s = motion.phasor[1];
     expand_harmonics(place_of_gap(0u), place_of_x(0u));
     gap_terms[0] = q[0];
     gap_terms[1] = q[1];
     x_terms[0] = q[2];
     x_terms[1] = q[3];
-    var load_gap = g[5];
-    var load_x = r[5];
+    var z = q[0];
+    var w = q[1];
+    var x = q[2];
+    var v = q[3];
+    var part: Real = 1.0;
+    var force = Forcing(forcing(g), forcing(r));
+    var load = vec2<Real>(g[5], r[5]);
+    let turn = -here.angle * here.angle;
     //% again expand for k in 0..SHORT_TERMS-2
 }
 
@@ -263,9 +266,10 @@ fn carry_over_short(t: Real, end: End, removed: Real) {
         end.x_acceleration + (kick * x_row[3] - x_row[1]) * removed,
     );
     crossing.jump.rate = end.rate;
-    for (var i = 0u; i < tally.tangent_count; i++) {
+    let f = short_exponential(fourth_power(row, x_row), t);
+    for (var i = 0u; i < VECTORS; i++) {
         iterations += 1u;
-        set_tangent(i, saltate(glide_short(tangent(i), t)));
+        set_tangent(i, saltate(glide(row, x_row, f, tangent(i))));
     }
     check_range();
 }

@@ -11,12 +11,6 @@ var<private> closing: Real;
 var<private> law: Law;
 var<private> shape: FlowShape;
 
-// All three domains, in variants that keep copies (KEEP). A software driver reads storage lane by lane, which takes longer than the
-// arithmetic. On a graphics device, lanes of one flow read the same address together, and copies would not fit into registers.
-var<private> free: Domain;
-var<private> on_right: Domain;
-var<private> on_left: Domain;
-
 fn fetch_constants() {
     let f = cell.flow_index;
     law = laws[cell.law_index];
@@ -28,11 +22,6 @@ fn fetch_constants() {
     closing = flows[f].closing;
     if STAGES {
         load_change();
-    }
-    if KEEP {
-        free = flows[f].domains[0];
-        on_right = flows[f].domains[1];
-        on_left = flows[f].domains[2];
     }
     enter(domain_of(tally.mode));
 }
@@ -49,23 +38,12 @@ fn mesh_speed(side: u32) -> Real {
 
 // Makes domain `d` govern the motion.
 fn enter(d: u32) {
-    if !KEEP {
-        here = flows[cell.flow_index].domains[d];
-    } else if d == 0u {
-        here = free;
-    } else if d == 1u {
-        here = on_right;
-    } else {
-        here = on_left;
-    }
+    here = flows[cell.flow_index].domains[d];
 }
 
 // Propagator of one step in the domain that governs the motion. Careful passes do not use it.
 fn propagator() -> array<Real, 28> {
-    if !KEEP {
-        return flows[cell.flow_index].domains[domain_of(tally.mode)].step;
-    }
-    return here.step;
+    return flows[cell.flow_index].domains[domain_of(tally.mode)].step;
 }
 
 // Constants of the accelerations in a domain.
@@ -88,12 +66,6 @@ fn present_pull() -> Pull {
 // Accelerations while meshing on a side.
 fn meshing_pull(side: u32) -> Pull {
     let d = 1u + side;
-    if !KEEP {
-        let f = cell.flow_index;
-        return Pull(flows[f].domains[d].gap_row, flows[f].domains[d].x_row, flows[f].domains[d].share, flows[f].domains[d].angle, place_of_gap(d), place_of_x(d));
-    }
-    if side == SIDE_RIGHT {
-        return Pull(on_right.gap_row, on_right.x_row, on_right.share, on_right.angle, place_of_gap(d), place_of_x(d));
-    }
-    return Pull(on_left.gap_row, on_left.x_row, on_left.share, on_left.angle, place_of_gap(d), place_of_x(d));
+    let f = cell.flow_index;
+    return Pull(flows[f].domains[d].gap_row, flows[f].domains[d].x_row, flows[f].domains[d].share, flows[f].domains[d].angle, place_of_gap(d), place_of_x(d));
 }

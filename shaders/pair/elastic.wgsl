@@ -44,7 +44,7 @@ fn stays_behind(side: u32) -> bool {
 // Sets the change of tangent vectors across a wall with a damper, inwards (`way` = 1) or outwards (-1). The fields of both sides differ by
 // the damper's force alone, which is proportional to the rate. The rate cancels in the saltation matrix, so grazing is no special case.
 fn pass_damper(side: u32, way: Real) {
-    if EXPONENT {
+    if VECTORS > 0u {
         let damper = flows[cell.flow_index].damper[side];
         crossing.is_smooth = true;
         crossing.jolt = array<Real, 2>(way * damper[0], way * damper[1]);

@@ -5,71 +5,85 @@ const CLEAR: u32 = 0u;
 const CROSSING: u32 = 1u;
 const UNCLEAR: u32 = 2u;
 
-// Judges a distance (positive inside) over a time `dt`, from value, slope and curvature at both ends. `order` is the order of its root at
-// the start. This root is divided out, which drops `order` Bernstein coefficients. `eps` bounds the remainder.
-fn judge(left: vec3<Real>, right: vec3<Real>, dt: Real, order: u32, eps: Real) -> u32 {
-    let f0 = select(left.x, Real(0.0), order > 0u);
+// Returns the Bernstein coefficients of a distance (positive inside) over a time `dt`, from value, slope and curvature at both ends.
+fn coefficients(left: vec3<Real>, right: vec3<Real>, dt: Real) -> array<Real, 7> {
+    let square = dt * dt;
     let s0 = dt * left.y;
-    let a0 = dt * dt * left.z;
-    let f1 = right.x;
+    let a0 = square * left.z;
     let s1 = dt * right.y;
-    let a1 = dt * dt * right.z;
-    let c3 = 0.5 * ((f0 + 0.4 * s0 + 0.05 * a0) + (f1 - 0.4 * s1 + 0.05 * a1));
-    var plus = 0u;
-    plus |= select(0u, 1u, f0 > 0.0);
-    plus |= select(0u, 2u, f0 + s0 * (1.0 / 6.0) > 0.0);
-    plus |= select(0u, 4u, f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0)) > 0.0);
-    plus |= select(0u, 16u, f1 - (s1 * (1.0 / 3.0) - a1 * (1.0 / 30.0)) > 0.0);
-    plus |= select(0u, 32u, f1 - s1 * (1.0 / 6.0) > 0.0);
-    plus |= select(0u, 64u, f1 > 0.0);
-    // Signs of the two polynomials that enclose the function.
-    let lower = (plus | select(0u, 8u, c3 > eps)) >> order;
-    let upper = (plus | select(0u, 8u, c3 > -eps)) >> order;
-    if lower == (127u >> order) {
+    let a1 = square * right.z;
+    return array<Real, 7>(
+        left.x,
+        left.x + s0 * (1.0 / 6.0),
+        left.x + s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0),
+        0.5 * (left.x + right.x) + 0.2 * (s0 - s1) + 0.025 * (a0 + a1),
+        right.x - s1 * (1.0 / 3.0) + a1 * (1.0 / 30.0),
+        right.x - s1 * (1.0 / 6.0),
+        right.x,
+    );
+}
+
+// Judges a distance by its coefficients. `order` is the order of its root at the start. This root is divided out, which drops `order`
+// coefficients. `eps` bounds the remainder.
+fn judge(c: array<Real, 7>, order: u32, eps: Real) -> u32 {
+    let first = min(select(c[6], c[0], order < 1u), min(select(c[6], c[1], order < 2u), select(c[6], c[2], order < 3u)));
+    if min(min(first, c[3] - eps), min(min(c[4], c[5]), c[6])) > 0.0 {
         return CLEAR;
     }
-    // Positive coefficients followed by negative ones mean one change of sign in each polynomial.
+    var plus = select(0u, 1u, c[0] > 0.0);
+    plus |= select(0u, 2u, c[1] > 0.0);
+    plus |= select(0u, 4u, c[2] > 0.0);
+    plus |= select(0u, 16u, c[4] > 0.0);
+    plus |= select(0u, 32u, c[5] > 0.0);
+    plus |= select(0u, 64u, c[6] > 0.0);
+    // Signs of the two polynomials that enclose the function. Positive coefficients followed by negative ones mean one change of sign in
+    // each polynomial.
+    let lower = (plus | select(0u, 8u, c[3] > eps)) >> order;
+    let upper = (plus | select(0u, 8u, c[3] > -eps)) >> order;
     let single = (lower & (lower + 1u)) == 0u && (upper & (upper + 1u)) == 0u && lower > 0u;
-    if single && upper != (127u >> order) {
-        return CROSSING;
-    }
-    return UNCLEAR;
+    return select(UNCLEAR, CROSSING, single && upper != (127u >> order));
 }
 
-// The two distances whose zeros may end a flight, each with slope and curvature.
-struct Watch {
-    first: vec3<Real>,
-    second: vec3<Real>,
-}
+// A flight ends where one of two distances vanishes. In free motion these are the distances from the right and the left wall. In contact
+// there is the depth alone, and the second distance is HUGE. In the contact onset, the second distance is the pressing acceleration.
 
-// Distances at the start of the careful step.
+// Distances at the start of the careful step, and their derivatives with respect to the gap's displacement.
 var<private> offsets: vec2<Real>;
+var<private> slopes: vec2<Real>;
 
-fn watch(tau: Real) -> Watch {
-    let z = gap_jet(tau);
-    if tally.mode == MODE_FREE {
-        var both = Watch(
-            vec3<Real>(offsets.x - z.x, -z.y, -z.z),
-            vec3<Real>(offsets.y + z.x, z.y, z.z),
-        );
-        if is_bounded_by_force(SIDE_RIGHT) {
-            both.first = force_jet(offsets.x, z, tau);
-        } else if is_bounded_by_force(SIDE_LEFT) {
-            both.second = force_jet(offsets.y, z, tau);
-        }
-        return both;
+// Whether a distance is the force of a wall that only pushes.
+fn is_force(second: bool) -> bool {
+    return tally.mode == MODE_FREE && is_bounded_by_force(select(SIDE_RIGHT, SIDE_LEFT, second));
+}
+
+// Returns a distance at `tau` with slope and curvature. `z` is the displacement of the gap with slope and curvature.
+fn event_distance(second: bool, z: vec3<Real>, tau: Real) -> vec3<Real> {
+    if second && is_onset() {
+        return sign_of(side_of(tally.mode)) * pressing_jet(tau);
     }
-    let sign = sign_of(side_of(tally.mode));
-    if tally.mode < MODE_ONSET || sticks() {
-        return Watch(vec3<Real>(offsets.x + sign * z.x, sign * z.y, sign * z.z), vec3<Real>(HUGE, 0.0, 0.0));
+    let offset = select(offsets.x, offsets.y, second);
+    if is_force(second) {
+        return force_jet(offset, z, tau);
     }
-    return Watch(vec3<Real>(offsets.x - sign * z.x, -sign * z.y, -sign * z.z), sign * pressing_jet(tau));
+    let slope = select(slopes.x, slopes.y, second);
+    return vec3<Real>(offset + slope * z.x, slope * z.y, slope * z.z);
+}
+
+// Returns a bound on the remainder of a distance's middle coefficient. `rest` is the sixth power of the time, divided by 14,400.
+fn remainder(second: bool, growth: Real, rest: Real) -> Real {
+    if is_force(second) {
+        return force_bound(motion.bound + growth, rate_bound + growth) * rest + 8.0 * ULP * size_of_force(motion.q);
+    }
+    // The pressing acceleration has derivatives of two more orders.
+    return (select(motion.bound, pressing_bound, second) + growth) * rest + 8.0 * ULP * abs(select(offsets.x, offsets.y, second));
 }
 
 fn set_offsets() {
     let z = motion.q[0];
+    let sign = sign_of(side_of(tally.mode));
     if tally.mode == MODE_FREE {
         offsets = vec2<Real>(walls[0] - z, z - walls[1]);
+        slopes = vec2<Real>(-1.0, 1.0);
         if watches_force() {
             // A flight that begins where the force is 0 has a root at its start.
             let begins = tally.order > 0u && tally.origin == side_of_interval();
@@ -77,10 +91,14 @@ fn set_offsets() {
             offsets = select(vec2<Real>(offsets.x, start), vec2<Real>(start, offsets.y), side_of_interval() == SIDE_RIGHT);
         }
     } else if sticks() {
-        offsets = vec2<Real>(sign_of(side_of(tally.mode)) * gap_terms[0], 0.0);
+        offsets = vec2<Real>(sign * gap_terms[0], HUGE);
+        slopes = vec2<Real>(sign, 0.0);
+    } else if tally.mode >= MODE_ONSET {
+        offsets = vec2<Real>(-sign * z, 0.0);
+        slopes = vec2<Real>(-sign, 0.0);
     } else {
-        let sign = sign_of(side_of(tally.mode));
-        offsets = vec2<Real>(select(sign, -sign, tally.mode >= MODE_ONSET) * z, 0.0);
+        offsets = vec2<Real>(sign * z, HUGE);
+        slopes = vec2<Real>(sign, 0.0);
     }
 }
 
@@ -88,35 +106,43 @@ fn set_offsets() {
 // remainder.
 const STEEP: Real = 4.0;
 
-// Largest number of Newton steps of the root search, and of all its steps. The steps after Newton's are bisections.
-const NEWTON_CAP: u32 = 10u;
+// Largest number of Halley steps of the root search, and of all its steps. Later steps are bisections.
+const HALLEY_CAP: u32 = 10u;
 const ROOT_CAP: u32 = 120u;
 // Largest number of parts into which one careful step may be divided.
 const CHECK_CAP: u32 = 200u;
 
-// Returns the root in (lo, hi] at which a distance on the exact flow falls from + to -, and the slope there. A root at the start is divided
-// out.
-fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<Real> {
-    var lo = start;
-    var hi = end;
-    var t = guess;
+// Returns the root in (a, b] at which a distance on the exact flow falls from + to -, and the slope there. A root at the start is divided
+// out. `left` and `right` are the distance at a and b with slope and curvature.
+//
+// The search uses Halley's method. f1, f2 and f3 are derivatives, r is f2 / f1, and s is a step. The error after the step is about
+// `|s|^3 (r^2 / 4 + |f3 / f1| / 6)`. The curvatures at the ends give an estimate of f3.
+fn root(second: bool, a: Real, b: Real, left: vec3<Real>, right: vec3<Real>, order: u32) -> vec2<Real> {
+    let third = abs(right.z - left.z) / (b - a) + abs(right.z);
+    var lo = a;
+    var hi = b;
+    var t = root_guess(a, b, left, right, order);
     for (var i = 0u; i < ROOT_CAP; i++) {
         iterations += 1u;
-        let at = watch(t);
-        let f = select(at.first, at.second, second);
+        let f = event_distance(second, gap_jet(t), t);
+        let per_time = select(1.0 / t, Real(0.0), order == 0u);
+        let m = Real(order) * per_time;
+        let inverse = 1.0 / (f.y - m * f.x);
+        let ratio = (f.z - m * (2.0 * f.y - (m + per_time) * f.x)) * inverse;
+        let newton = f.x * inverse;
+        let step = newton / (1.0 - 0.5 * newton * ratio);
+        var next = t - step;
+        let size = abs(step);
+        let converged = size * size * size * (ratio * ratio + third * abs(inverse)) <= 4.0 * ULP * t || size <= 4.0 * ULP * t;
+        if converged && next >= a && next <= b {
+            return vec2<Real>(next, f.y - step * f.z);
+        }
         if f.x > 0.0 {
             lo = t;
         } else {
             hi = t;
         }
-        // The error after a Newton step is of second order in the step.
-        let step = f.x / (f.y - Real(order) * f.x / t);
-        var next = t - step;
-        let converged = abs(f.z) * (step * step) <= ULP * t * abs(f.y) || abs(step) <= 4.0 * ULP * t;
-        if converged && next >= start && next <= end {
-            return vec2<Real>(next, f.y);
-        }
-        if i >= NEWTON_CAP || !(next > lo && next < hi) {
+        if i >= HALLEY_CAP || !(next > lo && next < hi) {
             next = 0.5 * (lo + hi);
             if hi - lo <= 4.0 * ULP * hi {
                 return vec2<Real>(next, f.y);
@@ -128,6 +154,23 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<R
     return vec2<Real>(t, 0.0);
 }
 
+// Returns an estimate of the root in (a, b]: the inverse of the function is interpolated by Hermite's cubic polynomial.
+fn root_guess(a: Real, b: Real, left: vec3<Real>, right: vec3<Real>, order: u32) -> Real {
+    var y = vec2<Real>(left.x, right.x);
+    var slope = vec2<Real>(left.y, right.y);
+    if order > 0u {
+        // The root at the start is divided out.
+        y = vec2<Real>(left.y, right.x / b);
+        slope = vec2<Real>(0.5 * left.z, (right.y - y.y) / b);
+    }
+    let fall = y.x - y.y;
+    let u = clamp(y.x / fall, Real(0.01), Real(0.99));
+    let rest = 1.0 - u;
+    let cubic = a + (b - a) * (u * u * (1.0 + 2.0 * rest)) - fall * (u * rest) * (rest / slope.x - u / slope.y);
+    let fits = slope.x < 0.0 && slope.y < 0.0 && cubic > a && cubic < b;
+    return select(a + u * (b - a), cubic, fits);
+}
+
 // Result of a careful step.
 struct Find {
     // Whether there is an event, and which of the two distances vanishes.
@@ -137,19 +180,34 @@ struct Find {
     tau: Real,
 }
 
-// Returns the first event within `len` of the present step.
-fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
-    var orders = order;
+// Whether the search begins with the second distance. It begins with the distance that has a root at the start, otherwise with the smaller
+// one. Rounding of the sum of both is then small compared with the other distance.
+fn begins_second() -> bool {
+    return tally.mode == MODE_FREE && select((offsets.y < offsets.x), tally.origin == SIDE_LEFT, (tally.order > 0u));
+}
+
+// Returns the first event within `len` of the present step. The search begins with the distance `begun`, which has a root of the order
+// `begun_order` at the start.
+fn first_event(len: Real, growth: Real, begun: bool, begun_order: u32) -> Find {
+    // In free motion the sum of both distances is constant. In contact the second one is HUGE, and so is the sum.
+    let is_mirrored = !(is_onset() || watches_force());
+    let reach = offsets.x + offsets.y;
+    let start = vec3<Real>(0.0, gap_terms[1], 2.0 * gap_terms[2]);
+    var order = begun_order;
     var a: Real = 0.0;
     var width = len;
-    var left = watch(0.0);
+    var left = event_distance(begun, start, 0.0);
     var checks = 0u;
     // Rounding has put the start on the boundary or beyond it.
-    if orders.x == 0u && left.first.x <= 0.0 {
-        return Find(true, false, 0.0);
+    if order == 0u && left.x <= 0.0 {
+        return Find(true, begun, 0.0);
     }
-    if orders.y == 0u && left.second.x <= 0.0 {
-        return Find(true, true, 0.0);
+    var other_start = reach - left.x;
+    if !is_mirrored {
+        other_start = event_distance(!begun, start, 0.0).x;
+    }
+    if other_start <= 0.0 {
+        return Find(true, !begun, 0.0);
     }
     loop {
         checks += 1u;
@@ -163,84 +221,84 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             b = len;
         }
         let dt = b - a;
-        let right = watch(b);
+        let z = gap_jet(b);
+        let right = event_distance(begun, z, b);
         let cube = dt * dt * dt;
-        let rest = cube * cube * (1.0 / 14400.0);
-        // In the contact onset the second distance is an acceleration, so its remainder has derivatives of two more orders.
-        var eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest) * here.swell
-            + 8.0 * ULP * abs(offsets);
-        if watches_force() {
-            let of_force = force_bound(motion.bound + growth, rate_bound + growth) * rest * here.swell
-                + 8.0 * ULP * size_of_force(motion.q);
-            eps = select(vec2<Real>(eps.x, of_force), vec2<Real>(of_force, eps.y), side_of_interval() == SIDE_RIGHT);
+        let rest = cube * cube * (here.swell * (1.0 / 14400.0));
+        let eps = remainder(begun, growth, rest);
+        let other_eps = remainder(!begun, growth, rest);
+        let c = coefficients(vec3<Real>(select(left.x, Real(0.0), order > 0u), left.y, left.z), right, dt);
+        let verdict = judge(c, order, eps);
+        let top = max(max(max(c[0], c[1]), max(c[2], c[4])), max(max(c[5], c[6]), c[3] + other_eps));
+        var other = CLEAR;
+        var other_left = vec3<Real>(reach - left.x, -left.y, -left.z);
+        var other_right = vec3<Real>(reach - right.x, -right.y, -right.z);
+        if !(is_mirrored && top < reach) {
+            if !is_mirrored {
+                other_left = event_distance(!begun, gap_jet(a), a);
+                other_right = event_distance(!begun, z, b);
+            }
+            other = judge(coefficients(other_left, other_right, dt), 0u, other_eps);
         }
-        let first = judge(left.first, right.first, dt, orders.x, eps.x);
-        let second = judge(left.second, right.second, dt, orders.y, eps.y);
-        if first == CLEAR && second == CLEAR {
+        if verdict == CLEAR && other == CLEAR {
             if b == len {
                 break;
             }
             a = b;
             left = right;
-            orders = vec2<u32>(0u, 0u);
+            order = 0u;
             width = 2.0 * dt;
             continue;
+        }
+        let is_single = verdict + other == CROSSING;
+        let is_other = verdict == CLEAR;
+        var found = vec2<Real>(0.0, 0.0);
+        if is_single {
+            let f0 = select(left, other_left, is_other);
+            let f1 = select(right, other_right, is_other);
+            found = root(begun != is_other, a, b, f0, f1, select(order, 0u, is_other));
+            // If the slope is below the remainder, there may be three roots instead of one.
+            if dt * abs(found.y) > STEEP * select(eps, other_eps, is_other) {
+                return Find(true, begun != is_other, found.x);
+            }
         }
         // Between the ends, the distance may be smaller by an eighth of its bend. While the bend exceeds the remainder, a crossing is
         // possible even in a very short time.
         var is_shortest = dt <= SHORTEST;
         if is_shortest && dt > SHORTEST_STEP {
-            let bend = dt * dt * vec2<Real>(
-                max(abs(left.first.z), abs(right.first.z)),
-                max(abs(left.second.z), abs(right.second.z)),
-            );
-            is_shortest = !((first != CLEAR && bend.x > 8.0 * eps.x) || (second != CLEAR && bend.y > 8.0 * eps.y));
-        }
-        // Both distances vanish within the shortest time that is resolved. Linear estimates decide which one is earlier.
-        let both = first == CROSSING && second == CROSSING && is_shortest && orders.x + orders.y == 0u;
-        if first + second == CROSSING || both {
-            let falls = vec2<Real>(left.first.x - right.first.x, left.second.x - right.second.x);
-            let is_earlier = left.second.x * falls.x < left.first.x * falls.y;
-            let which = second == CROSSING && (is_earlier || !both);
-            let at_start = select(left.first.x, left.second.x, which);
-            let at_end = select(right.first.x, right.second.x, which);
-            let order = select(orders.x, orders.y, which);
-            var guess = a + clamp(at_start / (at_start - at_end), Real(0.01), Real(0.99)) * dt;
-            if order > 0u {
-                // The gap leaves a wall and is pressed back: the parabola of a short flight.
-                let leaving = select(left.first, left.second, which);
-                let short = -2.0 * leaving.y / leaving.z;
-                guess = select(Real(0.5) * b, short, short > 0.0 && short < 0.5 * b);
-            }
-            let found = root(which, a, b, order, guess);
-            // If the slope is below the remainder, there may be three roots instead of one.
-            if dt * abs(found.y) > STEEP * select(eps.x, eps.y, which) || is_shortest {
-                return Find(true, which, found.x);
-            }
-            width = 0.5 * dt;
-            continue;
+            let bend = dt * dt * vec2<Real>(max(abs(left.z), abs(right.z)), max(abs(other_left.z), abs(other_right.z)));
+            is_shortest = !((verdict != CLEAR && bend.x > 8.0 * eps) || (other != CLEAR && bend.y > 8.0 * other_eps));
         }
         if !is_shortest {
             width = 0.5 * dt;
             continue;
         }
+        if is_single {
+            return Find(true, begun != is_other, found.x);
+        }
+        if verdict == CROSSING && other == CROSSING && order == 0u {
+            // Both distances vanish within the shortest time that is resolved. Linear estimates decide which one is earlier.
+            let share = left.x / (left.x - right.x);
+            let other_share = other_left.x / (other_left.x - other_right.x);
+            return Find(true, begun != (other_share < share), a + min(share, other_share) * dt);
+        }
         // The shortest part is still unclear, so the gap touches the wall within rounding. At elastic walls this has no effect.
-        let touched = select(side_of(tally.mode), select(SIDE_LEFT, SIDE_RIGHT, first != CLEAR), tally.mode == MODE_FREE);
+        let touched = select(side_of(tally.mode), select(SIDE_RIGHT, SIDE_LEFT, begun != is_other), tally.mode == MODE_FREE);
         if !is_elastic(touched) || has_preload(touched) {
             tally.grazes += 1u;
         }
-        if right.first.x <= 0.0 {
-            return Find(true, false, b);
+        if right.x <= 0.0 {
+            return Find(true, begun, b);
         }
-        if right.second.x <= 0.0 {
-            return Find(true, true, b);
+        if other_right.x <= 0.0 {
+            return Find(true, !begun, b);
         }
         if b == len {
             break;
         }
         a = b;
         left = right;
-        orders = vec2<u32>(0u, 0u);
+        order = 0u;
         width = dt;
     }
     return Find(false, false, len);
@@ -272,7 +330,7 @@ fn crosses_backlash(tau: Real) -> bool {
     for (var i = 0u; i < DEEPEST_CAP; i++) {
         iterations += 1u;
         let middle = 0.5 * (early + late);
-        let depth = watch(middle).first;
+        let depth = event_distance(false, gap_jet(middle), middle);
         if depth.x >= backlash {
             return true;
         }
@@ -282,7 +340,7 @@ fn crosses_backlash(tau: Real) -> bool {
             late = middle;
         }
     }
-    return watch(tau).first.x >= backlash;
+    return event_distance(false, gap_jet(tau), tau).x >= backlash;
 }
 
 // Moves to the first event of the next step, or to its end, and acts on the event. Returns true at a stop phase.
@@ -290,7 +348,7 @@ fn careful() -> bool {
     let d = domain_of(tally.mode);
     let substeps = here.substeps;
     let share = here.share;
-    sync_phasor();
+    sync_overtones(tally.step, motion.theta);
     iterations += 1u;
     expand();
     if sticks() {
@@ -301,8 +359,6 @@ fn careful() -> bool {
         gap_terms[2] = 0.0;
     }
     set_offsets();
-    motion.bound =
-        derivative_bound(120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
     pressing_bound = motion.bound;
     if watches_force() {
         rate_bound =
@@ -334,9 +390,7 @@ fn careful() -> bool {
         changes = to_change <= len && (tally.step == change_step || tally.step + 1u == change_step);
         len = select(len, to_change, changes);
     }
-    let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
-    let order = select(vec2<u32>(tally.order, 0u), vec2<u32>(0u, tally.order), on_second);
-    let found = first_event(len, here.growth, order);
+    let found = first_event(len, here.growth, begins_second(), tally.order);
     if is_onset() && crosses_backlash(found.tau) {
         tally.status = STATUS_TOO_STIFF;
     }
@@ -350,7 +404,6 @@ fn careful() -> bool {
         motion.q[0] = 0.0;
         motion.q[1] = 0.0;
     }
-    motion.bound = here.swell * (motion.bound + here.growth);
     tally.order = 0u;
     if MESH && (d > 0u || is_behind_wall()) {
         count_meshing(found.tau * share);
@@ -364,16 +417,18 @@ fn careful() -> bool {
         motion.theta = 0.0;
     }
     check_finite();
-    turn_phasor(found.tau);
-    sync_overtones(tally.step, motion.theta);
-    crossing = Crossing();
-    let flight_pull = present_pull();
+    sync_phasor();
+    if VECTORS > 0u {
+        glide_tangents(found.tau, held);
+    }
     if found.event {
         act(found.second, found.tau);
+        if VECTORS > 0u {
+            jump_tangents();
+        }
     }
-    if EXPONENT {
-        carry_tangents(flight_pull, found.tau, held);
-    }
+    check_range();
+    renew_bound();
     return tally.step >= stop;
 }
 
@@ -384,6 +439,7 @@ fn act(second: bool, tau: Real) {
     var side = side_of(mode);
     var is_force = false;
     var jump: Jump;
+    crossing = Crossing();
     if mode == MODE_FREE {
         side = select(SIDE_RIGHT, SIDE_LEFT, second);
         is_force = is_bounded_by_force(side);
@@ -393,7 +449,7 @@ fn act(second: bool, tau: Real) {
     } else if !second {
         motion.q[0] = 0.0;
     }
-    if EXPONENT {
+    if VECTORS > 0u {
         crossing.before = field();
     }
     if is_force {
@@ -435,7 +491,7 @@ fn act(second: bool, tau: Real) {
     if sticks() {
         tally.order = stuck_order(side);
     }
-    if EXPONENT && jump.event {
+    if VECTORS > 0u && jump.event {
         crossing.jump = jump;
         crossing.after = field();
     }
@@ -445,5 +501,4 @@ fn act(second: bool, tau: Real) {
     if CHATTER {
         chatters = tally.mode == MODE_FREE && begins_chatter(side, jump.pressed_back);
     }
-    renew_bound();
 }

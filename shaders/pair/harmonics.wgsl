@@ -12,7 +12,7 @@ const PLACE_OF_DOMAINS: u32 = 3u;
 // Phasors of the harmonics at the present step and fraction.
 var<private> overtones: array<vec2<Real>, HARMONICS + 1u>;
 
-// Taylor terms of the harmonics' part in the accelerations of gap and x.
+// Derivatives, from order 0 on, of the harmonics' part in the accelerations of gap and x.
 var<private> gap_force: array<Real, TERMS>;
 var<private> x_force: array<Real, TERMS>;
 
@@ -111,7 +111,7 @@ fn with_bound(rest: Real, place: u32, order: u32) -> Real {
     return sum;
 }
 
-// Computes the Taylor terms of the harmonics' part in two rows.
+// Computes the derivatives of the harmonics' part in two rows.
 fn expand_harmonics(gap_place: u32, x_place: u32) {
     if HARMONICS == 0u {
         return;
@@ -132,11 +132,11 @@ fn expand_harmonic(phasor: vec2<Real>, angle: Real, gap: vec2<Real>, x: vec2<Rea
     //% for k in 0..TERMS
     gap_force[$k] += dot(gap, p);
     x_force[$k] += dot(x, p);
-    p = (angle * (1.0 / $(k+1).0)) * vec2<Real>(-p.y, p.x);
+    p = angle * vec2<Real>(-p.y, p.x);
     //% end
 }
 
-// Adds a Taylor term of the harmonics' part to `rest`.
+// Adds a derivative of the harmonics' part to `rest`.
 fn with_term(rest: Real, term: Real) -> Real {
     if HARMONICS > 0u {
         return rest + term;

@@ -232,7 +232,7 @@ fn add_symbol_of_flight(side: u32) {
 // each other at the start of chatter.
 fn fly_to_stop_phase() -> bool {
     if CHATTER {
-        while has_work() && iterations < settings.iterations {
+        while tally.status == STATUS_OK && iterations < settings.iterations {
             if flight_to_chatter() {
                 return true;
             }
@@ -249,7 +249,7 @@ fn fly_to_stop_phase() -> bool {
 // Follows the motion to the next stop phase, or to an impact that begins a series of short flights.
 fn flight_to_chatter() -> bool {
     chatters = false;
-    while has_work() && !chatters && iterations < settings.iterations {
+    while tally.status == STATUS_OK && !chatters && iterations < settings.iterations {
         if STAGES {
             change_stage();
             if motion.bound == 0.0 {

@@ -64,7 +64,7 @@ fn has_preload(side: u32) -> bool {
 
 // The force of a wall that only pushes changes its sign: contact begins or ends. State and vector field are continuous.
 fn change_force() -> Jump {
-    if EXPONENT {
+    if VECTORS > 0u {
         crossing.is_smooth = true;
     }
     if MEASURE {

@@ -39,7 +39,7 @@ fn stick(side: u32) -> Jump {
 fn let_go(side: u32) -> Jump {
     motion.q[0] = walls[side];
     motion.q[1] = 0.0;
-    if EXPONENT {
+    if VECTORS > 0u {
         crossing.is_smooth = true;
     }
     return Jump(true, MODE_FREE, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
@@ -58,27 +58,23 @@ fn expand_stuck() {
     let p = flows[cell.flow_index].pressing[side];
     expand_harmonics(PLACE_OF_PRESSING + side, place_of_x(1u + side));
     let r = here.x_row;
-    let angle = here.angle;
-    var c = motion.phasor[0];
-    var s = motion.phasor[1];
-    // Term k of x and of its rate.
+    // Derivatives of order k and k + 1, and the reciprocal of k!.
     var x = motion.q[2];
     var v = here.share * motion.q[3];
-    var load_gap = p[5];
-    var load_x = r[5];
+    var part: Real = 1.0;
+    var force = Forcing(forcing(p), forcing(r));
+    var load = vec2<Real>(p[5], r[5]);
+    let turn = -here.angle * here.angle;
     //% for k in 0..TERMS
     {
-        x_terms[$k] = x;
-        gap_terms[$k] = (p[2] * x + p[3] * v) + with_term(p[4] * c + with_sine(load_gap, p[6], s), gap_force[$k]);
-        let turn: Real = 1.0 / $(k+1).0;
-        let next = turn * ((r[2] * x + r[3] * v) + with_term(r[4] * c + with_sine(load_x, r[6], s), x_force[$k]));
-        x = turn * v;
-        v = next;
-        load_gap = 0.0;
-        load_x = 0.0;
-        let turned = -(angle * turn) * s;
-        s = (angle * turn) * c;
-        c = turned;
+        x_terms[$k] = part * x;
+        gap_terms[$k] = part * (p[2] * x + (p[3] * v + with_term(force.gap.x + load.x, gap_force[$k])));
+        let b = r[2] * x + (r[3] * v + with_term(force.x.x + load.y, x_force[$k]));
+        part *= 1.0 / $(k+1).0;
+        x = v;
+        v = b;
+        load = vec2<Real>(0.0, 0.0);
+        force = Forcing(vec2<Real>(force.gap.y, turn * force.gap.x), vec2<Real>(force.x.y, turn * force.x.x));
     }
     //% end
     if tally.order == 1u {

@@ -2,11 +2,8 @@
 
 // Carries the columns of the monodromy matrix over full steps. Each vector counts as one iteration.
 fn step_columns(count: u32) {
-    if tally.tangent_count <= 1u {
-        return;
-    }
     let m = propagator();
-    for (var i = 0u; i < tally.tangent_count; i++) {
+    for (var i = 0u; i < VECTORS; i++) {
         var u = tangent(i);
         u[1] *= here.share;
         u[3] *= here.share;
@@ -24,7 +21,7 @@ fn step_columns(count: u32) {
     }
 }
 
-// Changes of the tangent vectors at the end of a careful step.
+// Changes of the tangent vectors by an event.
 struct Crossing {
     // The event, and the vector fields before and after it.
     jump: Jump,
@@ -45,22 +42,31 @@ struct Crossing {
 
 var<private> crossing: Crossing;
 
-// Carries every vector over a part of a step and the event after it. A stuck gap has the same displacement and rate in all neighbouring
-// motions.
-fn carry_tangents(flight_pull: Pull, tau: Real, held: bool) {
-    let back = 1.0 / flight_pull.share;
-    for (var i = 0u; i < tally.tangent_count; i++) {
+// Carries every vector over a part of a step. A stuck gap has the same displacement and rate in all neighbouring motions.
+fn glide_tangents(tau: Real, held: bool) {
+    let g = here.gap_row;
+    let r = here.x_row;
+    let f = exponential(fourth_power(g, r), tau);
+    for (var i = 0u; i < VECTORS; i++) {
         iterations += 1u;
         var u = tangent(i);
         if held {
             u[0] = 0.0;
             u[1] = 0.0;
         }
-        u[1] *= flight_pull.share;
-        u[3] *= flight_pull.share;
-        u = glide(flight_pull, u, tau);
-        u[1] *= back;
-        u[3] *= back;
+        u[1] *= here.share;
+        u[3] *= here.share;
+        u = glide(g, r, f, u);
+        u[1] *= here.substeps;
+        u[3] *= here.substeps;
+        set_tangent(i, u);
+    }
+}
+
+// Applies an event to every vector.
+fn jump_tangents() {
+    for (var i = 0u; i < VECTORS; i++) {
+        var u = tangent(i);
         if crossing.jump.event {
             u = saltate(u);
         }
@@ -69,48 +75,57 @@ fn carry_tangents(flight_pull: Pull, tau: Real, held: bool) {
         }
         set_tangent(i, u);
     }
-    check_range();
 }
 
-// Carries a vector over a part `tau` of a step: the series of the unforced motion.
-fn glide(flight_pull: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
-    let g = flight_pull.gap_row;
-    let r = flight_pull.x_row;
-    var z = u[0];
-    var w = u[1];
-    var x = u[2];
-    var v = u[3];
-    var sum = u;
-    // (z, w, x, v): derivatives of order k and k + 1, times tau^k / k!.
-    //% for k in 1..TERMS: glide
-    {
-        let step = tau * (1.0 / $k.0);
-        let a = (g[0] * z + g[2] * x) + (g[1] * w + g[3] * v);
-        let b = (r[0] * z + r[2] * x) + (r[1] * w + r[3] * v);
-        z = step * w;
-        x = step * v;
-        w = step * a;
-        v = step * b;
-        sum[0] += z;
-        sum[1] += w;
-        sum[2] += x;
-        sum[3] += v;
-    }
+// Returns the factors of `A^4 = c0 + c1 A + c2 A^2 + c3 A^3`, where A is the matrix of (z, w, x, v) in unforced motion. They follow from
+// its characteristic polynomial by the theorem of Cayley and Hamilton.
+fn fourth_power(g: array<Real, 7>, r: array<Real, 7>) -> vec4<Real> {
+    return vec4<Real>(
+        g[2] * r[0] - g[0] * r[2],
+        (g[2] * r[1] - g[1] * r[2]) + (g[3] * r[0] - g[0] * r[3]),
+        (g[3] * r[1] - g[1] * r[3]) + (g[0] + r[2]),
+        g[1] + r[3],
+    );
+}
+
+// Returns the factors of `exp(A tau) = f0 + f1 A + f2 A^2 + f3 A^3`. Each term of the exponential series adds to all four.
+fn exponential(c: vec4<Real>, tau: Real) -> vec4<Real> {
+    var part = tau * tau * tau * (1.0 / 6.0);
+    var f = vec4<Real>(1.0, tau, 0.5 * tau * tau, part);
+    // Factors of A^k.
+    var power = vec4<Real>(0.0, 0.0, 0.0, 1.0);
+    //% for k in 4..TERMS: exponential
+    part *= tau * (1.0 / $k.0);
+    power = vec4<Real>(0.0, power.x, power.y, power.z) + power.w * c;
+    f += part * power;
     //% end
-    return sum;
+    return f;
 }
 
-// Carries a vector over a short flight of free motion.
-fn glide_short(u: array<Real, 4>, tau: Real) -> array<Real, 4> {
-    let g = here.gap_row;
-    let r = here.x_row;
-    var z = u[0];
-    var w = u[1];
-    var x = u[2];
-    var v = u[3];
-    var sum = u;
-    //% again glide for k in 1..SHORT_TERMS
-    return sum;
+// Like `exponential`, for a short flight.
+fn short_exponential(c: vec4<Real>, tau: Real) -> vec4<Real> {
+    var part = tau * tau * tau * (1.0 / 6.0);
+    var f = vec4<Real>(1.0, tau, 0.5 * tau * tau, part);
+    var power = vec4<Real>(0.0, 0.0, 0.0, 1.0);
+    //% again exponential for k in 4..SHORT_TERMS
+    return f;
+}
+
+// Multiplies a vector by `exp(A tau)`.
+fn glide(g: array<Real, 7>, r: array<Real, 7>, f: vec4<Real>, u: array<Real, 4>) -> array<Real, 4> {
+    // Derivatives of gap and x.
+    let a = g[3] * u[3] + (g[1] * u[1] + (g[0] * u[0] + g[2] * u[2]));
+    let b = r[3] * u[3] + (r[1] * u[1] + (r[0] * u[0] + r[2] * u[2]));
+    let a1 = g[3] * b + (g[1] * a + (g[0] * u[1] + g[2] * u[3]));
+    let b1 = r[3] * b + (r[1] * a + (r[0] * u[1] + r[2] * u[3]));
+    let a2 = g[3] * b1 + (g[1] * a1 + (g[0] * a + g[2] * b));
+    let b2 = r[3] * b1 + (r[1] * a1 + (r[0] * a + r[2] * b));
+    return array<Real, 4>(
+        f.x * u[0] + (f.y * u[1] + (f.z * a + f.w * a1)),
+        f.x * u[1] + (f.y * a + (f.z * a1 + f.w * a2)),
+        f.x * u[2] + (f.y * u[3] + (f.z * b + f.w * b1)),
+        f.x * u[3] + (f.y * b + (f.z * b1 + f.w * b2)),
+    );
 }
 
 // Returns the present vector field, per free step.

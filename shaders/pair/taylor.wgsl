@@ -6,38 +6,52 @@
 var<private> gap_terms: array<Real, TERMS>;
 var<private> x_terms: array<Real, TERMS>;
 
+// Derivatives of order k and k + 1 of the forcing in the accelerations of gap and x, without its constant part. The derivative of order
+// k + 2 is that of order k times minus the square of the forcing's angle per step.
+struct Forcing {
+    gap: vec2<Real>,
+    x: vec2<Real>,
+}
+
+// Returns value and first derivative of a row's forcing.
+fn forcing(row: array<Real, 7>) -> vec2<Real> {
+    let c = motion.phasor[0];
+    let s = motion.phasor[1];
+    return vec2<Real>(with_sine(row[4] * c, row[6], s), here.angle * with_sine(-row[4] * s, row[6], c));
+}
+
 // Expands the motion about the present state and phase.
 fn expand() {
-    let q = motion.q;
     let g = here.gap_row;
     let r = here.x_row;
-    let share = here.share;
-    let angle = here.angle;
-    var c = motion.phasor[0];
-    var s = motion.phasor[1];
     let d = domain_of(tally.mode);
     expand_harmonics(place_of_gap(d), place_of_x(d));
-    gap_terms[0] = q[0];
-    gap_terms[1] = share * q[1];
-    x_terms[0] = q[2];
-    x_terms[1] = share * q[3];
-    var load_gap = g[5];
-    var load_x = r[5];
+    gap_terms[0] = motion.q[0];
+    gap_terms[1] = here.share * motion.q[1];
+    x_terms[0] = motion.q[2];
+    x_terms[1] = here.share * motion.q[3];
+    // Derivatives of order k and k + 1, and the reciprocal of (k + 2)!.
+    var z = gap_terms[0];
+    var w = gap_terms[1];
+    var x = x_terms[0];
+    var v = x_terms[1];
+    var part: Real = 1.0;
+    var force = Forcing(forcing(g), forcing(r));
+    var load = vec2<Real>(g[5], r[5]);
+    let turn = -here.angle * here.angle;
     //% for k in 0..TERMS-2: expand
     {
-        let z = gap_terms[$k];
-        let w = $(k+1).0 * gap_terms[$(k+1)];
-        let x = x_terms[$k];
-        let v = $(k+1).0 * x_terms[$(k+1)];
-        let next: Real = 1.0 / ($(k+1).0 * $(k+2).0);
-        gap_terms[$(k+2)] = next * (((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + with_term(g[4] * c + with_sine(load_gap, g[6], s), gap_force[$k]));
-        x_terms[$(k+2)] = next * (((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + with_term(r[4] * c + with_sine(load_x, r[6], s), x_force[$k]));
-        load_gap = 0.0;
-        load_x = 0.0;
-        let turn = angle * (1.0 / $(k+1).0);
-        let turned = -turn * s;
-        s = turn * c;
-        c = turned;
+        let a = g[3] * v + (g[1] * w + (g[0] * z + (g[2] * x + with_term(force.gap.x + load.x, gap_force[$k]))));
+        let b = r[3] * v + (r[1] * w + (r[0] * z + (r[2] * x + with_term(force.x.x + load.y, x_force[$k]))));
+        part *= 1.0 / $(k+2).0;
+        gap_terms[$(k+2)] = part * a;
+        x_terms[$(k+2)] = part * b;
+        z = w;
+        w = a;
+        x = v;
+        v = b;
+        load = vec2<Real>(0.0, 0.0);
+        force = Forcing(vec2<Real>(force.gap.y, turn * force.gap.x), vec2<Real>(force.x.y, turn * force.x.x));
     }
     //% end
 }
@@ -55,30 +69,26 @@ fn renew_bound() {
     let d = domain_of(tally.mode);
     let g = here.gap_row;
     let r = here.x_row;
-    // Derivatives of order k and k + 1 of the motion, and of order k of the forcing.
+    // Derivatives of order k and k + 1 of the motion.
     var z = motion.q[0];
     var w = here.share * motion.q[1];
     var x = motion.q[2];
     var v = here.share * motion.q[3];
-    var c = motion.phasor[0];
-    var s = motion.phasor[1];
-    var load_gap = g[5];
-    var load_x = r[5];
+    var force = Forcing(forcing(g), forcing(r));
+    var load = vec2<Real>(g[5], r[5]);
+    let turn = -here.angle * here.angle;
     //% for k in 0..5
     {
-        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v))
-            + with_derivative(g[4] * c + with_sine(load_gap, g[6], s), place_of_gap(d), here.angle, $ku);
-        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v))
-            + with_derivative(r[4] * c + with_sine(load_x, r[6], s), place_of_x(d), here.angle, $ku);
+        let a = g[3] * v + (g[1] * w + (g[0] * z + (g[2] * x
+            + with_derivative(force.gap.x + load.x, place_of_gap(d), here.angle, $ku))));
+        let b = r[3] * v + (r[1] * w + (r[0] * z + (r[2] * x
+            + with_derivative(force.x.x + load.y, place_of_x(d), here.angle, $ku))));
         z = w;
         w = a;
         x = v;
         v = b;
-        load_gap = 0.0;
-        load_x = 0.0;
-        let turned = -here.angle * s;
-        s = here.angle * c;
-        c = turned;
+        load = vec2<Real>(0.0, 0.0);
+        force = Forcing(vec2<Real>(force.gap.y, turn * force.gap.x), vec2<Real>(force.x.y, turn * force.x.x));
     }
     //% end
     motion.bound = derivative_bound(z, w, x, v);

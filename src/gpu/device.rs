@@ -23,8 +23,10 @@ pub(super) struct EntryPoint {
 
 /// Puts lanes at their starts.
 pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 2, 5, 6, 7, 8, 9] };
-/// Integrates lanes.
+/// Integrates lanes to their next stop phase.
 pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
+/// Observes lanes at their stop phase.
+pub(super) const OBSERVE: EntryPoint = EntryPoint { name: "observe", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
 /// Decides what follows for lanes that have read a cycle.
 pub(super) const JUDGE: EntryPoint = EntryPoint { name: "judge_cycles", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
 /// Makes the lists of lanes, in three passes.

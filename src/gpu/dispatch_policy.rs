@@ -2,25 +2,23 @@
 
 use web_time::Duration;
 
-/// Settings by which the host dispatches lanes. Only `late_tangent` and `keep` affect records, by rounding.
+/// Settings by which the host dispatches lanes. Only `late_tangent` affects records, by rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DispatchPolicy {
-    /// Number of times that a round makes the lists of lanes and dispatches all kernels.
+    /// Number of repetitions in a round: lists, some periods, lists, judging.
     pub(super) dispatches: u32,
     /// Desired duration of a round, from one check to the next.
     pub(super) round: Duration,
     /// Largest number of lanes with which a round of [`FEWEST_ITERATIONS`](super::rounds) certainly takes less than a
     /// second.
     pub(super) at_once: u32,
-    /// Number of periods of the first dispatches, unless there are very many lanes.
+    /// Number of periods after which lists are made again in the first round, unless there are very many lanes.
     pub(super) first_periods: u32,
     /// Number of rounds after which results of ended lanes are read even if few lanes have ended, provided that further lanes can begin.
     pub(super) patience: u32,
-    /// Whether lanes begin in a variant without the tangent vector and change to the other variant when they need it. This reduces the
+    /// Whether lanes begin in a variant without the tangent vector and change to the variant with the vector when they need it. This reduces the
     /// work, but the variants run one after the other.
     pub(super) late_tangent: bool,
-    /// Whether lanes keep copies of all their constants.
-    pub(super) keep: bool,
     /// If a list has at most this many lanes, each gets a warp of its own.
     pub(super) few_lanes: u32,
     /// Longest time to wait for a submission. A device that takes longer counts as lost.
@@ -40,7 +38,6 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
     first_periods: 1,
     patience: 8,
     late_tangent: true,
-    keep: true,
     few_lanes: 0,
     longest_wait: LONGEST_WAIT,
     simulated: None,
@@ -48,7 +45,7 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
 
 /// Hardware that shares the processor's memory and draws the screen. The amount of work matters as it does for software.
 const INTEGRATED: DispatchPolicy =
-    DispatchPolicy { round: Duration::from_millis(10), patience: 4, keep: false, ..SOFTWARE };
+    DispatchPolicy { round: Duration::from_millis(10), patience: 4, ..SOFTWARE };
 
 /// Hardware that runs all lanes under way side by side. A round costs the host more time than the first lanes of a map cost the device, so
 /// rounds are few and long.

@@ -87,9 +87,8 @@ structs! {
         chaos_from: u32,
         // Number of standard errors by which the exponent of such a lane must exceed zero.
         chaos_errors: f32,
-        // A dispatch ends for a lane after this number of loop iterations, or of whole periods.
+        // A dispatch ends for a lane after this number of loop iterations.
         iterations: u32,
-        whole_periods: u32,
         // Largest length of a list whose lanes get a warp each.
         few_lanes: u32,
         // Passes (scan steps and careful steps) allowed in one period.
@@ -326,12 +325,16 @@ impl Finding {
 }
 
 named! {
-    /// A list of lanes. Each kernel has one.
+    /// A list of lanes. Each kernel has one. `Observe` overlaps the three before it.
     pub(super) enum List {
         /// Lanes that are integrated without the exponent's tangent vector.
         Plain = "plain",
         /// Lanes that are integrated with this vector.
         Growth = "growth",
+        /// Lanes that read a cycle with the columns of its monodromy matrix.
+        Reading = "reading",
+        /// Lanes of the lists above, which are observed at stop phases.
+        Observe = "observe",
         /// Lanes that are measured.
         Measure = "measure",
         /// Lanes that have read a cycle.
@@ -345,7 +348,7 @@ named! {
 pub(super) const LISTS: usize = List::ALL.len();
 
 /// Number of keys by which lanes are sorted (shaders/lists.wgsl).
-pub(super) const KEYS: usize = 8 * LISTS;
+pub(super) const KEYS: usize = 4 * LISTS;
 
 /// Number of lanes of a workgroup that makes lists.
 pub(super) const BLOCK: u32 = 256;

@@ -50,8 +50,8 @@ pub use machine::MachineShape;
 pub use pool::Pool;
 pub use precision::Precision;
 pub use reading::LaneResult;
-pub use shader::Variant;
 use shader::WORKGROUP;
+pub use shader::{Tangents, Variant};
 pub use stage::{DeviceTimes, Stage};
 pub use tables::Tables;
 pub(crate) use tables::{COPIES, MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
@@ -61,7 +61,7 @@ use panics::{PanicFree, catch_panic};
 
 use crate::record::Record;
 use crate::record::limits::MOST_STEPS;
-use device::{BEGIN, CONCLUDE, EntryPoint, GATHER, JUDGE, Kernel, LIST, SWEEP};
+use device::{BEGIN, CONCLUDE, EntryPoint, GATHER, JUDGE, Kernel, LIST, OBSERVE, SWEEP};
 use dispatch_policy::DispatchPolicy;
 use rattlemap_dynamics::model::{Form, Law, Pair, State};
 use rattlemap_dynamics::orbit::Budget;
@@ -267,7 +267,8 @@ impl Kernels {
     /// Returns all entry points, those first that take longest to compile.
     fn entry_points(&self) -> impl Iterator<Item = (Variant, EntryPoint)> + '_ {
         let sweeps = self.sweeps.iter().rev().map(|&variant| (variant, SWEEP));
-        let common = self.judges.then_some(JUDGE).into_iter().chain([CONCLUDE, BEGIN, GATHER]).chain(LIST);
+        let common =
+            self.judges.then_some(JUDGE).into_iter().chain([OBSERVE, CONCLUDE, BEGIN, GATHER]).chain(LIST);
         sweeps.chain(common.map(|entry_point| (self.common, entry_point)))
     }
 }
@@ -478,19 +479,19 @@ impl Gpu {
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
         let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, .. } = *settings;
         let LaneSettings { chatter, features, .. } = *settings;
-        let keep = self.policy.keep;
         // Lanes run without the tangent vector until they need it, if this saves time.
-        let growths: &[bool] = match (exponent, self.policy.late_tangent) {
-            (false, _) => &[false],
-            (true, true) => &[false, true],
-            (true, false) => &[true],
+        let carried: &[Tangents] = match (exponent, self.policy.late_tangent) {
+            (false, _) => &[Tangents::None],
+            (true, true) => &[Tangents::None, Tangents::Vector],
+            (true, false) => &[Tangents::Vector],
         };
+        let reading = (exponent && settings.max_period > 0).then_some(Tangents::Columns);
         let precision = self.precision;
-        let variant = |growth| Variant {
+        let variant = |tangents| Variant {
             precision,
             workgroup,
             exponent,
-            growth,
+            tangents,
             word,
             pattern,
             mesh,
@@ -498,22 +499,21 @@ impl Gpu {
             chatter,
             features,
             measures: None,
-            keep,
         };
         let measuring = settings.measured_on_lanes().map(|measures| Variant {
             // The number of periods does not change the shader.
             measures: Some(Measures { periods: 1, ..measures }),
             exponent: false,
-            growth: false,
             word: false,
             pattern: false,
             mesh: false,
             symmetry: false,
             chatter: false,
-            ..variant(false)
+            ..variant(Tangents::None)
         });
-        let sweeps: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).chain(measuring).collect();
-        let kernels = Kernels { sweeps, common: variant(exponent), judges: settings.max_period > 0 };
+        let sweeps: Vec<Variant> =
+            carried.iter().copied().chain(reading).map(variant).chain(measuring).collect();
+        let kernels = Kernels { sweeps, common: variant(Tangents::None), judges: settings.max_period > 0 };
         let is_missing = |(variant, entry_point): &(Variant, EntryPoint)| {
             !self.pipelines.contains_key(&(*variant, entry_point.name))
         };

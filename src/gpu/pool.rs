@@ -39,7 +39,7 @@ pub struct Pool {
     /// Contents of the buffers, by slot.
     cells: Vec<Cell>,
     starts: Vec<f64>,
-    /// Length of the dispatches of the next round.
+    /// Periods between lists and iterations per dispatch in the next round.
     length: Length,
     /// Whether a round is under way that was sent ahead, while the host reads results.
     is_ahead: bool,

@@ -1,12 +1,14 @@
 //! Rounds of dispatches over the lanes under way, until few enough are left.
 //!
-//! Before each dispatch the device makes the lists of lanes anew (shaders/lists.wgsl), and computes how many workgroups each kernel needs.
-//! At its end a round counts the lanes of each list. The next round runs while the host checks the last one, and while it reads results.
-//! Rounds are short, because some drivers reset a device whose work takes seconds, and long enough that their overhead is small.
+//! The device makes the lists of lanes (shaders/lists.wgsl) and computes how many workgroups each kernel needs. Then the lanes run for
+//! some forcing periods. In each period, every integrating kernel is dispatched once, and then `observe`. At its end, a round counts the
+//! lanes of each list. The next round runs while the host checks the last one, and while it reads results. Rounds are short, because some
+//! drivers reset a device whose work takes seconds, and long enough that their overhead is small.
 
 use web_time::{Duration, Instant};
 
-use super::device::{EntryPoint, JUDGE, LIST, SWEEP};
+use super::device::{EntryPoint, JUDGE, LIST, OBSERVE, SWEEP};
+use super::dispatch_policy::DEDICATED;
 use super::layout::{BLOCK, LISTS, List, Settings};
 use super::stage::{Clock, DeviceTimes};
 use super::transfer::{Download, readback};
@@ -19,8 +21,11 @@ const FEWEST_ITERATIONS: u32 = 250;
 /// duration of the first round is unknown and must not be longer.
 const FEWEST_AT_ONCE: u32 = 1 << 14;
 
-/// Largest number of whole periods after which a dispatch ends for a lane. A lane that has read a cycle waits for the end.
-const MOST_PERIODS: u32 = 16;
+/// Largest number of periods between two makings of lists. A lane that has read a cycle waits for the end.
+const MOST_PERIODS: u32 = 8;
+
+// A round of four kernels has a pair of timestamps for each dispatch, two rounds are under way, and wgpu allows 4,096 timestamps.
+const _: () = assert!(4 * (1 + DEDICATED.dispatches * (1 + 4 * MOST_PERIODS)) <= 4096);
 
 /// Desired longest duration of a dispatch. The allowed number of iterations grows while dispatches are shorter.
 const LONGEST_DISPATCH: Duration = Duration::from_millis(250);
@@ -35,11 +40,11 @@ const LONGEST_HOLD: Duration = Duration::from_millis(500);
 const BEAT: u64 = 4 * LISTS as u64;
 const TIMES: u64 = BEAT + 4;
 
-/// Byte offset of the length of a dispatch in the shader's settings.
+/// Byte offset of the largest number of iterations in the shader's settings.
 const LENGTH: u64 = std::mem::offset_of!(Settings, iterations) as u64;
 
-/// Length of a dispatch. It ends for a lane after a number of whole forcing periods. Lanes of neighbouring places then stand at the same
-/// place of the period. For a lane with very many events it ends after a number of loop iterations.
+/// Number of forcing periods between two makings of lists. For a lane with very many events, a dispatch ends after a number of loop
+/// iterations instead of a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Length {
     periods: u32,
@@ -78,7 +83,7 @@ impl Length {
     fn simulated(self, iteration: Duration) -> Duration {
         /// Iterations of a gear pair per forcing period.
         const PER_PERIOD: u32 = 80;
-        iteration * self.iterations.min(PER_PERIOD * self.periods)
+        iteration * self.periods * self.iterations.min(PER_PERIOD)
     }
 }
 
@@ -100,8 +105,9 @@ pub(super) struct Rounds<'a> {
 /// The kernels of a pool with their buffers.
 struct BoundKernels<'a> {
     lists: [(Bound<'a>, Workgroups<'static>); 3],
-    /// The kernels that continue lanes, with their lists.
-    lanes: Vec<(Bound<'a>, List)>,
+    /// The kernels of a forcing period, with their lists: those that integrate, and the one that observes.
+    period: Vec<(Bound<'a>, List)>,
+    judge: Option<Bound<'a>>,
 }
 
 /// A round that has been submitted.
@@ -130,7 +136,7 @@ impl Rounds<'_> {
         let gpu = self.gpu;
         let (clock, bound, checks) = gpu.call(|| {
             let bound = self.bound(kernels);
-            let dispatches = gpu.policy.dispatches * bound.lanes.len() as u32;
+            let dispatches = gpu.policy.dispatches * (1 + MOST_PERIODS * bound.period.len() as u32);
             let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue, dispatches));
             let checks = [(); 2].map(|()| readback(gpu, "check", TIMES + Clock::bytes(dispatches)));
             (clock, bound, checks)
@@ -195,11 +201,12 @@ impl Rounds<'_> {
 
     fn bound<'a>(&'a self, kernels: &Kernels) -> BoundKernels<'a> {
         let sweep = |variant: &Variant| (bind(self.gpu, variant, SWEEP, self.buffers), variant.list());
-        let judge = kernels.judges.then(|| bind(self.gpu, &kernels.common, JUDGE, self.buffers));
-        let sweeps = kernels.sweeps.iter().map(sweep);
+        let common = |entry_point| bind(self.gpu, &kernels.common, entry_point, self.buffers);
+        let observe = (common(OBSERVE), List::Observe);
         BoundKernels {
             lists: making_lists(self.gpu, &kernels.common, self.buffers, self.active_lanes),
-            lanes: sweeps.chain(judge.map(|judge| (judge, List::Judge))).collect(),
+            period: kernels.sweeps.iter().map(sweep).chain([observe]).collect(),
+            judge: kernels.judges.then(|| common(JUDGE)),
         }
     }
 
@@ -212,21 +219,26 @@ impl Rounds<'_> {
         clock: Option<&Clock>,
     ) -> Option<Round<'a>> {
         let gpu = self.gpu;
-        gpu.write(self.settings, LENGTH, bytemuck::cast_slice(&[length.iterations, length.periods]));
+        // Lanes with very many events must not make a round longer than its other lanes do.
+        let iterations = (length.iterations / length.periods).max(FEWEST_ITERATIONS.min(length.iterations));
+        gpu.write(self.settings, LENGTH, bytemuck::bytes_of(&iterations));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let slot = check.map_or(0, |(slot, _)| slot);
         let mut dispatches = 0;
         for _ in 0..gpu.policy.dispatches {
-            for (nth, (kernel, list)) in kernels.lanes.iter().enumerate() {
-                // The judge has lists of its own: otherwise a lane would wait for it during the next dispatch.
-                let renews = nth == 0 || *list == List::Judge;
+            let periods =
+                (0..length.periods).flat_map(|_| &kernels.period).map(|(kernel, list)| (kernel, *list));
+            // The judge has lists of its own: otherwise a lane would wait for it during the next periods.
+            let judge = kernels.judge.iter().map(|judge| (judge, List::Judge));
+            for (nth, (kernel, list)) in periods.chain(judge).enumerate() {
+                let renews = nth == 0 || list == List::Judge;
                 for (pass, (kernel, groups)) in kernels.lists.iter().enumerate().filter(|_| renews) {
                     let is_first = dispatches == 0 && pass == 0;
                     let writes = clock.and_then(|clock| clock.writes(slot, is_first, false));
                     dispatch(gpu, &mut encoder, kernel, *groups, writes);
                 }
                 let writes = clock.map(|clock| clock.dispatch_writes(slot, dispatches));
-                dispatch(gpu, &mut encoder, kernel, Listed(self.workgroups, *list), writes);
+                dispatch(gpu, &mut encoder, kernel, Listed(self.workgroups, list), writes);
                 dispatches += 1;
             }
         }
@@ -371,7 +383,7 @@ mod tests {
         assert!((7..=9).contains(&length.periods), "{length:?}");
         assert_eq!(length.iterations, 4000);
         let long = Length { periods: 10, iterations: 1000 };
-        let longest = Length { periods: 16, iterations: 4000 };
+        let longest = Length { periods: 8, iterations: 4000 };
         assert_eq!(long.next(Duration::ZERO, ROUND, 4).within(least, 4000), longest);
         let slow = long.next(Duration::from_secs(100), ROUND, 4).within(least, 4000);
         assert_eq!(slow, Length { periods: 2, iterations: 250 });

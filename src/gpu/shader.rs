@@ -22,8 +22,8 @@ pub struct Variant {
     pub workgroup: u32,
     /// Whether cycles are read with their monodromy matrix.
     pub exponent: bool,
-    /// Whether lanes carry a tangent vector for the exponent of aperiodic motion.
-    pub growth: bool,
+    /// Tangent vectors that lanes carry.
+    pub tangents: Tangents,
     /// Whether the words of cycles are stored.
     pub word: bool,
     /// Whether the words' patterns are stored.
@@ -38,8 +38,17 @@ pub struct Variant {
     pub features: Features,
     /// Quantities that this variant measures on lanes whose class is decided; `None` in a variant that decides classes.
     pub measures: Option<Measures>,
-    /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
-    pub keep: bool,
+}
+
+/// Tangent vectors that a kernel carries along the motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Tangents {
+    /// No vector.
+    None,
+    /// One vector, for the exponent of aperiodic motion.
+    Vector,
+    /// The columns of the monodromy matrix, while a cycle is read.
+    Columns,
 }
 
 /// Default number of invocations per workgroup.
@@ -48,7 +57,6 @@ pub(super) const WORKGROUP: u32 = 64;
 /// Sources that both engines of motion share.
 const COMMON: &str = concat!(
     include_str!("../../shaders/layout.wgsl"),
-    include_str!("../../shaders/turn.wgsl"),
     include_str!("../../shaders/growth.wgsl"),
     include_str!("../../shaders/observe.wgsl"),
     include_str!("../../shaders/recurrence.wgsl"),
@@ -102,7 +110,7 @@ impl Variant {
             precision,
             workgroup: WORKGROUP,
             exponent: true,
-            growth: true,
+            tangents: Tangents::Vector,
             word: true,
             pattern: true,
             mesh: true,
@@ -110,16 +118,16 @@ impl Variant {
             chatter: true,
             features: Features { kinds: true, sine: true, ..Features::default() },
             measures: None,
-            keep: false,
         }
     }
 
     /// Returns the list of the lanes that it integrates.
     pub(super) fn list(&self) -> List {
-        match (self.measures, self.growth) {
+        match (self.measures, self.tangents) {
             (Some(_), _) => List::Measure,
-            (None, true) => List::Growth,
-            (None, false) => List::Plain,
+            (None, Tangents::Vector) => List::Growth,
+            (None, Tangents::Columns) => List::Reading,
+            (None, Tangents::None) => List::Plain,
         }
     }
 
@@ -130,6 +138,11 @@ impl Variant {
         let terms = count(real, "TERMS");
         let harmonics = machine.map_or(self.features.harmonics, |shape| shape.harmonics);
         let dim = self.features.dim() as u32;
+        let vectors = match self.tangents {
+            Tangents::None => 0,
+            Tangents::Vector => 1,
+            Tangents::Columns => dim,
+        };
         let code = SymbolCode::of_gaps(machine.map_or(1, |shape| shape.gaps as usize));
         let mut names = vec![
             ("TERMS", terms),
@@ -172,6 +185,7 @@ impl Variant {
             ("HARMONICS", harmonics),
             ("DIM", dim),
             ("MATRIX", dim * dim),
+            ("VECTORS", vectors),
             ("COORDINATES", dim / 2),
             ("START", self.features.start_numbers() as u32),
             ("SYMBOL_BITS", code.bits as u32),
@@ -189,7 +203,8 @@ impl Variant {
             numbers.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
         let options = [
             ("EXPONENT", self.exponent),
-            ("GROWTH", self.growth),
+            ("GROWTH", self.tangents == Tangents::Vector),
+            ("COLUMNS", self.tangents == Tangents::Columns),
             ("WORD", self.word),
             ("PATTERN", self.pattern),
             ("MESH", self.mesh),
@@ -203,7 +218,6 @@ impl Variant {
             ("MEASURE", self.measures.is_some()),
             ("EXTREME", self.measures.is_some_and(|measures| measures.extremes)),
             ("MOMENTS", self.measures.is_some_and(|measures| measures.moments)),
-            ("KEEP", self.keep),
         ]
         .map(|(name, value)| format!("const {name}: bool = {value};\n"))
         .concat();

@@ -292,7 +292,6 @@ fn uniform(
         max_period: settings.max_period.min(LONGEST_CYCLE),
         early_stop: u32::from(early_stop),
         measured_periods: settings.measured_on_lanes().map_or(0, |measures| measures.periods.max(1)),
-        whole_periods: u32::MAX,
         few_lanes: policy.few_lanes,
     }
 }

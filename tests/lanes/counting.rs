@@ -25,9 +25,11 @@ fn count_iterations(source: &str, function: &str) -> String {
     let start = silent.find(&format!("fn {function}(")).expect("the shader has the function");
     let (before, after) = silent.split_at(start);
     let (body, rest) = after.split_at(after.find("\n}\n").expect("a function ends"));
-    let paid =
-        if body.contains("iterations += price;") { "iterations += price;" } else { "iterations += 1u;" };
-    format!("{before}{}{rest}", replace(body, paid, &format!("{paid} tally.impacts += 1u;")))
+    let [paid, count] = match function {
+        "scan" => ["iterations += count * price;", "count"],
+        _ => ["iterations += 1u;", "1u"],
+    };
+    format!("{before}{}{rest}", replace(body, paid, &format!("{paid} tally.impacts += {count};")))
 }
 
 fn replace(text: &str, from: &str, to: &str) -> String {

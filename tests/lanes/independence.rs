@@ -86,7 +86,8 @@ fn check_cuts(precision: Precision, workgroups: &[u32]) {
 }
 
 /// Lanes that begin while others run, in slots of lanes that have ended or in a pool that has grown, have the records
-/// of lanes that run together. With the dispatch policy of a card, each of few lanes has a warp of its own, and one kernel integrates all.
+/// of lanes that run together. With the dispatch policy of a card, each of few lanes has a warp of its own, and one kernel integrates
+/// all lanes that read no cycle.
 #[test]
 fn records_do_not_depend_on_when_lanes_begin() {
     check_begins(&[(Precision::F32, false)]);

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use rattlemap::gpu::{Features, MachineShape, Measures, Precision, Variant, layout};
+use rattlemap::gpu::{Features, MachineShape, Measures, Precision, Tangents, Variant, layout};
 
 fn module(variant: Variant) -> (naga::Module, ModuleInfo) {
     let source = variant.source();
@@ -34,29 +34,29 @@ fn variants(precision: Precision) -> [Variant; 23] {
     let measuring = |extremes, moments| Variant {
         measures: Some(Measures { periods: 1, extremes, moments }),
         exponent: false,
-        growth: false,
+        tangents: Tangents::None,
         chatter: false,
         ..everything
     };
     let class = Variant { word: false, pattern: false, mesh: false, symmetry: false, ..everything };
     let all = Features { stages: true, ..class.features };
     [
-        Variant { keep: true, ..everything },
-        Variant { growth: false, ..everything },
-        Variant { exponent: false, growth: false, ..everything },
-        Variant { workgroup: 256, keep: true, ..class },
-        Variant { growth: false, ..class },
-        Variant { chatter: false, keep: true, ..everything },
-        Variant { chatter: false, growth: false, ..class },
-        Variant { workgroup: 32, exponent: false, growth: false, ..class },
+        everything,
+        Variant { tangents: Tangents::None, ..everything },
+        Variant { exponent: false, tangents: Tangents::None, ..everything },
+        Variant { workgroup: 256, ..class },
+        Variant { tangents: Tangents::Columns, ..class },
+        Variant { chatter: false, ..everything },
+        Variant { chatter: false, tangents: Tangents::None, ..class },
+        Variant { workgroup: 32, exponent: false, tangents: Tangents::None, ..class },
         Variant { symmetry: true, ..class },
-        Variant { mesh: true, keep: true, ..class },
-        Variant { word: true, growth: false, ..class },
+        Variant { mesh: true, ..class },
+        Variant { word: true, tangents: Tangents::None, ..class },
         Variant { pattern: true, ..class },
-        Variant { keep: true, ..measuring(true, true) },
+        measuring(true, true),
         measuring(false, true),
         measuring(true, false),
-        Variant { features: Features { harmonics: 7, ..class.features }, keep: true, ..class },
+        Variant { features: Features { harmonics: 7, ..class.features }, ..class },
         Variant { features: Features { harmonics: 1, stages: true, ..class.features }, ..everything },
         Variant {
             features: Features { harmonics: 2, intervals: true, pushing: true, ..all },
@@ -75,7 +75,7 @@ fn variants(precision: Precision) -> [Variant; 23] {
         Variant {
             features: Features { machine: Some(machine(4, 3, 2, 0)), ..Features::default() },
             exponent: false,
-            growth: false,
+            tangents: Tangents::None,
             ..class
         },
     ]
@@ -133,7 +133,11 @@ fn structs_have_the_same_size_on_host_and_device() {
 fn variants_translate_for_every_kind_of_device() {
     for exponent in [false, true] {
         for precision in Precision::ALL {
-            let variant = Variant { exponent, growth: exponent, ..Variant::of(precision) };
+            let variant = Variant {
+                exponent,
+                tangents: if exponent { Tangents::Columns } else { Tangents::None },
+                ..Variant::of(precision)
+            };
             let (module, info) = module(variant);
             let words = spv::write_vec(&module, &info, &spv::Options::default(), None)
                 .unwrap_or_else(|error| panic!("SPIR-V, {variant:?}: {error}"));

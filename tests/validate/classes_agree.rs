@@ -88,8 +88,10 @@ fn other_planes_of_more_cells_are_classified_as_the_reference_does() {
 fn lanes_agree_with_every_row_of_the_independent_programs_table() {
     let rows = rows();
     let pairs: Vec<_> = rows.iter().map(Row::pair).collect();
+    // Which of the chaotic lanes are undecided after 528 periods depends on rounding.
+    let settings = LaneSettings { undecided_periods: 1584, ..LaneSettings::default() };
     for precision in Precision::ALL {
-        let records = run_from_rest(&mut open(precision), &pairs, &LaneSettings::default());
+        let records = run_from_rest(&mut open(precision), &pairs, &settings);
         for (row, record) in rows.iter().zip(&records) {
             let at = format!("{precision:?}, {}: {record:?}", row.place());
             assert_eq!(classify(record), row.class(), "{at}");

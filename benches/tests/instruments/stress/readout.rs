@@ -13,6 +13,7 @@ const REPLACEMENT: &str = "        let before = motion.q;
         jump = contact(side, settling);
         motion.q = array<Real, 4>(before[1], motion.q[1], before[3], motion.q[3]);
         tally.stage = STAGE_DONE;
+        iterations = settings.iterations;
         return;
 ";
 
