@@ -39,6 +39,12 @@ typedef Two<float> float2;
 typedef Two<bool> bool2;
 typedef Two<uint> uint2;
 typedef Three<float> float3;
+template <class T> struct Four {
+    T x, y, z, w;
+    DEVICE Four() : x(), y(), z(), w() {}
+    DEVICE Four(T x, T y, T z, T w) : x(x), y(y), z(z), w(w) {}
+};
+typedef Four<float> float4;
 struct uint3 { uint x, y, z; };
 
 #define OPERATOR(o) \
@@ -47,6 +53,8 @@ struct uint3 { uint x, y, z; };
     template <class T> DEVICE Two<T> operator o(T a, Two<T> b) { return {a o b.x, a o b.y}; } \
     template <class T> DEVICE Three<T> operator o(T a, Three<T> b) { return {a o b.x, a o b.y, a o b.z}; }
 OPERATOR(+) OPERATOR(-) OPERATOR(*) OPERATOR(/)
+DEVICE float4 operator+(float4 a, float4 b) { return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w}; }
+DEVICE float4 operator*(float a, float4 b) { return {a * b.x, a * b.y, a * b.z, a * b.w}; }
 DEVICE bool2 operator==(uint2 a, uint2 b) { return {a.x == b.x, a.y == b.y}; }
 DEVICE uint2& operator-=(uint2& a, uint2 b) { return a = a - b; }
 DEVICE bool all(bool2 b) { return b.x && b.y; }

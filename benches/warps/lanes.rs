@@ -1,4 +1,4 @@
-//! Writes what the simulation of warps needs: the shader of a map, some of its lanes, and the settings of a dispatch.
+//! Writes what the simulation of warps needs: the shaders of a map, some of its lanes, and the settings of a dispatch.
 //!
 //!     cargo run -p rattlemap-bench --example warps -- FOLDER GROUPS LANES SCENE [NAME=VALUE ...]
 //!
@@ -10,7 +10,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use rattlemap::gpu::layout::{self, Cell, Flow, FlowShape, Settings};
-use rattlemap::gpu::{Constants, Features, LaneSettings, Precision, Variant, follows_chatter};
+use rattlemap::gpu::{Constants, Features, LaneSettings, Precision, Tangents, Variant, follows_chatter};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
 use rattlemap::model::Form;
@@ -79,6 +79,8 @@ fn main() -> anyhow::Result<()> {
     write("settings.bin", bytemuck::bytes_of(&settings(&plan, cells.len() as u32)))?;
     let variant = Variant { chatter, features, ..Variant::of(Precision::F32) };
     write("shader.wgsl", (variant.source() + KEYS).as_bytes())?;
+    let reading = Variant { tangents: Tangents::Columns, ..variant };
+    write("reading.wgsl", reading.source().replace("fn sweep(", "fn reading(").as_bytes())?;
     Ok(())
 }
 

@@ -12,18 +12,18 @@ import re
 import sys
 from pathlib import Path
 
-KERNELS = ["sweep", "judge_cycles"]
+KERNELS = ["sweep", "reading", "observe", "judge_cycles"]
 # The phases of a lane's work, with the functions of the shader that begin them. A function that is not listed belongs to its caller.
 PHASES = {
     "scan": "scan",
     "judging of stretches, with series": "first_event",
     "root search": "root",
-    "tangents, columns": "carry_tangents step_columns check_range check_columns",
+    "tangents, columns": "glide_tangents jump_tangents step_columns check_range check_columns",
     "expansion": "expand",
-    "rest of careful pass, state, bounds": "careful state_at derivative_bound renew_bound flight_to_chatter sweep",
+    "rest of careful pass, state, bounds": "careful state_at derivative_bound renew_bound flight_to_chatter sweep reading",
     "contact law, word": "act enter count_event close_chatter",
     "judge cycle": "judge_cycles",
-    "recurrence, strobe": "begin_period compare_mirror",
+    "recurrence, strobe": "begin_period compare_mirror observe",
     "load and store of lanes": "load_lane store_lane load_strobe_state store_strobe_state load_tangent store_tangent_now "
     "resume_motion suspend_motion prepare_motion",
 }

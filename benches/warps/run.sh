@@ -4,7 +4,7 @@
 #
 #     benches/warps/run.sh [PERIODS [GROUPS LANES]]
 #
-# A dispatch ends for a lane after PERIODS whole periods. GROUPS groups of LANES neighbouring lanes are spread over the map.
+# Lists are made again after PERIODS periods. GROUPS groups of LANES neighbouring lanes are spread over the map.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -17,14 +17,15 @@ cuda="$out/cuda/nvidia/cu13/bin"
 mkdir -p "$out"
 cargo run --quiet -p rattlemap-bench --example warps -- "$out" "$groups" "$lanes" scenes/e_omega.toml \
     axis.0.count=1024 axis.1.count=1024
-for entry in begin keys sweep judge_cycles; do
-    naga --compact --entry-point "$entry" "$out/shader.wgsl" "$out/$entry.metal"
+for entry in begin keys sweep reading observe judge_cycles; do
+    source=shader && [ "$entry" != reading ] || source=reading
+    naga --compact --entry-point "$entry" "$out/$source.wgsl" "$out/$entry.metal"
     python3 "$here/cuda.py" "$out/$entry.metal" "$out/$entry.cu"
 done
 
 echo "| kernel for sm_90 | registers | spilled bytes | bytes of code |"
 echo "| --- | --- | --- | --- |"
-for kernel in sweep judge_cycles; do
+for kernel in sweep reading observe judge_cycles; do
     "$cuda/nvcc" -w -std=c++17 -arch=sm_90 -I "$here" -ptx -lineinfo -prec-div=false -prec-sqrt=false \
         "$out/$kernel.cu" -o "$out/$kernel.ptx"
     "$cuda/ptxas" -arch=sm_90 -v "$out/$kernel.ptx" -o "$out/$kernel.cubin" 2>"$out/$kernel.txt"
@@ -34,7 +35,7 @@ for kernel in sweep judge_cycles; do
     echo "| $kernel | $registers | $spilled | $((16#$code)) |"
 done
 python3 "$here/lockstep.py" "$out"
-g++ -O1 -w -std=c++20 -mfma -ffp-contract=off -I "$here" -I "$out" "$here/simulate.cpp" "$out"/{sweep,judge_cycles}.cpp -o "$out/simulate"
+g++ -O1 -w -std=c++20 -mfma -ffp-contract=off -I "$here" -I "$out" "$here/simulate.cpp" "$out"/{sweep,reading,observe,judge_cycles}.cpp -o "$out/simulate"
 for map in brute decided; do
     echo && "$out/simulate" "$out" "$map" "$periods"
 done

@@ -2,13 +2,14 @@
 //
 //     simulate FOLDER brute|decided PERIODS
 //
-// Before each dispatch the host sorts the lanes as shaders/lists.wgsl does. The cost of sorting is not counted.
+// The host sorts the lanes as shaders/lists.wgsl does, every PERIODS periods and before cycles are judged. The cost of sorting is not counted.
 
 #include <cstdio>
 #include <fstream>
 #include <map>
 #include <numeric>
 #include <string>
+#include <utility>
 
 #include "cuda.h"
 #include "phases.h"
@@ -40,7 +41,7 @@ template <class T> std::vector<T> read(const std::string& file) {
 int main(int, char** arguments) {
     const std::string folder = std::string(arguments[1]) + "/", map = arguments[2];
     auto settings = read<Settings>(folder + "settings.bin").at(0);
-    settings.whole_periods = std::stoi(arguments[3]);
+    const int length = std::stoi(arguments[3]);
     if (map == "brute") {
         settings.early_stop = settings.hands_over = 0;
         settings.periods = settings.decided_by = settings.longest = BRUTE_PERIODS;
@@ -65,8 +66,7 @@ int main(int, char** arguments) {
     for (uint32_t i = 0; i < n; i++) begins::run(i, buffers);
 
     Cost phases[std::size(PHASES)] = {}, all = {};
-    uint32_t dispatches = 0;
-    for (;; dispatches++) {
+    auto make_lists = [&] {
         for (uint32_t i = 0; i < n; i++) sorts::run(i, buffers);
         uint32_t* const sorted = std::copy(active, active + n, active + n) - n;
         std::stable_sort(sorted, sorted + n, [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
@@ -75,11 +75,22 @@ int main(int, char** arguments) {
             queue.begins.inner[list] = begin;
             begin += queue.counts.inner[list] = std::count_if(keys.begin(), keys.end(), is_listed);
         }
-        if (queue.counts.inner[LIST_ENDED] == n) break;
-        for (auto [program, list] : {std::pair{sweep, OWN_LIST}, {judge_cycles, LIST_JUDGE}}) {
-            const uint32_t lanes = queue.counts.inner[list];
-            for (uint32_t first = 0; first < lanes; first += WIDTH) program(first, WORKGROUP, phases);
+        queue.counts.inner[LIST_OBSERVE] = std::exchange(queue.begins.inner[LIST_OBSERVE], 0);
+    };
+    auto run = [&](Program program, uint32_t list) {
+        const uint32_t lanes = queue.counts.inner[list];
+        for (uint32_t first = 0; first < lanes; first += WIDTH) program(first, WORKGROUP, phases);
+    };
+    uint32_t rounds = 0;
+    for (make_lists(); queue.counts.inner[LIST_ENDED] < n; rounds++) {
+        for (int period = 0; period < length; period++) {
+            run(sweep, OWN_LIST);
+            run(reading, LIST_READING);
+            run(observe, LIST_OBSERVE);
         }
+        make_lists();
+        run(judge_cycles, LIST_JUDGE);
+        make_lists();
     }
 
     double periods = 0;
@@ -90,7 +101,7 @@ int main(int, char** arguments) {
         failures += tally.now.status != STATUS_OK;
         cycles[tally.search.cycle]++;
     }
-    printf("%s: %u lanes, %u of them failed, %.1f periods per lane, %u dispatches", map.c_str(), n, failures, periods / n, dispatches);
+    printf("%s: %u lanes, %u of them failed, %.1f periods per lane, %u rounds", map.c_str(), n, failures, periods / n, rounds);
     printf("\nperiod of the cycle (lanes):");
     for (auto [cycle, count] : cycles) printf(" %u (%d)", cycle, count);
     printf("\n\n| phase | operations per lane-period | issued per 32 lane-periods | active |\n| --- | --- | --- | --- |\n");

@@ -36,7 +36,7 @@ struct Cost {
 
 // Runs the warp whose first invocation is `first`, and adds its cost to that of each phase. `END` is the number of blocks.
 typedef void (*Program)(uint32_t first, uint32_t workgroup, Cost* phases);
-extern const Program sweep, judge_cycles;
+extern const Program sweep, reading, observe, judge_cycles;
 template <class Lane, const Block<Lane>* BLOCKS, int END> void run_warp(uint32_t first, uint32_t workgroup, Cost* phases) {
     // Lanes that are together until they come to the block where the others wait.
     struct Part {
