@@ -16,6 +16,7 @@
 #     brute       the main map with SIDE x SIDE cells and without early stops
 #     no_events   like brute, with a small force, so that no gap meets a wall. The difference from brute is the cost of events
 #     no_tangents like brute, with impacts and contact time alone. The difference from brute is the cost of tangent vectors and classes
+#     workgroups  like brute, with 32 and with 128 invocations per workgroup instead of 64
 #     own_flow    as many cells, each with its own flow: meshing stiffness against frequency
 #     adaptive    the adaptive map of the main plane, classes only
 #     latency     four lanes, for as many periods as the slowest lane of a map may take
@@ -23,6 +24,8 @@
 #     engines     the main plane on every engine, from 10^3 lanes (`rattlemap bench engines`): utilisation of the device,
 #                 longest dispatch, idle gaps
 #     again       each timed run a second and a third time. The table has the run with the middle time from start to files
+#
+# Why warps wait is not measured: ncu, NVIDIA's profiler of kernels, profiles CUDA and not Vulkan.
 #
 # Everything takes at most MEASURE_SECONDS (480), even on a slow card: each run has a time limit, and steps without time are
 # reported as missing. The script measures the first hardware adapter, or the adapter named by WGPU_ADAPTER_NAME, which may be
@@ -43,7 +46,7 @@ binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
 steps=("${@:4}")
-all=(right main classes sizes window basin brute no_events no_tangents own_flow adaptive latency compile engines again)
+all=(right main classes sizes window basin brute no_events no_tangents workgroups own_flow adaptive latency compile engines again)
 ((${#steps[@]})) || steps=("${all[@]}")
 for step in "${steps[@]}"; do
     [[ " ${all[*]} " == *" $step "* ]] || { echo "error: there is no step $step; the steps are ${all[*]}" >&2; exit 2; }
@@ -211,6 +214,7 @@ timed() {
 # Sets the scene and the settings of a step.
 settings() {
     scene="$scenes/e_omega.toml" sets=()
+    unset RATTLEMAP_WORKGROUP
     local classes=(--set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]')
     case $1 in
         main) ((side >= 512)) || square "$side" ;;
@@ -221,7 +225,10 @@ settings() {
             sets+=(--set axis.0.min=0.5 --set axis.0.max=0.7 --set axis.1.min=5 --set axis.1.max=6.5)
             ;;
         basin) scene="$scenes/basin.toml" ;;
-        brute) square "$side" && sets+=(--set integration.early_stop=false) ;;
+        brute | brute_*)
+            square "$side" && sets+=(--set integration.early_stop=false)
+            [[ $1 == brute ]] || export RATTLEMAP_WORKGROUP="${1#brute_}"
+            ;;
         no_events) square "$side" && sets+=(--set integration.early_stop=false --set F=0.1) ;;
         no_tangents) square "$side" && sets+=(--set integration.early_stop=false --set 'outputs.quantities=["impacts", "mesh"]') ;;
         own_flow)
@@ -241,6 +248,14 @@ sizes() {
     for cells in 32 100 316 1000 3162; do
         settings "size_$cells" && timed "size_$cells" "$precision" 1 "${sets[@]}"
     done
+}
+
+workgroups() {
+    local precision="$1" size
+    for size in 32 128; do
+        settings "brute_$size" && timed "brute_$size" "$precision" 1 "${sets[@]}"
+    done
+    unset RATTLEMAP_WORKGROUP
 }
 
 compile() {
@@ -360,7 +375,7 @@ for step in "${steps[@]}"; do
         *)
             for precision in "${precisions[@]}"; do
                 case $step in
-                    right | sizes | compile) "$step" "$precision" ;;
+                    right | sizes | workgroups | compile) "$step" "$precision" ;;
                     *) settings "$step" && timed "$step" "$precision" 1 "${sets[@]}" ;;
                 esac
                 summary

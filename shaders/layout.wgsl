@@ -9,15 +9,15 @@
 alias State = array<Real, DIM>;
 alias Matrix = array<Real, MATRIX>;
 
-// State that a lane carries between dispatches. `MotionNow` and `TallyNow` are used by every step and event; a lane
-// keeps them in registers. `Measures` and `Search` are used by `observe` and `judge_cycles` alone, so
-// that they take no registers from the steps. Arrays that are indexed stay in the buffer: an indexed array would move
-// its whole struct out of registers.
+// State that a lane carries between dispatches. `MotionNow` and `TallyNow` are used by every step and event; a lane keeps them in registers.
+// `Measures` and `Search` are used by `observe` and `judge_cycles` alone, so that they take no registers from the steps. Arrays that are
+// indexed stay in the buffer: an indexed array would move its whole struct out of registers. Structs that are loaded whole are aligned, so
+// that compilers can read and write four numbers at a time.
 
 // The motion.
 struct MotionNow {
     // Displacements and rates: gap (from the wall while meshing), its rate, x, its rate; rates per free step.
-    q: State,
+    @align(FOUR_REALS) q: State,
     // cos and sin of the forcing phase.
     phasor: array<Real, 2>,
     // Fraction of the present free step that has passed; during an interrupted scan, at the scan's start.
@@ -35,7 +35,7 @@ struct MotionNow {
 // Averages and scales of the motion, updated at strobes.
 struct Measures {
     // Growth of the tangent vector over whole blocks: its sum, and the sum of squared deviations from its mean.
-    growth_sum: Real,
+    @align(FOUR_REALS) growth_sum: Real,
     growth_squares: Real,
     // Sum of the products of consecutive blocks, whose growth is taken relative to the first block; growth of the first and of the last
     // whole block.
@@ -63,14 +63,14 @@ struct Motion {
     now: MotionNow,
     measures: Measures,
     // Columns of the monodromy matrix in lane units.
-    tangents: Matrix,
+    @align(FOUR_REALS) tangents: Matrix,
     // Tangent vector of the exponent.
-    vector: State,
+    @align(FOUR_REALS) vector: State,
     // Growth of perturbations on the cycle that is read (check_columns in growth.wgsl): smallest size of the columns so far, largest ratio
     // of a size to an earlier one, and largest size.
     stretch: array<Real, 3>,
     // The last strobe states of the motion (approach.wgsl).
-    trail: array<State, TRAIL>,
+    @align(FOUR_REALS) trail: array<State, TRAIL>,
     // Weighted averages of the displacements and of the sum of their squares, relative to a centre: first window minus second window
     // (regularity.wgsl).
     averages: array<Real, COORDINATES + 1>,
@@ -87,7 +87,7 @@ struct Motion {
 // Counters and flags.
 struct TallyNow {
     // Free steps since phase 0; during an interrupted scan, at the scan's start.
-    step: u32,
+    @align(16) step: u32,
     // Steps of a scan that the end of a dispatch interrupted.
     scanned: u32,
     // MODE_*.
@@ -141,7 +141,7 @@ struct TallyNow {
 // Search for a cycle, updated at strobes.
 struct Search {
     // `has_read`: 1 once a cycle is being read or has been read. `cycle`: period of a cycle that was read and is stable.
-    has_read: u32,
+    @align(16) has_read: u32,
     cycle: u32,
     // Cycles that were read without success.
     failed_readings: u32,

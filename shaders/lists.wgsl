@@ -43,7 +43,8 @@ fn place_in_list(list: u32, id: vec3<u32>) -> u32 {
 }
 
 // Returns the list to which the lane belongs. The kernel without the exponent's tangent vector moves a lane until it needs the vector, or
-// reads a cycle with the columns of its monodromy matrix. The choice must not depend on where a dispatch ends, because kernels round differently.
+// reads a cycle with the columns of its monodromy matrix. The choice must not depend on where a dispatch ends, because kernels round
+// differently.
 fn list_of_lane() -> u32 {
     if tally.status != STATUS_OK || tally.stage == STAGE_DONE {
         return LIST_ENDED;
@@ -61,8 +62,8 @@ fn list_of_lane() -> u32 {
     return select(LIST_PLAIN, LIST_GROWTH, EXPONENT && grows);
 }
 
-// Returns the key of a lane of the active list: its list, and the size of its number of events per period. Lanes
-// without early stops keep their order: in a map in which no lane ends, neighbours are more alike (benches/warps).
+// Returns the key of a lane of the active list: its list, and the size of its number of events per period. Lanes without early stops keep
+// their order: in a map in which no lane ends, neighbours are more alike (benches/warps).
 fn key_of(i: u32) -> u32 {
     let slot = active_lane(i);
     tally.status = tallies[slot].now.status;

@@ -1,5 +1,7 @@
 // Single precision.
 alias Real = f32;
+// Size of four numbers in bytes.
+const FOUR_REALS: u32 = 16u;
 // Number of terms of the Taylor series of one step. A step turns by at most a radian, so the remainder is below rounding.
 const TERMS: u32 = 12u;
 // Number of terms of the series of a short flight, and the factorial of SHORT_TERMS - 2.

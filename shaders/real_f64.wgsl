@@ -1,5 +1,7 @@
 // Double precision; needs SHADER_F64. The constants have the meaning that real_f32.wgsl describes.
 alias Real = f64;
+// Size of four numbers in bytes.
+const FOUR_REALS: u32 = 32u;
 const TERMS: u32 = 20u;
 const SHORT_TERMS: u32 = 13u;
 const SHORT_FACTORIAL: Real = 39916800.0;

@@ -18,6 +18,9 @@ def translated(text):
     text = text.split("using metal::uint;", 1)[1]
     text = re.sub(r"\[\[[^\]]*\]\]", "", text)
     text = text.replace("as_type<", "bits_as<")
+    # WGSL aligns the structs of lanes. Metal has padding instead.
+    text = re.sub(r"\bstruct (Motion|MotionNow|Measures|Tally|TallyNow|Search|Cell|Law|Domain) ", r"struct alignas(16) \1 ", text)
+    text = re.sub(r"\bchar (_pad\d+)\[(\d+)\]", lambda pad: f"uint {pad[1]}[{int(pad[2]) // 4}]", text)
     text = re.sub(r"\bconstant (\w+)& ", r"const \1& ", text)
     text = re.sub(r"\bconstant ", "CONSTANT ", text)
     text = re.sub(r"\b(device|thread) ", "", text)

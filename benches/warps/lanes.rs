@@ -40,7 +40,8 @@ fn main() -> anyhow::Result<()> {
     let begins = (0..groups).map(|nth| (2 * nth + 1) * parts / (2 * groups) * lanes);
     let picked: Vec<_> = begins.flat_map(|begin| plan.cells(begin..begin + lanes)).collect();
 
-    // Each lane has a flow and a law of its own.
+    // Lanes share flows, as in a map. Each has a law of its own.
+    let mut known = HashMap::new();
     let (mut flows, mut shapes, mut laws, mut cells, mut starts) = (vec![], vec![], vec![], vec![], vec![]);
     let (mut pairs, mut places) = (vec![[0.0; 2]; PAIRS_PER_HARMONIC], HashMap::new());
     let (mut chatter, mut features) = (false, Features::default());
@@ -52,6 +53,14 @@ fn main() -> anyhow::Result<()> {
         };
         chatter |= law.mesh_speed.iter().any(|&speed| follows_chatter(oscillator, speed));
         features = features.and(Features::of(form.clone()));
+        let mirror = (constants.mirror_symmetric && law.is_symmetric()).into();
+        laws.push(layout::Law { restitution: law.restitution, mesh_speed: law.mesh_speed });
+        starts.push(pair.to_lane(picked.start));
+        let flow_index = *known.entry(picked.flow).or_insert(flows.len() as u32);
+        cells.push(Cell { flow_index, law_index: i, refused: 0, mirror });
+        if (flow_index as usize) < flows.len() {
+            continue;
+        }
         let phasors = *places.entry(constants.steps).or_insert_with_key(|&steps| {
             let place = pairs.len() as u32;
             let angles = (0..=steps).map(|n| TAU * f64::from(n % steps) / f64::from(steps));
@@ -61,10 +70,6 @@ fn main() -> anyhow::Result<()> {
         let Constants { steps, degrees, .. } = constants;
         shapes.push(FlowShape { steps, phasors, degrees, behind: [NO_FLOW; 2], ..FlowShape::default() });
         flows.push(pair.flow);
-        laws.push(layout::Law { restitution: law.restitution, mesh_speed: law.mesh_speed });
-        let mirror = (constants.mirror_symmetric && law.is_symmetric()).into();
-        cells.push(Cell { flow_index: i, law_index: i, refused: 0, mirror });
-        starts.push(pair.to_lane(picked.start));
     }
     pairs.push([1.0, 0.0]);
     anyhow::ensure!(features == Features::default(), "the tables lack constants of {features:?}");

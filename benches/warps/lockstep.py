@@ -33,7 +33,7 @@ MOST_CALLS = 20
 
 # C++ types of registers, by the letters of their names, and of operations.
 TYPES = {"f": "float", "r": "uint32_t", "rd": "uint64_t", "rs": "uint16_t", "p": "bool", "pred": "bool", "f32": "float"}
-TYPES |= {f"{kind}{bits}": f"{'int' if kind == 's' else 'uint'}{bits}_t" for kind in "sub" for bits in (16, 32, 64)}
+TYPES |= {f"{kind}{bits}": f"{'int' if kind == 's' else 'uint'}{bits}_t" for kind in "sub" for bits in (8, 16, 32, 64)}
 EXPRESSIONS = {
     "add": "{0} + {1}", "sub": "{0} - {1}", "mul": "{0} * {1}", "mad": "{0} * {1} + {2}", "fma": "std::fma({0}, {1}, {2})",
     "div": "{0} / {1}", "rem": "{0} % {1}", "rcp": "1 / {0}", "sqrt": "std::sqrt({0})", "rsqrt": "1 / std::sqrt({0})",
@@ -82,7 +82,7 @@ def basic_blocks(lines, functions, source, kernel):
             blocks.append([])
         elif instruction := re.match(r"(@!?%p\d+)?\s*([a-z][\w.]*)\s*(.*);", line):
             guard, code, operands = instruction.groups()
-            blocks[-1].append(Instruction(guard, code.split("."), re.split(r",\s*", operands), phase))
+            blocks[-1].append(Instruction(guard, code.split("."), re.findall(r"{.*?}|[^, ]+", operands), phase))
             if code.startswith("bra") or code == "ret":
                 blocks.append([])
     return blocks, labels
@@ -130,17 +130,21 @@ def value(operand, of):
     return f"as<{TYPES[of]}>({operand})"
 
 
-def memory(operand, of):
-    """Returns a place in memory as a C++ expression."""
-    base, offset = re.fullmatch(r"\[([^+\]]+)(?:\+(-?\d+))?\]", operand).groups()
-    return f"at<{TYPES[of]}>({value(base, 'u64')} + {offset or 0})"
+def access(code, operands):
+    """Returns a load, or a store, of one or several neighbouring numbers as C++ statements."""
+    registers, place = operands if code[0] == "ld" else reversed(operands)
+    base, offset = re.fullmatch(r"\[([^+\]]+)(?:\+(-?\d+))?\]", place).groups()
+    of = TYPES[code[-1]]
+    for n, register in enumerate(re.findall(r"[^{}, ]+", registers)):
+        # All numbers of an access are in one line.
+        where = "global" if "global" in code and n == 0 else "at"
+        memory = f"{where}<{of}>({value(base, 'u64')} + {offset or 0} + {n} * sizeof({of}))"
+        yield f"set({name(register)}, {memory});" if code[0] == "ld" else f"{memory} = {value(register, code[-1])};"
 
 
 def result(code, operands):
     """Returns the result of an operation as a C++ expression."""
     root, of = code[0], code[-1]
-    if root == "ld":
-        return memory(operands[0], of)
     if root == "cvt":
         return f"converted_{code[1] if len(code) > 3 else 'rn'}<{TYPES[code[-2]]}>({value(operands[0], of)})"
     if root == "setp":
@@ -163,8 +167,8 @@ def statement(instruction, nexts):
         return f"{condition}return {nexts[0]};"
     if guard:
         raise ValueError(f"only branches may have a condition: {instruction}")
-    if code[0] == "st":
-        return f"{memory(operands[0], code[-1])} = {value(operands[1], code[-1])};"
+    if code[0] in ("ld", "st"):
+        return " ".join(access(code, operands))
     return f"set({name(operands[0])}, {result(code, operands[1:])});"
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Counts what the shader of the main map costs a card, without a card: instructions by phase, registers, spilled bytes and code size.
+# Counts what the shader of the main map costs a card, without a card: registers, spilled bytes and code size of each kernel, instructions
+# by phase, and accesses to memory by kernel. counts.md has the output without arguments.
 # Needs python3 with pip, g++ and naga (cargo install naga-cli --version 30.0.1). Downloads NVIDIA's compiler (125 MB) into out/warps.
 #
 #     benches/warps/run.sh [PERIODS [GROUPS LANES]]

@@ -29,6 +29,9 @@ using namespace shader;
 // Periods of lanes that do not end early.
 const uint32_t BRUTE_PERIODS = 110;
 const void* parameters[16];
+double lines;
+std::vector<std::pair<uint32_t, uint64_t>> accessed;
+uint32_t accesses;
 
 template <class T> std::vector<T> read(const std::string& file) {
     std::ifstream in(file, std::ios::binary);
@@ -77,19 +80,22 @@ int main(int, char** arguments) {
         }
         queue.counts.inner[LIST_OBSERVE] = std::exchange(queue.begins.inner[LIST_OBSERVE], 0);
     };
-    auto run = [&](Program program, uint32_t list) {
+    std::map<std::string, double> lines_of;
+    auto run = [&](const char* kernel, Program program, uint32_t list) {
         const uint32_t lanes = queue.counts.inner[list];
+        const double before = lines;
         for (uint32_t first = 0; first < lanes; first += WIDTH) program(first, WORKGROUP, phases);
+        lines_of[kernel] += lines - before;
     };
     uint32_t rounds = 0;
     for (make_lists(); queue.counts.inner[LIST_ENDED] < n; rounds++) {
         for (int period = 0; period < length; period++) {
-            run(sweep, OWN_LIST);
-            run(reading, LIST_READING);
-            run(observe, LIST_OBSERVE);
+            run("sweep", sweep, OWN_LIST);
+            run("reading", reading, LIST_READING);
+            run("observe", observe, LIST_OBSERVE);
         }
         make_lists();
-        run(judge_cycles, LIST_JUDGE);
+        run("judge_cycles", judge_cycles, LIST_JUDGE);
         make_lists();
     }
 
@@ -114,4 +120,7 @@ int main(int, char** arguments) {
         all = {all.issued + phases[k].issued, all.operations + phases[k].operations};
     }
     row("**all**", all);
+    printf("\n| kernel | lines of memory per 32 lane-periods |\n| --- | --- |\n");
+    for (auto [kernel, lines] : lines_of) printf("| %s | %.0f |\n", kernel.c_str(), WIDTH * lines / periods);
+    printf("| **all** | %.0f |\n", WIDTH * lines / periods);
 }

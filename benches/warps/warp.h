@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <iterator>
 #include <limits>
+#include <utility>
 #include <vector>
 
 // Lanes of a warp.
@@ -34,6 +35,14 @@ struct Cost {
     double issued, operations;
 };
 
+// Bytes of a line of memory. Lanes that access one line at the same time share the access.
+const uint64_t LINE = 128;
+
+// Lines of memory that warps have accessed, and those of the present block: the number of the access in the block, and the line.
+extern double lines;
+extern std::vector<std::pair<uint32_t, uint64_t>> accessed;
+extern uint32_t accesses;
+
 // Runs the warp whose first invocation is `first`, and adds its cost to that of each phase. `END` is the number of blocks.
 typedef void (*Program)(uint32_t first, uint32_t workgroup, Cost* phases);
 extern const Program sweep, reading, observe, judge_cycles;
@@ -43,8 +52,8 @@ template <class Lane, const Block<Lane>* BLOCKS, int END> void run_warp(uint32_t
         int block, until;
         uint32_t lanes;
     };
-    static Lane lanes[WIDTH];
-    for (uint32_t n = 0; n < WIDTH; n++) (Place&)lanes[n] = {(first + n) / workgroup, 0, (first + n) % workgroup};
+    static Lane warp[WIDTH];
+    for (uint32_t n = 0; n < WIDTH; n++) (Place&)warp[n] = {(first + n) / workgroup, 0, (first + n) % workgroup};
     std::vector<Part> parts{{0, END, 0xffffffffu}};
     while (!parts.empty()) {
         Part& part = parts.back();
@@ -57,11 +66,15 @@ template <class Lane, const Block<Lane>* BLOCKS, int END> void run_warp(uint32_t
         int target = -1, other = -1;
         uint32_t taken = 0;
         for (uint32_t rest = part.lanes; rest; rest &= rest - 1) {
-            const int n = __builtin_ctz(rest), next = block.run(lanes[n]);
+            accesses = 0;
+            const int n = __builtin_ctz(rest), next = block.run(warp[n]);
             if (!taken) target = next;
             if (next == target) taken |= 1u << n;
             else other = next;
         }
+        std::sort(accessed.begin(), accessed.end());
+        lines += std::unique(accessed.begin(), accessed.end()) - accessed.begin();
+        accessed.clear();
         for (auto [phase, instructions] : block.counts) {
             phases[phase].issued += instructions;
             phases[phase].operations += instructions * __builtin_popcount(part.lanes);
@@ -86,6 +99,10 @@ template <class To, class From> To as(From from) {
 }
 template <class To, class From> void set(To& to, From from) { to = as<To>(from); }
 template <class T> T& at(uint64_t address) { return *(T*)address; }
+template <class T> T& global(uint64_t address) {
+    accessed.push_back({accesses++, address / LINE});
+    return at<T>(address);
+}
 
 template <class T> T shifted_left(T a, uint32_t by) { return by < 8 * sizeof a ? a << by : 0; }
 template <class T> T shifted_right(T a, uint32_t by) { return by < 8 * sizeof a ? a >> by : 0; }

@@ -16,8 +16,8 @@ pub(super) struct DispatchPolicy {
     pub(super) first_periods: u32,
     /// Number of rounds after which results of ended lanes are read even if few lanes have ended, provided that further lanes can begin.
     pub(super) patience: u32,
-    /// Whether lanes begin in a variant without the tangent vector and change to the variant with the vector when they need it. This reduces the
-    /// work, but the variants run one after the other.
+    /// Whether lanes begin in a variant without the tangent vector and change to the variant with the vector when they need it. This
+    /// reduces the work, but the variants run one after the other.
     pub(super) late_tangent: bool,
     /// If a list has at most this many lanes, each gets a warp of its own.
     pub(super) few_lanes: u32,

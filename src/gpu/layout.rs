@@ -39,8 +39,13 @@ macro_rules! structs {
                 ],
             )),*];
             let declared = structs.map(|(name, fields)| {
+                let align = match name {
+                    "Domain" | "Law" => "@align(FOUR_REALS) ",
+                    "Cell" => "@align(16) ",
+                    _ => "",
+                };
                 let fields: String = fields.iter().map(|(name, of)| format!("    {name}: {of},\n")).collect();
-                format!("struct {name} {{\n{fields}}}\n\n")
+                format!("struct {name} {{\n    {align}{}}}\n\n", fields.trim_start())
             });
             declared.concat()
         }
@@ -181,6 +186,8 @@ structs! {
         share: f64,
         // Steps of this domain per free step.
         substeps: f64,
+        // Fills the struct to a multiple of four numbers.
+        unused: [f64; 2],
     }
 
     /// Constants that lanes share if they differ only in the contact law. Each stage and each interval between walls has such a struct.
@@ -224,6 +231,8 @@ structs! {
         push: [f64; 3],
         // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters the wall.
         preload: [[f64; 2]; 2],
+        // Fills the struct to a multiple of four numbers.
+        unused: [f64; 2],
     }
 
     /// Whole numbers of a flow.
@@ -263,7 +272,16 @@ pub fn length_of(name: &str, dim: usize) -> usize {
     let (fields, _) = from.split_once('}').expect("a struct ends");
     let fields = fields.lines().map(str::trim).filter(|line| !line.starts_with("//"));
     let types = fields.filter_map(|field| field.strip_suffix(',')?.split_once(": "));
-    types.map(|(_, of)| length_of_type(of, dim)).sum()
+    let mut length = 0;
+    let mut unit = 1;
+    for (name, of) in types {
+        if name.starts_with("@align") {
+            unit = 4;
+            length = usize::next_multiple_of(length, unit);
+        }
+        length += length_of_type(of, dim);
+    }
+    length.next_multiple_of(unit)
 }
 
 /// Returns how many numbers a type has.

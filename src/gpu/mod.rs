@@ -50,7 +50,7 @@ pub use machine::MachineShape;
 pub use pool::Pool;
 pub use precision::Precision;
 pub use reading::LaneResult;
-use shader::WORKGROUP;
+use shader::workgroup;
 pub use shader::{Tangents, Variant};
 pub use stage::{DeviceTimes, Stage};
 pub use tables::Tables;
@@ -196,7 +196,7 @@ impl Default for LaneSettings {
             steps_per_period: None,
             batch: None,
             iterations: 4000,
-            workgroup: WORKGROUP,
+            workgroup: workgroup(),
             passes_per_period: MOST_STEPS,
             events_per_period: 10_000,
             most_events: MOST_EVENTS,

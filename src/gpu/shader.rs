@@ -52,7 +52,14 @@ pub enum Tangents {
 }
 
 /// Default number of invocations per workgroup.
-pub(super) const WORKGROUP: u32 = 64;
+const WORKGROUP: u32 = 64;
+
+/// Returns the number of invocations per workgroup: the default, or 32, 64, 128 or 256 by the environment variable
+/// RATTLEMAP_WORKGROUP. `scripts/measure_gpu.sh` sets it to compare their speed; records do not depend on it.
+pub(super) fn workgroup() -> u32 {
+    let asked = std::env::var("RATTLEMAP_WORKGROUP").ok().and_then(|text| text.parse().ok());
+    asked.filter(|size| [32, 64, 128, 256].contains(size)).unwrap_or(WORKGROUP)
+}
 
 /// Sources that both engines of motion share.
 const COMMON: &str = concat!(

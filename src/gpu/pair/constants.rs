@@ -299,6 +299,7 @@ fn page_of(oscillator: &Pair, common: &Common, pages_behind: [Option<usize>; 2])
         held: [0.0; 3],
         push: [0.0; 3],
         preload: Side::BOTH.map(|side| coordinates.preload(oscillator, side).map(|rate| -h * h * rate)),
+        unused: [0.0; 2],
     };
     (flow, Page { harmonics, contacts: oscillator.contacts, behind: pages_behind })
 }
@@ -416,6 +417,7 @@ fn domain(oscillator: &Pair, domain: &model::Domain, wall: f64, free_step: f64, 
         damping: power_form(oscillator, domain, free_step),
         share: substeps.recip(),
         substeps,
+        unused: [0.0; 2],
     }
 }
 
@@ -465,6 +467,7 @@ fn held(oscillator: &Pair, wall: f64, h: f64) -> Domain {
         damping: power_form(oscillator, &oscillator.free, h),
         share: 1.0,
         substeps: 1.0,
+        unused: [0.0; 2],
     }
 }
 
