@@ -16,6 +16,9 @@ from .engine import warn
 from .errors import FolderError
 
 
+_KINDS = ("class", "period", "pattern", "word", "motion", "quantity")
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Differences between two maps. :func:`compare` returns it.
@@ -28,13 +31,17 @@ class Comparison:
         Number of cells with different classes, and of periodic cells with different periods.
     by_pattern, by_word
         Number of cells with equal periods that differ by pattern, or by word if a map has no patterns.
+    by_motion, by_quantity
+        Number of further cells with equal periods whose states at phase 0 belong to different cycles, up to mirror image, and of
+        those with the same cycle of which a quantity differs.
     differing
         Number of cells that differ by class or period.
     transitions
         One row per pair of different classes: class ``a`` in the first map, ``b`` in the second, and the number of ``cells``.
     table
         One row per differing cell, as in ``compare.csv``: indices, swept values, ``class_a``, ``period_a``, ``class_b``,
-        ``period_b``, ``lyapunov_a``, ``lyapunov_b``, and ``kind`` (``class``, ``period``, ``pattern``, ``word``).
+        ``period_b``, ``lyapunov_a``, ``lyapunov_b``, ``kind`` (``class``, ``period``, ``pattern``, ``word``, ``motion``,
+        ``quantity``), and ``quantities``: the names of those that differ, with spaces between.
     data
         The object that ``rattlemap compare --json`` prints, without the folder and its files.
     """
@@ -45,18 +52,24 @@ class Comparison:
     by_period: int
     by_pattern: int
     by_word: int
+    by_motion: int
+    by_quantity: int
     transitions: pd.DataFrame
     table: pd.DataFrame = field(repr=False)
     data: dict[str, Any] = field(repr=False)
 
 
-def compare(a: str | os.PathLike[str] | xr.Dataset, b: str | os.PathLike[str] | xr.Dataset) -> Comparison:
+def compare(
+    a: str | os.PathLike[str] | xr.Dataset, b: str | os.PathLike[str] | xr.Dataset, tolerance: float = 0.05
+) -> Comparison:
     """Compare two finished maps of the same cells, like ``rattlemap compare``.
 
     Parameters
     ----------
     a, b
         Folders of maps, or Datasets that :func:`rattlemap.open` has returned.
+    tolerance
+        Difference of a quantity that counts, relative to the larger of both values; of angles, in radians.
 
     Returns
     -------
@@ -76,11 +89,11 @@ def compare(a: str | os.PathLike[str] | xr.Dataset, b: str | os.PathLike[str] | 
     >>> rm.compare("up", "down").cells
     16
     """
-    result, text, warnings = _native.compare(_folder(a), _folder(b))
+    result, text, warnings = _native.compare(_folder(a), _folder(b), tolerance)
     warn(warnings)
     data = json.loads(result)
     return Comparison(
-        **{name: data[name] for name in ("cells", "differing", "by_class", "by_period", "by_pattern", "by_word")},
+        **{name: data[name] for name in ("cells", "differing", *(f"by_{kind}" for kind in _KINDS))},
         transitions=pd.DataFrame(data["transitions"], columns=["a", "b", "cells"]),
         table=pd.DataFrame(dataset.table_columns(dataset.text_table(StringIO(text)))),
         data=data,

@@ -54,11 +54,16 @@ pub(crate) fn check_folder(
 
 /// Compares two finished maps. Returns the result as JSON, `compare.csv`, and warnings.
 #[pyfunction]
-pub(crate) fn compare(py: Python<'_>, a: PathBuf, b: PathBuf) -> PyResult<(String, String, Vec<String>)> {
+pub(crate) fn compare(
+    py: Python<'_>,
+    a: PathBuf,
+    b: PathBuf,
+    tolerance: f64,
+) -> PyResult<(String, String, Vec<String>)> {
     worker::run(py, None, move |watch| {
         let job = CompareJob::open([&a, &b])?;
         let observer = Collector::new(watch);
-        let Some(result) = job.compare(&observer, watch.halt())? else { return Ok(None) };
+        let Some(result) = job.compare(tolerance, &observer, watch.halt())? else { return Ok(None) };
         let (json, table) = in_memory::comparison(&result.pair(&result.cells()))?;
         Ok(Some((json, table, observer.lines())))
     })

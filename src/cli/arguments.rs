@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use crate::cli::failure::Failure;
 use crate::cli::say;
+use crate::findings::compare::TOLERANCE;
 use crate::gpu::Precision;
 use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
 use crate::map::scene::{Along, FigureStyle, Format, MAX_PERIODS, toml};
@@ -60,7 +61,7 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
 /// # Errors
 /// The exit code, if the program should end.
 pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
-    P::try_parse_from(arguments).map_err(|mut error| {
+    P::try_parse_from(joined(arguments)).map_err(|mut error| {
         if error.use_stderr() {
             advise_set(&mut error);
             quote(&mut error);
@@ -72,6 +73,18 @@ pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsStrin
         }
         error.exit_code() as u8
     })
+}
+
+/// Turns `--fail quantities` into `--fail=quantities`. Other arguments after `--fail` are folders, because its value is optional.
+fn joined(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+    let mut all: Vec<OsString> = Vec::new();
+    for argument in arguments {
+        match all.last_mut() {
+            Some(last) if last == "--fail" && argument == "quantities" => last.push("=quantities"),
+            _ => all.push(argument),
+        }
+    }
+    all
 }
 
 /// Adds advice to the error for an argument `NAME=VALUE` without `--set`.
@@ -761,14 +774,30 @@ pub(crate) struct Validate {
     pub(crate) quiet: bool,
 }
 
-/// Compare two finished maps of the same cells: by class, period and pattern
+/// Reads a share between 0 and 1.
+fn parse_share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|share| *share > 0.0 && *share < 1.0);
+    share.ok_or_else(|| "a number above 0 and below 1 is needed, such as 0.05".to_owned())
+}
+
+/// What makes `compare --fail` fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FailOn {
+    /// Class or period.
+    Class,
+    /// Everything that compare.csv lists.
+    Quantities,
+}
+
+/// Compare two finished maps of the same cells: by class, period, pattern, motion and quantities
 ///
 /// Use it to compare starts (start.policy up and down), engines or versions. The axes must have the same values;
 /// differences of other parameters are listed. Writes compare.csv (one row per differing cell), compare.png and
 /// manifest.json. A cell differs if its class or period differs. Cells that differ only by pattern (by word if a map has
-/// no patterns) are listed, drawn and counted separately. For cells of equal period the summary also counts differences
-/// in symmetry, words and patterns, and gives the largest difference of exponents. A motion and its mirror image have the
-/// same word. Filled cells of adaptive maps are compared like the others.
+/// no patterns), by motion (if both maps store states) or by a quantity are listed, drawn and counted separately. Motions
+/// are compared up to mirror image, within 3 % of their size; quantities by --tolerance, if one of both motions is
+/// periodic. For cells of equal period the summary also counts differences in symmetry and words, and gives the largest
+/// difference of exponents. Filled cells of adaptive maps are compared like the others.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, hysteresis:\n  \
     rattlemap map scenes/e_omega.toml --set start.policy=up --out out/up\n  \
@@ -783,9 +812,15 @@ pub(crate) struct Compare {
     #[arg(value_name = "B")]
     pub(crate) b: PathBuf,
 
-    /// Exit with code 1 if any cell differs by class or period. Patterns, words and exponents do not count
-    #[arg(long)]
-    pub(crate) fail: bool,
+    /// Exit with code 1 if any cell differs by class or period; with `--fail quantities`, if any cell is listed in
+    /// compare.csv
+    #[arg(long, value_name = "class|quantities", num_args = 0..=1, require_equals = true, default_missing_value = "class")]
+    pub(crate) fail: Option<FailOn>,
+
+    /// Difference of a quantity that counts, relative to the larger of both values; of angles, in radians. Values below
+    /// a thousandth of this share of the map's largest one count as zero
+    #[arg(long, value_name = "SHARE", default_value_t = TOLERANCE, value_parser = parse_share)]
+    pub(crate) tolerance: f64,
 
     /// Folder to write to [default: out/compare/<A's name>-<B's name>]
     #[arg(long, value_name = "DIR")]

@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
 
 /// Describes where the two passes differ.
 fn described(found: &Hysteresis, name: &str) -> String {
-    let Hysteresis { columns, differing, ranges, by_pattern, pattern_ranges } = found;
+    let Hysteresis { columns, differing, ranges, .. } = found;
     let by_class = match differing {
         0 => format!("up and down have the same class and period in all {columns} columns"),
         _ => format!(
@@ -90,15 +90,14 @@ fn described(found: &Hysteresis, name: &str) -> String {
             listed(ranges)
         ),
     };
-    match by_pattern {
-        0 => by_class,
-        _ => {
-            let ranges = listed(pattern_ranges);
-            format!(
-                "{by_class}\nup and down differ by pattern only in {by_pattern} columns, at {name} = {ranges}"
-            )
-        }
-    }
+    let by = [
+        ("pattern", found.by_pattern, &found.pattern_ranges),
+        ("quantities", found.by_quantity, &found.quantity_ranges),
+    ];
+    let others = by.into_iter().filter(|(_, count, _)| *count > 0).map(|(what, count, ranges)| {
+        format!("\nup and down differ by {what} only in {count} columns, at {name} = {}", listed(ranges))
+    });
+    [by_class].into_iter().chain(others).collect()
 }
 
 fn listed(ranges: &[[f64; 2]]) -> String {

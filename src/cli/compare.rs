@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 
-use super::arguments::{Compare, figures_and_added};
+use super::arguments::{Compare, FailOn, figures_and_added};
 use super::console::Console;
 use super::failure::Failure;
 use super::interrupt::Interrupt;
 use super::say;
 use super::stdout::print_json;
-use crate::findings::compare::{Comparison, Kind, Tally};
+use crate::findings::compare::{Comparison, Kind, QuantityTally, Tally};
 use crate::job::compare::CompareJob;
 use crate::map::scene::Scene;
 use crate::show::map_pair::MapPair;
@@ -29,7 +29,8 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let folder = Folder::open(&out, arguments.force)?;
     folder.prepare(store::compare::names())?;
     interrupt.wait_for(Some("the maps are read"));
-    let result = job.compare(&Console::new(arguments.quiet, "", false), interrupt.raised())?;
+    let console = Console::new(arguments.quiet, "", false);
+    let result = job.compare(arguments.tolerance, &console, interrupt.raised())?;
     let stopped = || interrupt.failure(format!("interrupted, and nothing was written to {}", out.display()));
     let Some(result) = result.filter(|_| interrupt.wait_for(None)) else { return Err(stopped()) };
     let cells = result.cells();
@@ -38,16 +39,21 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let files = store::compare::write(&folder, &pair, (&formats, &style), clock.elapsed())?;
     if !arguments.quiet {
         let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
-        say::notes(format_args!("{}\n{files}", summary(&pair, job.scene())));
+        say::notes(format_args!("{}\n{files}", summary(&pair, job.scene(), arguments.tolerance)));
         say::removed(&folder);
     }
     if arguments.json {
         print_json(&store::compare::object(folder.path(), &files, &pair))?;
     }
-    let (differing, count) = (result.comparison.differing(), result.comparison.kinds.len());
-    match arguments.fail && differing > 0 {
-        true => Err(Failure::Run(anyhow!("{differing} of {count} cells differ by class or period"))),
-        false => Ok(()),
+    let count = result.comparison.kinds.len();
+    let (differing, by) = match arguments.fail {
+        None => return Ok(()),
+        Some(FailOn::Class) => (result.comparison.differing(), "class or period"),
+        Some(FailOn::Quantities) => (result.comparison.listed(), "class, period, motion or quantities"),
+    };
+    match differing {
+        0 => Ok(()),
+        _ => Err(Failure::Run(anyhow!("{differing} of {count} cells differ by {by}"))),
     }
 }
 
@@ -59,7 +65,7 @@ impl Compare {
 }
 
 /// Lists differences of scenes, engines, classes and periods, then differences between cells of equal class and period.
-fn summary(maps: &MapPair<'_>, scene: &Scene) -> String {
+fn summary(maps: &MapPair<'_>, scene: &Scene, tolerance: f64) -> String {
     let MapPair { sides, comparison } = maps;
     let (differing, cells) = (comparison.differing(), comparison.kinds.len());
     let differences = maps.scene_differences();
@@ -85,7 +91,20 @@ fn summary(maps: &MapPair<'_>, scene: &Scene) -> String {
         maps.transitions().iter().map(|pair| format!("{} in A, {} in B: {}", pair.a, pair.b, pair.cells)),
     );
     lines.extend(other_differences(comparison, scene));
+    lines.extend(comparison.quantities.iter().filter_map(|quantity| of_quantity(quantity, scene, tolerance)));
     lines.join("\n")
+}
+
+/// Describes the cells in which a quantity differs; none if it differs nowhere.
+fn of_quantity(quantity: &QuantityTally, scene: &Scene, tolerance: f64) -> Option<String> {
+    let QuantityTally { name, tally: Tally { compared, differing }, largest } = quantity;
+    let (place, percent) = (scene.points().named((*largest)?.id), 100.0 * tolerance);
+    let by = if name.contains("phase") || name.contains("argument") {
+        format!("{tolerance} rad")
+    } else {
+        format!("{percent} %")
+    };
+    Some(format!("{name} differs by more than {by} in {differing} of {compared} cells, most at {place}"))
 }
 
 /// Lists differences between cells of equal class and period, and in the number of attractors.
@@ -101,6 +120,7 @@ fn other_differences(comparison: &Comparison, scene: &Scene) -> Vec<String> {
         tally("in symmetry", comparison.symmetric),
         tally("by word", comparison.words),
         tally("by pattern", comparison.patterns),
+        tally("by motion", comparison.motions),
         exponents,
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();

@@ -43,6 +43,13 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     Some((0..cells).into_par_iter().map(count).collect())
 }
 
+/// Whether two periodic motions of a cell are one attractor.
+pub(crate) fn is_one(flow: &Flow, law: Law, motions: [&Record; 2]) -> bool {
+    let mut found = CellAttractors { law, chaos: false, torus: false, cycles: Vec::new() };
+    motions.into_iter().for_each(|record| found.take(flow, record));
+    found.count() == 1
+}
+
 /// Attractors of one cell.
 struct CellAttractors {
     law: Law,

@@ -1,8 +1,12 @@
 //! Comparison of two maps of one grid, cell by cell. Pure.
 //!
 //! It shows hysteresis between maps with policies up and down, and differences between engines or versions. Cells
-//! differ by class or period; cells that agree in both can still differ by pattern. Symmetry, words and exponents of
-//! cycles of one period are counted separately.
+//! differ by class or period; cells that agree in both can still differ by pattern, by motion or by quantities. Symmetry,
+//! words and exponents of cycles of one period are counted separately.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
 
 use crate::record::classify::classify;
 use crate::record::distance::apart;
@@ -22,6 +26,10 @@ named! {
         Pattern = "pattern",
         /// Cycles of one period with different words, if patterns are unknown.
         Word = "word",
+        /// Different cycles of one period, which are no mirror images.
+        Motion = "motion",
+        /// Cycles of one period with different quantities.
+        Quantity = "quantity",
     }
 }
 
@@ -57,17 +65,17 @@ impl Tally {
     }
 }
 
-/// Largest difference of the exponents of cycles of one period.
+/// Largest difference of a number of two maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Largest {
-    /// The difference, 0 or more; infinite if only one exponent is finite.
+    /// The difference, 0 or more; infinite if only one number is finite.
     pub difference: f64,
     /// Id of the cell.
     pub id: usize,
 }
 
 /// Result of a comparison.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Comparison {
     /// Difference in each cell, by id.
     pub kinds: Vec<Option<Kind>>,
@@ -84,9 +92,144 @@ pub struct Comparison {
     pub exponent: Option<Largest>,
     /// Numbers of attractors, if both maps count them.
     pub attractors: Tally,
+    /// Cycles of one period, up to mirror image.
+    pub motions: Tally,
+    /// Quantities that both maps have.
+    pub quantities: Vec<QuantityTally>,
+    /// Indices of the `quantities` that differ, for each cell in which any does.
+    pub differing_quantities: BTreeMap<usize, Vec<usize>>,
+}
+
+/// A quantity that both maps have, such as an amplitude.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QuantityTally {
+    /// Name of its column in tables.
+    pub name: String,
+    /// Cells in which it can be compared: one motion at least is periodic, because averages of aperiodic motions have
+    /// statistical errors.
+    pub tally: Tally,
+    /// Largest difference.
+    pub largest: Option<Largest>,
+}
+
+/// The values of quantities in the cells of two maps.
+pub struct Values<'a> {
+    /// Names of the quantities. The modulus of an angle stands in front of it.
+    pub names: Vec<String>,
+    /// Whether each is an angle in radians.
+    pub are_angles: Vec<bool>,
+    /// Returns the values of a cell in A and B.
+    #[allow(clippy::type_complexity, reason = "a closure with one argument")]
+    pub of: &'a (dyn Fn(usize) -> [Vec<Option<f64>>; 2] + Sync),
+}
+
+/// Difference of a quantity that counts, relative to the larger of both values, unless the caller names another.
+pub const TOLERANCE: f64 = 0.05;
+
+/// Share of a quantity's largest value in both maps below which differences are rounding.
+const ROUNDING: f64 = 1e-3;
+
+impl Values<'_> {
+    /// Returns the difference of two values of a quantity if it exceeds the tolerance, up to mirror image, and else 0; none if one
+    /// value is absent, or the modulus of the angle is as small as rounding.
+    fn difference(
+        &self,
+        nth: usize,
+        values: &[Vec<Option<f64>>; 2],
+        floors: &[f64],
+        tolerance: f64,
+    ) -> Option<f64> {
+        let [a, b] = values;
+        let (a_value, b_value) = a[nth].zip(b[nth])?;
+        let (difference, bar) = if self.are_angles[nth] {
+            let modulus = |of: &[Option<f64>]| nth.checked_sub(1).and_then(|before| of[before]);
+            let has_modulus =
+                [a, b].iter().all(|of| modulus(of).is_none_or(|size| size.abs() > floors[nth - 1]));
+            let turn = a_value - b_value;
+            (turn.sin().atan2(turn.cos()).abs(), if has_modulus { tolerance } else { return None })
+        } else {
+            // The mean of the mirror image has the other sign.
+            let [a, b] = [a_value, b_value].map(f64::abs);
+            (apart(a, b), (tolerance * a.max(b)).max(floors[nth]))
+        };
+        Some(if difference > bar { difference } else { 0.0 })
+    }
 }
 
 impl Comparison {
+    /// Compares the motions of cells of equal period. `is_same` returns whether both are one cycle up to mirror image; none for
+    /// other cells, or if the records do not tell.
+    pub fn take_motions(&mut self, is_same: impl Fn(usize) -> Option<bool> + Sync) {
+        let same: Vec<Option<bool>> = (0..self.kinds.len()).into_par_iter().map(&is_same).collect();
+        for (kind, same) in self.kinds.iter_mut().zip(same) {
+            self.motions.take(same.map(|same| !same));
+            *kind = kind.or((same == Some(false)).then_some(Kind::Motion));
+        }
+    }
+
+    /// Compares quantities: numbers differ if their difference exceeds this share of the larger one and a thousandth of the share of
+    /// the largest in both maps; angles if it exceeds the share of a radian. `classes` returns the classes of a cell.
+    pub fn take_quantities(
+        &mut self,
+        values: &Values<'_>,
+        tolerance: f64,
+        classes: impl Fn(usize) -> [Class; 2] + Sync,
+    ) {
+        let count = values.names.len();
+        let is_periodic = |class: &Class| matches!(class, Class::Periodic { .. });
+        let ids = || (0..self.kinds.len()).into_par_iter().filter(|&id| classes(id).iter().any(is_periodic));
+        let largest = |mut floors: Vec<f64>, values: Vec<Option<f64>>| {
+            for (floor, value) in floors.iter_mut().zip(values) {
+                *floor = value.map_or(*floor, |value| floor.max(value.abs()));
+            }
+            floors
+        };
+        let of_cell = |floors, id| (values.of)(id).into_iter().fold(floors, largest);
+        let joined = |a, b: Vec<f64>| largest(a, b.into_iter().map(Some).collect());
+        let floors = ids().fold(|| vec![0.0; count], of_cell).reduce(|| vec![0.0; count], joined);
+        let floors: Vec<f64> = floors.into_iter().map(|largest| ROUNDING * tolerance * largest).collect();
+        let compared = |id| {
+            let of_cell = (values.of)(id);
+            (
+                id,
+                (0..count)
+                    .map(|nth| values.difference(nth, &of_cell, &floors, tolerance))
+                    .collect::<Vec<_>>(),
+            )
+        };
+        let found: Vec<(usize, Vec<Option<f64>>)> = ids().map(compared).collect();
+        let new =
+            |name: &String| QuantityTally { name: name.clone(), tally: Tally::default(), largest: None };
+        self.quantities = values.names.iter().map(new).collect();
+        for (id, differences) in found {
+            let mut differing = Vec::new();
+            for (nth, (difference, quantity)) in differences.into_iter().zip(&mut self.quantities).enumerate()
+            {
+                quantity.tally.take(difference.map(|difference| difference > 0.0));
+                let Some(difference) = difference.filter(|difference| *difference > 0.0) else { continue };
+                differing.push(nth);
+                if quantity.largest.is_none_or(|largest| difference > largest.difference) {
+                    quantity.largest = Some(Largest { difference, id });
+                }
+            }
+            if !differing.is_empty() {
+                self.kinds[id] = self.kinds[id].or(Some(Kind::Quantity));
+                self.differing_quantities.insert(id, differing);
+            }
+        }
+    }
+
+    /// Returns the names of the quantities that differ in a cell.
+    pub fn names_of_differing(&self, id: usize) -> impl Iterator<Item = &str> {
+        let indices = self.differing_quantities.get(&id).into_iter().flatten();
+        indices.map(|&nth| self.quantities[nth].name.as_str())
+    }
+
+    /// Counts the cells with any kind of difference.
+    pub fn listed(&self) -> usize {
+        self.kinds.iter().flatten().count()
+    }
+
     /// Counts the cells with this kind of difference.
     pub fn count(&self, kind: Kind) -> usize {
         self.kinds.iter().filter(|of| **of == Some(kind)).count()
@@ -114,15 +257,7 @@ pub struct Side<'a> {
 /// # Panics
 /// If a map has fewer cells.
 pub fn compare(cells: usize, a: Side<'_>, b: Side<'_>) -> Comparison {
-    let mut found = Comparison {
-        kinds: Vec::with_capacity(cells),
-        symmetric: Tally::default(),
-        words: Tally::default(),
-        patterns: Tally::default(),
-        exponents: 0,
-        exponent: None,
-        attractors: Tally::default(),
-    };
+    let mut found = Comparison::default();
     let has_exponents = a.has_exponents && b.has_exponents;
     for id in 0..cells {
         let [a, b] = [a, b].map(|side| side.records.record(id));
@@ -223,7 +358,7 @@ mod tests {
         let b = [cycle(1, -0.1, b"36"), cycle(4, -0.1, b"36"), cycle(1, -0.1, b"36"), chaos()];
         let found = of(&a, &b);
         assert_eq!(found.kinds, [None, Some(Kind::Period), Some(Kind::Class), Some(Kind::Class)]);
-        assert_eq!((found.differing(), Kind::ALL.map(|kind| found.count(kind))), (3, [2, 1, 0, 0]));
+        assert_eq!((found.differing(), Kind::ALL.map(|kind| found.count(kind))), (3, [2, 1, 0, 0, 0, 0]));
         // Only cycles of one period are compared further.
         assert_eq!((found.exponents, found.symmetric.compared, found.words.compared), (1, 1, 1));
         let filled = b.map(|record| Record { valid: record.valid | valid::FILLED, ..record });
@@ -280,6 +415,33 @@ mod tests {
         assert_eq!(differ(&hashed(1, 80), &hashed(2, 80)), None, "it may be the mirror image");
         assert_eq!(differ(&hashed(1, 80), &hashed(1, 81)), Some(true));
         assert_eq!(differ(&hashed(1, 80), &Spelling::Whole(Word::cyclic(b"36"))), Some(true));
+    }
+
+    #[test]
+    fn motions_and_quantities_of_equal_cycles_are_compared() {
+        let cycles = [(); 5].map(|()| cycle(1, -0.1, b"36"));
+        let mut found = of(&cycles, &cycles);
+        found.take_motions(|id| [Some(true), Some(false), None, None, None].get(id).copied().flatten());
+        assert_eq!(found.motions, Tally { compared: 2, differing: 1 });
+        // Amplitude, phase and mean. The phase of a motion at rest means nothing; a mirror image has the opposite mean.
+        let a = [[1.0, 3.1, 0.5], [1.0, 0.2, 0.5], [1.0, 0.0, 0.0], [1e-9, 1.0, 0.0], [0.0, 0.0, 0.0]];
+        let b = [[1.04, -3.15, -0.5], [1.0, 0.1, 0.5], [1.06, 0.0, 0.0], [3e-9, 2.0, 0.0], [0.5, 0.0, 0.0]];
+        let values = |id: usize| [a, b].map(|side| side[id].map(Some).to_vec());
+        let names = ["amplitude_x", "phase_x", "mean_x"].map(str::to_owned).to_vec();
+        let values = Values { names, are_angles: vec![false, true, false], of: &values };
+        let classes = |id: usize| {
+            [Class::Periodic { period: 1 }, [Class::Chaotic, Class::Periodic { period: 1 }][id.min(1)]]
+        };
+        found.take_quantities(&values, 0.05, classes);
+        let tallies: Vec<Tally> = found.quantities.iter().map(|quantity| quantity.tally).collect();
+        let tally = |compared, differing| Tally { compared, differing };
+        assert_eq!(tallies, [tally(5, 2), tally(3, 1), tally(5, 0)]);
+        assert_eq!(found.kinds, [None, Some(Kind::Motion), Some(Kind::Quantity), None, Some(Kind::Quantity)]);
+        let names = |id| found.names_of_differing(id).collect::<Vec<_>>();
+        assert_eq!([names(0), names(1), names(4)], [vec![], vec!["phase_x"], vec!["amplitude_x"]]);
+        assert_eq!(found.quantities[0].largest, Some(Largest { difference: 0.5, id: 4 }));
+        found.take_quantities(&values, 0.05, |_| [Class::Chaotic; 2]);
+        assert!(found.quantities.iter().all(|quantity| quantity.tally.compared == 0), "averages of chaos");
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Hysteresis: values at which the two passes of a diagram differ.
 
-use crate::findings::compare::{Kind, words_differ};
+use crate::findings::compare::{Comparison, Kind, TOLERANCE, Values, words_differ};
 use crate::map::bifurcation::{Column, Direction};
+use crate::record::measures;
 
 /// Values of the axis at which the motion depends on the direction in which the attractor was followed.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,19 +18,39 @@ pub struct Hysteresis {
     pub by_pattern: usize,
     /// First and last value of each range of neighbouring values at which only the patterns differ.
     pub pattern_ranges: Vec<[f64; 2]>,
+    /// Number of values at which only quantities differ, by more than [`TOLERANCE`], and their ranges. They are those that the
+    /// scene requests, impacts, the mesh fraction and the largest speed at a wall.
+    pub by_quantity: usize,
+    /// First and last value of each range of neighbouring values at which only quantities differ.
+    pub quantity_ranges: Vec<[f64; 2]>,
 }
 
 /// Compares the two passes of a diagram; none if it has one pass.
 pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
     let pass = |direction| columns.iter().filter(move |column| column.direction == Some(direction));
     let [up, down] = Direction::ALL.map(pass);
-    let (mut differing, mut by_pattern) = (Runs::default(), Runs::default());
-    for (up, down) in up.zip(down) {
-        let differs = Kind::of(up.class, down.class).is_some();
-        differing.take(up.value, differs);
+    let pairs: Vec<[&Column; 2]> = up.zip(down).map(|(up, down)| [up, down]).collect();
+    let kind = |[up, down]: &[&Column; 2]| {
         // Patterns are compared, because words also count the bounces before meshing.
-        let patterns = up.pattern().zip(down.pattern());
-        by_pattern.take(up.value, !differs && patterns.is_some_and(|(up, down)| words_differ(&up, &down)));
+        let other_pattern =
+            up.pattern().zip(down.pattern()).is_some_and(|(up, down)| words_differ(&up, &down));
+        Kind::of(up.class, down.class).or(other_pattern.then_some(Kind::Pattern))
+    };
+    let mut compared = Comparison { kinds: pairs.iter().map(kind).collect(), ..Comparison::default() };
+    let values = Values {
+        names: std::iter::repeat_n(String::new(), AVERAGES + measures::all().count()).collect(),
+        are_angles: [false; AVERAGES]
+            .into_iter()
+            .chain(measures::all().map(|measure| measure.is_angle()))
+            .collect(),
+        of: &|nth| pairs[nth].map(quantities),
+    };
+    compared.take_quantities(&values, TOLERANCE, |nth| pairs[nth].map(|column| column.class));
+    let [mut differing, mut by_pattern, mut by_quantity] = [(); 3].map(|()| Runs::default());
+    for ([up, _], kind) in pairs.iter().zip(&compared.kinds) {
+        differing.take(up.value, kind.is_some_and(Kind::is_decisive));
+        by_pattern.take(up.value, *kind == Some(Kind::Pattern));
+        by_quantity.take(up.value, *kind == Some(Kind::Quantity));
     }
     (differing.total > 0).then_some(Hysteresis {
         columns: differing.total,
@@ -37,7 +58,26 @@ pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
         ranges: differing.ranges,
         by_pattern: by_pattern.count,
         pattern_ranges: by_pattern.ranges,
+        by_quantity: by_quantity.count,
+        quantity_ranges: by_quantity.ranges,
     })
+}
+
+/// Number of quantities in front of the measured ones.
+const AVERAGES: usize = 3;
+
+/// Returns the quantities of a column.
+fn quantities(column: &Column) -> Vec<Option<f64>> {
+    let speeds = column.points.iter().flat_map(|point| point.before.iter().skip(1).step_by(2));
+    let fastest = speeds.fold(0.0, |fastest: f64, speed| fastest.max(speed.abs()));
+    let averages: [f64; AVERAGES] = [column.impacts_per_period, column.mesh_fraction, fastest];
+    let measured = measures::all().map(|measure| column.measures[measure.place]);
+    averages
+        .map(Some)
+        .into_iter()
+        .chain(measured)
+        .map(|value| value.filter(|value| value.is_finite()))
+        .collect()
 }
 
 /// Values at which a condition holds, as ranges of neighbours.
@@ -90,8 +130,17 @@ mod tests {
             spell(i, word);
         }
         let ranges = vec![[1.0, 2.0], [5.0, 5.0]];
-        let expected =
-            Hysteresis { columns: 7, differing: 3, ranges, by_pattern: 1, pattern_ranges: vec![[0.0, 0.0]] };
+        (both[3].mesh_fraction, both[10].mesh_fraction) = (0.5, 0.6);
+        (both[4].mesh_fraction, both[11].mesh_fraction) = (0.5, 0.6);
+        let expected = Hysteresis {
+            columns: 7,
+            differing: 3,
+            ranges,
+            by_pattern: 1,
+            pattern_ranges: vec![[0.0, 0.0]],
+            by_quantity: 1,
+            quantity_ranges: vec![[4.0, 4.0]],
+        };
         assert_eq!(hysteresis(&both), Some(expected));
         assert_eq!(hysteresis(&[column(None, 0.0, one)]), None);
     }

@@ -4,16 +4,19 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::findings::coexistence;
-use crate::findings::compare::{self, Comparison, Side};
+use crate::findings::compare::{self, Comparison, Side, Values};
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap};
 use crate::job::observer::Observer;
+use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
-use crate::record::Records;
+use crate::record::classify::classify;
+use crate::record::{Records, valid};
 use crate::show::cells::{Cells, Survey};
 use crate::show::map_pair::{MapPair, MapSide};
 use crate::store::finished_map::FinishedMap;
+use rattlemap_dynamics::orbit::Class;
 
 /// Two finished maps that can be compared.
 pub struct CompareJob<'a> {
@@ -62,13 +65,14 @@ impl<'a> CompareJob<'a> {
         }
     }
 
-    /// Reads all records and compares them. Damage that affects no record is reported to the observer. Returns none if
-    /// `halt` is raised.
+    /// Reads all records and compares them. Quantities differ if their difference exceeds this share of the larger value. Damage that
+    /// affects no record is reported to the observer. Returns none if `halt` is raised.
     ///
     /// # Errors
     /// [`JobError`] if the records of a map cannot be read.
     pub fn compare(
         &self,
+        tolerance: f64,
         observer: &dyn Observer,
         halt: &AtomicBool,
     ) -> Result<Option<MapComparison<'_>>, JobError> {
@@ -91,10 +95,70 @@ impl<'a> CompareJob<'a> {
             attractors: counts[i].as_deref(),
             has_exponents: self.scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
         });
-        let comparison = compare::compare(loaded[0].plan.cell_count(), a, b);
+        let mut comparison = compare::compare(loaded[0].plan.cell_count(), a, b);
+        compare_motions(&mut comparison, &loaded);
+        if is_halted() {
+            return Ok(None);
+        }
+        compare_quantities(&mut comparison, &loaded, &self.scenes, tolerance);
+        if is_halted() {
+            return Ok(None);
+        }
         let surveys = loaded.each_mut().map(|map| Survey::of_refinement(map.stored.refined.take()));
         Ok(Some(MapComparison { job: self, loaded, surveys, comparison }))
     }
+}
+
+/// Compares the cycles of equal period whose strobe states both maps have.
+fn compare_motions(comparison: &mut Comparison, loaded: &[LoadedMap; 2]) {
+    let plan = &loaded[0].plan;
+    let flows = Flows::new(plan);
+    comparison.take_motions(|id| {
+        let [a, b] = loaded.each_ref().map(|map| map.stored.records.record(id));
+        let have_state = a.valid & b.valid & valid::STROBE != 0;
+        let is_cycle = matches!(classify(&a), Class::Periodic { .. }) && classify(&a) == classify(&b);
+        let cell = plan.cell(id as u32);
+        let is_one = |flow: &_| coexistence::is_one(flow, plan.law(cell.law), [&a, &b]);
+        (have_state && is_cycle).then(|| flows.with(cell.flow, is_one))
+    });
+}
+
+/// Compares the quantities that both maps have. States depend on the strobe of a cycle at which a run ends, and are left out.
+fn compare_quantities(
+    comparison: &mut Comparison,
+    loaded: &[LoadedMap; 2],
+    scenes: &[Scene; 2],
+    tolerance: f64,
+) {
+    let cells = [0, 1].map(|i| Cells::new(&scenes[i], &loaded[i].plan, &loaded[i].stored.records));
+    let [a, b] = cells.map(|cells| cells.numbers());
+    let is_shared = |name: &str| b.iter().position(|other| other.name == name);
+    let shared: Vec<[&_; 2]> = a
+        .iter()
+        .filter(|number| number.quantity != Quantity::State)
+        .filter_map(|number| Some([number, &b[is_shared(&number.name)?]]))
+        .collect();
+    let names = shared.iter().map(|[number, _]| number.name.clone());
+    let of = |id| {
+        [0, 1].map(|i| {
+            let row = cells[i].row(id);
+            let averages = [row.impacts_per_period, row.mesh_fraction];
+            averages
+                .into_iter()
+                .chain(shared.iter().map(|pair| pair[i].of_cell(&cells[i], id, &row)))
+                .collect()
+        })
+    };
+    let values = Values {
+        names: ["impacts_per_period", "mesh_fraction"].map(str::to_owned).into_iter().chain(names).collect(),
+        are_angles: [false, false]
+            .into_iter()
+            .chain(shared.iter().map(|[number, _]| number.is_angle()))
+            .collect(),
+        of: &of,
+    };
+    let classes = |id| loaded.each_ref().map(|map| classify(&map.stored.records.record(id)));
+    comparison.take_quantities(&values, tolerance, classes);
 }
 
 /// Two finished maps, and the cells in which they differ.

@@ -1,5 +1,7 @@
 //! Two maps of one grid and the differences between their cells and scenes.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use crate::findings::compare::Comparison;
@@ -75,15 +77,14 @@ impl MapPair<'_> {
 
     /// Counts the cells with different classes in A and B, by their classes.
     pub fn transitions(&self) -> Vec<ClassTransition> {
-        let mut counts = [[0usize; 4]; 4];
-        self.classes().for_each(|[a, b]| counts[a.index()][b.index()] += 1);
-        let pairs = (0..4).flat_map(|a| (0..4).map(move |b| (a, b)));
-        let differing = pairs.filter(|&(a, b)| a != b && counts[a][b] > 0);
-        let transition = |(a, b): (usize, usize)| ClassTransition {
+        let mut counts = BTreeMap::new();
+        let differing = self.classes().map(|pair| pair.map(Class::index)).filter(|[a, b]| a != b);
+        differing.for_each(|pair| *counts.entry(pair).or_default() += 1);
+        let transition = |([a, b], cells): ([usize; 2], usize)| ClassTransition {
             a: Class::NAMES[a],
             b: Class::NAMES[b],
-            cells: counts[a][b],
+            cells,
         };
-        differing.map(transition).collect()
+        counts.into_iter().map(transition).collect()
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::findings::compare::{Kind, Tally};
+use crate::findings::compare::{Kind, QuantityTally, Tally};
 use crate::map::scene::{FigureStyle, Format};
 use crate::show::drawing::write_figure;
 use crate::show::figure;
@@ -27,8 +27,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     [MANIFEST, DIFFERENCES].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
 }
 
-/// Describes the result of the comparison. `by_pattern` and `by_word` count cells that agree in class and period and differ
-/// by pattern, or by word if a map has no patterns. Counts over cells with one period are null if a map has no such values;
+/// Describes the result of the comparison. `by_pattern`, `by_word`, `by_motion` and `by_quantity` count cells that agree in class and
+/// period and differ by pattern, by word if a map has no patterns, else by motion, else by quantities. Counts over cells with one period are null if a map has no such values;
 /// the largest difference of exponents is null if it is infinite.
 pub(crate) fn result(compared: &MapPair<'_>) -> Value {
     let MapPair { sides, comparison } = compared;
@@ -47,6 +47,14 @@ pub(crate) fn result(compared: &MapPair<'_>) -> Value {
         (compared > 0).then(|| json!({ "compared": compared, "differing": differing }))
     };
     let indices = comparison.exponent.map(|largest| sides[0].cells.row(largest.id).indices);
+    let quantity = |quantity: &QuantityTally| {
+        let largest = quantity.largest.map(|largest| {
+            let [i, j] = sides[0].cells.row(largest.id).indices;
+            json!({ "difference": largest.difference, "i": i, "j": j })
+        });
+        json!({ "name": quantity.name, "compared": quantity.tally.compared, "differing": quantity.tally.differing, "largest": largest })
+    };
+    let compared_quantities = comparison.quantities.iter().filter(|quantity| quantity.tally.compared > 0);
     json!({
         "a": a,
         "b": b,
@@ -57,6 +65,8 @@ pub(crate) fn result(compared: &MapPair<'_>) -> Value {
         "by_period": comparison.count(Kind::Period),
         "by_pattern": comparison.count(Kind::Pattern),
         "by_word": comparison.count(Kind::Word),
+        "by_motion": comparison.count(Kind::Motion),
+        "by_quantity": comparison.count(Kind::Quantity),
         "transitions": compared.transitions(),
         "symmetric": tally(comparison.symmetric),
         "words": tally(comparison.words),
@@ -68,6 +78,8 @@ pub(crate) fn result(compared: &MapPair<'_>) -> Value {
             "j": indices.map(|[_, j]| j),
         },
         "attractors": tally(comparison.attractors),
+        "motions": tally(comparison.motions),
+        "quantities": compared_quantities.map(quantity).collect::<Vec<_>>(),
     })
 }
 

@@ -80,8 +80,9 @@ fn differing_cells_are_those_of_the_tables() {
     ]));
     let out = folder.path().join("out/compare/up-down");
     let (header, found) = rows(&out.join("compare.csv"));
-    assert_eq!(header, "i,j,omega,e,class_a,period_a,class_b,period_b,lyapunov_a,lyapunov_b,kind");
-    assert_eq!(found, differing);
+    assert_eq!(header, "i,j,omega,e,class_a,period_a,class_b,period_b,lyapunov_a,lyapunov_b,kind,quantities");
+    let decisive = found.iter().filter(|row| ["class", "period"].contains(&&*row[10]));
+    assert_eq!(decisive.map(|row| &row[..11]).collect::<Vec<_>>(), differing);
     let manifest = json(&out.join("manifest.json"));
     let printed = printed(&done);
     assert_eq!(
@@ -138,8 +139,8 @@ fn cells_that_differ_by_pattern_are_listed_and_do_not_fail() {
     let counts = ["differing", "by_pattern", "by_word"].map(|name| object[name].as_u64().unwrap());
     assert_eq!(counts, [0, differing as u64, 0]);
     let (_, rows) = rows(&folder.path().join("c/compare.csv"));
-    assert_eq!(rows.len(), differing);
-    assert!(rows.iter().all(|row| row[10] == "pattern"), "{rows:?}");
+    assert_eq!(rows.iter().filter(|row| row[10] == "pattern").count(), differing);
+    assert!(rows.iter().all(|row| row[10] == "pattern" || row[10] == "motion"), "{rows:?}");
     let picture = image::open(folder.path().join("c/compare.png")).unwrap().to_rgb8();
     let pixels = picture.pixels().filter(|pixel| pixel.0 == [0xf6, 0xd9, 0x8b]).count();
     assert!(pixels > 0, "no pixel has the colour of patterns");
@@ -208,6 +209,72 @@ fn of_other_sources(out: &Path) {
     fs::write(manifest, inventory::sealed(object).unwrap()).unwrap();
 }
 
+/// Where a response curve jumps, run-up and coast-down have equal class, period and pattern, and other amplitudes.
+#[test]
+fn cycles_of_equal_period_differ_by_motion_and_quantities() {
+    let folder = with_scene(
+        "model = 'kahraman-singh'
+        [[axis]]
+        parameter = 'F_m'
+        min = 0.15
+        max = 0.17
+        count = 2
+        [[axis]]
+        parameter = 'omega'
+        min = 0.7
+        max = 1.0
+        count = 13
+        [outputs]
+        quantities = ['class', 'pattern', 'amplitude']
+        files = ['csv']
+        ",
+    );
+    ["up", "down"].into_iter().for_each(|name| map(&folder, name, &[&format!("start.policy={name}")]));
+    let cells = ["up", "down"].map(|name| rows(&folder.path().join(format!("{name}/cells.csv"))));
+    let at = |column: &str| cells[0].0.split(',').position(|name| name == column).unwrap();
+    let (class, period, amplitude) = (at("class"), at("period"), at("amplitude_x"));
+    let far = cells[0].1.iter().zip(&cells[1].1).filter(|(up, down)| {
+        let [a, b] = [up, down].map(|row| row[amplitude].parse::<f64>().unwrap());
+        up[class] == "periodic" && up[period] == down[period] && (a - b).abs() > 0.05 * a.max(b)
+    });
+    let far = far.count();
+    assert!(far > 2, "{far} cells");
+    let done = compare(&folder, "up down --fail quantities --json --out c").code(1);
+    let object = printed(&done);
+    let (_, listed) = rows(&folder.path().join("c/compare.csv"));
+    let equal = listed.iter().filter(|row| row[5] == row[7] && row[4] == "periodic");
+    let named = equal.clone().filter(|row| row[11].split(' ').any(|name| name == "amplitude_x")).count();
+    assert_eq!(named, far, "{listed:?}");
+    assert!(equal.clone().all(|row| row[10] != "period" && row[10] != "class"));
+    let amplitudes =
+        object["quantities"].as_array().unwrap().iter().find(|of| of["name"] == "amplitude_x").unwrap();
+    assert!(amplitudes["differing"].as_u64().unwrap() as usize >= far, "{object}");
+    assert!(object["motions"]["differing"].as_u64().unwrap() as usize >= far, "{object}");
+    done.stderr(says(&["amplitude_x differs by more than 5 % in ", "error: ", "motion or quantities"]));
+    // Half of the larger amplitude is a larger tolerance, and folders may follow --fail.
+    compare(&folder, "--fail up up --quiet --out d").success();
+    let tolerant = printed(&compare(&folder, "up down --tolerance 0.5 --json --out e").success());
+    assert_ne!(tolerant["quantities"], object["quantities"]);
+    compare(&folder, "up down --tolerance 5").code(2).stderr(says(&["above 0 and below 1"]));
+}
+
+#[test]
+fn all_classes_are_compared() {
+    let folder = with_scene(include_str!("../../scenes/gallery/absorber_chain.toml"));
+    let few = ["axis.0.count=3", "axis.1.count=3"];
+    map(&folder, "a", &few);
+    let short = [
+        "integration.observed_periods=20",
+        "integration.transient_periods=20",
+        "integration.undecided_periods=0",
+    ];
+    map(&folder, "b", &[&few[..], &short].concat());
+    let object = printed(&compare(&folder, "a b --json").success());
+    let classes: Vec<&str> =
+        object["transitions"].as_array().unwrap().iter().filter_map(|pair| pair["a"].as_str()).collect();
+    assert!(classes.contains(&"quasi-periodic"), "{object}");
+}
+
 /// Lists have no indices along axes, and no figure.
 #[test]
 fn lists_of_cells_are_compared_row_by_row() {
@@ -221,7 +288,7 @@ fn lists_of_cells_are_compared_row_by_row() {
     map(&folder, "u", &["start.policy=state", "start.state=[0.5,4,-0.5,0]"]);
     compare(&folder, "out/s u --quiet --out c").success();
     let (header, _) = rows(&folder.path().join("c/compare.csv"));
-    assert_eq!(header, "e,omega,class_a,period_a,class_b,period_b,lyapunov_a,lyapunov_b,kind");
+    assert_eq!(header, "e,omega,class_a,period_a,class_b,period_b,lyapunov_a,lyapunov_b,kind,quantities");
     assert!(!folder.path().join("c/compare.png").exists());
     compare(&folder, "out/s out/t").code(2).stderr(says(&[
         "maps of different cells",

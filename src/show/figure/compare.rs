@@ -31,7 +31,7 @@ const fn entry(color: Color, text: &'static str, kind: Option<Kind>) -> CellColo
 /// All colours. Those of differences are from Okabe and Ito's colour-blind safe set.
 const COLORS: [CellColor; 10] = [
     entry([0xdc, 0xe9, 0xf4], "both periodic", None),
-    entry([0xf6, 0xd9, 0x8b], "both periodic, other pattern", None),
+    entry([0xf6, 0xd9, 0x8b], "both periodic, other", None),
     entry([0xbc, 0xbc, 0xbc], "both chaotic", None),
     entry([0xd9, 0xb0, 0xf8], "both undecided or failed", None),
     entry([0xd5, 0x5e, 0x00], "A periodic, B chaotic", Some(Kind::Class)),
@@ -42,8 +42,8 @@ const COLORS: [CellColor; 10] = [
     entry(QUASI_PERIODIC, "quasi-periodic in one", Some(Kind::Class)),
 ];
 
-/// Index of the colour of cells of equal period whose patterns differ, or whose words differ where there are no patterns.
-const OTHER_PATTERN: usize = 1;
+/// Index of the colour of cells of equal period that differ otherwise.
+const OTHER: usize = 1;
 
 /// Returns the index of the colour of a cell with the given classes in A and B.
 fn color_index(classes: [Class; 2]) -> usize {
@@ -64,18 +64,16 @@ fn color_index(classes: [Class; 2]) -> usize {
 /// Draws the comparison.
 pub fn draw(style: &FigureStyle, pair: &MapPair<'_>) -> Canvas {
     let index = |(classes, kind): ([Class; 2], &Option<Kind>)| match kind {
-        Some(kind) if !kind.is_decisive() => OTHER_PATTERN,
+        Some(kind) if !kind.is_decisive() => OTHER,
         _ => color_index(classes),
     };
     let indices: Vec<usize> = pair.classes().zip(&pair.comparison.kinds).map(index).collect();
     let [a, b] = pair.sides;
     let title = format!("Where two maps differ: A is {}, B is {}", a.name, b.name);
-    let other_pattern = match [Kind::Pattern, Kind::Word].map(|kind| pair.comparison.count(kind)) {
-        [_, 0] => COLORS[OTHER_PATTERN].text,
-        [0, _] => "both periodic, other word",
-        _ => "both periodic, other pattern or word",
-    };
-    let (subtitle, rows) = (subtitle(pair), rows(&indices, other_pattern));
+    let others = Kind::ALL.into_iter().filter(|kind| !kind.is_decisive() && pair.comparison.count(*kind) > 0);
+    let others: Vec<&str> = others.map(Kind::name).collect();
+    let other = format!("{} {}", COLORS[OTHER].text, others.join(" or "));
+    let (subtitle, rows) = (subtitle(pair), rows(&indices, &other));
     let figure =
         MapFigure { cells: a.cells, title: &title, subtitle: &subtitle, rows, bar: None, legend: LEGEND };
     figure.draw(style, |id| COLORS[indices[id]].color, |_, _| {})
@@ -110,7 +108,7 @@ fn subtitle(pair: &MapPair<'_>) -> String {
 }
 
 /// Returns the rows of the legend: colours with numbers and shares of cells, below the sum of their kind.
-fn rows(indices: &[usize], other_pattern: &str) -> Vec<LegendRow> {
+fn rows(indices: &[usize], other: &str) -> Vec<LegendRow> {
     let mut counts = [0usize; COLORS.len()];
     indices.iter().for_each(|&index| counts[index] += 1);
     let count = |cells: usize| format!("{cells}  ({:.2} %)", 100.0 * cells as f64 / indices.len() as f64);
@@ -126,7 +124,7 @@ fn rows(indices: &[usize], other_pattern: &str) -> Vec<LegendRow> {
         let (is_apart, text) = (!rows.is_empty(), text.to_owned());
         rows.push(LegendRow { key: LegendKey::Heading, text, cells: count(sum), is_apart });
         for (index, (entry, cells)) in entries().filter(|(_, (_, cells))| *cells > 0) {
-            let text = if index == OTHER_PATTERN { other_pattern } else { entry.text };
+            let text = if index == OTHER { other } else { entry.text };
             rows.push(LegendRow::of_color(entry.color, text, count(cells)));
         }
     }

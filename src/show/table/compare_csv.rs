@@ -1,4 +1,4 @@
-//! `compare.csv`: one row per cell in which two maps differ by class, period, pattern or word.
+//! `compare.csv`: one row per cell in which two maps differ by class, period, pattern, word, motion or quantities.
 
 use std::io::Write;
 
@@ -9,8 +9,8 @@ use crate::show::table::cell_columns::{CellRow, location_names};
 use rattlemap_dynamics::orbit::Class;
 
 /// Columns after indices and swept values.
-const COMPARE_FIELDS: [&str; 7] =
-    ["class_a", "period_a", "class_b", "period_b", "lyapunov_a", "lyapunov_b", "kind"];
+const COMPARE_FIELDS: [&str; 8] =
+    ["class_a", "period_a", "class_b", "period_b", "lyapunov_a", "lyapunov_b", "kind", "quantities"];
 
 /// Writes the table.
 pub fn write(out: impl Write, pair: &MapPair<'_>) -> Result<(), WriteError> {
@@ -28,6 +28,8 @@ pub fn write(out: impl Write, pair: &MapPair<'_>) -> Result<(), WriteError> {
             float(a.lyapunov),
             float(b.lyapunov),
             kind.name().to_owned(),
+            // Names of the quantities that differ.
+            pair.comparison.names_of_differing(id).collect::<Vec<_>>().join(" "),
         ]))?;
     }
     Ok(table.flush()?)

@@ -71,14 +71,18 @@ pub(crate) fn bifurcation(
 }
 
 /// Describes the values at which the result depends on the direction of the sweep. `ranges` are the first and the last
-/// value of each group of neighbours; `by_pattern` is the number of values at which only patterns differ.
+/// value of each group of neighbours; `by_pattern` and `by_quantity` are the numbers of values at which only patterns, or only quantities,
+/// differ.
 fn describe(found: Hysteresis) -> Value {
-    let Hysteresis { columns, differing, ranges, by_pattern, pattern_ranges } = found;
+    let Hysteresis { columns, differing, ranges, by_pattern, pattern_ranges, by_quantity, quantity_ranges } =
+        found;
     json!({
         "columns": columns,
         "differing": differing,
         "ranges": ranges,
         "by_pattern": by_pattern,
         "pattern_ranges": pattern_ranges,
+        "by_quantity": by_quantity,
+        "quantity_ranges": quantity_ranges,
     })
 }
