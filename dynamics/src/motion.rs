@@ -17,7 +17,8 @@ mod trajectory;
 pub use allowance::Allowance;
 pub(crate) use clock::Clock;
 pub use event::{
-    EVENTS_PER_PERIOD_CAP, EventKind, GapEvent, Observer, STEPS_PER_PERIOD_CAP, SlipEvent, States, Stop, Work,
+    EVENTS_PER_PERIOD_CAP, EventKind, GapEvent, Observer, STEPS_PER_PERIOD_CAP, SlipEvent, SlipKind, States,
+    Stop, Work,
 };
 pub use flow::{Engine, Flow};
 pub use slip::{Slip, Slips};

@@ -44,7 +44,7 @@ use crate::model::{Side, State};
 use crate::named;
 use crate::word::Word;
 
-pub use crate::motion::{DISPLACEMENTS, EventKind, place_of_displacement, place_of_gap};
+pub use crate::motion::{DISPLACEMENTS, EventKind, SlipKind, place_of_displacement, place_of_gap};
 
 /// One event on a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +65,21 @@ pub struct Event {
     pub after: State,
     /// Side of the lasting contact after the event, if there is one.
     pub meshing: Option<Side>,
+}
+
+/// One change of friction on a trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlipPoint {
+    /// What happened.
+    pub kind: SlipKind,
+    /// Index of the element with dry friction.
+    pub element: usize,
+    /// Time since phase 0 of the first period of the cycle or window; in a [`History`] since the start.
+    pub t: f64,
+    /// Time since the last phase 0, in `[0, T)`.
+    pub t_mod_period: f64,
+    /// State.
+    pub state: State,
 }
 
 /// The class of a motion.
@@ -182,8 +197,10 @@ pub struct Orbit {
     pub strobe: State,
     /// The wall of the lasting contact at that instant, if there is one.
     pub strobe_meshing: Option<Side>,
-    /// Events of one cycle, or of the last periods, in order of time.
+    /// Events at walls of one cycle, or of the last periods, in order of time.
     pub events: Vec<Event>,
+    /// Events of friction of the same periods.
+    pub slips: Vec<SlipPoint>,
     /// Forcing periods that `events` and `word` span.
     pub cycle_periods: u32,
     /// The forcing period `T`.

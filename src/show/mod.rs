@@ -8,6 +8,7 @@ pub mod color;
 mod color_difference;
 pub mod drawing;
 pub mod error;
+mod event_row;
 pub mod figure;
 pub mod instant;
 pub mod layers;

@@ -2,13 +2,13 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::model_file::several_gaps;
+use crate::show::event_row::{self, PlaceNames};
 use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
 use crate::show::parameters::{self, Parameters};
 use rattlemap_dynamics::model::{Model, State};
-use rattlemap_dynamics::orbit::{Event, History, Orbit};
+use rattlemap_dynamics::orbit::{Event, History, Orbit, SlipPoint};
 
 /// Returns the orbit of a model as a JSON object of several lines. Numbers are the shortest decimals that read back as the
 /// same number; numbers that are not finite become null.
@@ -28,7 +28,7 @@ pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         "periods_run": orbit.periods_run,
         "quantities": orbit_quantities::object(model, orbit),
         "strobe": components(model, &orbit.strobe),
-        "events": events(model, &orbit.events),
+        "events": events(model, &orbit.events, &orbit.slips),
     });
     object(model, properties, instant)
 }
@@ -46,7 +46,7 @@ pub fn history_to_json(
         "last_period": last,
         "forcing_period": history.forcing_period,
         "end": history.samples.last().map(|sample| components(model, &sample.state)),
-        "events": events(model, &history.events),
+        "events": events(model, &history.events, &history.slips),
     });
     object(model, properties, instant)
 }
@@ -55,24 +55,25 @@ fn components(model: &dyn Model, state: &State) -> Vec<f64> {
     state[..model.state_names().len()].to_vec()
 }
 
-fn events(model: &dyn Model, events: &[Event]) -> Vec<Value> {
-    let gaps = several_gaps(model);
-    let event = |(event, impulse): (&Event, Option<f64>)| {
+fn events(model: &dyn Model, events: &[Event], slips: &[SlipPoint]) -> Vec<Value> {
+    let names = PlaceNames::of(model);
+    let rows = event_row::rows(model, events, slips).into_iter().map(|row| {
         let mut object = json!({
-            "kind": event.kind.name(),
-            "side": names::side_code(event.side),
-            "t": event.t,
-            "t_mod_period": event.t_mod_period,
-            "before": components(model, &event.before),
-            "after": components(model, &event.after),
-            "impulse": impulse,
+            "kind": row.kind,
+            "side": row.side_code(),
+            "t": row.t,
+            "t_mod_period": row.t_mod_period,
+            "before": components(model, &row.before),
+            "after": components(model, &row.after),
+            "impulse": row.impulse(),
         });
-        if let Some(gaps) = &gaps {
-            object["gap"] = json!(gaps[event.gap]);
+        for (column, name) in names.columns(Some(row.place)).into_iter().filter(|(_, name)| !name.is_empty())
+        {
+            object[column] = name.into();
         }
         object
-    };
-    events.iter().zip(orbit_quantities::impulses(model, events)).map(event).collect()
+    });
+    rows.collect()
 }
 
 /// Returns an object of the parameters, these properties, and the state at a requested time.

@@ -8,7 +8,7 @@ use crate::show::numbers::Number;
 use crate::show::symbols::with_unit;
 use rattlemap_dynamics::model::{Model, Side};
 use rattlemap_dynamics::number::significant;
-use rattlemap_dynamics::orbit::{Event, Orbit};
+use rattlemap_dynamics::orbit::Orbit;
 
 /// Returns all measured quantities by name, and the approach speeds at each wall. A quantity that the motion does not have is
 /// null.
@@ -31,15 +31,8 @@ fn approaches(orbit: &Orbit, side: Side) -> Option<[f64; 2]> {
     (speeds.count > 0).then_some([speeds.mean, speeds.largest])
 }
 
-/// Returns the impulse of each event on its gap, which is negative at a right wall.
-pub(crate) fn impulses(model: &dyn Model, events: &[Event]) -> Vec<Option<f64>> {
-    let oscillator = model.oscillator().ok();
-    let of = |event: &Event| Some(oscillator.as_ref()?.gap_impulse(event.gap, [&event.before, &event.after]));
-    events.iter().map(of).collect()
-}
-
 /// Lines of a summary: their quantities, each with the word before its numbers.
-const LINES: [(&str, &[(Quantity, &str)]); 6] = [
+const LINES: [(&str, &[(Quantity, &str)]); 7] = [
     ("impact speed", &[(Quantity::ImpactSpeed, "mean"), (Quantity::ImpactSpeedMax, "largest")]),
     ("contact force", &[(Quantity::ContactForceMax, "largest"), (Quantity::ContactForceRms, "rms")]),
     (
@@ -49,6 +42,10 @@ const LINES: [(&str, &[(Quantity, &str)]); 6] = [
             (Quantity::ImpactEnergy, "energy of impacts"),
             (Quantity::Dissipated, "energy of dampers"),
         ],
+    ),
+    (
+        "friction",
+        &[(Quantity::FrictionEnergy, "energy per unit time"), (Quantity::StickFraction, "sticking fraction")],
     ),
     ("amplitude", &[(Quantity::Amplitude, "")]),
     ("root mean square", &[(Quantity::Rms, "")]),

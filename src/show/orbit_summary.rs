@@ -2,14 +2,14 @@
 
 use std::fmt::Write;
 
-use crate::model_file::several_gaps;
+use crate::show::event_row::{self, EventRow, Place, PlaceNames};
 use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
 use crate::show::symbols::with_unit;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 use rattlemap_dynamics::number::significant;
-use rattlemap_dynamics::orbit::{Class, Event, History, Orbit, Status};
+use rattlemap_dynamics::orbit::{Class, Event, History, Orbit, SlipPoint, Status};
 
 /// Largest number of events in the table, and number of events before those that are left out. The summary above the table
 /// stays on the screen.
@@ -39,10 +39,10 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         with_unit(&significant(orbit.forcing_period), units.time.as_deref())
     );
     text.push_str(&match orbit.strobe_meshing {
-        Some(side) if orbit.events.is_empty() => {
+        Some(side) if orbit.events.is_empty() && orbit.slips.is_empty() => {
             format!("none: always in contact with the {} wall\n", names::side(side))
         }
-        _ => events(model, &orbit.events),
+        meshing => events(model, &orbit.events, &orbit.slips, meshing.is_some() || orbit.mesh_fraction > 0.0),
     });
     text
 }
@@ -67,10 +67,10 @@ pub fn history_summary(
     facts.extend(instant.map(|instant| ("state", state(model, instant))));
     let mut text: String = facts.iter().map(|(label, value)| format!("{label:<21} {value}\n")).collect();
     text += &match history.meshing {
-        Some(side) if history.events.is_empty() => {
+        Some(side) if history.events.is_empty() && history.slips.is_empty() => {
             format!("\nno events: always in contact with the {} wall\n", names::side(side))
         }
-        _ => format!("\nevents\n{}", events(model, &history.events)),
+        meshing => format!("\nevents\n{}", events(model, &history.events, &history.slips, meshing.is_some())),
     };
     text
 }
@@ -199,9 +199,13 @@ fn state_in_units(model: &dyn Model, state: State) -> String {
     texts.collect::<Vec<_>>().join(" ")
 }
 
-fn events(model: &dyn Model, events: &[Event]) -> String {
-    if events.is_empty() {
-        return "none: the motion does not reach a wall\n".to_owned();
+fn events(model: &dyn Model, events: &[Event], slips: &[SlipPoint], is_in_contact: bool) -> String {
+    let rows = event_row::rows(model, events, slips);
+    if rows.is_empty() {
+        return match is_in_contact {
+            true => "none: contact neither begins nor ends\n".to_owned(),
+            false => "none: the motion does not reach a wall\n".to_owned(),
+        };
     }
     let (names, units) = (model.state_names(), model.units());
     let (count, time) = (names.len(), units.time.as_deref());
@@ -217,21 +221,23 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
         "impulse".to_owned(),
     ];
     let head = head.into_iter().chain(components(" before")).chain(components(" after")).collect();
-    let gaps = several_gaps(model);
-    let row = |(event, impulse): &(&Event, Option<f64>)| -> Vec<String> {
-        let side = names::side(event.side);
-        let side = gaps.as_ref().map_or(side.to_owned(), |gaps| format!("{} {side}", gaps[event.gap]));
-        let head = [event.kind.name().to_owned(), side];
-        let times = [event.t, event.t_mod_period].map(significant);
-        let impulse = impulse.map_or("-".to_owned(), significant);
-        let states = event.before[..count].iter().chain(&event.after[..count]).copied();
-        head.into_iter().chain(times).chain([impulse]).chain(states.map(significant)).collect()
+    let places = PlaceNames::of(model);
+    let row = |row: &EventRow| -> Vec<String> {
+        let side = match row.place {
+            Place::Wall { side, .. } => names::side(side),
+            Place::Element(_) => "",
+        };
+        let place = places.columns(Some(row.place)).into_iter().map(|(_, name)| name);
+        let place = place.chain([side]).filter(|text| !text.is_empty()).collect::<Vec<_>>().join(" ");
+        let times = [row.t, row.t_mod_period].map(significant);
+        let impulse = row.impulse().map_or("-".to_owned(), significant);
+        let states = row.before[..count].iter().chain(&row.after[..count]).copied();
+        let head = [row.kind.to_owned(), place].into_iter().chain(times);
+        head.chain([impulse]).chain(states.map(significant)).collect()
     };
-    let impulses = orbit_quantities::impulses(model, events);
-    let listed: Vec<(&Event, Option<f64>)> = events.iter().zip(impulses).collect();
-    let hidden = events.len().saturating_sub(MOST_ROWS);
-    let first = if hidden > 0 { FIRST_ROWS } else { events.len() };
-    let shown = listed[..first].iter().chain(&listed[first + hidden..]);
+    let hidden = rows.len().saturating_sub(MOST_ROWS);
+    let first = if hidden > 0 { FIRST_ROWS } else { rows.len() };
+    let shown = rows[..first].iter().chain(&rows[first + hidden..]);
     let mut lines = aligned(&[head].into_iter().chain(shown.map(row)).collect::<Vec<_>>());
     if hidden > 0 {
         lines.insert(1 + first, format!("... {hidden} more events; --json and --out list all of them"));

@@ -191,7 +191,7 @@ pub fn write_history(
     inventory::clear_for(folder, names())?;
     let moments = orbit_tables::moments(model, history)?;
     folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, model, &moments))?;
-    folder.replace(EVENTS, |out| orbit_tables::write_events(out, model, &history.events))?;
+    folder.replace(EVENTS, |out| orbit_tables::write_events(out, model, &history.events, &history.slips))?;
     let mut files = vec![TRAJECTORY, EVENTS];
     let plot = OrbitPlot::of_history(model, &request.start, history)?;
     let figure = figure::draw_history(style, &plot);
@@ -223,6 +223,7 @@ pub(crate) fn moments(
         meshing: orbit.strobe_meshing,
         samples,
         events: orbit.events.clone(),
+        slips: orbit.slips.clone(),
         samples_per_period,
         forcing_period: orbit.forcing_period,
     };

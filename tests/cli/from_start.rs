@@ -1,5 +1,6 @@
 //! `orbit --from-start`, and states at the exact time of an event.
 
+use std::f64::consts::PI;
 use std::fs;
 
 use serde_json::Value;
@@ -154,4 +155,38 @@ fn impossible_windows_are_refused() {
         let run = rattlemap(&empty()).arg("orbit").args(arguments).assert();
         run.code(2).stdout("").stderr(says(&[part]));
     }
+}
+
+/// A mass on a spring with dry friction, released from 0.85 mm, reverses at pi/100, 2 pi/100 and 3 pi/100 and sticks for good at 4 pi/100.
+#[test]
+fn reversals_and_sticking_are_events() {
+    let folder = empty();
+    let model = "name = 'pad'\n[motion]\ncoordinates = ['r']\nmass = [[1]]\nstiffness = [[1e4]]\nfrequency = 100\ngap = [1]\n\
+        [[friction]]\nforce = 1\n";
+    fs::write(folder.path().join("pad.toml"), model).unwrap();
+    let line = "orbit --model pad.toml --start=0.00085,0 --from-start 3";
+    let printed = run(&folder, &format!("{line} --out o --format svg")).success();
+    printed.stdout(says(&["reversal  friction", "stick     friction"]));
+    let (header, events) = rows(&folder.path().join("o/events.csv"));
+    assert_eq!(header, "kind,side,t,t_mod_period,before_r,before_v,after_r,after_v,impulse,element");
+    let kinds: Vec<[&str; 3]> = events.iter().map(|row| [&*row[0], &*row[1], &*row[9]]).collect();
+    let of = |kind| [kind, "", "friction"];
+    assert_eq!(kinds, [of("reversal"), of("reversal"), of("reversal"), of("stick")]);
+    for (row, n) in events.iter().zip(1..) {
+        let [t, r] = [2, 4].map(|column| row[column].parse::<f64>().unwrap());
+        let exact = [-0.65e-3, 0.45e-3, -0.25e-3, 0.05e-3][n - 1];
+        assert!((t - n as f64 * PI / 100.0).abs() < 1e-12 && (r - exact).abs() < 1e-15, "{row:?}");
+    }
+    let (header, moments) = rows(&folder.path().join("o/trajectory.csv"));
+    assert!(header.ends_with("event,side,moment,element"), "{header}");
+    let sticks: Vec<_> = moments.iter().filter(|row| row.contains(&"stick".to_owned())).collect();
+    assert_eq!(sticks.len(), 2, "before and after");
+    let figure = fs::read_to_string(folder.path().join("o/history.svg")).unwrap();
+    assert!(["sticking begins", "sliding reverses"].iter().all(|text| figure.contains(text)));
+    let object = run(&folder, "orbit --model friction-oscillator --json").success();
+    let object: Value = serde_json::from_slice(&object.get_output().stdout).unwrap();
+    let kinds: Vec<_> =
+        object["events"].as_array().unwrap().iter().map(|event| event["kind"].clone()).collect();
+    assert_eq!(kinds, ["stick", "slip", "stick", "slip"]);
+    assert!(object["events"][0]["side"].is_null() && object["events"][0]["element"] == "friction");
 }

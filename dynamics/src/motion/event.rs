@@ -47,6 +47,18 @@ named! {
     }
 }
 
+named! {
+    /// The kind of a change of friction.
+    pub enum SlipKind {
+        /// Sliding ends, and sticking begins.
+        Stick = "stick",
+        /// Sticking ends, and sliding begins.
+        Slip = "slip",
+        /// The direction of sliding changes without sticking.
+        Reversal = "reversal",
+    }
+}
+
 /// An event at a wall of a gap.
 #[derive(Clone, Copy, Debug)]
 pub struct GapEvent {
@@ -82,6 +94,10 @@ pub struct GapEvent {
 /// A change of the mode of dry friction.
 #[derive(Clone, Copy, Debug)]
 pub struct SlipEvent {
+    /// Index of the element whose mode changed.
+    pub element: usize,
+    /// What happened.
+    pub kind: SlipKind,
     /// Modes after the event.
     pub slips: Slips,
     /// Symbol `b'7'` if a phase of sticking ends, and `b'0'` if sliding reverses without sticking.

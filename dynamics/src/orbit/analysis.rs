@@ -160,6 +160,7 @@ fn failed(status: Status, strobe: State, forcing_period: f64) -> Orbit {
         strobe,
         strobe_meshing: None,
         events: Vec::new(),
+        slips: Vec::new(),
         cycle_periods: 0,
         forcing_period,
         periods_run: 0,
@@ -229,7 +230,8 @@ impl Analysis<'_> {
         Some(Orbit {
             strobe,
             strobe_meshing,
-            events: section.events(&second.events, period),
+            events: section.shifted(&second.events, period, |event| [&mut event.t, &mut event.t_mod_period]),
+            slips: section.shifted(&second.slips, period, |slip| [&mut slip.t, &mut slip.t_mod_period]),
             quantities: second.quantities.map(|quantities| section.quantities(quantities)),
             periods_run: first.periods_run + second.periods_run,
             ..second
@@ -585,6 +587,7 @@ impl Analysis<'_> {
             strobe: cycle.state,
             strobe_meshing: reading.strobe_meshing,
             events: reading.events.clone(),
+            slips: reading.slips.clone(),
             cycle_periods: cycle.period,
             forcing_period: self.flow.period,
             periods_run: 0,
@@ -627,6 +630,7 @@ impl Analysis<'_> {
             strobe: reading.strobe,
             strobe_meshing: reading.strobe_meshing,
             events: reading.events,
+            slips: reading.slips,
             cycle_periods: self.event_periods,
             forcing_period: self.flow.period,
             periods_run: 0,

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use super::analysis::ALLOWANCE;
 use super::reading::EventLog;
 use super::trace::{sample, sample_period};
-use super::{Event, Sample, status_of};
+use super::{Event, Sample, SlipPoint, status_of};
 use crate::model::{Law, Side, State};
 use crate::motion::Flow;
 use crate::motion::{Allowance, Stop, Trajectory};
@@ -20,8 +20,10 @@ pub struct History {
     pub meshing: Option<Side>,
     /// Samples at equal intervals, including both ends.
     pub samples: Vec<Sample>,
-    /// Events in order of time.
+    /// Events at walls in order of time.
     pub events: Vec<Event>,
+    /// Events of friction in order of time.
+    pub slips: Vec<SlipPoint>,
     /// Number of samples per forcing period.
     pub samples_per_period: usize,
     /// The forcing period `T`.
@@ -79,6 +81,7 @@ pub fn history(
         meshing,
         samples,
         events: log.events,
+        slips: log.slips,
         samples_per_period,
         forcing_period: flow.period,
     }))

@@ -1,8 +1,8 @@
 //! The events of a trajectory over a number of forcing periods, and averages over them.
 
-use super::Event;
 use super::itinerary::{Itinerary, Recorder};
 use super::quantities::{Meter, Quantities};
+use super::{Event, SlipPoint};
 use crate::model::{Side, State};
 use crate::motion::{EventKind, Flow, GapEvent, Observer, SlipEvent, States, Stop, Sums, Trajectory};
 use crate::word::Word;
@@ -16,6 +16,7 @@ pub(super) struct Reading {
     pub(super) strobe: State,
     pub(super) strobe_meshing: Option<Side>,
     pub(super) events: Vec<Event>,
+    pub(super) slips: Vec<SlipPoint>,
     /// The itinerary of each period.
     pub(super) itineraries: Vec<Itinerary>,
     pub(super) word: Word,
@@ -77,6 +78,7 @@ impl Reading {
                     turns < ON_STROBE_TURNS || 1.0 - turns < ON_STROBE_TURNS
                 }),
             events: events.events,
+            slips: events.slips,
         })
     }
 }
@@ -107,6 +109,7 @@ impl Observer for Log<'_> {
         self.recorders[(event.period - self.start) as usize].slip(event);
         self.symbols.extend(event.symbol);
         self.times.push(event.t);
+        self.events.slip(event);
     }
 
     fn sums(&mut self) -> Option<&mut Sums> {
@@ -114,29 +117,41 @@ impl Observer for Log<'_> {
     }
 }
 
-/// Collects the events at walls, with the states of the model.
+/// Collects the events at walls and those of friction, with the states of the model.
 pub(super) struct EventLog<'f> {
     flow: &'f Flow,
     /// The first period.
     start: u64,
     pub(super) events: Vec<Event>,
+    pub(super) slips: Vec<SlipPoint>,
 }
 
 impl<'f> EventLog<'f> {
     /// Starts a log of the periods from `start` on.
     pub(super) fn new(flow: &'f Flow, start: u64) -> EventLog<'f> {
-        EventLog { flow, start, events: Vec::new() }
+        EventLog { flow, start, events: Vec::new(), slips: Vec::new() }
+    }
+
+    /// Returns the time of an event since the start, and since the last phase 0. An event that rounding puts at the end of a period lies
+    /// at phase 0 of the next period.
+    fn times(&self, period: u64, t: f64) -> [f64; 2] {
+        let t_mod_period = if t < self.flow.period { t } else { 0.0 };
+        [(period - self.start) as f64 * self.flow.period + t, t_mod_period]
     }
 }
 
 impl Observer for EventLog<'_> {
     fn event(&mut self, event: &GapEvent, states: States<'_>) {
-        let GapEvent { gap, kind, side, t, meshing, .. } = *event;
-        // An event that rounding puts at the end of a period lies at phase 0 of the next period.
-        let t_mod_period = if t < self.flow.period { t } else { 0.0 };
+        let GapEvent { gap, kind, side, meshing, .. } = *event;
         let [before, after] = states();
         let after = if kind == EventKind::MeshEnd { before } else { after };
-        let t = (event.period - self.start) as f64 * self.flow.period + t;
+        let [t, t_mod_period] = self.times(event.period, event.t);
         self.events.push(Event { kind, gap, side, t, t_mod_period, before, after, meshing });
+    }
+
+    fn slip(&mut self, event: &SlipEvent) {
+        let SlipEvent { element, kind, at, .. } = *event;
+        let [t, t_mod_period] = self.times(event.period, event.t);
+        self.slips.push(SlipPoint { kind, element, t, t_mod_period, state: at });
     }
 }

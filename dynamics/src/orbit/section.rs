@@ -6,7 +6,6 @@
 
 use std::f64::consts::TAU;
 
-use super::Event;
 use super::instant::after_events;
 use super::quantities::Quantities;
 use super::reading::{EventLog, ON_STROBE_TURNS};
@@ -73,20 +72,27 @@ impl Section {
     }
 
     /// Converts the events of a cycle of `periods` forcing periods, whose times begin at this phase, to times since the next phase 0. An
-    /// event at phase 0 ends the cycle, because the strobe is the state after the event.
-    pub(super) fn events(&self, events: &[Event], periods: u32) -> Vec<Event> {
+    /// event at phase 0 ends the cycle, because the strobe is the state after the event. `times` gives the time of an event in the cycle
+    /// and since the last phase 0.
+    pub(super) fn shifted<T: Clone>(
+        &self,
+        events: &[T],
+        periods: u32,
+        times: impl Fn(&mut T) -> [&mut f64; 2],
+    ) -> Vec<T> {
         let period = self.flow.period;
         let cycle = f64::from(periods) * period;
         let rounding = ON_STROBE_TURNS * period;
-        let mut list: Vec<Event> = events.to_vec();
+        let mut list: Vec<T> = events.to_vec();
         for event in &mut list {
-            let t = event.t - self.time_to_strobe();
+            let [time, t_mod_period] = times(event);
+            let t = *time - self.time_to_strobe();
             let nearest = (t / period).round() * period;
             let t = if (t - nearest).abs() < rounding { nearest } else { t };
-            event.t = if t <= 0.0 { t + cycle } else { t };
-            event.t_mod_period = if t == nearest { 0.0 } else { event.t % period };
+            *time = if t <= 0.0 { t + cycle } else { t };
+            *t_mod_period = if t == nearest { 0.0 } else { *time % period };
         }
-        list.sort_by(|a, b| a.t.total_cmp(&b.t));
+        list.sort_by(|a, b| times(&mut a.clone())[0].total_cmp(times(&mut b.clone())[0]));
         list
     }
 

@@ -195,6 +195,10 @@ impl Canvas {
                 let ((left, top), (right, bottom)) = (corner(-0.85, -0.85), corner(0.85, 0.85));
                 Outline::Rect(Rect { left, top, right, bottom })
             }
+            Shape::Diamond => {
+                let corners = [(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)];
+                Outline::Polygon(corners.map(|(dx, dy)| corner(dx, dy)).to_vec())
+            }
             Shape::Triangle => {
                 Outline::Polygon(vec![corner(0.0, -1.25), corner(1.1, 0.75), corner(-1.1, 0.75)])
             }

@@ -53,6 +53,8 @@ pub enum Shape {
     Triangle,
     /// An end of meshing.
     Square,
+    /// A change of friction.
+    Diamond,
 }
 
 impl Shape {

@@ -4,15 +4,15 @@ use std::io::Write;
 
 use crate::model_file::{gap_columns, several_gaps};
 use crate::show::error::WriteError;
+use crate::show::event_row::{self, EventRow, Place, PlaceNames};
 use crate::show::figure::orbit::gaps::{PlotGap, contacts_at_start};
-use crate::show::names;
-use crate::show::orbit_quantities;
+use crate::show::names::optional;
 use crate::show::orbit_spectrum::Spectrum;
 use rattlemap_dynamics::model::{Model, ModelError, Side, State};
-use rattlemap_dynamics::orbit::{Event, History, is_reached};
+use rattlemap_dynamics::orbit::{Event, History, SlipPoint, is_reached};
 
 /// A row of the motion: a sample, or the state before or after an event.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Moment {
     /// Time since phase 0 of the first period.
     pub t: f64,
@@ -24,8 +24,8 @@ pub struct Moment {
     pub state: State,
     /// For each gap `free`, `meshing_right` or `meshing_left`.
     pub domains: Vec<&'static str>,
-    /// Kind and side of the event, `before` or `after`, and the index of the gap.
-    pub event: Option<(&'static str, i8, &'static str, usize)>,
+    /// The event, and `before` or `after`.
+    event: Option<(EventRow, &'static str)>,
 }
 
 /// Merges samples with the states before and after every event. A sample at the time of an event would repeat it.
@@ -33,7 +33,7 @@ pub struct Moment {
 /// # Errors
 /// [`ModelError`] if the model is not valid.
 pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, ModelError> {
-    let History { samples, events, samples_per_period, forcing_period, .. } = history;
+    let History { samples, events, slips, samples_per_period, forcing_period, .. } = history;
     let oscillator = model.oscillator()?;
     let mut moments = Vec::with_capacity(samples.len() + 2 * events.len());
     let gaps = PlotGap::all(model, &oscillator);
@@ -53,17 +53,18 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
             event,
         });
     };
-    let mut events = events.iter().peekable();
+    let mut events = event_row::rows(model, events, slips).into_iter().peekable();
     let mut last = f64::NEG_INFINITY;
     for (i, sample) in samples.iter().enumerate() {
         while let Some(event) = events.next_if(|event| is_reached(event.t, sample.t)) {
             let phase = event.t_mod_period / forcing_period;
-            let (kind, side) = (event.kind.name(), names::side_code(event.side));
-            let mark = |moment| Some((kind, side, moment, event.gap));
-            add(event.t, phase, &event.before, &contacts, mark("before"));
-            contacts[event.gap] = event.meshing;
-            add(event.t, phase, &event.after, &contacts, mark("after"));
             last = event.t;
+            add(last, phase, &event.before, &contacts, Some((event.clone(), "before")));
+            if let Place::Wall { gap, meshing, .. } = event.place {
+                contacts[gap] = meshing;
+            }
+            let after = event.after;
+            add(last, phase, &after, &contacts, Some((event, "after")));
         }
         if sample.t > last {
             let phase = (i % samples_per_period) as f64 / *samples_per_period as f64;
@@ -77,53 +78,60 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
     Ok(moments)
 }
 
-/// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`. With several gaps, the last column is the name of
-/// the gap.
-pub fn write_events(out: impl Write, model: &dyn Model, events: &[Event]) -> Result<(), WriteError> {
+/// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`. The last columns are the name of the gap, if
+/// there are several, and that of the friction element, if the model has friction. An event of friction has no side.
+pub fn write_events(
+    out: impl Write,
+    model: &dyn Model,
+    events: &[Event],
+    slips: &[SlipPoint],
+) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
-    let names = model.state_names();
+    let (names, places) = (model.state_names(), PlaceNames::of(model));
     let states = ["before", "after"].into_iter();
     let states = states.flat_map(|moment| names.iter().map(move |name| format!("{moment}_{name}")));
     let head = ["kind", "side", "t", "t_mod_period"].map(str::to_owned).into_iter().chain(states);
-    let gaps = several_gaps(model);
-    let of_gap = gaps.as_ref().map(|_| "gap".to_owned());
-    table.write_record(head.chain(["impulse".to_owned()]).chain(of_gap))?;
-    for (event, impulse) in events.iter().zip(orbit_quantities::impulses(model, events)) {
-        let texts = [event.kind.name().to_owned(), names::side_code(event.side).to_string()];
-        let states = [&event.before, &event.after].into_iter().flat_map(|state| &state[..names.len()]);
-        let numbers = [event.t, event.t_mod_period].into_iter().chain(states.copied());
-        let texts = texts.into_iter().chain(numbers.map(|x| format!("{x:?}")));
-        let impulse = impulse.map_or(String::new(), |x| format!("{x:?}"));
-        table
-            .write_record(texts.chain([impulse]).chain(gaps.as_ref().map(|gaps| gaps[event.gap].clone())))?;
+    let last = places.columns(None).into_iter().map(|(column, _)| column.to_owned());
+    table.write_record(head.chain(["impulse".to_owned()]).chain(last))?;
+    for row in event_row::rows(model, events, slips) {
+        let states = [&row.before, &row.after].into_iter().flat_map(|state| &state[..names.len()]);
+        let numbers = [row.t, row.t_mod_period].into_iter().chain(states.copied());
+        let texts = [row.kind.to_owned(), optional(row.side_code())].into_iter();
+        let texts = texts.chain(numbers.map(|x| format!("{x:?}")));
+        let impulse = row.impulse().map_or(String::new(), |x| format!("{x:?}"));
+        let last = places.columns(Some(row.place)).into_iter().map(|(_, name)| name.to_owned());
+        table.write_record(texts.chain([impulse]).chain(last))?;
     }
     Ok(table.flush()?)
 }
 
-/// Writes `trajectory.csv`, one row per moment. With several gaps, each has a column `domain_` with its name, and the last column is the name
-/// of the gap of an event.
+/// Writes `trajectory.csv`, one row per moment. With several gaps, each has a column `domain_` with its name. The last columns are those
+/// of `events.csv`.
 pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
-    let (state_names, several) = (model.state_names(), several_gaps(model));
+    let (state_names, several, places) = (model.state_names(), several_gaps(model), PlaceNames::of(model));
     let own = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
     let domains = match &several {
         Some(gaps) => gaps.iter().map(|gap| format!("domain_{gap}")).collect(),
         None => own(&["domain"]),
     };
-    let of_gap = several.as_ref().map_or(Vec::new(), |_| own(&["gap"]));
     let gaps = gap_columns(model).concat();
+    let names_of =
+        |place| places.columns(place).into_iter().map(|(column, name)| [column, name].map(str::to_owned));
+    let last = names_of(None).map(|[column, _]| column).collect();
     let head =
-        [own(&["t", "phase"]), gaps, own(&state_names), domains, own(&["event", "side", "moment"]), of_gap];
+        [own(&["t", "phase"]), gaps, own(&state_names), domains, own(&["event", "side", "moment"]), last];
     table.write_record(head.concat())?;
     for Moment { t, phase, gaps, state, domains, event } in moments {
         let numbers = [*t, *phase].into_iter().chain(gaps.concat());
         let numbers = numbers.chain(state[..state_names.len()].iter().copied());
         let texts = numbers.map(|x| format!("{x:?}")).chain(own(domains));
-        let marks = event
-            .map(|(kind, side, moment, _)| [kind.to_owned(), side.to_string(), moment.to_owned()])
-            .unwrap_or_default();
-        let of_gap = several.as_ref().map(|gaps| event.map_or(String::new(), |(.., gap)| gaps[gap].clone()));
-        table.write_record(texts.chain(marks).chain(of_gap))?;
+        let mark = |(row, moment): &(EventRow, &str)| {
+            [row.kind.to_owned(), optional(row.side_code()), (*moment).to_owned()]
+        };
+        let marks = event.as_ref().map(mark).unwrap_or_default();
+        let place = event.as_ref().map(|(row, _)| row.place);
+        table.write_record(texts.chain(marks).chain(names_of(place).map(|[_, name]| name)))?;
     }
     Ok(table.flush()?)
 }

@@ -7,7 +7,7 @@ use crate::machine::modes::{AtRest, GapMode, signed};
 use crate::machine::watch::Watch;
 use crate::model::{Side, Wall};
 use crate::motion::{
-    EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, GapEvent, NO_SPEED, Observer, SlipEvent,
+    EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, GapEvent, NO_SPEED, Observer, SlipEvent, SlipKind,
 };
 use crate::word;
 
@@ -250,9 +250,16 @@ impl MachineMotion<'_> {
     }
 
     /// Counts and reports a change of friction modes.
-    pub(super) fn record_slip(&mut self, symbol: Option<u8>, observer: &mut dyn Observer) {
+    pub(super) fn record_slip(&mut self, element: usize, kind: SlipKind, observer: &mut dyn Observer) {
         self.count_event();
+        let symbol = match kind {
+            SlipKind::Stick => None,
+            SlipKind::Slip => Some(b'7'),
+            SlipKind::Reversal => Some(b'0'),
+        };
         observer.slip(&SlipEvent {
+            element,
+            kind,
             slips: self.modes.slips,
             symbol,
             period: self.period,

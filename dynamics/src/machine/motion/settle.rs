@@ -5,7 +5,7 @@ use super::act::RELEASE_ORDER;
 use crate::machine::modes::{AtRest, GapMode, Modes};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
-use crate::motion::{EventKind, Observer};
+use crate::motion::{EventKind, Observer, SlipKind};
 
 /// Largest number of decisions on elements at rest after one event.
 const MOST_DECISIONS: usize = 16;
@@ -59,7 +59,7 @@ impl MachineMotion<'_> {
         }
         self.roots.from_rate[i] = 2;
         self.has_slid[i] = true;
-        self.record_slip(Some(b'7'), observer);
+        self.record_slip(i, SlipKind::Slip, observer);
         for gap in freed() {
             self.roots.at_wall[gap] = self.roots.at_wall[gap].map(|(side, _)| (side, RELEASE_ORDER));
             if let GapMode::Onset(_) = self.modes.gaps[gap] {
@@ -213,9 +213,9 @@ impl MachineMotion<'_> {
             let is_at_rest = stopped == Some(i) || self.system.rate_row(i).vanishes(&self.point);
             self.roots.from_rate[i] = usize::from(after != Slip::Stick && is_at_rest);
             match before {
-                Slip::Stick => self.record_slip(Some(b'7'), observer),
-                _ if !reverses => self.record_slip(None, observer),
-                _ if stopped == Some(i) => self.record_slip(Some(b'0'), observer),
+                Slip::Stick => self.record_slip(i, SlipKind::Slip, observer),
+                _ if !reverses => self.record_slip(i, SlipKind::Stick, observer),
+                _ if stopped == Some(i) => self.record_slip(i, SlipKind::Reversal, observer),
                 _ => {}
             }
         }

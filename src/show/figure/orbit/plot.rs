@@ -13,7 +13,9 @@ use crate::show::figure::orbit::motion::DrawnMotion;
 use crate::show::names;
 use crate::show::symbols::{symbol, with_unit};
 use rattlemap_dynamics::model::{Contact, Model, ModelError, Oscillator, Side, State, Units};
-use rattlemap_dynamics::orbit::{Class, Event, EventKind, History, Orbit, Sample};
+use rattlemap_dynamics::orbit::{
+    Class, Event, EventKind, History, Orbit, Sample, SlipKind, SlipPoint, is_reached,
+};
 
 /// Default width of all figures of an orbit, and least distance of panels from the left edge.
 pub(crate) const ORBIT_WIDTH: f64 = 1600.0;
@@ -31,6 +33,8 @@ pub struct OrbitPlot<'a> {
     pub(crate) oscillator: Oscillator,
     pub(crate) gaps: Vec<PlotGap>,
     pub(crate) motion: DrawnMotion,
+    /// Events of friction within the trace, with their times.
+    slips: Vec<(f64, SlipPoint)>,
     /// Label of the axis of time.
     time: String,
     /// Length of the cycle in forcing periods; none if the motion is not periodic.
@@ -52,7 +56,8 @@ impl<'a> OrbitPlot<'a> {
         let cycle = matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods));
         let subtitle = heading::character(model, orbit);
         let plot = OrbitPlot::of(model, (&orbit.events, trace), orbit.forcing_period, subtitle)?;
-        Ok(OrbitPlot { cycle, ..plot })
+        let slips = slips_within(&orbit.slips, trace, orbit.forcing_period);
+        Ok(OrbitPlot { cycle, slips, ..plot })
     }
 
     /// Prepares the figure of a motion from `start`. Its times are not divided by the forcing period.
@@ -66,7 +71,8 @@ impl<'a> OrbitPlot<'a> {
     ) -> Result<OrbitPlot<'a>, ModelError> {
         let parts = (&history.events[..], &history.samples[..]);
         let plot = OrbitPlot::of(model, parts, 1.0, heading::from_start(model, start))?;
-        Ok(OrbitPlot { time: with_unit("time, t", plot.units.time.as_deref()), ..plot })
+        let slips = slips_within(&history.slips, &history.samples, 1.0);
+        Ok(OrbitPlot { time: with_unit("time, t", plot.units.time.as_deref()), slips, ..plot })
     }
 
     fn of(
@@ -83,6 +89,7 @@ impl<'a> OrbitPlot<'a> {
             units: model.units(),
             bodies: model.bodies(),
             motion: DrawnMotion::new(events, trace, contacts, unit_of_time),
+            slips: Vec::new(),
             oscillator,
             gaps,
             time: "time in forcing periods, t / T".to_owned(),
@@ -156,16 +163,31 @@ impl<'a> OrbitPlot<'a> {
                 canvas.marker(after, Marker { hollow: twice, ..marker });
             }
         }
+        for (t, slip) in &self.slips {
+            let (x, y) = at(*t, &slip.state);
+            canvas.marker(frame.at(x, y), self.slip_marker(slip.kind));
+        }
     }
 
-    /// Returns the marker of an event. Markers are smaller if there are many events.
+    /// Returns the marker of an event.
     fn marker(&self, kind: EventKind, color: Color) -> Marker {
-        let radius = match self.motion.events.len() {
+        Marker { shape: Shape::of(kind), ..Marker::dot(color, self.radius()) }
+    }
+
+    /// Returns the marker of a change of friction: filled where sticking begins, hollow where it ends, small where sliding reverses.
+    fn slip_marker(&self, kind: SlipKind) -> Marker {
+        let radius = if kind == SlipKind::Reversal { 0.6 * self.radius() } else { self.radius() };
+        let dot = Marker::dot(DARK, radius);
+        Marker { shape: Shape::Diamond, hollow: kind == SlipKind::Slip, ..dot }
+    }
+
+    /// Returns the radius of markers, which are smaller if there are many events.
+    fn radius(&self) -> f64 {
+        match self.motion.events.len() + self.slips.len() {
             0..=40 => 7.0,
             41..=150 => 5.0,
             _ => 3.5,
-        };
-        Marker { shape: Shape::of(kind), ..Marker::dot(color, radius) }
+        }
     }
 
     /// Returns the legend: the motion, the events, and the walls. With `both`, impacts have states before and after.
@@ -183,6 +205,11 @@ impl<'a> OrbitPlot<'a> {
                     Entry::new(Key::Marker(marker), &format!("{} ends", self.contact_name()))
                 }
             });
+        }
+        let names = ["sticking begins", "sticking ends", "sliding reverses"];
+        for (kind, name) in SlipKind::ALL.into_iter().zip(names) {
+            let occurs = self.slips.iter().any(|(_, slip)| slip.kind == kind);
+            entries.extend(occurs.then(|| Entry::new(Key::Marker(self.slip_marker(kind)), name)));
         }
         if both && self.motion.events.iter().any(|(_, event)| event.before != event.after) {
             entries.push(Entry::new(Key::Dashes { color: FAINT }, "velocity jump"));
@@ -237,4 +264,10 @@ impl<'a> OrbitPlot<'a> {
         let unit = units.next().flatten().filter(|first| units.all(|unit| unit.as_ref() == Some(first)));
         Axis::around(&with_unit(label, unit.as_deref()), values, self.decayed() * scale)
     }
+}
+
+/// Returns the events of friction before the end of the trace, with their times divided by `unit`.
+fn slips_within(slips: &[SlipPoint], trace: &[Sample], unit: f64) -> Vec<(f64, SlipPoint)> {
+    let end = trace.last().map_or(f64::INFINITY, |last| last.t);
+    slips.iter().filter(|slip| is_reached(slip.t, end)).map(|slip| (slip.t / unit, *slip)).collect()
 }
