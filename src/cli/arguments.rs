@@ -769,9 +769,24 @@ pub(crate) struct Validate {
           value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_PERIODS)))]
     pub(crate) chaos_periods: u32,
 
+    /// Second judge beside the reference: f64 lanes, also on a software driver, or an ODE solver with event location, which
+    /// judges only what the reference computed or finished [default: lanes if lanes computed the map or there is a hardware
+    /// GPU, else the solver]
+    #[arg(long, value_name = "JUDGE", value_enum)]
+    pub(crate) judge: Option<JudgeChoice>,
+
     /// Print only errors and warnings
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+/// Second judge of a validation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum JudgeChoice {
+    /// Lanes in f64.
+    Lanes,
+    /// The ODE solver.
+    Solver,
 }
 
 /// Reads a share between 0 and 1.

@@ -3,13 +3,14 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use crate::cli::arguments::Validate;
+use crate::cli::arguments::{JudgeChoice, Validate};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::say;
 use crate::job::observer::Observer;
 use crate::job::validate::ValidateJob;
+use crate::validate::Judge;
 
 /// Reads the map, computes the sample again, and writes the comparison.
 pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
@@ -32,7 +33,11 @@ pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
         );
         interrupt.failure(text)
     };
-    let lanes = job.run_lanes(interrupt.raised());
+    let judge = arguments.judge.map(|judge| match judge {
+        JudgeChoice::Lanes => Judge::Lanes,
+        JudgeChoice::Solver => Judge::Independent,
+    });
+    let lanes = job.run_lanes(judge, &console, interrupt.raised());
     if !interrupt.wait_for(None) {
         return Err(stopped(0));
     }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::gpu::{AdapterChoice, Gpu, Precision, is_hardware};
+use crate::gpu::{AdapterChoice, Gpu, Precision, describe, is_hardware};
 use crate::job::check::CheckedFolder;
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap};
@@ -19,7 +19,7 @@ use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::map::{self, MANIFEST, VALIDATION};
 use crate::store::record_file::Identity;
-use crate::validate::{self, Kind, Lanes, Sample, Subject, Validation};
+use crate::validate::{self, Judge, Kind, Lanes, Sample, Subject, Validation, Value};
 
 /// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
 const NAMED_CELLS: usize = 8;
@@ -106,12 +106,18 @@ impl ValidateJob {
         }
     }
 
-    /// Computes the sample's lanes again: on the device that made the map, else on the best adapter; also in f64 if an
-    /// adapter has it, for maps of the reference a hardware adapter. `halt` has no effect while a driver compiles.
+    /// Computes the sample's lanes again: on the device that made the map, else on the best adapter. They also run in f64 with
+    /// [`Judge::Lanes`] if an adapter has it, and never with [`Judge::Independent`]; by default if a lane computed the map or the adapter is
+    /// hardware. The observer is told what begins. `halt` has no effect while a driver compiles.
     ///
     /// # Errors
     /// [`JobError::Failed`] if a device fails.
-    pub fn run_lanes(&self, halt: &Arc<AtomicBool>) -> Result<SampleLanes, JobError> {
+    pub fn run_lanes(
+        &self,
+        judge: Option<Judge>,
+        observer: &dyn Observer,
+        halt: &Arc<AtomicBool>,
+    ) -> Result<SampleLanes, JobError> {
         let subject = self.subject();
         let open =
             |precision: Precision, choice: &AdapterChoice| pollster::block_on(Gpu::open(precision, choice));
@@ -128,15 +134,29 @@ impl ValidateJob {
         let mut double = match is_double {
             true => None,
             // The ODE solver is the second judge then.
-            false if subject.plan.needs_reference() => None,
+            false if subject.plan.needs_reference() || judge == Some(Judge::Independent) => None,
             // A software driver takes minutes to compile shaders, longer than the solver needs for a sample.
-            false => open(Precision::F64, &own)
-                .or_else(|_| open(Precision::F64, &any))
-                .ok()
-                .filter(|gpu| subject.is_lane || is_hardware(gpu.adapter())),
+            false => {
+                let is_quick = |gpu: &Gpu| judge.is_some() || subject.is_lane || is_hardware(gpu.adapter());
+                open(Precision::F64, &own).or_else(|_| open(Precision::F64, &any)).ok().filter(is_quick)
+            }
         };
+        for gpu in gpu.iter().chain(&double) {
+            let wait = match is_hardware(gpu.adapter()) {
+                true => "",
+                false => "; its driver may compile shaders for minutes, which Ctrl-C does not interrupt",
+            };
+            observer.note(&format!(
+                "lanes in {} run on {}{wait}",
+                gpu.precision().name(),
+                describe(gpu.adapter())
+            ));
+        }
         gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.stop_on(halt));
-        let lanes = pollster::block_on(Lanes::run(&subject, &self.sample, gpu.as_mut(), double.as_mut()));
+        let lanes =
+            pollster::block_on(Lanes::run(&subject, &self.sample, gpu.as_mut(), double.as_mut(), &|phase| {
+                observer.note(phase)
+            }));
         let lanes = lanes
             .map_err(|error| JobError::Failed(format!("cannot compute the sample's lanes again: {error}")))?;
         Ok(SampleLanes { lanes, not_own })
@@ -231,10 +251,31 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), JobEr
         false => format!("; all such cells: {}{more}", named.join(" ")),
     };
     Err(JobError::Failed(format!(
-        "do not trust this map: {}{cells}; {} lists them, each with the command that replays it",
+        "do not trust this map: {}{cells}; {} lists them, each with the command that replays it{}",
         faults.join("; "),
-        dir.join(VALIDATION).display()
+        dir.join(VALIDATION).display(),
+        remedy(plan, validation)
     )))
+}
+
+/// Returns what may mend the map, by the classes and statuses of its wrong cells.
+fn remedy(plan: &Plan, validation: &Validation) -> String {
+    let unexplained = validation.mismatches.iter().filter(|mismatch| mismatch.kind == Kind::Unexplained);
+    let differences: Vec<_> = unexplained.flat_map(|mismatch| &mismatch.differences).collect();
+    let is =
+        |value: &str| differences.iter().any(|difference| difference.record == Value::Text(value.to_owned()));
+    let budget = plan.budget();
+    let mut remedies = Vec::new();
+    if budget.early_stop && (is("chaotic") || is("quasi-periodic")) {
+        remedies.push("`integration.early_stop = false` if motion without a period was decided too early");
+    }
+    if is("chaotic") && budget.confirm_chaos == 0 {
+        remedies.push("`integration.confirm_chaos` if chaos ends late");
+    }
+    if ["too_stiff", "cap_events"].into_iter().any(is) {
+        remedies.push("a larger mesh_speed, or softer springs, if lanes end at a limit");
+    }
+    if remedies.is_empty() { String::new() } else { format!(". Try {}", remedies.join(", or ")) }
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ pub struct Lanes {
 
 impl Lanes {
     /// Computes the lanes of a sample again. `single` is a device in the map's precision; none for a map of the reference. `double` is a
-    /// device in f64, if the adapter supports it.
+    /// device in f64, if the adapter supports it. `phase` receives what begins.
     ///
     /// # Errors
     /// [`GpuError`] if a device fails.
@@ -42,6 +42,7 @@ impl Lanes {
         sample: &Sample,
         single: Option<&mut Gpu>,
         double: Option<&mut Gpu>,
+        phase: &dyn Fn(&str),
     ) -> Result<Lanes, GpuError> {
         let Subject { plan, records, .. } = *subject;
         let ids = sample.ids();
@@ -52,9 +53,11 @@ impl Lanes {
         if let Some(gpu) = single {
             lanes.device = Some(gpu::describe(gpu.adapter()));
             let as_in_map = LaneSettings { hands_over: Completion::hands_over(plan.budget()), ..own };
+            phase(&format!("running {} lanes again, as in the map", ids.len()));
             let again = run_lanes(gpu, plan, records, &ids, &as_in_map).await?;
             lanes.again = ids.iter().copied().zip(again).collect();
             if double.is_some() {
+                phase("running these lanes without early stops");
                 let records = run_lanes(gpu, plan, records, &ids, &whole).await?;
                 lanes.whole = ids.iter().copied().zip(records).collect();
             }
@@ -69,6 +72,7 @@ impl Lanes {
             let periods = budget.periods();
             let longer =
                 LaneSettings { periods, transient_periods: budget.settings.transient_periods, ..whole };
+            phase(&format!("running {} lanes in f64", ids.len()));
             for (ids, settings) in [(others, &whole), (finished, &longer)] {
                 let records = run_lanes(gpu, plan, records, &ids, settings).await?;
                 lanes.double.extend(ids.into_iter().zip(records));

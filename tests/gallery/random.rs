@@ -316,7 +316,8 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>, most: f64) {
     let mut double = (precision == Precision::F32).then(|| open(Precision::F64));
     for (i, kind) in kinds.iter_mut().filter(|(_, kind)| *kind == Some(Kind::Unexplained)) {
         *kind = validate(&cells[*i], precision, &records[*i], |subject, sample| {
-            pollster::block_on(Lanes::run(subject, sample, Some(&mut gpu), double.as_deref_mut())).unwrap()
+            pollster::block_on(Lanes::run(subject, sample, Some(&mut gpu), double.as_deref_mut(), &|_| ()))
+                .unwrap()
         });
     }
     let silent =

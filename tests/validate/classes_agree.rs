@@ -31,7 +31,8 @@ fn check_maps(axes: [Axis<'_>; 2], side: u32, pair: GearPair, precisions: &[Prec
         let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
         let all = sample(&plan, &records, plan.cell_count(), 1);
         let double = double.as_deref_mut();
-        let lanes = pollster::block_on(Lanes::run(&subject, &all, Some(&mut *single), double)).unwrap();
+        let lanes =
+            pollster::block_on(Lanes::run(&subject, &all, Some(&mut *single), double, &|_| ())).unwrap();
         let validation = replay(&subject, &all, &lanes, &|_| ());
         for mismatch in &validation.mismatches {
             let [i, j] = plan.indices(mismatch.id);

@@ -330,7 +330,7 @@ fn validate_lanes(plan: &Plan, precision: Precision, rewrite: Option<fn(String) 
     let mut selection = sample(plan, &records, usize::MAX, 1);
     selection.states = (0..records.len() as u32).collect();
     let mut double = (precision == Precision::F32 && rewrite.is_none()).then(|| open(Precision::F64));
-    let lanes = Lanes::run(&subject, &selection, Some(&mut *gpu), double.as_deref_mut());
+    let lanes = Lanes::run(&subject, &selection, Some(&mut *gpu), double.as_deref_mut(), &|_| ());
     replay(&subject, &selection, &pollster::block_on(lanes).unwrap(), &|_| {})
 }
 
@@ -396,7 +396,7 @@ fn check_missed_impacts(precision: Precision) {
     let records = vec![Record::default(); ids.len()];
     let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
     let selection = Sample { states: ids, ..sample_of(Vec::new()) };
-    let lanes = pollster::block_on(Lanes::run(&subject, &selection, Some(&mut gpu), None)).unwrap();
+    let lanes = pollster::block_on(Lanes::run(&subject, &selection, Some(&mut gpu), None, &|_| ())).unwrap();
     let states = replay(&subject, &selection, &lanes, &|_| {}).states.unwrap();
     assert!(states.rate().is_too_many(), "{states:?}");
 }
@@ -439,7 +439,8 @@ fn an_undecided_judge_does_not_contradict_a_record() {
     let subject = Subject { plan: &plan, records: &records, precision: Precision::F64, is_lane: false };
     let mut double = open(Precision::F64);
     let selection = sample_of(vec![0]);
-    let lanes = pollster::block_on(Lanes::run(&subject, &selection, None, Some(&mut *double))).unwrap();
+    let lanes =
+        pollster::block_on(Lanes::run(&subject, &selection, None, Some(&mut *double), &|_| ())).unwrap();
     let found = replay(&subject, &selection, &lanes, &|_| {});
     assert_eq!((found.judge, kinds(&found)), (Judge::Lanes, vec![Kind::Budget]), "{:?}", found.mismatches);
 }

@@ -238,7 +238,7 @@ impl OpenEngine {
         let subject = Subject { plan: &plan, records: &records, precision, is_lane: device.is_some() };
         let sample = validate::sample(&plan, &records, samples, SEED);
         let lanes = match device {
-            Some(device) => pollster::block_on(Lanes::run(&subject, &sample, Some(device), None))
+            Some(device) => pollster::block_on(Lanes::run(&subject, &sample, Some(device), None, &|_| ()))
                 .map_err(|error| anyhow!("cannot compute the sample's lanes again: {error}"))?,
             None => Lanes::default(),
         };

@@ -112,6 +112,8 @@ fn the_files_of_a_validation_are_checked() {
     let validate = "validate out/s --samples 4 --quiet";
     succeeds(&folder, validate);
     is_good(&folder, "out/s");
+    let told = crate::common::run(&folder, "validate out/s --samples 4 --judge solver").success();
+    told.stderr(crate::common::says(&["replaying 4 cells without early stops", "DOP853"]));
     let good = files(&out);
     is_named(&folder, "out/s", "validation.json");
     fs::remove_file(out.join("report.html")).unwrap();
