@@ -22,7 +22,7 @@ pub use event::{
 };
 pub use flow::{Engine, Flow};
 pub use slip::{Slip, Slips};
-pub(crate) use sums::{Contacts, Moments, nodes, root};
+pub(crate) use sums::{Contacts, GapSums, Moments, nodes, root};
 pub use sums::{DISPLACEMENTS, Sums, place_of_displacement, place_of_gap};
 pub(crate) use trajectory::Flights;
 pub use trajectory::Trajectory;

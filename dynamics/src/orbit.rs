@@ -33,7 +33,9 @@ pub use cell::{Measurement, measure, measure_at_section, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;
-pub use quantities::{Approaches, Displacement, FrictionQuantities, Quantities, quantities_after};
+pub use quantities::{
+    Approaches, Displacement, FrictionQuantities, GapQuantities, Quantities, quantities_after,
+};
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};
 pub use resolution::rounding_decides;

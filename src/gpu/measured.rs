@@ -38,6 +38,7 @@ pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quan
         displacements: std::array::from_fn(|i| if i < 3 { displacement(i) } else { Displacement::default() }),
         dissipated: dissipated * energy / (steps * h),
         friction: None,
+        gaps: None,
     })
 }
 

@@ -22,7 +22,7 @@ const PROGRAM: u64 = 30_000_000;
 /// Memory per run without its record, in bytes: its place in the order, and its state.
 const RUN: u64 = 5;
 /// Memory of the numbers that only records of larger models have, in bytes.
-const FURTHER: u64 = 450;
+const FURTHER: u64 = 570;
 /// Memory per cell of an adaptive map, in bytes: label, request, blocks.
 const REFINED: u64 = 40;
 /// Memory per cell of a list, in bytes: values, their text, flow and law.

@@ -24,8 +24,9 @@ use thiserror::Error;
 pub(crate) use start::followed;
 
 use crate::map::scene::{Axis, Points, Quantity, Refine, Scene, Start, Steps};
+use crate::model_file::several_gaps;
 use crate::record::measures::Group;
-use crate::record::{Record, Records};
+use crate::record::{Record, Records, valid};
 use rattlemap_dynamics::model::{Form, Law, Model, ModelError, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Class};
 use start::Starts;
@@ -68,6 +69,8 @@ pub struct Needs {
     pub measures: u32,
     /// Last strobe state as a quantity.
     pub state: bool,
+    /// Impacts and meshing of each of several gaps.
+    pub gaps: bool,
 }
 
 impl Needs {
@@ -82,11 +85,12 @@ impl Needs {
         pattern: true,
         measures: u32::MAX,
         state: true,
+        gaps: true,
     };
 
     /// Whether a measured quantity is requested.
     pub fn has(&self, group: &Group) -> bool {
-        self.measures & group.bit != 0
+        self.measures & group.bit != 0 || self.gaps && group.bit & (valid::IMPACTS | valid::MESH) != 0
     }
 
     /// Whether one of these measured quantities is requested.
@@ -94,10 +98,11 @@ impl Needs {
         quantities.iter().filter_map(|quantity| quantity.group()).any(|group| self.has(group))
     }
 
-    /// Whether the motion must be measured: for all measured quantities but the multiplier, which is known for a cycle.
+    /// Whether the motion must be measured: for all measured quantities but the multiplier, which is known for a cycle, and for the
+    /// contacts of each of several gaps.
     pub fn measures_motion(&self) -> bool {
         let multiplier = Quantity::Multiplier.group().map_or(0, |group| group.bit);
-        self.measures & !multiplier != 0
+        self.gaps || self.measures & !multiplier != 0
     }
 }
 
@@ -149,7 +154,7 @@ impl Plan {
         assert!(scene.axes().len() == 2 || scene.list().is_some(), "a map has two axes, or a list of cells");
         assert!(u32::try_from(scene.run_count()).is_ok(), "cells are numbered by u32");
         let points = scene.points().clone();
-        let mut needs = needs(&scene.outputs().quantities);
+        let mut needs = needs(&scene.outputs().quantities, several_gaps(scene.base()).is_some());
         // A map of basins needs the exponent, because chaos is an attractor, too.
         needs.exponent |= scene.is_basin();
         // An adaptive map must not interpolate between motion with and without contact.
@@ -405,7 +410,7 @@ pub(crate) fn stores_flows(flows: u64, runs: u64) -> bool {
     flows < runs && flows <= MOST_STORED_FLOWS as u64
 }
 
-fn needs(quantities: &[Quantity]) -> Needs {
+fn needs(quantities: &[Quantity], has_several_gaps: bool) -> Needs {
     let has = |quantity| quantities.contains(&quantity);
     Needs {
         // The exponent distinguishes chaos from a cycle that was not found. Lanes compute the multiplier together with it.
@@ -421,6 +426,7 @@ fn needs(quantities: &[Quantity]) -> Needs {
             .filter_map(|quantity| quantity.group())
             .fold(0, |bits, group| bits | group.bit),
         state: has(Quantity::State),
+        gaps: has_several_gaps && (has(Quantity::Impacts) || has(Quantity::Mesh)),
     }
 }
 

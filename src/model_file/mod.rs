@@ -125,6 +125,13 @@ pub fn gap_columns(model: &dyn Model) -> Vec<[String; 2]> {
     names.iter().map(|name| [name.clone(), rate(name)]).collect()
 }
 
+/// Returns the letter that each gap has in words, and its name, if the model has several gaps.
+pub fn letters(model: &dyn Model) -> Option<String> {
+    let names = several_gaps(model)?;
+    let letters = ('a'..).zip(names).map(|(letter, name)| format!("{letter} = {name}"));
+    Some(letters.collect::<Vec<_>>().join(", "))
+}
+
 /// Returns the names of a model's gaps, if it has several.
 pub fn several_gaps(model: &dyn Model) -> Option<Vec<String>> {
     let symbols = model.downcast_ref::<FileModel>()?.gap_symbols();

@@ -1,7 +1,7 @@
 //! The fields of a record as rows of numbers, for files and messages.
 
 use super::Record;
-use super::measures::{FURTHER, GROUPS, MEASURES, places_before};
+use super::measures::{FURTHER, GROUPS, MEASURES, OF_GAPS, places_before};
 use rattlemap_dynamics::model::STATE;
 
 /// A field of a record, or the measured quantities of a group.
@@ -101,13 +101,15 @@ const BEFORE: [Field; 16] = [
 /// Place of the strobe state in [`FIELDS`].
 pub const STROBE: usize = 4;
 
-/// All fields in the order of files. The last one has the measured quantities of displacements and gaps that oscillators of at most two
-/// coordinates with one gap do not have.
-pub const FIELDS: [Field; BEFORE.len() + GROUPS.len() + 1] = {
-    let further = field!("further_displacements", MEASURES - FURTHER, 8, |record, nth| record.measures[nth]);
-    let mut fields = [Field { first: FURTHER, ..further }; BEFORE.len() + GROUPS.len() + 1];
-    let mut i = 0;
-    while i < fields.len() - 1 {
+/// All fields in the order of files. The last but one has the measured quantities of displacements and gaps that oscillators of at most
+/// two coordinates with one gap do not have, the last one those of each of several gaps.
+pub const FIELDS: [Field; BEFORE.len() + GROUPS.len() + 2] = {
+    let further = field!("further_displacements", OF_GAPS - FURTHER, 8, |record, nth| record.measures[nth]);
+    let mut fields = [Field { first: FURTHER, ..further }; BEFORE.len() + GROUPS.len() + 2];
+    let mut i = fields.len() - 1;
+    fields[i] = Field { name: "gaps", first: OF_GAPS, count: MEASURES - OF_GAPS, ..further };
+    i = 0;
+    while i < fields.len() - 2 {
         fields[i] = match i.checked_sub(BEFORE.len()) {
             None => BEFORE[i],
             Some(group) => {
@@ -122,7 +124,7 @@ pub const FIELDS: [Field; BEFORE.len() + GROUPS.len() + 1] = {
 
 impl Record {
     /// Number of bytes in messages to and from pages.
-    pub const BYTES: usize = 792;
+    pub const BYTES: usize = 912;
 
     /// Returns the bytes of all fields, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {

@@ -8,10 +8,29 @@ use rattlemap_dynamics::orbit::{
 };
 
 /// Number of numbers in [`Record::measures`].
-pub const MEASURES: usize = FURTHER + FURTHER_DISPLACEMENTS * numbers_before(GROUPS.len());
+pub const MEASURES: usize = OF_GAPS + MOST_GAPS * GAP_GROUPS.len();
 
 /// First of the numbers of further displacements and gaps in [`Record::measures`].
 pub(crate) const FURTHER: usize = places_before(GROUPS.len());
+
+/// First of the numbers of each gap in [`Record::measures`], which only models with several gaps have.
+pub(crate) const OF_GAPS: usize = FURTHER + FURTHER_DISPLACEMENTS * numbers_before(GROUPS.len());
+
+/// Numbers of each gap of a model with several gaps. They have the validity bits of the quantities for all gaps together, and are NaN if
+/// a gap does not have the number.
+#[rustfmt::skip]
+pub(crate) const GAP_GROUPS: [Group; 5] = [
+    group("impacts", 2, false, &[number("impacts_per_period", "impacts per forcing period of {}", Dimension::None,
+        |of, gap| Some(of.quantities?.gaps?[gap].impacts_per_period))]),
+    group("mesh", 3, false, &[number("mesh_fraction", "fraction of time in meshing of {}", Dimension::None,
+        |of, gap| Some(of.quantities?.gaps?[gap].mesh_fraction))]),
+    group("impact_energy", 11, false, &[number("impact_energy", "energy lost in impacts of {} per unit time", Dimension::Power,
+        |of, gap| Some(of.quantities?.gaps?[gap].impact_energy))]),
+    group("contact_force_max", 12, false, &[number("contact_force_max", "largest contact force of {}", Dimension::Force,
+        |of, gap| Some(of.quantities?.gaps?[gap].contact_force?[0]))]),
+    group("contact_force_rms", 13, false, &[number("contact_force_rms", "rms contact force of {}", Dimension::Force,
+        |of, gap| Some(of.quantities?.gaps?[gap].contact_force?[1]))]),
+];
 
 /// Quantities that a scene requests by one name, in the order of their places in a record.
 #[rustfmt::skip]
@@ -145,6 +164,8 @@ const FURTHER_DISPLACEMENTS: usize = DISPLACEMENTS - FIRST_DISPLACEMENTS;
 enum Subject {
     Displacement(usize),
     Gap(usize),
+    /// A gap whose contacts are counted apart.
+    OneOfSeveral(usize),
 }
 
 impl Subject {
@@ -153,11 +174,12 @@ impl Subject {
         (0..MOST_COORDINATES).map(Subject::Displacement).chain((0..MOST_GAPS).map(Subject::Gap))
     }
 
-    /// Returns the place in [`Quantities::displacements`].
+    /// Returns the place in [`Quantities::displacements`], or in [`Quantities::gaps`].
     fn place(self) -> usize {
         match self {
             Subject::Displacement(i) => place_of_displacement(i),
             Subject::Gap(i) => place_of_gap(i),
+            Subject::OneOfSeveral(i) => i,
         }
     }
 }
@@ -242,6 +264,25 @@ pub fn all() -> impl Iterator<Item = Measure> {
     GROUPS.iter().enumerate().flat_map(of_group)
 }
 
+/// Returns the numbers of each gap, in the order of columns in tables.
+pub(crate) fn of_gaps() -> impl Iterator<Item = Measure> {
+    GAP_GROUPS.iter().enumerate().flat_map(|(index, group)| {
+        (0..MOST_GAPS).map(move |gap| Measure {
+            place: OF_GAPS + gap * GAP_GROUPS.len() + index,
+            group,
+            subject: Some(Subject::OneOfSeveral(gap)),
+            number: &group.numbers[0],
+        })
+    })
+}
+
+/// Returns the impacts per forcing period and the mesh fraction of one of several gaps, if they were measured.
+pub(crate) fn contacts_of_gap(record: &Record, gap: usize) -> Option<[f64; 2]> {
+    let first = OF_GAPS + gap * GAP_GROUPS.len();
+    let bits = GAP_GROUPS[0].bit | GAP_GROUPS[1].bit;
+    (record.valid & bits == bits).then(|| [0, 1].map(|number| record.measures[first + number]))
+}
+
 impl Measure {
     /// Whether a motion with these state components and gaps has the number. There are names of gaps only if there are several.
     pub fn is_of(&self, state_names: &[&str], gaps: &[String]) -> bool {
@@ -254,7 +295,7 @@ impl Measure {
         match self.subject {
             None => Some(""),
             Some(Subject::Gap(0)) if gaps.is_empty() => Some("gap"),
-            Some(Subject::Gap(i)) => gaps.get(i).map(String::as_str),
+            Some(Subject::Gap(i) | Subject::OneOfSeveral(i)) => gaps.get(i).map(String::as_str),
             Some(Subject::Displacement(i)) => state_names.get(2 * i).copied(),
         }
     }
@@ -338,7 +379,7 @@ impl<'a> Measured<'a> {
     /// Returns all numbers by their places in a record.
     pub fn numbers(&self) -> [Option<f64>; MEASURES] {
         let mut numbers = [None; MEASURES];
-        all().for_each(|measure| numbers[measure.place] = measure.read(self));
+        all().chain(of_gaps()).for_each(|measure| numbers[measure.place] = measure.read(self));
         numbers
     }
 
@@ -375,6 +416,12 @@ impl Record {
         }
         let valid = self.valid;
         self.clear_measures(|group| valid & group.bit == 0);
+        let has_gaps = motion.quantities.is_some_and(|quantities| quantities.gaps.is_some());
+        for measure in of_gaps() {
+            let value = || measure.read(motion).map_or(f64::NAN, |value| value + 0.0);
+            let is_set = has_gaps && valid & measure.group.bit != 0;
+            self.measures.set(measure.place, if is_set { value() } else { 0.0 });
+        }
     }
 
     /// Sets all measured quantities but the multiplier.
@@ -384,8 +431,13 @@ impl Record {
         self.set_measures(&Measured { quantities, multiplier });
     }
 
-    /// Removes the numbers of some quantities.
+    /// Removes the numbers of some quantities. Those of gaps are removed with their quantity.
     pub fn clear_measures(&mut self, is_cleared: impl Fn(&Group) -> bool) {
+        for measure in
+            of_gaps().filter(|measure| self.valid & measure.group.bit == 0 || is_cleared(measure.group))
+        {
+            self.measures.set(measure.place, 0.0);
+        }
         for measure in all().filter(|measure| is_cleared(measure.group)) {
             self.valid &= !measure.group.bit;
             self.measures.set(measure.place, 0.0);
@@ -404,7 +456,7 @@ mod tests {
 
     #[test]
     fn each_number_has_a_place_and_each_quantity_a_bit_of_its_own() {
-        let mut places: Vec<usize> = all().map(|measure| measure.place).collect();
+        let mut places: Vec<usize> = all().chain(of_gaps()).map(|measure| measure.place).collect();
         places.sort_unstable();
         assert_eq!(places, (0..MEASURES).collect::<Vec<_>>());
         let bits = GROUPS.iter().fold(valid::PATTERN * 2 - 1, |bits, group| {
@@ -464,7 +516,7 @@ mod tests {
             distance("harmonic", |record, first| record.measures[first + 1] += std::f64::consts::TAU + 1e-3);
         assert!((turned - 1e-3).abs() < 1e-6, "{turned}");
         assert!(distance("rms", |record, first| record.measures[first + 2] = 0.6) > 0.19, "the gap");
-        assert!(distance("rms", |record, _| record.measures[MEASURES - 17] = 0.6) > 0.19, "the last gap");
+        assert!(distance("rms", |record, _| record.measures[OF_GAPS - 17] = 0.6) > 0.19, "the last gap");
     }
 
     /// An amplitude that is a thousand times smaller than the mean.

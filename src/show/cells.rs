@@ -9,12 +9,13 @@ use crate::findings::coexistence;
 use crate::map::plan::Plan;
 use crate::map::scene::{Continuous, Quantity, Scene};
 use crate::map::schedule::Refined;
+use crate::model_file::several_gaps;
 use crate::record::classify::{classify, status};
 use crate::record::measures::{self, MEASURES};
 use crate::record::{Record, Records, valid};
 use crate::show::numbers::Number;
 use crate::validate::Rate;
-use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::model::{Contact, State};
 use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -267,6 +268,19 @@ impl<'a> Cells<'a> {
         Number::of(self.scene.base(), &self.scene.outputs().quantities)
     }
 
+    /// Returns the gap whose contact classes tell, and its name; none for a model with one gap. It is the first one with a wall that has
+    /// an impact law, else the first.
+    pub(crate) fn contact_gap(&self) -> Option<(usize, String)> {
+        let names = several_gaps(self.scene.base())?;
+        let oscillator = self.plan.model(0).oscillator().ok()?;
+        let has_impacts = |gap: &usize| {
+            let walls = oscillator.gaps[*gap].walls.iter().flatten();
+            walls.into_iter().any(|wall| wall.contact == Contact::Impact)
+        };
+        let gap = (0..names.len()).find(has_impacts).unwrap_or(0);
+        Some((gap, names.get(gap)?.clone()))
+    }
+
     /// Returns the impacts per unit time of the run `id`.
     pub(crate) fn impact_rate(&self, id: usize) -> Option<f64> {
         let record = self.record(id);
@@ -293,8 +307,12 @@ impl<'a> Cells<'a> {
             (shows && self.has(quantity) && record.valid & bit != 0 && value.is_finite()).then_some(value)
         };
         let mut measures = [None; MEASURES];
-        if shows && self.plan.needs().measures != 0 {
-            measures::all().for_each(|measure| measures[measure.place] = measure.of(record));
+        let needs = self.plan.needs();
+        if shows && (needs.measures != 0 || needs.gaps) {
+            let all = measures::all().chain(measures::of_gaps());
+            all.for_each(|measure| {
+                measures[measure.place] = measure.of(record).filter(|value| !value.is_nan())
+            });
         }
         let has_state = self.has(Quantity::State) && !status(record).is_failure();
         let has_class = self.has(Quantity::Class);

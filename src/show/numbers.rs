@@ -3,7 +3,7 @@
 use crate::map::bifurcation::Column;
 use crate::map::scene::Quantity;
 use crate::model_file::several_gaps;
-use crate::record::measures::{Dimension, MEASURES, Measure, Measured};
+use crate::record::measures::{self, Dimension, MEASURES, Measure, Measured};
 use crate::show::cells::{Cells, Row};
 use crate::show::symbols::{symbol, with_unit};
 use rattlemap_dynamics::model::{Model, State, Units};
@@ -147,7 +147,10 @@ fn of_quantity(quantity: Quantity, states: &[&str], gaps: &[String]) -> Vec<Numb
                     source: Source::Measure(measure),
                 })
             };
-            quantity.group().into_iter().flat_map(|group| group.measures()).filter_map(of).collect()
+            let whole = quantity.group().into_iter().flat_map(|group| group.measures());
+            // One gap has the numbers of the whole motion.
+            let each = measures::of_gaps().filter(|m| !gaps.is_empty() && m.group.name == quantity.name());
+            whole.chain(each).filter_map(of).collect()
         }
     }
 }

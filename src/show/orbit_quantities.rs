@@ -13,7 +13,9 @@ use rattlemap_dynamics::orbit::Orbit;
 /// Returns all measured quantities by name, and the approach speeds at each wall. A quantity that the motion does not have is
 /// null.
 pub(crate) fn object(model: &dyn Model, orbit: &Orbit) -> Value {
-    let numbers = Number::of(model, &Quantity::measured());
+    // Impacts and meshing have numbers of each gap if there are several.
+    let quantities = [&[Quantity::Impacts, Quantity::Mesh][..], &Quantity::measured()].concat();
+    let numbers = Number::of(model, &quantities);
     let mut object: Map<String, Value> =
         numbers.iter().map(|number| (number.name.clone(), number.of_orbit(orbit).into())).collect();
     for side in Side::BOTH {
@@ -32,7 +34,7 @@ fn approaches(orbit: &Orbit, side: Side) -> Option<[f64; 2]> {
 }
 
 /// Lines of a summary: their quantities, each with the word before its numbers.
-const LINES: [(&str, &[(Quantity, &str)]); 7] = [
+const LINES: [(&str, &[(Quantity, &str)]); 9] = [
     ("impact speed", &[(Quantity::ImpactSpeed, "mean"), (Quantity::ImpactSpeedMax, "largest")]),
     ("contact force", &[(Quantity::ContactForceMax, "largest"), (Quantity::ContactForceRms, "rms")]),
     (
@@ -50,6 +52,8 @@ const LINES: [(&str, &[(Quantity, &str)]); 7] = [
     ("amplitude", &[(Quantity::Amplitude, "")]),
     ("root mean square", &[(Quantity::Rms, "")]),
     ("first harmonic", &[(Quantity::Harmonic, "")]),
+    ("impacts of each gap", &[(Quantity::Impacts, "")]),
+    ("meshing of each gap", &[(Quantity::Mesh, "")]),
 ];
 
 /// Returns labels and values of the lines of a summary with the quantities that the motion has.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::model_file;
 use crate::show::event_row::{self, EventRow, Place, PlaceNames};
 use crate::show::instant::Instant;
 use crate::show::names;
@@ -106,6 +107,9 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
             let pattern = orbit.word.pattern();
             if pattern != orbit.word {
                 add("pattern", pattern.time_order());
+            }
+            if let Some(letters) = model_file::letters(model) {
+                add("letters of gaps", letters);
             }
         }
         (Class::Periodic { .. }, None) => add("word", "none: no contact".to_owned()),

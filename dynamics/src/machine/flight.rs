@@ -52,9 +52,12 @@ impl Flight<'_> {
             }
             sums.dissipated += weight * self.dissipation(&point);
             sums.heat += weight * self.heat(&point);
-            for signal in &forces {
-                sums.force.square += weight * signal.at(&point).powi(2);
+            for (gap, signal) in &forces {
+                let square = weight * signal.at(&point).powi(2);
+                sums.force.square += square;
                 sums.contact_time += weight;
+                sums.gaps[*gap].force.square += square;
+                sums.gaps[*gap].force_time += weight;
             }
             if self.sticks() {
                 sums.sticking_time += weight;
@@ -69,10 +72,16 @@ impl Flight<'_> {
                 }
             };
             displacements.iter().for_each(|(place, signal)| include(&mut sums.displacements[*place], signal));
-            for signal in &forces {
-                include(&mut sums.force, signal);
+            for (gap, signal) in &forces {
+                include(&mut sums.gaps[*gap].force, signal);
             }
             before = Some((share, point));
+        }
+        for (gap, of_gap) in sums.gaps.iter_mut().enumerate().take(self.system.gaps()) {
+            if self.system.contact(self.modes, gap).is_some() {
+                of_gap.contact_time += self.duration;
+            }
+            sums.force.high = sums.force.high.max(of_gap.force.high);
         }
     }
 
@@ -93,8 +102,8 @@ impl Flight<'_> {
         displacements.chain(gaps).map(|(place, row)| (place, self.signal(row))).collect()
     }
 
-    /// Returns the forces of the compliant contacts, positive where they push.
-    fn contact_forces(&self) -> Vec<Signal> {
+    /// Returns the gaps with compliant contact and its force, positive where it pushes.
+    fn contact_forces(&self) -> Vec<(usize, Signal)> {
         let key = self.modes.key(self.system);
         let engaged = (0..self.system.gaps()).filter(|&gap| key.engaged[gap] != 0);
         engaged
@@ -107,7 +116,7 @@ impl Flight<'_> {
                     row.0[self.system.n + gap] += sign * spring.damping;
                     row = row.plus(spring.preload - sign * spring.stiffness * wall.at, self.system.width());
                 }
-                self.signal(row)
+                (gap, self.signal(row))
             })
             .collect()
     }

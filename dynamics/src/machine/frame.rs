@@ -165,7 +165,7 @@ impl Frame {
         (self.length, self.speed, self.escape)
     }
 
-    pub(super) fn gaps(&self) -> usize {
+    pub(crate) fn gaps(&self) -> usize {
         self.machine.gaps.len()
     }
 

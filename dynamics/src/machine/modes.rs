@@ -86,6 +86,14 @@ impl Frame {
         GapMode::Beyond(signed(side, self.walls(gap, side).len() - 1))
     }
 
+    /// Returns the side of a gap's lasting contact, if there is one. A wall that only pushes has none while its force is 0.
+    pub(super) fn contact(&self, modes: &Modes, gap: usize) -> Option<Side> {
+        match modes.gaps[gap] {
+            GapMode::Open(side) => self.before_last(gap, side).contact(),
+            mode => mode.contact(),
+        }
+    }
+
     /// Returns side and index of the next wall in a direction from a gap.
     pub(super) fn wall_ahead(&self, modes: &Modes, gap: usize, direction: Side) -> Option<(Side, usize)> {
         let GapMode::Beyond(passed) = modes.gaps[gap] else { return None };

@@ -10,7 +10,7 @@ mod tangents;
 use super::domain::{Carrier, LinearDomain, Path, STAYS_ZERO};
 use super::domains::System;
 use super::flight::Flight;
-use super::modes::{GapMode, Modes};
+use super::modes::Modes;
 use super::watch::{Moment, Roots, Watch};
 use super::{Numbers, PhasePoint};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
@@ -92,10 +92,7 @@ impl<'s> MachineMotion<'s> {
 
     /// Returns the side of a gap's lasting contact, if there is one.
     pub fn contact(&self, gap: usize) -> Option<Side> {
-        match self.modes.gaps[gap] {
-            GapMode::Open(side) => self.system.before_last(gap, side).contact(),
-            mode => mode.contact(),
-        }
+        self.system.contact(&self.modes, gap)
     }
 
     /// Whether no gap is in lasting contact.
@@ -342,7 +339,11 @@ impl<'s> MachineMotion<'s> {
         let before = observer.sums().is_some().then(|| energy(self));
         self.act(watch, observer);
         if let (Some(before), Some(sums)) = (before, observer.sums()) {
-            sums.lost += before - energy(self);
+            let lost = before - energy(self);
+            sums.lost += lost;
+            if let Some(gap) = watch.gap() {
+                sums.gaps[gap].lost += lost;
+            }
         }
         if let Some((row, field)) = linearised {
             self.saltate(watch, &row, &field);

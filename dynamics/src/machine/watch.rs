@@ -32,6 +32,20 @@ pub(super) enum Watch {
 }
 
 impl Watch {
+    /// Returns the gap at whose wall the watch waits; none for friction.
+    pub(super) fn gap(self) -> Option<usize> {
+        match self {
+            Watch::Wall(gap, _)
+            | Watch::OnsetEnds(gap, _)
+            | Watch::PressingEnds(gap, _)
+            | Watch::Leaves(gap, _)
+            | Watch::ForceEnds(gap, _)
+            | Watch::ForceBegins(gap, _)
+            | Watch::PushEnds(gap, _) => Some(gap),
+            Watch::RateVanishes(_) | Watch::Slips(..) => None,
+        }
+    }
+
     /// Whether the watch waits for a gap to reach a position.
     pub(super) fn is_distance(self) -> bool {
         matches!(self, Watch::Wall(..) | Watch::OnsetEnds(..) | Watch::Leaves(..))

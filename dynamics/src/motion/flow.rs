@@ -145,6 +145,13 @@ impl Flow {
         }
     }
 
+    pub(crate) fn gap_count(&self) -> usize {
+        match &self.engine {
+            Engine::Pair(_) => 1,
+            Engine::Machine(system) => system.gaps(),
+        }
+    }
+
     /// Returns the number of entries of a state that can differ from 0: two for each coordinate, and four at least.
     pub fn state_len(&self) -> usize {
         2 * self.degrees.max(2)

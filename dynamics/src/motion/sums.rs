@@ -75,6 +75,25 @@ impl Moments {
     }
 }
 
+/// Contacts of one gap so far.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GapSums {
+    /// Impacts.
+    pub(crate) impacts: u64,
+    /// Time in lasting contact.
+    pub(crate) contact_time: f64,
+    /// Energy lost at its walls.
+    pub(crate) lost: f64,
+    /// Force of its compliant contacts, and the time during which it acts.
+    pub(crate) force: Moments,
+    pub(crate) force_time: f64,
+}
+
+impl GapSums {
+    const NONE: GapSums =
+        GapSums { impacts: 0, contact_time: 0.0, lost: 0.0, force: Moments::NONE, force_time: 0.0 };
+}
+
 /// Integrals and extremes so far.
 #[derive(Clone, Debug)]
 pub struct Sums {
@@ -92,6 +111,8 @@ pub struct Sums {
     /// Time during which an element with dry friction sticks, and energy that friction turns into heat.
     pub(crate) sticking_time: f64,
     pub(crate) heat: f64,
+    /// Each gap of a machine.
+    pub(crate) gaps: [GapSums; MOST_GAPS],
 }
 
 impl Sums {
@@ -104,6 +125,7 @@ impl Sums {
         contact_time: 0.0,
         sticking_time: 0.0,
         heat: 0.0,
+        gaps: [GapSums::NONE; MOST_GAPS],
     };
 
     /// Counts an approach to a wall.

@@ -2,10 +2,10 @@
 //!
 //! A [`Meter`] receives the events of a trajectory, whose engine measures the flights between them.
 
-use crate::model::{Law, NonImpacting, State};
+use crate::model::{Law, MOST_GAPS, NonImpacting, State};
 use crate::motion::{
-    Allowance, Contacts, DISPLACEMENTS, Flights, Flow, GapEvent, Moments, Observer, States, Stop, Sums,
-    Trajectory,
+    Allowance, Contacts, DISPLACEMENTS, EventKind, Flights, Flow, GapEvent, GapSums, Moments, Observer,
+    States, Stop, Sums, Trajectory,
 };
 
 /// Quantities of one motion over a whole number of forcing periods, in the units of the model.
@@ -24,6 +24,21 @@ pub struct Quantities {
     pub dissipated: f64,
     /// Dry friction; none without it.
     pub friction: Option<FrictionQuantities>,
+    /// Each gap; none with one gap. Unused entries are 0.
+    pub gaps: Option<[GapQuantities; MOST_GAPS]>,
+}
+
+/// Contacts of one gap.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GapQuantities {
+    /// Impacts per forcing period, without starts of lasting contact.
+    pub impacts_per_period: f64,
+    /// Fraction of the time in lasting contact.
+    pub mesh_fraction: f64,
+    /// Energy lost at its walls per unit time.
+    pub impact_energy: f64,
+    /// Largest and root mean square force of its compliant contacts, positive if it presses; none without such contact.
+    pub contact_force: Option<[f64; 2]>,
 }
 
 /// Quantities of dry friction.
@@ -154,6 +169,13 @@ impl<'f> Meter<'f> {
         self.flights.complete_periods(period, &mut self.sums);
         let (sums, time) = (self.sums, (period - self.first_period) as f64 * self.flow.period);
         let [right, left] = sums.contacts;
+        let of_gap = |gap: GapSums| GapQuantities {
+            impacts_per_period: gap.impacts as f64 / (period - self.first_period) as f64,
+            mesh_fraction: gap.contact_time / time,
+            impact_energy: gap.lost / time,
+            contact_force: (gap.force_time > 0.0)
+                .then(|| [gap.force.high, (gap.force.square / gap.force_time).sqrt()]),
+        };
         Quantities {
             approaches: [right, left, right.and(left)].map(Approaches::of),
             impact_energy: sums.lost / time,
@@ -165,12 +187,14 @@ impl<'f> Meter<'f> {
                 sticking: sums.sticking_time / time,
                 dissipated: sums.heat / time,
             }),
+            gaps: (self.flow.gap_count() > 1).then(|| sums.gaps.map(of_gap)),
         }
     }
 }
 
 impl Observer for Meter<'_> {
     fn event(&mut self, event: &GapEvent, _: States<'_>) {
+        self.sums.gaps[event.gap].impacts += u64::from(event.kind == EventKind::Impact);
         self.flights.event(event, &mut self.sums);
     }
 

@@ -35,7 +35,7 @@ pub fn measured_record(measured: &Measurement, needs: &Needs) -> Record {
         record.set_word(word);
         record.set_pattern(&word.pattern());
     }
-    if needs.measures != 0 {
+    if needs.measures != 0 || needs.gaps {
         record.set_measures(&measured.into());
     }
     drop_unrequested(&mut record, needs);
@@ -58,7 +58,7 @@ pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
     clear_unless(needs.pattern, valid::PATTERN, |r| {
         (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
     });
-    if record.valid & measures::bits() & !needs.measures != 0 {
+    if needs.gaps || record.valid & measures::bits() & !needs.measures != 0 {
         record.clear_measures(|group| !needs.has(group));
     }
 }
@@ -101,6 +101,7 @@ mod tests {
                 pattern: false,
                 measures: 0,
                 state: false,
+                gaps: false,
             },
         );
         assert_eq!(record, Record { valid: valid::PERIOD | valid::STROBE, ..Record::default() });

@@ -92,8 +92,10 @@ impl Filling {
     /// Returns the averages of the measured quantities that all corners have.
     fn measures(&self, weights: [f64; 4]) -> [f64; MEASURES] {
         let mut averages = [0.0; MEASURES];
-        if GROUPS.iter().any(|group| self.valid & group.bit != 0) {
-            for measure in measures::all().filter(|measure| self.valid & measure.group.bit != 0) {
+        let has_gaps = measures::of_gaps().any(|measure| self.corners[0].measures[measure.place] != 0.0);
+        if has_gaps || GROUPS.iter().any(|group| self.valid & group.bit != 0) {
+            let all = measures::all().chain(measures::of_gaps());
+            for measure in all.filter(|measure| self.valid & measure.group.bit != 0) {
                 let values = self.corners.each_ref().map(|corner| corner.measures[measure.place]);
                 let weighted: Vec<(f64, f64)> = values.into_iter().zip(weights).collect();
                 averages[measure.place] = measure.average(&weighted);

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::map::scene::Quantity;
 use crate::record::classify::classify;
+use crate::record::measures::contacts_of_gap;
 use crate::record::{Record, valid};
 use crate::show::cells::Cells;
 use crate::show::color::Color;
@@ -36,8 +37,10 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         chaos.map(|(id, _)| cells.record(id).lyapunov)
     };
     let high = round_bound(exponents());
+    let gap = cells.contact_gap();
+    let nth = gap.as_ref().map(|(nth, _)| *nth);
     let index = |record: &Record| match classify(record) {
-        Class::Periodic { period: 1 } => first_period(record, cells.has(Quantity::Symmetric)),
+        Class::Periodic { period: 1 } => first_period(record, nth, cells.has(Quantity::Symmetric)),
         Class::Periodic { period } => FIRST_PERIOD + (period.min(64) - 2) as u8,
         Class::Undecided => EXCEPTIONS,
         Class::Failed => EXCEPTIONS + 1,
@@ -67,7 +70,9 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         }
         None => "chaos".to_owned(),
     };
-    let entries = entries(&indices, &palette, chaos, shows_chaos, cells.has(Quantity::Symmetric));
+    let of_gap = gap.map_or(String::new(), |(_, name)| format!(" of {name}"));
+    let has_symmetry = cells.has(Quantity::Symmetric);
+    let entries = entries(&indices, &palette, (chaos, &of_gap), shows_chaos, has_symmetry);
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);
     Layer {
         name: "map".into(),
@@ -81,12 +86,21 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
     }
 }
 
-/// Returns the index of a cell of period 1. Its symmetry is unknown where the motion converges slowly.
-fn first_period(record: &Record, shows_symmetry: bool) -> u8 {
+/// Returns the index of a cell of period 1, by the contact of one of several gaps. Its symmetry is unknown where the motion converges
+/// slowly.
+fn first_period(record: &Record, gap: Option<usize>, shows_symmetry: bool) -> u8 {
     let measured = |bit| record.valid & bit != 0;
-    if record.is_contact_free() {
+    let of_gap =
+        gap.and_then(|gap| contacts_of_gap(record, gap)).map(|[impacts_per_period, mesh_fraction]| Record {
+            impacts_per_period,
+            mesh_fraction,
+            valid: record.valid,
+            ..Record::default()
+        });
+    let contacts = of_gap.as_ref().unwrap_or(record);
+    if contacts.is_contact_free() {
         0
-    } else if record.is_always_in_contact() {
+    } else if contacts.is_always_in_contact() {
         4
     } else if shows_symmetry && !measured(valid::SYMMETRIC) {
         3
@@ -109,7 +123,7 @@ fn palette() -> Vec<Color> {
 fn entries(
     indices: &[u8],
     palette: &[Color],
-    chaos_text: String,
+    (chaos_text, of_gap): (String, &str),
     shows_chaos: bool,
     shows_symmetry: bool,
 ) -> Vec<NamedColor> {
@@ -123,8 +137,8 @@ fn entries(
         (false, _) => "period 1",
     };
     let mut list = vec![
-        entry(0, "period 1, no contact".to_owned()),
-        entry(4, "period 1, always in contact".to_owned()),
+        entry(0, format!("period 1, no contact{of_gap}")),
+        entry(4, format!("period 1, always in contact{of_gap}")),
         entry(1, with_contact.to_owned()),
         entry(2, "period 1, unsymmetric".to_owned()),
         entry(3, "period 1, symmetry unknown".to_owned()),

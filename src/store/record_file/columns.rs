@@ -120,7 +120,7 @@ mod tests {
                 let (count, width) = size(column, strobes);
                 count * width
             };
-            let whole: usize = (1..COUNT - 1).map(bytes_of).sum();
+            let whole: usize = (1..COUNT - 2).map(bytes_of).sum();
             assert_eq!(whole, bytes, "{coordinates} coordinates");
             let entries: Vec<f64> = (1..=strobes).map(|n| n as f64 / 3.0).collect();
             let record = Record { strobe: entries.into_iter().collect(), period: 3, ..Record::default() };

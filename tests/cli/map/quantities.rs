@@ -133,3 +133,58 @@ fn chaos_that_ends_is_counted_by_maps_and_by_validations() {
     succeeds(&folder, "validate out/s --samples 5 --chaos-periods 0 --quiet");
     assert!(json(&out.join("validation.json"))["chaos_ends"].is_null());
 }
+
+/// A quarter car with bump stops on the suspension `susp`, whose tyre may lift off, and two loose gears with walls of law `impact`.
+#[test]
+fn contacts_of_each_gap_are_counted_apart() {
+    let car = [("v", 20.0, 100.0), ("A", 0.02, 0.08)];
+    let folder = measured("quarter_car.toml", car, [4, 4], "files = ['csv', 'svg']\n");
+    fs::write(folder.path().join("quarter_car.toml"), include_str!("../../gallery/data/quarter_car.toml"))
+        .unwrap();
+    let gears = measured(
+        "two-loose-gears",
+        [("A", 2e-4, 8e-4), ("omega", 150.0, 230.0)],
+        [3, 3],
+        "files = ['csv']\n",
+    );
+    for (folder, [a, b]) in [(&folder, ["susp", "tyre"]), (&gears, ["a", "b"])] {
+        let quantities = "class impacts mesh impact_energy contact_force_max".replace(' ', "\",\"");
+        let line = format!("map s.toml --engine cpu --quiet --set outputs.quantities=[\"{quantities}\"]");
+        succeeds(folder, &line);
+        let cells = folder.path().join("out/s/cells.csv");
+        let of = |name: &str| column(&cells, name);
+        let each = |name: &str| [a, b].map(|gap| of(&format!("{name}_{gap}")));
+        let close = |x: f64, y: f64| (x - y).abs() <= 1e-9 * x.abs().max(y.abs()).max(1.0);
+        let [first, second] = each("impact_energy");
+        for ((whole, a), b) in of("impact_energy").into_iter().zip(first).zip(second) {
+            assert!(close(whole.unwrap(), a.unwrap() + b.unwrap()), "{whole:?} {a:?} {b:?}");
+        }
+        let [first, second] = each("contact_force_max");
+        for ((whole, a), b) in of("contact_force_max").into_iter().zip(first).zip(second) {
+            assert_eq!(whole, a.into_iter().chain(b).reduce(f64::max), "{a:?} {b:?}");
+        }
+        // Averages of all gaps together cover other periods if the motion is not periodic.
+        let (header, table) = rows(&cells);
+        let class = header.split(',').position(|name| name == "class").unwrap();
+        let periodic: Vec<usize> = (0..table.len()).filter(|&id| table[id][class] == "periodic").collect();
+        assert!(periodic.len() > 2);
+        let of = |name: &str| periodic.iter().map(|&id| of(name)[id]).collect::<Vec<_>>();
+        let each = |name: &str| [a, b].map(|gap| of(&format!("{name}_{gap}")));
+        let [first, second] = each("mesh_fraction");
+        for ((whole, a), b) in of("mesh_fraction").into_iter().zip(first).zip(second) {
+            let [whole, a, b] = [whole, a, b].map(Option::unwrap);
+            assert!(whole > a.max(b) - 1e-9 && whole < a + b + 1e-9, "{whole} {a} {b}");
+        }
+        let [first, second] = each("impacts_per_period");
+        for ((whole, a), b) in of("impacts_per_period").into_iter().zip(first).zip(second) {
+            assert!(close(whole.unwrap(), a.unwrap() + b.unwrap()), "{whole:?} {a:?} {b:?}");
+        }
+    }
+    // The tyre is always in contact where the road is flat, and the suspension never; a bump stop is hit where it is rough.
+    let cells = folder.path().join("out/s/cells.csv");
+    let [susp, tyre] = ["susp", "tyre"].map(|gap| column(&cells, &format!("mesh_fraction_{gap}")));
+    assert!(susp[0] == Some(0.0) && tyre[0].unwrap() > 1.0 - 1e-9, "{susp:?} {tyre:?}");
+    assert!(susp.iter().any(|share| share.unwrap() > 0.0) && tyre.iter().any(|share| share.unwrap() < 0.99));
+    let map = fs::read_to_string(folder.path().join("out/s/map.svg")).unwrap();
+    assert!(map.contains("no contact of susp"), "{map:.300}");
+}
