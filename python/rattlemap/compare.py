@@ -32,8 +32,8 @@ class Comparison:
     by_pattern, by_word
         Number of cells with equal periods that differ by pattern, or by word if a map has no patterns.
     by_motion, by_quantity
-        Number of further cells with equal periods whose states at phase 0 belong to different cycles, up to mirror image, and of
-        those with the same cycle of which a quantity differs.
+        ``by_motion``: number of further cells with equal periods but different cycles; mirror images count as equal.
+        ``by_quantity``: number of cells that differ only in a quantity.
     differing
         Number of cells that differ by class or period.
     transitions
@@ -89,6 +89,8 @@ def compare(
     >>> rm.compare("up", "down").cells
     16
     """
+    if not 0 < tolerance < 1:
+        raise ValueError(f"tolerance = {tolerance}: it must be above 0 and below 1")
     result, text, warnings = _native.compare(_folder(a), _folder(b), tolerance)
     warn(warnings)
     data = json.loads(result)

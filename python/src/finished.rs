@@ -85,7 +85,7 @@ pub(crate) fn validate(
         let clock = Instant::now();
         let observer = Collector::new(watch);
         let job = ValidateJob::open(&folder, samples as usize, seed, chaos_periods, &observer)?;
-        let lanes = job.run_lanes(None, &observer, watch.halt());
+        let lanes = job.run_lanes(None, &(), watch.halt());
         if watch.is_halted() {
             return Ok(None);
         }

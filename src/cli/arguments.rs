@@ -75,12 +75,17 @@ pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsStrin
     })
 }
 
-/// Turns `--fail quantities` into `--fail=quantities`. Other arguments after `--fail` are folders, because its value is optional.
+/// Turns `compare --fail quantities` into `compare --fail=quantities`. Other arguments after `--fail` are folders, because its value is
+/// optional.
 fn joined(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     let mut all: Vec<OsString> = Vec::new();
     for argument in arguments {
         match all.last_mut() {
-            Some(last) if last == "--fail" && argument == "quantities" => last.push("=quantities"),
+            Some(last)
+                if last == "--fail" && argument == "quantities" && !Path::new("quantities").exists() =>
+            {
+                last.push("=quantities");
+            }
             _ => all.push(argument),
         }
     }
@@ -769,9 +774,9 @@ pub(crate) struct Validate {
           value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_PERIODS)))]
     pub(crate) chaos_periods: u32,
 
-    /// Second judge beside the reference: f64 lanes, also on a software driver, or an ODE solver with event location, which
-    /// judges only what the reference computed or finished [default: lanes if lanes computed the map or there is a hardware
-    /// GPU, else the solver]
+    /// Engine that checks the reference: f64 lanes, even on a software driver, or an ODE solver with event location. The
+    /// solver checks only cells that the reference computed or finished [default: lanes if lanes computed the map or there is
+    /// a hardware GPU, else the solver]
     #[arg(long, value_name = "JUDGE", value_enum)]
     pub(crate) judge: Option<JudgeChoice>,
 
@@ -810,7 +815,7 @@ pub(crate) enum FailOn {
 /// differences of other parameters are listed. Writes compare.csv (one row per differing cell), compare.png and
 /// manifest.json. A cell differs if its class or period differs. Cells that differ only by pattern (by word if a map has
 /// no patterns), by motion (if both maps store states) or by a quantity are listed, drawn and counted separately. Motions
-/// are compared up to mirror image, within 3 % of their size; quantities by --tolerance, if one of both motions is
+/// are compared up to mirror image, within 3 % of their size; quantities by --tolerance, if at least one motion is
 /// periodic. For cells of equal period the summary also counts differences in symmetry and words, and gives the largest
 /// difference of exponents. Filled cells of adaptive maps are compared like the others.
 #[derive(Debug, Args)]
@@ -829,11 +834,11 @@ pub(crate) struct Compare {
 
     /// Exit with code 1 if any cell differs by class or period; with `--fail quantities`, if any cell is listed in
     /// compare.csv
-    #[arg(long, value_name = "class|quantities", num_args = 0..=1, require_equals = true, default_missing_value = "class")]
+    #[arg(long, value_name = "quantities", hide_possible_values = true, num_args = 0..=1, require_equals = true, default_missing_value = "class")]
     pub(crate) fail: Option<FailOn>,
 
-    /// Difference of a quantity that counts, relative to the larger of both values; of angles, in radians. Values below
-    /// a thousandth of this share of the map's largest one count as zero
+    /// Difference of a quantity that counts, relative to the larger of both values; of angles, in radians. Differences
+    /// below a thousandth of this share of the largest value in both maps are ignored
     #[arg(long, value_name = "SHARE", default_value_t = TOLERANCE, value_parser = parse_share)]
     pub(crate) tolerance: f64,
 

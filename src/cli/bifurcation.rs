@@ -95,7 +95,7 @@ fn described(found: &Hysteresis, name: &str) -> String {
         ("quantities", found.by_quantity, &found.quantity_ranges),
     ];
     let others = by.into_iter().filter(|(_, count, _)| *count > 0).map(|(what, count, ranges)| {
-        format!("\nup and down differ by {what} only in {count} columns, at {name} = {}", listed(ranges))
+        format!("\nup and down differ only by {what} in {count} columns, at {name} = {}", listed(ranges))
     });
     [by_class].into_iter().chain(others).collect()
 }

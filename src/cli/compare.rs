@@ -17,6 +17,7 @@ use crate::map::scene::Scene;
 use crate::show::map_pair::MapPair;
 use crate::store;
 use crate::store::folder::Folder;
+use rattlemap_dynamics::number::significant;
 
 /// Reads both maps, compares them, and writes the result.
 pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
@@ -49,7 +50,9 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let (differing, by) = match arguments.fail {
         None => return Ok(()),
         Some(FailOn::Class) => (result.comparison.differing(), "class or period"),
-        Some(FailOn::Quantities) => (result.comparison.listed(), "class, period, motion or quantities"),
+        Some(FailOn::Quantities) => {
+            (result.comparison.listed(), "class, period, pattern, motion or quantities")
+        }
     };
     match differing {
         0 => Ok(()),
@@ -97,12 +100,11 @@ fn summary(maps: &MapPair<'_>, scene: &Scene, tolerance: f64) -> String {
 
 /// Describes the cells in which a quantity differs; none if it differs nowhere.
 fn of_quantity(quantity: &QuantityTally, scene: &Scene, tolerance: f64) -> Option<String> {
-    let QuantityTally { name, tally: Tally { compared, differing }, largest } = quantity;
-    let (place, percent) = (scene.points().named((*largest)?.id), 100.0 * tolerance);
-    let by = if name.contains("phase") || name.contains("argument") {
-        format!("{tolerance} rad")
-    } else {
-        format!("{percent} %")
+    let QuantityTally { name, is_angle, tally: Tally { compared, differing }, largest } = quantity;
+    let place = scene.points().named((*largest)?.id);
+    let by = match is_angle {
+        true => format!("{tolerance} rad"),
+        false => format!("{} %", significant(100.0 * tolerance)),
     };
     Some(format!("{name} differs by more than {by} in {differing} of {compared} cells, most at {place}"))
 }

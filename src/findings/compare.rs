@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::record::classify::classify;
 use crate::record::distance::apart;
+use crate::record::measures::Dimension;
 use crate::record::{Record, Records, Spelling, valid};
 use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::Class;
@@ -26,7 +27,7 @@ named! {
         Pattern = "pattern",
         /// Cycles of one period with different words, if patterns are unknown.
         Word = "word",
-        /// Different cycles of one period, which are no mirror images.
+        /// Different cycles of one period that are not mirror images of each other.
         Motion = "motion",
         /// Cycles of one period with different quantities.
         Quantity = "quantity",
@@ -96,6 +97,8 @@ pub struct Comparison {
     pub motions: Tally,
     /// Quantities that both maps have.
     pub quantities: Vec<QuantityTally>,
+    /// Difference of a quantity that counts, relative to the larger value.
+    pub tolerance: f64,
     /// Indices of the `quantities` that differ, for each cell in which any does.
     pub differing_quantities: BTreeMap<usize, Vec<usize>>,
 }
@@ -105,19 +108,31 @@ pub struct Comparison {
 pub struct QuantityTally {
     /// Name of its column in tables.
     pub name: String,
-    /// Cells in which it can be compared: one motion at least is periodic, because averages of aperiodic motions have
+    /// Whether it is an angle in radians.
+    pub is_angle: bool,
+    /// Cells in which it can be compared: at least one motion is periodic, because averages of aperiodic motions have
     /// statistical errors.
     pub tally: Tally,
     /// Largest difference.
     pub largest: Option<Largest>,
 }
 
+/// A quantity to compare.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// Name of its column in tables.
+    pub name: String,
+    /// Dimension. Numbers of one dimension are compared with the largest of them; those without dimension have their own scale. The
+    /// modulus of an angle stands in front of it.
+    pub dimension: Dimension,
+    /// Whether the mirror image of a motion has the opposite value.
+    pub is_odd: bool,
+}
+
 /// The values of quantities in the cells of two maps.
 pub struct Values<'a> {
-    /// Names of the quantities. The modulus of an angle stands in front of it.
-    pub names: Vec<String>,
-    /// Whether each is an angle in radians.
-    pub are_angles: Vec<bool>,
+    /// The quantities.
+    pub quantities: Vec<Compared>,
     /// Returns the values of a cell in A and B.
     #[allow(clippy::type_complexity, reason = "a closure with one argument")]
     pub of: &'a (dyn Fn(usize) -> [Vec<Option<f64>>; 2] + Sync),
@@ -126,97 +141,134 @@ pub struct Values<'a> {
 /// Difference of a quantity that counts, relative to the larger of both values, unless the caller names another.
 pub const TOLERANCE: f64 = 0.05;
 
-/// Share of a quantity's largest value in both maps below which differences are rounding.
+/// Share of the tolerance, relative to the largest value of a dimension in both maps, below which differences are rounding.
 const ROUNDING: f64 = 1e-3;
 
 impl Values<'_> {
+    /// Returns for each quantity the difference below which values differ by rounding.
+    fn floors(&self, tolerance: f64, ids: impl ParallelIterator<Item = usize>) -> Vec<f64> {
+        let larger = |mut largest: Vec<f64>, values: Vec<Option<f64>>| {
+            for (largest, value) in largest.iter_mut().zip(values) {
+                *largest = value.map_or(*largest, |value| largest.max(value.abs()));
+            }
+            largest
+        };
+        let none = || vec![0.0; self.quantities.len()];
+        let of_cell = |largest, id| (self.of)(id).into_iter().fold(largest, larger);
+        let joined = |a, b: Vec<f64>| larger(a, b.into_iter().map(Some).collect());
+        let largest = ids.fold(none, of_cell).reduce(none, joined);
+        let of_dimension = |(nth, quantity): (usize, &Compared)| {
+            let all = self.quantities.iter().zip(&largest);
+            let same = all.filter(|(other, _)| {
+                quantity.dimension != Dimension::None && other.dimension == quantity.dimension
+            });
+            ROUNDING * tolerance * same.map(|(_, largest)| *largest).fold(largest[nth], f64::max)
+        };
+        self.quantities.iter().enumerate().map(of_dimension).collect()
+    }
+
     /// Returns the difference of two values of a quantity if it exceeds the tolerance, up to mirror image, and else 0; none if one
     /// value is absent, or the modulus of the angle is as small as rounding.
     fn difference(
         &self,
         nth: usize,
-        values: &[Vec<Option<f64>>; 2],
+        [a, b]: &[Vec<Option<f64>>; 2],
         floors: &[f64],
         tolerance: f64,
     ) -> Option<f64> {
-        let [a, b] = values;
-        let (a_value, b_value) = a[nth].zip(b[nth])?;
-        let (difference, bar) = if self.are_angles[nth] {
+        let (x, y) = a[nth].zip(b[nth])?;
+        let Compared { dimension, is_odd, .. } = self.quantities[nth];
+        let (difference, bar) = if dimension == Dimension::Angle {
             let modulus = |of: &[Option<f64>]| nth.checked_sub(1).and_then(|before| of[before]);
-            let has_modulus =
-                [a, b].iter().all(|of| modulus(of).is_none_or(|size| size.abs() > floors[nth - 1]));
-            let turn = a_value - b_value;
-            (turn.sin().atan2(turn.cos()).abs(), if has_modulus { tolerance } else { return None })
+            if [a, b].iter().any(|of| modulus(of).is_some_and(|size| size.abs() <= floors[nth - 1])) {
+                return None;
+            }
+            let turn = x - y;
+            (turn.sin().atan2(turn.cos()).abs(), tolerance)
         } else {
-            // The mean of the mirror image has the other sign.
-            let [a, b] = [a_value, b_value].map(f64::abs);
-            (apart(a, b), (tolerance * a.max(b)).max(floors[nth]))
+            let apart = if is_odd { apart(x, y).min(apart(x, -y)) } else { apart(x, y) };
+            (apart, (tolerance * x.abs().max(y.abs())).max(floors[nth]))
         };
         Some(if difference > bar { difference } else { 0.0 })
     }
 }
 
+impl QuantityTally {
+    /// Takes a difference if it is larger; of equal ones that of the first cell.
+    fn larger(&mut self, other: Option<Largest>) {
+        let rank = |largest: &Largest| (largest.difference, std::cmp::Reverse(largest.id));
+        if let Some(other) = other
+            && self.largest.is_none_or(|own| rank(&other) > rank(&own))
+        {
+            self.largest = Some(other);
+        }
+    }
+}
+
+/// Quantities that were compared in some cells, and for each cell those that differ.
+type Found = (Vec<QuantityTally>, Vec<(usize, Vec<usize>)>);
+
 impl Comparison {
-    /// Compares the motions of cells of equal period. `is_same` returns whether both are one cycle up to mirror image; none for
-    /// other cells, or if the records do not tell.
+    /// Compares the motions of cells in which no other difference was found. `is_same` returns whether both are one cycle up to mirror
+    /// image; none for other cells, or if the records do not tell.
     pub fn take_motions(&mut self, is_same: impl Fn(usize) -> Option<bool> + Sync) {
-        let same: Vec<Option<bool>> = (0..self.kinds.len()).into_par_iter().map(&is_same).collect();
+        let same = |(id, kind): (usize, &Option<Kind>)| kind.is_none().then(|| is_same(id)).flatten();
+        let same: Vec<Option<bool>> = self.kinds.par_iter().enumerate().map(same).collect();
         for (kind, same) in self.kinds.iter_mut().zip(same) {
             self.motions.take(same.map(|same| !same));
             *kind = kind.or((same == Some(false)).then_some(Kind::Motion));
         }
     }
 
-    /// Compares quantities: numbers differ if their difference exceeds this share of the larger one and a thousandth of the share of
-    /// the largest in both maps; angles if it exceeds the share of a radian. `classes` returns the classes of a cell.
+    /// Compares quantities. Numbers differ if their difference exceeds this share of the larger one, and a thousandth of this share of
+    /// the largest value of their dimension in both maps; angles differ if their difference exceeds the share of a radian. `classes`
+    /// returns the classes of a cell.
     pub fn take_quantities(
         &mut self,
         values: &Values<'_>,
         tolerance: f64,
         classes: impl Fn(usize) -> [Class; 2] + Sync,
     ) {
-        let count = values.names.len();
         let is_periodic = |class: &Class| matches!(class, Class::Periodic { .. });
         let ids = || (0..self.kinds.len()).into_par_iter().filter(|&id| classes(id).iter().any(is_periodic));
-        let largest = |mut floors: Vec<f64>, values: Vec<Option<f64>>| {
-            for (floor, value) in floors.iter_mut().zip(values) {
-                *floor = value.map_or(*floor, |value| floor.max(value.abs()));
-            }
-            floors
+        let floors = values.floors(tolerance, ids());
+        let new = |quantity: &Compared| QuantityTally {
+            name: quantity.name.clone(),
+            is_angle: quantity.dimension == Dimension::Angle,
+            tally: Tally::default(),
+            largest: None,
         };
-        let of_cell = |floors, id| (values.of)(id).into_iter().fold(floors, largest);
-        let joined = |a, b: Vec<f64>| largest(a, b.into_iter().map(Some).collect());
-        let floors = ids().fold(|| vec![0.0; count], of_cell).reduce(|| vec![0.0; count], joined);
-        let floors: Vec<f64> = floors.into_iter().map(|largest| ROUNDING * tolerance * largest).collect();
-        let compared = |id| {
-            let of_cell = (values.of)(id);
-            (
-                id,
-                (0..count)
-                    .map(|nth| values.difference(nth, &of_cell, &floors, tolerance))
-                    .collect::<Vec<_>>(),
-            )
-        };
-        let found: Vec<(usize, Vec<Option<f64>>)> = ids().map(compared).collect();
-        let new =
-            |name: &String| QuantityTally { name: name.clone(), tally: Tally::default(), largest: None };
-        self.quantities = values.names.iter().map(new).collect();
-        for (id, differences) in found {
-            let mut differing = Vec::new();
-            for (nth, (difference, quantity)) in differences.into_iter().zip(&mut self.quantities).enumerate()
-            {
+        let none = || (values.quantities.iter().map(new).collect(), Vec::new());
+        let take = |(mut quantities, mut cells): Found, id| {
+            let (of_cell, mut differing) = ((values.of)(id), Vec::new());
+            for (nth, quantity) in quantities.iter_mut().enumerate() {
+                let difference = values.difference(nth, &of_cell, &floors, tolerance);
                 quantity.tally.take(difference.map(|difference| difference > 0.0));
-                let Some(difference) = difference.filter(|difference| *difference > 0.0) else { continue };
-                differing.push(nth);
-                if quantity.largest.is_none_or(|largest| difference > largest.difference) {
-                    quantity.largest = Some(Largest { difference, id });
+                if let Some(difference) = difference.filter(|difference| *difference > 0.0) {
+                    differing.push(nth);
+                    quantity.larger(Some(Largest { difference, id }));
                 }
             }
             if !differing.is_empty() {
-                self.kinds[id] = self.kinds[id].or(Some(Kind::Quantity));
-                self.differing_quantities.insert(id, differing);
+                cells.push((id, differing));
             }
+            (quantities, cells)
+        };
+        let join = |(mut quantities, mut cells): Found, (others, further): Found| {
+            for (quantity, other) in quantities.iter_mut().zip(others) {
+                quantity.tally.compared += other.tally.compared;
+                quantity.tally.differing += other.tally.differing;
+                quantity.larger(other.largest);
+            }
+            cells.extend(further);
+            (quantities, cells)
+        };
+        let (quantities, cells) = ids().fold(none, take).reduce(none, join);
+        for (id, _) in &cells {
+            self.kinds[*id] = self.kinds[*id].or(Some(Kind::Quantity));
         }
+        (self.quantities, self.differing_quantities) = (quantities, cells.into_iter().collect());
+        self.tolerance = tolerance;
     }
 
     /// Returns the names of the quantities that differ in a cell.
@@ -427,8 +479,13 @@ mod tests {
         let a = [[1.0, 3.1, 0.5], [1.0, 0.2, 0.5], [1.0, 0.0, 0.0], [1e-9, 1.0, 0.0], [0.0, 0.0, 0.0]];
         let b = [[1.04, -3.15, -0.5], [1.0, 0.1, 0.5], [1.06, 0.0, 0.0], [3e-9, 2.0, 0.0], [0.5, 0.0, 0.0]];
         let values = |id: usize| [a, b].map(|side| side[id].map(Some).to_vec());
-        let names = ["amplitude_x", "phase_x", "mean_x"].map(str::to_owned).to_vec();
-        let values = Values { names, are_angles: vec![false, true, false], of: &values };
+        let quantity = |name: &str, dimension, is_odd| Compared { name: name.to_owned(), dimension, is_odd };
+        let quantities = vec![
+            quantity("amplitude_x", Dimension::Length, false),
+            quantity("phase_x", Dimension::Angle, false),
+            quantity("mean_x", Dimension::Length, true),
+        ];
+        let values = Values { quantities, of: &values };
         let classes = |id: usize| {
             [Class::Periodic { period: 1 }, [Class::Chaotic, Class::Periodic { period: 1 }][id.min(1)]]
         };

@@ -1,8 +1,8 @@
 //! Hysteresis: values at which the two passes of a diagram differ.
 
-use crate::findings::compare::{Comparison, Kind, TOLERANCE, Values, words_differ};
+use crate::findings::compare::{Compared, Comparison, Kind, TOLERANCE, Values, words_differ};
 use crate::map::bifurcation::{Column, Direction};
-use crate::record::measures;
+use crate::record::measures::{self, Dimension};
 
 /// Values of the axis at which the motion depends on the direction in which the attractor was followed.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,8 +18,8 @@ pub struct Hysteresis {
     pub by_pattern: usize,
     /// First and last value of each range of neighbouring values at which only the patterns differ.
     pub pattern_ranges: Vec<[f64; 2]>,
-    /// Number of values at which only quantities differ, by more than [`TOLERANCE`], and their ranges. They are those that the
-    /// scene requests, impacts, the mesh fraction and the largest speed at a wall.
+    /// Number of values at which only quantities differ, by more than [`TOLERANCE`]: measured quantities, impacts, the mesh fraction
+    /// and the largest speed at a wall.
     pub by_quantity: usize,
     /// First and last value of each range of neighbouring values at which only quantities differ.
     pub quantity_ranges: Vec<[f64; 2]>,
@@ -38,10 +38,13 @@ pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
     };
     let mut compared = Comparison { kinds: pairs.iter().map(kind).collect(), ..Comparison::default() };
     let values = Values {
-        names: std::iter::repeat_n(String::new(), AVERAGES + measures::all().count()).collect(),
-        are_angles: [false; AVERAGES]
-            .into_iter()
-            .chain(measures::all().map(|measure| measure.is_angle()))
+        quantities: std::iter::repeat_n(Dimension::None, AVERAGES)
+            .map(|dimension| Compared { name: String::new(), dimension, is_odd: false })
+            .chain(measures::all().map(|measure| Compared {
+                name: measure.name(&[], &[]),
+                dimension: measure.dimension(),
+                is_odd: measure.is_odd(),
+            }))
             .collect(),
         of: &|nth| pairs[nth].map(quantities),
     };

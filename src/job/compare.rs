@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::findings::coexistence;
-use crate::findings::compare::{self, Comparison, Side, Values};
+use crate::findings::compare::{self, Compared, Comparison, Side, Values};
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap};
 use crate::job::observer::Observer;
@@ -12,9 +12,11 @@ use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
 use crate::record::classify::classify;
+use crate::record::measures::Dimension;
 use crate::record::{Records, valid};
 use crate::show::cells::{Cells, Survey};
 use crate::show::map_pair::{MapPair, MapSide};
+use crate::show::numbers::Number;
 use crate::store::finished_map::FinishedMap;
 use rattlemap_dynamics::orbit::Class;
 
@@ -96,7 +98,7 @@ impl<'a> CompareJob<'a> {
             has_exponents: self.scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
         });
         let mut comparison = compare::compare(loaded[0].plan.cell_count(), a, b);
-        compare_motions(&mut comparison, &loaded);
+        compare_motions(&mut comparison, &loaded, &self.scenes, &is_halted);
         if is_halted() {
             return Ok(None);
         }
@@ -109,17 +111,33 @@ impl<'a> CompareJob<'a> {
     }
 }
 
-/// Compares the cycles of equal period whose strobe states both maps have.
-fn compare_motions(comparison: &mut Comparison, loaded: &[LoadedMap; 2]) {
+/// Compares the cycles of equal period whose strobe states both maps have, if both maps have the same model and parameters.
+fn compare_motions(
+    comparison: &mut Comparison,
+    loaded: &[LoadedMap; 2],
+    scenes: &[Scene; 2],
+    is_halted: &(dyn Fn() -> bool + Sync),
+) {
+    // A motion of another oscillator cannot be compared with a cycle of this one.
+    let of_model = |scene: &Scene| {
+        let is_own = |name: &str| name.starts_with("parameters.") || name.starts_with("model");
+        scene.identity().into_iter().filter(|(name, _)| is_own(name)).collect::<Vec<_>>()
+    };
+    if of_model(&scenes[0]) != of_model(&scenes[1]) {
+        return;
+    }
     let plan = &loaded[0].plan;
     let flows = Flows::new(plan);
     comparison.take_motions(|id| {
         let [a, b] = loaded.each_ref().map(|map| map.stored.records.record(id));
         let have_state = a.valid & b.valid & valid::STROBE != 0;
         let is_cycle = matches!(classify(&a), Class::Periodic { .. }) && classify(&a) == classify(&b);
+        if !(have_state && is_cycle) || is_halted() {
+            return None;
+        }
         let cell = plan.cell(id as u32);
         let is_one = |flow: &_| coexistence::is_one(flow, plan.law(cell.law), [&a, &b]);
-        (have_state && is_cycle).then(|| flows.with(cell.flow, is_one))
+        Some(a.strobe() == b.strobe() || flows.with(cell.flow, is_one))
     });
 }
 
@@ -132,13 +150,22 @@ fn compare_quantities(
 ) {
     let cells = [0, 1].map(|i| Cells::new(&scenes[i], &loaded[i].plan, &loaded[i].stored.records));
     let [a, b] = cells.map(|cells| cells.numbers());
-    let is_shared = |name: &str| b.iter().position(|other| other.name == name);
-    let shared: Vec<[&_; 2]> = a
+    let shared: Vec<[&Number; 2]> = a
         .iter()
         .filter(|number| number.quantity != Quantity::State)
-        .filter_map(|number| Some([number, &b[is_shared(&number.name)?]]))
+        .filter_map(|number| Some([number, b.iter().find(|other| other.name == number.name)?]))
         .collect();
-    let names = shared.iter().map(|[number, _]| number.name.clone());
+    let has_mirror_images = loaded[0].plan.model(0).oscillator().is_ok_and(|of| of.mirror_symmetric());
+    let averages = ["impacts_per_period", "mesh_fraction"].map(|name| Compared {
+        name: name.to_owned(),
+        dimension: Dimension::None,
+        is_odd: false,
+    });
+    let measured = shared.iter().map(|[number, _]| Compared {
+        name: number.name.clone(),
+        dimension: number.dimension,
+        is_odd: has_mirror_images && number.is_odd(),
+    });
     let of = |id| {
         [0, 1].map(|i| {
             let row = cells[i].row(id);
@@ -149,14 +176,7 @@ fn compare_quantities(
                 .collect()
         })
     };
-    let values = Values {
-        names: ["impacts_per_period", "mesh_fraction"].map(str::to_owned).into_iter().chain(names).collect(),
-        are_angles: [false, false]
-            .into_iter()
-            .chain(shared.iter().map(|[number, _]| number.is_angle()))
-            .collect(),
-        of: &of,
-    };
+    let values = Values { quantities: averages.into_iter().chain(measured).collect(), of: &of };
     let classes = |id| loaded.each_ref().map(|map| classify(&map.stored.records.record(id)));
     comparison.take_quantities(&values, tolerance, classes);
 }

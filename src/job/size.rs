@@ -244,7 +244,9 @@ fn disk(scene: &Scene) -> [u64; 2] {
         let column = |quantity: &Quantity| match quantity {
             Quantity::Word | Quantity::Pattern => words,
             Quantity::Lyapunov => exponent,
-            Quantity::Impacts | Quantity::Mesh | Quantity::ImpactRate => 8,
+            Quantity::ImpactRate => 8,
+            // Each of several gaps has a number of its own.
+            Quantity::Impacts | Quantity::Mesh => 8 + numbers(scene, *quantity),
             Quantity::Class => class,
             Quantity::Symmetric => 1,
             Quantity::State => state_bytes(scene),

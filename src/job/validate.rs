@@ -19,7 +19,7 @@ use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::map::{self, MANIFEST, VALIDATION};
 use crate::store::record_file::Identity;
-use crate::validate::{self, Judge, Kind, Lanes, Sample, Subject, Validation, Value};
+use crate::validate::{self, Field, Judge, Kind, Lanes, Sample, Subject, Validation, Value};
 
 /// Largest number of cells that the message of a failed validation names; [`VALIDATION`] lists all.
 const NAMED_CELLS: usize = 8;
@@ -134,13 +134,22 @@ impl ValidateJob {
         let mut double = match is_double {
             true => None,
             // The ODE solver is the second judge then.
-            false if subject.plan.needs_reference() || judge == Some(Judge::Independent) => None,
+            false if subject.plan.needs_reference() => None,
+            // Lanes in f64 show which differences of lanes are rounding.
+            false if judge == Some(Judge::Independent) && !subject.is_lane => None,
             // A software driver takes minutes to compile shaders, longer than the solver needs for a sample.
             false => {
                 let is_quick = |gpu: &Gpu| judge.is_some() || subject.is_lane || is_hardware(gpu.adapter());
                 open(Precision::F64, &own).or_else(|_| open(Precision::F64, &any)).ok().filter(is_quick)
             }
         };
+        if judge == Some(Judge::Lanes) && double.is_none() && !is_double {
+            let why = match subject.plan.needs_reference() {
+                true => "lanes cannot compute this model",
+                false => "no graphics adapter computes in f64",
+            };
+            return Err(JobError::Usage(format!("--judge lanes: {why}; use --judge solver")));
+        }
         for gpu in gpu.iter().chain(&double) {
             let wait = match is_hardware(gpu.adapter()) {
                 true => "",
@@ -261,19 +270,23 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), JobEr
 /// Returns what may mend the map, by the classes and statuses of its wrong cells.
 fn remedy(plan: &Plan, validation: &Validation) -> String {
     let unexplained = validation.mismatches.iter().filter(|mismatch| mismatch.kind == Kind::Unexplained);
-    let differences: Vec<_> = unexplained.flat_map(|mismatch| &mismatch.differences).collect();
-    let is =
-        |value: &str| differences.iter().any(|difference| difference.record == Value::Text(value.to_owned()));
+    let differences = unexplained.flat_map(|mismatch| &mismatch.differences);
+    let told = differences.filter(|difference| matches!(difference.field, Field::Class | Field::Status));
+    let told: Vec<&Value> = told.map(|difference| &difference.record).collect();
+    let is = |value: &str| told.iter().any(|told| **told == Value::Text(value.to_owned()));
     let budget = plan.budget();
     let mut remedies = Vec::new();
     if budget.early_stop && (is("chaotic") || is("quasi-periodic")) {
         remedies.push("`integration.early_stop = false` if motion without a period was decided too early");
     }
     if is("chaotic") && budget.confirm_chaos == 0 {
-        remedies.push("`integration.confirm_chaos` if chaos ends late");
+        remedies
+            .push("`integration.confirm_chaos = 6000` if chaos that ends late was taken for lasting chaos");
     }
     if ["too_stiff", "cap_events"].into_iter().any(is) {
-        remedies.push("a larger mesh_speed, or softer springs, if lanes end at a limit");
+        remedies.push(
+            "a larger mesh_speed, or softer springs, if cells end with the status too_stiff or cap_events",
+        );
     }
     if remedies.is_empty() { String::new() } else { format!(". Try {}", remedies.join(", or ")) }
 }

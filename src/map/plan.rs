@@ -154,13 +154,16 @@ impl Plan {
         assert!(scene.axes().len() == 2 || scene.list().is_some(), "a map has two axes, or a list of cells");
         assert!(u32::try_from(scene.run_count()).is_ok(), "cells are numbered by u32");
         let points = scene.points().clone();
-        let mut needs = needs(&scene.outputs().quantities, several_gaps(scene.base()).is_some());
+        let mut needs = needs(&scene.outputs().quantities);
         // A map of basins needs the exponent, because chaos is an attractor, too.
         needs.exponent |= scene.is_basin();
         // An adaptive map must not interpolate between motion with and without contact.
-        let needs_contact = scene.refine().is_some() && needs.measures != 0;
+        let has_several_gaps = several_gaps(scene.base()).is_some();
+        let has_gaps = has_several_gaps && (needs.impacts || needs.mesh);
+        let needs_contact = scene.refine().is_some() && (needs.measures != 0 || has_gaps);
         needs.impacts |= needs_contact;
         needs.mesh |= needs_contact;
+        needs.gaps = has_several_gaps && (needs.impacts || needs.mesh);
         let integration = scene.integration();
         Plan {
             flows: Parts::flows(&points),
@@ -410,7 +413,7 @@ pub(crate) fn stores_flows(flows: u64, runs: u64) -> bool {
     flows < runs && flows <= MOST_STORED_FLOWS as u64
 }
 
-fn needs(quantities: &[Quantity], has_several_gaps: bool) -> Needs {
+fn needs(quantities: &[Quantity]) -> Needs {
     let has = |quantity| quantities.contains(&quantity);
     Needs {
         // The exponent distinguishes chaos from a cycle that was not found. Lanes compute the multiplier together with it.
@@ -426,7 +429,7 @@ fn needs(quantities: &[Quantity], has_several_gaps: bool) -> Needs {
             .filter_map(|quantity| quantity.group())
             .fold(0, |bits, group| bits | group.bit),
         state: has(Quantity::State),
-        gaps: has_several_gaps && (has(Quantity::Impacts) || has(Quantity::Mesh)),
+        gaps: false,
     }
 }
 

@@ -276,10 +276,15 @@ pub(crate) fn of_gaps() -> impl Iterator<Item = Measure> {
     })
 }
 
+/// Returns the places of the impacts per forcing period of each gap.
+pub(crate) fn impacts_of_gaps() -> impl Iterator<Item = usize> {
+    of_gaps().filter(|measure| measure.group.bit == GAP_GROUPS[0].bit).map(|measure| measure.place)
+}
+
 /// Returns the impacts per forcing period and the mesh fraction of one of several gaps, if they were measured.
 pub(crate) fn contacts_of_gap(record: &Record, gap: usize) -> Option<[f64; 2]> {
     let first = OF_GAPS + gap * GAP_GROUPS.len();
-    let bits = GAP_GROUPS[0].bit | GAP_GROUPS[1].bit;
+    let bits = GAP_GROUPS[0].bit | GAP_GROUPS[1].bit | valid::GAPS;
     (record.valid & bits == bits).then(|| [0, 1].map(|number| record.measures[first + number]))
 }
 
@@ -308,6 +313,11 @@ impl Measure {
         }
     }
 
+    /// Whether it describes one of several gaps.
+    fn is_of_one_gap(&self) -> bool {
+        matches!(self.subject, Some(Subject::OneOfSeveral(_)))
+    }
+
     /// Returns the name in tables, layers and Python for a model with these state components and gaps.
     pub fn name(&self, state_names: &[&str], gaps: &[String]) -> String {
         match self.subject(state_names, gaps) {
@@ -318,6 +328,9 @@ impl Measure {
 
     /// Returns what the number's name adds to that of its quantity, such as `mean` or `argument`.
     pub fn part(&self) -> &'static str {
+        if self.is_of_one_gap() {
+            return "";
+        }
         self.number.name.strip_prefix(self.group.name).unwrap_or(self.number.name).trim_start_matches('_')
     }
 
@@ -331,6 +344,11 @@ impl Measure {
         self.number.dimension
     }
 
+    /// Whether the mirror image of a motion has the opposite value.
+    pub fn is_odd(&self) -> bool {
+        self.number.name == "mean"
+    }
+
     /// Whether the number is an angle, so that minus pi and pi are equal.
     pub fn is_angle(&self) -> bool {
         self.number.dimension == Dimension::Angle
@@ -338,7 +356,10 @@ impl Measure {
 
     /// Returns the number of a record, if it has the quantity.
     pub fn of(&self, record: &Record) -> Option<f64> {
-        (record.valid & self.group.bit != 0).then(|| record.measures[self.place])
+        let bits = self.group.bit | if self.is_of_one_gap() { valid::GAPS } else { 0 };
+        let value = (record.valid & bits == bits).then(|| record.measures[self.place]);
+        // A gap may not have the number.
+        value.filter(|value| !(self.is_of_one_gap() && value.is_nan()))
     }
 
     /// Returns the number of a motion.
@@ -414,12 +435,13 @@ impl Record {
                 None => self.valid &= !measure.group.bit,
             }
         }
-        let valid = self.valid;
-        self.clear_measures(|group| valid & group.bit == 0);
+        let present = self.valid;
+        self.clear_measures(|group| present & group.bit == 0);
         let has_gaps = motion.quantities.is_some_and(|quantities| quantities.gaps.is_some());
+        self.valid = present & !valid::GAPS | if has_gaps { valid::GAPS } else { 0 };
         for measure in of_gaps() {
             let value = || measure.read(motion).map_or(f64::NAN, |value| value + 0.0);
-            let is_set = has_gaps && valid & measure.group.bit != 0;
+            let is_set = has_gaps && present & measure.group.bit != 0;
             self.measures.set(measure.place, if is_set { value() } else { 0.0 });
         }
     }
@@ -433,6 +455,9 @@ impl Record {
 
     /// Removes the numbers of some quantities. Those of gaps are removed with their quantity.
     pub fn clear_measures(&mut self, is_cleared: impl Fn(&Group) -> bool) {
+        if GAP_GROUPS.iter().all(&is_cleared) {
+            self.valid &= !valid::GAPS;
+        }
         for measure in
             of_gaps().filter(|measure| self.valid & measure.group.bit == 0 || is_cleared(measure.group))
         {

@@ -45,6 +45,8 @@ pub mod valid {
     /// `pattern`, `pattern_length` and `pattern_hash`.
     pub const PATTERN: u32 = 1 << 8;
     // The bits from 9 on belong to the groups of [`measures`](super::measures::GROUPS).
+    /// The numbers of each of several gaps.
+    pub const GAPS: u32 = 1 << 21;
     /// A lane began the cell, and the reference finished it.
     pub const BY_REFERENCE: u32 = 1 << 28;
     /// Set by lanes, cleared by engines: the lane has ended before its class is decided, so that the reference continues it.

@@ -268,8 +268,8 @@ impl<'a> Cells<'a> {
         Number::of(self.scene.base(), &self.scene.outputs().quantities)
     }
 
-    /// Returns the gap whose contact classes tell, and its name; none for a model with one gap. It is the first one with a wall that has
-    /// an impact law, else the first.
+    /// Returns the gap whose contact the class map shows, and its name; none for a model with one gap. It is the first one with a wall
+    /// that has an impact law, else the first.
     pub(crate) fn contact_gap(&self) -> Option<(usize, String)> {
         let names = several_gaps(self.scene.base())?;
         let oscillator = self.plan.model(0).oscillator().ok()?;

@@ -46,8 +46,10 @@ impl Number {
         quantities.sort_unstable();
         let (names, units) = (model.state_names(), model.units());
         let gaps = several_gaps(model).unwrap_or_default();
-        let mut numbers: Vec<Number> =
-            quantities.into_iter().flat_map(|quantity| of_quantity(quantity, &names, &gaps)).collect();
+        // Numbers of each gap come last, because scripts may know the columns by their places.
+        let whole = quantities.iter().flat_map(|&quantity| of_quantity(quantity, &names, &gaps));
+        let each = quantities.iter().flat_map(|&quantity| of_gaps(quantity, &names, &gaps));
+        let mut numbers: Vec<Number> = whole.chain(each).collect();
         for number in &mut numbers {
             number.unit = unit(number, &units);
             number.label = with_unit(&number.label, number.unit.as_deref());
@@ -58,6 +60,11 @@ impl Number {
     /// Whether the number is an angle, so that minus pi and pi are equal.
     pub fn is_angle(&self) -> bool {
         self.dimension == Dimension::Angle
+    }
+
+    /// Whether the mirror image of a motion has the opposite value.
+    pub(crate) fn is_odd(&self) -> bool {
+        matches!(self.source, Source::Measure(measure) if measure.is_odd())
     }
 
     /// Returns the number of a cell.
@@ -133,26 +140,31 @@ fn of_quantity(quantity: Quantity, states: &[&str], gaps: &[String]) -> Vec<Numb
             states.iter().enumerate().map(of).collect()
         }
         _ => {
-            let of = |measure: Measure| {
-                let subject = measure.subject(states, gaps)?;
-                Some(Number {
-                    name: measure.name(states, gaps),
-                    title: measure.title(subject),
-                    label: measure.title(&symbol(subject)),
-                    subject: [measure.part(), subject].join(" ").trim().to_owned(),
-                    dimension: measure.dimension(),
-                    unit: None,
-                    quantity,
-                    component: measure.coordinate().map(|i| 2 * i),
-                    source: Source::Measure(measure),
-                })
-            };
-            let whole = quantity.group().into_iter().flat_map(|group| group.measures());
-            // One gap has the numbers of the whole motion.
-            let each = measures::of_gaps().filter(|m| !gaps.is_empty() && m.group.name == quantity.name());
-            whole.chain(each).filter_map(of).collect()
+            let all = quantity.group().into_iter().flat_map(|group| group.measures());
+            all.filter_map(|measure| of_measure(measure, quantity, states, gaps)).collect()
         }
     }
+}
+
+/// Returns the numbers of each of several gaps. One gap has the numbers of the whole motion.
+fn of_gaps(quantity: Quantity, states: &[&str], gaps: &[String]) -> Vec<Number> {
+    let own = measures::of_gaps().filter(|m| !gaps.is_empty() && m.group.name == quantity.name());
+    own.filter_map(|measure| of_measure(measure, quantity, states, gaps)).collect()
+}
+
+fn of_measure(measure: Measure, quantity: Quantity, states: &[&str], gaps: &[String]) -> Option<Number> {
+    let subject = measure.subject(states, gaps)?;
+    Some(Number {
+        name: measure.name(states, gaps),
+        title: measure.title(subject),
+        label: measure.title(&symbol(subject)),
+        subject: [measure.part(), subject].join(" ").trim().to_owned(),
+        dimension: measure.dimension(),
+        unit: None,
+        quantity,
+        component: measure.coordinate().map(|i| 2 * i),
+        source: Source::Measure(measure),
+    })
 }
 
 #[cfg(test)]

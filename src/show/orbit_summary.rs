@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::model_file;
+use crate::model_file::{self, several_gaps};
 use crate::show::event_row::{self, EventRow, Place, PlaceNames};
 use crate::show::instant::Instant;
 use crate::show::names;
@@ -39,8 +39,9 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         "\nevents over {span} (T = {})",
         with_unit(&significant(orbit.forcing_period), units.time.as_deref())
     );
+    let has_one_gap = several_gaps(model).is_none();
     text.push_str(&match orbit.strobe_meshing {
-        Some(side) if orbit.events.is_empty() && orbit.slips.is_empty() => {
+        Some(side) if has_one_gap && orbit.events.is_empty() && orbit.slips.is_empty() => {
             format!("none: always in contact with the {} wall\n", names::side(side))
         }
         meshing => events(model, &orbit.events, &orbit.slips, meshing.is_some() || orbit.mesh_fraction > 0.0),
@@ -67,11 +68,15 @@ pub fn history_summary(
     facts.extend(end.map(|end| ("end", state(model, end))));
     facts.extend(instant.map(|instant| ("state", state(model, instant))));
     let mut text: String = facts.iter().map(|(label, value)| format!("{label:<21} {value}\n")).collect();
+    let has_one_gap = several_gaps(model).is_none();
     text += &match history.meshing {
-        Some(side) if history.events.is_empty() && history.slips.is_empty() => {
+        Some(side) if has_one_gap && history.events.is_empty() && history.slips.is_empty() => {
             format!("\nno events: always in contact with the {} wall\n", names::side(side))
         }
-        meshing => format!("\nevents\n{}", events(model, &history.events, &history.slips, meshing.is_some())),
+        meshing => format!(
+            "\nevents\n{}",
+            events(model, &history.events, &history.slips, meshing.is_some() || !has_one_gap)
+        ),
     };
     text
 }

@@ -27,8 +27,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     [MANIFEST, DIFFERENCES].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
 }
 
-/// Describes the result of the comparison. `by_pattern`, `by_word`, `by_motion` and `by_quantity` count cells that agree in class and
-/// period and differ by pattern, by word if a map has no patterns, else by motion, else by quantities. Counts over cells with one period are null if a map has no such values;
+/// Describes the result of the comparison. Each cell counts once, under its first difference: class, period, pattern (word if a map has
+/// no patterns), motion, quantities. Counts over cells with one period are null if a map has no such values;
 /// the largest difference of exponents is null if it is infinite.
 pub(crate) fn result(compared: &MapPair<'_>) -> Value {
     let MapPair { sides, comparison } = compared;
@@ -79,6 +79,7 @@ pub(crate) fn result(compared: &MapPair<'_>) -> Value {
         },
         "attractors": tally(comparison.attractors),
         "motions": tally(comparison.motions),
+        "tolerance": comparison.tolerance,
         "quantities": compared_quantities.map(quantity).collect::<Vec<_>>(),
     })
 }

@@ -57,7 +57,7 @@ impl Lanes {
             let again = run_lanes(gpu, plan, records, &ids, &as_in_map).await?;
             lanes.again = ids.iter().copied().zip(again).collect();
             if double.is_some() {
-                phase("running these lanes without early stops");
+                phase(&format!("running the same {} lanes without early stops", ids.len()));
                 let records = run_lanes(gpu, plan, records, &ids, &whole).await?;
                 lanes.whole = ids.iter().copied().zip(records).collect();
             }

@@ -58,7 +58,7 @@ pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
     clear_unless(needs.pattern, valid::PATTERN, |r| {
         (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
     });
-    if needs.gaps || record.valid & measures::bits() & !needs.measures != 0 {
+    if record.valid & (measures::bits() & !needs.measures | valid::GAPS) != 0 {
         record.clear_measures(|group| !needs.has(group));
     }
 }

@@ -7,7 +7,7 @@ use super::keys;
 use super::limits::{LONGEST_TITLE, MAX_PERIODS};
 use super::section::{Field, Section};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
-use crate::record::measures::Group;
+use crate::record::measures::{self, Group};
 use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit;
 
@@ -214,6 +214,8 @@ impl Quantity {
             Quantity::State => state_names.iter().map(|name| format!("state_{name}")).collect(),
             _ => {
                 let measures = self.group().into_iter().flat_map(|group| group.measures());
+                let each = measures::of_gaps().filter(|m| !gaps.is_empty() && m.group.name == self.name());
+                let measures = measures.chain(each);
                 measures.filter(|m| m.is_of(state_names, gaps)).map(|m| m.name(state_names, gaps)).collect()
             }
         }

@@ -81,9 +81,14 @@ impl Filling {
         // A cell on an edge depends only on the corners of that edge.
         let mut weighted = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
         if weighted.all(|(corner, _)| same_count(&filled, corner)) {
-            Record { impacts_per_period: filled.impacts_per_period, ..averaged }
+            let mut counted = Record { impacts_per_period: filled.impacts_per_period, ..averaged };
+            measures::impacts_of_gaps().for_each(|place| counted.measures.set(place, filled.measures[place]));
+            counted
         } else {
-            Record { impacts_per_period: 0.0, valid: averaged.valid & !valid::IMPACTS, ..averaged }
+            let bits = averaged.valid & !valid::IMPACTS;
+            let mut uncounted = Record { impacts_per_period: 0.0, valid: bits, ..averaged };
+            measures::impacts_of_gaps().for_each(|place| uncounted.measures.set(place, 0.0));
+            uncounted
         }
     }
 }
@@ -92,12 +97,14 @@ impl Filling {
     /// Returns the averages of the measured quantities that all corners have.
     fn measures(&self, weights: [f64; 4]) -> [f64; MEASURES] {
         let mut averages = [0.0; MEASURES];
-        let has_gaps = measures::of_gaps().any(|measure| self.corners[0].measures[measure.place] != 0.0);
+        let has_gaps = self.valid & valid::GAPS != 0;
         if has_gaps || GROUPS.iter().any(|group| self.valid & group.bit != 0) {
-            let all = measures::all().chain(measures::of_gaps());
+            let all = measures::all().chain(measures::of_gaps().filter(|_| has_gaps));
             for measure in all.filter(|measure| self.valid & measure.group.bit != 0) {
                 let values = self.corners.each_ref().map(|corner| corner.measures[measure.place]);
-                let weighted: Vec<(f64, f64)> = values.into_iter().zip(weights).collect();
+                // A corner without weight may be NaN.
+                let weighted: Vec<(f64, f64)> =
+                    values.into_iter().zip(weights).filter(|(_, weight)| *weight > 0.0).collect();
                 averages[measure.place] = measure.average(&weighted);
             }
         }

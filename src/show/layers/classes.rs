@@ -86,8 +86,8 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
     }
 }
 
-/// Returns the index of a cell of period 1, by the contact of one of several gaps. Its symmetry is unknown where the motion converges
-/// slowly.
+/// Returns the index of a cell of period 1, by the contact of `gap` if there are several. Its symmetry is unknown where the motion
+/// converges slowly.
 fn first_period(record: &Record, gap: Option<usize>, shows_symmetry: bool) -> u8 {
     let measured = |bit| record.valid & bit != 0;
     let of_gap =

@@ -18,6 +18,7 @@ const ID: usize = size_of::<u32>();
 
 /// Number of columns: ids and fields.
 const COUNT: usize = 1 + FIELDS.len();
+const _: () = assert!(COUNT < u32::BITS as usize, "a mask has a bit for each column");
 
 /// Names of the columns, in the order of their bits. A later version may add columns at the end.
 pub(crate) const NAMES: [&str; COUNT] = {
