@@ -1,7 +1,7 @@
 //! `rattlemap explore`: opens a page that computes a map on demand.
 
 use std::fs;
-use std::io;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,10 +16,16 @@ use crate::job::explore;
 use crate::job::scene_file::SceneFile;
 use crate::store::folder::Folder;
 use crate::store::map::REPORT;
+use crate::store::plain_file;
 
 /// Writes the page of a scene, or finds that of a finished map, and opens it.
 pub(crate) fn run(arguments: &Explore) -> Result<(), Failure> {
     let page = match arguments.what.is_dir() {
+        true if !arguments.set.is_empty() || arguments.out.is_some() => {
+            return Err(Failure::Usage(anyhow!(
+                "--set and --out are for a scene; a folder has its page, {REPORT}: give the scene, or neither option"
+            )));
+        }
         true => report_of(&arguments.what)?,
         false => written(arguments)?,
     };
@@ -58,22 +64,14 @@ fn written(arguments: &Explore) -> Result<PathBuf, Failure> {
     }
     let free = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Folder::check_writable(free)?;
+    plain_file::refuse_link(&out).map_err(|error| Failure::Usage(anyhow!("{}: {error}", say::path(free))))?;
     let interrupt = Interrupt::listen(*quiet)?;
     let console = Arc::new(Console::new(*quiet, "cells", false));
     let page = explore::page(&scene, set, console.clone(), interrupt.raised())?;
     let page = page.ok_or_else(|| interrupt.failure("interrupted; nothing was written".to_owned()))?;
-    replace(&out, &page).map_err(|error| anyhow!("{}: {error}", say::path(&out)))?;
+    let written =
+        fs::create_dir_all(free).and_then(|()| plain_file::replace(&out, |file| file.write_all(&page)));
+    written.map_err(|error| anyhow!("{}: {error}", say::path(&out)))?;
     console.finish(&format!("{}: {}", say::path(&out), scene.title()));
     Ok(out)
-}
-
-/// Replaces a file in one step, so that an interruption never leaves half a file.
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let written = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));
-    if written.is_err() {
-        let _ = fs::remove_file(&partial);
-    }
-    written
 }

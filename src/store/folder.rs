@@ -16,7 +16,7 @@ use thiserror::Error;
 use crate::show::error::WriteError;
 use crate::store::error::OutputError;
 use crate::store::file_names::UNFINISHED;
-use crate::store::plain_file::{partial, refuse_link};
+use crate::store::plain_file::{self, partial, refuse_link};
 pub(crate) use lock::LOCK;
 use lock::Lock;
 
@@ -69,7 +69,9 @@ impl NewFolders {
         let mut missing: Vec<PathBuf> = path.ancestors().take_while(is_missing).map(Path::to_owned).collect();
         missing.reverse();
         let created = NewFolders(missing);
-        fs::create_dir_all(path).map(|()| created)
+        fs::create_dir_all(path)?;
+        created.0.iter().try_for_each(|folder| plain_file::sync_names(folder))?;
+        Ok(created)
     }
 }
 
@@ -132,10 +134,10 @@ impl Folder {
     ///
     /// # Errors
     /// As [`Folder::open`] and [`Folder::prepare`], as far as can be known without writing.
-    pub fn check<'n>(
+    pub fn check(
         path: &Path,
         force: bool,
-        names: impl IntoIterator<Item = &'n str>,
+        names: impl IntoIterator<Item = impl AsRef<str>>,
     ) -> Result<(), FolderError> {
         Folder::check_writable(path)?;
         if Lock::is_held(path) {
@@ -152,20 +154,14 @@ impl Folder {
     ///
     /// # Errors
     /// [`FolderError::Link`] for the first link, [`FolderError::NotWritable`] if a file cannot be removed.
-    pub fn prepare<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
-        let names: Vec<&str> = names.into_iter().collect();
-        refuse_links_in(&self.path, names.iter().copied())?;
+    pub fn prepare(&self, names: impl IntoIterator<Item = impl AsRef<str>>) -> Result<(), FolderError> {
+        let names: Vec<_> = names.into_iter().collect();
+        refuse_links_in(&self.path, &names)?;
         // The records of a merge have a temporary name while they are gathered, and another one before.
-        let once = names.iter().map(|name| partial(&self.path.join(name)));
-        for path in once.flat_map(|path| [partial(&path), path]) {
-            match fs::remove_file(path) {
-                Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
-                    return Err(FolderError::NotWritable { path: self.path.clone(), reason });
-                }
-                _ => {}
-            }
-        }
-        Ok(())
+        let mut once = names.iter().map(|name| partial(&self.path.join(name.as_ref())));
+        let removed =
+            once.try_for_each(|path| plain_file::remove(&partial(&path)).and(plain_file::remove(&path)));
+        removed.map_err(|reason| FolderError::NotWritable { path: self.path.clone(), reason })
     }
 
     /// Whether a folder contains other files than those of a run that was killed before it wrote any result.
@@ -189,8 +185,7 @@ impl Folder {
         &self.path
     }
 
-    /// Writes the file `name` completely or not at all: `write` writes to a temporary file, which is renamed after it has
-    /// succeeded.
+    /// Writes the file `name` completely or not at all.
     ///
     /// # Errors
     /// [`OutputError::Write`]: the error of `write` or of the file system, with the file's path.
@@ -200,31 +195,13 @@ impl Folder {
         write: impl FnOnce(&mut BufWriter<File>) -> Result<(), WriteError>,
     ) -> Result<(), OutputError> {
         let clock = Instant::now();
-        let target = self.path.join(name);
-        let partial = partial(&target);
-        let links = refuse_link(&target).and_then(|()| refuse_link(&partial));
-        if let Err(reason) = links {
-            return Err(OutputError::Write { path: target, reason: reason.into() });
-        }
-        let whole = || {
-            let mut out = BufWriter::new(File::create(&partial)?);
-            write(&mut out)?;
-            out.flush()?;
-            // Without this, a power cut after renaming could leave an empty file.
-            out.get_ref().sync_all()?;
-            drop(out);
-            Ok(fs::rename(&partial, &target)?)
-        };
-        let written: Result<(), WriteError> = whole();
-        if written.is_err() {
-            // Best effort: the error that matters is the one already at hand.
-            let _ = fs::remove_file(&partial);
-        }
+        let path = self.path.join(name);
+        let written = plain_file::replace(&path, write);
         if name != UNFINISHED {
             let mut times = self.written.lock().unwrap_or_else(PoisonError::into_inner);
             times.insert(name.to_owned(), clock.elapsed());
         }
-        written.map_err(|reason| OutputError::Write { path: target, reason })
+        written.map(drop).map_err(|reason| OutputError::Write { path, reason })
     }
 
     /// Writes `object` as the file `name`, in lines to be read, whole or not at all.
@@ -271,12 +248,11 @@ impl Folder {
     }
 }
 
-fn refuse_links_in<'n>(folder: &Path, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
-    let check = |name| {
-        let path = folder.join(name);
-        refuse_link(&path).and_then(|()| refuse_link(&partial(&path)))
-    };
-    let checked = names.into_iter().try_for_each(check);
+fn refuse_links_in(
+    folder: &Path,
+    names: impl IntoIterator<Item = impl AsRef<str>>,
+) -> Result<(), FolderError> {
+    let checked = names.into_iter().try_for_each(|name| refuse_link(&folder.join(name.as_ref())));
     checked.map_err(|reason| FolderError::Link { path: folder.to_owned(), reason })
 }
 
@@ -297,6 +273,8 @@ fn is_empty(path: &Path) -> io::Result<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const NONE: [&str; 0] = [];
 
     #[test]
     fn full_folders_need_force() {
@@ -387,12 +365,12 @@ mod tests {
         Folder::check(&new, false, ["x.txt"]).unwrap();
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
         fs::write(&file, "").unwrap();
-        assert!(matches!(Folder::check(&file, true, []), Err(FolderError::NotAFolder { .. })));
-        assert!(matches!(Folder::check(&file.join("x"), true, []), Err(FolderError::NotWritable { .. })));
-        assert!(matches!(Folder::check(root.path(), false, []), Err(FolderError::NotEmpty { .. })));
+        assert!(matches!(Folder::check(&file, true, NONE), Err(FolderError::NotAFolder { .. })));
+        assert!(matches!(Folder::check(&file.join("x"), true, NONE), Err(FolderError::NotWritable { .. })));
+        assert!(matches!(Folder::check(root.path(), false, NONE), Err(FolderError::NotEmpty { .. })));
         Folder::check(root.path(), true, ["file"]).unwrap();
         let folder = Folder::open(&new, false).unwrap();
-        assert!(matches!(Folder::check(&new, true, []), Err(FolderError::InUse { .. })));
+        assert!(matches!(Folder::check(&new, true, NONE), Err(FolderError::InUse { .. })));
         drop(folder);
         fs::create_dir_all(new.join("x.txt")).unwrap();
         assert!(matches!(Folder::check(&new, true, ["x.txt"]), Err(FolderError::Link { .. })));

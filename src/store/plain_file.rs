@@ -1,8 +1,8 @@
-//! Plain files: temporary names, no writing through links, and bounded reading.
+//! Plain files: written whole or not at all, never through links, and read up to a bound.
 
 use std::borrow::Cow;
 use std::fs::{self, File, Metadata, OpenOptions};
-use std::io::{self, Read};
+use std::io::{self, BufWriter, IntoInnerError, Read};
 #[cfg(unix)]
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
@@ -17,16 +17,75 @@ pub(crate) fn partial(path: &Path) -> PathBuf {
     path.with_file_name(format!("{PARTIAL}{}", name_of(path)))
 }
 
-/// Refuses to write to anything but a plain file: a symbolic link may point anywhere, and opening a pipe blocks.
+/// Refuses to write to anything but a plain file, also under its temporary name: a symbolic link may point anywhere, and
+/// opening a pipe blocks.
 pub(crate) fn refuse_link(path: &Path) -> io::Result<()> {
-    match fs::symlink_metadata(path) {
-        Ok(data) if data.is_symlink() => Err(io::Error::other(format!(
-            "{} is a symbolic link, and no file is written through one; remove it",
-            name_of(path)
-        ))),
-        Ok(data) if !data.is_file() => {
-            Err(io::Error::other(format!("{} is no plain file; remove it", name_of(path))))
-        }
+    for path in [path, &partial(path)] {
+        let name = name_of(path);
+        let why = match fs::symlink_metadata(path) {
+            Ok(data) if data.is_symlink() => {
+                "is a symbolic link, and no file is written through one; remove it"
+            }
+            Ok(data) if !data.is_file() => "is no plain file; remove it",
+            _ => continue,
+        };
+        return Err(io::Error::other(format!("{name} {why}")));
+    }
+    Ok(())
+}
+
+/// Writes a file completely or not at all: `write` writes to a temporary file, which gets the name when all of it is on the
+/// disk. Returns the file, open for reading and writing.
+///
+/// # Errors
+/// The error of `write` or of the file system.
+pub(crate) fn replace<E: From<io::Error>>(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+) -> Result<File, E> {
+    refuse_link(path)?;
+    let partial = partial(path);
+    // A command that was killed may have left one.
+    remove(&partial)?;
+    // A new file is neither a link nor a pipe that has been put there since the check.
+    let file = OpenOptions::new().read(true).write(true).create_new(true).open(&partial)?;
+    let whole = || {
+        let mut out = BufWriter::new(file);
+        write(&mut out)?;
+        let file = out.into_inner().map_err(IntoInnerError::into_error)?;
+        // Without this, a power cut after renaming could leave an empty file.
+        file.sync_all()?;
+        rename(&partial, path)?;
+        Ok(file)
+    };
+    let written = whole();
+    if written.is_err() {
+        // Best effort: the error that matters is the one already at hand.
+        let _ = fs::remove_file(&partial);
+    }
+    written
+}
+
+/// Renames a file of a folder. The new name is on the disk.
+pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    fs::rename(from, to)?;
+    sync_names(to)
+}
+
+/// Waits until the names in the folder of a file are on the disk. Without this, a power cut could undo renaming and creating.
+pub(crate) fn sync_names(file: &Path) -> io::Result<()> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    // Windows opens no folder, and some network disks sync none.
+    let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) else { return Ok(()) };
+    folder
+        .sync_all()
+        .or_else(|reason| if reason.kind() == io::ErrorKind::InvalidInput { Ok(()) } else { Err(reason) })
+}
+
+/// Removes a file if it exists.
+pub(crate) fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(reason) if reason.kind() != io::ErrorKind::NotFound => Err(reason),
         _ => Ok(()),
     }
 }

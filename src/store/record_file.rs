@@ -88,7 +88,7 @@ impl RecordFile {
             file.sync_all()?;
             // Windows renames no open file.
             drop(file);
-            fs::rename(&aside, path)
+            plain_file::rename(&aside, path)
         });
         placed.map_err(|reason| io_error(path, reason))
     }
@@ -181,15 +181,7 @@ fn io_error(path: &Path, reason: io::Error) -> RecordFileError {
 /// Creates a file with a header and, if `from` is given, copies of these byte ranges of another file. The file gets its
 /// name when all of it is on the disk.
 fn begin(path: &Path, identity: &Identity, from: Option<(File, &[Range<u64>])>) -> io::Result<File> {
-    refuse_link(path)?;
-    let partial = partial(path);
-    refuse_link(&partial)?;
-    match fs::remove_file(&partial) {
-        Err(reason) if reason.kind() != io::ErrorKind::NotFound => return Err(reason),
-        _ => {}
-    }
-    let mut file = OpenOptions::new().read(true).write(true).create_new(true).open(&partial)?;
-    let write = |file: &mut File| {
+    plain_file::replace(path, |file| {
         file.write_all(&header::bytes(identity)?)?;
         // The other file is closed before the renaming: Windows replaces no open file.
         if let Some((mut from, ranges)) = from {
@@ -198,16 +190,6 @@ fn begin(path: &Path, identity: &Identity, from: Option<(File, &[Range<u64>])>) 
                 io::copy(&mut (&from).take(range.end - range.start), file)?;
             }
         }
-        file.sync_all()?;
-        fs::rename(&partial, path)?;
-        // The name reaches the disk, too, on systems that can open a folder.
-        let _ = path.parent().map(|folder| File::open(folder).and_then(|folder| folder.sync_all()));
         Ok(())
-    };
-    if let Err(reason) = write(&mut file) {
-        // An error here is ignored: the one before is reported.
-        let _ = fs::remove_file(&partial);
-        return Err(reason);
-    }
-    Ok(file)
+    })
 }
