@@ -40,7 +40,7 @@ pub(crate) fn check_shards(
     if let Some(out) = out {
         // A folder without results may be replaced, as in `merge`.
         let force = force || !Folder::holds_results(&out);
-        Folder::check(&out, force, store::map::names()).map_err(Problem::from)?;
+        Folder::check(&out, force, store::map::names_of(&scene.scene)).map_err(Problem::from)?;
     }
     Ok(())
 }
@@ -117,7 +117,7 @@ fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Op
     check_merge(parts.scene(), Some(&out.path))?;
     // A folder without results may be replaced. A run that was killed at its start leaves one.
     let force = out.force || !Folder::holds_results(&out.path);
-    let folder = Out { force, ..out }.open(watch)?;
+    let folder = Out { force, ..out }.open(parts.scene(), watch)?;
     let continues = |Progress { done, of }| {
         watch.set_progress(done, of);
         !watch.is_halted()

@@ -60,11 +60,11 @@ pub(crate) struct Out {
 
 impl Out {
     /// Opens the folder. Waits while an abandoned computation of this process may still use it.
-    pub(crate) fn open(&self, watch: &Watch) -> Result<Folder, Problem> {
+    pub(crate) fn open(&self, scene: &Scene, watch: &Watch) -> Result<Folder, Problem> {
         loop {
             // Read first: the abandoned computation may end between a failed attempt and its evaluation.
             let may_wait = worker::has_abandoned_work();
-            match open_folder(&self.path, self.force, self.resume) {
+            match open_folder(&self.path, scene, self.force, self.resume) {
                 Err(RunRecordsError::Folder(FolderError::InUse { .. })) if may_wait && !watch.is_halted() => {
                     thread::sleep(worker::TICK);
                 }
@@ -99,7 +99,7 @@ impl Task {
     ) -> Result<Option<T>, Problem> {
         let job = self.job();
         let plan = job.plan()?;
-        let folder = self.out.as_ref().map(|out| out.open(watch)).transpose()?;
+        let folder = self.out.as_ref().map(|out| out.open(&self.scene, watch)).transpose()?;
         let observer = Arc::new(Collector::new(watch));
         let opened = job.open(&plan, folder.as_ref(), observer.clone())?;
         if watch.is_halted() {

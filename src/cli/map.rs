@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     }
     let restart = Restart { arguments, sets: &sets, job: &job, plan: &plan };
     let interrupt = Interrupt::listen(quiet)?;
-    let folder = open_folder(&out, options.force, *resume)?;
+    let folder = open_folder(&out, &scene, options.force, *resume)?;
     interrupt.ends_at_once(restart.before_begin(), folder.leaver());
     let opened = job.open(&plan, Some(&folder), console.clone());
     let opened = opened.map_err(|error| restart.engine_not_opened(error, &folder))?;
@@ -100,7 +100,7 @@ fn compute(
             folder.path().display()
         ));
     }
-    integrate(&mut run, restart, interrupt)?;
+    integrate(&mut run, restart, interrupt, folder)?;
     let clock = Instant::now();
     interrupt.ends_at_once(restart.text(run.done()), || {});
     match arguments.shard {
@@ -110,20 +110,26 @@ fn compute(
 }
 
 /// Computes the remaining runs. After a signal it stores the runs that have ended, and stops; unfinished runs are lost.
-fn integrate(run: &mut MapRun<'_>, restart: &Restart<'_>, interrupt: &Interrupt) -> Result<(), Failure> {
+fn integrate(
+    run: &mut MapRun<'_>,
+    restart: &Restart<'_>,
+    interrupt: &Interrupt,
+    folder: &Folder,
+) -> Result<(), Failure> {
     let integrated = match interrupt.wait_for(Some("finished cells are stored")) {
         true => run.integrate(interrupt.raised()),
         false => Ok(false),
     };
-    let restart_text = restart.text(run.done());
     match integrated {
         Ok(true) => Ok(()),
-        Ok(false) => Err(interrupt.failure(format!("interrupted; {restart_text}"))),
-        Err(error @ SweepError::Engine(_)) => {
-            let text = format!("{error}; {restart_text}{}", restart.with_the_cpu());
-            Err(JobError::Failed(text).into())
+        Ok(false) => Err(interrupt.failure(format!("interrupted; {}", restart.text(run.done())))),
+        Err(error) => {
+            let is_engine = matches!(error, SweepError::Engine(_));
+            let other = if is_engine { restart.with_the_cpu() } else { String::new() };
+            // Not all runs that are done have been stored.
+            let stored = restart.text(Restart::stored(folder));
+            Err(JobError::Failed(format!("{error}; {stored}{other}")).into())
         }
-        Err(error) => Err(JobError::Failed(format!("{error}; {restart_text}")).into()),
     }
 }
 

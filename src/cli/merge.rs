@@ -22,7 +22,7 @@ pub(crate) fn run(arguments: &Merge) -> Result<(), Failure> {
     size::check_merge(parts.scene(), Some(&arguments.out))?;
     // A folder without results may be replaced. A run that was killed at its start leaves one.
     let folder = Folder::open(&arguments.out, arguments.force || !Folder::holds_results(&arguments.out))?;
-    folder.prepare(store::map::names())?;
+    folder.prepare(store::map::names_of(parts.scene()))?;
     let (shards, out) = (parts.count(), arguments.out.display());
     let runs = parts.scene().run_count().max(1) as usize;
     let progress = progress::Progress::new(runs, 0, "runs", arguments.quiet);

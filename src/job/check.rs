@@ -92,7 +92,7 @@ impl CheckedFolder {
             JobError::Failed(why) => JobError::Failed(format!("{}; {why}", damage(&self.dir, self.lost()))),
             error => error,
         })?;
-        folder.prepare(map::names())?;
+        folder.prepare(map::names_of(&scene))?;
         let mut loaded = LoadedMap::read(&map, &scene, observer)?;
         let survey = loaded.survey();
         let has_validation =
@@ -137,11 +137,15 @@ impl CheckedFolder {
                 LIST => format!(
                     "no other file than {LIST} lists the cells; `{remake}` recreates every file from the scene's own table"
                 ),
-                _ if map::names().any(|known| known == name) => continue,
-                _ => format!("a map has no file {}; `{remake}` recreates every file", name.escape_debug()),
+                _ => continue,
             });
         }
         let scene = finished::scene(&map)?;
+        let known = map::names_of(&scene);
+        if let Some(Finding { name, .. }) = self.lost().find(|finding| !known.contains(&finding.name)) {
+            let name = name.escape_debug();
+            return failed(format!("a map has no file {name}; `{remake}` recreates every file"));
+        }
         Ok((map, scene))
     }
 

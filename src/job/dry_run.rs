@@ -69,7 +69,7 @@ impl DryRun {
         if job.resume {
             run_records::require_records(out)?;
         }
-        let is_taken = match Folder::check(out, force || job.resume, map::names()) {
+        let is_taken = match Folder::check(out, force || job.resume, map::names_of(job.scene)) {
             Err(FolderError::NotEmpty { .. }) => true,
             checked => checked.map(|()| false)?,
         };

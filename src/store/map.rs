@@ -9,13 +9,14 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 use serde_json::Value;
 
-use crate::map::scene::{Format, List, Scene};
+use crate::map::scene::{Format, List, Quantity, Scene};
 use crate::model_file::FileModel;
 use crate::show::cells::Cells;
 use crate::show::drawing::write_figure;
 use crate::show::error::WriteError;
 use crate::show::figure;
 use crate::show::layers::Layer;
+use crate::show::numbers::Number;
 use crate::show::table::words_csv::WordRows;
 use crate::show::table::{attractors_csv, cells_csv, cells_npy};
 use crate::show::validation::Validated;
@@ -50,16 +51,28 @@ const SIDE_BY_SIDE: usize = 1 << 22;
 /// Largest size of a validation that is read, in bytes.
 const MOST_VALIDATION_BYTES: u64 = 1_000_000_000;
 
-/// Names of all files that are made from a map's records.
+/// Names of all files that are made from a map's records, apart from figures of measured quantities.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
     let tables = [MANIFEST, CSV, NPY, WORDS, ATTRACTORS, REPORT, VALIDATION].map(str::to_owned);
     let figures = LAYERS.into_iter().flat_map(|layer| names::figures(layer).map(|(_, name)| name));
     tables.into_iter().chain(figures).collect()
 });
 
-/// Names of all files that a map may write.
+/// Names of the files that a map of any model may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
     ALL.iter().map(String::as_str).chain([LIST, MODEL, RECORDS, UNFINISHED])
+}
+
+/// Names of all files that a map of the scene's model may write.
+pub fn names_of(scene: &Scene) -> Vec<String> {
+    made(scene).into_iter().chain([LIST, MODEL, RECORDS, UNFINISHED].map(str::to_owned)).collect()
+}
+
+/// Names of all files that are made from the records of a map of the scene's model.
+fn made(scene: &Scene) -> Vec<String> {
+    let numbers = Number::of(scene.base(), &Quantity::ALL);
+    let figures = numbers.iter().flat_map(|number| names::figures(&number.name).map(|(_, name)| name));
+    ALL.iter().cloned().chain(figures).collect()
 }
 
 /// Prepares the folder for a run: removes the files of an earlier one except its records, and writes the copy of the list
@@ -78,7 +91,7 @@ pub fn begin(folder: &Folder, scene: &Scene) -> Result<(), OutputError> {
     if let Some(list) = scene.list() {
         write_list(folder, list)?;
     }
-    inventory::clear(folder, ALL.iter().map(String::as_str), keeps)
+    inventory::clear(folder, made(scene).iter().map(String::as_str), keeps)
 }
 
 fn write_list(folder: &Folder, list: &List) -> Result<(), OutputError> {
@@ -108,7 +121,7 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<St
     let mut files = write_files(folder, cells, &run.made, validation.as_ref(), &|_| true)?;
     files.extend(validation.is_some().then(|| VALIDATION.to_owned()));
     let keeps = |name: &str| [MANIFEST, RECORDS].contains(&name) || files.iter().any(|file| file == name);
-    inventory::clear(folder, ALL.iter().map(String::as_str), keeps)?;
+    inventory::clear(folder, made(cells.scene()).iter().map(String::as_str), keeps)?;
     let listed = [inventory::entries(folder, &files)?, records].concat();
     let timings = manifest::map::timings(run, clock.elapsed(), folder.writing_times());
     let mut manifest = manifest::map::map(cells, run, timings, &listed);

@@ -96,16 +96,16 @@ pub fn require_records(out: &Path) -> Result<(), RecordFileError> {
     }
 }
 
-/// Opens a new folder; with `force` or `resume` also the folder of an earlier run.
+/// Opens a new folder for the map of a scene; with `force` or `resume` also the folder of an earlier run.
 ///
 /// # Errors
 /// [`RunRecordsError`] if the folder cannot be used, or if there is nothing in it to resume but other files.
-pub fn open_folder(out: &Path, force: bool, resume: bool) -> Result<Folder, RunRecordsError> {
+pub fn open_folder(out: &Path, scene: &Scene, force: bool, resume: bool) -> Result<Folder, RunRecordsError> {
     if resume {
         require_records(out)?;
     }
     let folder = Folder::open(out, force || resume)?;
-    folder.prepare(map::names())?;
+    folder.prepare(map::names_of(scene))?;
     Ok(folder)
 }
 

@@ -26,6 +26,13 @@ impl Restart<'_> {
         format!("{stored} of {most}{total} {unit} are kept; go on with: {}", self.command("--resume"))
     }
 
+    /// Number of runs whose records a resumed run finds.
+    pub(super) fn stored(folder: &Folder) -> usize {
+        let path = folder.path().join(RECORDS);
+        let extent = |identity| RecordFile::read(&path, &identity, Order::Any, |_| true).ok();
+        Identity::read(&path).ok().flatten().and_then(extent).map_or(0, |extent| extent.count)
+    }
+
     /// The message of a run that stops before it changes the folder.
     pub(super) fn before_begin(&self) -> String {
         let Map { run: options, resume, .. } = self.arguments;
@@ -45,16 +52,8 @@ impl Restart<'_> {
         if error.is_usage() {
             return error.into();
         }
-        let rest = if self.arguments.run.force {
-            self.before_begin()
-        } else {
-            let stored = || {
-                let path = folder.path().join(RECORDS);
-                let identity = Identity::read(&path).ok()??;
-                Some(RecordFile::read(&path, &identity, Order::Any, |_| true).ok()?.count)
-            };
-            self.text(stored().unwrap_or(0))
-        };
+        let rest =
+            if self.arguments.run.force { self.before_begin() } else { self.text(Restart::stored(folder)) };
         JobError::Failed(format!("{error}; {rest}{}", self.with_the_cpu())).into()
     }
 

@@ -40,6 +40,17 @@ fn a_model_with_one_coordinate_has_columns_and_figures_of_that_coordinate() {
     for name in names.split(',').filter(|name| *name != "status") {
         assert!(files.contains(&format!("{name}.png")), "no figure of {name}");
     }
+    let figure = fs::read(out.join("mean_x.png")).unwrap();
+    for name in ["mean_x.png", "state_v.png", "cells.csv"] {
+        fs::remove_file(out.join(name)).unwrap();
+    }
+    succeeds(&folder, "check out/s --repair --quiet");
+    succeeds(&folder, "check out/s --quiet").stderr("");
+    assert!(fs::read(out.join("mean_x.png")).unwrap() == figure);
+    let link = out.join("partial-mean_x.png");
+    fs::write(&link, "left by a killed run").unwrap();
+    succeeds(&folder, "map s.toml --engine cpu --quiet --resume");
+    assert!(!link.exists(), "incomplete figures are removed");
     let csv = out.join("cells.csv");
     assert_eq!(column(&csv, "contact_force_max"), [None; 9], "a rigid stop has no force");
     let [x, gap] = ["amplitude_x", "amplitude_gap"].map(|name| column(&csv, name));
