@@ -20,6 +20,8 @@ mod measure_gpu;
 mod models;
 mod orbit_tables;
 #[cfg(target_os = "linux")]
+mod power_cuts;
+#[cfg(target_os = "linux")]
 mod slurm;
 mod systems;
 mod text;

@@ -1,0 +1,53 @@
+//! Power cuts: what a command promises to keep is on the disk when it ends.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+use std::process::Command as Process;
+
+use crate::common::{rattlemap, run, says, with_scene};
+
+/// Makes the folder `cut` from the folder `out` and the calls of `faults/journal.c`: names and parts of files that were not
+/// synced are lost.
+fn cut(calls: &[Vec<&str>], out: &Path, cut: &Path) {
+    let is_synced = |calls: &[Vec<&str>], folder| {
+        calls.iter().any(|call| call[0] == "sync" && Path::new(call[2]) == folder)
+    };
+    assert!(is_synced(calls, out.parent().unwrap()), "the folder is lost");
+    let names =
+        calls.iter().enumerate().filter(|(nth, call)| call[0] == "rename" && is_synced(&calls[*nth..], out));
+    let names: HashMap<&str, &str> = names.map(|(_, call)| (call[3], call[1])).collect();
+    fs::remove_dir_all(cut).ok();
+    fs::create_dir(cut).unwrap();
+    for (path, inode) in names.into_iter().filter(|(path, _)| Path::new(path).exists()) {
+        let synced = calls.iter().rfind(|call| call[0] == "sync" && call[1] == inode);
+        let bytes = fs::read(path).unwrap();
+        let size = synced.map_or(0, |call| call[3].parse().unwrap());
+        fs::write(cut.join(Path::new(path).file_name().unwrap()), &bytes[..size]).unwrap();
+    }
+}
+
+#[test]
+fn what_a_command_has_written_survives_a_power_cut() {
+    let folder = with_scene(crate::faults::SCENE);
+    let root = folder.path().canonicalize().unwrap();
+    let [library, journal] = ["journal.so", "journal"].map(|name| root.join(name));
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cli/faults/journal.c");
+    let mut compiler = Process::new("cc");
+    let Ok(status) = compiler.args(["-shared", "-fPIC", source, "-o"]).arg(&library).status() else { return };
+    assert!(status.success());
+    let map = "map s.toml --engine cpu --quiet --out";
+    run(&folder, &format!("{map} part-1 --shard 1/2")).success();
+    run(&folder, &format!("{map} part-2 --shard 2/2")).success();
+    for line in [format!("{map} OUT"), "merge OUT part-1 part-2 --quiet".to_owned()] {
+        let out = root.join("out");
+        drop((fs::remove_dir_all(&out), fs::remove_file(&journal)));
+        let mut recorded = rattlemap(&folder);
+        recorded.env("LD_PRELOAD", &library).env("RATTLEMAP_JOURNAL", &journal);
+        recorded.args(line.replace("OUT", out.to_str().unwrap()).split(' ')).assert().success();
+        let text = fs::read_to_string(&journal).unwrap();
+        let calls: Vec<Vec<&str>> = text.lines().map(|line| line.split('\t').collect()).collect();
+        cut(&calls, &out, &root.join("cut"));
+        run(&folder, "check cut").success().stderr(says(&["all 2 files are as manifest.json says"]));
+    }
+}
