@@ -18,7 +18,7 @@ from .model import Model, require_model
 
 #: Ranges of the arguments, as in the program.
 _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
-_HISTORY, _LAST = (1, 10_000), 30_000_000
+_HISTORY, _LAST, _POINTS = (1, 10_000), 30_000_000, (1, 10_000_000)
 
 
 class Orbit:
@@ -161,7 +161,7 @@ class Orbit:
         Parameters
         ----------
         points
-            Least number of evenly spaced samples. Each forcing period has the same number.
+            Least number of evenly spaced samples, 1 to 10,000,000. Each forcing period has the same number.
 
         Returns
         -------
@@ -175,17 +175,16 @@ class Orbit:
         Raises
         ------
         ValueError
-            If ``points`` is less than 1.
+            If ``points`` is out of its range.
 
         Examples
         --------
         >>> path = rm.orbit(rm.gear_pair(), e=0.06).trajectory(400)
         >>> plt.plot(path["z"], path["w"])
         """
-        if points < 1:
-            raise ValueError(f"points = {points}: it must be at least 1")
+        _check_whole("points", points, _POINTS)
         periods = max(self._native.cycle_periods, 1)
-        table = StringIO(self._native.trajectory(-(-points // periods)))
+        table = StringIO(self._native.trajectory(-(-int(points) // periods)))
         return pd.DataFrame(dataset.table_columns(dataset.text_table(table)))
 
     def history(self, periods: int, *, to_period: int | None = None, points: int = 2000) -> pd.DataFrame:
@@ -223,7 +222,7 @@ class Orbit:
         last = periods if to_period is None else to_period
         _check_whole("periods", periods, _HISTORY)
         _check_whole("to_period", last, (int(periods), _LAST))
-        _check_whole("points", points, (1, 10_000_000))
+        _check_whole("points", points, _POINTS)
         table = StringIO(self._native.history(int(last) - int(periods), int(periods), int(points)))
         return pd.DataFrame(dataset.table_columns(dataset.text_table(table)))
 

@@ -58,6 +58,8 @@ def test_a_trajectory_has_the_requested_points() -> None:
     assert len(samples) == 401 and samples["t"].iloc[-1] == pytest.approx(orbit.forcing_period)
     assert len(path) == 401 + 2 * len(orbit.events)
     assert "periodic, period 1, word 36" in repr(orbit)
+    with pytest.raises(ValueError, match="points = 100000000: it must be a whole number from 1 to 10000000"):
+        orbit.trajectory(100_000_000)
 
 
 def test_a_history_is_the_programs(program: Program, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::job::engine_choice::EngineKind;
 use crate::job::error::JobError;
-use crate::job::forecast::Forecast;
+use crate::job::forecast::{self, Forecast};
 use crate::job::map::{MapJob, OpenMap};
 use crate::job::model_engine;
 use crate::job::observer::Observer;
@@ -73,6 +73,9 @@ impl DryRun {
             Err(FolderError::NotEmpty { .. }) => true,
             checked => checked.map(|()| false)?,
         };
+        if let Some(warning) = forecast::long_cells(plan) {
+            observer.warn(&warning);
+        }
         let job = MapJob { engine: job.engine_request(Some(out)), ..job.clone() };
         let OpenMap { mut engine, reason, opening, .. } = job.open(plan, None, observer)?;
         let stored = if job.resume {

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::job::engine_choice::{EngineKind, EngineRequest};
 use crate::job::error::JobError;
+use crate::job::forecast;
 use crate::job::map::MapJob;
 use crate::job::observer::Observer;
 use crate::job::scene_file::FILES;
@@ -52,6 +53,9 @@ pub fn page(
     let job = MapJob { sets, ..MapJob::new(scene, engine) };
     job.check(None)?;
     let plan = job.plan()?;
+    if let Some(warning) = forecast::long_cells(&plan) {
+        observer.warn(&warning);
+    }
     let mut run = job.open(&plan, None, observer)?.begin()?;
     if !run.integrate(halt)? {
         return Ok(None);

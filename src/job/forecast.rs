@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 
 use crate::map::engine::{Engine, EngineError};
 use crate::map::plan::{Cell, Plan};
+use rattlemap_dynamics::model::REST;
+use rattlemap_dynamics::motion::{Allowance, Flow, Trajectory};
 
 /// A sample that takes at least this long is the last one.
 const LONG_ENOUGH: Duration = Duration::from_millis(1500);
@@ -25,6 +27,37 @@ const GOLDEN: u64 = 2_654_435_761;
 
 /// Quantile of the normal distribution for an interval of 95 %.
 const QUANTILE: f64 = 1.96;
+
+/// Seconds for a cell from which on there is a warning.
+const LONG_CELL: f64 = 2.0;
+
+/// Time in which the motion of one cell is measured.
+const PROBE: Duration = Duration::from_millis(200);
+
+/// Returns a warning if a cell can take long: measures the forcing periods of one cell on a processor core, the later half of
+/// those that fit into the probe, and multiplies by the largest number of periods.
+pub fn long_cells(plan: &Plan) -> Option<String> {
+    let model = plan.model((plan.cell_count() / 2) as u32);
+    let (flow, halt, clock) = (Flow::of(&*model).ok()?, halted_after(PROBE), Instant::now());
+    let mut trajectory = <Trajectory>::new(&flow, model.law(), REST);
+    trajectory = trajectory.allowing(Allowance::UNLIMITED.until(&halt));
+    let longest = plan.budget().longest();
+    let mut ends = vec![0.0];
+    while trajectory.advance_period(&mut ()).is_ok() && ends.len() <= longest as usize {
+        ends.push(clock.elapsed().as_secs_f64());
+    }
+    if ends.len() == 1 && halt.load(Ordering::Relaxed) {
+        ends.push(PROBE.as_secs_f64());
+    }
+    let (last, half) = (ends.len() - 1, (ends.len() - 1) / 2);
+    let each = (ends[last] - ends[half]) / (last - half) as f64;
+    let seconds = each * f64::from(longest);
+    (seconds > LONG_CELL).then(|| {
+        format!(
+            "a cell can take about {seconds:.0} s of a core: {longest} forcing periods ([integration]) of {each:.1e} s each"
+        )
+    })
+}
 
 /// Predicted time of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]

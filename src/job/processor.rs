@@ -30,6 +30,9 @@ pub fn is_fit() -> bool {
     true
 }
 
+/// Largest number of threads of a computation; more cores than any machine has.
+const MOST_THREADS: usize = 1024;
+
 /// Number of threads that can run at a time.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
@@ -38,10 +41,14 @@ pub fn cores() -> usize {
 /// Starts the threads that all computations share, unless they have been started.
 ///
 /// # Errors
-/// The message, if the system refuses.
+/// The message, if the system refuses, or if too many are asked for.
 pub fn start_threads() -> Result<(), String> {
     // Threads that could not be started cannot be started later.
     static STARTED: OnceLock<Result<(), String>> = OnceLock::new();
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse::<usize>().ok());
+    if let Some(asked) = asked.filter(|&asked| asked > MOST_THREADS) {
+        return Err(format!("RAYON_NUM_THREADS={asked}: it must be at most {MOST_THREADS}"));
+    }
     let start = || match rayon::ThreadPoolBuilder::new().build_global() {
         Err(error) if error.source().is_some() => Err(format!(
             "cannot start a thread on each core ({error}); raise the limits of this shell (`ulimit -u` and `ulimit -v`), or \

@@ -4,6 +4,7 @@ use super::Points;
 use super::axis::{Axis, meanings, names};
 use super::error::SceneError;
 use super::keys;
+use super::limits::MOST_LINES;
 use super::section::{Field, Section};
 use super::settings::read_title;
 use crate::text::document::Value;
@@ -135,6 +136,10 @@ fn read_lines(field: &Field<'_>, points: &Points) -> Result<Vec<MapLine>, SceneE
         return Err(field.wrong_type("names and expressions, such as { \"threshold\" = \"k1 - 2*k2\" }"));
     }
     let Some(lines) = Section::open_any(field.node, &field.path) else { return Ok(Vec::new()) };
+    let fields = lines.fields_as_written();
+    if fields.len() > MOST_LINES {
+        return Err(field.wrong_count(fields.len(), "lines", &format!("at most {MOST_LINES} lines")));
+    }
     let line = |(name, field): (&str, Field<'_>)| {
         let expression = field.expression(&names(model), &meanings(model), "\"k1 - 2*k2\"")?;
         let is_swept =
@@ -144,5 +149,5 @@ fn read_lines(field: &Field<'_>, points: &Points) -> Result<Vec<MapLine>, SceneE
         }
         Ok(MapLine { name: name.to_owned(), expression })
     };
-    lines.fields_as_written().into_iter().map(line).collect()
+    fields.into_iter().map(line).collect()
 }

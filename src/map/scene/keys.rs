@@ -102,7 +102,7 @@ pub const KEYS: &[Key] = &[
     key("figure", "font_size", Words("7.4"), Takes::Words("7 to 24, and at most width / 21"), "size of tick labels and legends, in points. Exponents are smaller; headings and names of axes are at least as large"),
     key("figure", "title", Words("the scene's title"), Takes::Text(LONGEST_TITLE), "title of figures; \"\" removes the heading, with its lines below the title"),
     key("figure", "legend", Value("true"), Takes::Flag, "whether figures have a legend. Without it, maps have no colour bar either"),
-    key("figure", "lines", KeyDefault::None, Takes::Words("{ \"name\" = \"expression\", ... } in parameters of the model, also derived ones"), "lines on maps, where an expression is zero"),
+    key("figure", "lines", KeyDefault::None, Takes::Words("{ \"name\" = \"expression\", ... } with at most 32 names, in parameters of the model, also derived ones"), "lines on maps, where an expression is zero"),
 ];
 
 /// Returns the names of the keys in one table.

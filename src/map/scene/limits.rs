@@ -9,5 +9,8 @@ pub(crate) const MAX_PERIODS: u32 = 1_000_000_000;
 /// Largest number of starts per cell: the number of attractors of a cell is stored in one byte.
 pub(super) const MAX_STARTS: u32 = 255;
 
+/// Largest number of lines on a map: each is searched in all cells, and its name is in the legend.
+pub(super) const MOST_LINES: usize = 32;
+
 /// Largest length of a title in characters: figures have one line for it.
 pub(super) const LONGEST_TITLE: usize = 200;

@@ -56,3 +56,18 @@ fn a_dry_run_refuses_what_a_run_refuses() {
     text.stdout(says(&["folder   not empty: the run needs --resume or --force; nothing was written\n"]));
     assert_eq!(names(&folder.path().join("out/s")), before);
 }
+
+/// The warning comes before the work, which would take an hour and is ended.
+#[test]
+fn cells_that_take_long_cause_a_warning() {
+    let folder = folder();
+    let long = format!("s.toml {FEW} --set integration.confirm_chaos=100000000");
+    for line in [format!("map {long} --engine cpu --dry-run"), format!("explore {long} --no-open")] {
+        let run = command(&folder, &line).timeout(std::time::Duration::from_secs(5)).assert().failure();
+        run.stderr(says(&[
+            "warning: a cell can take about ",
+            "100000528 forcing periods ([integration]) of ",
+        ]));
+    }
+    map(&folder, &format!("{FEW} --dry-run --quiet")).success().stderr("");
+}

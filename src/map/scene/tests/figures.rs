@@ -43,6 +43,13 @@ fn wrong_styles_are_refused_with_their_place_and_the_remedy() {
         let message = read(figure).unwrap_err().to_string();
         assert!(message.starts_with(place) && message.contains(part), "{figure}: {message}");
     }
+    let lines: Vec<String> = (0..33).map(|n| format!("l{n} = \"omega - {n}\"")).collect();
+    let message = read(&format!("lines = {{ {} }}", lines.join(", "))).unwrap_err().to_string();
+    assert!(
+        message.contains("`figure.lines = 33 lines` is out of range: it must be at most 32 lines"),
+        "{message}"
+    );
+    read(&format!("lines = {{ {} }}", lines[1..].join(", "))).unwrap();
 }
 
 #[test]
