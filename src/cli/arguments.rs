@@ -1,5 +1,6 @@
 //! Arguments of all commands, and their help texts.
 
+use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,7 +12,7 @@ use crate::gpu::Precision;
 use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
 use crate::map::scene::{Along, FigureStyle, Format, MAX_PERIODS, toml};
 use crate::map::shard::Shard;
-use crate::model_file::DEFAULT as DEFAULT_MODEL;
+use crate::model_file::{DEFAULT as DEFAULT_MODEL, FileModel};
 use crate::store::inventory::figure_formats;
 use crate::store::orbit::{HistoryRequest, TABLED};
 use crate::text::printable::is_printable;
@@ -22,7 +23,7 @@ use clap::builder::PossibleValue;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use rattlemap_dynamics::model::{self, REST, STATE, State};
+use rattlemap_dynamics::model::{self, Model, REST, STATE, State};
 use rattlemap_dynamics::orbit::{LONGEST_WINDOW, Settings};
 
 /// Version and commit, as `--version` prints them.
@@ -61,9 +62,10 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
 /// # Errors
 /// The exit code, if the program should end.
 pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
-    P::try_parse_from(joined(arguments)).map_err(|mut error| {
+    let arguments = joined(arguments);
+    P::try_parse_from(&arguments).map_err(|mut error| {
         if error.use_stderr() {
-            advise_set(&mut error);
+            advise_set(&mut error, &arguments);
             quote(&mut error);
             // Colours are removed, because a quoted argument could contain some.
             say::notes(error.render().to_string().trim_end());
@@ -92,8 +94,8 @@ fn joined(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     all
 }
 
-/// Adds advice to the error for an argument `NAME=VALUE` without `--set`.
-fn advise_set(error: &mut clap::Error) {
+/// Adds advice to the error for an argument `NAME=VALUE` without `--set`, and for a parameter as an option: `--NAME VALUE`.
+fn advise_set(error: &mut clap::Error, arguments: &[OsString]) {
     let text = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),
         Some(ContextValue::StyledStr(text)) => Some(text.to_string()),
@@ -102,13 +104,34 @@ fn advise_set(error: &mut clap::Error) {
     let (argument, usage) = (text(ContextKind::InvalidArg), text(ContextKind::Usage));
     let sets = ["map", "bifurcation", "orbit"].map(|command| format!("rattlemap {command} "));
     let takes_sets = usage.is_some_and(|usage| sets.iter().any(|command| usage.contains(command)));
-    let is_assignment = |argument: &String| !argument.starts_with('-') && argument.contains('=');
+    let assignment = |argument: String| match argument.strip_prefix('-') {
+        None => Some(argument).filter(|argument| argument.contains('=')),
+        Some(name) => {
+            let name = name.trim_start_matches('-');
+            let given = arguments.iter().map(|given| given.to_string_lossy());
+            let mut given = given.skip_while(|given| given.split('=').next() != Some(&argument));
+            let value =
+                given.next().and_then(|option| option.split_once('=').map(|(_, value)| value.to_owned()));
+            let value = value.or_else(|| Some(given.next()?.into_owned())).unwrap_or("VALUE".to_owned());
+            parameters().contains(name).then(|| format!("{name}={value}"))
+        }
+    };
     if let (ErrorKind::UnknownArgument, Some(argument), true) =
-        (error.kind(), argument.filter(is_assignment), takes_sets)
+        (error.kind(), argument.and_then(assignment), takes_sets)
     {
+        error.remove(ContextKind::SuggestedArg);
         let advice = format!("a parameter is set by an option: --set {argument}");
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
     }
+}
+
+/// Names of the parameters of all built-in models.
+pub(crate) fn parameters() -> BTreeSet<String> {
+    let models = FileModel::all_built_in();
+    models
+        .iter()
+        .flat_map(|model| model.parameters().iter().map(|parameter| parameter.name.to_string()))
+        .collect()
 }
 
 /// Escapes arguments that an error quotes.
@@ -501,9 +524,9 @@ impl ValueEnum for EngineKind {
     The first 20 forcing periods, from a given state:\n  \
     rattlemap orbit --start 0.1,0,-0.2,1.5 --from-start 20 --out out/first")]
 pub(crate) struct Orbit {
-    /// Model: a name that `rattlemap models` lists, or the path of a model's file
-    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_MODEL)]
-    pub(crate) model: String,
+    /// Model: a name that `rattlemap models` lists, or the path of a model's file; - reads it from standard input
+    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_MODEL, allow_hyphen_values = true)]
+    pub(crate) model: PathBuf,
 
     /// Set a parameter of the model; the others keep the model's defaults. The gear pair has the parameters m1 m2 r1 r2 k1 k2
     /// r k F omega b e mesh_speed, with the values of the paper's Table 1 and e = 0.605. start.phase=P starts at the phase P of
@@ -733,9 +756,9 @@ impl Explore {
     rattlemap models my-model.toml\n  \
     rattlemap models bilinear --file > my-model.toml")]
 pub(crate) struct Models {
-    /// Name of a built-in model, or path of a model's file
+    /// Name of a built-in model, or path of a model's file; - reads it from standard input
     #[arg(value_name = "NAME|FILE")]
-    pub(crate) name: Option<String>,
+    pub(crate) name: Option<PathBuf>,
 
     /// Print the model's file, for instance as a template for your own model
     #[arg(long, requires = "name")]
@@ -930,9 +953,7 @@ impl CompletionTarget {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model_file::FileModel;
     use clap::CommandFactory;
-    use rattlemap_dynamics::model::Model;
 
     #[test]
     fn the_command_line_is_consistent() {

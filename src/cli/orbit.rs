@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
         let place = (&start, request.skipped + 1, request.last());
         print(&match arguments.json {
             true => history_to_json(&*model, &history, place, instant),
-            false => history_summary(&*model, &history, place, instant),
+            false => broken(&history_summary(&*model, &history, place, instant)),
         })?;
         let write = |folder: &Folder, figures: Figures<'_>| {
             store::orbit::write_history(folder, &*model, &history, &request, clock.elapsed(), figures)
@@ -80,13 +80,38 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let orbit = orbit?.ok_or_else(stopped)?;
     print(&match arguments.json {
         true => to_json(&*model, &orbit, instant),
-        false => summary(&*model, &orbit, instant),
+        false => broken(&summary(&*model, &orbit, instant)),
     })?;
     let request = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
     finish(arguments, folder, &style, |folder, figures| {
         store::orbit::write(folder, &*model, &orbit, &request, figures)
     })?;
     fail_if(orbit.class == Class::Failed, "the integration failed; `status` says why")
+}
+
+/// Longest row of a summary, in characters.
+const LONGEST_ROW: usize = 120;
+
+/// Width of the labels of a summary, and of the first two columns of its table.
+const LABELS: usize = 21;
+
+/// Breaks the longer rows of a summary: behind columns, so that the parts of a table stay aligned, between words, or within a
+/// long one.
+fn broken(text: &str) -> String {
+    let row = |line: &str| {
+        let (mut rows, mut rest) = (String::new(), line.to_owned());
+        while rest.chars().count() > LONGEST_ROW {
+            let places = || rest.char_indices().take(LONGEST_ROW + 1).skip(LABELS + 1).map(|(at, _)| at);
+            let ends = || places().filter(|&at| rest[at..].starts_with(' ') && !rest[..at].ends_with(' '));
+            let column = ends().filter(|&at| rest[at..].starts_with("  ")).last();
+            let word = || ends().filter(|&at| !rest[at..].starts_with(" [")).last();
+            let Some(end) = column.or_else(word).or(places().last()) else { break };
+            rows += &format!("{}\n", &rest[..end]);
+            rest = format!("{:LABELS$}{}", "", &rest[end..]);
+        }
+        rows + &rest
+    };
+    text.lines().map(row).collect::<Vec<_>>().join("\n")
 }
 
 /// Formats and style of figures.

@@ -12,17 +12,23 @@ use crate::text::printable;
 /// Strings that mark the path of a file. Names of built-in models do not contain them.
 const FILE_MARKS: [&str; 3] = [".toml", "/", "\\"];
 
+/// Names of standard input. A pipe has no size that could be checked before it is read.
+const STDIN: [&str; 2] = ["-", "/dev/stdin"];
+
 /// Returns the built-in model of this name, or reads the model's file of this name.
 ///
 /// # Errors
 /// [`JobError`] if there is no such model, or its file cannot be read or is wrong.
-pub fn find(name: &str) -> Result<FileModel, JobError> {
+pub fn find(path: impl AsRef<Path>) -> Result<FileModel, JobError> {
+    let path = path.as_ref();
+    let name = &*path.to_string_lossy();
     if let Some(model) = FileModel::built_in(name) {
         return Ok(model);
     }
     let quoted = printable::line(name);
-    if FILE_MARKS.iter().any(|mark| name.contains(mark)) {
-        let file = scene_file::find_model(Path::new(name));
+    let is_stdin = STDIN.contains(&name);
+    if is_stdin || FILE_MARKS.iter().any(|mark| name.contains(mark)) {
+        let file = if is_stdin { scene_file::model_of_stdin() } else { scene_file::find_model(path) };
         let file = file.map_err(|reason| JobError::Usage(format!("{quoted}: the model {reason}")))?;
         return Ok(FileModel::parse(&file.text, &file.name)?);
     }

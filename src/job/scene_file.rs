@@ -114,6 +114,19 @@ pub(crate) fn find_model(path: &Path) -> Result<FileText, String> {
     }
 }
 
+/// Reads a model's file from standard input.
+///
+/// # Errors
+/// As [`find_model`].
+pub(crate) fn model_of_stdin() -> Result<FileText, String> {
+    let name = "standard input".to_owned();
+    match io::read_to_string(io::stdin().take(MOST_OF_MODEL + 1)) {
+        Ok(text) if text.len() as u64 <= MOST_OF_MODEL => Ok(FileText { name, text }),
+        Ok(_) => Err(format!("in {name} has more than {}; write a shorter model", bytes(MOST_OF_MODEL))),
+        Err(error) => Err(format!("cannot be read from {name} ({error})")),
+    }
+}
+
 fn find_table(path: &Path, most: u64) -> Result<FileText, String> {
     let name = path.display().to_string();
     match read_text(path, most, "list fewer cells") {

@@ -184,7 +184,10 @@ impl Fault {
     }
 }
 
-/// Returns the remedy for an unknown name: the most similar known one, if there is one, and `all`, the list of known
+/// Least number of characters of a part by which a longer name is suggested.
+const LEAST_PART: usize = 4;
+
+/// Returns the remedy for an unknown name: the most similar known one, or those that contain it, and `all`, the list of known
 /// names.
 pub(crate) fn suggest(name: &str, known: &[&str], all: &str) -> String {
     let length = name.chars().count();
@@ -199,7 +202,17 @@ pub(crate) fn suggest(name: &str, known: &[&str], all: &str) -> String {
         Some((typos, nearest)) if typos <= most => {
             format!("did you mean `{nearest}`? valid names: {all}")
         }
-        _ => format!("valid names: {all}"),
+        _ => {
+            let contain = |known: &&&str| length >= LEAST_PART && known.contains(name);
+            let longer: Vec<String> =
+                known.iter().filter(contain).take(3).map(|known| format!("`{known}`")).collect();
+            let meant = longer.join(" or ");
+            if meant.is_empty() {
+                format!("valid names: {all}")
+            } else {
+                format!("did you mean {meant}? valid names: {all}")
+            }
+        }
     }
 }
 

@@ -67,7 +67,8 @@ pub enum ExpressionError {
 fn place(rest: &str) -> String {
     let excerpt: String = rest.chars().take(LONGEST_REST).collect();
     let more = if excerpt.len() < rest.len() { "..." } else { "" };
-    if rest.trim().is_empty() { "to its end".to_owned() } else { format!("from `{excerpt}{more}` on") }
+    let power = if rest.starts_with('*') { " (a power is `^`, not `**`)" } else { "" };
+    if rest.trim().is_empty() { "to its end".to_owned() } else { format!("from `{excerpt}{more}` on{power}") }
 }
 
 /// An expression that can be evaluated.
@@ -428,7 +429,7 @@ mod tests {
             ("2 x", "cannot be read from `x` on"),
             ("2*(x+1", "cannot be read to its end"),
             ("x)", "cannot be read from `)` on"),
-            ("x ** 2", "cannot be read from `* 2` on"),
+            ("x ** 2", "cannot be read from `* 2` on (a power is `^`, not `**`)"),
             ("x, 2", "cannot be read from `, 2` on"),
             ("#", "cannot be read from `#` on"),
             ("omgea*2", "unknown name `omgea`"),

@@ -135,7 +135,7 @@ impl<'a> Field<'a> {
         match self.node.value {
             Value::Integer(i) => Ok(i as f64),
             Value::Float(x) => Ok(x),
-            _ => Err(self.wrong_type("a number")),
+            _ => Err(self.no_number("a number")),
         }
     }
 
@@ -143,7 +143,16 @@ impl<'a> Field<'a> {
     pub(crate) fn number_or(&self, expected: &str) -> Result<f64, SceneError> {
         match self.node.value {
             Value::Integer(_) | Value::Float(_) => self.number(),
-            _ => Err(self.wrong_type(expected)),
+            _ => Err(self.no_number(expected)),
+        }
+    }
+
+    /// Builds the error for a value that must be a number and may have a decimal comma.
+    fn no_number(&self, expected: &str) -> SceneError {
+        let pointed = self.node.excerpt.replacen(',', ".", 1);
+        match pointed.parse::<f64>() {
+            Ok(_) => self.wrong_type(&format!("{expected}, with a decimal point: {pointed}")),
+            Err(_) => self.wrong_type(expected),
         }
     }
 

@@ -183,15 +183,25 @@ fn completions_contain_every_command() {
     for word in ["rattlemap bifurcation", "rattlemap bench engines", "transient", "repair"] {
         assert!(page.contains(word), "{word}: {page}");
     }
-    // Bash completes an option.
+    // Bash completes an option, a model and a parameter.
     let folder = folder();
     let path = folder.path().join("rattlemap");
     fs::write(&path, script("bash")).unwrap();
-    let ask = ". ./rattlemap; COMP_WORDS=(rattlemap map --res); COMP_CWORD=2; _rattlemap rattlemap --res map; \
-               echo \"${COMPREPLY[@]}\"";
-    if let Ok(run) = std::process::Command::new("bash").args(["-c", ask]).current_dir(&folder).output() {
-        assert_eq!(String::from_utf8_lossy(&run.stdout).trim(), "--resume", "{run:?}");
+    for (line, at, completed) in [
+        ("map --res", 2, "--resume"),
+        ("orbit --model impact-o", 3, "impact-oscillator"),
+        ("orbit --set ome", 3, "omega="),
+        ("bifurcation --along mesh_s", 3, "mesh_speed"),
+    ] {
+        let ask = format!(
+            ". ./rattlemap; COMP_WORDS=(rattlemap {line}); COMP_CWORD={at}; \
+             _rattlemap rattlemap \"${{COMP_WORDS[-1]}}\" \"${{COMP_WORDS[-2]}}\"; echo \"${{COMPREPLY[@]}}\""
+        );
+        if let Ok(run) = std::process::Command::new("bash").args(["-c", &ask]).current_dir(&folder).output() {
+            assert_eq!(String::from_utf8_lossy(&run.stdout).trim(), completed, "{run:?}");
+        }
     }
+    assert!(script("fish").contains("__fish_complete_directories"), "folders");
     run(&folder, "completions tcsh").code(2).stderr(says(&["bash", "man"]));
 }
 
@@ -410,4 +420,36 @@ fn orbit_help_explains_periods_and_transient() {
         "periods, at most 64",
         "All of it is integrated",
     ]));
+}
+
+#[test]
+fn advice_names_what_would_be_right() {
+    let folder = folder();
+    let model = include_str!("../../models/bilinear.toml").replace("\"omega\"", "\"omega**2\"");
+    fs::write(folder.path().join("m.toml"), model).unwrap();
+    fs::copy(SMOKE, folder.path().join("s.toml")).unwrap();
+    let set = "a parameter is set by an option: --set e=0.6";
+    for (line, advice) in [
+        ("orbit --e 0.6", set),
+        ("map s.toml -e 0.6", set),
+        ("orbit --set e=0,6", "it must be a number, with a decimal point: 0.6"),
+        ("models m.toml", "(a power is `^`, not `**`)"),
+        (
+            "bifurcation s.toml --set outputs.quantities=[\"energy\"]",
+            "did you mean `impact_energy` or `friction_energy`?",
+        ),
+    ] {
+        run(&folder, line).code(2).stderr(says(&[advice]));
+    }
+}
+
+#[test]
+fn rows_of_orbit_have_at_most_120_characters() {
+    for line in
+        ["two-loose-gears", "two-loose-gears --from-start 2", "gear-pair", "absorber-chain --from-start 2"]
+    {
+        let run = run(&folder(), &format!("orbit --model {line}")).success();
+        let text = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+        assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    }
 }

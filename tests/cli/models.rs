@@ -355,3 +355,18 @@ fn a_parameter_outside_its_limits_is_refused_with_the_set_arguments() {
          change the parameters\n"
     );
 }
+
+#[cfg(unix)]
+#[test]
+fn models_come_from_standard_input_and_from_paths_that_are_not_text() {
+    let folder = empty();
+    let text = stdout(&folder, "models bilinear --file");
+    let name: &std::ffi::OsStr = std::os::unix::ffi::OsStrExt::from_bytes(b"m\xff.toml");
+    fs::write(folder.path().join(name), &text).unwrap();
+    for name in ["-".as_ref(), "/dev/stdin".as_ref(), name] {
+        rattlemap(&folder).arg("models").arg(name).write_stdin(text.clone()).assert().success();
+        rattlemap(&folder).args(["orbit", "--model"]).arg(name).write_stdin(text.clone()).assert().success();
+    }
+    let large = rattlemap(&folder).args(["models", "-"]).write_stdin("#".repeat(1_000_001)).assert().code(2);
+    large.stderr(predicates::str::contains("the model in standard input has more than 1.0 MB"));
+}
