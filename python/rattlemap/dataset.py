@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
@@ -201,7 +202,7 @@ def from_columns(columns: Mapping[str, Array], manifest: Mapping[str, Any], text
     return arrange(columns, manifest, columns.__getitem__, read)
 
 
-#: Types of columns of tables. Absent values are 0, NaN or empty, as in ``cells.npy``.
+#: Types of columns of whole numbers in tables. Absent values are 0, NaN or empty, as in ``cells.npy``.
 _TYPES: dict[str, Any] = {
     "label": np.int32,
     "period": np.uint16,
@@ -213,7 +214,8 @@ _TYPES: dict[str, Any] = {
     "i": np.int64,
     "j": np.int64,
 }
-_NAMES = frozenset(("class", "class_a", "class_b", "status", "kind", "direction", "domain", "event", "moment"))
+#: Columns of text that can be empty in every row.
+_NAMES = frozenset(("class", "class_a", "class_b", "status", "kind", "direction", "event", "moment", "gap"))
 
 
 def text_table(source: Path | StringIO | BytesIO) -> pd.DataFrame:
@@ -222,17 +224,21 @@ def text_table(source: Path | StringIO | BytesIO) -> pd.DataFrame:
 
 
 def table_column(name: str, values: pd.Series) -> Array:
-    """Convert a column of :func:`text_table` to the type that its variable has in a map."""
+    """Convert a column of :func:`text_table` to the type that its variable has in a map.
+
+    Names of other columns can be those of a model's gaps, so the fields decide: a column is text if one of them is not a number.
+    """
     text = values.fillna("")
     if name in TEXT_COLUMNS:
         return text_array(text)
-    if name in _NAMES:
-        return np.asarray(text.to_numpy(), dtype=str)
     if name == "symmetric":
         return np.array([{"true": 1, "false": 0}.get(value, -1) for value in text], dtype=np.int8)
     if name in _TYPES:
         return np.array([int(value or 0) for value in text], dtype=_TYPES[name])
-    return np.array([float(value or "nan") for value in text], dtype=np.float64)
+    if any(text) or name not in _NAMES:
+        with suppress(ValueError):
+            return np.array([float(value or "nan") for value in text], dtype=np.float64)
+    return np.asarray(text.to_numpy(), dtype=str)
 
 
 def table_columns(table: pd.DataFrame) -> dict[str, Array]:
