@@ -40,6 +40,10 @@ export default { render };
 """
 
 
+#: What a page shows by default: the quantities of ``scenes/e_omega.toml``.
+_QUANTITIES = ("class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern")
+
+
 class Explorer:
     """A page that shows a map and computes what is visible in it. :func:`explore` returns it.
 
@@ -131,7 +135,8 @@ def explore(
     ----------
     model, scene, set, axes, parameters, quantities, start, settings, **names
         The map, as in :func:`map`. Counts above 65 are reduced to 65, because the page computes finer cells of the visible
-        part. The count may be left out: ``e=(0, 1)``.
+        part. The count may be left out: ``e=(0, 1)``. With a model, ``quantities`` are by default classes, exponents, impacts,
+        meshing, symmetry, words and patterns.
     height
         Height of the page in a notebook, in pixels.
     progress
@@ -162,7 +167,7 @@ def explore(
         purpose="map",
         axes=2,
         sets=set,
-        quantities=quantities,
+        quantities=_QUANTITIES if quantities is None and scene is None else quantities,
         start=start,
         settings=settings,
     )

@@ -13,7 +13,7 @@ import pandas as pd
 
 from . import _native, dataset, scenes
 from .engine import interruptible
-from .errors import SceneError
+from .errors import EngineError, SceneError
 from .model import Model, require_model
 
 #: Ranges of the arguments, as in the program.
@@ -83,8 +83,8 @@ class Orbit:
 
     @property
     def lyapunov(self) -> float:
-        """Largest Lyapunov exponent per unit of time; NaN if the motion failed."""
-        return _number(self._facts["lyapunov"])
+        """Largest Lyapunov exponent per unit of time: minus infinity if all multipliers are 0, NaN if the motion failed."""
+        return self._native.lyapunov
 
     @property
     def lyapunov_error(self) -> float:
@@ -186,6 +186,36 @@ class Orbit:
         periods = max(self._native.cycle_periods, 1)
         table = StringIO(self._native.trajectory(-(-int(points) // periods)))
         return pd.DataFrame(dataset.table_columns(dataset.text_table(table)))
+
+    def spectrum(self) -> pd.DataFrame:
+        """Return the spectrum of each gap and of its velocity.
+
+        The spectrum of a cycle is its Fourier series. That of any other motion is a root mean square over 7 Hann windows of 128
+        forcing periods, which overlap by half.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The columns of ``spectrum.csv``: ``frequency`` in multiples of the forcing frequency, and the amplitudes of the gap
+            ``z`` and its velocity ``w``, with the names of :meth:`trajectory`. At frequency 0 they are magnitudes of the mean.
+            ``attrs["units"]`` has the units by column, if the model has units.
+
+        Raises
+        ------
+        EngineError
+            If the motion cannot be followed for long enough.
+
+        Examples
+        --------
+        >>> lines = rm.orbit(rm.gear_pair(), e=0.605, omega=5.6).spectrum()
+        >>> plt.plot(lines["frequency"], lines["z"])
+        """
+        text = self._native.spectrum()
+        if text is None:
+            raise EngineError("the motion cannot be followed for as long as its spectrum requires")
+        lines = pd.DataFrame(dataset.table_columns(dataset.text_table(StringIO(text))))
+        lines.attrs["units"] = {name: unit for name, unit in self.units.items() if name in lines}
+        return lines
 
     def history(self, periods: int, *, to_period: int | None = None, points: int = 2000) -> pd.DataFrame:
         """Return the motion from its start, which :meth:`trajectory` leaves out as transient.

@@ -1,4 +1,4 @@
-"""Figures of maps whose cells have names: classes and periods, words, patterns, attractors."""
+"""Figures of maps whose cells have names (classes and periods, words, patterns, attractors), of diagrams and of orbits."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ import pandas as pd
 import xarray as xr
 
 from . import _native
+from .orbit import Orbit
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.patches import Patch
 
 #: Names of cells without a cycle, in the order of legends.
 _WITHOUT_CYCLE = ("chaotic", "quasi-periodic", "undecided", "failed")
@@ -24,27 +25,36 @@ _UNITS = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0, "pt": 1 / 72}
 _WIDTHS = (60 / 25.4 - 1e-9, 300 / 25.4 + 1e-9)
 _POINTS = 7.4
 
+#: A step between columns is a jump, not part of a branch, if it is this share of the span, and this multiple of the steps beside it.
+_JUMP = (0.15, 4)
+
 Texts = npt.NDArray[Any]
 
 
 def plot(
-    data: xr.Dataset | xr.DataArray,
+    data: xr.Dataset | xr.DataArray | Orbit,
     *,
+    y: str | None = None,
     ax: Axes | None = None,
     most: int = 16,
     legend: bool = True,
     width: str | None = None,
 ) -> Axes:
-    """Draw a map whose cells have names, in the colours of the program's figures.
+    """Draw a map whose cells have names, a bifurcation diagram or an orbit, in the colours of the program's figures.
 
-    Use ``.plot()`` of xarray for numbers, such as ``ds["lyapunov"]``.
+    Use ``.plot()`` of xarray for numbers of a map, such as ``ds["lyapunov"]``.
 
     Parameters
     ----------
     data
         A map of :func:`rattlemap.map`, :func:`rattlemap.basins` or :func:`rattlemap.open`: draws its attractors if it has any,
         else periods and classes. Or one of its variables: ``ds["class"]``, ``ds["pattern"]``, ``ds["word"]``, ``ds["status"]``,
-        ``ds["period"]``, ``ds["attractor"]``; two dimensions.
+        ``ds["period"]``, ``ds["attractor"]``; two dimensions. Or a diagram of :func:`rattlemap.bifurcation`, or an orbit of
+        :func:`rattlemap.orbit`.
+    y
+        What to draw. Of a diagram: a component of the state at the walls, before contact, or a variable over the parameter, such
+        as ``"lyapunov"``, whose branches are lines; by default the first component that is not the same at all walls. Of an
+        orbit: a column of its trajectory against time; by default the velocity of the first gap against the gap.
     ax
         Axes to draw on; by default the current ones.
     most
@@ -63,27 +73,23 @@ def plot(
     Raises
     ------
     ValueError
-        If the data does not have two dimensions, a Dataset has neither classes with periods nor attractors, ``width`` is not a
-        length, or both ``width`` and ``ax`` are given.
+        If a map does not have two dimensions, a Dataset has neither classes with periods nor attractors, ``width`` is not a
+        length, both ``width`` and ``ax`` are given, or there is no ``y`` of this name.
 
     Examples
     --------
     >>> ds = rm.map(rm.gear_pair(), e=(0, 1, 16), omega=(1, 12, 16), quantities=["class", "pattern"])
     >>> _ = rm.plot(ds)
     >>> _ = rm.plot(ds["pattern"], most=8)
+    >>> _ = rm.plot(rm.orbit(rm.gear_pair(), e=0.605, omega=5.6))
     """
     import matplotlib.pyplot as plt
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
     from matplotlib.text import Text
 
-    cells = _cell_names(data) if isinstance(data, xr.Dataset) else data
-    if cells.ndim != 2:
+    is_diagram = isinstance(data, xr.Dataset) and "point" in data.dims
+    cells = _cell_names(data) if isinstance(data, xr.Dataset) and not is_diagram else data
+    if isinstance(cells, xr.DataArray) and cells.ndim != 2:
         raise ValueError(f"a map must have two dimensions; this has {cells.ndim}: {', '.join(map(str, cells.dims))}")
-    names, places = _categories(cells, most)
-    colors = [_color(name, place, str(cells.name)) for place, name in enumerate(names)]
-    # The type stubs of xarray do not describe the method `plot`.
-    image: Any = cells.copy(data=places)
     inches = None if width is None else _inches(width)
     if inches is None:
         axes = plt.gca() if ax is None else ax
@@ -91,20 +97,95 @@ def plot(
         raise ValueError("width is for a new figure; give either width or ax, and set the size of your own figure with figsize")
     else:
         axes = plt.figure(figsize=(inches, inches), layout="constrained").add_subplot()
-    image.plot(ax=axes, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(names) - 0.5, add_colorbar=False)
+    if isinstance(cells, Orbit):
+        title, keys = "", _draw_orbit(axes, cells, y)
+    elif isinstance(cells, xr.Dataset):
+        title, keys = "", _draw_diagram(axes, cells, y)
+    else:
+        title, keys = str(cells.name), _draw_cells(axes, cells, most)
     axes.set_title("")
-    if legend:
-        shares = np.bincount(places.ravel(), minlength=len(names)) / max(places.size, 1)
-        lines = [f"{_label(name)}  {_percent(share)}" for name, share in zip(names, shares, strict=True)]
-        handles = [Patch(facecolor=color, edgecolor="0.4", linewidth=0.5) for color in colors]
+    if legend and keys:
+        lines, handles = [*keys], [*keys.values()]
         if inches is None:
-            axes.legend(handles, lines, loc="upper left", bbox_to_anchor=(1.01, 1), title=str(cells.name), fontsize="small")
+            axes.legend(handles, lines, loc="upper left", bbox_to_anchor=(1.01, 1), title=title, fontsize="small")
         else:
             _legend_below(axes, handles, lines, inches)
     if inches is not None:
         for text in axes.figure.findobj(Text):
             text.set_fontsize(_POINTS)
     return axes
+
+
+def _draw_cells(axes: Axes, cells: xr.DataArray, most: int) -> dict[str, Artist]:
+    """Draw the names of cells. Returns the legend."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    names, places = _categories(cells, most)
+    colors = [_color(name, place, str(cells.name)) for place, name in enumerate(names)]
+    # The type stubs of xarray do not describe the method `plot`.
+    image: Any = cells.copy(data=places)
+    image.plot(ax=axes, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(names) - 0.5, add_colorbar=False)
+    shares = np.bincount(places.ravel(), minlength=len(names)) / max(places.size, 1)
+    lines = [f"{_label(name)}  {_percent(share)}" for name, share in zip(names, shares, strict=True)]
+    return {line: Patch(facecolor=color, edgecolor="0.4", linewidth=0.5) for line, color in zip(lines, colors, strict=True)}
+
+
+def _draw_diagram(axes: Axes, ds: xr.Dataset, y: str | None) -> dict[str, Artist]:
+    """Draw section points, coloured by wall or direction, or the branches of a variable. Returns the legend."""
+    states = [str(name).removesuffix("_before") for name in ds.data_vars if str(name).endswith("_before")]
+    varied = [name for name in states if ds.sizes["point"] and np.ptp(ds[f"{name}_before"].values) > 1e-9]
+    name = y if y is not None else (varied or ["lyapunov"])[0]
+    variable = ds[f"{name}_before"] if name in states else ds.get(name)
+    if variable is None or variable.dtype.kind not in "fiu":
+        raise ValueError(f"y = {name!r}: the diagram has no numbers of this name")
+    parameter = next(str(dim) for dim in ds["class"].dims if dim != "direction")
+    axes.set(xlabel=_heading(ds[parameter].attrs), ylabel=_heading(variable.attrs))
+    styles = {"right wall": "right", "left wall": "left", "upwards": "right", "downwards": "left"}
+    colors = {label: _color(color, 0, "") for label, color in styles.items()}
+    if name in states:
+        is_up = ds["point_direction"] == "up" if "point_direction" in ds.coords else ds["side"] == 1
+        names = ("upwards", "downwards") if "point_direction" in ds.coords else ("right wall", "left wall")
+        parts = {label: (ds[f"point_{parameter}"][where], variable[where]) for label, where in zip(names, (is_up, ~is_up), strict=True)}
+        few = 4 if ds.sizes["point"] < 5000 else 1
+        return {label: axes.plot(*part, ".", ms=few, mew=0, color=colors[label])[0] for label, part in parts.items() if part[0].size}
+    values = ds[parameter].values
+    if "direction" not in variable.dims:
+        axes.plot(*_branches(values, variable.values), ".-", ms=3, lw=1, color="0.15")
+        return {}
+    up, down = (_branches(values, variable.sel(direction=name).values) for name in ("up", "down"))
+    return {
+        "upwards": axes.plot(*up, ".-", ms=3, lw=1, color=colors["upwards"])[0],
+        "downwards": axes.plot(*down, ".--", ms=3, lw=1, color=colors["downwards"])[0],
+    }
+
+
+def _branches(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Return a curve with a gap at each jump from one branch to another."""
+    y = np.where(np.isfinite(y), y, np.nan)
+    steps = np.abs(np.diff(y))
+    beside = np.fmax(np.append(0, steps[:-1]), np.append(steps[1:], 0))
+    span = np.nanmax(y) - np.nanmin(y) if np.isfinite(y).any() else 0
+    jumps = np.flatnonzero((steps > _JUMP[0] * span) & (steps > _JUMP[1] * beside)) + 1
+    return np.insert(x, jumps, np.nan), np.insert(y, jumps, np.nan)
+
+
+def _draw_orbit(axes: Axes, orbit: Orbit, y: str | None) -> dict[str, Artist]:
+    """Draw the phase plane of the first gap, or a column against time. An orbit needs no legend."""
+    table = orbit.trajectory()
+    gap, rate = table.columns[2:4]
+    if y is not None and (y not in table or table[y].dtype.kind != "f"):
+        raise ValueError(f"y = {y!r}: the trajectory has no numbers of this name; it has {', '.join(table.select_dtypes('float'))}")
+    names = (gap, rate) if y is None else ("t", y)
+    axes.plot(*(table[name] for name in names), "-", lw=1, color="0.15")
+    x_label, y_label = (_heading({"long_name": name, "units": orbit.units.get(name)}) for name in names)
+    axes.set(xlabel=x_label, ylabel=y_label)
+    return {}
+
+
+def _heading(attrs: Any) -> str:
+    """Return the name of an axis with its unit."""
+    return attrs["long_name"] + (f" [{attrs['units']}]" if attrs.get("units") else "")
 
 
 def _inches(width: str) -> float:
@@ -119,7 +200,7 @@ def _inches(width: str) -> float:
     return inches
 
 
-def _legend_below(axes: Axes, handles: list[Patch], lines: list[str], inches: float) -> None:
+def _legend_below(axes: Axes, handles: list[Artist], lines: list[str], inches: float) -> None:
     """Draw the legend below the map, and make the figure higher by its height. Long words are cut in the middle."""
     # In millimetres: a patch with its margins, and a character.
     patch, character, page = 12, 1.7, inches * 25.4

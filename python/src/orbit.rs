@@ -31,6 +31,12 @@ impl Orbit {
         to_json(&*self.model, &self.orbit, None)
     }
 
+    /// Largest Lyapunov exponent. JSON cannot tell that of a superstable cycle, which is minus infinity.
+    #[getter]
+    fn lyapunov(&self) -> f64 {
+        self.orbit.lyapunov
+    }
+
     /// Number of forcing periods that the events span.
     #[getter]
     fn cycle_periods(&self) -> u32 {
@@ -51,6 +57,12 @@ impl Orbit {
     fn trajectory(&self, py: Python<'_>, samples_per_period: usize) -> PyResult<String> {
         let (model, orbit) = (Arc::clone(&self.model), Arc::clone(&self.orbit));
         worker::run(py, None, move |_| Ok(Some(in_memory::trajectory(&*model, &orbit, samples_per_period)?)))
+    }
+
+    /// Returns `spectrum.csv`; none if the motion cannot be followed for the required time.
+    fn spectrum(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let (model, orbit) = (Arc::clone(&self.model), Arc::clone(&self.orbit));
+        worker::run(py, None, move |_| Ok(Some(in_memory::spectrum(&*model, &orbit)?)))
     }
 
     /// Returns `trajectory.csv` of the motion from its start: `periods` forcing periods after the first `skipped`, with at least

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 import rattlemap as rm
-from rattlemap.explore import replayed
+from conftest import SCENES
+from rattlemap.explore import _QUANTITIES, replayed
 
 
 def test_a_page_is_written_and_a_selection_becomes_an_orbit(tmp_path: Path) -> None:
@@ -35,3 +37,8 @@ def test_a_map_can_be_explored() -> None:
     assert f">{ds.attrs['title']}</title>" in ds.rattlemap.explore(progress=False).page
     with pytest.raises(rm.SceneError, match="does not describe a map"):
         ds.drop_attrs().rattlemap.explore()
+
+
+def test_a_page_shows_the_quantities_of_the_main_scene() -> None:
+    assert f"quantities = {json.dumps(_QUANTITIES)}" in (SCENES / "e_omega.toml").read_text()
+    assert "pattern" in rm.explore(rm.gear_pair(), e=(0, 1, 2), omega=(1, 2, 2), progress=False).page

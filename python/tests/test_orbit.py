@@ -118,3 +118,21 @@ def test_absent_numbers_are_nan() -> None:
     assert np.isnan(cycle.lyapunov_error) and cycle.symmetric is False
     chaos = rm.orbit(rm.gear_pair(), e=0.99, omega=5.6)
     assert chaos.lyapunov_error > 0 and chaos.period is None and chaos.multipliers.shape == (0,)
+
+
+def test_a_spectrum_is_the_programs(program: Program, tmp_path: Path) -> None:
+    program("orbit", "--model", "loose-gear", "--out", tmp_path / "orbit")
+    lines = rm.orbit(rm.load_model("loose-gear")).spectrum()
+    assert_same_columns(lines, pd.read_csv(tmp_path / "orbit" / "spectrum.csv", float_precision="round_trip"))
+    assert lines.attrs["units"] == {name: unit for name, unit in [*zip(lines.columns[1:], ("m", "m/s"), strict=True)]}
+
+
+def test_the_exponent_of_a_superstable_cycle_is_minus_infinity_everywhere(program: Program, tmp_path: Path) -> None:
+    model = rm.load_model("impact-oscillator", e=0, omega=2.8)
+    orbit = rm.orbit(model)
+    assert orbit.period and not orbit.multipliers.any() and orbit.lyapunov == -np.inf
+    line = rm.bifurcation(model, omega=(2.8, 2.9, 2), progress=False)
+    ds = rm.map(model, omega=(2.8, 2.9, 2), e=(0, 0.5, 2), engine="cpu", out=tmp_path / "map", settings={"outputs.files": ["csv", "npy"]})
+    assert line["lyapunov"].values[0] == ds["lyapunov"].values.ravel()[0] == -np.inf
+    assert pd.read_csv(tmp_path / "map" / "cells.csv")["lyapunov"][0] == -np.inf
+    assert "Lyapunov exponent     -inf" in program("orbit", "--model", "impact-oscillator", "--set", "e=0", "--set", "omega=2.8").stdout

@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.text import Text
+from rattlemap.plot import _branches
 
 
 @pytest.fixture(scope="module")
@@ -113,3 +114,35 @@ def test_a_wrong_width_is_refused(ds: xr.Dataset, axes: Axes) -> None:
             rm.plot(ds, width=width)
     with pytest.raises(ValueError, match="either width or ax"):
         rm.plot(ds, ax=axes, width="85mm")
+
+
+def test_a_diagram_has_points_by_wall_and_branches_as_lines(axes: Axes) -> None:
+    line = rm.bifurcation(rm.gear_pair(), e=(0.05, 0.2, 12), omega=5.6)
+    assert rm.plot(line, ax=axes) is axes
+    drawn = {curve.get_color(): len(np.asarray(curve.get_xdata())) for curve in axes.lines}
+    assert sum(drawn.values()) == line.sizes["point"] and len(drawn) == 2
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("coefficient of restitution", "displacement of gear 1 before the event")
+    both = rm.bifurcation(rm.load_model("impact-oscillator"), omega=(0.6, 0.9, 6), start="both", quantities="amplitude")
+    axes.clear()
+    rm.plot(both, y="amplitude_x", ax=axes)
+    assert [curve.get_linestyle() for curve in axes.lines] == ["-", "--"]
+    with pytest.raises(ValueError, match="no numbers of this name"):
+        rm.plot(both, y="word", ax=axes)
+
+
+def test_a_jump_ends_a_branch() -> None:
+    x, y = _branches(np.arange(6.0), np.array([1.0, 1.1, 1.2, 0.1, 0.2, -np.inf]))
+    assert x.tolist()[:3] == [0, 1, 2] and np.isnan(x[3]) and x.tolist()[4:] == [3, 4, 5]
+    assert np.isnan(y[[3, 6]]).all()
+
+
+def test_an_orbit_is_drawn_in_its_phase_plane_or_against_time(axes: Axes) -> None:
+    orbit = rm.orbit(rm.load_model("loose-gear"))
+    rm.plot(orbit, ax=axes)
+    gap, rate = orbit.trajectory().columns[2:4]
+    assert axes.get_xlabel() == f"{gap} [{orbit.units[gap]}]" and axes.get_ylabel().startswith(rate)
+    axes.clear()
+    rm.plot(orbit, y=gap, ax=axes)
+    assert axes.get_xlabel() == "t [s]"
+    with pytest.raises(ValueError, match="the trajectory has no numbers"):
+        rm.plot(orbit, y="moment", ax=axes)

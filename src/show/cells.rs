@@ -13,6 +13,7 @@ use crate::model_file::several_gaps;
 use crate::record::classify::{classify, status};
 use crate::record::measures::{self, MEASURES};
 use crate::record::{Record, Records, valid};
+use crate::show::names;
 use crate::show::numbers::Number;
 use crate::validate::Rate;
 use rattlemap_dynamics::model::{Contact, State};
@@ -304,7 +305,7 @@ impl<'a> Cells<'a> {
         let is_filled = record.valid & valid::FILLED != 0;
         let shows = self.shows_averages(record);
         let measured = |quantity, bit, value: f64| {
-            (shows && self.has(quantity) && record.valid & bit != 0 && value.is_finite()).then_some(value)
+            (shows && self.has(quantity) && record.valid & bit != 0 && names::is_told(value)).then_some(value)
         };
         let mut measures = [None; MEASURES];
         let needs = self.plan.needs();

@@ -19,7 +19,9 @@ pub use layer::{Layer, NamedColor};
 use crate::map::scene::Quantity;
 use crate::show::cells::Cells;
 use crate::show::color::Color;
+use crate::show::drawing::wall_color;
 use crate::show::words::MapWords;
+use rattlemap_dynamics::model::Side;
 
 /// Colours of the program's figures, for plots by other programs.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,6 +43,8 @@ pub fn shared_colors() -> SharedColors {
         ("failed", colors::FAILED),
         ("quasi-periodic", colors::QUASI_PERIODIC),
         ("rare", words::RARE),
+        ("right", wall_color(Side::Right)),
+        ("left", wall_color(Side::Left)),
     ];
     SharedColors { named, in_a_row: (1..64).map(colors::distinct).collect() }
 }

@@ -38,10 +38,15 @@ pub fn side(side: Side) -> &'static str {
     }
 }
 
+/// Whether tables tell a number.
+pub(crate) fn is_told(x: f64) -> bool {
+    x.is_finite() || x == f64::NEG_INFINITY
+}
+
 /// Formats a number for a table: the shortest decimal that reads back as the same number. Absent and not finite numbers are
-/// empty.
+/// empty, except minus infinity, the exponent of a superstable cycle.
 pub(crate) fn float(x: impl Into<Option<f64>>) -> String {
-    x.into().filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:?}"))
+    x.into().filter(|x| is_told(*x)).map_or(String::new(), |x| format!("{x:?}"))
 }
 
 /// Formats an optional value for a table. An absent value is empty.
@@ -54,11 +59,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_that_are_not_finite_are_empty_in_tables() {
+    fn numbers_that_are_not_finite_are_empty_in_tables_except_the_exponent_of_a_superstable_cycle() {
         assert_eq!(
             [0.1 + 0.2, -0.0, f64::NAN, f64::INFINITY].map(float),
             ["0.30000000000000004", "-0.0", "", ""]
         );
-        assert_eq!([Some(1.0), Some(f64::NEG_INFINITY), None].map(float), ["1.0", "", ""]);
+        assert_eq!([Some(1.0), Some(f64::NEG_INFINITY), None].map(float), ["1.0", "-inf", ""]);
     }
 }

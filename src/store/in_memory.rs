@@ -10,6 +10,7 @@ use crate::show::cells::Cells;
 use crate::show::error::WriteError;
 use crate::show::map_pair::MapPair;
 use crate::show::numbers::Number;
+use crate::show::orbit_spectrum::Spectrum;
 use crate::show::table::cell_columns::{self, Values};
 use crate::show::table::words_csv::WordRows;
 use crate::show::table::{attractors_csv, bifurcation_tables, compare_csv, orbit_tables};
@@ -107,6 +108,15 @@ pub fn trajectory(
 pub fn history(model: &dyn Model, history: &History) -> Result<String, OutputError> {
     let moments = orbit_tables::moments(model, history)?;
     text(|to| orbit_tables::write_trajectory(to, model, &moments))
+}
+
+/// Returns `spectrum.csv` of an orbit; none if the motion cannot be followed for the required time.
+///
+/// # Errors
+/// [`OutputError`] if the model is not valid.
+pub fn spectrum(model: &dyn Model, orbit: &Orbit) -> Result<Option<String>, OutputError> {
+    let spectrum = Spectrum::of(model, orbit)?;
+    spectrum.map(|spectrum| text(|to| orbit_tables::write_spectrum(to, model, &spectrum))).transpose()
 }
 
 /// Returns a comparison as JSON, without a folder and its files, and its table `compare.csv`.

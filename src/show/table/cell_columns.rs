@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Write};
 
 use crate::map::scene::Quantity;
 use crate::show::cells::{Cells, Finished, Row, Source};
+use crate::show::names;
 use crate::show::table::words_csv::WordRows;
 use rattlemap_dynamics::orbit::Class;
 
@@ -179,7 +180,7 @@ fn number(
         quantity: Some(quantity),
         text: Box::new(move |c, _, to| {
             // The shortest decimal that reads back as the same number.
-            text(c).filter(|x| x.is_finite()).map_or(Ok(()), |x| write!(to, "{x:?}"))
+            text(c).filter(|x| names::is_told(*x)).map_or(Ok(()), |x| write!(to, "{x:?}"))
         }),
         value: TypedValue::F64(Box::new(move |c, _| value(c).unwrap_or(f64::NAN))),
     }
