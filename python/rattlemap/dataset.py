@@ -215,7 +215,7 @@ _TYPES: dict[str, Any] = {
     "j": np.int64,
 }
 #: Columns of text that can be empty in every row.
-_NAMES = frozenset(("class", "class_a", "class_b", "status", "kind", "direction", "event", "moment", "gap"))
+_NAMES = frozenset(("class", "class_a", "class_b", "status", "kind", "direction", "event", "moment", "gap", "element", "quantities"))
 
 
 def text_table(source: Path | StringIO | BytesIO) -> pd.DataFrame:

@@ -134,9 +134,10 @@ class Orbit:
     def events(self) -> npt.NDArray[np.void]:
         """All events in order of time: a structured array, shape (events,).
 
-        Fields: ``kind`` (``impact``, ``mesh_start``, ``mesh_end``), ``side`` (1 right, -1 left), ``t`` (since phase 0 of
-        the cycle), ``t_mod_period`` (in [0, T)), ``before`` and ``after`` (states), ``impulse`` (of the contact on the gap);
-        and ``gap``, the name of the gap, if the model has several gaps and the motion has events.
+        Fields: ``kind`` (at walls ``impact``, ``mesh_start``, ``mesh_end``), ``side`` (1 right, -1 left, 0 for friction), ``t``
+        (since phase 0 of the cycle), ``t_mod_period`` (in [0, T)), ``before`` and ``after`` (states), ``impulse`` (of the contact
+        on the gap; NaN for friction); ``gap``, the name of the gap, if there are events in a model with several gaps; and
+        ``element``, the name of the friction element, if there are events of friction.
         """
         events = self._facts["events"]
         count = len(self._native.state_names)
@@ -149,11 +150,13 @@ class Orbit:
                 ("before", np.float64, (count,)),
                 ("after", np.float64, (count,)),
                 ("impulse", np.float64),
-                *([("gap", "U32")] if any("gap" in event for event in events) else []),
+                *((name, "U32") for name in ("gap", "element") if any(name in event for event in events)),
             ]
         )
         assert kind.names is not None
-        return np.array([tuple(event[name] for name in kind.names) for event in events], dtype=kind)
+        absent = {"side": 0, "impulse": np.nan, "gap": "", "element": ""}
+        rows = [{name: absent[name] if event.get(name) is None else event[name] for name in kind.names} for event in events]
+        return np.array([tuple(row.values()) for row in rows], dtype=kind)
 
     def trajectory(self, points: int = 2000) -> pd.DataFrame:
         """Return the motion over its cycle, or over its last 8 forcing periods.

@@ -25,9 +25,6 @@ _UNITS = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0, "pt": 1 / 72}
 _WIDTHS = (60 / 25.4 - 1e-9, 300 / 25.4 + 1e-9)
 _POINTS = 7.4
 
-#: A step between columns is a jump, not part of a branch, if it is this share of the span, and this multiple of the steps beside it.
-_JUMP = (0.15, 4)
-
 Texts = npt.NDArray[Any]
 
 
@@ -98,9 +95,9 @@ def plot(
     else:
         axes = plt.figure(figsize=(inches, inches), layout="constrained").add_subplot()
     if isinstance(cells, Orbit):
-        title, keys = "", _draw_orbit(axes, cells, y)
+        title, keys = None, _draw_orbit(axes, cells, y)
     elif isinstance(cells, xr.Dataset):
-        title, keys = "", _draw_diagram(axes, cells, y)
+        title, keys = None, _draw_diagram(axes, cells, y)
     else:
         title, keys = str(cells.name), _draw_cells(axes, cells, most)
     axes.set_title("")
@@ -133,59 +130,57 @@ def _draw_cells(axes: Axes, cells: xr.DataArray, most: int) -> dict[str, Artist]
 
 def _draw_diagram(axes: Axes, ds: xr.Dataset, y: str | None) -> dict[str, Artist]:
     """Draw section points, coloured by wall or direction, or the branches of a variable. Returns the legend."""
-    states = [str(name).removesuffix("_before") for name in ds.data_vars if str(name).endswith("_before")]
-    varied = [name for name in states if ds.sizes["point"] and np.ptp(ds[f"{name}_before"].values) > 1e-9]
-    name = y if y is not None else (varied or ["lyapunov"])[0]
-    variable = ds[f"{name}_before"] if name in states else ds.get(name)
+    from matplotlib.lines import Line2D
+
+    parameter = next(str(dim) for dim in ds["class"].dims if dim != "direction")
+    states = {str(name).removesuffix("_before"): ds[name] for name in ds.data_vars if str(name).endswith("_before")}
+    varied = [name for name, values in states.items() if values.size and np.ptp(values.values) > 1e-9]
+    name = y or (varied or ["lyapunov"])[0]
+    variable = states.get(name, ds.get(name))
     if variable is None or variable.dtype.kind not in "fiu":
         raise ValueError(f"y = {name!r}: the diagram has no numbers of this name")
-    parameter = next(str(dim) for dim in ds["class"].dims if dim != "direction")
-    axes.set(xlabel=_heading(ds[parameter].attrs), ylabel=_heading(variable.attrs))
-    styles = {"right wall": "right", "left wall": "left", "upwards": "right", "downwards": "left"}
-    colors = {label: _color(color, 0, "") for label, color in styles.items()}
+    _label_axes(axes, ds[parameter].attrs, variable.attrs)
+    names = ("upwards", "downwards") if "direction" in ds.dims else ("right wall", "left wall")
+    colors = [_color(side, 0, "") for side in ("right", "left")]
     if name in states:
-        is_up = ds["point_direction"] == "up" if "point_direction" in ds.coords else ds["side"] == 1
-        names = ("upwards", "downwards") if "point_direction" in ds.coords else ("right wall", "left wall")
-        parts = {label: (ds[f"point_{parameter}"][where], variable[where]) for label, where in zip(names, (is_up, ~is_up), strict=True)}
-        few = 4 if ds.sizes["point"] < 5000 else 1
-        return {label: axes.plot(*part, ".", ms=few, mew=0, color=colors[label])[0] for label, part in parts.items() if part[0].size}
-    values = ds[parameter].values
-    if "direction" not in variable.dims:
-        axes.plot(*_branches(values, variable.values), ".-", ms=3, lw=1, color="0.15")
-        return {}
-    up, down = (_branches(values, variable.sel(direction=name).values) for name in ("up", "down"))
-    return {
-        "upwards": axes.plot(*up, ".-", ms=3, lw=1, color=colors["upwards"])[0],
-        "downwards": axes.plot(*down, ".--", ms=3, lw=1, color=colors["downwards"])[0],
+        is_first = ds["point_direction"] == "up" if "direction" in ds.dims else ds["side"] == 1
+        for part, color in zip((is_first, ~is_first), colors, strict=True):
+            axes.plot(ds[f"point_{parameter}"][part], variable[part], ".", ms=4 if part.size < 5000 else 1, mew=0, color=color)
+        return {label: Line2D([], [], marker=".", ls="", color=color) for label, color in zip(names, colors, strict=True)}
+    passes = [variable] if "direction" not in variable.dims else [variable.sel(direction=way) for way in ("up", "down")]
+    # Where both passes agree, the second line lies within the first.
+    drawn: dict[str, Artist] = {
+        label: axes.plot(*_branches(ds[parameter].values, values.values), ".-", ms=2 * width, lw=width, color=color)[0]
+        for label, values, color, width in zip(names, passes, colors, (2.5, 1), strict=False)
     }
+    return drawn if len(passes) > 1 else {}
 
 
 def _branches(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Return a curve with a gap at each jump from one branch to another."""
+    """Return a curve with a gap at each jump: a step of a large share of the span, and much larger than those beside it."""
     y = np.where(np.isfinite(y), y, np.nan)
     steps = np.abs(np.diff(y))
     beside = np.fmax(np.append(0, steps[:-1]), np.append(steps[1:], 0))
-    span = np.nanmax(y) - np.nanmin(y) if np.isfinite(y).any() else 0
-    jumps = np.flatnonzero((steps > _JUMP[0] * span) & (steps > _JUMP[1] * beside)) + 1
+    jumps = np.flatnonzero((steps > 0.15 * (np.fmax.reduce(y) - np.fmin.reduce(y))) & (steps > 4 * beside)) + 1
     return np.insert(x, jumps, np.nan), np.insert(y, jumps, np.nan)
 
 
 def _draw_orbit(axes: Axes, orbit: Orbit, y: str | None) -> dict[str, Artist]:
     """Draw the phase plane of the first gap, or a column against time. An orbit needs no legend."""
     table = orbit.trajectory()
-    gap, rate = table.columns[2:4]
+    names = tuple(table.columns[2:4]) if y is None else ("t", y)
     if y is not None and (y not in table or table[y].dtype.kind != "f"):
         raise ValueError(f"y = {y!r}: the trajectory has no numbers of this name; it has {', '.join(table.select_dtypes('float'))}")
-    names = (gap, rate) if y is None else ("t", y)
-    axes.plot(*(table[name] for name in names), "-", lw=1, color="0.15")
-    x_label, y_label = (_heading({"long_name": name, "units": orbit.units.get(name)}) for name in names)
-    axes.set(xlabel=x_label, ylabel=y_label)
+    axes.plot(*(table[name] for name in names), lw=1, color="0.15")
+    _label_axes(axes, *({"long_name": name, "units": orbit.units.get(name)} for name in names))
     return {}
 
 
-def _heading(attrs: Any) -> str:
-    """Return the name of an axis with its unit."""
-    return attrs["long_name"] + (f" [{attrs['units']}]" if attrs.get("units") else "")
+def _label_axes(axes: Axes, *attrs: Any) -> None:
+    """Write the names of both axes with their units."""
+    axes.ticklabel_format(scilimits=(-3, 4))
+    names = [each["long_name"] + (f" [{each['units']}]" if each.get("units") else "") for each in attrs]
+    axes.set(xlabel=names[0], ylabel=names[1])
 
 
 def _inches(width: str) -> float:

@@ -82,7 +82,7 @@ def test_a_comparison_is_the_programs(program: Program, pair: tuple[Path, Path],
     for name in ("period_a", "period_b"):
         table[name] = [int(text or 0) for text in table[name]]
     assert_same_columns(found.table, table)
-    assert len(table) == found.differing + found.by_pattern + found.by_word
+    assert len(table) == found.differing + found.by_pattern + found.by_word + found.by_motion + found.by_quantity
     with pytest.raises(rm.FolderError, match="the Dataset has no folder"):
         rm.compare(pair[0], xr.Dataset())
 

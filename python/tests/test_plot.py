@@ -125,7 +125,7 @@ def test_a_diagram_has_points_by_wall_and_branches_as_lines(axes: Axes) -> None:
     both = rm.bifurcation(rm.load_model("impact-oscillator"), omega=(0.6, 0.9, 6), start="both", quantities="amplitude")
     axes.clear()
     rm.plot(both, y="amplitude_x", ax=axes)
-    assert [curve.get_linestyle() for curve in axes.lines] == ["-", "--"]
+    assert [curve.get_linewidth() for curve in axes.lines] == [2.5, 1]
     with pytest.raises(ValueError, match="no numbers of this name"):
         rm.plot(both, y="word", ax=axes)
 

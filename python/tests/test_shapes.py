@@ -75,7 +75,7 @@ def motion(orbit: rm.Orbit) -> None:
             value()
     assert len(pickle.loads(pickle.dumps(orbit)).events) == len(orbit.events) and repr(orbit)
     table = orbit.history(2, points=50)
-    texts = {name for name in table if str(name).split("_")[0] in ("domain", "event", "moment") or name == "gap" and "gap_rate" not in table}
+    texts = {name for name in table if str(name).split("_")[0] in ("domain", "event", "moment", "element") or name == "gap" and "gap_rate" not in table}
     assert {*table.select_dtypes("number")} == {*table} - texts, table.dtypes
 
 
