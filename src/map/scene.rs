@@ -27,7 +27,8 @@ pub use along::Along;
 pub use axis::{Axis, Scale, Target};
 pub use builder::{SceneBuilder, quoted as toml};
 pub(crate) use derived::Rule;
-pub use figure::{FigureStyle, MapLine};
+pub use figure::{DiagramStyle, FigureStyle, MapLine, SECTION};
+pub(crate) use figure::{LayerScale, place};
 pub use keys::{KEYS, Key, KeyDefault, Takes};
 pub use limits::MAX_COUNT;
 pub(crate) use limits::MAX_PERIODS;
@@ -195,6 +196,7 @@ impl Scene {
         let title = root.get("title").map(|title| settings::read_title(&title)).transpose()?;
         let is_list = list.is_some();
         let points = Points::new(base, axes, list, derived);
+        let outputs = settings::read_outputs(&root, purpose, is_list)?;
         let scene = Scene {
             text,
             settings: settings_of(document, model),
@@ -203,8 +205,8 @@ impl Scene {
             start: start::read(&root, model, purpose)?,
             draw: start::read_draw(&root, purpose)?,
             refine: settings::read_refine(&root, purpose)?,
-            outputs: settings::read_outputs(&root, purpose, is_list)?,
-            figure: figure::read(&root, &points)?,
+            figure: figure::read(&root, &points, &outputs.quantities)?,
+            outputs,
             points,
         };
         start::check(&root, &scene)?;
@@ -368,6 +370,16 @@ impl Scene {
     /// Returns the appearance of the figures.
     pub fn figure_style(&self) -> &FigureStyle {
         &self.figure.style
+    }
+
+    /// Returns the panels of figures of diagrams.
+    pub fn diagram_style(&self) -> &DiagramStyle {
+        &self.figure.diagram
+    }
+
+    /// Returns the scale of the colours of a layer.
+    pub(crate) fn layer_scale(&self, layer: &str) -> LayerScale {
+        self.figure.scales.iter().find(|(name, _)| name == layer).map_or((None, None), |(_, scale)| *scale)
     }
 
     /// Returns the lines that figures of maps show.

@@ -24,6 +24,17 @@ pub fn symbol(name: &str) -> String {
     symbol
 }
 
+/// Returns a title with the symbols of Greek names, and with the sign of multiplication for a single `x` between blanks.
+pub(crate) fn in_title(title: &str) -> String {
+    let is_greek = |word: &str| {
+        GREEK.iter().any(|(name, letter)| symbol(word).starts_with(*letter) && word.starts_with(name))
+    };
+    let word = |word: &str| {
+        if is_greek(word) { symbol(word) } else { word.replacen("x", "\u{d7}", usize::from(word == "x")) }
+    };
+    title.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
 /// Returns the label of a parameter's axis.
 pub fn axis_label(parameter: &Parameter) -> String {
     let symbol = symbol(&parameter.name);
@@ -69,7 +80,7 @@ pub(crate) fn lowered(sign: char) -> Option<char> {
 
 #[cfg(test)]
 mod tests {
-    use super::{axis_label, equation};
+    use super::{axis_label, equation, in_title};
     use crate::model_file::FileModel;
     use crate::show::symbols::symbol;
     use rattlemap_dynamics::model::Model;
@@ -87,6 +98,12 @@ mod tests {
             (axis_label(zeta), equation(zeta, 0.1)),
             ("damping ratio, \u{3b6}".into(), "\u{3b6} = 0.1".into())
         );
+    }
+
+    #[test]
+    fn titles_have_symbols() {
+        let title = in_title("Beats: omega_0 x e at 64 x 64 cells, betas");
+        assert_eq!(title, "Beats: \u{3c9}\u{2080} \u{d7} e at 64 \u{d7} 64 cells, betas");
     }
 
     #[test]

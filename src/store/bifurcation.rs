@@ -25,14 +25,19 @@ const POINTS: &str = "bifurcation.csv";
 const COLUMNS_CSV: &str = "bifurcation_columns.csv";
 /// Strobe states, for models with walls that fix a displacement.
 const STROBE_CSV: &str = "bifurcation_strobe.csv";
-/// Names of the figure, by format.
-static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("bifurcation"));
+/// Names of the figures, by format.
+static FIGURES: LazyLock<Vec<[(Format, String); 3]>> = LazyLock::new(|| {
+    let numbered = (2..=MOST_FIGURES).map(|number| names::figures(&format!("bifurcation_{number}")));
+    std::iter::once(names::figures("bifurcation")).chain(numbered).collect()
+});
+/// More than the panels that a model with all quantities has.
+const MOST_FIGURES: usize = 256;
 
 /// Names of all files that a bifurcation diagram may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
     [MANIFEST, POINTS, COLUMNS_CSV, STROBE_CSV]
         .into_iter()
-        .chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+        .chain(FIGURES.iter().flatten().map(|(_, name)| name.as_str()))
 }
 
 /// Writes the files that the scene asks for, and the manifest last. Returns the names of the files.
@@ -69,7 +74,7 @@ pub fn write(
         }
     }
     let panels = Panels::of(scene.base(), fixed, &numbers);
-    for (format, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
+    for (panels, names) in panels.figures(scene.figure_style(), scene.diagram_style()).iter().zip(&*FIGURES) {
         let label = axis_label(parameter);
         let title = format!("{}{}", scene.title(), line(arguments.along));
         let subtitle = format!("{}; {}", scene.start().in_words(), caption::of_scene(scene));
@@ -79,9 +84,11 @@ pub fn write(
             scene::Scale::Values => Scale::Listed,
         };
         let (texts, style) = ([&*title, &*subtitle], scene.figure_style());
-        let figure = figure::bifurcation::draw(style, texts, (&label, scale), &panels, columns);
-        folder.replace(name, |out| write_figure(out, *format, &figure))?;
-        files.push(name);
+        let figure = figure::bifurcation::draw(style, texts, (&label, scale), panels, columns);
+        for (format, name) in names.iter().filter(|(format, _)| wanted.contains(format)) {
+            folder.replace(name, |out| write_figure(out, *format, &figure))?;
+            files.push(name);
+        }
     }
     let listed = inventory::entries(folder, &files)?;
     let times = [elapsed, clock.elapsed()];

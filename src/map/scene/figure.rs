@@ -1,12 +1,13 @@
 //! `[figure]`: width, type size, heading and legend of all figures, and lines on maps.
 
-use super::Points;
 use super::axis::{Axis, meanings, names};
 use super::error::SceneError;
 use super::keys;
 use super::limits::MOST_LINES;
 use super::section::{Field, Section};
 use super::settings::read_title;
+use super::{Points, Quantity};
+use crate::model_file::several_gaps;
 use crate::text::document::Value;
 use crate::text::expression::Expression;
 use rattlemap_dynamics::model::Model;
@@ -85,6 +86,26 @@ impl FigureStyle {
     }
 }
 
+/// Name of the panels of section points of a diagram.
+pub const SECTION: &str = "section";
+
+/// Panels of a diagram and their files.
+#[derive(Clone, Debug, Default)]
+pub struct DiagramStyle {
+    /// Names of the panels; none: all.
+    pub panels: Option<Vec<&'static str>>,
+    /// Whether each panel has a file of its own.
+    pub is_divided: bool,
+}
+
+/// Scale of the colours of a layer: the factor of the decimal logarithm, none if linear, and the ends of the numbers.
+pub(crate) type LayerScale = (Option<f64>, Option<[f64; 2]>);
+
+/// Returns the place of a number on a scale; not finite if it has none.
+pub(crate) fn place(factor: Option<f64>, number: f64) -> f64 {
+    factor.map_or(number, |factor| factor * number.log10())
+}
+
 /// A line on maps: the zeros of an expression in the parameters of the model.
 #[derive(Clone, Debug)]
 pub struct MapLine {
@@ -108,10 +129,17 @@ impl MapLine {
 pub(super) struct Figure {
     pub(super) style: FigureStyle,
     pub(super) lines: Vec<MapLine>,
+    pub(super) diagram: DiagramStyle,
+    /// Scales of layers by name.
+    pub(super) scales: Vec<(String, LayerScale)>,
 }
 
 /// Reads `[figure]`.
-pub(super) fn read(root: &Section<'_>, points: &Points) -> Result<Figure, SceneError> {
+pub(super) fn read(
+    root: &Section<'_>,
+    points: &Points,
+    quantities: &[Quantity],
+) -> Result<Figure, SceneError> {
     let section = root.section("figure", &keys::names("figure"))?;
     let mut style = FigureStyle::default();
     if let Some(field) = section.get("width") {
@@ -127,7 +155,45 @@ pub(super) fn read(root: &Section<'_>, points: &Points) -> Result<Figure, SceneE
         style.check().map_err(|text| field.out_of_range(&text))?;
     }
     let lines = section.get("lines").map(|field| read_lines(&field, points)).transpose()?;
-    Ok(Figure { style, lines: lines.unwrap_or_default() })
+    let mut diagram = DiagramStyle::default();
+    if let Some(field) = section.get("panels") {
+        let measured = Quantity::measured().into_iter().filter(|quantity| quantities.contains(quantity));
+        let measured = measured.map(|quantity| quantity.name());
+        let known: Vec<&'static str> =
+            [SECTION, Quantity::Lyapunov.name()].into_iter().chain(measured).collect();
+        diagram.panels = Some(field.choices(&known.iter().map(|name| (*name, *name)).collect::<Vec<_>>())?);
+    }
+    if let Some(field) = section.get("files") {
+        diagram.is_divided = field.choice(&[("pages", false), ("panels", true)])?;
+    }
+    let mut scales = Vec::new();
+    if let Some(field) = section.get("scale") {
+        let (states, gaps) = (points.base().state_names(), several_gaps(points.base()).unwrap_or_default());
+        let fixed = ["lyapunov", "impacts", "mesh"].map(str::to_owned);
+        let layers: Vec<String> =
+            quantities.iter().flat_map(|quantity| quantity.columns(&states, &gaps)).chain(fixed).collect();
+        let known: Vec<&str> = layers.iter().map(String::as_str).collect();
+        for (name, field) in Section::open(field.node, &field.path, &known)?.fields() {
+            scales.push((name.to_owned(), read_scale(&field)?));
+        }
+    }
+    Ok(Figure { style, lines: lines.unwrap_or_default(), diagram, scales })
+}
+
+/// Reads the scale of a layer and the ends of its numbers.
+fn read_scale(field: &Field<'_>) -> Result<LayerScale, SceneError> {
+    let known = [("linear", None), ("log", Some(1.0)), ("dB", Some(20.0))];
+    let Value::List(_) = field.node.value else { return Ok((field.choice(&known)?, None)) };
+    let requirement = "two ends [low, high], or a scale and two ends, such as [\"log\", 1e-6, 1]";
+    let (factor, ends) = match &field.list(requirement)?[..] {
+        [low, high] => (None, [low.number()?, high.number()?]),
+        [scale, low, high] => (scale.choice(&known)?, [low.number()?, high.number()?]),
+        _ => return Err(field.wrong_type(requirement)),
+    };
+    match ends.map(|end| place(factor, end)) {
+        [low, high] if low.is_finite() && high.is_finite() && low < high => Ok((factor, Some(ends))),
+        _ => Err(field.out_of_range("ascending ends, above 0 unless the scale is linear")),
+    }
 }
 
 fn read_lines(field: &Field<'_>, points: &Points) -> Result<Vec<MapLine>, SceneError> {

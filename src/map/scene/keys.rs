@@ -102,6 +102,9 @@ pub const KEYS: &[Key] = &[
     key("figure", "font_size", Words("7.4"), Takes::Words("7 to 24, and at most width / 21"), "size of tick labels and legends, in points. Exponents are smaller; headings and names of axes are at least as large"),
     key("figure", "title", Words("the scene's title"), Takes::Text(LONGEST_TITLE), "title of figures; \"\" removes the heading, with its lines below the title"),
     key("figure", "legend", Value("true"), Takes::Flag, "whether figures have a legend. Without it, maps have no colour bar either"),
+    key("figure", "panels", Words("all"), Takes::Words("a list of section, lyapunov, and names of requested quantities"), "panels of diagrams"),
+    key("figure", "files", Value("\"pages\""), Takes::OneOf(&["pages", "panels"]), "pages: as many panels of a diagram in one figure as fit a page; panels: one figure for each panel. The second figure is bifurcation_2, and so on"),
+    key("figure", "scale", Words("\"linear\", with ends from the numbers"), Takes::Words("{ LAYER = \"log\", ... }: linear, log or dB; ends such as [0, 2]; or both, such as [\"log\", 1e-6, 1]"), "colours of layers of numbers; 20 dB are a factor of 10"),
     key("figure", "lines", KeyDefault::None, Takes::Words("{ \"name\" = \"expression\", ... } with at most 32 names, in parameters of the model, also derived ones"), "lines on maps, where an expression is zero"),
 ];
 

@@ -86,6 +86,8 @@ impl Bitmap {
 pub struct Canvas {
     pub(crate) items: RefCell<Vec<Item>>,
     size: Cell<(f64, f64)>,
+    /// Number of items of the heading, and its height. PDF files lack it: what it says belongs in the caption.
+    pub(crate) heading: Cell<(usize, f64)>,
     pub(crate) style: FigureStyle,
     /// Units per inch of the printed figure.
     pub(crate) per_inch: f64,
@@ -97,8 +99,13 @@ impl Canvas {
     pub fn new(style: &FigureStyle, width: f64) -> Canvas {
         let default = Typeface::of_figures().em(SMALL) / PER_INCH * 72.0;
         let per_inch = PER_INCH * default / style.font_size.unwrap_or(default);
-        let canvas =
-            Canvas { items: RefCell::default(), size: Cell::default(), style: style.clone(), per_inch };
+        let canvas = Canvas {
+            items: RefCell::default(),
+            size: Cell::default(),
+            heading: Cell::default(),
+            style: style.clone(),
+            per_inch,
+        };
         canvas.set_width(width);
         canvas
     }

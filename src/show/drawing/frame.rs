@@ -124,7 +124,7 @@ fn mark_length(label: &str) -> f64 {
 }
 
 /// Height of a panel in a figure of other than default size, as a share of the figure's width, and its least value.
-const PANEL_HEIGHT: f64 = 0.36;
+pub(crate) const PANEL_HEIGHT: f64 = 0.36;
 const LEAST_PANEL: f64 = 240.0;
 /// Height of the only panel of a figure, in panels.
 const SINGLE: f64 = 1.6;

@@ -4,6 +4,7 @@ use crate::show::color::Color;
 use crate::show::drawing::canvas::Canvas;
 use crate::show::drawing::shapes::{Align, Marker, Point, Rect};
 use crate::show::drawing::style::{DARK, LARGE, MEDIUM, SMALL};
+use crate::show::symbols::in_title;
 
 /// Width of a legend key.
 pub(crate) const KEY: f64 = 38.0;
@@ -70,16 +71,19 @@ impl Entry {
 /// below them.
 pub fn draw_head(canvas: &Canvas, title: &str, subtitle: &str, entries: &[Entry]) -> f64 {
     let entries = if canvas.style.legend { entries } else { &[] };
-    let title = canvas.style.title.as_deref().unwrap_or(title);
+    let title = canvas.style.title.clone().unwrap_or_else(|| in_title(title));
     let is_usual = canvas.is_default() && canvas.has_heading();
     let mut y = if is_usual { 40.0 } else { FIRST_ROW };
     if canvas.has_heading() {
-        y = draw_lines(canvas, title, y, LARGE);
+        y = draw_lines(canvas, &title, y, LARGE);
         for (i, line) in subtitle.lines().enumerate() {
             y += if i == 0 { 40.0 } else { 34.0 };
             y = draw_lines(canvas, line, y, if canvas.is_default() { MEDIUM } else { SMALL });
         }
         y += 44.0;
+        if canvas.style.title.is_none() {
+            canvas.heading.set((canvas.items.borrow().len(), y - FIRST_ROW));
+        }
     }
     if entries.is_empty() && !is_usual {
         y -= NO_ROW;

@@ -35,12 +35,13 @@ pub(crate) fn encoded(canvas: &Canvas) -> Result<Vec<u8>, WriteError> {
     };
     // Coordinates are units from the upper left corner.
     let points = 72.0 / canvas.per_inch;
+    let (heading, above) = canvas.heading.get();
     let (scale, size) =
-        (points as f32, [canvas.size().0, canvas.size().1].map(|side| (side * points) as f32));
-    page.content.transform([scale, 0.0, 0.0, -scale, 0.0, size[1]]);
+        (points as f32, [canvas.size().0, canvas.size().1 - above].map(|side| (side * points) as f32));
+    page.content.transform([scale, 0.0, 0.0, -scale, 0.0, size[1] + (above * points) as f32]);
     page.content.set_line_cap(LineCapStyle::RoundCap).set_line_join(LineJoinStyle::RoundJoin);
     let items = canvas.items.borrow();
-    items.iter().for_each(|item| page.draw(item));
+    items.iter().skip(heading).for_each(|item| page.draw(item));
     page.finish(size)
 }
 

@@ -11,20 +11,18 @@ use crate::show::color::Color;
 use crate::show::drawing::axis::{Axis, Scale};
 use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
-use crate::show::drawing::{Bitmap, Canvas, FAINT, Marker, Rect, wall_color};
+use crate::show::drawing::{Bitmap, Canvas, FAINT, Marker, Point, Rect, wall_color};
 use coloring::{Coloring, STROBE, both_directions, class_color, direction_color, mixed};
-use panels::Panel;
 pub use panels::Panels;
+use panels::{Panel, States};
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::Class;
 
-/// Default size, and least distance of the panels from the left edge.
+/// Width and least distance of the panels from the left edge in a figure of default size. Its height is that of head and foot, and of
+/// panels.
 const WIDTH: f64 = 1600.0;
-const HEIGHT: f64 = 1750.0;
-/// Most panels of states in a figure of default size.
-const STATE_PANELS: usize = 3;
-/// Height that a further panel of states or of a measured quantity adds.
-const FURTHER_HEIGHT: f64 = 420.0;
+const HEAD_AND_FOOT: f64 = 372.0;
+const HEIGHT: f64 = 530.0;
 const PANEL_LEFT: f64 = 130.0;
 /// Height of the panel of exponents, as a share of the height of another panel.
 const EXPONENTS_HEIGHT: f64 = 0.6;
@@ -37,11 +35,20 @@ const POINT_DOT: (f64, f64) = (0.7, 2.2);
 /// Columns of at most `CURVE_POINTS` points form curves. Their dots have at least radius `CURVE_DOT`, so that they join.
 const CURVE_POINTS: usize = 24;
 const CURVE_DOT: f64 = 1.3;
+/// Radius of a dot without another one beside it, and the distance up to which one is beside it.
+const LONE_DOT: f64 = 2.4;
+const BESIDE: f64 = 6.0;
+/// Widths of the lines of the first and the second pass. Where both agree, the second lies within the first.
+const LINES: [f64; 2] = [4.0, 1.8];
+const DIRECTIONS: [&str; 2] = ["followed upwards", "downwards"];
+/// A step of a line is a jump to another branch if it has this share of the panel's height, and this multiple of the steps beside it.
+const JUMP: (f64, f64) = (0.15, 4.0);
 
-/// Draws the section points, one panel per displacement, measured quantities, and the largest Lyapunov exponent.
+/// Draws the section points, one panel per displacement, measured quantities, and the largest Lyapunov exponent, as far as the
+/// figure has these panels.
 ///
-/// Points are coloured by wall. Where they overlap, opacity increases with the logarithm of their number and shows the density
-/// of a chaotic band. In a diagram of two passes they are coloured by direction, and grey where both passes agree. Columns that
+/// Branches of measured quantities are lines. Points are coloured by wall. Where they overlap, opacity increases with the logarithm of
+/// their number and shows the density of a chaotic band. In a diagram of two passes they are coloured by direction, and grey where both passes agree. Columns that
 /// are undecided or failed have a mark at the lower edge. There may be no columns and no points; values that are not finite are
 /// skipped. `axis` is the label and the scale of the parameter.
 pub fn draw(
@@ -60,39 +67,42 @@ pub fn draw(
     // Strips of classes need more of a low panel.
     let is_low = !canvas.is_default() && coloring.strips() > 0;
     let exponents = if is_low { 1.0 } else { EXPONENTS_HEIGHT };
-    let shares = [vec![1.0; panels.list.len()], vec![exponents]].concat();
-    let of_states = panels.list.len() - panels.measured();
-    let further = panels.measured() + of_states.saturating_sub(STATE_PANELS);
-    let height = HEIGHT + FURTHER_HEIGHT * further as f64;
+    let share = |panel: &Panel| if panel.states == States::Exponents { exponents } else { 1.0 };
+    let shares: Vec<f64> = panels.list.iter().map(share).collect();
+    let height = HEAD_AND_FOOT + HEIGHT * shares.iter().sum::<f64>();
+    let has_exponents = panels.has(&[States::Exponents]);
     let edges = stacked(canvas, top, height, &shares);
-    let axis = |(i, edges): (usize, [f64; 2])| {
+    let axis = |(panel, edges): (&Panel, [f64; 2])| {
         let height = edges[1] - edges[0];
-        let Some(panel) = panels.list.get(i) else {
+        if panel.states == States::Exponents {
             return (edges, exponents::axis(columns, coloring.strips(), height));
-        };
+        }
         let mut y = quantity_axis(panel, columns);
         // Leaves room for the marks below the data.
         y.low -= (y.high - y.low) * MARKS / height;
         (edges, y)
     };
-    let placed = edges.into_iter().enumerate().map(axis).collect();
-    let beside = exponents::beside(canvas, coloring);
-    let mut frames = column(canvas, placed, &x, PANEL_LEFT, beside);
-    let last = frames.pop();
-    for (frame, panel) in frames.iter().zip(&panels.list) {
+    let placed = panels.list.iter().zip(edges).map(axis).collect();
+    let beside = if has_exponents { exponents::beside(canvas, coloring) } else { 0.0 };
+    let frames = column(canvas, placed, &x, PANEL_LEFT, beside);
+    for (i, (frame, panel)) in frames.iter().zip(&panels.list).enumerate() {
         frame.draw_grid(canvas);
-        draw_points(canvas, frame, panel, columns, coloring);
+        let is_last = i + 1 == frames.len();
+        match panel.states {
+            States::Exponents => {
+                exponents::draw(canvas, frame, columns, coloring);
+                frame.draw_axes(canvas, is_last);
+                continue;
+            }
+            States::None => draw_branches(canvas, frame, panel, columns, coloring),
+            _ => draw_points(canvas, frame, panel, columns, coloring),
+        }
         let bottom = frame.rect.bottom;
         for value in marked.iter().filter(|v| v.is_finite()) {
             let x = frame.at(*value, 0.0).0;
             canvas.stroke(&[(x, bottom - MARKS + 2.0), (x, bottom)], 1.2, FAINT);
         }
-        frame.draw_axes(canvas, false);
-    }
-    if let Some(frame) = last {
-        frame.draw_grid(canvas);
-        exponents::draw(canvas, &frame, columns, coloring);
-        frame.draw_axes(canvas, true);
+        frame.draw_axes(canvas, is_last);
     }
     drawn
 }
@@ -115,35 +125,40 @@ fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry>
     let dot = |color: Color, text: &str| Entry::new(Key::Marker(Marker::dot(color, 6.0)), text);
     let patch = |color, opacity, text| Entry::new(Key::Patch { color, opacity }, text);
     let has = |index: usize| columns.iter().any(|column| column.class.index() == index);
-    let is_periodic = has(Class::Periodic { period: 1 }.index());
-    let is_chaotic = has(Class::Chaotic.index());
-    let has_tori = has(Class::QuasiPeriodic.index());
+    let has_exponents = panels.has(&[States::Exponents]);
+    let is_periodic = has_exponents && has(Class::Periodic { period: 1 }.index());
+    let is_chaotic = has_exponents && has(Class::Chaotic.index());
+    let has_tori = has_exponents && has(Class::QuasiPeriodic.index());
     let torus = class_color(Class::QuasiPeriodic);
     let periodic = class_color(Class::Periodic { period: 1 });
     let chaotic = class_color(Class::Chaotic);
     let mut entries = Vec::new();
+    let shows_walls = panels.has(&[States::Crossings, States::Contacts]);
     match coloring {
         Coloring::Walls => {
-            let walls = Side::BOTH.into_iter().filter(|side| panels.walls.has(*side));
+            let walls = Side::BOTH.into_iter().filter(|side| shows_walls && panels.walls.has(*side));
             entries.extend(walls.map(|side| dot(wall_color(side), &panels.walls.entry(side))));
-            entries.extend(panels.has_strobes().then(|| dot(STROBE, "phase 0 of each period")));
+            entries.extend(panels.has(&[States::Strobes]).then(|| dot(STROBE, "phase 0 of each period")));
             entries.extend(is_periodic.then(|| dot(periodic, "\u{3bb}: periodic")));
             entries.extend(is_chaotic.then(|| dot(chaotic, "\u{3bb}: chaotic")));
             entries.extend(has_tori.then(|| dot(torus, "\u{3bb}: quasi-periodic")));
         }
         Coloring::Directions => {
-            entries.push(dot(direction_color(Direction::Up), "followed upwards"));
-            entries.push(dot(direction_color(Direction::Down), "downwards"));
-            entries.push(dot(both_directions(), "both"));
+            for ((direction, text), width) in Direction::ALL.into_iter().zip(DIRECTIONS).zip(LINES) {
+                let color = direction_color(direction);
+                entries.push(Entry::new(Key::Line { color, width }, text));
+            }
+            let both = panels.list.iter().any(|panel| panel.states != States::None);
+            entries.extend(both.then(|| dot(both_directions(), "both")));
             entries.extend(is_periodic.then(|| patch(periodic, 1.0, "periodic")));
             entries.extend(is_chaotic.then(|| patch(chaotic, 1.0, "chaotic")));
             entries.extend(has_tori.then(|| patch(torus, 1.0, "quasi-periodic")));
         }
     }
-    if columns.iter().any(|column| column.lyapunov_error.is_some()) {
+    if has_exponents && columns.iter().any(|column| column.lyapunov_error.is_some()) {
         entries.push(patch(chaotic, exponents::ERROR_BAND, "\u{3bb}: standard error"));
     }
-    if columns.iter().any(is_marked) {
+    if columns.iter().any(is_marked) && panels.list.iter().any(|panel| panel.states != States::Exponents) {
         entries.push(Entry::new(Key::Mark { color: FAINT }, "undecided or failed"));
     }
     entries
@@ -172,20 +187,59 @@ fn value_axis((label, scale): (&str, Scale), columns: &[Column]) -> Axis {
 /// Pixels of the image of points per unit of the figure, in each direction.
 const FINE: f64 = 2.0;
 
+/// Draws each branch of a measured quantity as a line, and a single value as a dot.
+fn draw_branches(canvas: &Canvas, frame: &Frame, panel: &Panel, columns: &[Column], coloring: Coloring) {
+    let height = frame.rect.bottom - frame.rect.top;
+    for (&pass, width) in coloring.passes().iter().zip(LINES) {
+        let of_pass = columns.iter().filter(|column| column.direction == pass);
+        let point = |column: &Column| {
+            let value = panel.values(column).first().map_or(f64::NAN, |(value, _)| *value);
+            frame.at(column.value, value)
+        };
+        let points: Vec<(f64, f64)> = of_pass.map(point).collect();
+        let color = pass.map_or(coloring.colors(panel)[0], direction_color);
+        let steps: Vec<f64> = points.windows(2).map(|pair| (pair[1].1 - pair[0].1).abs()).collect();
+        let step = |i: Option<usize>| i.and_then(|i| steps.get(i)).copied().unwrap_or(0.0);
+        let is_joined = |i: usize| {
+            let beside = step(i.checked_sub(1)).max(step(Some(i + 1)));
+            steps[i].is_finite() && !(steps[i] > JUMP.0 * height && steps[i] > JUMP.1 * beside)
+        };
+        let mut start = 0;
+        for end in 1..=points.len() {
+            if end < points.len() && is_joined(end - 1) {
+                continue;
+            }
+            match &points[start..end] {
+                [single] => canvas.marker(*single, Marker::dot(color, LONE_DOT)),
+                branch => canvas.stroke(branch, width, color),
+            }
+            start = end;
+        }
+    }
+}
+
 /// Counts the dots on every pixel of the image, then sets the colour of each pixel.
 fn draw_points(canvas: &Canvas, frame: &Frame, panel: &Panel, columns: &[Column], coloring: Coloring) {
     let Rect { left, top, right, bottom } = frame.rect;
     let [width, height] = [right - left, bottom - top].map(|side| (FINE * side).round().max(0.0) as usize);
     let mut counts = vec![[0u32; 2]; width * height];
-    let [fine, joined] = [POINT_DOT.0, CURVE_DOT].map(|least| dot(frame, columns, least));
-    for column in columns {
+    let [fine, joined, lone] = [POINT_DOT.0, CURVE_DOT, LONE_DOT].map(|least| dot(frame, columns, least));
+    let places: Vec<Vec<Point>> = columns
+        .iter()
+        .map(|column| panel.values(column).iter().map(|(value, _)| frame.at(column.value, *value)).collect())
+        .collect();
+    for (i, column) in columns.iter().enumerate() {
         let values = panel.values(column);
-        let dot = if values.len() <= CURVE_POINTS { &joined } else { &fine };
+        let beside = || places[i.saturating_sub(1)..(i + 2).min(places.len())].concat();
+        let beside = if values.len() <= CURVE_POINTS { beside() } else { Vec::new() };
         for (value, side) in values {
             let (x, y) = frame.at(column.value, value);
             if !(x.is_finite() && y.is_finite()) {
                 continue;
             }
+            // The point itself is one of those beside it.
+            let near = beside.iter().filter(|other| (other.0 - x).hypot(other.1 - y) < BESIDE).count();
+            let dot = [&fine, &lone, &joined][near.min(2)];
             let hue = coloring.index(column, side);
             let (x, y) = ((FINE * (x - left)).round() as i32, (FINE * (y - top)).round() as i32);
             for (dx, dy) in dot {
@@ -209,7 +263,7 @@ fn draw_points(canvas: &Canvas, frame: &Frame, panel: &Panel, columns: &[Column]
 /// Returns the pixels of a dot relative to its centre. Its radius is at least `least`.
 fn dot(frame: &Frame, columns: &[Column], least: f64) -> Vec<(i32, i32)> {
     let spacing = (frame.rect.right - frame.rect.left) / columns.len().max(1) as f64;
-    let radius = FINE * (0.4 * spacing).clamp(least, POINT_DOT.1);
+    let radius = FINE * (0.4 * spacing).clamp(least, POINT_DOT.1.max(least));
     let reach = radius.ceil() as i32;
     let all = (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy)));
     all.filter(|(dx, dy)| f64::from(*dx).hypot(f64::from(*dy)) <= radius).collect()

@@ -1,18 +1,24 @@
 //! A layer of a map as a picture: cells, lines, attractors, legend, colour bar.
 
+use std::cmp::Reverse;
+
 use crate::map::scene::{Axis, Target};
 use crate::show::caption;
 use crate::show::cells::Cells;
 use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::Key;
 use crate::show::drawing::{Canvas, Color, DARK, Marker, Point, WHITE, wall_color};
-use crate::show::figure::map_layout::{LegendRow, MapFigure};
+use crate::show::figure::map_layout::{LegendKey, LegendRow, MapFigure};
 use crate::show::figure::map_lines;
+use crate::show::layers::colors::{FAILED, HATCH, QUASI_PERIODIC, UNDECIDED};
 use crate::show::layers::{Layer, NamedColor, share};
 use rattlemap_dynamics::model::{Side, State};
 
 /// Width of the legend, and least height of map and legend.
 const LEGEND: (f64, f64) = (460.0, 700.0);
+/// Most rows of colours, and most stripes of a row of several.
+const ROWS: usize = 10;
+const STRIPES: usize = 5;
 /// Colours of lines, repeated for more lines; width of a line and of its white rim.
 const LINE_COLORS: [fn() -> Color; 3] = [|| DARK, || wall_color(Side::Right), || wall_color(Side::Left)];
 const LINE: f64 = 3.0;
@@ -26,9 +32,7 @@ const IN_PLANE: f64 = 1e-9;
 pub fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
     let scene = cells.scene();
     let subtitle = format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
-    let row =
-        |entry: &NamedColor| LegendRow::of_color(entry.color, &entry.text, share(entry.cells, cells.count()));
-    let mut rows: Vec<LegendRow> = layer.entries.iter().map(row).collect();
+    let mut rows = rows(layer, cells.count());
     let color = |nth: usize| LINE_COLORS[nth % LINE_COLORS.len()]();
     rows.extend(
         scene
@@ -51,7 +55,12 @@ pub fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
     };
     figure.draw(
         scene.figure_style(),
-        |id| layer.palette[usize::from(layer.indices[id])],
+        |id| {
+            let color = layer.palette[usize::from(layer.indices[id])];
+            let columns = cells.counts()[0];
+            let is_hatched = color == UNDECIDED && (id % columns + id / columns) % 4 == 0;
+            if is_hatched { HATCH } else { color }
+        },
         |canvas, frame| {
             for (nth, line) in scene.lines().iter().enumerate() {
                 draw_line(
@@ -64,6 +73,31 @@ pub fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
             attractors.iter().for_each(|(x, y)| canvas.marker(frame.at(*x, *y), ATTRACTOR));
         },
     )
+}
+
+/// Returns the rows of the colours of a layer. Rare periods share a row, and so do the smallest entries beyond [`ROWS`].
+fn rows(layer: &Layer, total: usize) -> Vec<LegendRow> {
+    let is_alone = |entry: &NamedColor| [UNDECIDED, FAILED, QUASI_PERIODIC].contains(&entry.color);
+    let is_rare = |entry: &NamedColor| entry.text.starts_with("period") && entry.cells * 1000 < total;
+    let mut entries: Vec<&NamedColor> = layer.entries.iter().collect();
+    entries.sort_by_key(|entry| (!is_alone(entry), is_rare(entry), Reverse(entry.cells)));
+    let frequent = entries.iter().filter(|entry| is_alone(entry) || !is_rare(entry)).count();
+    let is_short = entries.len() <= ROWS && entries.len() <= frequent + 1;
+    let (kept, merged) = entries.split_at(if is_short { entries.len() } else { frequent.min(ROWS - 1) });
+    let row = |entry: &NamedColor| {
+        let row = LegendRow::of_color(entry.color, &entry.text, share(entry.cells, total));
+        let is_hatched = entry.color == UNDECIDED;
+        if is_hatched { LegendRow { key: LegendKey::Stripes(vec![UNDECIDED, HATCH]), ..row } } else { row }
+    };
+    let kept = layer.entries.iter().filter(|entry| kept.iter().any(|kept| std::ptr::eq(*kept, *entry)));
+    let mut rows: Vec<LegendRow> = kept.map(row).collect();
+    if let Some(first) = merged.first() {
+        let cells = merged.iter().map(|entry| entry.cells).sum();
+        let row = LegendRow::of_color(first.color, "others, a colour each", share(cells, total));
+        let colors = merged.iter().take(STRIPES).map(|entry| entry.color).collect();
+        rows.push(LegendRow { key: LegendKey::Stripes(colors), ..row });
+    }
+    rows
 }
 
 /// Draws a line with a white rim, which separates it from cells of its own colour.
@@ -163,6 +197,17 @@ mod tests {
                 assert!(count(&picture, color) > least, "{entries} entries: {}", count(&picture, color));
             }
         }
+    }
+
+    #[test]
+    fn a_legend_has_at_most_ten_rows_with_all_cells() {
+        let mut layer = layer(30, [0, 0]);
+        layer.entries[29] = NamedColor { color: UNDECIDED, text: "undecided".into(), cells: 1 };
+        layer.entries.iter_mut().take(12).for_each(|entry| entry.cells = 300);
+        let found: Vec<String> =
+            rows(&layer, CELLS).into_iter().map(|row| row.text + " " + &row.cells).collect();
+        assert_eq!(found.len(), ROWS);
+        assert_eq!(found[8..], ["undecided 1 cell", "others, a colour each 25.4 %"]);
     }
 
     #[test]

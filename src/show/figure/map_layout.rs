@@ -52,6 +52,8 @@ const FLAT_LABELS: f64 = 46.0;
 pub(crate) enum LegendKey {
     /// A colour of cells.
     Patch(Color),
+    /// Several colours of cells.
+    Stripes(Vec<Color>),
     /// A line or marker on the map.
     Drawn(Key),
     /// None: a heading.
@@ -333,13 +335,18 @@ impl LegendRow {
     /// Draws the row within a rectangle; `y` is its middle.
     fn draw(&self, canvas: &Canvas, place: Rect, y: f64) {
         let (left, right) = (place.left, place.left + PATCH.0);
-        match self.key {
+        let patch = Rect { left, top: y - PATCH.1 / 2.0, right, bottom: y + PATCH.1 / 2.0 };
+        match &self.key {
             LegendKey::Patch(color) => {
-                let patch = Rect { left, top: y - PATCH.1 / 2.0, right, bottom: y + PATCH.1 / 2.0 };
-                canvas.fill(patch, color, 1.0);
+                canvas.fill(patch, *color, 1.0);
                 canvas.outline(patch, 1.0);
             }
-            LegendKey::Drawn(key) => draw_key(canvas, key, (left + (PATCH.0 - KEY) / 2.0, y)),
+            LegendKey::Stripes(colors) => {
+                let count = if colors.len() < 3 { 4 * colors.len() } else { colors.len() };
+                canvas.raster(patch, [count, 1], |[i, _]| colors[i % colors.len()]);
+                canvas.outline(patch, 1.0);
+            }
+            LegendKey::Drawn(key) => draw_key(canvas, *key, (left + (PATCH.0 - KEY) / 2.0, y)),
             LegendKey::Heading => {}
         }
         let text_left = left + self.text_left();

@@ -4,7 +4,7 @@ use super::{bifurcation, compare, map};
 use crate::findings::compare::{Comparison, Side as MapRecords, compare as compared};
 use crate::map::bifurcation::{self as diagram, Column};
 use crate::map::plan::Plan;
-use crate::map::scene::{FigureStyle, Format, Purpose, Scene, Start};
+use crate::map::scene::{DiagramStyle, FigureStyle, Format, Purpose, Quantity, Scene, Start};
 use crate::model_file::FileModel;
 use crate::record::{Record, valid};
 use crate::show::cells::{Cells, Survey};
@@ -13,6 +13,7 @@ use crate::show::drawing::{Canvas, Rect, write_figure};
 use crate::show::figure::bifurcation::Panels;
 use crate::show::figure::orbit::{OrbitFigure, OrbitPlot, spectrum};
 use crate::show::map_pair::{MapPair, MapSide};
+use crate::show::numbers::Number;
 use crate::show::orbit_spectrum::Spectrum;
 use crate::show::provenance::Provenance;
 use crate::show::{layers, words};
@@ -243,12 +244,22 @@ fn diagrams_fit_a_page() {
         let columns: Vec<Column> =
             diagram::run_until(&line, start, &settings, &|_| (), &Default::default()).unwrap().unwrap();
         for style in styles() {
-            let panels = Panels::of(&*line[0].1, diagram::fixed(&line), &[]);
+            let numbers = Number::of(&*line[0].1, &[Quantity::Amplitude, Quantity::Harmonic]);
+            let panels = Panels::of(&*line[0].1, diagram::fixed(&line), &numbers);
             let texts =
                 ["Gear rattle, along e at \u{3c9} = 5.6", "k = 900; all other parameters at their defaults"];
             let axis = ("coefficient of restitution, e", Scale::Linear);
-            let canvas = bifurcation::draw(&style, texts, axis, &panels, &columns);
-            check(&format!("{start:?} {style:?}"), &canvas, false);
+            for is_divided in [false, true] {
+                let diagram = DiagramStyle { is_divided, ..DiagramStyle::default() };
+                let figures = panels.clone().figures(&style, &diagram);
+                assert_eq!(figures.len(), if is_divided { 15 } else { figures.len() });
+                for (nth, panels) in figures.iter().enumerate() {
+                    let canvas = bifurcation::draw(&style, texts, axis, panels, &columns);
+                    check(&format!("{start:?} {nth} {is_divided} {style:?}"), &canvas, false);
+                    let (_, height) = canvas.size();
+                    assert!(canvas.is_default() || height * millimetres(&canvas) < 290.0, "{height}");
+                }
+            }
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::show::symbols::number;
 
 /// Largest share of the values that may lie beyond an end of a bar. A few extreme values must not take the contrast from
 /// the others.
-const LARGEST_SHARE_BEYOND: f64 = 0.005;
+pub(crate) const LARGEST_SHARE_BEYOND: f64 = 0.005;
 
 /// A range of colours that represents a range of numbers.
 #[derive(Clone, Debug)]

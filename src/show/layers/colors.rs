@@ -34,8 +34,10 @@ const DISTINCT: [Color; 63] = [
 pub(crate) const CHAOTIC: Color = hex(0x2a2a2a);
 /// The smallest and the largest exponent of chaos.
 const CHAOS_RAMP: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
-/// Exceptions have conspicuous colours.
-pub(crate) const UNDECIDED: Color = hex(0xce44fa);
+/// Figures hatch undecided cells with the second colour.
+pub(crate) const UNDECIDED: Color = hex(0xdcdce2);
+pub(crate) const HATCH: Color = hex(0x707070);
+/// Other exceptions have conspicuous colours.
 pub(crate) const QUASI_PERIODIC: Color = hex(0x0000fa);
 pub(crate) const FAILED: Color = hex(0x8d130f);
 /// Cells without a value of a continuous layer.
@@ -86,7 +88,12 @@ pub(crate) fn distinct(n: usize) -> Color {
 /// Returns the colour of a non-negative number, given as a share (0 to 1) of the largest. The square root gives more colours
 /// to small numbers, which are more frequent.
 pub(crate) fn sequential(share: f64) -> Color {
-    between(&SEQUENTIAL, share.max(0.0).sqrt())
+    linear(share.max(0.0).sqrt())
+}
+
+/// Returns the colour at a share (0 to 1) of the scale of [`sequential`], whose colours are evenly spread.
+pub(crate) fn linear(share: f64) -> Color {
+    between(&SEQUENTIAL, share)
 }
 
 /// Returns the colour of a number from -1 to 1. Zero is white. The square root spreads positive numbers, because most
@@ -166,8 +173,15 @@ mod tests {
         least(all(&near));
         let greys = (0..=20).map(|step| chaos(f64::from(step) / 20.0));
         let others: Vec<Color> = legend.iter().copied().chain(greys).chain([FAILED]).collect();
-        least(others.iter().map(|color| (*color, UNDECIDED)).collect());
-        least(others.iter().chain(&[UNDECIDED]).map(|color| (*color, QUASI_PERIODIC)).collect());
+        // One of the two colours of a hatching is enough.
+        let farther = |color: Color| {
+            [UNDECIDED, HATCH]
+                .into_iter()
+                .max_by(|a, b| least_difference(color, *a).total_cmp(&least_difference(color, *b)))
+        };
+        let hatched = others.iter().chain(&[QUASI_PERIODIC]).map(|&color| (color, farther(color).unwrap()));
+        least(hatched.collect());
+        least(others.iter().map(|color| (*color, QUASI_PERIODIC)).collect());
         let exceptions =
             legend[..usual].iter().copied().chain((0..=20).map(|step| chaos(f64::from(step) / 20.0)));
         least(exceptions.map(|color| (color, FAILED)).collect());

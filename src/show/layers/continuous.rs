@@ -5,11 +5,11 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use crate::map::scene::Quantity;
+use crate::map::scene::{Quantity, place};
 use crate::show::cells::{Cells, Row};
 use crate::show::color::Color;
-use crate::show::layers::bar::{Bar, count_beyond, round_bound};
-use crate::show::layers::colors::{NO_VALUE, cyclic, diverging, sequential, signed};
+use crate::show::layers::bar::{Bar, LARGEST_SHARE_BEYOND, count_beyond, round_bound};
+use crate::show::layers::colors::{NO_VALUE, cyclic, diverging, linear, sequential, signed};
 use crate::show::layers::layer::{Layer, NamedColor, legend};
 use crate::show::numbers::Number;
 
@@ -105,13 +105,16 @@ fn measured<'c>(cells: &'c Cells<'c>, number: Number) -> Continuous<'c> {
 
 impl Continuous<'_> {
     fn layer(self, cells: &Cells<'_>) -> Layer {
-        let values: Vec<f64> =
-            cells.ids().map(|id| (self.value)(id, &cells.row(id)).unwrap_or(f64::NAN)).collect();
+        let (factor, ends) = cells.scene().layer_scale(&self.name);
+        let value = |id| place(factor, (self.value)(id, &cells.row(id)).unwrap_or(f64::NAN));
+        let values: Vec<f64> = cells.ids().map(value).collect();
         let numbers = || values.iter().copied().filter(|value| !value.is_nan());
         let sizes = |sign: f64| numbers().map(move |value| sign * value).filter(|size| *size > 0.0);
         let has_negative = sizes(-1.0).next().is_some();
-        let [low, high] = match self.colors {
-            Colors::Cyclic => [-PI, PI],
+        let [low, high] = match (ends, factor, self.colors) {
+            (Some(ends), ..) => ends.map(|end| place(factor, end)),
+            (_, Some(factor), _) => whole(numbers(), factor.min(10.0)),
+            (.., Colors::Cyclic) => [-PI, PI],
             _ => [
                 if has_negative { -round_bound(sizes(-1.0)) } else { 0.0 },
                 if has_negative && numbers().all(|value| value < 0.0) {
@@ -129,6 +132,8 @@ impl Continuous<'_> {
             let value = low + f64::from(level) / f64::from(LEVELS - 1) * (high - low);
             // Each side uses all its colours: values are relative to the end of their side.
             let share = match value {
+                value if factor.is_some() => return linear((value - low) / (high - low)),
+                value if low > 0.0 => (value - low) / (high - low),
                 negative if negative < 0.0 => negative / -low,
                 positive if high > 0.0 => positive / high,
                 _ => 0.0,
@@ -138,7 +143,11 @@ impl Continuous<'_> {
         let colors: Vec<Color> = (0..LEVELS).map(color).collect();
         let absent = values.iter().filter(|value| value.is_nan()).count();
         let index = |&value: &f64| if value.is_nan() { LEVELS } else { level(value) };
-        let label = self.title.clone();
+        let label = match factor {
+            None => self.title.clone(),
+            Some(1.0) => format!("log\u{2081}\u{2080} of {}", self.title).into(),
+            Some(_) => format!("{}, in dB", self.title).into(),
+        };
         Layer {
             name: self.name,
             short: self.short,
@@ -152,11 +161,22 @@ impl Continuous<'_> {
                 colors,
                 low,
                 high,
-                is_fixed: self.colors == Colors::Cyclic,
+                is_fixed: self.colors == Colors::Cyclic || ends.is_some(),
                 beyond: count_beyond(numbers(), low, high),
             }),
         }
     }
+}
+
+/// Returns multiples of `step` between which nearly all places lie.
+fn whole(places: impl Iterator<Item = f64>, step: f64) -> [f64; 2] {
+    let mut places: Vec<f64> = places.filter(|place| place.is_finite()).collect();
+    places.sort_by(f64::total_cmp);
+    let beyond = (LARGEST_SHARE_BEYOND * places.len() as f64) as usize;
+    let [low, high] =
+        [beyond, places.len().saturating_sub(1 + beyond)].map(|i| places.get(i).copied().unwrap_or(0.0));
+    let low = (low / step).floor() * step;
+    [low, ((high / step).ceil() * step).max(low + step)]
 }
 
 #[cfg(test)]

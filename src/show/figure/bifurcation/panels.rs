@@ -1,13 +1,18 @@
 //! Panels of a diagram: which quantities of a model it shows.
 
 use crate::map::bifurcation::{Column, SectionPoint};
-use crate::map::scene::Quantity;
+use crate::map::scene::{DiagramStyle, FigureStyle, Quantity, SECTION};
 use crate::model_file::several_gaps;
+use crate::show::drawing::frame::PANEL_HEIGHT;
 use crate::show::numbers::Number;
 use crate::show::symbols::{symbol, with_unit};
 use crate::show::wall_labels::WallLabels;
 use rattlemap_dynamics::model::{MOST_COORDINATES, Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::EventKind;
+
+/// Height of the panels of a page, in points, and largest number of panels in a figure of default size.
+const PAGE: f64 = 210.0 * 72.0 / 25.4;
+const DEFAULT_MOST: usize = 6;
 
 /// Panels and wall labels of a diagram.
 #[derive(Clone, Debug)]
@@ -19,6 +24,8 @@ pub struct Panels {
 /// A panel: one component of certain states, or a measured quantity.
 #[derive(Clone, Debug)]
 pub(crate) struct Panel {
+    /// What `[figure] panels` calls it.
+    name: &'static str,
     pub(crate) label: String,
     component: usize,
     pub(crate) states: States,
@@ -39,13 +46,15 @@ pub(crate) enum States {
     Strobes,
     /// None: the panel shows a measured quantity.
     None,
+    /// None: the panel shows the largest Lyapunov exponent.
+    Exponents,
 }
 
 impl Panels {
     /// Returns the panels of a model: displacements at the walls. With several gaps, a displacement is shown at the walls of those that
     /// depend on it. If the walls [fix](crate::map::bifurcation::fixed) one of the
     /// displacements, the panels show its velocity before contact and the displacements at phase 0 instead. Below them, each of
-    /// the `numbers` has a panel, except states and the gap if it is one displacement.
+    /// the `numbers` has a panel, except states and the gap if it is one displacement. The last panel shows exponents.
     pub fn of(model: &dyn Model, fixed: Option<usize>, numbers: &[Number]) -> Panels {
         let walls = WallLabels::of_all(model);
         let names: Vec<String> = model.state_names().into_iter().map(symbol).collect();
@@ -53,6 +62,7 @@ impl Panels {
         let units = model.units();
         let of_gaps = Gaps::of(model);
         let panel = |label: String, component, states| Panel {
+            name: SECTION,
             label: with_unit(&label, units.component(component).as_deref()),
             component,
             states,
@@ -76,24 +86,35 @@ impl Panels {
             number.quantity != Quantity::State && (fixed.is_none() || !number.name.ends_with("_gap"))
         };
         let measured = numbers.iter().filter(is_shown);
-        list.extend(measured.map(|number| Panel {
-            label: number.label.clone(),
+        let other = |name, label, states, number| Panel {
+            name,
+            label,
             component: 0,
-            states: States::None,
+            states,
             gaps: Vec::new(),
-            number: Some(number.clone()),
+            number,
+        };
+        list.extend(measured.map(|number| {
+            other(number.quantity.name(), number.label.clone(), States::None, Some(number.clone()))
         }));
+        list.push(other(Quantity::Lyapunov.name(), String::new(), States::Exponents, None));
         Panels { list, walls }
     }
 
-    /// Returns the number of panels of measured quantities.
-    pub(crate) fn measured(&self) -> usize {
-        self.list.iter().filter(|panel| panel.states == States::None).count()
+    /// Divides the panels that a scene wants into figures. All panels of one figure fit on a page.
+    pub fn figures(mut self, style: &FigureStyle, diagram: &DiagramStyle) -> Vec<Panels> {
+        self.list.retain(|panel| diagram.panels.as_ref().is_none_or(|wanted| wanted.contains(&panel.name)));
+        let of_width = |points: f64| (PAGE / (PANEL_HEIGHT * points)) as usize;
+        let most = if diagram.is_divided { 1 } else { style.width.map_or(DEFAULT_MOST, of_width).max(2) };
+        // Figures of about equal height.
+        let figures = self.list.len().div_ceil(most).max(1);
+        let parts = self.list.chunks(self.list.len().div_ceil(figures).max(1));
+        parts.map(|part| Panels { list: part.to_vec(), walls: self.walls.clone() }).collect()
     }
 
-    /// Whether a panel shows states at phase 0.
-    pub(crate) fn has_strobes(&self) -> bool {
-        self.list.iter().any(|panel| panel.states == States::Strobes)
+    /// Whether a panel shows such states.
+    pub(crate) fn has(&self, states: &[States]) -> bool {
+        self.list.iter().any(|panel| states.contains(&panel.states))
     }
 }
 
@@ -148,6 +169,7 @@ impl Panel {
                 let value = self.number.as_ref().and_then(|number| number.of_column(column));
                 value.map(|value| (value, None)).into_iter().collect()
             }
+            States::Exponents => Vec::new(),
         }
     }
 }
@@ -169,7 +191,7 @@ mod tests {
             "x\u{2081} at the walls of a [m]",
             "x\u{2082} at the walls of b [m]",
         ];
-        assert_eq!(labels, expected);
+        assert_eq!(labels[..3], expected);
         let point = |gap| SectionPoint {
             gap,
             side: Side::Right,
@@ -179,8 +201,7 @@ mod tests {
             after: REST,
         };
         let column = Column { points: vec![point(0), point(1)], ..Column::plain(0.0, Class::Chaotic) };
-        let values: Vec<Vec<f64>> = panels
-            .list
+        let values: Vec<Vec<f64>> = panels.list[..3]
             .iter()
             .map(|panel| panel.values(&column).into_iter().map(|(x, _)| x).collect())
             .collect();
@@ -192,14 +213,13 @@ mod tests {
         let model = GearPair::paper(0.5);
         let numbers = Number::of(&model, &[Quantity::State, Quantity::ImpactSpeed, Quantity::Rms]);
         let panels = Panels::of(&model, None, &numbers);
-        let labels: Vec<&str> = panels.list.iter().skip(2).map(|panel| &*panel.label).collect();
+        let labels: Vec<&str> = panels.list[2..6].iter().map(|panel| &*panel.label).collect();
         let rms = ["x\u{2081}", "x\u{2082}", "gap"].map(|name| format!("root mean square of {name}"));
         assert_eq!(labels, [&["mean approach speed of impacts".to_owned()], &rms[..]].concat());
-        assert_eq!(panels.measured(), 4);
         let mut column = Column::plain(1.0, Class::Chaotic);
         let group = Quantity::Rms.group().unwrap();
         group.measures().for_each(|measure| column.measures[measure.place] = Some(measure.place as f64));
-        let values: Vec<_> = panels.list.iter().skip(2).map(|panel| panel.values(&column)).collect();
+        let values: Vec<_> = panels.list[2..6].iter().map(|panel| panel.values(&column)).collect();
         let first = group.measures().next().unwrap().place as f64;
         let of = |i: u32| vec![(first + f64::from(i), None)];
         assert_eq!(values, [vec![], of(0), of(1), of(2)], "no value without impacts");
