@@ -34,7 +34,11 @@ fn wrong_styles_are_refused_with_their_place_and_the_remedy() {
             "s.toml:17:13: `figure.font_size",
             "at most 8 points at this width",
         ),
-        ("colour = 1", "s.toml:16:1: ", "width, font_size, title, legend, lines"),
+        ("colour = 1", "s.toml:16:1: ", "legend, panels, files, scale, lines"),
+        ("panels = [\"amplitude\"]", "s.toml:16:11: `figure.panels.0", "section, lyapunov"),
+        ("scale = { rms = \"log\" }", "s.toml:16:11: ", "lyapunov, impacts, mesh"),
+        ("scale = { mesh = [2, 1] }", "s.toml:16:18: `figure.scale.mesh", "ascending ends"),
+        ("scale = { mesh = [\"log\", 0, 1] }", "s.toml:16:18: `figure.scale.mesh", "above 0"),
         ("lines = 3", "s.toml:16:9: `figure.lines", "names and expressions"),
         ("lines = { a = \"k1 - q\" }", "s.toml:16:15: `figure.lines.a", "`q`"),
         ("lines = { a = \"k1 -\" }", "s.toml:16:15: `figure.lines.a", "cannot be read"),
@@ -50,6 +54,14 @@ fn wrong_styles_are_refused_with_their_place_and_the_remedy() {
         "{message}"
     );
     read(&format!("lines = {{ {} }}", lines[1..].join(", "))).unwrap();
+}
+
+#[test]
+fn layers_have_scales_with_ends() {
+    let scene = read("scale = { mesh = \"log\", lyapunov = [\"dB\", 1e-3, 1] }").unwrap();
+    assert_eq!(scene.layer_scale("mesh"), (Some(1.0), None));
+    assert_eq!(scene.layer_scale("lyapunov"), (Some(20.0), Some([1e-3, 1.0])));
+    assert_eq!(scene.layer_scale("impacts"), (None, None));
 }
 
 #[test]
