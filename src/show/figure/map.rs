@@ -58,7 +58,7 @@ pub fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
         |id| {
             let color = layer.palette[usize::from(layer.indices[id])];
             let columns = cells.counts()[0];
-            let is_hatched = color == UNDECIDED && (id % columns + id / columns) % 4 == 0;
+            let is_hatched = color == UNDECIDED && (id % columns + id / columns).is_multiple_of(4);
             if is_hatched { HATCH } else { color }
         },
         |canvas, frame| {
