@@ -119,6 +119,7 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
         }
         (Class::Periodic { .. }, None) => add("word", "none: no contact".to_owned()),
         (Class::Periodic { .. }, Some(_)) => add("word", "none: always in contact".to_owned()),
+        (Class::Undecided, _) => add("word", "none: the class is undecided".to_owned()),
         _ => add("word", "none: the motion is not periodic".to_owned()),
     }
     add("Lyapunov exponent", exponent(orbit));

@@ -9,8 +9,10 @@ use crate::record::{Record, Spelling, valid};
 use crate::show::cells::Cells;
 use rattlemap_dynamics::orbit::Class;
 
-/// Number of a cell that is not periodic.
+/// Number of a chaotic or quasi-periodic cell, of an undecided one, and of one whose computation failed.
 pub(crate) const APERIODIC: u32 = u32::MAX;
+pub(crate) const UNDECIDED: u32 = u32::MAX - 2;
+pub(crate) const FAILED: u32 = u32::MAX - 3;
 /// Number of a periodic cell whose word is not known: it was filled between cells of different words, or its motion had not
 /// converged.
 pub(crate) const UNKNOWN: u32 = u32::MAX - 1;
@@ -20,7 +22,7 @@ pub(crate) const UNKNOWN: u32 = u32::MAX - 1;
 pub struct WordIndex {
     /// Words by number, the most frequent first, with the number of their cells.
     pub(crate) list: Vec<(Spelling, usize)>,
-    /// Number of each cell's word, by id; [`APERIODIC`] or [`UNKNOWN`] if it has none.
+    /// Number of each cell's word, by id; one of the constants above if it has none.
     pub(crate) numbers: Vec<u32>,
 }
 
@@ -85,6 +87,8 @@ impl WordIndex {
             };
             numbers.push(number.unwrap_or_else(|| match classify(record) {
                 Class::Periodic { .. } => UNKNOWN,
+                Class::Undecided => UNDECIDED,
+                Class::Failed => FAILED,
                 _ => APERIODIC,
             }));
             number.into_iter().for_each(|number| list[number as usize].1 += 1);
@@ -104,7 +108,7 @@ fn sorted(list: &[(Spelling, usize)], mut numbers: Vec<u32>) -> WordIndex {
     order.sort_by_cached_key(|&number| (Reverse(list[number].1), list[number].0.text()));
     let mut rank = vec![0; list.len()];
     order.iter().enumerate().for_each(|(place, &number)| rank[number] = place as u32);
-    let known = numbers.iter_mut().filter(|number| **number < UNKNOWN);
+    let known = numbers.iter_mut().filter(|number| **number < FAILED);
     known.for_each(|number| *number = rank[*number as usize]);
     WordIndex { list: order.into_iter().map(|number| list[number].clone()).collect(), numbers }
 }

@@ -34,8 +34,8 @@ const ASIDE: f64 = 250.0;
 /// Computes the motion of a `rattlemap orbit` command, and draws it.
 ///
 /// `command` is the text that a report shows for a cell. `model` is the text of the map's own model file; it is empty for a
-/// built-in model. Returns a JSON object: `summary`, the text that the command prints, and `figures`, SVG images, keyed by
-/// the figure's name; or `error`, a message.
+/// built-in model. Returns a JSON object: `summary`, the text that the command prints, `class`, `period` (null if not periodic),
+/// `periods_run`, and `figures`, SVG images, keyed by the figure's name; or `error`, a message.
 #[wasm_bindgen]
 pub fn orbit(command: &str, model: &str) -> String {
     let object = computed(command, model).unwrap_or_else(|error| json!({ "error": error }));
@@ -93,7 +93,17 @@ fn computed(command: &str, text: &str) -> Result<Value, String> {
             figures.insert(figure.name().to_owned(), json!(svg(&figure.draw(style, &plot))));
         }
     }
-    Ok(json!({ "summary": summary(&*cell, &motion, None), "figures": figures }))
+    let period = match motion.class {
+        Class::Periodic { period } => Some(period),
+        _ => None,
+    };
+    Ok(json!({
+        "summary": summary(&*cell, &motion, None),
+        "class": motion.class.name(),
+        "period": period,
+        "periods_run": motion.periods_run,
+        "figures": figures,
+    }))
 }
 
 /// The arguments of a command.
@@ -150,6 +160,7 @@ mod tests {
         let summary = found["summary"].as_str().unwrap();
         assert!(summary.contains("\nclass                 periodic, period 1\n"), "{summary}");
         assert!(summary.contains("\npattern               135462\n"), "{summary}");
+        assert_eq!((&found["class"], &found["period"]), (&json!("periodic"), &json!(1)));
         for name in ["phase_plane", "time_history", "gap"] {
             assert!(found["figures"][name].as_str().unwrap().starts_with("<svg "), "{name}");
         }

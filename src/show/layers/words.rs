@@ -1,19 +1,25 @@
 //! The layers of words and patterns: a colour for each of the most frequent ones.
 
 use crate::show::color::Color;
-use crate::show::layers::colors::{CHAOTIC, distinct};
+use crate::show::layers::colors::{self, CHAOTIC, distinct};
 use crate::show::layers::layer::{Layer, NamedColor, legend};
-use crate::show::words::{APERIODIC, UNKNOWN, WordIndex};
+use crate::show::words::{APERIODIC, FAILED, UNDECIDED, UNKNOWN, WordIndex};
 
 /// Numbers of words with an entry of their own in the legend, and with a colour of their own.
 const LISTED_WORDS: usize = 20;
 const COLORED_WORDS: usize = 240;
 
-/// Indices into the palette of cells without a word, and of the most frequent word.
+/// Number, colour and text of cells without a word, in the order of the legend. The text of a word that is not known follows the
+/// name of the layer.
+const WITHOUT_WORD: [(u32, Color, &str); 4] = [
+    (UNKNOWN, NOT_KNOWN, "not known"),
+    (APERIODIC, CHAOTIC, "not periodic"),
+    (UNDECIDED, colors::UNDECIDED, "undecided"),
+    (FAILED, colors::FAILED, "failed"),
+];
+/// Indices into the palette of cells without events, and of the most frequent word. Between them are cells without a word.
 const NO_EVENTS_INDEX: u8 = 0;
-const APERIODIC_INDEX: u8 = 1;
-const UNKNOWN_WORD_INDEX: u8 = 2;
-const FIRST_WORD: u8 = 3;
+const FIRST_WORD: u8 = 1 + WITHOUT_WORD.len() as u8;
 
 pub(crate) const WITHOUT_EVENTS: Color = [0xf2, 0xf2, 0xf2];
 pub(crate) const COMMONEST: Color = [0xb4, 0xd0, 0xe8];
@@ -52,13 +58,14 @@ fn layer(words: &WordIndex, texts: &Texts) -> Layer {
         false => FIRST_WORD + number.min(COLORED_WORDS) as u8,
     };
     let indices: Vec<u8> = spellings.iter().enumerate().map(index_of_word).collect();
-    let index = |&number: &u32| match number {
-        APERIODIC => APERIODIC_INDEX,
-        UNKNOWN => UNKNOWN_WORD_INDEX,
-        _ => indices[number as usize],
+    let index = |&number: &u32| match WITHOUT_WORD.iter().position(|(without, ..)| *without == number) {
+        Some(position) => 1 + position as u8,
+        None => indices[number as usize],
     };
     // The word that covers most of the map has a pale colour.
-    let mut palette = vec![WITHOUT_EVENTS, CHAOTIC, NOT_KNOWN, COMMONEST];
+    let mut palette = vec![WITHOUT_EVENTS];
+    palette.extend(WITHOUT_WORD.map(|(_, color, _)| color));
+    palette.push(COMMONEST);
     palette.extend((1..COLORED_WORDS).map(distinct));
     palette.push(RARE);
     Layer {
@@ -94,10 +101,11 @@ fn entries(
         let cells = some.iter().map(|(_, cells)| cells).sum();
         list.push(NamedColor { color: color(ends[0]), text, cells });
     }
-    let count = |number: u32| words.numbers.iter().filter(|&&other| other == number).count();
-    let text = format!("{} not known", texts.name);
-    list.push(NamedColor { color: NOT_KNOWN, text, cells: count(UNKNOWN) });
-    list.push(NamedColor { color: CHAOTIC, text: "not periodic".to_owned(), cells: count(APERIODIC) });
+    list.extend(WITHOUT_WORD.map(|(without, color, text)| NamedColor {
+        color,
+        text: if without == UNKNOWN { format!("{} {text}", texts.name) } else { text.to_owned() },
+        cells: words.numbers.iter().filter(|&&number| number == without).count(),
+    }));
     legend(list)
 }
 
@@ -134,8 +142,8 @@ mod tests {
         let among = near(1).chain(near(2)).map(|(i, j)| (named[i], named[j]));
         let any = named.iter().flat_map(|&color| [(color, WITHOUT_EVENTS), (color, CHAOTIC)]);
         let last = named[LISTED_WORDS - 2..].iter().map(|&color| (color, RARE));
-        let ends = [RARE, NOT_KNOWN, CHAOTIC, WITHOUT_EVENTS];
-        let ends = (0..4).flat_map(|i| (0..i).map(move |j| (ends[i], ends[j])));
+        let ends = [RARE, NOT_KNOWN, CHAOTIC, colors::UNDECIDED, colors::FAILED, WITHOUT_EVENTS];
+        let ends = (0..6).flat_map(|i| (0..i).map(move |j| (ends[i], ends[j])));
         for (a, b) in among.chain(any).chain(last).chain(ends) {
             assert!(least_difference(a, b) >= 10.0, "{a:02x?} {b:02x?}: {}", least_difference(a, b));
         }

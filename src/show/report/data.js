@@ -91,6 +91,10 @@ function centreOf(cell) {
   const { left, bottom, width, height } = rectangle(cell);
   return [left + width / 2, bottom + height / 2];
 }
+// Returns the values of the axes in a cell.
+const valuesAt = ({ sheet: { data }, i, j }) => data.axes.map((axis, k) => axisValue(axis, [i, j][k]));
+// Whether a cell shows a copy of a coarser cell's record, because its own is not there.
+const isPending = ({ sheet, i, j }) => Boolean(sheet.pending?.[j * sheet.columns + i]);
 // Returns the cell of a sheet at a position, or null outside it.
 function cellOf(sheet, u, v) {
   const { place, columns: across, rows: up } = sheet;

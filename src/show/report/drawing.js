@@ -37,6 +37,9 @@ function placeOf({ min, max, count, scale, values }, value) {
   return share * (count - 1) + 0.5;
 }
 
+// Share of the colour that a cell has while its record is a copy of a coarser one.
+const PALE = 0.4;
+
 // Draws a sheet into an image with one pixel per cell. Numbers get the colours of the layer `scale`.
 function paint(sheet, own, scale) {
   const { columns: across, rows: up } = sheet;
@@ -45,15 +48,15 @@ function paint(sheet, own, scale) {
   const brush = picture.getContext("2d");
   const image = brush.createImageData(across, up);
   const pixels = new Uint32Array(image.data.buffer);
-  const palette = Uint32Array.from(own.values ? scale.palette : isolatedPalette(own), (c) => {
-    const rgb = parseInt(c, 16);
-    return (0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16)) >>> 0;
-  });
+  const palettes = [1, PALE].map((depth) => Uint32Array.from(own.values ? scale.palette : isolatedPalette(own), (text) => {
+    const [red, green, blue] = [0, 2, 4].map((at) => Math.round(255 - depth * (255 - parseInt(text.slice(at, at + 2), 16))));
+    return (0xff000000 | (blue << 16) | (green << 8) | red) >>> 0;
+  }));
   const level = own.values && levels(scale);
   const index = own.values ? (id) => level(own.values[id]) : (id) => own.indices[id];
   for (let j = 0; j < up; j++) {
     const [from, to] = [j * across, (up - 1 - j) * across];
-    for (let i = 0; i < across; i++) pixels[to + i] = palette[index(from + i)];
+    for (let i = 0; i < across; i++) pixels[to + i] = palettes[sheet.pending?.[from + i] ?? 0][index(from + i)];
   }
   brush.putImageData(image, 0, 0);
   return picture;

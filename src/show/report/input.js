@@ -15,7 +15,7 @@ function zoom(factor, x, y) {
 function keepInside() {
   view.left = within(view.left, 0, columns - view.width);
   view.bottom = within(view.bottom, 0, rows - view.height);
-  draw();
+  hover();
   settle();
   share();
 }
@@ -37,6 +37,8 @@ let moved = 0;
 // The rectangle that is being drawn with the shift key, and the position where it began.
 let drawnRectangle = null;
 let corner = null;
+// The pixel under the pointer; none outside the canvas.
+let hovered = null;
 
 canvas.addEventListener("wheel", (event) => {
   event.preventDefault();
@@ -54,11 +56,10 @@ canvas.addEventListener("pointermove", (event) => {
   const here = [event.offsetX, event.offsetY];
   const before = pointers.get(event.pointerId);
   if (!before) {
-    pointerCell = cellAt(...here);
-    updateReadout();
-    draw();
+    hover(here);
     return;
   }
+  hovered = here;
   const others = [...pointers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
   pointers.set(event.pointerId, here);
   moved += Math.hypot(here[0] - before[0], here[1] - before[1]);
@@ -94,11 +95,15 @@ canvas.addEventListener("pointerup", (event) => {
   if (moved < 4 && cell) choose(cell);
 });
 canvas.addEventListener("pointercancel", (event) => pointers.delete(event.pointerId));
-canvas.addEventListener("pointerleave", () => {
-  pointerCell = null;
+canvas.addEventListener("pointerleave", () => hover(null));
+
+// Finds the cell under the pointer again after the pointer, the view or the sheets have changed.
+function hover(at = hovered) {
+  hovered = at;
+  pointerCell = at && cellAt(...at);
   updateReadout();
   draw();
-});
+}
 
 // Shows a rectangle, in cells. One that is too small or outside the map is enlarged or moved.
 function showView({ left, bottom, width, height }) {
@@ -129,7 +134,7 @@ document.addEventListener("keydown", (event) => {
       [u, v] = centreOf(from);
       [u, v] = [u + di * width, v + dj * height];
     }
-    pointerCell = null;
+    hovered = pointerCell = null;
     const { place } = sheet;
     choose(cellOf(sheet, within(u, place.left + width / 2, place.left + place.width - width / 2),
       within(v, place.bottom + height / 2, place.bottom + place.height - height / 2)));

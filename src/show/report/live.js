@@ -79,7 +79,7 @@ function showMap() {
   showFixed(map);
   fitColors();
   showScene();
-  pointerCell = null;
+  hover();
   if (selectedCell && selectedCell.sheet.data.fixed !== map.fixed) choose(cellOf(base, ...centreOf(selectedCell)));
 }
 
@@ -117,6 +117,8 @@ function nextLevel() {
   const [across, up] = counts;
   job.records = new Uint8Array(across * up * starts * size);
   job.todo = [];
+  // A 1 for each run whose record is missing or a copy.
+  job.pending = new Uint8Array(across * up * starts);
   // A cell that the coarser picture lacks shows the record of a neighbour until its own is computed.
   const parts = job.along.map(({ values }) => (values || !earlier ? 1 : 2));
   const [words, target, source] = [size / 4, new Uint32Array(job.records.buffer), earlier && new Uint32Array(earlier.records.buffer)];
@@ -133,6 +135,7 @@ function nextLevel() {
       if (!earlier || isCopy || i % parts[0]) job.todo.push(run);
     }
   }
+  for (const run of job.todo) job.pending[run] = 1;
   job.next_run = job.ended = 0;
   job.total = job.todo.length;
   job.redrawn = performance.now();
@@ -183,7 +186,14 @@ function assign(member) {
   } else if (job.wants_data && !job.awaits_data) {
     job.wants_data = false;
     job.awaits_data = true;
-    send("data", { records: job.records, whole: job.ended === job.total });
+    const isWhole = job.ended === job.total;
+    send("data", { records: job.records, whole: isWhole });
+    const [across, up] = job.counts;
+    // A cell is pending while one of its runs is.
+    if (!isWhole) member.request.pending = Uint8Array.from({ length: across * up }, (_, id) => {
+      for (let run = id; run < job.pending.length; run += across * up) if (job.pending[run]) return 1;
+      return 0;
+    });
   } else if (isLeft && !job.onLanes) {
     compute("compute", within(Math.round(member.per_ms * SPELL), 4, 2048));
   }
@@ -218,7 +228,10 @@ function receive(member, { records, data, figure, labels, opened, prepared, erro
     member.per_ms = request.runs.length / Math.max(performance.now() - request.begun, 1);
     if (isLanes && request.runs.length >= FEWEST_LANES) dropSlowLanes();
     if (job && request.job === job && request.id === job.id) {
-      request.runs.forEach((run, k) => job.records.set(records.subarray(k * size, (k + 1) * size), run * size));
+      request.runs.forEach((run, k) => {
+        job.records.set(records.subarray(k * size, (k + 1) * size), run * size);
+        job.pending[run] = 0;
+      });
       job.ended += request.runs.length;
       if (isLanes) job.by_lanes += request.runs.length;
       const isWhole = job.ended === job.total;
@@ -272,20 +285,19 @@ function checkLanes() {
 }
 
 // Shows the cells of a job, and begins its next level if all of them are there.
-async function showWindow(data, { job: of, id, whole: isWhole }) {
+async function showWindow(data, { job: of, id, whole: isWhole, pending }) {
   const [[left, width], [bottom, height]] = of.along.map(({ cover }, k) => cover(data.axes[k].count));
   const sheet = await fill(sheetOf(data, { left, bottom, width, height }));
   if (of !== job || id !== job.id) return;
-  sheet.made = of.view;
-  sheet.ranges = of.ranges;
-  sheet.isWhole = isWhole;
+  Object.assign(sheet, { job: of, made: of.view, ranges: of.ranges, isWhole, pending });
   live = sheet;
   of.drawn = true;
   showFixed(data);
   fitColors();
   showScene();
   if (isWhole) chooseIn(sheet);
-  updateReadout();
+  renewSelection(sheet);
+  hover();
   if (of.next) {
     of.next = false;
     wish();
@@ -303,6 +315,13 @@ function chooseIn(sheet) {
   choose(cell);
   awaited = place;
   updateLink();
+}
+
+// Gives a selected cell that this page computed the records of a newer picture, if that has a cell with the same values.
+function renewSelection(sheet) {
+  if (!selectedCell || selectedCell.sheet === base || selectedCell.sheet.data.fixed !== sheet.data.fixed) return;
+  const cell = cellOf(sheet, ...centreOf(selectedCell));
+  if (cell && String(valuesAt(cell)) === String(valuesAt(selectedCell))) selectedCell = cell;
 }
 
 function stop(member) {

@@ -12,6 +12,8 @@ let worker = null;
 let wanted = null;
 // The request that the worker computes, with the time at which it began; none if the worker is idle.
 let request = null;
+// Class, period and number of periods of the motion that is shown; none while it is computed.
+let reached = null;
 
 // Compiles the engine once.
 function compiled() {
@@ -28,14 +30,29 @@ function showOrbit(cell) {
   // Tells a notebook that shows this page in a frame.
   if (parent !== window && !isPanel) parent.postMessage({ kind: "rattlemap", command: byId("command").textContent }, "*");
   byId("computing").textContent = "computing\u2026";
+  reached = null;
   for (const id of ["motion", "orbit"]) byId(id).setAttribute("aria-busy", "true");
   if (request && performance.now() - request.begun > PATIENCE) stopWorker();
   if (!request) compute().catch(fail);
 }
 
 // Names a cell by the values of its axes.
-function nameOf({ sheet: { data }, i, j }) {
-  return data.axes.map((axis, k) => `${axis.symbol} = ${Number(axisValue(axis, [i, j][k]).toPrecision(8))}`).join(", ");
+const nameOf = (cell) => valuesAt(cell).map((value, k) => `${map.axes[k].symbol} = ${Number(value.toPrecision(8))}`).join(", ");
+
+// Says what the map and the motion of the selected cell are if they differ, and which of them the program gives.
+function compareMotion() {
+  byId("differs").textContent = "";
+  if (!reached?.class || !selectedCell || isPending(selectedCell)) return;
+  const { sheet: { data, values, columns: across }, i, j } = selectedCell;
+  const id = j * across + i;
+  const ofMap = data.classes[values.class?.[id]];
+  const [theirs, ours] = [[ofMap, values.period?.[id]], [reached.class, reached.period]].map(([name, n]) => (name === "periodic" ? `period ${n}` : name));
+  if (!ofMap || theirs === ours) return;
+  const by = selectedCell.sheet !== base ? "computed in this page, as the motion is, and not by the program"
+    : data.sources[values.source?.[id]] === "filled" ? "which the program filled in" : "which the program gives";
+  const how = ofMap === "periodic" && reached.period ? "a coexisting motion"
+    : `after ${count(reached.periods_run, "period")} instead of ${values.periods_run[id]}`;
+  byId("differs").textContent = `The map: ${theirs}, ${by}; from the same start this page reaches ${ours}, ${how}.`;
 }
 
 async function compute() {
@@ -91,11 +108,12 @@ function fail(error) {
   showMotion({ error: `the engine cannot run: ${error}` });
 }
 
-function showMotion({ summary = null, figures = null, error = null }, took = 0) {
+function showMotion({ summary = null, figures = null, error = null, ...motion }, took = 0) {
+  reached = motion;
+  compareMotion();
   for (const id of ["motion", "orbit"]) byId(id).removeAttribute("aria-busy");
   byId("computing").textContent = error ? `Not computed: ${error}`
-    : `computed in this page in ${Math.round(took)} ms, over as many periods as the class needs, which may be more than the map's; `
-      + "the last digits may differ from the program's";
+    : `computed in this page in ${Math.round(took)} ms`;
   byId("summary").textContent = summary ?? "";
   for (const name of FIGURES) {
     const image = byId(name);

@@ -25,6 +25,9 @@ interface Sheet {
   made?: Place;
   ranges?: any[];
   isWhole?: boolean;
+  // The part of the map to which the sheet belongs, and a 1 for each cell whose record is a copy.
+  job?: any;
+  pending?: Uint8Array;
 }
 
 // A cell of a sheet.

@@ -15,8 +15,7 @@ function facts(cell) {
   });
   const computed = (array, name, text) => (values[array] ? [[name, text(at(array))]] : []);
   const spelled = (list) => (index) => (list[index] === "" ? "no events" : list[index]);
-  return [
-    ...data.axes.map((axis, k) => [axis.symbol, axisValue(axis, [i, j][k]), axis.label]), ...derivedValues(cell),
+  const found = [
     ...computed("class", "class", (index) => (data.classes[index] === "periodic" ? period(cell.sheet, id) : data.classes[index])),
     ...measured,
     ...computed("symmetric", "symmetric", (flag) => ["no", "yes"][flag]),
@@ -28,8 +27,11 @@ function facts(cell) {
     ...computed("source", "source", () => source),
     ...computed("finished", "finished by", (index) => data.finishers[index] ?? "no engine: filled in"),
     ["periods run", at("periods_run")],
-    ["cell", `${i}, ${j}`],
   ];
+  const text = cell.sheet.job === job ? "being computed" : "not computed";
+  const missing = found.map(([name], k) => [name, k ? undefined : text]);
+  return [...valuesAt(cell).map((value, k) => [data.axes[k].symbol, value, data.axes[k].label]), ...derivedValues(cell),
+    ...(isPending(cell) ? missing : found), ["cell", `${i}, ${j}`]];
 }
 
 // Returns the period of a cell; a legend can say more about it, as in "period 1, no contact".
@@ -51,6 +53,7 @@ function updateReadout() {
     return row;
   });
   byId("readout").replaceChildren(...lines);
+  compareMotion();
 }
 
 // Selects a cell of a sheet, by default of the program's map, and shows the command that replays it.
@@ -60,7 +63,7 @@ function choose(cell) {
   byId("replay").hidden = !cell;
   if (cell) {
     const { sheet: { data, starts, columns: across }, i, j } = selectedCell;
-    const [a, b] = [axisValue(data.axes[0], i), axisValue(data.axes[1], j)];
+    const [a, b] = valuesAt(selectedCell);
     const width = Math.max(data.components, 4), place = width * (j * across + i);
     const own = (data.start ?? starts?.subarray(place, place + width))?.slice(0, data.components);
     const start = own ? ` --start ${[...own].map((x, k) => [a, b][data.axes.findIndex((axis) => axis.start === k)] ?? x).join(",")}` : "";
