@@ -90,6 +90,7 @@ pub fn data(
         },
         "model": scene.base().title(),
         "source": scene.base().source(),
+        "equations": scene.base().downcast_ref::<FileModel>().map(FileModel::equations),
         // The scene without its axes, to which the page adds those of the view, and the command that computes it.
         "scene": scene.settings(),
         "compute": compute(made),

@@ -89,6 +89,120 @@ async function walk() {
 walk().catch((error) => { said.error = String(error.stack); finish(); });
 "##;
 
+/// Keeps records of a finer picture back, looks at a cell without a record, and lets the records arrive.
+const PARTIAL: &str = r##"
+const fact = (name) => [...document.querySelectorAll("#readout tr")].find((row) => row.cells[0].textContent === name).cells[1].textContent;
+const facts = () => ["\u03c9", "class", "exponent", "periods run"].map(fact);
+async function partial() {
+  await until(() => !document.getElementById("wait"));
+  const [give, held] = [receive, []];
+  let isBegun = false;
+  receive = (member, answer) => {
+    if (!answer.records || job?.level !== 2 || job.view.width !== 24) give(member, answer);
+    else if (isBegun) held.push([member, answer]);
+    else {
+      isBegun = true;
+      job.redrawn = -Infinity;
+      give(member, answer);
+    }
+  };
+  showView({ left: 20, bottom: 10, width: 24, height: 24 });
+  await until(() => live?.pending && held.length);
+  const [known, missing] = [0, 1].map((flag) => live.pending.lastIndexOf(flag));
+  const picture = layerOf(live).picture.getContext("2d").getImageData(0, 0, live.columns, live.rows).data;
+  const color = (id) => [...picture].slice(4 * ((live.rows - 1 - Math.floor(id / live.columns)) * live.columns + (id % live.columns))).slice(0, 3);
+  const layerColors = layerOf(live);
+  said.colors = [known, missing].map((id) => [color(id), parseInt(layerColors.palette[layerColors.indices[id]], 16)]);
+  const cell = (sheet, id) => ({ sheet, i: id % sheet.columns, j: Math.floor(id / sheet.columns) });
+  choose(cell(live, missing));
+  said.selected = facts();
+  const [u, v] = centreOf(selectedCell);
+  choose(null);
+  hover(pixel(u, v));
+  said.hovered = facts();
+  choose(cell(live, missing));
+  hover(null);
+  pause();
+  said.paused = [text("live"), text("stop")];
+  receive = give;
+  document.getElementById("stop").click();
+  await until(() => selectedCell.sheet.isWhole);
+  const { sheet } = selectedCell;
+  const id = selectedCell.j * sheet.columns + selectedCell.i;
+  said.renewed = facts();
+  said.own = [map.classes[sheet.values.class[id]], String(sheet.values.periods_run[id])];
+  newWorker(await compiled(), ({ labels }) => { said.labels = [map.classes[labels[0]], labels[1]]; }, () => {})
+    .postMessage({ task: "labels", key: "again", scene: sceneOver(map.scene, sheet.ranges), model: map.model_file, sets: "", runs: Uint32Array.of(id) });
+  await until(() => said.labels);
+  finish();
+}
+partial().catch((error) => { said.error = String(error.stack); finish(); });
+"##;
+
+/// Changes what the map says of a cell, and selects it; then zooms, goes back, uses keys, plays a slider, and saves pictures.
+const TOOLS: &str = r##"
+async function tools() {
+  const byName = (id) => document.getElementById(id);
+  await until(() => !byName("wait"));
+  const id = base.values.period.findIndex((period, id) => period === 1 && id > 2000);
+  const [i, j] = [id % columns, Math.floor(id / columns)];
+  choose({ i, j });
+  await motion();
+  said.same = text("differs");
+  base.values.period[id] = 3;
+  choose({ i, j });
+  await motion();
+  said.differs = text("differs");
+  base.values.period[id] = 1;
+  const settle = async (width) => until(() => Math.abs(view.width - width) < 1 && location.hash.includes("view=") === width < 60);
+  showView({ left: 10, bottom: 10, width: 30, height: 30 });
+  await settle(30);
+  byName("back").click();
+  await settle(65);
+  said.back = [view.width, byName("back").disabled];
+  const press = (target, key) => target.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+  press(byName("home"), "ArrowRight");
+  said.elsewhere = selectedCell.i - i;
+  press(canvas, "ArrowRight");
+  said.canvas = centreOf(selectedCell)[0] - i - 0.5;
+  said.spoken = text("spoken");
+  press(byName("layers"), "ArrowRight");
+  said.layer = [layer, document.activeElement.textContent];
+  showLayer(0);
+  const row = [...document.querySelectorAll("#sliders label")].find(({ firstChild }) => firstChild.textContent === "F");
+  row.children[3].click();
+  await until(() => changes.F > 52.5);
+  row.children[3].click();
+  document.getElementById("restore").click();
+  await until(() => job?.ended === job?.total && !byName("save-svg").hidden);
+  const files = [];
+  save = (blob, name) => files.push([blob, name]);
+  const white = async (blob) => {
+    const image = await createImageBitmap(blob);
+    const brush = Object.assign(element("canvas"), { width: image.width, height: image.height }).getContext("2d");
+    brush.drawImage(image, 0, 0);
+    return [image.width > 600, ...brush.getImageData(1, 1, 1, 1).data];
+  };
+  byName("save-png").click();
+  await until(() => files.length);
+  titledPicture().toBlob((blob) => save(blob, "canvas"));
+  await until(() => files.length > 1);
+  said.files = [files[0][1], await white(files[0][0]), await white(files[1][0])];
+  finish();
+}
+tools().catch((error) => { said.error = String(error.stack); finish(); });
+"##;
+
+/// Collects whether the page is wider than a phone, and which parts are visible.
+const PHONE: &str = r##"
+until(() => !document.getElementById("wait")).then(() => {
+  said.overflow = document.scrollingElement.scrollWidth - innerWidth;
+  said.width = innerWidth;
+  said.order = ["stage", "legend-box", "readout", "parameters"].map((id) => document.getElementById(id).getBoundingClientRect().top);
+  finish();
+});
+"##;
+
 /// Waits for the shaders, and computes a part of the map with lanes.
 const LANES: &str = r##"
 async function computeOnLanes() {
@@ -232,6 +346,63 @@ fn a_walk_through_the_page_shows_what_the_program_computes() {
             photograph(browser, &page, name, link);
         }
     }
+}
+
+#[test]
+fn cells_without_a_record_are_pale_and_show_no_numbers_until_it_arrives() {
+    let Some(browser) = chromium() else { return skipped() };
+    let folder = tempfile::tempdir().unwrap();
+    let said = visited(browser, &explored(&folder, &["e_omega.toml"]), PARTIAL, "", &WITHOUT_GRAPHICS);
+    let nothing = "\u{2013}";
+    for shown in ["selected", "hovered"] {
+        assert_eq!(said[shown].as_array().unwrap()[1..], ["being computed", nothing, nothing], "{shown}: {said}");
+    }
+    for (nth, depth) in [(0, 1.0), (1, 0.4)] {
+        let full = said["colors"][nth][1].as_u64().unwrap();
+        for (channel, shift) in [16, 8, 0].into_iter().enumerate() {
+            let expected = 255.0 - depth * (255 - (full >> shift & 255)) as f64;
+            assert_eq!(said["colors"][nth][0][channel], expected.round() as u64, "{said}");
+        }
+    }
+    let [live, button] = [0, 1].map(|k| said["paused"][k].as_str().unwrap());
+    assert!(live.starts_with("stopped: ") && live.ends_with(" cells are left") && button == "Continue", "{said}");
+    let (renewed, class) = (&said["renewed"], said["labels"][0].as_str().unwrap());
+    assert_eq!(renewed[0], said["selected"][0], "the selection moved: {said}");
+    let period = format!("period {}", said["labels"][1]);
+    let expected = if class == "periodic" { &period } else { class };
+    assert!(renewed[1].as_str().unwrap().starts_with(expected), "{said}");
+    assert_eq!((&said["own"][0], &said["own"][1]), (&class.into(), &renewed[3]));
+}
+
+#[test]
+fn the_page_compares_goes_back_plays_and_saves() {
+    let Some(browser) = chromium() else { return skipped() };
+    let folder = tempfile::tempdir().unwrap();
+    let page = explored(&folder, &["e_omega.toml"]);
+    let said = visited(browser, &page, TOOLS, "", &["--disable-gpu", "--force-dark-mode"]);
+    assert_eq!(said["same"], "");
+    assert_eq!(
+        said["differs"],
+        "The map: period 3, which the program gives; from the same start this page reaches period 1, a coexisting motion."
+    );
+    assert_eq!(said["back"], serde_json::json!([65, true]));
+    assert_eq!((&said["elsewhere"], &said["canvas"]), (&0.into(), &1.into()));
+    let spoken = said["spoken"].as_str().unwrap();
+    assert!(spoken.starts_with("e 0.") && spoken.contains(", class "), "{spoken}");
+    assert_eq!(said["layer"], serde_json::json!([1, "exponent"]));
+    let white = serde_json::json!([true, 255, 255, 255, 255]);
+    assert_eq!(said["files"], serde_json::json!(["map.png", white, white]));
+    let phone = visited(browser, &page, PHONE, "", &["--disable-gpu", "--window-size=500,800"]);
+    assert_eq!(phone["overflow"], 0, "{phone}");
+    let tops: Vec<f64> = serde_json::from_value(phone["order"].clone()).unwrap();
+    assert!(tops.is_sorted(), "{phone}");
+    let paper = folder.path().join("page.pdf");
+    let status = std::process::Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=3000"])
+        .args([format!("--print-to-pdf={}", paper.display()), format!("file://{}", page.display())])
+        .stderr(std::process::Stdio::null())
+        .status();
+    assert!(status.unwrap().success() && fs::metadata(paper).unwrap().len() > 20_000);
 }
 
 /// The browser's own software device computes the page's shaders.

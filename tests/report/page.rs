@@ -94,7 +94,7 @@ function browse(x, y) {
   said.panned = view.left > before;
   document.querySelectorAll("#layers button")[1].click();
   said.legend = text("legend-title");
-  document.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
+  canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true }));
   said.moved = fact("cell");
   showAll();
   said.all = view.width === columns && view.left === 0;
@@ -520,7 +520,7 @@ fn the_page_lists_what_was_computed_and_how() {
 
 /// Presses keys without a pointer, then follows the link to the page.
 const KEYS: &str = r#"pointerCell = null;
-  const press = (key) => document.dispatchEvent(new KeyboardEvent("keydown", { key }));
+  const press = (key) => canvas.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
   view = { left: 3, bottom: 2, width: 6, height: 5 };
   choose(null);
   press("ArrowUp");

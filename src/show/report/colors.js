@@ -65,7 +65,11 @@ function fitColors() {
   draw();
 }
 
+// Colours, ticks and heading of the bar that is shown; none if the layer has no bar.
+let shownBar = null;
+
 function showBar(current) {
+  shownBar = null;
   byId("bar").replaceChildren();
   byId("span").hidden = !current.values;
   if (!current.bar) return;
@@ -77,17 +81,19 @@ function showBar(current) {
   ramp.style.background = `linear-gradient(to right, ${colors.map((c) => `#${c}`).join(",")})`;
   const scale = element("div", undefined, "ticks");
   const { marks, factor } = barTicks(current.bar, low, high);
-  for (const [value, text] of marks) {
+  const places = marks.map(([value, text]) => [(value - low) / (high - low), text]);
+  for (const [share, text] of places) {
     const tick = element("span", text);
-    const share = (value - low) / (high - low);
     tick.style.left = `${100 * share}%`;
     // Labels are centred; near the ends of the bar they stay inside it.
     tick.style.transform = `translateX(${-50 * (within(share / 0.06, 0, 1) + within((share - 0.94) / 0.06, 0, 1))}%)`;
     scale.append(tick);
   }
   const isWhole = low === least && high === most;
-  const remarks = isWhole ? beyond : [`The colours fit the visible cells; at most ${100 * BEYOND}\u00a0% of these lie beyond each end.`];
+  const fits = current.values || current.bar.is_fixed ? [] : ["The greys fit this picture: another view has a scale of its own."];
+  const remarks = isWhole ? [...fits, ...beyond] : [`The colours fit the visible cells; at most ${100 * BEYOND}\u00a0% of these lie beyond each end.`];
   const heading = label === current.title ? factor.replace(/^, /, "") : label + factor;
+  shownBar = { colors, places, heading };
   byId("bar").append(...(heading ? [element("div", heading)] : []), ramp, scale,
     ...remarks.map((text) => element("div", text, "beyond")));
 }
@@ -95,7 +101,10 @@ function showBar(current) {
 function showLayer(index) {
   if (layer !== index) isolated = null;
   layer = index;
-  [...byId("layers").children].forEach((button, k) => button.setAttribute("aria-checked", k === layer));
+  [...byId("layers").children].forEach((button, k) => {
+    button.setAttribute("aria-checked", k === layer);
+    button.tabIndex = k === layer ? 0 : -1;
+  });
   fitColors();
   updateLink();
   share();

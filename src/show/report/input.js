@@ -49,7 +49,7 @@ canvas.addEventListener("pointerdown", (event) => {
   canvas.setPointerCapture(event.pointerId);
   pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
   moved = 0;
-  corner = event.shiftKey ? position(event.offsetX, event.offsetY) : null;
+  corner = event.shiftKey || isPressed("draw-rectangle") ? position(event.offsetX, event.offsetY) : null;
 });
 
 canvas.addEventListener("pointermove", (event) => {
@@ -89,6 +89,7 @@ canvas.addEventListener("pointerup", (event) => {
   if (drawnRectangle) {
     showView(drawnRectangle);
     drawnRectangle = null;
+    press("draw-rectangle", false);
     return;
   }
   const cell = cellAt(event.offsetX, event.offsetY);
@@ -112,6 +113,12 @@ function showView({ left, bottom, width, height }) {
 }
 const showAll = () => showView(everything);
 canvas.addEventListener("dblclick", () => showAll());
+byId("home").addEventListener("click", () => showAll());
+byId("back").addEventListener("click", () => history.back());
+
+const isPressed = (id) => byId(id).getAttribute("aria-pressed") === "true";
+const press = (id, isOn) => byId(id).setAttribute("aria-pressed", isOn);
+byId("draw-rectangle").addEventListener("click", () => press("draw-rectangle", !isPressed("draw-rectangle")));
 
 document.addEventListener("keydown", (event) => {
   // Keys typed into a field do not control the map.
@@ -123,7 +130,7 @@ document.addEventListener("keydown", (event) => {
   else if (event.key === "-") zoom(1 / 0.7, p.x + p.width / 2, p.y + p.height / 2);
   else if (event.key === "0") showAll();
   else if (number >= 1 && number <= map.layers.length) showLayer(number - 1);
-  else if (steps[event.key]) {
+  else if (steps[event.key] && event.target === canvas) {
     event.preventDefault();
     const sheet = uppermost();
     const { width, height } = rectangle({ sheet, i: 0, j: 0 });
@@ -151,10 +158,11 @@ function follow(cell) {
   keepInside();
 }
 
-// What the page shows, without a second panel.
+// What the page shows, without a second panel, and the view that the address names.
 let link = "";
+let addressed = "";
 
-// Writes layer, parameters, cell, view and choice of colours into the link.
+// Writes layer, parameters, cell, view and choice of colours into the link. The browser's Back undoes a change of the view.
 function updateLink() {
   const parts = ["v=1", `layer=${encodeURIComponent(map.layers[layer].name)}`];
   for (const [name, value] of Object.entries(changes)) parts.push(`set=${encodeURIComponent(name)}:${value}`);
@@ -164,9 +172,17 @@ function updateLink() {
   if (!showsAll()) parts.push(`view=${[view.left, view.bottom, view.width, view.height].join(",")}`);
   if (spansMap) parts.push("colors=map");
   link = parts.join("&");
-  if (isPanel) sharePanel();
+  if (isPanel) {
+    sharePanel();
+    return;
+  }
   try {
-    history.replaceState(null, "", `#${link}${second ? `&beside=${encodeURIComponent(second.link)}` : ""}`);
+    const now = JSON.stringify(view);
+    const address = `#${link}${second ? `&beside=${encodeURIComponent(second.link)}` : ""}`;
+    if (addressed && addressed !== now) history.pushState({ isOwn: true }, "", address);
+    else history.replaceState(history.state, "", address);
+    addressed = now;
+    byId("back").disabled = !history.state?.isOwn;
   } catch {
     // A page in a frame of a notebook has no address of its own.
   }
@@ -182,6 +198,7 @@ function readLink(text) {
   spansMap = byId("whole").checked = named.get("colors") === "map";
   const sets = named.getAll("set").map((text) => text.split(":")).map(([name, value]) => [name, Number(value)]);
   changes = Object.fromEntries(sets.filter(([name, value]) => Number.isFinite(value) && map.parameters.some((own) => own.name === name)));
+  addressed = "";
   showParameters();
   dropStale();
   const [left, bottom, width, height] = numbers("view");
@@ -198,8 +215,8 @@ function readLink(text) {
   awaited = isNamed && !isOwn ? [i + 0.5, j + 0.5] : null;
   if (named.get("beside") !== null) openSecond(named.get("beside"));
   else if (second) closeSecond();
-  updateLink();
   keepInside();
+  updateLink();
 }
 const readAddress = () => readLink(location.hash.slice(1));
 addEventListener("hashchange", readAddress);

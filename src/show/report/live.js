@@ -13,6 +13,8 @@ const REDRAW = 1000;
 let job = null;
 // Workers, each with the job and the runs of its request.
 let pool = [];
+// Whether the reader has stopped the job.
+let isPaused = false;
 
 // Returns the values that a window needs along an axis, and the part of the axis that they cover, in cells.
 function windowAlong(axis, from, extent) {
@@ -48,6 +50,7 @@ function wish() {
     job.next = true;
     return;
   }
+  isPaused = false;
   job = { key, along, view: { ...view }, begun: performance.now(), changes: { ...changes }, level: firstLevel() - 1, by_lanes: 0, drawn: false, next: false };
   // A figure, which the user asked for, is waited for.
   pool.filter(({ request }) => request && request.task !== "figure" && performance.now() - request.begun > PATIENCE).forEach(stop);
@@ -68,6 +71,8 @@ function firstLevel() {
 
 function stopJob() {
   job = null;
+  isPaused = false;
+  showWork();
   byId("live").textContent = "";
   byId("save-svg").hidden = true;
   if (live) showMap();
@@ -105,7 +110,8 @@ function nextLevel() {
     if (job.by_lanes) checkLanes();
     byId("save-svg").hidden = false;
     awaited = null;
-    byId("live").textContent = `${job.counts.join(" \u00d7 ")} cells, computed in this page in ${((performance.now() - job.begun) / 1000).toFixed(1)} s`
+    showWork();
+    byId("live").textContent = byId("spoken").textContent = `${job.counts.join(" \u00d7 ")} cells, computed in this page in ${((performance.now() - job.begun) / 1000).toFixed(1)} s`
       + (job.by_lanes ? `, ${job.by_lanes} of them on the graphics device` : "");
     return;
   }
@@ -146,6 +152,7 @@ function nextLevel() {
 // Gives work to idle workers.
 async function employ() {
   const module = await compiled();
+  showWork();
   if (!job) return;
   const most = within(navigator.hardwareConcurrency || 2, 1, 16);
   while (pool.length < most) {
@@ -157,8 +164,38 @@ async function employ() {
   for (const member of [...pool, ...(lanes ? [lanes] : [])]) if (!member.request) assign(member);
 }
 
+// Shows whether there is work to stop or to continue.
+function showWork() {
+  byId("stop").disabled = !request && !(job && job.ended < job.total);
+  byId("stop").textContent = isPaused ? "Continue" : "Stop";
+}
+
+// Stops all workers. The cells that they compute now are computed again when the reader continues.
+function pause() {
+  isPaused = true;
+  for (const member of pool.filter((each) => each.request)) {
+    const { job: of, runs, task, layer: drawn, ending } = member.request;
+    if (of === job && runs) job.todo.push(...runs);
+    if (of === job && task === "data") [job.wants_data, job.awaits_data] = [true, false];
+    if (of === job && task === "figure") job.wants_figure = { layer: drawn, ending };
+    stop(member);
+  }
+  if (request) fail("stopped");
+  if (job && job.ended < job.total) byId("live").textContent = `stopped: ${job.total - job.ended} cells are left`;
+  else isPaused = false;
+  showWork();
+}
+
+byId("stop").addEventListener("click", () => {
+  if (!isPaused) pause();
+  else isPaused = false;
+  employ().catch(failJob);
+});
+// A hidden page gives its workers nothing to do.
+document.addEventListener("visibilitychange", () => employ().catch(failJob));
+
 function assign(member) {
-  if (!job) return;
+  if (!job || isPaused || document.hidden) return;
   const isLanes = member === lanes;
   if (!isLanes && samples.length) {
     const sample = samples.shift();
@@ -181,7 +218,7 @@ function assign(member) {
     if (!lanes.isReady) send("prepare", {});
     else if (isLeft && job.onLanes) compute("lanes", lanesAtOnce());
   } else if (job.wants_figure) {
-    send("figure", { records: job.records, layer: job.wants_figure });
+    send("figure", { records: job.records, ...job.wants_figure });
     job.wants_figure = null;
   } else if (job.wants_data && !job.awaits_data) {
     job.wants_data = false;
@@ -222,7 +259,9 @@ function receive(member, { records, data, figure, labels, opened, prepared, erro
   if (labels) {
     request.sample.tell(labels);
   } else if (figure) {
-    save(new Blob([figure], { type: "image/svg+xml" }), `${request.layer}.svg`);
+    const drawn = new Blob([figure], { type: "image/svg+xml" });
+    if (request.ending === "svg") save(drawn, `${request.layer}.svg`);
+    else saveAsPicture(drawn).catch(failJob);
   } else if (records) {
     const { record_bytes: size } = map.live;
     member.per_ms = request.runs.length / Math.max(performance.now() - request.begun, 1);
@@ -238,7 +277,9 @@ function receive(member, { records, data, figure, labels, opened, prepared, erro
       // Cells of a first picture have no coarser neighbours whose records they could show.
       job.wants_data ||= isWhole || (job.drawn && performance.now() - job.redrawn > REDRAW);
       if (job.wants_data) job.redrawn = performance.now();
-      byId("live").textContent = `computing ${job.counts.join(" \u00d7 ")} cells: ${Math.floor((100 * job.ended) / job.total)} %`;
+      const speed = (job.onLanes ? [lanes] : pool).reduce((sum, { per_ms: each }) => sum + each, 0);
+      byId("live").textContent = `computing ${job.counts.join(" \u00d7 ")} cells: ${Math.floor((100 * job.ended) / job.total)} %, `
+        + `${Math.ceil((job.total - job.ended) / speed / 1000)} s left`;
     }
   } else if (data && request.job === job && request.id === job.id) {
     job.awaits_data = false;
@@ -335,6 +376,7 @@ function failJob(error) {
   byId("save-svg").hidden = true;
   const isOutdated = job?.next;
   job = null;
+  showWork();
   if (isOutdated) wish();
 }
 
@@ -343,9 +385,26 @@ function dropStale() {
   if (!isChanged() && live && live.data.fixed !== map.fixed) showMap();
 }
 
-// Lists the parameters of the map, each with a slider and a field.
+// Number of steps in which a slider is played, and time between two of them in ms.
+const PLAYED = 40;
+const BEAT = 250;
+let played = null;
+
+// Calls `step` again and again, each time after the picture of the previous step; not if its button is pressed already.
+function play(button, step) {
+  const isSame = played?.button === button;
+  if (played) clearInterval(played.timer);
+  played?.button.setAttribute("aria-pressed", "false");
+  played = null;
+  if (!button || isSame) return;
+  button.setAttribute("aria-pressed", "true");
+  played = { button, timer: setInterval(() => document.hidden || isPaused || (job && !job.drawn) || step(), BEAT) };
+}
+
+// Lists the parameters of the map, each with a slider, a field and a button that plays the slider.
 function showParameters() {
-  byId("parameters").hidden = !map.live;
+  byId("parameters").hidden = byId("compare").hidden = !map.live;
+  play(null);
   byId("sliders").replaceChildren(...map.parameters.map(({ name, symbol, label, value, min, max }) => {
     const [slider, field] = ["range", "number"].map((type) => Object.assign(element("input"), { type }));
     const now = changes[name] ?? value;
@@ -372,7 +431,15 @@ function showParameters() {
     const row = element("label");
     const text = element("span", symbol);
     text.title = label;
-    row.append(text, slider, field);
+    const button = Object.assign(element("button", "\u25b6"), { type: "button", title: `play ${label}` });
+    button.setAttribute("aria-label", button.title);
+    button.setAttribute("aria-pressed", "false");
+    const [low, high] = [slider.min, slider.max].map(Number);
+    button.addEventListener("click", () => play(button, () => {
+      const next = Number((Number(slider.value) + (high - low) / PLAYED).toPrecision(4));
+      change(String(next > high ? low : next));
+    }));
+    row.append(text, slider, field, button);
     return row;
   }));
 }
@@ -393,11 +460,80 @@ function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 const fileName = (ending) => `${map.layers[layer].name}.${ending}`;
-byId("save-png").addEventListener("click", () => canvas.toBlob((blob) => save(blob, fileName("png"))));
+
+// Saves a drawing, twice as large, on a white ground.
+async function saveAsPicture(drawn) {
+  const image = Object.assign(new Image(), { src: URL.createObjectURL(drawn) });
+  await image.decode();
+  const picture = Object.assign(element("canvas"), { width: 2 * image.naturalWidth, height: 2 * image.naturalHeight });
+  const brush = picture.getContext("2d");
+  brush.fillStyle = "#fff";
+  brush.fillRect(0, 0, picture.width, picture.height);
+  brush.drawImage(image, 0, 0, picture.width, picture.height);
+  URL.revokeObjectURL(image.src);
+  picture.toBlob((blob) => save(blob, fileName("png")));
+}
+
+// Draws the map in black ink, for paper.
+function ink(color) {
+  canvas.style.color = color;
+  draw();
+}
+addEventListener("beforeprint", () => ink("#000"));
+addEventListener("afterprint", () => ink(""));
+
+// Returns what the canvas shows with title and legend on a white ground. The engine draws a figure only of what it computed.
+function titledPicture() {
+  const { entries, title } = layerOf(uppermost());
+  const { fixed } = uppermost().data;
+  const { clientWidth: width, clientHeight: height } = canvas;
+  const [ratio, top, across] = [canvas.width / width, 52, Math.max(1, Math.floor(width / 260))];
+  const bar = shownBar ? 62 : 0;
+  const picture = element("canvas");
+  [picture.width, picture.height] = [canvas.width, ratio * (top + height + bar + 22 * Math.ceil(entries.length / across) + 12)];
+  const brush = picture.getContext("2d");
+  brush.scale(ratio, ratio);
+  const write = (text, x, y, font = "13px system-ui, sans-serif") => {
+    brush.fillStyle = "#000";
+    brush.font = font;
+    brush.fillText(text, x, y, width - x);
+  };
+  brush.fillStyle = "#fff";
+  brush.fillRect(0, 0, width, picture.height);
+  write(`${map.title}: ${title}`, 14, 22, "600 16px system-ui, sans-serif");
+  if (fixed) write(`Other parameters: ${fixed}`, 14, 42);
+  ink("#000");
+  brush.drawImage(canvas, 0, top, width, height);
+  ink("");
+  const below = top + height + 16;
+  if (shownBar) {
+    const { colors, places, heading } = shownBar;
+    const ramp = brush.createLinearGradient(14, 0, 414, 0);
+    colors.forEach((color, k) => ramp.addColorStop(k / (colors.length - 1), `#${color}`));
+    write(heading, 14, below);
+    brush.fillStyle = ramp;
+    brush.fillRect(14, below + 6, 400, 14);
+    for (const [share, text] of places) write(text, 10 + 400 * share, below + 34);
+  }
+  entries.forEach(({ color, text, share }, k) => {
+    const [x, y] = [14 + 260 * (k % across), below + bar + 22 * Math.floor(k / across)];
+    brush.fillStyle = `#${color}`;
+    brush.fillRect(x, y - 11, 24, 13);
+    brush.strokeRect(x, y - 11, 24, 13);
+    write(`${text}  ${share}`, x + 32, y);
+  });
+  return picture;
+}
+
+// Has a worker draw the figure of a computed view.
+function wantFigure(ending) {
+  job.wants_figure = { layer: map.layers[layer].name, ending };
+  employ().catch(failJob);
+}
+byId("save-png").addEventListener("click", () => {
+  if (job && !byId("save-svg").hidden) wantFigure("png");
+  else titledPicture().toBlob((blob) => save(blob, fileName("png")));
+});
 byId("save-model").hidden = !map.model_file;
 byId("save-model").addEventListener("click", () => save(new Blob([map.model_file]), "model.toml"));
-byId("save-svg").addEventListener("click", () => {
-  if (!job) return;
-  job.wants_figure = map.layers[layer].name;
-  employ().catch(failJob);
-});
+byId("save-svg").addEventListener("click", () => job && wantFigure("svg"));

@@ -58,6 +58,7 @@ function compareMotion() {
 async function compute() {
   const own = { task: "orbit", command: byId("command").textContent, model: map.model_file };
   request = { ...own, begun: performance.now() };
+  showWork();
   const mine = request;
   const module = await compiled();
   // A newer selection may have stopped this request.
@@ -83,6 +84,7 @@ function startWorker(module) {
   worker = newWorker(module, ({ command, result, broken }) => {
     const took = performance.now() - request.begun;
     request = null;
+    showWork();
     // After a fault the engine's memory may be damaged.
     if (broken) stopWorker();
     if (wanted && command === byId("command").textContent) showMotion(JSON.parse(result), took);
@@ -105,7 +107,7 @@ function stopWorker() {
 function fail(error) {
   stopWorker();
   engine = null;
-  showMotion({ error: `the engine cannot run: ${error}` });
+  showMotion({ error: error === "stopped" ? error : `the engine cannot run: ${error}` });
 }
 
 function showMotion({ summary = null, figures = null, error = null, ...motion }, took = 0) {

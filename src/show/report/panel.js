@@ -76,6 +76,7 @@ function choose(cell) {
   }
   showOrbit(selectedCell);
   updateReadout();
+  if (cell) byId("spoken").textContent = facts(selectedCell).filter(([, value]) => value !== undefined).map(([name, value]) => `${name} ${value}`).join(", ");
   updateLink();
   draw();
 }

@@ -19,16 +19,16 @@ function openSecond(text) {
   const frame = Object.assign(element("iframe"), { id: "second", title: "The map with other parameters", src: address });
   frame.addEventListener("load", () => URL.revokeObjectURL(address));
   second = { frame, link: text };
-  byId("stage").append(frame);
-  byId("stage").classList.add("split");
-  byId("compare").textContent = "Close the second panel";
+  byId("views").append(frame);
+  document.documentElement.classList.add("split");
+  byId("compare").setAttribute("aria-pressed", "true");
 }
 
 function closeSecond() {
   second.frame.remove();
   second = null;
-  byId("stage").classList.remove("split");
-  byId("compare").textContent = "Compare with other parameters";
+  document.documentElement.classList.remove("split");
+  byId("compare").setAttribute("aria-pressed", "false");
   updateLink();
 }
 
@@ -55,7 +55,6 @@ addEventListener("message", ({ source, data }) => {
   } else if (data.panel === "link") {
     hasJoined = true;
     readLink(data.link);
-    byId("parameters").open = true;
   } else if (data.panel === "state") {
     second.link = data.link;
     updateLink();

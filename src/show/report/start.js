@@ -11,6 +11,8 @@ async function start() {
   const { engine, precision, device, version, commit } = map.made;
   byId("made").textContent = `Computed by rattlemap ${version} (commit ${commit}) with the engine ${engine} in ${precision}: ${device}.`;
   byId("compute").textContent = map.compute;
+  byId("equations").hidden = !map.equations?.length;
+  byId("equations").textContent = (map.equations ?? []).join("\n");
   byId("layers").append(...map.layers.map(({ short }, k) => {
     const button = element("button", short);
     button.type = "button";
@@ -18,6 +20,14 @@ async function start() {
     button.addEventListener("click", () => showLayer(k));
     return button;
   }));
+  byId("layers").addEventListener("keydown", ({ key }) => {
+    const step = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[key];
+    if (!step) return;
+    showLayer((layer + step + map.layers.length) % map.layers.length);
+    byId("layers").children[layer].focus();
+  });
+  // A map's folder has the model's own file; the page of `explore` has no folder.
+  if (map.model_file) byId("where").textContent = map.live?.at_once ? "First save the model beside it: Other files of this view." : "Run it in the map's folder.";
   if (map.refinement) showRefinement(map.refinement);
   if (map.validation) showValidation(map.validation);
   await fill(base);
