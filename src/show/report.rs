@@ -42,12 +42,12 @@ const SCRIPT: &str = concat!(
     include_str!("report/ticks.js"),
     include_str!("report/drawing.js"),
     include_str!("report/colors.js"),
-    include_str!("report/panel.js"),
+    include_str!("report/values.js"),
     include_str!("report/input.js"),
     include_str!("report/orbit.js"),
     include_str!("report/live.js"),
     include_str!("report/lanes.js"),
-    include_str!("report/panels.js"),
+    include_str!("report/second.js"),
     include_str!("report/checks.js"),
     include_str!("report/start.js"),
 );
@@ -133,7 +133,7 @@ pub fn data(
 /// If a write fails.
 pub fn write(mut page: impl Write, data: &Value) -> Result<(), WriteError> {
     // The script contains that of the worker, so that the policy's hash covers both.
-    let worker = json!(WORKER).to_string().replace('<', "\\u003c");
+    let worker = packed("u8", WORKER.as_bytes());
     let [style, script] = [STYLE, &format!("{SCRIPT}const WORKER = {worker};\n")].map(inline);
     let engine = STANDARD.encode(ENGINE);
     let policy = policy(&style, &script);

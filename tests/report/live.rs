@@ -355,7 +355,11 @@ fn cells_without_a_record_are_pale_and_show_no_numbers_until_it_arrives() {
     let said = visited(browser, &explored(&folder, &["e_omega.toml"]), PARTIAL, "", &WITHOUT_GRAPHICS);
     let nothing = "\u{2013}";
     for shown in ["selected", "hovered"] {
-        assert_eq!(said[shown].as_array().unwrap()[1..], ["being computed", nothing, nothing], "{shown}: {said}");
+        assert_eq!(
+            said[shown].as_array().unwrap()[1..],
+            ["being computed", nothing, nothing],
+            "{shown}: {said}"
+        );
     }
     for (nth, depth) in [(0, 1.0), (1, 0.4)] {
         let full = said["colors"][nth][1].as_u64().unwrap();
@@ -365,7 +369,12 @@ fn cells_without_a_record_are_pale_and_show_no_numbers_until_it_arrives() {
         }
     }
     let [live, button] = [0, 1].map(|k| said["paused"][k].as_str().unwrap());
-    assert!(live.starts_with("stopped: ") && live.ends_with(" cells are left") && button == "Continue", "{said}");
+    assert!(
+        live.starts_with("stopped: ")
+            && live.ends_with(" cells of this picture are left")
+            && button == "Continue",
+        "{said}"
+    );
     let (renewed, class) = (&said["renewed"], said["labels"][0].as_str().unwrap());
     assert_eq!(renewed[0], said["selected"][0], "the selection moved: {said}");
     let period = format!("period {}", said["labels"][1]);

@@ -1,7 +1,7 @@
 // The colours of a layer: its range of numbers, which fits the visible cells, and its legend.
 
 // Text of the only legend entry whose cells are shown; null shows all cells.
-let isolated = null;
+/** @type {any} */ let isolated = null;
 // Colour of the cells that are not shown.
 const HIDDEN = "b8b8b8";
 
@@ -66,7 +66,7 @@ function fitColors() {
 }
 
 // Colours, ticks and heading of the bar that is shown; none if the layer has no bar.
-let shownBar = null;
+/** @type {any} */ let shownBar = null;
 
 function showBar(current) {
   shownBar = null;

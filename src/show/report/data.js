@@ -2,11 +2,11 @@
 // The document before this script changes it.
 /** @type {any} */
 const pristine = document.documentElement.cloneNode(true);
-// The data of the map, and what the page shows now.
-const map = JSON.parse(document.getElementById("map").textContent);
-const [columns, rows] = map.axes.map((axis) => axis.count);
 /** @type {(id: string) => any} */
 const byId = (id) => document.getElementById(id);
+// The data of the map, and what the page shows now.
+const map = JSON.parse(byId("map").textContent);
+const [columns, rows] = map.axes.map((axis) => axis.count);
 
 let layer = 0;
 // The visible part of the map, in cells of the program's map: its lower left corner and its extent. Cell i spans i to i + 1.

@@ -3,7 +3,7 @@ const canvas = byId("canvas");
 const pen = canvas.getContext("2d");
 const MARGIN = { left: 78, right: 28, top: 10, bottom: 58 };
 
-const panel = () => {
+const plotArea = () => {
   const { width, height } = canvas.getBoundingClientRect();
   return { x: MARGIN.left, y: MARGIN.top, width: width - MARGIN.left - MARGIN.right,
     height: height - MARGIN.top - MARGIN.bottom };
@@ -11,13 +11,13 @@ const panel = () => {
 
 // Returns the position of a pixel, in cells of the program's map.
 function position(x, y) {
-  const p = panel();
+  const p = plotArea();
   return [view.left + ((x - p.x) / p.width) * view.width, view.bottom + ((p.y + p.height - y) / p.height) * view.height];
 }
 
 // Returns the uppermost cell at a pixel, or null.
 function cellAt(x, y) {
-  const p = panel();
+  const p = plotArea();
   if (x < p.x || x > p.x + p.width || y < p.y || y > p.y + p.height) return null;
   const sheets = shown().reverse();
   return sheets.map((sheet) => cellOf(sheet, ...position(x, y))).find((cell) => cell) ?? null;
@@ -25,7 +25,7 @@ function cellAt(x, y) {
 
 // Returns the pixel of a position in cells. Cell i spans i to i + 1.
 function pixel(i, j) {
-  const p = panel();
+  const p = plotArea();
   return [p.x + ((i - view.left) / view.width) * p.width,
     p.y + p.height - ((j - view.bottom) / view.height) * p.height];
 }
@@ -45,7 +45,7 @@ function paint(sheet, own, scale) {
   const { columns: across, rows: up } = sheet;
   const picture = document.createElement("canvas");
   [picture.width, picture.height] = [across, up];
-  const brush = picture.getContext("2d");
+  const brush = /** @type {any} */ (picture.getContext("2d"));
   const image = brush.createImageData(across, up);
   const pixels = new Uint32Array(image.data.buffer);
   const palettes = [1, PALE].map((depth) => Uint32Array.from(own.values ? scale.palette : isolatedPalette(own), (text) => {
@@ -75,7 +75,7 @@ function fitCanvas() {
 
 function draw() {
   pen.clearRect(0, 0, ...fitCanvas());
-  const p = panel();
+  const p = plotArea();
   const scale = scaleLayer();
   if (!scale?.ready) return;
   if (scale.values) scale.range ??= visibleRange(uppermost(), scale);

@@ -4,7 +4,7 @@
 const leastExtent = (axis) => (map.live && axis.scale !== "values" ? 1e-9 * axis.count : Math.min(4, axis.count));
 
 function zoom(factor, x, y) {
-  const p = panel();
+  const p = plotArea();
   const [u, v] = [(x - p.x) / p.width, (p.y + p.height - y) / p.height];
   const width = within(view.width * factor, leastExtent(map.axes[0]), columns);
   const height = within(view.height * factor, leastExtent(map.axes[1]), rows);
@@ -35,10 +35,10 @@ function settle() {
 const pointers = new Map();
 let moved = 0;
 // The rectangle that is being drawn with the shift key, and the position where it began.
-let drawnRectangle = null;
-let corner = null;
+/** @type {any} */ let drawnRectangle = null;
+/** @type {any} */ let corner = null;
 // The pixel under the pointer; none outside the canvas.
-let hovered = null;
+/** @type {any} */ let hovered = null;
 
 canvas.addEventListener("wheel", (event) => {
   event.preventDefault();
@@ -72,7 +72,7 @@ canvas.addEventListener("pointermove", (event) => {
     return;
   }
   canvas.classList.add("dragging");
-  const p = panel();
+  const p = plotArea();
   if (others.length === 1) {
     const apart = (at) => Math.max(Math.hypot(at[0] - others[0][0], at[1] - others[0][1]), 1);
     zoom(apart(before) / apart(here), (here[0] + others[0][0]) / 2, (here[1] + others[0][1]) / 2);
@@ -123,7 +123,7 @@ byId("draw-rectangle").addEventListener("click", () => press("draw-rectangle", !
 document.addEventListener("keydown", (event) => {
   // Keys typed into a field do not control the map.
   if (event.ctrlKey || event.metaKey || event.altKey || event.target instanceof HTMLInputElement) return;
-  const p = panel();
+  const p = plotArea();
   const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   const number = Number(event.key);
   if (event.key === "+" || event.key === "=") zoom(0.7, p.x + p.width / 2, p.y + p.height / 2);
@@ -172,8 +172,8 @@ function updateLink() {
   if (!showsAll()) parts.push(`view=${[view.left, view.bottom, view.width, view.height].join(",")}`);
   if (spansMap) parts.push("colors=map");
   link = parts.join("&");
-  if (isPanel) {
-    sharePanel();
+  if (isSecond) {
+    shareLink();
     return;
   }
   try {
@@ -189,7 +189,7 @@ function updateLink() {
 }
 
 // Position of a cell that the link names and that has yet to be computed.
-let awaited = null;
+/** @type {any} */ let awaited = null;
 
 // Shows what a link names; it may name nothing.
 function readLink(text) {

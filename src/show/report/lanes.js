@@ -7,7 +7,7 @@ const MOST_LANES = 65536;
 const LANES_SPELL = 250;
 
 // The worker of lanes. None before it is opened, without a device, and after a failure.
-let lanes = null;
+/** @type {any} */ let lanes = null;
 let triedLanes = false;
 
 // A program on the processor that acts as a device is slower than the other workers. It is used only if the address asks for it.

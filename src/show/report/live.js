@@ -10,9 +10,9 @@ const SPELL = 40;
 const REDRAW = 1000;
 
 // The part of the map that workers compute now, with its view, scene and progress; null if the program's map is fine enough.
-let job = null;
+/** @type {any} */ let job = null;
 // Workers, each with the job and the runs of its request.
-let pool = [];
+/** @type {any[]} */ let pool = [];
 // Whether the reader has stopped the job.
 let isPaused = false;
 
@@ -110,6 +110,7 @@ function nextLevel() {
     if (job.by_lanes) checkLanes();
     byId("save-svg").hidden = false;
     awaited = null;
+    job.isDone = true;
     showWork();
     byId("live").textContent = byId("spoken").textContent = `${job.counts.join(" \u00d7 ")} cells, computed in this page in ${((performance.now() - job.begun) / 1000).toFixed(1)} s`
       + (job.by_lanes ? `, ${job.by_lanes} of them on the graphics device` : "");
@@ -166,13 +167,12 @@ async function employ() {
 
 // Shows whether there is work to stop or to continue.
 function showWork() {
-  byId("stop").disabled = !request && !(job && job.ended < job.total);
+  byId("stop").disabled = !request && (!job || job.isDone);
   byId("stop").textContent = isPaused ? "Continue" : "Stop";
 }
 
 // Stops all workers. The cells that they compute now are computed again when the reader continues.
 function pause() {
-  isPaused = true;
   for (const member of pool.filter((each) => each.request)) {
     const { job: of, runs, task, layer: drawn, ending } = member.request;
     if (of === job && runs) job.todo.push(...runs);
@@ -181,8 +181,8 @@ function pause() {
     stop(member);
   }
   if (request) fail("stopped");
-  if (job && job.ended < job.total) byId("live").textContent = `stopped: ${job.total - job.ended} cells are left`;
-  else isPaused = false;
+  isPaused = job !== null && !job.isDone;
+  if (isPaused) byId("live").textContent = `stopped: ${job.total - job.ended} cells of this picture are left`;
   showWork();
 }
 
@@ -320,7 +320,7 @@ function checkProgram() {
 
 // Compares the cells of the graphics device with those of the other workers.
 function checkLanes() {
-  drawSample(live, job.onLanes ? job.todo : null, windowOf(job), (all, same) => {
+  if (live) drawSample(live, job.onLanes ? job.todo : null, windowOf(job), (all, same) => {
     byId("lanes").textContent = `The graphics device computes in f32. The page computed ${all} of its random cells again in f64: ${same} have the same class and period.`;
   });
 }
@@ -388,7 +388,7 @@ function dropStale() {
 // Number of steps in which a slider is played, and time between two of them in ms.
 const PLAYED = 40;
 const BEAT = 250;
-let played = null;
+/** @type {any} */ let played = null;
 
 // Calls `step` again and again, each time after the picture of the previous step; not if its button is pressed already.
 function play(button, step) {

@@ -4,20 +4,24 @@ const FIGURES = ["gap", "phase_plane", "time_history"];
 // Time in ms after which a newer selection stops a computation.
 const PATIENCE = 300;
 
-// The compiled engine, a promise; none before the first selection.
-let engine = null;
+// The compiled engine, a promise; none before the first selection. With it the script of its workers is unpacked.
+/** @type {any} */ let engine = null;
+/** @type {any} */ let workerScript = null;
 // The worker that is computing or idle; none before the first selection, and after a failure.
-let worker = null;
+/** @type {any} */ let worker = null;
 // The selected cell whose motion is shown or wanted.
-let wanted = null;
+/** @type {any} */ let wanted = null;
 // The request that the worker computes, with the time at which it began; none if the worker is idle.
-let request = null;
+/** @type {any} */ let request = null;
 // Class, period and number of periods of the motion that is shown; none while it is computed.
-let reached = null;
+/** @type {any} */ let reached = null;
 
 // Compiles the engine once.
 function compiled() {
-  engine ??= unpack({ data: byId("engine").textContent, type: "u8" }).then((bytes) => WebAssembly.compile(bytes));
+  engine ??= Promise.all([{ data: byId("engine").textContent, type: "u8" }, WORKER].map(unpack)).then(([bytes, script]) => {
+    workerScript = script;
+    return WebAssembly.compile(bytes);
+  });
   return engine;
 }
 
@@ -28,7 +32,7 @@ function showOrbit(cell) {
   if (byId("motion").hidden) return;
   byId("which-motion").textContent = byId("which-orbit").textContent = `Motion at ${nameOf(cell)}`;
   // Tells a notebook that shows this page in a frame.
-  if (parent !== window && !isPanel) parent.postMessage({ kind: "rattlemap", command: byId("command").textContent }, "*");
+  if (parent !== window && !isSecond) parent.postMessage({ kind: "rattlemap", command: byId("command").textContent }, "*");
   byId("computing").textContent = "computing\u2026";
   reached = null;
   for (const id of ["motion", "orbit"]) byId(id).setAttribute("aria-busy", "true");
@@ -69,7 +73,7 @@ async function compute() {
 
 // Starts a worker with the engine. Calls `answer` with each message, and `failed` with a text if the worker cannot run.
 function newWorker(module, answer, failed) {
-  const script = URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" }));
+  const script = URL.createObjectURL(new Blob([workerScript], { type: "text/javascript" }));
   const started = new Worker(script);
   started.addEventListener("message", ({ data }) => {
     URL.revokeObjectURL(script);
@@ -121,7 +125,7 @@ function showMotion({ summary = null, figures = null, error = null, ...motion },
     const image = byId(name);
     URL.revokeObjectURL(image.src);
     image.hidden = !figures?.[name];
-    if (!image.hidden) image.src = URL.createObjectURL(new Blob([figures[name]], { type: "image/svg+xml" }));
+    if (figures?.[name]) image.src = URL.createObjectURL(new Blob([figures[name]], { type: "image/svg+xml" }));
   }
 }
 

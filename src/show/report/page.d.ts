@@ -1,7 +1,7 @@
 // Types of the page's scripts. `scripts/test.sh --all` checks them with the TypeScript compiler.
 
-// The script of a worker.
-declare const WORKER: string;
+// The script of a worker, compressed.
+declare const WORKER: { data: string, type: string };
 
 // A rectangle, in cells of the program's map.
 interface Place {

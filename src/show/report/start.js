@@ -33,7 +33,7 @@ async function start() {
   await fill(base);
   byId("wait").remove();
   readAddress();
-  if (isPanel) parent.postMessage({ panel: "ready" }, "*");
+  if (isSecond) parent.postMessage({ panel: "ready" }, "*");
   // Starts the worker early, so that the first selection does not wait for it.
   if (map.model_file !== null) setTimeout(() => prepareWorker().catch(() => {}), 300);
 }

@@ -5,7 +5,7 @@
 const SPACING = [90, 55];
 
 // The worker, a promise; none before the first request.
-let chooser = null;
+/** @type {any} */ let chooser = null;
 // What the worker chooses ticks for, by the number of the request.
 const asked = [];
 

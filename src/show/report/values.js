@@ -61,7 +61,7 @@ function choose(cell) {
   selectedCell = cell && { sheet: base, ...cell };
   awaited = null;
   byId("replay").hidden = !cell;
-  if (cell) {
+  if (selectedCell) {
     const { sheet: { data, starts, columns: across }, i, j } = selectedCell;
     const [a, b] = valuesAt(selectedCell);
     const width = Math.max(data.components, 4), place = width * (j * across + i);
@@ -76,7 +76,7 @@ function choose(cell) {
   }
   showOrbit(selectedCell);
   updateReadout();
-  if (cell) byId("spoken").textContent = facts(selectedCell).filter(([, value]) => value !== undefined).map(([name, value]) => `${name} ${value}`).join(", ");
+  if (selectedCell) byId("spoken").textContent = facts(selectedCell).filter(([, value]) => value !== undefined).map(([name, value]) => `${name} ${value}`).join(", ");
   updateLink();
   draw();
 }
@@ -112,7 +112,7 @@ function copies(button, text) {
       button.textContent = "Copied";
     } catch {
       // A page opened from a disk cannot always write to the clipboard.
-      getSelection().selectAllChildren(text);
+      getSelection()?.selectAllChildren(text);
       button.textContent = "Selected: press Ctrl-C";
     }
     setTimeout(() => { button.textContent = label; }, 1500);

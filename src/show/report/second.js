@@ -1,8 +1,8 @@
 // A second panel beside the map: this page in a frame, with parameters of its own. Both panels show the same part and layer.
 
-const isPanel = document.documentElement.classList.contains("panel");
+const isSecond = document.documentElement.classList.contains("panel");
 // The second panel: its frame and what it shows; none unless it is open.
-let second = null;
+/** @type {any} */ let second = null;
 // What both panels showed last, as text.
 let shared = "";
 
@@ -33,9 +33,9 @@ function closeSecond() {
 }
 
 // Whether this panel knows what to show. Before that, it tells the page nothing.
-let hasJoined = !isPanel;
+let hasJoined = !isSecond;
 
-const partner = () => (isPanel ? parent : second?.frame.contentWindow);
+const partner = () => (isSecond ? parent : second?.frame.contentWindow);
 
 // Tells the other panel which part and layer are shown, if they changed here.
 function share() {
@@ -46,7 +46,7 @@ function share() {
 }
 
 // Tells the page what the link to its second panel is.
-const sharePanel = () => hasJoined && parent.postMessage({ panel: "state", link }, "*");
+const shareLink = () => hasJoined && parent.postMessage({ panel: "state", link }, "*");
 
 addEventListener("message", ({ source, data }) => {
   if (!data?.panel || source !== partner()) return;
