@@ -92,7 +92,7 @@ walk().catch((error) => { said.error = String(error.stack); finish(); });
 /// Keeps records of a finer picture back, looks at a cell without a record, and lets the records arrive.
 const PARTIAL: &str = r##"
 const fact = (name) => [...document.querySelectorAll("#readout tr")].find((row) => row.cells[0].textContent === name).cells[1].textContent;
-const facts = () => ["\u03c9", "class", "exponent", "periods run"].map(fact);
+const lines = () => ["\u03c9", "class", "exponent", "periods run"].map(fact);
 async function partial() {
   await until(() => !document.getElementById("wait"));
   const [give, held] = [receive, []];
@@ -115,11 +115,11 @@ async function partial() {
   said.colors = [known, missing].map((id) => [color(id), parseInt(layerColors.palette[layerColors.indices[id]], 16)]);
   const cell = (sheet, id) => ({ sheet, i: id % sheet.columns, j: Math.floor(id / sheet.columns) });
   choose(cell(live, missing));
-  said.selected = facts();
+  said.selected = lines();
   const [u, v] = centreOf(selectedCell);
   choose(null);
   hover(pixel(u, v));
-  said.hovered = facts();
+  said.hovered = lines();
   choose(cell(live, missing));
   hover(null);
   pause();
@@ -129,7 +129,7 @@ async function partial() {
   await until(() => selectedCell.sheet.isWhole);
   const { sheet } = selectedCell;
   const id = selectedCell.j * sheet.columns + selectedCell.i;
-  said.renewed = facts();
+  said.renewed = lines();
   said.own = [map.classes[sheet.values.class[id]], String(sheet.values.periods_run[id])];
   newWorker(await compiled(), ({ labels }) => { said.labels = [map.classes[labels[0]], labels[1]]; }, () => {})
     .postMessage({ task: "labels", key: "again", scene: sceneOver(map.scene, sheet.ranges), model: map.model_file, sets: "", runs: Uint32Array.of(id) });
@@ -402,7 +402,7 @@ fn the_page_compares_goes_back_plays_and_saves() {
     let white = serde_json::json!([true, 255, 255, 255, 255]);
     assert_eq!(said["files"], serde_json::json!(["map.png", white, white]));
     let phone = visited(browser, &page, PHONE, "", &["--disable-gpu", "--window-size=500,800"]);
-    assert_eq!(phone["overflow"], 0, "{phone}");
+    assert!(phone["overflow"].as_i64().unwrap() <= 0, "{phone}");
     let tops: Vec<f64> = serde_json::from_value(phone["order"].clone()).unwrap();
     assert!(tops.is_sorted(), "{phone}");
     let paper = folder.path().join("page.pdf");

@@ -142,6 +142,26 @@ impl Observer for () {
     }
 }
 
+/// In a page all observers share one copy of the code.
+#[cfg(target_arch = "wasm32")]
+impl Observer for &mut dyn Observer {
+    fn event(&mut self, event: &GapEvent, states: States<'_>) {
+        (**self).event(event, states);
+    }
+
+    fn sees_events(&self) -> bool {
+        (**self).sees_events()
+    }
+
+    fn slip(&mut self, event: &SlipEvent) {
+        (**self).slip(event);
+    }
+
+    fn sums(&mut self) -> Option<&mut Sums> {
+        (**self).sums()
+    }
+}
+
 impl Observer for Vec<GapEvent> {
     fn event(&mut self, event: &GapEvent, _: States<'_>) {
         self.push(*event);

@@ -292,6 +292,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// A [`Stop`] if the trajectory cannot be continued.
     #[inline]
     pub fn advance_period(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
+        #[cfg(target_arch = "wasm32")]
+        let observer = &mut (observer as &mut dyn Observer);
         each!(mut self, motion => motion.advance_period(observer))
     }
 
@@ -301,6 +303,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// A [`Stop`] if the trajectory cannot be continued.
     #[inline]
     pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        #[cfg(target_arch = "wasm32")]
+        let observer = &mut (observer as &mut dyn Observer);
         each!(mut self, motion => motion.advance_to(until, observer))
     }
 }
