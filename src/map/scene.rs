@@ -377,6 +377,11 @@ impl Scene {
         &self.figure.diagram
     }
 
+    /// Returns the index of the gap whose contact the class map shows, if the scene names one of several.
+    pub(crate) fn contact_gap(&self) -> Option<usize> {
+        self.figure.gap
+    }
+
     /// Returns the scale of the colours of a layer.
     pub(crate) fn layer_scale(&self, layer: &str) -> LayerScale {
         self.figure.scales.iter().find(|(name, _)| name == layer).map_or((None, None), |(_, scale)| *scale)

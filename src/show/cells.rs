@@ -269,8 +269,8 @@ impl<'a> Cells<'a> {
         Number::of(self.scene.base(), &self.scene.outputs().quantities)
     }
 
-    /// Returns the gap whose contact the class map shows, and its name; none for a model with one gap. It is the first one with a wall
-    /// that has an impact law, else the first.
+    /// Returns the gap whose contact the class map shows, and its name; none for a model with one gap. Unless the scene names one, it is
+    /// the first one with a wall that has an impact law, else the first.
     pub(crate) fn contact_gap(&self) -> Option<(usize, String)> {
         let names = several_gaps(self.scene.base())?;
         let oscillator = self.plan.model(0).oscillator().ok()?;
@@ -278,7 +278,7 @@ impl<'a> Cells<'a> {
             let walls = oscillator.gaps[*gap].walls.iter().flatten();
             walls.into_iter().any(|wall| wall.contact == Contact::Impact)
         };
-        let gap = (0..names.len()).find(has_impacts).unwrap_or(0);
+        let gap = self.scene.contact_gap().or_else(|| (0..names.len()).find(has_impacts)).unwrap_or(0);
         Some((gap, names.get(gap)?.clone()))
     }
 

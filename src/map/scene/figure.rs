@@ -132,6 +132,8 @@ pub(super) struct Figure {
     pub(super) diagram: DiagramStyle,
     /// Scales of layers by name.
     pub(super) scales: Vec<(String, LayerScale)>,
+    /// Index of the gap whose contact the class map shows, if the scene names one of several.
+    pub(super) gap: Option<usize>,
 }
 
 /// Reads `[figure]`.
@@ -166,9 +168,18 @@ pub(super) fn read(
     if let Some(field) = section.get("files") {
         diagram.is_divided = field.choice(&[("pages", false), ("panels", true)])?;
     }
+    let gaps = several_gaps(points.base()).unwrap_or_default();
+    let mut gap = None;
+    if let Some(field) = section.get("gap") {
+        let known: Vec<(&str, usize)> = gaps.iter().map(String::as_str).zip(0..).collect();
+        if known.is_empty() {
+            return Err(field.conflict("the model has one gap; remove this key"));
+        }
+        gap = Some(field.choice(&known)?);
+    }
     let mut scales = Vec::new();
     if let Some(field) = section.get("scale") {
-        let (states, gaps) = (points.base().state_names(), several_gaps(points.base()).unwrap_or_default());
+        let states = points.base().state_names();
         let fixed = ["lyapunov", "impacts", "mesh"].map(str::to_owned);
         let layers: Vec<String> =
             quantities.iter().flat_map(|quantity| quantity.columns(&states, &gaps)).chain(fixed).collect();
@@ -177,7 +188,7 @@ pub(super) fn read(
             scales.push((name.to_owned(), read_scale(&field)?));
         }
     }
-    Ok(Figure { style, lines: lines.unwrap_or_default(), diagram, scales })
+    Ok(Figure { style, lines: lines.unwrap_or_default(), diagram, scales, gap })
 }
 
 /// Reads the scale of a layer and the ends of its numbers.

@@ -70,7 +70,7 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         }
         None => "chaos".to_owned(),
     };
-    let of_gap = gap.map_or(String::new(), |(_, name)| format!(" of {name}"));
+    let of_gap = gap.map_or(String::new(), |(_, name)| format!("{name}: "));
     let has_symmetry = cells.has(Quantity::Symmetric);
     let entries = entries(&indices, &palette, (chaos, &of_gap), shows_chaos, has_symmetry);
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);
@@ -137,8 +137,8 @@ fn entries(
         (false, _) => "period 1",
     };
     let mut list = vec![
-        entry(0, format!("period 1, no contact{of_gap}")),
-        entry(4, format!("period 1, always in contact{of_gap}")),
+        entry(0, format!("period 1, {of_gap}no contact")),
+        entry(4, format!("period 1, {of_gap}always in contact")),
         entry(1, with_contact.to_owned()),
         entry(2, "period 1, unsymmetric".to_owned()),
         entry(3, "period 1, symmetry unknown".to_owned()),

@@ -587,7 +587,7 @@ let wasm_bindgen = (function(exports) {
                         const a = state0.a;
                         state0.a = 0;
                         try {
-                            return wasm_bindgen__convert__closures_____invoke__h408f1e0240671d96(a, state0.b, arg0, arg1);
+                            return wasm_bindgen__convert__closures_____invoke__h51eb4ae3d83fc22c(a, state0.b, arg0, arg1);
                         } finally {
                             state0.a = a;
                         }
@@ -903,27 +903,27 @@ let wasm_bindgen = (function(exports) {
                 arg0.writeBuffer(arg1, arg2, getArrayU8FromWasm0(arg3, arg4), arg5, arg6);
             }, arguments); },
             __wbindgen_generic_0000000000000001: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h7af06d38255f967f);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__hffd9278dca3d5a78);
                 return ret;
             },
             __wbindgen_generic_0000000000000002: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2);
                 return ret;
             },
             __wbindgen_generic_0000000000000003: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__hb47b03ab2e01bd26);
                 return ret;
             },
             __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_16);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__hb47b03ab2e01bd26_16);
                 return ret;
             },
             __wbindgen_generic_0000000000000005: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2_17);
                 return ret;
             },
             __wbindgen_generic_0000000000000006: function(arg0, arg1) {
-                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_18);
+                const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2_18);
                 return ret;
             },
             __wbindgen_generic_0000000000000007: function(arg0) {
@@ -959,44 +959,44 @@ let wasm_bindgen = (function(exports) {
         };
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7(arg0, arg1, arg2) {
-        wasm.wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__hb47b03ab2e01bd26(arg0, arg1, arg2) {
+        wasm.wasm_bindgen__convert__closures_____invoke__hb47b03ab2e01bd26(arg0, arg1, arg2);
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_16(arg0, arg1, arg2) {
-        wasm.wasm_bindgen__convert__closures_____invoke__h7fa0b2c660499ae7_16(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__hb47b03ab2e01bd26_16(arg0, arg1, arg2) {
+        wasm.wasm_bindgen__convert__closures_____invoke__hb47b03ab2e01bd26_16(arg0, arg1, arg2);
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h7af06d38255f967f(arg0, arg1, arg2) {
-        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h7af06d38255f967f(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__hffd9278dca3d5a78(arg0, arg1, arg2) {
+        const ret = wasm.wasm_bindgen__convert__closures_____invoke__hffd9278dca3d5a78(arg0, arg1, arg2);
         if (ret[1]) {
             throw takeFromExternrefTable0(ret[0]);
         }
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6(arg0, arg1, arg2) {
-        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2(arg0, arg1, arg2) {
+        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2(arg0, arg1, arg2);
         if (ret[1]) {
             throw takeFromExternrefTable0(ret[0]);
         }
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17(arg0, arg1, arg2) {
-        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_17(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2_17(arg0, arg1, arg2) {
+        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2_17(arg0, arg1, arg2);
         if (ret[1]) {
             throw takeFromExternrefTable0(ret[0]);
         }
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_18(arg0, arg1, arg2) {
-        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h5b45daab8ef94be6_18(arg0, arg1, arg2);
+    function wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2_18(arg0, arg1, arg2) {
+        const ret = wasm.wasm_bindgen__convert__closures_____invoke__h1c5569c5a5974ae2_18(arg0, arg1, arg2);
         if (ret[1]) {
             throw takeFromExternrefTable0(ret[0]);
         }
     }
 
-    function wasm_bindgen__convert__closures_____invoke__h408f1e0240671d96(arg0, arg1, arg2, arg3) {
-        wasm.wasm_bindgen__convert__closures_____invoke__h408f1e0240671d96(arg0, arg1, arg2, arg3);
+    function wasm_bindgen__convert__closures_____invoke__h51eb4ae3d83fc22c(arg0, arg1, arg2, arg3) {
+        wasm.wasm_bindgen__convert__closures_____invoke__h51eb4ae3d83fc22c(arg0, arg1, arg2, arg3);
     }
 
 
