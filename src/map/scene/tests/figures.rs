@@ -34,7 +34,7 @@ fn wrong_styles_are_refused_with_their_place_and_the_remedy() {
             "s.toml:17:13: `figure.font_size",
             "at most 8 points at this width",
         ),
-        ("colour = 1", "s.toml:16:1: ", "legend, panels, files, scale, lines"),
+        ("colour = 1", "s.toml:16:1: ", "legend, panels, files, scale, gap, lines"),
         ("panels = [\"amplitude\"]", "s.toml:16:11: `figure.panels.0", "section, lyapunov"),
         ("scale = { rms = \"log\" }", "s.toml:16:11: ", "lyapunov, impacts, mesh"),
         ("scale = { mesh = [2, 1] }", "s.toml:16:18: `figure.scale.mesh", "ascending ends"),
