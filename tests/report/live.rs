@@ -11,7 +11,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::report::page::{WITHOUT_GRAPHICS, between, chromium, hashed, skipped, visit};
+use crate::report::page::{WITHOUT_GRAPHICS, between, chromium, hashed, skipped, unbroken, visit};
 
 /// Functions for scripts that wait for workers. The browser's virtual time does not wait for them, so each step takes some
 /// real time.
@@ -331,7 +331,8 @@ fn a_walk_through_the_page_shows_what_the_program_computes() {
         let [command, summary] = [0, 1].map(|k| side[k].as_str().unwrap());
         let printed = rattlemap(&folder).args(command.split(' ').skip(1)).output().unwrap();
         let first = |text: &str| text.lines().take(4).map(str::to_owned).collect::<Vec<_>>();
-        assert_eq!(first(summary), first(&String::from_utf8(printed.stdout).unwrap()), "{command}");
+        let printed = unbroken(&String::from_utf8(printed.stdout).unwrap());
+        assert_eq!(first(summary), first(&printed), "{command}");
     }
     let symmetric = [0, 1]
         .map(|k| said["sides"][k][1].as_str().unwrap().lines().find(|line| line.starts_with("symmetric")));

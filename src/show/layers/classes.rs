@@ -70,9 +70,9 @@ pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
         }
         None => "chaos".to_owned(),
     };
-    let of_gap = gap.map_or(String::new(), |(_, name)| format!("{name}: "));
+    let gap = gap.map(|(_, name)| name);
     let has_symmetry = cells.has(Quantity::Symmetric);
-    let entries = entries(&indices, &palette, (chaos, &of_gap), shows_chaos, has_symmetry);
+    let entries = entries(&indices, &palette, (chaos, gap.as_deref()), shows_chaos, has_symmetry);
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);
     Layer {
         name: "map".into(),
@@ -123,7 +123,7 @@ fn palette() -> Vec<Color> {
 fn entries(
     indices: &[u8],
     palette: &[Color],
-    (chaos_text, of_gap): (String, &str),
+    (chaos_text, gap): (String, Option<&str>),
     shows_chaos: bool,
     shows_symmetry: bool,
 ) -> Vec<NamedColor> {
@@ -136,9 +136,13 @@ fn entries(
         (true, false) => "period 1, contact",
         (false, _) => "period 1",
     };
+    let of_gap = |all: &str, state: &str| match gap {
+        None => format!("period 1, {all}"),
+        Some(gap) => format!("period 1, {gap} always {state}"),
+    };
     let mut list = vec![
-        entry(0, format!("period 1, {of_gap}no contact")),
-        entry(4, format!("period 1, {of_gap}always in contact")),
+        entry(0, of_gap("no contact", "open")),
+        entry(4, of_gap("always in contact", "closed")),
         entry(1, with_contact.to_owned()),
         entry(2, "period 1, unsymmetric".to_owned()),
         entry(3, "period 1, symmetry unknown".to_owned()),
