@@ -154,9 +154,9 @@ fn contacts_of_each_gap_are_counted_apart() {
         [3, 3],
         "files = ['csv']\n",
     );
+    let quantities = "class impacts mesh impact_energy contact_force_max".replace(' ', "\",\"");
+    let line = format!("map s.toml --engine cpu --quiet --set outputs.quantities=[\"{quantities}\"]");
     for (folder, [a, b]) in [(&folder, ["susp", "tyre"]), (&gears, ["a", "b"])] {
-        let quantities = "class impacts mesh impact_energy contact_force_max".replace(' ', "\",\"");
-        let line = format!("map s.toml --engine cpu --quiet --set outputs.quantities=[\"{quantities}\"]");
         succeeds(folder, &line);
         let cells = folder.path().join("out/s/cells.csv");
         let of = |name: &str| column(&cells, name);
@@ -194,7 +194,7 @@ fn contacts_of_each_gap_are_counted_apart() {
     assert!(susp.iter().any(|share| share.unwrap() > 0.0) && tyre.iter().any(|share| share.unwrap() < 0.99));
     let map = fs::read_to_string(folder.path().join("out/s/map.svg")).unwrap();
     assert!(map.contains("susp always open"), "{map:.300}");
-    succeeds(&folder, "map s.toml --engine cpu --quiet --force --set figure.gap=\"tyre\"");
+    succeeds(&folder, &format!("{line} --force --set figure.gap=\"tyre\""));
     let map = fs::read_to_string(folder.path().join("out/s/map.svg")).unwrap();
     assert!(map.contains("tyre always closed") && !map.contains("susp always"), "{map:.300}");
     fails(&folder, "map s.toml --force --set figure.gap=\"tire\"", 2, &["susp", "tyre"]);
